@@ -1,0 +1,1 @@
+"""Judgements of a trajectory, one file each; every tolerance stands in `tolerances`."""

@@ -1,0 +1,1 @@
+"""Functions of one variable: the piecewise polynomial and the laws that build one. numpy only."""

@@ -1,0 +1,227 @@
+"""The one curve type of trajcli: a vector-valued piecewise polynomial.
+
+A joint path q(s), a time law s(t) and a trajectory q(t) are this type in three roles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import perm
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+Side = Literal["left", "right"]
+
+_BLOCK = 4096  # rows evaluated at a time: their monomials and results stay in the processor's cache
+_FEW = 8  # rows a piece below which gathering coefficients beats a product for each piece
+
+
+def read_only(values: ArrayLike) -> Array:
+    """Return a contiguous float64 copy that cannot be written to."""
+    array = np.array(values, dtype=np.float64, order="C")
+    array.flags.writeable = False
+    return array
+
+
+@dataclass(frozen=True, eq=False)
+class PiecewisePolynomial:
+    """A function of one variable with values in R^n, a polynomial between neighbouring breaks.
+
+    Attributes:
+        breaks: Shape (pieces + 1,), strictly increasing. A curve of no length has the one piece [a, a].
+        coefficients: Shape (degree + 1, pieces, n), highest power first, in powers of (t - breaks[piece]).
+    """
+
+    breaks: Array
+    coefficients: Array
+
+    def __post_init__(self) -> None:
+        breaks, coefficients = read_only(self.breaks), read_only(self.coefficients)
+        if breaks.ndim != 1 or coefficients.ndim != 3 or coefficients.shape[1] != breaks.size - 1:
+            raise ValueError(
+                f"breaks {breaks.shape} and coefficients {coefficients.shape} do not fit: "
+                "expected (pieces + 1,) and (degree + 1, pieces, n)"
+            )
+        if not (np.isfinite(breaks).all() and np.isfinite(coefficients).all()):
+            raise ValueError("breaks and coefficients must be finite")
+        if breaks.size > 2 and not (np.diff(breaks) > 0).all() or breaks[-1] < breaks[0]:
+            raise ValueError("breaks must strictly increase")
+        object.__setattr__(self, "breaks", breaks)
+        object.__setattr__(self, "coefficients", coefficients)
+
+    @property
+    def degree(self) -> int:
+        """Highest power that the coefficients have room for."""
+        return int(self.coefficients.shape[0]) - 1
+
+    @property
+    def pieces(self) -> int:
+        """Number of pieces."""
+        return int(self.coefficients.shape[1])
+
+    @property
+    def dimension(self) -> int:
+        """Number n of components."""
+        return int(self.coefficients.shape[2])
+
+    @property
+    def start(self) -> float:
+        """First break."""
+        return float(self.breaks[0])
+
+    @property
+    def end(self) -> float:
+        """Last break."""
+        return float(self.breaks[-1])
+
+    @property
+    def duration(self) -> float:
+        """Last break minus first break."""
+        return self.end - self.start
+
+    @property
+    def lengths(self) -> Array:
+        """Length of each piece, shape (pieces,)."""
+        return np.diff(self.breaks)
+
+    def derivative(self, order: int = 1) -> PiecewisePolynomial:
+        """Return the curve's derivative; of an order above the degree it is zero, of degree 0."""
+        return PiecewisePolynomial(self.breaks, derivative_coefficients(self.coefficients, order))
+
+    def piece_ends(self, order: int = 0) -> tuple[Array, Array]:
+        """Return the derivative of each piece at its own two ends, as two arrays of shape (pieces, n).
+
+        The second array up to the last row and the first array from the second row on are the two sides
+        of the inner breaks.
+        """
+        coefficients = derivative_coefficients(self.coefficients, order)
+        return coefficients[-1], horner(coefficients, self.lengths[:, None])
+
+    def evaluate(self, t: ArrayLike, order: int = 0, *, side: Side = "right") -> Array:
+        """Return the derivative of the given order at `t`, shape (*t.shape, n).
+
+        Args:
+            t: Any shape, inside [start, end].
+            order: 0 for the value.
+            side: Which of two neighbouring pieces speaks at a break.
+
+        Raises:
+            ValueError: When a time lies outside the curve.
+        """
+        times = np.asarray(t, dtype=np.float64)
+        flat = np.ascontiguousarray(times.reshape(-1))
+        return self.evaluate_orders(flat, (order,), side=side).reshape(*times.shape, self.dimension)
+
+    def evaluate_orders(self, t: Array, orders: Sequence[int], *, side: Side = "right") -> Array:
+        """Return several derivatives at once, shape (N, len(orders), n).
+
+        Args:
+            t: Shape (N,), inside [start, end]; fastest when sorted.
+            orders: Derivative orders, 0 for the value.
+            side: Which of two neighbouring pieces speaks at a break.
+
+        Raises:
+            ValueError: When a time lies outside the curve.
+        """
+        if t.size and (np.isnan(t).any() or t.min() < self.start or t.max() > self.end):
+            raise ValueError(f"time outside the curve's domain [{self.start!r}, {self.end!r}]")
+        table = np.concatenate(
+            [_padded(derivative_coefficients(self.coefficients, order), self.degree) for order in orders], axis=2
+        )
+        rows = np.empty((t.size, table.shape[2]))
+        piece = np.clip(np.searchsorted(self.breaks, t, side) - 1, 0, self.pieces - 1)
+        for low in range(0, t.size, _BLOCK):
+            block = slice(low, min(low + _BLOCK, t.size))
+            _evaluate_block(self.breaks, table, t[block], piece[block], rows[block])
+        return rows.reshape(t.size, len(orders), self.dimension)
+
+    def shifted(self, offset: float) -> PiecewisePolynomial:
+        """Return the same curve starting `offset` later."""
+        return PiecewisePolynomial(increasing(self.breaks + offset), self.coefficients)
+
+
+def derivative_coefficients(coefficients: Array, order: int) -> Array:
+    """Return the coefficients (degree + 1, ...) of the derivative, highest power first."""
+    degree = coefficients.shape[0] - 1
+    if order == 0:
+        return coefficients
+    if order > degree:
+        return np.zeros((1, *coefficients.shape[1:]))
+    factors = np.array([perm(power, order) for power in range(degree, order - 1, -1)], dtype=np.float64)
+    return coefficients[: degree + 1 - order] * factors.reshape(-1, *([1] * (coefficients.ndim - 1)))
+
+
+def horner(coefficients: Array, x: Array) -> Array:
+    """Return the polynomials (degree + 1, ...) at `x`, which broadcasts against the trailing shape."""
+    result = np.broadcast_to(coefficients[0], np.broadcast_shapes(coefficients.shape[1:], x.shape)).copy()
+    for row in coefficients[1:]:
+        result *= x
+        result += row
+    return result
+
+
+def taylor_shift(coefficients: Array, x: Array) -> Array:
+    """Return the coefficients (degree + 1, ...) of p(t + x) for p given by `coefficients`."""
+    shifted = np.array(coefficients, dtype=np.float64)
+    degree = shifted.shape[0] - 1
+    for last in range(degree, 0, -1):
+        for power in range(1, last + 1):
+            shifted[power] += x * shifted[power - 1]
+    return shifted
+
+
+def increasing(breaks: Array) -> Array:
+    """Return `breaks` with those that rounding made equal moved apart by the smallest possible step."""
+    if (np.diff(breaks) > 0).all():
+        return breaks
+    result = breaks.copy()
+    for k in range(1, result.size):
+        if result[k] <= result[k - 1]:
+            result[k] = np.nextafter(result[k - 1], np.inf)
+    return result
+
+
+def concatenate(curves: Sequence[PiecewisePolynomial]) -> PiecewisePolynomial:
+    """Join curves end to start; the first keeps its time, each other is moved to where the last one ends.
+
+    Curves of no length contribute nothing unless all have none.
+    """
+    long = [curve for curve in curves if curve.duration > 0] or list(curves[:1])
+    degree = max(curve.degree for curve in long)
+    breaks, end = [long[0].breaks[:1]], long[0].start
+    for curve in long:
+        breaks.append(curve.breaks[1:] + (end - curve.start))
+        end = float(breaks[-1][-1])
+    joined = np.concatenate([_padded(curve.coefficients, degree) for curve in long], axis=1)
+    times = np.concatenate(breaks)
+    return PiecewisePolynomial(times if times.size == 2 else increasing(times), joined)
+
+
+def constant(value: ArrayLike, duration: float) -> PiecewisePolynomial:
+    """Return the curve that stays at `value` (n,) from 0 to `duration`, which may be zero."""
+    return PiecewisePolynomial(np.array([0.0, duration]), np.asarray(value, dtype=np.float64)[None, None, :])
+
+
+def _padded(coefficients: Array, degree: int) -> Array:
+    missing = degree + 1 - coefficients.shape[0]
+    return np.concatenate([np.zeros((missing, *coefficients.shape[1:])), coefficients]) if missing else coefficients
+
+
+def _evaluate_block(breaks: Array, table: Array, t: Array, piece: NDArray[np.intp], out: Array) -> None:
+    first, last = int(piece[0]), int(piece[-1])
+    local = t - breaks[piece]
+    if (piece[1:] < piece[:-1]).any() or (last - first + 1) * _FEW > t.size:
+        out[:] = horner(table[:, piece, :], local[:, None])
+        return
+    monomials = np.empty((t.size, table.shape[0]))
+    monomials[:, -1] = 1.0
+    for power in range(table.shape[0] - 2, -1, -1):
+        np.multiply(monomials[:, power + 1], local, out=monomials[:, power])
+    edges = np.searchsorted(piece, np.arange(first, last + 2))
+    for k in range(first, last + 1):
+        rows = slice(edges[k - first], edges[k - first + 1])
+        np.matmul(monomials[rows], table[:, k, :], out=out[rows])

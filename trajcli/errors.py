@@ -1,0 +1,102 @@
+"""The error tree: one branch for each exit code of the command line.
+
+Every error carries one or more problems. A problem is one sentence about one thing that is wrong, with
+the numbers in it, the place it stands in (if it stands in a file), and what would fix it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True)
+class Place:
+    """A stretch of one line of a file. Lines and columns count from 1."""
+
+    file: str
+    line: int
+    column: int
+    source: str = ""
+    length: int = 1
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}"
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing that is wrong.
+
+    Attributes:
+        message: What is wrong, with the number and the bound, in the user's units.
+        hint: What would fix it.
+        place: Where it stands in the user's file.
+        move: Index of the move, from 0.
+        joint: Name of the joint.
+        time: Seconds from the start of the move.
+        value: The offending number, SI.
+        limit: The bound it breaks, SI.
+    """
+
+    message: str
+    hint: str | None = None
+    place: Place | None = None
+    move: int | None = None
+    joint: str | None = None
+    time: float | None = None
+    value: float | None = None
+    limit: float | None = None
+
+
+class TrajcliError(Exception):
+    """Base of all errors that trajcli raises on purpose.
+
+    Attributes:
+        exit_code: What the command line returns for it.
+        problems: At least one problem.
+    """
+
+    exit_code = 70
+
+    def __init__(self, *problems: Problem | str, hint: str | None = None) -> None:
+        self.problems = tuple(Problem(p, hint) if isinstance(p, str) else p for p in problems)
+        super().__init__(*self.problems)
+
+    def __str__(self) -> str:
+        return "\n".join(problem.message for problem in self.problems)
+
+    def located(self, **fields: object) -> TrajcliError:
+        """Return the same error with `fields` (of `Problem`) filled in where they are still empty."""
+        problems = []
+        for problem in self.problems:
+            empty = {name: value for name, value in fields.items() if getattr(problem, name) is None}
+            problems.append(replace(problem, **empty))  # type: ignore[arg-type]
+        return type(self)(*problems)
+
+
+class VerificationError(TrajcliError):
+    """A curve exists and a check fails, or files differ: nothing was written."""
+
+    exit_code = 1
+
+
+class InputError(TrajcliError):
+    """The input is wrong: usage, content of a file, files that cannot be compared."""
+
+    exit_code = 2
+
+
+class MissingLimitError(InputError):
+    """A planner needs a limit that nobody gave."""
+
+
+class PlanningError(TrajcliError):
+    """No curve exists: unreachable, impossible timing."""
+
+    exit_code = 3
+
+
+class FileError(TrajcliError):
+    """A file is missing, unreadable or unwritable."""
+
+    exit_code = 4

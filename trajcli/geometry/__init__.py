@@ -1,0 +1,1 @@
+"""Rotations, poses and curves in space. numpy only."""

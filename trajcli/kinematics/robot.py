@@ -1,0 +1,109 @@
+"""The robot as frozen values: joints by Denavit-Hartenberg row, limits, base and tool. No current state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from trajcli.curves.piecewise import Array, read_only
+
+JointType = Literal["revolute", "prismatic"]
+Convention = Literal["standard", "modified"]
+QUANTITIES = ("position", "velocity", "acceleration", "jerk")
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One joint and its DH row: theta_i = theta + sign q (revolute), d_i = d + sign q (prismatic).
+
+    Attributes:
+        name: Unique within the robot.
+        type: Revolute (rad) or prismatic (m).
+        theta: Angle about z, rad.
+        d: Offset along z, m.
+        a: Length along x, m.
+        alpha: Angle about x, rad.
+        sign: 1 or -1: the direction in which the joint counts.
+    """
+
+    name: str
+    type: JointType = "revolute"
+    theta: float = 0.0
+    d: float = 0.0
+    a: float = 0.0
+    alpha: float = 0.0
+    sign: int = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """Lower and upper bounds by joint; an infinite one means unlimited, and is not checked.
+
+    Attributes:
+        position: Shape (n, 2), rad or m.
+        velocity: Shape (n, 2), per second; lower < 0 < upper.
+        acceleration: Shape (n, 2), per second squared; lower < 0 < upper.
+        jerk: Shape (n, 2), per second cubed; lower < 0 < upper.
+    """
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+    jerk: Array
+
+    def __post_init__(self) -> None:
+        for index, name in enumerate(QUANTITIES):
+            bounds = read_only(getattr(self, name))
+            if bounds.ndim != 2 or bounds.shape[1] != 2 or np.isnan(bounds).any():
+                raise ValueError(f"{name} limits: expected shape (n, 2) without NaN, got {bounds.shape}")
+            low, high = bounds[:, 0], bounds[:, 1]
+            if (low > high).any() or (index and not ((low < 0) & (high > 0)).all()):
+                raise ValueError(f"{name} limits: lower must be below {'0 and 0 below upper' if index else 'upper'}")
+            object.__setattr__(self, name, bounds)
+
+    def of_order(self, order: int) -> Array:
+        """Return the bounds (n, 2) of the derivative of the given order, 0 (position) to 3 (jerk)."""
+        return getattr(self, QUANTITIES[order])  # type: ignore[no-any-return]
+
+
+def unlimited(joints: int) -> Limits:
+    """Return limits that bound nothing."""
+    none = np.tile([-np.inf, np.inf], (joints, 1))
+    return Limits(none, none, none, none)
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A serial robot.
+
+    Attributes:
+        name: For messages and reports.
+        joints: 1 to 12 joints.
+        limits: The limits in force.
+        convention: Whose DH rows the joints are; None for bare joints, which have no geometry.
+        base: T_world_base, shape (4, 4).
+        tool: T_flange_tcp, shape (4, 4).
+    """
+
+    name: str
+    joints: tuple[Joint, ...]
+    limits: Limits
+    convention: Convention | None
+    base: Array
+    tool: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "base", read_only(self.base))
+        object.__setattr__(self, "tool", read_only(self.tool))
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints, from the base on."""
+        return tuple(joint.name for joint in self.joints)
+
+    @property
+    def joint_types(self) -> tuple[JointType, ...]:
+        """Types of the joints, from the base on."""
+        return tuple(joint.type for joint in self.joints)

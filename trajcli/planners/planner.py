@@ -1,0 +1,96 @@
+"""What every planner is and gives back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.kinematics.robot import Robot
+from trajcli.planners.fields import Model
+from trajcli.trajectory import State
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A named stretch of a move.
+
+    Attributes:
+        name: Such as "accelerate", "cruise", "jerk +".
+        start: Seconds from the start of the move.
+        end: Seconds from the start of the move.
+        joint: Index of the joint it is about; None when it is about all of them.
+    """
+
+    name: str
+    start: float
+    end: float
+    joint: int | None = None
+
+
+@dataclass(frozen=True)
+class Event:
+    """A concession that was made, and would otherwise go unnoticed.
+
+    Attributes:
+        kind: A stable word for programs, such as "slowed".
+        message: One sentence for people, with the numbers.
+        move: Index of the move; None when it is about the whole job.
+    """
+
+    kind: str
+    message: str
+    move: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """What a planner returns.
+
+    Attributes:
+        curve: q(t) from t = 0 to the move's duration.
+        end: The state in which the move declares to end.
+        law: s(t) with values in [0, 1] where one law moves all joints along a straight line, else None.
+        phases: Named stretches, in order of time.
+        events: Concessions.
+        arrivals: Seconds after which each joint alone has arrived, shape (n,); None where all share one law.
+        closed_form: "cycloid" where the curve is a fit of q0 + dq (t/T - sin(2 pi t/T) / (2 pi)).
+    """
+
+    curve: PiecewisePolynomial
+    end: State
+    law: PiecewisePolynomial | None = None
+    phases: tuple[Phase, ...] = ()
+    events: tuple[Event, ...] = ()
+    arrivals: tuple[float, ...] | None = None
+    closed_form: Literal["cycloid"] | None = None
+
+
+class Planner(Model):
+    """A method of planning one move: its fields are its parameters, in SI.
+
+    Adding one takes a file here with a subclass, a line in `planners/__init__.py`, and an example.
+
+    Attributes:
+        continuity: Derivatives that join without a jump at either end and inside: 1 (velocity) or 2
+            (acceleration). A step in the derivative after that is legal where the joint has no limit on it.
+    """
+
+    continuity: ClassVar[Literal[1, 2]]
+
+    def plan(self, start: State, robot: Robot) -> Planned:
+        """Return the move that begins in `start` at t = 0.
+
+        Args:
+            start: The acceleration is zero for a planner of continuity 1.
+            robot: Carries the limits in force for this move.
+
+        Raises:
+            MissingLimitError: When a limit is needed that nobody gave.
+            PlanningError: When no such move exists.
+        """
+        raise PlannerWithoutPlanError(type(self).__name__)
+
+
+class PlannerWithoutPlanError(TypeError):
+    """A planner class does not say how to plan."""

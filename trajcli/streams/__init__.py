@@ -1,0 +1,1 @@
+"""Formats in which samples leave and enter, one file each."""

@@ -1,0 +1,89 @@
+"""A trajectory: one curve q(t) of all joints, and where each move begins and ends on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, read_only
+from trajcli.kinematics.robot import JointType
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Position, velocity and acceleration of all joints, each of shape (n,), SI."""
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+    def __post_init__(self) -> None:
+        for name in ("position", "velocity", "acceleration"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether velocity and acceleration are zero."""
+        return not (self.velocity.any() or self.acceleration.any())
+
+
+def resting(position: Array) -> State:
+    """Return the state of rest at `position` (n,)."""
+    zero = np.zeros_like(position)
+    return State(position, zero, zero)
+
+
+@dataclass(frozen=True)
+class Span:
+    """Where one move stands on the trajectory.
+
+    Attributes:
+        index: Number of the move in the job, from 0.
+        planner: Its planner's tag.
+        start: Seconds from the start of the trajectory.
+        end: Seconds from the start of the trajectory; equals the next span's start.
+        continuity: Derivatives that the planner promises to join without a jump: 1 or 2.
+    """
+
+    index: int
+    planner: str
+    start: float
+    end: float
+    continuity: int
+
+    @property
+    def duration(self) -> float:
+        """Seconds."""
+        return self.end - self.start
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """The motion of all joints over time.
+
+    Attributes:
+        curve: q(t) from t = 0, rad or m by joint.
+        joint_names: n names.
+        joint_types: n types.
+        spans: One for each move, in order, covering the whole curve.
+        start: State in which the job says that the arm stands when t = 0.
+        end: State in which the last move declares to end.
+    """
+
+    curve: PiecewisePolynomial
+    joint_names: tuple[str, ...]
+    joint_types: tuple[JointType, ...]
+    spans: tuple[Span, ...]
+    start: State
+    end: State
+
+    @property
+    def duration(self) -> float:
+        """Seconds."""
+        return self.curve.duration
+
+    def span_at(self, time: float) -> Span:
+        """Return the span that holds `time`; at a border the later one, as long as it has a length."""
+        later = [span for span in self.spans if span.start <= time and span.duration > 0]
+        return later[-1] if later else self.spans[0]
