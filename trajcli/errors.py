@@ -6,7 +6,8 @@ the numbers in it, the place it stands in (if it stands in a file), and what wou
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,24 @@ class Place:
 
 
 @dataclass(frozen=True)
+class Amount:
+    """A number inside a message, in SI, so that it can be said in the user's units.
+
+    Attributes:
+        value: SI.
+        order: 0 for a joint's position, 1 to 3 for its time derivatives; without a joint the value is in seconds.
+        joint: Index of the joint that says whether angle or length is meant.
+    """
+
+    value: float
+    order: int = 0
+    joint: int | None = None
+
+    def __str__(self) -> str:
+        return f"{self.value:.9g}"
+
+
+@dataclass(frozen=True)
 class Problem:
     """One thing that is wrong.
 
@@ -36,6 +55,7 @@ class Problem:
         time: Seconds from the start of the move.
         value: The offending number, SI.
         limit: The bound it breaks, SI.
+        amounts: Numbers that the message holds as `{name}`.
     """
 
     message: str
@@ -46,6 +66,18 @@ class Problem:
     time: float | None = None
     value: float | None = None
     limit: float | None = None
+    amounts: Mapping[str, Amount] = field(default_factory=dict)
+
+    def text(self, say: Callable[[Amount], str] = str) -> str:
+        """Return the message with its amounts said by `say`."""
+        return said(self.message, self.amounts, say)
+
+
+def said(message: str, amounts: Mapping[str, Amount], say: Callable[[Amount], str] = str) -> str:
+    """Return a message with its amounts, which stand in it as `{name}`, said by `say`."""
+    for name, amount in amounts.items():
+        message = message.replace("{" + name + "}", say(amount))
+    return message
 
 
 class TrajcliError(Exception):
@@ -63,7 +95,7 @@ class TrajcliError(Exception):
         super().__init__(*self.problems)
 
     def __str__(self) -> str:
-        return "\n".join(problem.message for problem in self.problems)
+        return "\n".join(problem.text() for problem in self.problems)
 
     def located(self, **fields: object) -> TrajcliError:
         """Return the same error with `fields` (of `Problem`) filled in where they are still empty."""
@@ -72,6 +104,10 @@ class TrajcliError(Exception):
             empty = {name: value for name, value in fields.items() if getattr(problem, name) is None}
             problems.append(replace(problem, **empty))  # type: ignore[arg-type]
         return type(self)(*problems)
+
+    def said_by(self, say: Callable[[Amount], str]) -> TrajcliError:
+        """Return the same error with the amounts of its messages said by `say`."""
+        return type(self)(*(replace(p, message=p.text(say), amounts={}) for p in self.problems))
 
 
 class VerificationError(TrajcliError):

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar, Literal
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field
 
 from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.errors import Amount, said
 from trajcli.kinematics.robot import Robot
+from trajcli.planners.bounds import LimitsSpec
 from trajcli.planners.fields import Model
 from trajcli.trajectory import State
+
+WhenOverLimit = Literal["error", "slow"]
 
 
 @dataclass(frozen=True)
@@ -36,11 +43,17 @@ class Event:
         kind: A stable word for programs, such as "slowed".
         message: One sentence for people, with the numbers.
         move: Index of the move; None when it is about the whole job.
+        amounts: Numbers that the message holds as `{name}`.
     """
 
     kind: str
     message: str
     move: int | None = None
+    amounts: Mapping[str, Amount] = field(default_factory=dict)
+
+    def text(self, say: Callable[[Amount], str] = str) -> str:
+        """Return the message with its amounts said by `say`."""
+        return said(self.message, self.amounts, say)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,9 +87,19 @@ class Planner(Model):
     Attributes:
         continuity: Derivatives that join without a jump at either end and inside: 1 (velocity) or 2
             (acceleration). A step in the derivative after that is legal where the joint has no limit on it.
+        limits: Tightens the job's limits for this move; applied before `plan` is called.
+        when_over_limit: Overrides the job's; applied after `plan` was called.
     """
 
     continuity: ClassVar[Literal[1, 2]]
+
+    limits: Annotated[LimitsSpec | None, Field(description="Tighter limits for this move.")] = None
+    when_over_limit: Annotated[WhenOverLimit | None, Field(description="Overrides the job's for this move.")] = None
+
+    @property
+    def tag(self) -> str:
+        """The planner's name in job files."""
+        return str(type(self).model_fields["planner"].default)
 
     def plan(self, start: State, robot: Robot) -> Planned:
         """Return the move that begins in `start` at t = 0.
@@ -89,8 +112,4 @@ class Planner(Model):
             MissingLimitError: When a limit is needed that nobody gave.
             PlanningError: When no such move exists.
         """
-        raise PlannerWithoutPlanError(type(self).__name__)
-
-
-class PlannerWithoutPlanError(TypeError):
-    """A planner class does not say how to plan."""
+        raise TypeError(f"{type(self).__name__} does not say how to plan")

@@ -1,0 +1,275 @@
+"""Jumps that are there by very little, on one side, or only as far as breaks are rounded."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from motions import between, limits, state, trajectory
+
+from trajcli.checks.continuity import JERK_HINT, acceleration_steps, check_continuity
+from trajcli.curves.hermite import hermite_pieces
+from trajcli.curves.piecewise import PiecewisePolynomial, constant
+from trajcli.trajectory import State, Trajectory
+
+FREE, LIMITED = limits(), limits(jerk=1e9)
+QUANTITIES = ("position", "velocity", "acceleration")
+PEAK = {"position": 2.0, "velocity": 1.875, "acceleration": 10 / np.sqrt(3)}
+
+
+def bump(kind: str, size: float, duration: float) -> np.ndarray:
+    """Return the quintic (6,) that begins with a jump in one quantity and ends in nothing at all."""
+    derivatives = np.zeros((3, 2, 1))
+    derivatives[QUANTITIES.index(kind), 0] = size
+    return hermite_pieces([0.0, duration], derivatives).coefficients[:, 0, 0]
+
+
+def with_jump(kind: str, size: float) -> PiecewisePolynomial:
+    """Return quintics 1 -> 2 -> 1 of a second each, with a jump in the middle and none at the end."""
+    curve = between([1.0], [2.0], [1.0], duration=1.0)
+    coefficients = curve.coefficients.copy()
+    coefficients[:, 1, 0] += bump(kind, size, 1.0)
+    return PiecewisePolynomial(curve.breaks, coefficients)
+
+
+def declared_end(curve: PiecewisePolynomial) -> State:
+    return State(*(curve.piece_ends(order)[1][-1] for order in range(3)))
+
+
+def judge(curve: PiecewisePolynomial, bounds=FREE):
+    whole = trajectory(curve, end=declared_end(curve))
+    return check_continuity(whole, [bounds])
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("kind", QUANTITIES)
+def test_a_jump_of_two_billionths_of_the_peak_is_found_and_one_of_half_a_billionth_is_not(
+    kind: str, sign: float
+) -> None:
+    assert judge(with_jump(kind, sign * 0.5e-9 * PEAK[kind]), LIMITED) == []
+    found = judge(with_jump(kind, sign * 2e-9 * PEAK[kind]), LIMITED)
+    assert [(f.move, f.joint, f.kind, f.time) for f in found] == [(0, "j1", f"{kind}_jump", 1.0)]
+    assert found[0].value == pytest.approx(sign * 2e-9 * PEAK[kind], rel=1e-5)
+    assert found[0].limit == pytest.approx(1e-9 * PEAK[kind], rel=1e-2)
+    assert found[0].factor is None
+
+
+def test_a_valid_motion_has_no_jumps() -> None:
+    for conditions in (3, 4):
+        curve = between(
+            [1.0, 0.0, 3.0], [-2.0, 0.0, 3.1], [0.4, 0.0, 3.1], duration=0.37, conditions=conditions
+        )
+        assert judge(curve, limits(3, jerk=1e9)) == []
+        assert acceleration_steps(trajectory(curve)) == []
+
+
+def test_a_step_in_acceleration_is_legal_where_no_jerk_limit_is() -> None:
+    curve = with_jump("acceleration", 0.25)
+    assert judge(curve, FREE) == []
+    assert judge(curve, limits(velocity=100.0, acceleration=100.0)) == []
+    for one_sided in (LIMITED, limits(jerk=(-np.inf, 5e3))):
+        found = judge(curve, one_sided)
+        assert [(f.kind, f.time, f.hint) for f in found] == [("acceleration_jump", 1.0, JERK_HINT)]
+        assert found[0].value == pytest.approx(0.25)
+    whole = trajectory(curve, end=declared_end(curve))
+    steps = acceleration_steps(whole)
+    assert [(s.move, s.joint, s.time) for s in steps] == [(0, "j1", 1.0)]
+    assert steps[0].size == pytest.approx(0.25)
+    assert acceleration_steps(whole, [FREE]) == steps
+    assert acceleration_steps(whole, [LIMITED]) == []
+
+
+def test_joints_are_judged_one_by_one() -> None:
+    curve = between([0.0, 1.0, 2.0], [1.0, 1.0, 3.0], duration=1.0, conditions=2)
+    bounds = limits(3, jerk=np.array([[-np.inf, np.inf], [-9.0, 9.0], [-9.0, 9.0]]))
+    whole = trajectory(curve)
+    assert [(f.joint, f.kind, f.time) for f in check_continuity(whole, [bounds])] == [
+        ("j3", "acceleration_jump", 0.0)
+    ]
+    assert [(s.joint, s.time, round(s.size, 9)) for s in acceleration_steps(whole, [bounds])] == [
+        ("j1", 0.0, 6.0),
+        ("j1", 1.0, 6.0),
+    ]
+
+
+def test_the_start_must_be_where_the_arm_is() -> None:
+    curve = between([1.0], [2.0])
+    for declared, kind, value in (
+        (state([1.1]), "position_jump", -0.1),
+        (state([1.0], velocity=0.3), "velocity_jump", -0.3),
+        (state([1.0], acceleration=0.7), "acceleration_jump", -0.7),
+    ):
+        found = check_continuity(trajectory(curve, start=declared), [LIMITED])
+        assert [(f.move, f.kind, f.time) for f in found] == [(0, kind, 0.0)]
+        assert found[0].value == pytest.approx(value)
+    assert check_continuity(trajectory(curve, start=state([1.0], acceleration=0.7)), [FREE]) == []
+
+
+def test_the_end_must_be_what_the_last_move_declares() -> None:
+    curve = between([1.0], [2.0])
+    for declared, kind, value in (
+        (state([2.1]), "position_jump", 0.1),
+        (state([2.0], velocity=-0.3), "velocity_jump", -0.3),
+        (state([2.0], acceleration=0.7), "acceleration_jump", 0.7),
+    ):
+        found = check_continuity(trajectory(curve, curve_at(2.0), end=declared), [LIMITED, LIMITED])
+        assert [(f.move, f.kind, f.time) for f in found] == [(1, kind, 5.0)]
+        assert found[0].value == pytest.approx(value)
+
+
+def curve_at(position: float) -> PiecewisePolynomial:
+    return constant([position], 3.0)
+
+
+def test_a_motion_that_begins_in_an_accelerating_arm_does_not_step() -> None:
+    parabola = PiecewisePolynomial(np.array([0.0, 1.0]), np.array([1.0, 0.5, 3.0])[:, None, None])
+    whole = trajectory(parabola, start=state([3.0], 0.5, 2.0), end=state([4.5], 2.5, 2.0))
+    assert check_continuity(whole, [LIMITED]) == []
+    assert acceleration_steps(whole) == []
+
+
+def test_a_jump_at_a_border_is_the_later_moves() -> None:
+    first, second = between([0.0], [1.0]), between([1.5], [2.0])
+    found = check_continuity(trajectory(first, second), [FREE, FREE])
+    assert [(f.move, f.kind, f.time, f.value) for f in found] == [
+        (1, "position_jump", 2.0, pytest.approx(0.5))
+    ]
+
+
+def cubics(*positions: float) -> list[PiecewisePolynomial]:
+    return [between([a], [b], duration=1.0, conditions=2) for a, b in pairwise(positions)]
+
+
+def test_a_step_at_a_border_is_a_finding_where_either_move_steps_and_limits_its_jerk() -> None:
+    cubic, quintic = cubics(0.0, 1.0)[0], between([1.0], [2.0], duration=1.0)
+
+    def moves_found(moves, bounds):
+        return sorted((f.move, f.time) for f in check_continuity(trajectory(*moves), bounds))
+
+    assert moves_found([cubic, quintic], [FREE, LIMITED]) == []
+    assert moves_found([cubic, quintic], [LIMITED, FREE]) == [(0, 0.0)]
+    steps = acceleration_steps(trajectory(cubic, quintic), [FREE, LIMITED])
+    assert [(s.move, s.time) for s in steps] == [(0, 0.0), (0, 1.0)]
+    back = between([1.0], [0.0], duration=1.0)
+    assert moves_found([back, cubic], [LIMITED, FREE]) == []
+    assert moves_found([back, cubic], [FREE, LIMITED]) == [(1, 1.0)]
+    ramp_up = PiecewisePolynomial(np.array([0.0, 1.0]), np.array([1.0, 0, 0, 0])[:, None, None])
+    after = PiecewisePolynomial(np.array([0.0, 1.0]), np.array([1.0, -3.0, 3.0, 1.0])[:, None, None])
+    assert moves_found([ramp_up, after], [LIMITED, FREE]) == [(0, 1.0)]
+    assert moves_found([ramp_up, after], [FREE, LIMITED]) == [(1, 1.0)]
+    assert moves_found([ramp_up, after], [LIMITED, LIMITED]) == [(1, 1.0)]
+    assert moves_found([ramp_up, after], [FREE, FREE]) == []
+
+
+def test_a_move_joined_with_the_same_acceleration_does_not_step() -> None:
+    parts = [
+        PiecewisePolynomial(np.array([0.0, 1.0]), np.array([1.0, 0.0, 0.0])[:, None, None]),
+        PiecewisePolynomial(np.array([0.0, 1.0]), np.array([1.0, 2.0, 1.0])[:, None, None]),
+    ]
+    whole = trajectory(*parts, end=state([4.0], 4.0))
+    assert [(s.time, s.size, s.move) for s in acceleration_steps(whole)] == [(0.0, 2.0, 0), (2.0, -2.0, 1)]
+
+
+def test_the_largest_of_many_steps_is_named_and_of_equal_ones_the_first() -> None:
+    heights = [0.0, 1.0, 1.0, 4.0, 6.0]
+    curve = between(*([h] for h in heights), duration=1.0, conditions=2)
+    found = check_continuity(trajectory(curve), [LIMITED])
+    assert [(f.time, f.value) for f in found] == [(3.0, pytest.approx(30.0))]
+    rising = with_jump("acceleration", 0.25).coefficients[:, [0, 1, 1]].copy()
+    rising[:, 2] *= -1.0
+    rising[-1, 2] += 2.0
+    rising[3, 2] = -rising[3, 1] * (1 + 1e-15)
+    even = between([0.0], [1.0], [1.0], [2.0], duration=1.0, conditions=2)
+    assert [f.time for f in check_continuity(trajectory(even), [LIMITED])] == [0.0]
+    assert [s.time for s in acceleration_steps(trajectory(even))] == [0.0, 1.0, 2.0, 3.0]
+
+
+def steep_trapezoid(acceleration: float, length: float = 1.0) -> PiecewisePolynomial:
+    """Return one unit of travel at unit speed between ramps of 1 / acceleration."""
+    ramp = 1.0 / acceleration
+    pieces = [[acceleration / 2, 0.0, 0.0], [0.0, 1.0, ramp / 2], [-acceleration / 2, 1.0, ramp / 2 + length]]
+    breaks = np.array([0.0, ramp, ramp + length, 2 * ramp + length])
+    return PiecewisePolynomial(breaks, np.array(pieces).T[:, :, None])
+
+
+@pytest.mark.parametrize("acceleration", [1e3, 1e9, 1e13, 1e15])
+def test_a_steep_ramp_is_not_a_jump(acceleration: float) -> None:
+    curve = steep_trapezoid(acceleration)
+    whole = trajectory(curve, end=state([1.0 + 1 / acceleration]))
+    assert check_continuity(whole, [FREE]) == []
+    assert len(acceleration_steps(whole)) == 4
+
+
+def test_a_jump_beside_a_ramp_that_is_not_steep_is_a_jump() -> None:
+    """The last ramp at 1e15 misses its end by 0.1 of the speed, which its break explains; at 1e9 nothing does."""
+    steep = steep_trapezoid(1e15)
+    missed = float(np.abs(steep.piece_ends(1)[1][-1, 0]))
+    assert missed > 0.05
+    curve = steep_trapezoid(1e9)
+    found = check_continuity(trajectory(curve, end=state([1.0 + 1e-9], velocity=missed)), [FREE])
+    assert [f.kind for f in found] == ["velocity_jump"]
+
+
+def test_a_joint_that_rests_may_tremble_by_rounding_only() -> None:
+    for size, kinds in ((5e-13, []), (2e-12, ["velocity_jump"])):
+        wobble = PiecewisePolynomial(np.array([0.0, 1.0]), np.array([[size, 0.0], [3.0, 0.0]])[:, None, :])
+        end = state([3.0 + size, 0.0])
+        found = check_continuity(trajectory(wobble, start=state([3.0, 0.0]), end=end), [limits(2)])
+        assert {f.kind for f in found} == set(kinds)
+
+
+def test_a_curve_of_no_length_is_where_it_should_be() -> None:
+    assert check_continuity(trajectory(constant([2.0], 0.0)), [LIMITED]) == []
+    found = check_continuity(trajectory(constant([2.0], 0.0), start=state([1.0])), [LIMITED])
+    assert [(f.kind, f.value) for f in found] == [("position_jump", 1.0)]
+
+
+def test_moves_of_no_length_own_no_jump() -> None:
+    hold = constant([1.0], 0.0)
+    whole = trajectory(between([0.0], [1.0]), hold, hold, between([1.25], [2.0]), hold)
+    assert [f.move for f in check_continuity(whole, [FREE] * 5)] == [3]
+
+
+def test_times_count_from_the_start_of_the_trajectory() -> None:
+    curve = with_jump("position", 1e-3).shifted(-0.5)
+    plain = trajectory(with_jump("position", 1e-3), end=declared_end(curve))
+    moved = Trajectory(curve, plain.joint_names, plain.joint_types, plain.spans, plain.start, plain.end)
+    assert [f.time for f in check_continuity(moved, [FREE])] == [1.0]
+
+
+def test_limits_must_be_as_many_as_moves() -> None:
+    with pytest.raises(ValueError, match="2 limits for 1 moves"):
+        check_continuity(trajectory(between([0.0], [1.0])), [FREE, FREE])
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.data())
+def test_exactly_the_jumps_that_were_put_in_are_found(data) -> None:
+    rng = np.random.default_rng(data.draw(st.integers(0, 2**32 - 1)))
+    joints, pieces = data.draw(st.integers(1, 3)), data.draw(st.integers(2, 6))
+    duration = float(10.0 ** rng.uniform(-3, 2))
+    curve = between(*rng.normal(size=(pieces + 1, joints)), duration=duration)
+    coefficients, expected = curve.coefficients.copy(), set()
+    split = data.draw(st.integers(1, pieces - 1))
+    for row in range(1, pieces):
+        kind, joint = data.draw(st.sampled_from(QUANTITIES)), data.draw(st.integers(0, joints - 1))
+        order = QUANTITIES.index(kind)
+        peak = np.abs(curve.evaluate(np.linspace(0, curve.end, 999), order)).max(axis=0)[joint]
+        size = data.draw(st.sampled_from([0.0, 1e-11, 1e-7, -1e-4])) * peak
+        assume(abs(size) <= 1e-11 * peak or abs(size) > 1e-11)
+        coefficients[:, row, joint] += bump(kind, size, duration)
+        if abs(size) > 1e-9 * peak:
+            expected.add((1 if row >= split else 0, f"j{joint + 1}", f"{kind}_jump"))
+    parts = [
+        PiecewisePolynomial(curve.breaks[a : b + 1] - curve.breaks[a], coefficients[:, a:b])
+        for a, b in ((0, split), (split, pieces))
+    ]
+    found = check_continuity(trajectory(*parts, end=declared_end(curve)), [limits(joints, jerk=1e9)] * 2)
+    assert {(f.move, f.joint, f.kind) for f in found} == expected
+    assert len(found) == len(expected)
+    for finding in found:
+        nearest = np.abs(curve.breaks - finding.time).min()
+        assert nearest <= 1e-12 * curve.end

@@ -1,0 +1,287 @@
+"""Extremes against dense sampling with local refinement, closed forms, and roots found by another method."""
+
+from __future__ import annotations
+
+import time
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.polynomial import Polynomial
+from scipy.interpolate import PPoly
+from scipy.optimize import brentq, minimize_scalar
+
+from trajcli.curves.extrema import peaks, peaks_between, piece_extremes
+from trajcli.curves.hermite import hermite_pieces
+from trajcli.curves.piecewise import PiecewisePolynomial, constant, taylor_shift
+
+ORDERS = (0, 1, 2, 3)
+
+
+def sampled_extremes(coefficients: np.ndarray, length: float, order: int) -> tuple[float, float]:
+    """Return low and high of one polynomial's derivative: samples, and a search around the best of them."""
+    polynomial = np.polyder(np.poly1d(coefficients), order) if order else np.poly1d(coefficients)
+    t = np.linspace(0.0, length, 150)
+    found = []
+    for sign in (1.0, -1.0):
+        values = sign * polynomial(t)
+        best = values.min()
+        around = np.concatenate([[np.inf], values, [np.inf]])
+        valleys = np.flatnonzero((values <= around[:-2]) & (values <= around[2:]))
+        for k in sorted(valleys, key=lambda k: values[k])[:3]:
+            search = minimize_scalar(
+                lambda x, sign=sign: sign * polynomial(x),
+                bounds=(t[max(k - 1, 0)], t[min(k + 1, t.size - 1)]),
+                method="bounded",
+                options={"xatol": 1e-9 * length},
+            )
+            best = min(best, search.fun)
+        found.append(sign * best)
+    return found[0], found[1]
+
+
+def rounding(coefficients: np.ndarray, length: float, order: int) -> float:
+    """Return how far two correct evaluations of the derivative may lie apart."""
+    sizes = np.polyder(np.poly1d(np.abs(coefficients)), order) if order else np.poly1d(np.abs(coefficients))
+    return 1e-13 * float(sizes(length)) + 1e-300
+
+
+def assert_extremes(curve: PiecewisePolynomial) -> None:
+    found = peaks(curve)
+    for order in ORDERS:
+        for joint in range(curve.dimension):
+            pieces = [(curve.coefficients[:, k, joint], float(curve.lengths[k])) for k in range(curve.pieces)]
+            sampled = [sampled_extremes(c, h, order) for c, h in pieces]
+            low, high = min(s[0] for s in sampled), max(s[1] for s in sampled)
+            exact = max(rounding(c, h, order) for c, h in pieces)
+            search = exact + 1e-9 * (high - low)
+            assert high - exact <= found[order].high[joint] <= high + search
+            assert low - search <= found[order].low[joint] <= low + exact
+            for value, at in (
+                (found[order].low[joint], found[order].low_time[joint]),
+                (found[order].high[joint], found[order].high_time[joint]),
+            ):
+                sides = [curve.evaluate(at, order, side=side)[joint] for side in ("left", "right")]
+                step = np.spacing(np.abs(curve.breaks).max()) * max(
+                    np.abs(curve.evaluate(at, order + 1, side=s)[joint]) for s in ("left", "right")
+                )
+                near = exact + 4 * step + 2e-12 * max(abs(low), abs(high))
+                assert min(abs(side - value) for side in sides) <= near
+
+
+@st.composite
+def curves(draw) -> PiecewisePolynomial:
+    degree = draw(st.integers(0, 9))
+    pieces, joints = draw(st.integers(1, 3)), draw(st.integers(1, 2))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    lengths = 10.0 ** rng.uniform(-6, 4) * rng.uniform(0.2, 1.0, pieces)
+    normal = rng.normal(size=(degree + 1, pieces, joints))
+    if draw(st.booleans()):
+        normal = np.rint(2 * normal)
+    for row in range(draw(st.integers(0, degree))):
+        normal[row] = 0.0
+    if draw(st.booleans()):
+        normal[:-1, :, 0] = 0.0
+    powers = lengths ** np.arange(degree, -1, -1)[:, None]
+    start = draw(st.sampled_from([0.0, 3.0, -1.5]))
+    breaks = start + np.concatenate([[0.0], np.cumsum(lengths)])
+    return PiecewisePolynomial(breaks, normal / powers[:, :, None])
+
+
+@settings(max_examples=60, deadline=None)
+@given(curves())
+def test_extremes_are_those_of_a_refined_search(curve: PiecewisePolynomial) -> None:
+    assert_extremes(curve)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.lists(st.sampled_from([-0.5, 0.0, 0.1, 0.25, 0.5, 0.5000001, 0.9, 1.0, 1.5]), min_size=1, max_size=8),
+    st.sampled_from([1e-6, 0.3, 1.0, 2e4]),
+)
+def test_multiple_and_close_roots_of_the_velocity(roots: list[float], length: float) -> None:
+    rate = Polynomial.fromroots(roots)
+    position = rate.integ().coef[::-1]
+    powers = length ** np.arange(position.size - 1, -1, -1)
+    curve = PiecewisePolynomial(np.array([0.0, length]), (position / powers)[:, None, None])
+    assert_extremes(curve)
+    ends = [u for u in roots if 0 <= u <= 1] + [0.0, 1.0]
+    values = [rate.integ()(u) for u in ends]
+    exact = rounding(position, 1.0, 0)
+    assert peaks(curve, (0,))[0].high[0] == pytest.approx(max(values), abs=exact)
+    assert peaks(curve, (0,))[0].low[0] == pytest.approx(min(values), abs=exact)
+
+
+@pytest.mark.parametrize(
+    ("conditions", "order", "peak"),
+    [
+        (2, 1, 1.5),
+        (2, 2, 6.0),
+        (3, 1, 1.875),
+        (3, 2, 10 / np.sqrt(3)),
+        (3, 3, 60.0),
+        (4, 1, 2.1875),
+        (4, 2, 84 * np.sqrt(5) / 25),
+    ],
+)
+@pytest.mark.parametrize("duration", [1e-3, 2.5, 4000.0])
+def test_rest_to_rest_polynomials_have_the_peaks_of_the_books(
+    conditions: int, order: int, peak: float, duration: float
+) -> None:
+    displacement = np.array([1.7, -0.4, 0.0])
+    ends = np.zeros((conditions, 2, 3))
+    ends[0] = np.array([np.full(3, 2.0), 2.0 + displacement])
+    found = peaks(hermite_pieces([0.0, duration], ends))[order]
+    expected = peak * np.abs(displacement) / duration**order
+    assert found.magnitude == pytest.approx(expected, rel=1e-13)
+    assert found.high_time[2] == 0.0
+    assert found.low_time[2] == 0.0
+    if order == 1:
+        assert found.high[0] == pytest.approx(expected[0], rel=1e-13)
+        assert found.high_time[0] == pytest.approx(duration / 2, rel=1e-7)
+        assert found.low[1] == pytest.approx(-expected[1], rel=1e-13)
+
+
+def test_the_slides_third_example_overshoots_its_target() -> None:
+    position = Polynomial([10, 0, 5, 12.5, -5.625, 0.625])
+    assert position(4.0) == 90.0
+    top = brentq(position.deriv(), 2.0, 3.99, xtol=1e-15, rtol=1e-15)
+    assert position(top) > 90.0
+    curve = PiecewisePolynomial(np.array([0.0, 4.0]), position.coef[::-1][:, None, None])
+    found = peaks(curve, (0,))[0]
+    assert found.high[0] == pytest.approx(position(top), rel=1e-15)
+    assert found.high_time[0] == pytest.approx(top, rel=1e-9)
+    assert (found.low[0], found.low_time[0]) == (10.0, 0.0)
+
+
+def test_both_sides_of_a_break_count() -> None:
+    curve = PiecewisePolynomial(np.array([0.0, 1.0, 2.0]), np.array([[[1.0], [-1.0]], [[0.0], [-5.0]]]))
+    low, high = peaks(curve, (0,))[0].low, peaks(curve, (0,))[0].high
+    assert (low[0], high[0]) == (-6.0, 1.0)
+    assert peaks(curve, (0,))[0].high_time[0] == 1.0
+    assert peaks(curve, (0,))[0].low_time[0] == 2.0
+
+
+def test_of_equal_peaks_the_earliest_is_named() -> None:
+    wave = (
+        np.array([[[16.0]] * 4, [[-16.0]] * 4, [[0.0]] * 4])
+        * np.array([1, 1 + 2e-16, 1 - 2e-16, 1 + 4e-16])[:, None]
+    )
+    curve = PiecewisePolynomial(np.array([5.0, 6.0, 7.0, 8.0, 9.0]), wave)
+    found = peaks(curve, (0, 1))
+    assert found[0].low[0] == pytest.approx(-4.0)
+    assert found[0].low_time[0] == 5.5
+    assert found[0].high_time[0] == 5.0
+    assert found[1].high_time[0] == 6.0
+
+
+def test_an_interval_inside_pieces_sees_nothing_outside_of_it() -> None:
+    rng = np.random.default_rng(5)
+    curve = PiecewisePolynomial(np.array([0.0, 1.0, 1.5, 3.0, 4.0]), rng.normal(size=(6, 4, 3)))
+    intervals = [(0.2, 0.4), (0.2, 3.1), (1.0, 1.5), (1.4, 1.6), (0.0, 4.0), (2.0, 2.0)]
+    for (start, end), found in zip(intervals, peaks_between(curve, intervals), strict=True):
+        cut = curve_between(curve, start, end)
+        for of_interval, alone, again in zip(
+            found, peaks(cut), peaks(curve, ORDERS, start, end), strict=True
+        ):
+            assert of_interval.low == pytest.approx(alone.low, rel=1e-12, abs=1e-12)
+            assert of_interval.high == pytest.approx(alone.high, rel=1e-12, abs=1e-12)
+            assert (of_interval.high == again.high).all()
+            assert (of_interval.high_time >= start).all()
+            assert (of_interval.high_time <= end).all()
+        assert_extremes(cut)
+
+
+def curve_between(curve: PiecewisePolynomial, start: float, end: float) -> PiecewisePolynomial:
+    """Cut by shifting each polynomial to where its stretch begins."""
+    inner = [b for b in curve.breaks if start < b < end]
+    breaks = np.array([start, *inner, end])
+    pieces = []
+    for low, high in pairwise(breaks):
+        k = min(int(np.searchsorted(curve.breaks, (low + high) / 2, "right")) - 1, curve.pieces - 1)
+        pieces.append(taylor_shift(curve.coefficients[:, k], np.array(low - curve.breaks[k])))
+    return PiecewisePolynomial(breaks, np.stack(pieces, axis=1))
+
+
+def test_at_a_break_an_interval_sees_its_own_side_only() -> None:
+    curve = PiecewisePolynomial(
+        np.array([0.0, 1.0, 2.0]),
+        np.array(
+            [
+                [
+                    [1.0],
+                    [2.0],
+                ]
+            ]
+        ),
+    )
+    first, second, none = peaks_between(curve, [(0.0, 1.0), (1.0, 2.0), (1.0, 1.0)], (0,))
+    assert (first[0].low[0], first[0].high[0]) == (1.0, 1.0)
+    assert (second[0].low[0], second[0].high[0]) == (2.0, 2.0)
+    assert (none[0].low[0], none[0].high[0], none[0].high_time[0]) == (2.0, 2.0, 1.0)
+
+
+def test_a_curve_of_no_length() -> None:
+    found = peaks(constant([1.0, -2.0], 0.0))
+    assert found[0].high.tolist() == [1.0, -2.0]
+    assert found[0].low_time.tolist() == [0.0, 0.0]
+    assert [f.magnitude.tolist() for f in found[1:]] == [[0.0, 0.0]] * 3
+    moving = peaks(PiecewisePolynomial(np.array([2.0, 2.0]), np.array([[[5.0]], [[3.0]], [[1.0]]])))
+    assert [f.high[0] for f in moving] == [1.0, 3.0, 10.0, 0.0]
+
+
+@pytest.mark.parametrize("interval", [(-0.1, 1.0), (0.0, 1.1), (0.6, 0.5), (float("nan"), 1.0)])
+def test_an_interval_off_the_curve_is_refused(interval: tuple[float, float]) -> None:
+    with pytest.raises(ValueError, match="outside the curve's domain"):
+        peaks(constant([1.0], 1.0), ORDERS, *interval)
+
+
+def test_pieces_that_are_no_curve_agree_with_scipys_roots() -> None:
+    rng = np.random.default_rng(11)
+    coefficients, lengths = rng.normal(size=(6, 40, 2)), rng.uniform(0.1, 3.0, 40)
+    for order, (low, high) in zip(ORDERS, piece_extremes(coefficients, lengths), strict=True):
+        for k in range(40):
+            for joint in range(2):
+                rate = PPoly(coefficients[:, k : k + 1, joint], [0.0, lengths[k]]).derivative(order)
+                inner = rate.derivative().roots(extrapolate=False)
+                values = rate(np.concatenate([[0.0, lengths[k]], inner]))
+                assert low[k, joint] == pytest.approx(values.min(), rel=1e-9, abs=1e-9)
+                assert high[k, joint] == pytest.approx(values.max(), rel=1e-9, abs=1e-9)
+
+
+def test_coefficients_that_rounding_left_do_not_matter() -> None:
+    clean = np.array([0.0, 0.0, -3.0, 3.0, 1.0])
+    for noise in (1e-18, -1e-18, 1e-300, 5e-324):
+        curve = PiecewisePolynomial(
+            np.array([0.0, 1.0]), (clean + noise * np.array([1, -1, 0, 0, 0]))[:, None, None]
+        )
+        found = peaks(curve, (0, 1))
+        assert found[0].high[0] == pytest.approx(1.75, rel=1e-15)
+        assert found[0].high_time[0] == pytest.approx(0.5, rel=1e-9)
+        assert (found[1].high[0], found[1].low[0]) == pytest.approx((3.0, -3.0))
+
+
+def test_a_slope_that_is_next_to_nothing_does_not_overflow() -> None:
+    curve = PiecewisePolynomial(np.array([0.0, 1.0]), np.array([0.0, 0.0, 0.0, 1e-310, 1e3])[:, None, None])
+    assert [f.high[0] for f in peaks(curve)] == [1e3, 1e-310, 0.0, 0.0]
+
+
+def test_a_peak_at_a_break_has_the_time_of_the_break() -> None:
+    breaks = np.array([0.3, 0.7, 1.9, 3.1])
+    curve = PiecewisePolynomial(breaks, np.stack([np.ones((3, 1)), np.arange(3.0)[:, None]]))
+    assert (breaks[:-1] + np.diff(breaks) != breaks[1:]).any()
+    for k, found in enumerate(peaks_between(curve, np.stack([breaks[:-1], breaks[1:]], axis=1), (0,))):
+        assert (found[0].low_time[0], found[0].high_time[0]) == (breaks[k], breaks[k + 1])
+
+
+def test_many_pieces_take_little_time() -> None:
+    rng = np.random.default_rng(3)
+    curve = PiecewisePolynomial(np.arange(10_001) * 0.1, rng.normal(size=(4, 10_000, 6)))
+    took = []
+    for _ in range(3):
+        began = time.perf_counter()
+        peaks(curve)
+        took.append(time.perf_counter() - began)
+    assert min(took) < 0.2

@@ -1,0 +1,66 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from trajcli.errors import InputError
+from trajcli.geometry.quaternion import (
+    canonical,
+    check_quaternion,
+    conjugate,
+    matrix_from_quaternion,
+    multiply,
+    quaternion_from_matrix,
+)
+
+RANDOM = Rotation.random(500, random_state=7)
+WXYZ = np.roll(RANDOM.as_quat(), 1, axis=-1)
+
+
+def test_matrices_agree_with_scipy():
+    np.testing.assert_allclose(matrix_from_quaternion(WXYZ), RANDOM.as_matrix(), rtol=0, atol=1e-15)
+    np.testing.assert_allclose(matrix_from_quaternion(3 * WXYZ), RANDOM.as_matrix(), rtol=0, atol=1e-15)
+
+
+def test_quaternions_agree_with_scipy():
+    quaternion = quaternion_from_matrix(RANDOM.as_matrix().reshape(5, 100, 3, 3))
+    assert quaternion.shape == (5, 100, 4)
+    np.testing.assert_allclose(quaternion.reshape(-1, 4), canonical(WXYZ), rtol=0, atol=2e-15)
+
+
+@pytest.mark.parametrize("axis", [[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.6, 0.8, 0], [1, -2, 2]])
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 1.0, np.pi - 1e-7, np.pi])
+def test_no_digit_is_lost_at_any_angle(axis, angle):
+    quaternion = np.append(np.cos(angle / 2), np.sin(angle / 2) * np.array(axis) / np.linalg.norm(axis))
+    again = quaternion_from_matrix(matrix_from_quaternion(quaternion))
+    assert min(np.abs(again - quaternion).max(), np.abs(again + quaternion).max()) < 3e-16
+
+
+def test_the_first_component_that_counts_is_positive():
+    given = np.array([[-0.5, 0.5, 0.5, 0.5], [0, 0, -1, 0], [0, 0, 0, 1], [0, -0.6, 0.8, 0]])
+    expected = [[0.5, -0.5, -0.5, -0.5], [0, 0, 1, 0], [0, 0, 0, 1], [0, 0.6, -0.8, 0]]
+    np.testing.assert_array_equal(canonical(given), expected)
+    assert not np.signbit(canonical(given)[1:, 0]).any()
+    assert (quaternion_from_matrix(RANDOM.as_matrix())[:, 0] >= 0).all()
+
+
+def test_products_are_products_of_the_matrices():
+    left, right = WXYZ[:250], WXYZ[250:]
+    matrices = RANDOM.as_matrix()
+    np.testing.assert_allclose(
+        matrix_from_quaternion(multiply(left, right)), matrices[:250] @ matrices[250:], rtol=0, atol=2e-15
+    )
+    np.testing.assert_allclose(
+        multiply(WXYZ, conjugate(WXYZ)), np.tile([1, 0, 0, 0], (500, 1)), rtol=0, atol=1e-15
+    )
+
+
+def test_what_is_no_unit_quaternion_is_refused():
+    assert check_quaternion([0.70711, 0, 0.70711, 0]) < 1e-5
+    with pytest.raises(InputError, match=r"length 1\.414"):
+        check_quaternion([1, 1, 0, 0])
+    with pytest.raises(InputError, match="four finite"):
+        check_quaternion([1, 0, 0])
+    with pytest.raises(InputError, match="length zero"):
+        matrix_from_quaternion([[1, 0, 0, 0], [0, 0, 0, 0]])

@@ -1,0 +1,160 @@
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import pytest
+
+from trajcli.errors import FileError, InputError
+from trajcli.streams import table
+from trajcli.streams.csv import write_csv
+from trajcli.streams.table import read_csv
+
+
+def read(tmp_path, text):
+    path = tmp_path / "in.csv"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return read_csv(path)
+
+
+def flaws(tmp_path, text):
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, text)
+    assert caught.value.exit_code == 2
+    return [
+        (str(flaw.place).removeprefix(f"{tmp_path}/"), flaw.message) if flaw.place else flaw.message
+        for flaw in caught.value.problems
+    ]
+
+
+@pytest.mark.parametrize("digits", ["fixed", "full"])
+def test_what_is_written_is_read(tmp_path, digits):
+    rows = np.random.default_rng(0).normal(size=(20000, 4)) * [1, 100, 1e4, 0]
+    rows[:, 3] = np.arange(20000) // 100
+    out = io.BytesIO()
+    write_csv([rows], ["t", "q1", "q2_deg", "move"], out, digits)
+    found = read(tmp_path, out.getvalue())
+    assert found.names == ("t", "q1", "q2_deg", "move")
+    if digits == "full":
+        np.testing.assert_array_equal(found.columns, rows)
+    else:
+        np.testing.assert_allclose(found.columns, rows, rtol=0, atol=5.01e-10)
+        assert found.decimals.tolist() == [9, 9, 9, 0]
+    np.testing.assert_array_equal(found.column("q1"), found.columns[:, 1])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "t,q1\n0,1.5\n1,-2\n",
+        "t,q1\r\n0,1.5\r\n1,-2\r\n",
+        "t,q1\n0,1.5\n1,-2",
+        "\ufefft,q1\n0,1.5\n1,-2\n",
+        "t,q1\n\n0,1.5\n\n1,-2\n\n\n",
+        't , "q1"\n0 , 1.5\n 1,\t-2 \n',
+        "t,q1\n0.,+1.5e0\n.1E1,-200e-2\n",
+        "t,q1\n0.000000000,1.500000000\n1.000000000,-2.000000000\n",
+    ],
+)
+def test_every_way_to_write_the_same(tmp_path, text):
+    found = read(tmp_path, text)
+    assert found.names == ("t", "q1")
+    np.testing.assert_array_equal(found.columns, [[0, 1.5], [1, -2]])
+
+
+@pytest.mark.parametrize(
+    ("cells", "decimals"),
+    [
+        (["1", "2"], 0),
+        (["1.25", "2.5"], 2),
+        (["1.", "2"], 0),
+        (["1.5e-3", "7.25"], 4),
+        (["1.5e3", "2e2"], 0),
+        ([" 1.125", "2"], 3),
+        (["1E-9", "2"], 9),
+        (["-1.250", "2"], 3),
+    ],
+)
+def test_the_decimals_are_the_most_that_a_column_shows(tmp_path, cells, decimals):
+    text = "t,q1\n" + "".join(f"{k}.5,{cell}\n" for k, cell in enumerate(cells))
+    assert read(tmp_path, text).decimals.tolist() == [1, decimals]
+
+
+def test_a_table_cannot_be_written_to(tmp_path):
+    found = read(tmp_path, "t\n1\n")
+    with pytest.raises(ValueError, match="read-only"):
+        found.columns[0] = 2
+
+
+def test_chunks_join_without_a_seam(tmp_path, monkeypatch):
+    rows = np.arange(900.0).reshape(300, 3) / 8
+    lines = [
+        ",".join(f"{value:.9f}" if k % 50 else repr(value) for value in row)
+        for k, row in enumerate(rows.tolist())
+    ]
+    text = "t,q1,q2\n" + "\n".join(lines)
+    monkeypatch.setattr(table, "_CHUNK", 100)
+    np.testing.assert_array_equal(read(tmp_path, text).columns, rows)
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, text.replace(lines[277], "1,2"))
+    assert caught.value.problems[0].place.line == 279
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("t,q1\n0,1\n1,abc\n", [("in.csv:3:3", "q1 is 'abc', expected a finite number")]),
+        ("t,q1\n0,\n", [("in.csv:2:3", "q1 is empty, expected a finite number")]),
+        ("t,q1\nnan,1\n", [("in.csv:2:1", "t is 'nan', expected a finite number")]),
+        ("t,q1\n0,-inf\n", [("in.csv:2:3", "q1 is '-inf', expected a finite number")]),
+        ("t,q1\n0,1e999\n", [("in.csv:2:3", "q1 is '1e999', expected a finite number")]),
+        ("t,q1\n0,1_000\n", [("in.csv:2:3", "q1 is '1_000', expected a finite number")]),
+        ("t,q1\n0,0x10\n", [("in.csv:2:3", "q1 is '0x10', expected a finite number")]),
+        ("t,q1\n0,1\n\n1\n", [("in.csv:4:1", "the line has 1 values, expected 2 as in line 1")]),
+        ("t,q1\n0,1,2\n", [("in.csv:2:1", "the line has 3 values, expected 2 as in line 1")]),
+        ("t,q1\n0,\xe9\xe9,\n", [("in.csv:2:1", "the line has 3 values, expected 2 as in line 1")]),
+        ("t,q1\nx,1\n0,y\n", [("in.csv:2:1", "t is 'x', expected a finite number"),
+                              ("in.csv:3:3", "q1 is 'y', expected a finite number")]),
+        ("t,q1,t\n0,1,2\n", [("in.csv:1:6", "there are two columns 't'")]),
+        ("t,,q1\n0,1,2\n", [("in.csv:1:3", "column 2 of 3 has no name")]),
+        ("0,1\n0,1\n", [("in.csv:1:1", "0 stands where a column's name should be")]),
+        ("\n0,1\n", [("in.csv:1:1", "column 1 of 1 has no name")]),
+        ("t;q1\n0;1\n", [("in.csv:1:1", "there is one column 't;q1'")]),
+        ("t,q1\n", [("in.csv:1:1", "the file has no rows, only the columns' names")]),
+        ("t,q1\n\n", [("in.csv:1:1", "the file has no rows, only the columns' names")]),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_said_with_its_place(tmp_path, text, expected):
+    assert flaws(tmp_path, text) == expected
+
+
+def test_at_most_ten_things_are_said(tmp_path):
+    assert len(flaws(tmp_path, "t,q1,q2\n" + "x,y,z\n" * 100)) == 10
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [(b"", "is empty"), (b"\x89MCAP0\r\n\x00\x01", "is not text"), (b"t\0\n1\n", "is not text"), (b"x" * 10**6, "is not text")],
+)  # fmt: skip
+def test_what_is_no_csv_at_all_is_named(tmp_path, content, message):
+    (said,) = flaws(tmp_path, content)
+    assert said.endswith(message)
+
+
+@pytest.mark.parametrize("name", ["missing.csv", ""])
+def test_a_file_that_cannot_be_read(tmp_path, name):
+    with pytest.raises(
+        FileError, match=r"cannot read .*: (No such file or directory|Is a directory)"
+    ) as caught:
+        read_csv(f"{tmp_path}/{name}")
+    assert caught.value.exit_code == 4
+
+
+def test_a_dash_is_standard_input(monkeypatch):
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(b"t,q1\n0,1\n")))
+    found = read_csv("-")
+    assert found.file == "stdin"
+    np.testing.assert_array_equal(found.columns, [[0, 1]])
+    monkeypatch.setattr("sys.stdin", None)
+    with pytest.raises(FileError, match="cannot read stdin: it is closed"):
+        read_csv("-")

@@ -1,0 +1,208 @@
+from __future__ import annotations
+
+import errno
+import os
+import stat
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from trajcli.errors import FileError
+from trajcli.streams.whole_file import standard_output, whole_file
+
+AS_ROOT = os.geteuid() == 0
+
+
+def write(path, text=b"new"):
+    with whole_file(path) as out:
+        out.write(text)
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+@pytest.mark.parametrize("old", [None, b"old"])
+def test_a_file_appears_at_the_end(tmp_path, old):
+    path = tmp_path / "out.csv"
+    if old is not None:
+        path.write_bytes(old)
+    with whole_file(str(path)) as out:
+        out.write(b"new")
+        out.flush()
+        assert (path.read_bytes() if path.exists() else None) == old
+    assert path.read_bytes() == b"new"
+    assert names(tmp_path) == ["out.csv"]
+
+
+@pytest.mark.parametrize("failure", [KeyboardInterrupt, SystemExit, ValueError, GeneratorExit])
+@pytest.mark.parametrize("old", [None, b"old"])
+def test_a_failure_leaves_what_was(tmp_path, failure, old):
+    path = tmp_path / "out.csv"
+    if old is not None:
+        path.write_bytes(old)
+    with pytest.raises(failure), whole_file(path) as out:  # noqa: PT012
+        out.write(b"half")
+        raise failure
+    assert names(tmp_path) == ([] if old is None else ["out.csv"])
+    assert old is None or path.read_bytes() == old
+
+
+def test_permissions_are_kept_and_new_files_obey_the_umask(tmp_path):
+    path = tmp_path / "out.csv"
+    before = os.umask(0o027)
+    try:
+        write(path)
+        assert stat.S_IMODE(path.stat().st_mode) == 0o640
+        path.chmod(0o606)
+        write(path)
+        assert stat.S_IMODE(path.stat().st_mode) == 0o606
+    finally:
+        os.umask(before)
+
+
+def test_a_symbolic_link_stays(tmp_path):
+    (tmp_path / "there").mkdir()
+    link, target = tmp_path / "link.csv", tmp_path / "there" / "target.csv"
+    link.symlink_to(target)
+    for _ in range(2):  # dangling, then not
+        write(link)
+        assert link.is_symlink()
+        assert target.read_bytes() == b"new"
+    assert names(tmp_path / "there") == ["target.csv"]
+
+
+def test_the_longest_name_fits(tmp_path):
+    write(tmp_path / ("n" * 255))
+    assert names(tmp_path) == ["n" * 255]
+
+
+def test_only_files_can_be_read_back(tmp_path):
+    with whole_file(tmp_path / "out.csv") as out:
+        assert out.readable()
+    with whole_file("/dev/null") as out:
+        assert not out.readable()
+        out.write(b"gone")
+    assert stat.S_ISCHR(Path("/dev/null").stat().st_mode)
+
+
+def test_a_pipe_is_written_to(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    read = []
+    reader = threading.Thread(target=lambda: read.append(pipe.read_bytes()))
+    reader.start()
+    write(pipe)
+    reader.join()
+    assert read == [b"new"]
+    assert names(tmp_path) == ["pipe"]
+
+
+def test_dev_stdout_goes_where_stdout_goes(tmp_path):
+    """Also when that is a file: what stood in it before stays, and what comes later follows."""
+    path = tmp_path / "out.txt"
+    code = (
+        "from trajcli.streams.whole_file import whole_file\nwith whole_file('{}') as out: out.write(b'new ')"
+    )
+    with path.open("wb") as stream:
+        for name in ("/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"):
+            os.write(stream.fileno(), b"before ")
+            subprocess.run([sys.executable, "-c", code.format(name)], stdout=stream, check=True)
+    assert path.read_bytes() == b"before new " * 3
+
+
+@pytest.mark.parametrize(
+    ("name", "reason", "hint"),
+    [
+        ("nowhere/out.csv", "No such file or directory", "the directory must exist"),
+        ("file/out.csv", "Not a directory", None),
+        ("", "Is a directory", None),
+        ("loop", "Too many levels of symbolic links", None),
+        ("n" * 256, "File name too long", None),
+    ],
+)
+def test_an_impossible_path_is_named_with_its_reason(tmp_path, name, reason, hint):
+    (tmp_path / "file").write_text("")
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    path = f"{tmp_path}/{name}"
+    with pytest.raises(FileError) as caught:
+        write(path)
+    assert str(caught.value) == f"cannot write {path}: {reason}"
+    assert caught.value.problems[0].hint == hint
+    assert names(tmp_path) == ["file", "loop"]
+
+
+@pytest.mark.skipif(AS_ROOT, reason="root may write everywhere")
+def test_what_may_not_be_written_is_not_replaced(tmp_path):
+    path = tmp_path / "out.csv"
+    path.write_text("old")
+    path.chmod(0o444)
+    with pytest.raises(FileError, match="Permission denied"):
+        write(path)
+    path.chmod(0o644)
+    tmp_path.chmod(0o555)
+    with pytest.raises(FileError, match="Permission denied"):
+        write(path)
+    tmp_path.chmod(0o755)
+    assert path.read_text() == "old"
+
+
+def test_a_disk_that_fills_leaves_what_was(tmp_path):
+    path = tmp_path / "out.csv"
+    path.write_text("old")
+    with pytest.raises(FileError, match="No space left on device") as caught, whole_file(path):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    assert caught.value.exit_code == 4
+    assert path.read_text() == "old"
+    assert names(tmp_path) == ["out.csv"]
+
+
+def test_a_full_device_is_told_even_when_all_fits_the_buffer():
+    with pytest.raises(FileError, match="cannot write /dev/full: No space left on device"):
+        write("/dev/full")
+
+
+def run(code, **options):
+    code = f"from trajcli.streams.whole_file import standard_output\n{code}"
+    return subprocess.run(
+        [sys.executable, "-c", code], stderr=subprocess.PIPE, text=True, check=False, **options
+    )
+
+
+WRITE = """
+try:
+    with standard_output() as out: out.write(b'x' * {})
+except Exception as error: raise SystemExit(f'{{type(error).__name__}}: {{error}}')
+"""
+
+
+@pytest.mark.parametrize("count", [1, 10**6])
+def test_standard_output_fails_once_and_clearly(count):
+    with Path("/dev/full").open("wb") as full:
+        done = run(WRITE.format(count), stdout=full)
+    assert done.returncode == 1
+    assert done.stderr == "FileError: cannot write standard output: No space left on device\n"
+
+
+@pytest.mark.parametrize("count", [1, 10**6])
+def test_a_closed_pipe_stays_a_closed_pipe(count):
+    read, write_end = os.pipe()
+    os.close(read)
+    done = run(WRITE.format(count), stdout=write_end)
+    os.close(write_end)
+    assert done.returncode == 1
+    assert done.stderr == "BrokenPipeError: [Errno 32] Broken pipe\n"
+
+
+def test_a_missing_standard_output_is_told():
+    done = run(WRITE.format(1), preexec_fn=lambda: os.close(1))
+    assert done.stderr == "FileError: cannot write standard output: it is closed\n"
+
+
+def test_standard_output_in_memory(capsysbinary):
+    with standard_output() as out:
+        out.write(b"bytes")
+    assert capsysbinary.readouterr().out == b"bytes"

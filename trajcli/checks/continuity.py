@@ -1,0 +1,201 @@
+"""Jumps: no joint may jump in position or velocity, nor in acceleration where its jerk is limited.
+
+Both sides of every break are compared. Before the first break the arm is in the trajectory's declared start,
+and after the last one in its declared end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajcli.checks.finding import Finding, Kind, Step
+from trajcli.checks.limits import peaks_by_move
+from trajcli.checks.tolerances import allowed_jump
+from trajcli.curves.extrema import Peaks
+from trajcli.curves.piecewise import Array
+from trajcli.kinematics.robot import Limits
+from trajcli.trajectory import Trajectory
+
+JERK_HINT = "use jerk_limited or quintic, or say limits: {jerk: null}"
+_SAME = 1e-12  # jumps that differ by less than this part are equal: the earliest is named
+_QUANTITIES = ("position", "velocity", "acceleration")
+_KINDS: tuple[Kind, ...] = ("position_jump", "velocity_jump", "acceleration_jump")
+
+
+def check_continuity(
+    trajectory: Trajectory,
+    limits_by_move: Sequence[Limits],
+    peaks: Sequence[tuple[Peaks, ...]] | None = None,
+) -> list[Finding]:
+    """Return where a joint jumps and must not: for each move, joint and quantity the largest jump, if any.
+
+    A jump at the border of two moves is the later one's. A step in acceleration is a finding where a move
+    that it belongs to limits the joint's jerk: a step to zero belongs to the move that ends, a step from zero
+    to the move that begins, any other to both.
+
+    Args:
+        trajectory: What to judge.
+        limits_by_move: One for each span.
+        peaks: `peaks_by_move(trajectory)`, where that is known already.
+
+    Raises:
+        ValueError: When there are more or fewer limits than spans.
+    """
+    known = peaks_by_move(trajectory) if peaks is None else peaks
+    found: list[Finding] = []
+    for order in range(2):
+        jumps = _jumps(trajectory, order, known)
+        found += _largest(trajectory, order, jumps, jumps.present, _later(trajectory))
+    steps = _jumps(trajectory, 2, known)
+    begins, ends = _limited(trajectory, limits_by_move, steps)
+    owner = np.where(begins, _later(trajectory), _earlier(trajectory))
+    return found + _largest(trajectory, 2, steps, begins | ends, owner)
+
+
+def acceleration_steps(
+    trajectory: Trajectory,
+    limits_by_move: Sequence[Limits] | None = None,
+    peaks: Sequence[tuple[Peaks, ...]] | None = None,
+) -> list[Step]:
+    """Return the steps in acceleration in order of time, or only the legal ones.
+
+    Args:
+        trajectory: What to look at.
+        limits_by_move: One for each span, to leave out the steps that `check_continuity` finds.
+        peaks: `peaks_by_move(trajectory)`, where that is known already.
+
+    Raises:
+        ValueError: When there are more or fewer limits than spans.
+    """
+    jumps = _jumps(trajectory, 2, peaks_by_move(trajectory) if peaks is None else peaks)
+    chosen = jumps.present
+    if limits_by_move is not None:
+        begins, ends = _limited(trajectory, limits_by_move, jumps)
+        chosen = chosen & ~(begins | ends)
+    rows, joints = np.nonzero(chosen)
+    owners = np.where(jumps.begins, _later(trajectory), _earlier(trajectory))[rows, joints]
+    times = (trajectory.curve.breaks - trajectory.curve.start)[rows]
+    columns = (owners.tolist(), joints.tolist(), times.tolist(), jumps.size[rows, joints].tolist())
+    return [
+        Step(trajectory.spans[owner].index, trajectory.joint_names[joint], time, size)
+        for owner, joint, time, size in zip(*columns, strict=True)
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class _Jumps:
+    """The two sides of every break, first and last included, each of shape (pieces + 1, n).
+
+    Attributes:
+        before: Value on the left side.
+        after: Value on the right side.
+        allowed: The difference that rounding explains.
+    """
+
+    before: Array
+    after: Array
+    allowed: Array
+
+    @property
+    def size(self) -> Array:
+        """Value after minus value before."""
+        return self.after - self.before
+
+    @property
+    def present(self) -> NDArray[np.bool_]:
+        """Where there is more than rounding explains."""
+        return np.logical_not(np.abs(self.size) <= self.allowed)
+
+    @property
+    def begins(self) -> NDArray[np.bool_]:
+        """Where the right side is not zero: above half of what is allowed, so that no jump lacks a side."""
+        return np.logical_not(np.abs(self.after) <= self.allowed / 2)
+
+    @property
+    def ends(self) -> NDArray[np.bool_]:
+        """Where the left side is not zero."""
+        return np.logical_not(np.abs(self.before) <= self.allowed / 2)
+
+
+def _jumps(trajectory: Trajectory, order: int, peaks: Sequence[tuple[Peaks, ...]]) -> _Jumps:
+    curve, quantity = trajectory.curve, _QUANTITIES[order]
+    first, last = curve.piece_ends(order)
+    slope_first, slope_last = np.abs(curve.piece_ends(order + 1))
+    nothing = np.zeros((1, curve.dimension))
+    slope = np.maximum(np.concatenate([nothing, slope_last]), np.concatenate([slope_first, nothing]))
+    peak = np.max([of_span[order].magnitude for of_span in peaks], axis=0)
+    return _Jumps(
+        before=np.concatenate([getattr(trajectory.start, quantity)[None], last]),
+        after=np.concatenate([first, getattr(trajectory.end, quantity)[None]]),
+        allowed=allowed_jump(peak, curve.breaks, slope),
+    )
+
+
+def _limited(
+    trajectory: Trajectory, limits_by_move: Sequence[Limits], steps: _Jumps
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return where a step breaks the jerk limit of the move after it, and of that before it, (m, n)."""
+    if len(limits_by_move) != len(trajectory.spans):
+        raise ValueError(f"{len(limits_by_move)} limits for {len(trajectory.spans)} moves")
+    limited = np.array([np.isfinite(limits.jerk).any(axis=1) for limits in limits_by_move])
+    begins = steps.present & steps.begins & limited[_later(trajectory)[:, 0]]
+    ends = steps.present & steps.ends & limited[_earlier(trajectory)[:, 0]]
+    return begins, ends
+
+
+def _later(trajectory: Trajectory) -> NDArray[np.intp]:
+    """Return the place in `spans` of the move after each break, the last move at the end; (pieces + 1, 1)."""
+    spans = _span_of_pieces(trajectory)
+    return np.append(spans, spans[-1])[:, None]
+
+
+def _earlier(trajectory: Trajectory) -> NDArray[np.intp]:
+    """Return the place in `spans` of the move before each break, the first at the start; (pieces + 1, 1)."""
+    spans = _span_of_pieces(trajectory)
+    return np.append(spans[0], spans)[:, None]
+
+
+def _span_of_pieces(trajectory: Trajectory) -> NDArray[np.intp]:
+    """Return the span of each piece, looked up at its middle because borders may be rounded; (pieces,)."""
+    starts = np.array([span.start for span in trajectory.spans])
+    breaks = trajectory.curve.breaks - trajectory.curve.start
+    later = np.searchsorted(starts, (breaks[1:] + breaks[:-1]) / 2, "right")
+    return np.maximum(later - 1, 0)
+
+
+def _largest(
+    trajectory: Trajectory, order: int, jumps: _Jumps, chosen: NDArray[np.bool_], owner: NDArray[np.intp]
+) -> list[Finding]:
+    """Return a finding for the largest of the chosen jumps of each move and joint."""
+    owners = np.broadcast_to(owner, chosen.shape)
+    rows, joints = _first_largest(np.abs(jumps.size), chosen, owners)
+    times = trajectory.curve.breaks - trajectory.curve.start
+    return [
+        Finding(
+            move=trajectory.spans[int(owners[row, joint])].index,
+            joint=trajectory.joint_names[joint],
+            kind=_KINDS[order],
+            value=float(jumps.size[row, joint]),
+            limit=float(jumps.allowed[row, joint]),
+            time=float(times[row]),
+            hint=JERK_HINT if order == 2 else None,
+        )
+        for row, joint in zip(rows.tolist(), joints.tolist(), strict=True)
+    ]
+
+
+def _first_largest(
+    sizes: Array, chosen: NDArray[np.bool_], owner: NDArray[np.intp]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return rows and columns of the largest chosen size of each owner and column, first of equal ones."""
+    rows, columns = np.nonzero(chosen)
+    group = owner[rows, columns] * sizes.shape[1] + columns
+    largest = np.full(int(group.max(initial=-1)) + 1, 0.0)
+    np.maximum.at(largest, group, sizes[rows, columns])
+    top = np.flatnonzero(np.logical_not(sizes[rows, columns] < largest[group] * (1 - _SAME)))
+    first = top[np.unique(group[top], return_index=True)[1]]
+    return rows[first], columns[first]

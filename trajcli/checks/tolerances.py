@@ -1,0 +1,54 @@
+"""Every tolerance of the checks, with its reason."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from trajcli.curves.piecewise import Array
+
+# A planner that runs at a limit reaches it by way of a dozen roundings, each 1e-16 of the value and each
+# magnified by what cancels; 1e-9 is a million times that, and a million times finer than any data sheet.
+LIMIT_RELATIVE = 1e-9
+
+# A bound of zero, or a joint that stands at its stop, leaves nothing to be relative to: a picometre, or a
+# picoradian, is a thousandth of the last decimal that is written.
+LIMIT_ABSOLUTE = 1e-12
+
+# Two formulas for the same state agree up to rounding; a real jump is a planner's mistake and has the size of
+# the motion. Relative to the joint's peak of the quantity that jumps, for the reason of LIMIT_RELATIVE.
+JUMP_RELATIVE = 1e-9
+
+# A joint that rests has a peak of zero, or of a rounding: positions of some radians or metres carry 1e-15.
+JUMP_ABSOLUTE = 1e-12
+
+# Breaks are float64. When a piece ends one unit in the last place of its break too late, the value there is
+# off by that times the next derivative: a ramp of 1e-14 s at 1e15 rad/s^2 is steep, not discontinuous. Both
+# ends of the piece are rounded, hence two units.
+JUMP_BREAK_UNITS = 2.0
+
+# A span whose length was added up in another order than the curve's breaks ends some units beside one.
+BORDER_UNITS = 4.0
+
+
+def exceeds(value: ArrayLike, bound: ArrayLike) -> NDArray[np.bool_]:
+    """Return whether values are above an upper bound by more than rounding; for a lower bound negate both.
+
+    Args:
+        value: Any shape, SI. One that is not a number exceeds everything.
+        bound: Broadcasts against `value`; infinite means unlimited.
+    """
+    limit = np.asarray(bound, dtype=np.float64)
+    return np.logical_not(np.asarray(value) <= limit + LIMIT_RELATIVE * np.abs(limit) + LIMIT_ABSOLUTE)
+
+
+def allowed_jump(peak: Array, breaks: Array, next_derivative: Array) -> Array:
+    """Return the difference between the two sides of a break that rounding explains, shape (m, n).
+
+    Args:
+        peak: Shape (n,): the joint's largest absolute value of the quantity over the trajectory.
+        breaks: Shape (m,), s.
+        next_derivative: Shape (m, n): largest absolute value of the quantity's derivative at the break.
+    """
+    late = JUMP_BREAK_UNITS * np.spacing(np.abs(breaks))[:, None] * next_derivative
+    return JUMP_ABSOLUTE + JUMP_RELATIVE * peak + late

@@ -1,0 +1,74 @@
+"""All judgements of a trajectory in one verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from trajcli.checks.continuity import acceleration_steps, check_continuity
+from trajcli.checks.finding import Finding, Step
+from trajcli.checks.limits import check_limits, peaks_by_move
+from trajcli.curves.extrema import Peaks
+from trajcli.kinematics.robot import QUANTITIES, Limits
+from trajcli.trajectory import Trajectory
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What the checks found.
+
+    Attributes:
+        findings: What is wrong, by move and time.
+        steps: Legal steps in acceleration, in order of time.
+        peaks: For each span the extremes of position, velocity, acceleration and jerk, times on the curve.
+        unchecked: (joint, quantity) that some move leaves unlimited in at least one direction.
+    """
+
+    findings: tuple[Finding, ...]
+    steps: tuple[Step, ...]
+    peaks: tuple[tuple[Peaks, ...], ...]
+    unchecked: tuple[tuple[str, str], ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing is wrong."""
+        return not self.findings
+
+
+def verify(trajectory: Trajectory, limits_by_move: Sequence[Limits]) -> Verdict:
+    """Return the verdict on a trajectory: its joint limits for all t, and its continuity.
+
+    Args:
+        trajectory: What to judge.
+        limits_by_move: The limits in force, one for each span.
+
+    Raises:
+        ValueError: When there are more or fewer limits than spans.
+    """
+    peaks = tuple(peaks_by_move(trajectory))
+    findings = check_limits(trajectory, limits_by_move, peaks)
+    findings += check_continuity(trajectory, limits_by_move, peaks)
+    place = {span.index: k for k, span in enumerate(trajectory.spans)}
+    findings.sort(key=lambda finding: (place.get(finding.move or 0, 0), finding.time))
+    return Verdict(
+        findings=tuple(findings),
+        steps=tuple(acceleration_steps(trajectory, limits_by_move, peaks)),
+        peaks=peaks,
+        unchecked=_unchecked(trajectory, limits_by_move),
+    )
+
+
+def _unchecked(trajectory: Trajectory, limits_by_move: Sequence[Limits]) -> tuple[tuple[str, str], ...]:
+    open_ended = [
+        [np.isinf(limits.of_order(order)).any(axis=1) for limits in limits_by_move]
+        for order in range(len(QUANTITIES))
+    ]
+    found = np.any(open_ended, axis=1)
+    return tuple(
+        (name, quantity)
+        for joint, name in enumerate(trajectory.joint_names)
+        for order, quantity in enumerate(QUANTITIES)
+        if found[order, joint]
+    )

@@ -1,0 +1,124 @@
+"""What the columns of a sample stream are called, and what a column's name says.
+
+A column in SI has its plain name (`q1`, `qd1`, `x`), any other carries its unit (`q1_deg`, `qd1_deg`,
+`q3_mm`).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from trajcli.curves.piecewise import Array
+from trajcli.errors import InputError
+from trajcli.kinematics.robot import JointType
+from trajcli.units import Quantity, Units, factor
+
+Group = Literal["t", "q", "qd", "qdd", "qddd", "move"]
+JOINT_ORDERS = {"q": 0, "qd": 1, "qdd": 2, "qddd": 3}
+GROUPS: tuple[Group, ...] = ("t", "q", "qd", "qdd", "qddd", "move")
+
+_UNIT_FACTORS = {
+    "deg": factor(Quantity("angle"), Units(angle="deg")),
+    "mm": factor(Quantity("length"), Units(length="mm")),
+}
+_NAME = re.compile(r"(?P<stem>.+?)(?:_(?P<unit>deg|mm))?", re.DOTALL)
+_JOINT = re.compile(r"(?P<kind>qd{0,3})(?P<number>[1-9][0-9]*)")
+
+
+@dataclass(frozen=True)
+class Column:
+    """What one column holds.
+
+    Attributes:
+        kind: "t", "q", "qd", "qdd", "qddd", "move", or the plain name of any other column, such as "x".
+        joint: Index of the joint, from 0; None where the column is not about one joint.
+        unit: "deg" or "mm"; None for SI.
+    """
+
+    kind: str
+    joint: int | None = None
+    unit: str | None = None
+
+    @property
+    def name(self) -> str:
+        """The column's name in a file."""
+        number = "" if self.joint is None else str(self.joint + 1)
+        return f"{self.kind}{number}" + (f"_{self.unit}" if self.unit else "")
+
+    @property
+    def quantity(self) -> tuple[str, int | None]:
+        """Kind and joint: the same for columns that differ in nothing but their unit."""
+        return self.kind, self.joint
+
+    @property
+    def factor(self) -> float:
+        """SI per unit of the column."""
+        return _UNIT_FACTORS[self.unit] if self.unit else 1.0
+
+    @property
+    def whole_numbers(self) -> bool:
+        """Whether the column counts, and is written without decimals."""
+        return self.kind == "move"
+
+
+def parse_column(name: str) -> Column:
+    """Return what `name` says; a name that is not of this language is a kind of its own."""
+    parts = _NAME.fullmatch(name)
+    stem, unit = (parts["stem"], parts["unit"]) if parts else (name, None)
+    joint = _JOINT.fullmatch(stem)
+    if joint:
+        return Column(joint["kind"], int(joint["number"]) - 1, unit)
+    return Column(stem, None, unit)
+
+
+def column_names(groups: Sequence[Group], joint_types: Sequence[JointType], units: Units) -> list[str]:
+    """Return the name of every column of `groups`, in the order of the groups, joints from the base on.
+
+    Raises:
+        InputError: When `groups` is empty, or holds an unknown group or one twice.
+    """
+    check_groups(groups)
+    names: list[str] = []
+    for group in groups:
+        if group in JOINT_ORDERS:
+            names += [Column(group, k, _suffix(kind, units)).name for k, kind in enumerate(joint_types)]
+        else:
+            names.append(group)
+    return names
+
+
+def check_groups(groups: Sequence[str]) -> None:
+    """Refuse a choice of columns that cannot be written.
+
+    Raises:
+        InputError: When `groups` is empty, or holds an unknown group or one twice.
+    """
+    hint = f"the columns are {', '.join(GROUPS)}"
+    if not groups:
+        raise InputError("no columns are asked for", hint=hint)
+    for place, group in enumerate(groups):
+        if group not in GROUPS:
+            raise InputError(f"there are no columns '{group}'", hint=hint)
+        if group in groups[:place]:
+            raise InputError(f"the columns '{group}' are asked for twice", hint="name them once")
+
+
+def joint_factors(joint_types: Sequence[JointType], units: Units) -> Array:
+    """Return SI per user unit for each joint's position and its time derivatives, shape (n,)."""
+    quantities = [Quantity("length" if kind == "prismatic" else "angle") for kind in joint_types]
+    return np.array([factor(quantity, units) for quantity in quantities], dtype=np.float64)
+
+
+def whole_number_columns(names: Sequence[str]) -> tuple[int, ...]:
+    """Return the places of the columns that are written without decimals."""
+    return tuple(place for place, name in enumerate(names) if parse_column(name).whole_numbers)
+
+
+def _suffix(joint_type: JointType, units: Units) -> str | None:
+    unit = units.length if joint_type == "prismatic" else units.angle
+    return unit if unit in _UNIT_FACTORS else None

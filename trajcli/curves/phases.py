@@ -1,0 +1,215 @@
+"""Motion of one variable in phases, in each of which one derivative is constant: jerk, acceleration or velocity.
+
+A solver hands its phases over with an error of its own. Newton's method on the durations lays the end of the
+motion exactly into its target: the least relative change of the durations that does it, so that phases of
+length zero stay away and long ones carry the correction. Where the durations alone cannot do it (a motion of
+given duration with few phases), the constants change too, a thousand times less willingly.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import factorial
+
+import numpy as np
+
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
+
+_GOAL = 4e-15  # relative to the scales: what summing a few phases leaves
+_ROUNDS = 12
+_RELUCTANCE = 1e-3
+_LARGEST_STEP = 0.5
+_LEVEL = 1e-9  # of the peak: an acceleration below this in a phase without jerk means a cruise
+
+
+@dataclass(frozen=True, eq=False)
+class PhaseChain:
+    """A motion from a given state, relative to its first position.
+
+    Attributes:
+        initial: Shape (order,): position 0 and its derivatives below the constant one at the start.
+        final: Shape (order,): the same at the end, as wanted; NaN where it is free.
+        durations: Shape (k,), positive.
+        constants: Shape (k,): the derivative of the given order in each phase.
+        cruising: Phases in which the derivative below is zero, not only small: else its rounding error would
+            drift through the longest phases.
+    """
+
+    initial: Array
+    final: Array
+    durations: Array
+    constants: Array
+    cruising: frozenset[int] = frozenset()
+
+    @property
+    def order(self) -> int:
+        """The derivative that is constant in each phase: 1, 2 or 3."""
+        return int(self.initial.size)
+
+    @cached_property
+    def duration(self) -> float:
+        """Sum of the phases' durations."""
+        return float(self.durations.sum())
+
+    @cached_property
+    def _walk(self) -> tuple[Array, Array]:
+        """The states before each phase and at the end, (k + 1, order), and what cruises found instead of zero."""
+        state = self.initial.tolist()
+        rows, leftover = [], []
+        for k, (time, constant) in enumerate(
+            zip(self.durations.tolist(), self.constants.tolist(), strict=True)
+        ):
+            if k in self.cruising:
+                leftover.append(state[-1])
+                state[-1] = 0.0
+            rows.append(state)
+            state = _after(state, constant, time)
+        return np.array([*rows, state]), np.array(leftover)
+
+    @property
+    def states(self) -> Array:
+        """Derivatives of order 0 to `order` - 1 before each phase and at the end, shape (k + 1, order)."""
+        return self._walk[0]
+
+    @cached_property
+    def peaks(self) -> Array:
+        """Largest magnitude of each derivative at the ends of phases, shape (order,)."""
+        return np.abs(self.states).max(axis=0)
+
+    @property
+    def scales(self) -> Array:
+        """The peaks, but for the position peak velocity times duration: rounding counts relative to that."""
+        scales = self.peaks.copy()
+        if self.order > 1:
+            scales[0] = max(scales[0], scales[1] * self.duration)
+        return np.where(scales > 0, scales, 1.0)
+
+    def with_cruises(self) -> PhaseChain:
+        """Return the motion with its cruises marked: phases without jerk and without acceleration."""
+        if self.order < 3:
+            return self
+        level = (np.abs(self.states[:-1, -1]) <= _LEVEL * self.peaks[-1]) & (self.constants == 0)
+        return replace(self, cruising=frozenset(np.flatnonzero(level).tolist()))
+
+    def defect(self, duration: float | None = None) -> float:
+        """Return by how much the end misses its target, relative to `scales` (and to `duration` if given)."""
+        return float(np.abs(self._residual(self.scales, duration)).max(initial=0.0))
+
+    def stretched(self, duration: float) -> PhaseChain:
+        """Return the motion over the same positions in `duration`; boundary derivatives must be zero."""
+        factor = duration / self.duration
+        return replace(self, durations=self.durations * factor, constants=self.constants / factor**self.order)
+
+    def polished(self, duration: float | None = None) -> PhaseChain:
+        """Return the motion whose end is its target to rounding, if the phases allow it; see `defect`.
+
+        Args:
+            duration: Kept exactly if given; else the duration is free.
+        """
+        best = self._corrected(1.0, 0.0, duration)
+        if best.defect(duration) > 10 * _GOAL and duration is not None:
+            other = self._corrected(1.0, _RELUCTANCE, duration)
+            best = min(best, other, key=lambda chain: chain.defect(duration))
+        return best
+
+    def curve(self, position: float, duration: float) -> PiecewisePolynomial:
+        """Return the motion from `position` as a curve (n = 1) over [0, `duration`].
+
+        Break times are rounded so that no phase but the longest gets shorter: no constant need grow. What that
+        does to the end is taken back by the constants, and what is left of the distance by the velocity of the
+        longest phase.
+        """
+        if not self.durations.size:
+            return PiecewisePolynomial(np.zeros(2), np.full((1, 1, 1), position))
+        breaks = _rounded_breaks(self.durations.tolist(), duration)
+        lengths = np.diff(breaks)
+        chain = replace(self, durations=lengths, constants=self.constants * self.durations / lengths)
+        chain = chain._corrected(0.0, 1.0, None)
+        states = chain.states[:-1]
+        rows = np.stack([chain.constants, *states.T[::-1]])
+        rows /= np.array([factorial(k) for k in range(self.order, -1, -1)])[:, None]
+        if not np.isnan(self.final[0]):
+            longest = int(lengths.argmax())
+            missing = self.final[0] - chain.states[-1, 0]
+            rows[-2, longest] += missing / lengths[longest]
+            rows[-1, longest + 1 :] += missing
+        rows[-1] += position
+        return PiecewisePolynomial(breaks, rows[:, :, None])
+
+    def _corrected(self, yield_duration: float, yield_constant: float, duration: float | None) -> PhaseChain:
+        """Return the chain after Newton steps that are least in the relative changes of durations and constants."""
+        chain, best, scales = self, self, self.scales
+        weights = np.repeat([yield_duration, yield_constant], self.durations.size)
+        least = np.inf
+        for _ in range(_ROUNDS):
+            residual = chain._residual(scales, duration)
+            miss = float(np.abs(residual).max(initial=0.0))
+            if miss < least:
+                best, least = chain, miss
+            if miss <= _GOAL:
+                break
+            matrix = chain._sensitivity(scales, duration) * weights
+            step = weights * np.linalg.lstsq(matrix, -residual, rcond=None)[0]
+            change = 1 + np.clip(step, -_LARGEST_STEP, _LARGEST_STEP).reshape(2, -1)
+            chain = replace(
+                chain, durations=chain.durations * change[0], constants=chain.constants * change[1]
+            )
+        return best
+
+    def _residual(self, scales: Array, duration: float | None) -> Array:
+        states, leftover = self._walk
+        miss = ((states[-1] - self.final) / scales)[~np.isnan(self.final)]
+        total = [] if duration is None else [self.duration / duration - 1]
+        return np.concatenate([miss, leftover / scales[-1], total])
+
+    def _sensitivity(self, scales: Array, duration: float | None) -> Array:
+        """Return the derivative of the residual by the relative changes of durations and constants."""
+        count, order = self.durations.size, self.order
+        by_change = np.zeros((order, 2 * count))
+        at_cruises = []
+        for k, (time, constant) in enumerate(
+            zip(self.durations.tolist(), self.constants.tolist(), strict=True)
+        ):
+            if k in self.cruising:
+                at_cruises.append(by_change[-1] / scales[-1])
+                by_change[-1] = 0.0
+            flow = _flow(time, order)
+            by_change = flow[:, :order] @ by_change
+            by_change[:, k] += np.append(self.states[k + 1][1:], constant) * time
+            by_change[:, count + k] += flow[:, order] * constant
+        rows = [*(by_change / scales[:, None])[~np.isnan(self.final)], *at_cruises]
+        if duration is not None:
+            rows.append(np.concatenate([self.durations / duration, np.zeros(count)]))
+        return np.array(rows)
+
+
+def _rounded_breaks(durations: list[float], end: float) -> Array:
+    """Return breaks from 0 to `end` between which all phases but the longest last at least their durations."""
+    longest = durations.index(max(durations))
+    before, after = [0.0], [end]
+    for length in durations[:longest]:
+        time = before[-1] + length
+        before.append(time if time - before[-1] >= length else math.nextafter(time, math.inf))
+    for length in durations[:longest:-1]:
+        time = after[-1] - length
+        after.append(time if after[-1] - time >= length else math.nextafter(time, -math.inf))
+    return np.array(before + after[::-1])
+
+
+def _after(state: list[float], constant: float, time: float) -> list[float]:
+    """Return the derivatives `time` later, when the one of order len(state) is constant."""
+    later = []
+    for order in range(len(state)):
+        value = constant
+        for power in range(len(state) - order, 0, -1):
+            value = state[order + power - 1] + value * time / power
+        later.append(value)
+    return later
+
+
+def _flow(time: float, order: int) -> Array:
+    """Return the matrix (order, order + 1) that takes a state and the constant to the state `time` later."""
+    taylor = [time**k / factorial(k) for k in range(order + 1)]
+    return np.array([[taylor[j - i] if j >= i else 0.0 for j in range(order + 1)] for i in range(order)])

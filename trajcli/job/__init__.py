@@ -1,0 +1,1 @@
+"""The file format: YAML with positions, units, the model, robot sources, limits, schemas."""

@@ -1,0 +1,106 @@
+"""The job file as a model. Values are SI; units, names and per-joint forms are resolved while it is read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+from pydantic.json_schema import JsonSchemaValue
+
+from trajcli.columns import Group
+from trajcli.kinematics.robot import Robot
+from trajcli.planners import Move
+from trajcli.planners.bounds import LimitsSpec
+from trajcli.planners.fields import Model, NamedTarget, Target
+from trajcli.planners.planner import WhenOverLimit
+from trajcli.planners.reading import FieldType, FlawError, Number, ReadingContext, refuse, shown
+from trajcli.units import Quantity, Units
+
+
+
+
+class UnitsSpec(Model):
+    """Units of plain numbers, and of the columns that are written."""
+
+    angle: Annotated[Literal["rad", "deg"], Field(description="Unit of angles.")] = "rad"
+    length: Annotated[Literal["m", "mm"], Field(description="Unit of lengths.")] = "m"
+
+    def as_units(self) -> Units:
+        """Return the plain value."""
+        return Units(self.angle, self.length)
+
+
+@dataclass(frozen=True)
+class RobotSource(FieldType):
+    """A robot, which the loader has put in the place of what names it."""
+
+    description: str = "Name of a catalogue robot, {file: PATH}, or the robot itself."
+
+    def read(self, value: Any, context: ReadingContext) -> Robot:  # noqa: ANN401
+        """Return the robot."""
+        if isinstance(value, Robot):
+            return value
+        raise FlawError(f"expected a robot, got {shown(value)}")
+
+    def json_schema(self) -> JsonSchemaValue:
+        """Return the schema of the three forms."""
+        file = {"type": "object", "properties": {"file": {"type": "string"}}, "required": ["file"]}
+        inline = {"$ref": "#/$defs/RobotModel"}
+        return {"anyOf": [{"type": "string"}, {**file, "additionalProperties": False}, inline]}
+
+
+Seconds = Annotated[float, Number(Quantity("time"), "Time, s.")]
+
+
+class Output(Model):
+    """Which rows and columns are written."""
+
+    rate: Annotated[float, Number(Quantity("frequency"), "Rows per second, Hz.", above=0.0)] = 1000.0
+    times: Annotated[list[Seconds] | None, Field(description="Times of the rows instead of a rate, s.")] = None
+    start_time: Annotated[float, Number(Quantity("time"), "Time of the first row, s.")] = 0.0
+    align: Annotated[bool, Field(description="Stretch each move to a whole number of periods.")] = False
+    columns: Annotated[
+        list[Group],
+        Field(min_length=1, description="Groups of columns, in this order: qd is the velocity, qdd the acceleration."),
+    ] = ["t", "q", "qd", "qdd"]
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Output:
+        if self.times is not None and "rate" in self.model_fields_set:
+            raise refuse([(("times",), "rate and times exclude each other", "leave one of them out")])
+        if self.times is not None and self.align:
+            raise refuse([(("align",), "align needs a rate, not times", "leave one of them out")])
+        if self.times is not None and (not self.times or any(b <= a for a, b in zip(self.times, self.times[1:]))):  # noqa: B905, RUF007
+            raise refuse([(("times",), "times must strictly increase, and there must be one", None)])
+        if len(set(self.columns)) < len(self.columns):
+            raise refuse([(("columns",), "a group of columns stands twice", None)])
+        return self
+
+
+class Job(Model):
+    """One robot, named points, and the moves to plan."""
+
+    version: Annotated[Literal[1], Field(description="Version of the job language.")]
+    name: Annotated[str | None, Field(description="For reports; the file's stem when left out.")] = None
+    units: UnitsSpec = UnitsSpec()
+    robot: Annotated[Robot, RobotSource()]
+    limits: Annotated[LimitsSpec | None, Field(description="Replaces the robot's limits, then scales.")] = None
+    points: Annotated[dict[str, Target], Field(description="Named states.")] = {}
+    start: Annotated[NamedTarget, Field(description="Where the arm stands before the first move.")]
+    moves: Annotated[list[Move], Field(min_length=1, description="What to do, in order.")]
+    when_over_limit: Annotated[
+        WhenOverLimit,
+        Field(description="error: exit 1; slow: the smallest stretch of the move that verifies, which is reported."),
+    ] = "error"
+    output: Output = Output()
+
+    @model_validator(mode="after")
+    def _start_is_a_place(self) -> Job:
+        if self.start.joints is None:
+            raise refuse([(("start",), "the start needs `joints`", None)])
+        first = self.moves[0]
+        if first.continuity == 1 and any(self.start.acceleration or ()):
+            hint = "use quintic or jerk_limited for the first move, or leave it out"
+            raise refuse([(("start",), f"{first.tag} cannot start with an acceleration", hint)])
+        return self

@@ -1,0 +1,127 @@
+"""Read a job file: YAML with positions, then the robot, then everything else in SI."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from trajcli.errors import Amount, InputError, Place, Problem
+from trajcli.job.limits import with_job_limits
+from trajcli.job.load import Document, parse_document, read_document
+from trajcli.job.messages import problems_of
+from trajcli.job.model import Job, UnitsSpec
+from trajcli.job.override import overridden
+from trajcli.job.robot_source import find_robot
+from trajcli.kinematics.robot import Robot
+from trajcli.planners.planner import Event
+from trajcli.planners.reading import ReadingContext
+from trajcli.units import Quantity, Units, to_user, unit_name
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedJob:
+    """A job that was read.
+
+    Attributes:
+        job: In SI.
+        name: The job's own, or the file's stem.
+        robot: With the job's limits in force.
+        document: For the places of later errors.
+        events: Concessions, such as a limit looser than the robot's.
+    """
+
+    job: Job
+    name: str
+    robot: Robot
+    document: Document
+    events: tuple[Event, ...]
+
+    @property
+    def units(self) -> Units:
+        """Units of the file, and of what is written."""
+        return self.job.units.as_units()
+
+    def say(self, amount: Amount) -> str:
+        """Return a number of a message in the job's units."""
+        if amount.joint is None:
+            return f"{amount.value:.9g} s"
+        prismatic = self.robot.joint_types[amount.joint] == "prismatic"
+        quantity = Quantity("length" if prismatic else "angle", amount.order)
+        return f"{to_user(amount.value, quantity, self.units):.9g} {unit_name(quantity, self.units)}"
+
+    def place_of_move(self, index: int) -> Place:
+        """Return where a move stands in the file."""
+        return self.document.place(("moves", index))
+
+
+def read_job(path: str, overrides: Sequence[str] = ()) -> LoadedJob:
+    """Return the job of a file; `-` is standard input.
+
+    Args:
+        path: The file.
+        overrides: Such as "moves.0.duration=3"; they replace what the file says, or add to it.
+
+    Raises:
+        InputError: With every flaw of the file at once.
+        FileError: When it cannot be read.
+    """
+    return _load(overridden(read_document(path), overrides))
+
+
+def job_from_text(text: str, file: str = "<text>") -> LoadedJob:
+    """Return the job of a text.
+
+    Raises:
+        InputError: With every flaw of the text at once.
+    """
+    return _load(parse_document(text, file))
+
+
+def _load(document: Document) -> LoadedJob:
+    plain = dict(document.plain())
+    units = _units(plain.get("units"))
+    problems: list[Problem] = []
+    robot: Robot | None = None
+    if "robot" in plain:
+        try:
+            robot = find_robot(plain["robot"], document, units)
+        except InputError as error:
+            problems += error.problems
+    context = ReadingContext(units, points=_points(plain.get("points")))
+    if robot is not None:
+        context.joint_names, context.joint_types = robot.joint_names, robot.joint_types
+    try:
+        job = Job.model_validate({**plain, **({"robot": robot} if robot else {})}, context=context)
+    except ValidationError as error:
+        problems += problems_of(error, Job, document)
+    if robot is None and problems:
+        problems = [problem for problem in problems if not problem.message.startswith("expected a robot, got")]
+    if problems or robot is None:
+        raise InputError(*sorted(problems, key=_position))
+    effective, events = with_job_limits(robot, job.limits)
+    name = job.name or ("stdin" if document.file in ("-", "<stdin>") else Path(document.file).stem)
+    return LoadedJob(job, name, effective, document, tuple(events))
+
+
+def _position(problem: Problem) -> tuple[str, int, int]:
+    return (problem.place.file, problem.place.line, problem.place.column) if problem.place else ("", 0, 0)
+
+
+def _units(value: Any) -> Units:  # noqa: ANN401
+    """Return the file's units as far as they are right; what is wrong is reported with the rest."""
+    given = value if isinstance(value, Mapping) else {}
+    right = {}
+    for key in ("angle", "length"):
+        try:
+            right |= {key: getattr(UnitsSpec.model_validate({key: given[key]}), key)} if key in given else {}
+        except ValidationError:
+            continue
+    return Units(**right)
+
+
+def _points(value: Any) -> Mapping[str, Any]:  # noqa: ANN401
+    return value if isinstance(value, Mapping) else {}

@@ -1,0 +1,110 @@
+"""The report as a model: what `--report` writes, and what schemas/report.schema.json describes. All SI."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from trajcli.planners.fields import Model
+
+Seconds = Annotated[float, Field(description="Seconds.")]
+Quantity = Literal["position", "velocity", "acceleration", "jerk"]
+
+
+class PeakReport(Model):
+    """The extremes of one joint's quantity in one move."""
+
+    joint: str
+    quantity: Quantity
+    low: Annotated[float, Field(description="Smallest value, SI.")]
+    low_time: Annotated[float, Field(description="Where it is, seconds from the start of the trajectory.")]
+    high: Annotated[float, Field(description="Largest value, SI.")]
+    high_time: Annotated[float, Field(description="Where it is, seconds from the start of the trajectory.")]
+    limit: Annotated[tuple[float | None, float | None], Field(description="Bounds, SI; null is unlimited.")]
+    used: Annotated[float | None, Field(description="Largest part of the bound that is used; null if unlimited.")]
+
+
+class BindingReport(Model):
+    """The limit that a move uses most."""
+
+    joint: str
+    quantity: Quantity
+    used: Annotated[float, Field(description="Part of the bound that is used: 1 is all of it.")]
+
+
+class ReferenceReport(Model):
+    """The shortest duration that any point-to-point move may have under the same limits, found by ruckig."""
+
+    duration: Seconds
+    ratio: Annotated[float | None, Field(description="Duration of the move over it; null where it is zero.")]
+    joint: Annotated[str | None, Field(description="The joint that needs it.")]
+
+
+class MoveReport(Model):
+    """One move."""
+
+    index: Annotated[int, Field(description="From 0.")]
+    planner: str
+    start: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
+    end: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
+    duration: Seconds
+    continuity: Annotated[Literal[1, 2], Field(description="Derivatives that the planner joins without a jump.")]
+    stretch: Annotated[float, Field(description="How many times longer it lasts than its planner said.")]
+    peaks: list[PeakReport]
+    binding: BindingReport | None
+    reference: ReferenceReport | None = None
+
+
+class FindingReport(Model):
+    """Something that is wrong."""
+
+    move: int | None
+    joint: str | None
+    kind: str
+    value: Annotated[float, Field(description="SI.")]
+    limit: Annotated[float, Field(description="SI.")]
+    time: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
+    method: Annotated[Literal["exact", "bounded"], Field(description="How the value was found.")]
+    factor: Annotated[float | None, Field(description="The move must last this many times longer; null: no help.")]
+    hint: str | None = None
+
+
+class EventReport(Model):
+    """A concession that was made."""
+
+    kind: str
+    message: str
+    move: int | None
+
+
+class StepReport(Model):
+    """A legal step in a joint's acceleration."""
+
+    move: int
+    joint: str
+    time: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
+    size: Annotated[float, Field(description="Acceleration after minus before, SI.")]
+
+
+class UncheckedReport(Model):
+    """A quantity that is not checked because it has no limit."""
+
+    joint: str
+    quantity: Quantity
+
+
+class Report(Model):
+    """What became of a job."""
+
+    version: Literal[1] = 1
+    trajcli: Annotated[str, Field(description="Version of trajcli.")]
+    verdict: Literal["verified", "violated"]
+    job: Annotated[str, Field(description="The job's name.")]
+    robot: Annotated[str, Field(description="The robot's name.")]
+    duration: Seconds
+    moves: list[MoveReport]
+    findings: list[FindingReport]
+    events: list[EventReport]
+    steps: list[StepReport]
+    unchecked: list[UncheckedReport]

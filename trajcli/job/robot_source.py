@@ -1,0 +1,101 @@
+"""Where a job's robot comes from: the catalogue, a robot file, or the job itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from trajcli.errors import FileError, InputError, Problem
+from trajcli.job.load import Document, read_document
+from trajcli.job.messages import problems_of
+from trajcli.job.robot_model import RobotModel
+from trajcli.job.suggest import did_you_mean, valid_names
+from trajcli.kinematics.robot import Robot
+from trajcli.planners.reading import ReadingContext, shown
+from trajcli.units import Units
+
+CATALOGUE = Path(__file__).parent.parent / "catalogue"
+
+
+def catalogue_names() -> list[str]:
+    """Return the names of the robots that come with trajcli."""
+    return sorted(path.stem for path in CATALOGUE.glob("*.yaml"))
+
+
+def find_robot(value: Any, document: Document, units: Units) -> Robot:  # noqa: ANN401
+    """Return the robot that stands under `robot` in a job.
+
+    Args:
+        value: A name, {file: PATH} (relative to the job's folder), or the robot itself.
+        document: The job's, for places.
+        units: The job's, in force for a robot that stands in the job.
+
+    Raises:
+        InputError: With every flaw of the robot.
+        FileError: When the robot's file cannot be read.
+    """
+    if isinstance(value, str):
+        return _from_catalogue(value, document)
+    if isinstance(value, Mapping) and "file" in value:
+        return _from_file_entry(value, document)
+    if not isinstance(value, Mapping):
+        message = f"expected a robot's name, {{file: PATH}} or a robot, got {shown(value)}"
+        raise InputError(Problem(message, valid_names(catalogue_names()), document.place(("robot",))))
+    if "units" in value:
+        place = document.place(("robot", "units"), key=True)
+        raise InputError(Problem("a robot inside a job uses the job's units", "leave `units` out here", place))
+    return _validated(value, document, ("robot",), units)
+
+
+def read_robot_file(path: str) -> Robot:
+    """Return the robot of a robot file, which has its own units.
+
+    Raises:
+        InputError: With every flaw of the file.
+        FileError: When it cannot be read.
+    """
+    document = read_document(path)
+    plain = document.plain()
+    spec = plain.get("units") if isinstance(plain.get("units"), Mapping) else {}
+    units = Units(
+        "deg" if spec.get("angle") == "deg" else "rad",
+        "mm" if spec.get("length") == "mm" else "m",
+    )
+    return _validated({"name": Path(path).stem, **plain}, document, (), units)
+
+
+def _from_catalogue(name: str, document: Document) -> Robot:
+    names = catalogue_names()
+    if name in names:
+        return read_robot_file(str(CATALOGUE / f"{name}.yaml"))
+    hint = did_you_mean(name, names) or valid_names(names)
+    if "/" in name or name.endswith((".yaml", ".yml")):
+        hint = f"a file is named by {{file: {name}}}"
+    raise InputError(Problem(f"the catalogue has no robot '{name}'", hint, document.place(("robot",))))
+
+
+def _from_file_entry(value: Mapping[str, Any], document: Document) -> Robot:
+    extra = [key for key in value if key != "file"]
+    if extra:
+        place = document.place(("robot", extra[0]), key=True)
+        hint = "change the robot under the job's `limits`, or copy its file"
+        raise InputError(Problem(f"unknown key '{extra[0]}' beside `file`", hint, place))
+    if not isinstance(value["file"], str):
+        place = document.place(("robot", "file"))
+        raise InputError(Problem(f"expected a path, got {shown(value['file'])}", None, place))
+    folder = Path.cwd() if document.file in ("-", "<stdin>") else Path(document.file).parent
+    try:
+        return read_robot_file(str(folder / value["file"]))
+    except FileError as error:
+        raise error.located(place=document.place(("robot", "file"))) from None
+
+
+def _validated(value: Mapping[str, Any], document: Document, at: tuple[str, ...], units: Units) -> Robot:
+    try:
+        model = RobotModel.model_validate(value, context=ReadingContext(units))
+    except ValidationError as error:
+        raise InputError(*problems_of(error, RobotModel, document, at)) from None
+    return model.as_robot()

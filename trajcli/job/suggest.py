@@ -1,0 +1,46 @@
+"""Nearest valid names, for messages about a name that does not exist."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+_LONGEST = 64  # characters: nobody mistypes more, and difflib's time grows with the square
+_LISTED = 12
+
+
+def nearest(name: str, names: Iterable[str]) -> str | None:
+    """Return the valid name nearest to `name`, or None when none is near.
+
+    Case, and `-` or a space for `_`, count for nothing.
+    """
+    from difflib import get_close_matches
+
+    if not name or len(name) > _LONGEST:
+        return None
+    plain: dict[str, str] = {}
+    for valid in names:
+        plain.setdefault(_plain(valid), valid)
+    near = get_close_matches(_plain(name), plain, 1)
+    return plain[near[0]] if near else None
+
+
+def did_you_mean(name: str, names: Iterable[str]) -> str | None:
+    """Return the hint "did you mean 'x'?" for the nearest valid name, or None when none is near."""
+    near = nearest(name, names)
+    return f"did you mean '{near}'?" if near is not None else None
+
+
+def valid_names(names: Iterable[str], what: str = "valid names") -> str | None:
+    """Return the hint that lists the valid names, of many the first; None when there are none."""
+    every = list(names)
+    if not every:
+        return None
+    more = f" ... ({len(every) - _LISTED} more)" if len(every) > _LISTED else ""
+    return f"{what}: {', '.join(every[:_LISTED])}{more}"
+
+
+def _plain(name: str) -> str:
+    return name.casefold().replace("-", "_").replace(" ", "_")

@@ -1,0 +1,82 @@
+"""Vectors in space for many configurations at once, one entry an array over the configurations.
+
+An entry that is the same for all of them is a plain number. The zeros and ones of an arm's geometry (right
+angles between axes, a base at the origin) then cost nothing, and entries that must vanish are exactly zero.
+"""
+
+from __future__ import annotations
+
+from trajcli.curves.piecewise import Array
+
+Entry = float | Array
+Column = tuple[Entry, Entry, Entry]
+ZERO: Column = (0.0, 0.0, 0.0)
+
+
+def product(a: Entry, b: Entry) -> Entry:
+    """Return a * b; nothing is computed for a number 0 or 1."""
+    if isinstance(b, float):
+        a, b = b, a
+    if isinstance(a, float):
+        if a == 0.0:
+            return 0.0
+        if a == 1.0:
+            return b
+        if a == -1.0:
+            return -b
+    return a * b
+
+
+def total(a: Entry, b: Entry) -> Entry:
+    """Return a + b; nothing is computed for a number 0."""
+    if isinstance(a, float) and a == 0.0:
+        return b
+    return a if isinstance(b, float) and b == 0.0 else a + b
+
+
+def difference(a: Entry, b: Entry) -> Entry:
+    """Return a - b; nothing is computed for a number 0, nor when both are the same array."""
+    if a is b:
+        return 0.0
+    if isinstance(b, float) and b == 0.0:
+        return a
+    return -b if isinstance(a, float) and a == 0.0 else a - b
+
+
+def combine(c: Entry, x: Column, s: Entry, y: Column) -> Column:
+    """Return c x + s y."""
+    return plus(scaled(c, x), scaled(s, y))
+
+
+def advance(p: Column, distance: Entry, axis: Column) -> Column:
+    """Return p + distance * axis."""
+    return plus(p, scaled(distance, axis))
+
+
+def plus(a: Column, b: Column) -> Column:
+    """Return a + b."""
+    return total(a[0], b[0]), total(a[1], b[1]), total(a[2], b[2])
+
+
+def minus(a: Column, b: Column) -> Column:
+    """Return a - b."""
+    return difference(a[0], b[0]), difference(a[1], b[1]), difference(a[2], b[2])
+
+
+def scaled(factor: Entry, a: Column) -> Column:
+    """Return factor * a."""
+    return product(factor, a[0]), product(factor, a[1]), product(factor, a[2])
+
+
+def dot(a: Column, b: Column) -> Entry:
+    """Return the scalar product."""
+    return total(total(product(a[0], b[0]), product(a[1], b[1])), product(a[2], b[2]))
+
+
+def cross(a: Column, b: Column) -> Column:
+    """Return the vector product."""
+    return (
+        difference(product(a[1], b[2]), product(a[2], b[1])),
+        difference(product(a[2], b[0]), product(a[0], b[2])),
+        difference(product(a[0], b[1]), product(a[1], b[0])),
+    )

@@ -1,0 +1,140 @@
+"""Velocity and acceleration of the tool: the geometric Jacobian, its time derivative, twists.
+
+Linear rows come first and belong to the tcp as the point of reference; angular rows follow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from trajcli.curves.piecewise import Array
+from trajcli.errors import InputError
+from trajcli.kinematics.chain import Axis, MovingFrame, blocks, configurations, links_of, travel
+from trajcli.kinematics.columns import ZERO, Column, advance, cross, dot, minus, plus
+from trajcli.kinematics.robot import Robot
+
+ReferenceFrame = Literal["world", "base", "tcp"]
+
+
+def jacobian(robot: Robot, q: ArrayLike, frame: ReferenceFrame = "world") -> Array:
+    """Return J with (v, w) = J qd of the tcp, shape (*batch, 6, n), m and rad by the joint's unit.
+
+    Args:
+        robot: The arm.
+        q: Joint values (*batch, n), rad or m.
+        frame: In whose axes the rows are written. The velocity is against the world in all three.
+
+    Raises:
+        InputError: When the robot has no geometry, or q has not n finite values.
+
+    Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning and Control (2009),
+    section 3.1.3.
+    """
+    links, values = links_of(robot), configurations(robot, q)
+    result = np.zeros((values.size // values.shape[-1], 6, len(links)))
+    for rows, (block,) in blocks(values):
+        axes, tcp = travel(links, _start(robot, frame), robot.tool, block)
+        for i, axis in enumerate(axes):
+            linear, angular = _columns(axis, tcp.p)
+            _write(result[rows, :3, i], _seen(linear, tcp, frame))
+            _write(result[rows, 3:, i], _seen(angular, tcp, frame))
+    return result.reshape(*values.shape[:-1], 6, len(links))
+
+
+def jacobian_dot_qd(robot: Robot, q: ArrayLike, qd: ArrayLike, frame: ReferenceFrame = "world") -> Array:
+    """Return the part of the tcp's acceleration that does not come from qdd, shape (*batch, 6).
+
+    (a, e) = J qdd + this. In the world and base frames it is the time derivative of J times qd; for the tcp
+    the same acceleration is written in the axes of the tcp.
+
+    With w the angular velocity of the link before joint i and u the velocity of the point p_i on its axis,
+    z_i' = w x z_i. So a revolute joint adds qd_i (w x z_i) to the angular part and
+    qd_i ((w x z_i) x (p - p_i) + z_i x (p' - u)) to the linear one; a prismatic joint adds qd_i (w x z_i) to
+    the linear part.
+
+    Raises:
+        InputError: When the robot has no geometry, or q and qd have not n finite values of the same batch.
+
+    Source: the columns of the geometric Jacobian differentiated; compare Siciliano, Sciavicco, Villani and
+    Oriolo, Robotics: Modelling, Planning and Control (2009), chapter 3.
+    """
+    links, values, rates = links_of(robot), *_state(robot, q, qd)
+    result = np.zeros((values.size // values.shape[-1], 6))
+    for rows, (block, rate) in blocks(values, rates):
+        axes, tcp = travel(links, _start(robot, frame), robot.tool, block)
+        linear, angular = _bias(axes, tcp.p, rate)
+        _write(result[rows, :3], _seen(linear, tcp, frame))
+        _write(result[rows, 3:], _seen(angular, tcp, frame))
+    return result.reshape(*values.shape[:-1], 6)
+
+
+def tcp_twist(robot: Robot, q: ArrayLike, qd: ArrayLike, frame: ReferenceFrame = "world") -> Array:
+    """Return the tcp's velocity (v, w), shape (*batch, 6), m/s and rad/s, in the axes of `frame`.
+
+    Raises:
+        InputError: When the robot has no geometry, or q and qd have not n finite values of the same batch.
+    """
+    values, rates = _state(robot, q, qd)
+    return np.asarray((jacobian(robot, values, frame) @ rates[..., None])[..., 0])
+
+
+def tcp_acceleration(
+    robot: Robot, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, frame: ReferenceFrame = "world"
+) -> Array:
+    """Return the tcp's acceleration (a, e), shape (*batch, 6), m/s^2 and rad/s^2, in the axes of `frame`.
+
+    Raises:
+        InputError: When the robot has no geometry, or q, qd and qdd have not n finite values of one batch.
+    """
+    values, second = _state(robot, q, qdd)
+    return np.asarray(tcp_twist(robot, values, second, frame) + jacobian_dot_qd(robot, values, qd, frame))
+
+
+def _state(robot: Robot, q: ArrayLike, rates: ArrayLike) -> tuple[Array, Array]:
+    values, given = configurations(robot, q), configurations(robot, rates, "the joint rates")
+    if values.shape != given.shape:
+        raise InputError(f"the joint rates have shape {given.shape}, q has shape {values.shape}")
+    return values, given
+
+
+def _start(robot: Robot, frame: ReferenceFrame) -> Array:
+    return np.eye(4) if frame == "base" else robot.base
+
+
+def _columns(axis: Axis, p: Column) -> tuple[Column, Column]:
+    """Return the linear and the angular velocity of the point p for unit speed of one joint."""
+    if axis.prismatic:
+        return axis.direction, ZERO
+    return cross(axis.direction, minus(p, axis.point)), axis.direction
+
+
+def _bias(axes: Sequence[Axis], p: Column, rate: Sequence[Array]) -> tuple[Column, Column]:
+    velocity = linear = angular = ZERO
+    for axis, speed in zip(axes, rate, strict=True):
+        velocity = advance(velocity, speed, _columns(axis, p)[0])
+    spin, speed_here, here = ZERO, ZERO, axes[0].point
+    for axis, speed in zip(axes, rate, strict=True):
+        speed_here = plus(speed_here, cross(spin, minus(axis.point, here)))
+        here = axis.point
+        swing = cross(spin, axis.direction)
+        if axis.prismatic:
+            linear = advance(linear, speed, swing)
+            speed_here = advance(speed_here, speed, axis.direction)
+            continue
+        change = plus(cross(swing, minus(p, here)), cross(axis.direction, minus(velocity, speed_here)))
+        linear, angular = advance(linear, speed, change), advance(angular, speed, swing)
+        spin = advance(spin, speed, axis.direction)
+    return linear, angular
+
+
+def _seen(vector: Column, tcp: MovingFrame, frame: ReferenceFrame) -> Column:
+    return (dot(tcp.x, vector), dot(tcp.y, vector), dot(tcp.z, vector)) if frame == "tcp" else vector
+
+
+def _write(out: Array, vector: Column) -> None:
+    for i, entry in enumerate(vector):
+        out[:, i] = entry

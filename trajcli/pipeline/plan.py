@@ -1,0 +1,103 @@
+"""From a job to a judged trajectory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from trajcli.checks.verify import Verdict, verify
+from trajcli.curves.piecewise import concatenate
+from trajcli.errors import TrajcliError
+from trajcli.job.limits import with_move_limits
+from trajcli.job.read import LoadedJob
+from trajcli.pipeline.stretch import PlannedMove, aligned, slowed
+from trajcli.planners.planner import Event, Planner
+from trajcli.trajectory import Span, State, Trajectory
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A planned and judged job.
+
+    Attributes:
+        loaded: The job.
+        moves: Its moves, in order.
+        trajectory: All of them, joined.
+        verdict: What the checks found.
+        events: Concessions, in order of the moves; the job's own first.
+    """
+
+    loaded: LoadedJob
+    moves: tuple[PlannedMove, ...]
+    trajectory: Trajectory
+    verdict: Verdict
+    events: tuple[Event, ...]
+
+
+def plan_job(loaded: LoadedJob) -> Plan:
+    """Return the plan of a job, with its verdict: a verdict with findings is no error here.
+
+    Raises:
+        InputError: When a move loosens a limit, or lacks one it needs.
+        PlanningError: When a move has no curve.
+    """
+    moves: list[PlannedMove] = []
+    events = list(loaded.events)
+    state = loaded.job.start.as_state()
+    before: Planner | None = None
+    for index, planner in enumerate(loaded.job.moves):
+        start = _handed_over(state, before, planner)
+        with _errors_of(loaded, index, planner):
+            move, concessions = _plan_move(loaded, index, planner, start)
+        moves.append(move)
+        events += concessions
+        state, before = move.planned.end, planner
+    trajectory = _joined(moves, loaded)
+    verdict = verify(trajectory, [move.robot.limits for move in moves])
+    said = tuple(replace(event, message=event.text(loaded.say), amounts={}) for event in events)
+    return Plan(loaded, tuple(moves), trajectory, verdict, said)
+
+
+def _plan_move(loaded: LoadedJob, index: int, planner: Planner, start: State) -> tuple[PlannedMove, list[Event]]:
+    job = loaded.job
+    robot = with_move_limits(loaded.robot, planner.limits, index)
+    planned = planner.plan(start, robot)
+    move = PlannedMove(index, planner, start, robot, planned)
+    events = [replace(event, move=index) for event in planned.events]
+    if (planner.when_over_limit or job.when_over_limit) == "slow":
+        move, more = slowed(move)
+        events += more
+    if job.output.align:
+        move = aligned(move, job.output.rate)
+    return move, events
+
+
+def _handed_over(state: State, before: Planner | None, after: Planner) -> State:
+    """Return the state in which `after` starts: the acceleration is handed over between continuity 2 only."""
+    if before is None or (before.continuity == 2 and after.continuity == 2):
+        return state
+    return State(state.position, state.velocity, np.zeros_like(state.acceleration))
+
+
+def _joined(moves: list[PlannedMove], loaded: LoadedJob) -> Trajectory:
+    curve = concatenate([move.planned.curve for move in moves])
+    spans, end = [], 0.0
+    for move in moves:
+        start, end = end, float(move.planned.curve.breaks[-1] + end)
+        spans.append(Span(move.index, move.planner.tag, start, end, move.planner.continuity))
+    robot, first, last = loaded.robot, moves[0].start, moves[-1].planned.end
+    return Trajectory(curve, robot.joint_names, robot.joint_types, tuple(spans), first, last)
+
+
+@contextmanager
+def _errors_of(loaded: LoadedJob, index: int, planner: Planner) -> Iterator[None]:
+    """Give errors the move they are about, its place in the file, and the job's units."""
+    try:
+        yield
+    except TrajcliError as error:
+        located = error.said_by(loaded.say).located(move=index, place=loaded.place_of_move(index))
+        problems = (replace(p, message=f"move {index} ({planner.tag}): {p.message}") for p in located.problems)
+        raise type(error)(*problems) from None

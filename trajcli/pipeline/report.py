@@ -1,0 +1,138 @@
+"""From a plan to its report, and to the errors of a verdict."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+
+from trajcli import __version__
+from trajcli.checks.finding import Finding
+from trajcli.curves.extrema import Peaks
+from trajcli.errors import Amount, Problem, VerificationError
+from trajcli.job.report import (
+    BindingReport,
+    EventReport,
+    FindingReport,
+    MoveReport,
+    PeakReport,
+    ReferenceReport,
+    Report,
+    StepReport,
+    UncheckedReport,
+)
+from trajcli.kinematics.robot import QUANTITIES
+from trajcli.pipeline.plan import Plan
+from trajcli.pipeline.reference import fastest_duration
+from trajcli.pipeline.stretch import PlannedMove
+
+_JUMPS = {"position_jump": 0, "velocity_jump": 1, "acceleration_jump": 2}
+
+
+def report_of(plan: Plan, *, reference: bool = False) -> Report:
+    """Return the report of a plan.
+
+    Args:
+        plan: The plan.
+        reference: Whether each move is compared with ruckig's bound.
+    """
+    verdict = plan.verdict
+    return Report(
+        trajcli=__version__,
+        verdict="verified" if verdict.passed else "violated",
+        job=plan.loaded.name,
+        robot=plan.loaded.robot.name,
+        duration=plan.trajectory.duration,
+        moves=[_move(plan, index, reference=reference) for index in range(len(plan.moves))],
+        findings=[FindingReport(**asdict(finding)) for finding in verdict.findings],
+        events=[EventReport(kind=e.kind, message=e.message, move=e.move) for e in plan.events],
+        steps=[StepReport(**asdict(step)) for step in verdict.steps],
+        unchecked=[UncheckedReport(joint=joint, quantity=quantity) for joint, quantity in verdict.unchecked],  # type: ignore[arg-type]
+    )
+
+
+def _move(plan: Plan, index: int, *, reference: bool) -> MoveReport:
+    move, span = plan.moves[index], plan.trajectory.spans[index]
+    peaks = [
+        _peak(move, joint, order, extremes)
+        for order, extremes in enumerate(plan.verdict.peaks[index])
+        for joint in range(len(move.robot.joints))
+    ]
+    used = [peak for peak in peaks if peak.used is not None and peak.quantity != "position"]
+    most = max(used, key=lambda peak: peak.used or 0.0, default=None)
+    binding = most and BindingReport(joint=most.joint, quantity=most.quantity, used=most.used or 0.0)
+    return MoveReport(
+        index=span.index,
+        planner=span.planner,
+        start=span.start,
+        end=span.end,
+        duration=move.duration,
+        continuity=span.continuity,
+        stretch=move.stretch,
+        peaks=peaks,
+        binding=binding,
+        reference=reference_of(move) if reference else None,
+    )
+
+
+def _peak(move: PlannedMove, joint: int, order: int, peaks: Peaks) -> PeakReport:
+    low, high = float(peaks.low[joint]), float(peaks.high[joint])
+    below, above = (float(bound) for bound in move.robot.limits.of_order(order)[joint])
+    parts = [value / bound for value, bound in ((low, below), (high, above)) if math.isfinite(bound) and bound]
+    return PeakReport(
+        joint=move.robot.joint_names[joint],
+        quantity=QUANTITIES[order],  # type: ignore[arg-type]
+        low=low,
+        low_time=float(peaks.low_time[joint]),
+        high=high,
+        high_time=float(peaks.high_time[joint]),
+        limit=(below if math.isfinite(below) else None, above if math.isfinite(above) else None),
+        used=max(0.0, *parts) if parts else None,
+    )
+
+
+def reference_of(move: PlannedMove) -> ReferenceReport | None:
+    """Return how a move compares with the shortest duration under its limits; None where there is no bound."""
+    bound = fastest_duration(move.start, move.planned.end, move.robot.limits)
+    if bound.duration is None:
+        return None
+    name = None if bound.joint is None else move.robot.joint_names[bound.joint]
+    ratio = move.duration / bound.duration if bound.duration > 0 else None
+    return ReferenceReport(duration=bound.duration, ratio=ratio, joint=name)
+
+
+def verification_error(plan: Plan) -> VerificationError:
+    """Return the error that says what the verdict found, with the places of the moves."""
+    return VerificationError(*(_problem(plan, finding) for finding in plan.verdict.findings))
+
+
+def _problem(plan: Plan, finding: Finding) -> Problem:
+    loaded, joint = plan.loaded, plan.trajectory.joint_names.index(finding.joint or "")
+    order = _JUMPS.get(finding.kind, QUANTITIES.index(finding.kind) if finding.kind in QUANTITIES else 0)
+    index = finding.move or 0
+    amounts = {"value": Amount(finding.value, order, joint), "limit": Amount(finding.limit, order, joint)}
+    quantity = QUANTITIES[order]
+    where = f"move {index} ({plan.moves[index].planner.tag}): "
+    if finding.kind in _JUMPS:
+        text = f"{where}the {quantity} of {finding.joint} jumps by {{value}} at t = {finding.time:.9g} s"
+        hint = finding.hint
+    else:
+        text = f"{where}the {quantity} of {finding.joint} reaches {{value}} at t = {finding.time:.9g} s, its limit is {{limit}}"
+        hint = _remedy(plan.moves[index], finding)
+    problem = Problem(text, amounts=amounts)
+    return Problem(
+        problem.text(loaded.say),
+        hint,
+        loaded.place_of_move(index),
+        index,
+        finding.joint,
+        finding.time,
+        finding.value,
+        finding.limit,
+    )
+
+
+def _remedy(move: PlannedMove, finding: Finding) -> str:
+    if finding.factor is None:
+        return "slowing down does not help: change the target, the start or the limit"
+    lasting = move.duration * finding.factor
+    return f"it must last {finding.factor:.6g} times longer ({lasting:.6g} s), or say `when_over_limit: slow`"

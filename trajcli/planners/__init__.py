@@ -1,0 +1,27 @@
+"""Planners: one file each. The union below is their registration; schema, messages, tests and docs read it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Union, get_args
+
+from pydantic import Field
+
+from trajcli.planners.cubic import Cubic
+from trajcli.planners.cycloidal import Cycloidal
+from trajcli.planners.hold import Hold
+from trajcli.planners.jerk_limited import JerkLimited
+from trajcli.planners.planner import Planner
+from trajcli.planners.quintic import Quintic
+from trajcli.planners.septic import Septic
+from trajcli.planners.trapezoid import Trapezoid
+
+Move = Annotated[
+    Union[Cubic, Quintic, Septic, Cycloidal, Trapezoid, JerkLimited, Hold],  # noqa: UP007
+    Field(discriminator="planner"),
+]
+
+PLANNERS: dict[str, type[Planner]] = {
+    str(planner.model_fields["planner"].default): planner for planner in get_args(get_args(Move)[0])
+}
+
+__all__ = ["PLANNERS", "Move", "Planner"]

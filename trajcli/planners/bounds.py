@@ -1,0 +1,128 @@
+"""Limits as they stand in a file: bounds by joint, and the factors that scale them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from pydantic.json_schema import JsonSchemaValue
+
+from trajcli.kinematics.robot import QUANTITIES
+from trajcli.planners.fields import Model
+from trajcli.planners.reading import (
+    FieldType,
+    FlawError,
+    Number,
+    ReadingContext,
+    per_joint_schema,
+    read_number,
+    read_per_joint,
+    shown,
+)
+from trajcli.units import Quantity
+
+Bound = tuple[float, float]
+UNLIMITED: Bound = (-math.inf, math.inf)
+
+
+def read_bound(value: Any, quantity: Quantity, context: ReadingContext) -> Bound:  # noqa: ANN401
+    """Return (lower, upper) in SI from a magnitude, a pair by direction, or null for unlimited.
+
+    Raises:
+        FlawError: When it is none of these, or the pair is the wrong way round.
+    """
+    rate = quantity.order > 0
+    if value is None:
+        return UNLIMITED
+    if isinstance(value, list | tuple):
+        if len(value) != 2:
+            raise FlawError(f"expected a pair [lower, upper], got {len(value)} values")
+        low, high = (read_number(item, quantity, context.units) for item in value)
+        if (rate and not low < 0 < high) or low >= high:
+            wanted = "a negative and a positive number" if rate else "the lower number first"
+            raise FlawError(f"expected a pair [lower, upper], {wanted}, got [{shown(value[0])}, {shown(value[1])}]")
+        return low, high
+    size = read_number(value, quantity, context.units)
+    if size <= 0:
+        raise FlawError(f"expected a number above 0, a pair [lower, upper] or null (unlimited), got {shown(value)}")
+    return -size, size
+
+
+def _bound_schema(order: int) -> JsonSchemaValue:
+    number = Number(Quantity("angle", order), "", above=0.0).json_schema()
+    signed = Number(Quantity("angle", order), "").json_schema()
+    pair = {"type": "array", "items": signed, "minItems": 2, "maxItems": 2}
+    return {"anyOf": [number, pair, {"type": "null"}]}
+
+
+@dataclass(frozen=True)
+class JointBound(FieldType):
+    """The bound of one joint, whose type is the first of the context."""
+
+    order: int
+    description: str
+
+    def read(self, value: Any, context: ReadingContext) -> Bound:  # noqa: ANN401
+        """Return (lower, upper) in SI."""
+        return read_bound(value, context.joint_quantity(0, self.order), context)
+
+    def json_schema(self) -> JsonSchemaValue:
+        """Return the schema of a magnitude, a pair or null."""
+        return _bound_schema(self.order)
+
+
+@dataclass(frozen=True)
+class Bounds(FieldType):
+    """One bound for all joints, a list with one entry each, or by joint name; None where a joint is left out."""
+
+    order: int
+    description: str
+
+    def read(self, value: Any, context: ReadingContext) -> tuple[Bound | None, ...]:  # noqa: ANN401
+        """Return (lower, upper) in SI for each joint."""
+
+        def read_one(item: Any, joint: int) -> Bound:  # noqa: ANN401
+            return read_bound(item, context.joint_quantity(joint, self.order), context)
+
+        try:
+            return read_per_joint(value, context, read_one, None)
+        except FlawError as error:
+            if isinstance(value, list | tuple) and len(value) == 2 and all(isinstance(v, int | float) for v in value):
+                named = f"under `limits` a list has one entry for each joint: for a pair write {{NAME: {list(value)}}}"
+                error.flaws = [(path, text, named) for path, text, _ in error.flaws]
+            raise
+
+    def json_schema(self) -> JsonSchemaValue:
+        """Return the schema of a bound for all joints, a list of bounds, or a mapping."""
+        one = _bound_schema(self.order)
+        single = {"anyOf": [branch for branch in one["anyOf"] if branch.get("type") != "array"]}
+        whole = per_joint_schema(one)
+        return {"anyOf": [single, *whole["anyOf"][1:]]}
+
+
+Factor = Annotated[float, Number(Quantity("ratio"), "Factor above 0 and at most 1.", above=0.0, at_most=1.0)]
+
+
+class Scale(Model):
+    """Factors by which limits are multiplied after they were replaced."""
+
+    velocity: Factor = 1.0
+    acceleration: Factor = 1.0
+    jerk: Factor = 1.0
+
+
+class LimitsSpec(Model):
+    """Limits that replace or tighten others; what is left out stays as it is, null is unlimited."""
+
+    position: Annotated[tuple[Bound | None, ...], Bounds(0, "Range of each joint (angle or length unit).")] | None = None
+    velocity: Annotated[tuple[Bound | None, ...], Bounds(1, "Velocity limit of each joint, per s.")] | None = None
+    acceleration: Annotated[tuple[Bound | None, ...], Bounds(2, "Acceleration limit of each joint, per s^2.")] | None = (
+        None
+    )
+    jerk: Annotated[tuple[Bound | None, ...], Bounds(3, "Jerk limit of each joint, per s^3.")] | None = None
+    scale: Scale = Scale()
+
+    def of_order(self, order: int) -> tuple[Bound | None, ...] | None:
+        """Return the bounds of the derivative of the given order, 0 (position) to 3 (jerk)."""
+        return getattr(self, QUANTITIES[order])  # type: ignore[no-any-return]

@@ -1,0 +1,100 @@
+"""Fields that several planners share: times, values by joint, targets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, core_schema
+
+from trajcli.planners.reading import Number, PerJoint, ReadingContext, refuse
+from trajcli.trajectory import State
+from trajcli.units import Quantity
+
+
+class Model(BaseModel):
+    """Base of everything that a job file may hold: frozen, and strict about unknown keys."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+Duration = Annotated[float, Number(Quantity("time"), "Duration of the move, s.", above=0.0)]
+MinimumDuration = Annotated[float, Number(Quantity("time"), "The move lasts at least this long, s.", above=0.0)]
+JointPositions = Annotated[
+    tuple[float, ...],
+    PerJoint(0, "Position of each joint (angle or length unit): one for all, a list, or by joint name."),
+]
+JointVelocities = Annotated[
+    tuple[float, ...],
+    PerJoint(1, "Velocity of each joint, per s; joints left out of a mapping are 0.", zero_missing=True),
+]
+JointAccelerations = Annotated[
+    tuple[float, ...],
+    PerJoint(2, "Acceleration of each joint, per s^2; joints left out of a mapping are 0.", zero_missing=True),
+]
+JointSpeeds = Annotated[tuple[float, ...], PerJoint(1, "Speed of each joint, per s, above 0.", above=0.0)]
+JointAccelerationMagnitudes = Annotated[
+    tuple[float, ...], PerJoint(2, "Magnitude of the acceleration of each joint, per s^2, above 0.", above=0.0)
+]
+
+
+class Target(Model):
+    """The state that a point names, or that a move starts from or ends in."""
+
+    joints: JointPositions | None = None
+    velocity: JointVelocities | None = None
+    acceleration: JointAccelerations | None = None
+
+    @model_validator(mode="after")
+    def _says_something(self) -> Target:
+        if self.joints is None and self.velocity is None:
+            raise refuse([((), "a state needs `joints` (or `velocity` alone, for a stop)", None)])
+        return self
+
+    def as_state(self) -> State:
+        """Return the state; what is not given is zero.
+
+        Raises:
+            ValueError: When the target has no joints.
+        """
+        if self.joints is None:
+            raise ValueError("a target without joints is no state")
+        zero = (0.0,) * len(self.joints)
+        return State(
+            np.array(self.joints), np.array(self.velocity or zero), np.array(self.acceleration or zero)
+        )
+
+
+class _Named:
+    """Lets the name of a point stand for the point."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
+        return core_schema.with_info_before_validator_function(self._look_up, handler(source))
+
+    @staticmethod
+    def _look_up(value: Any, info: core_schema.ValidationInfo) -> Any:  # noqa: ANN401
+        context = info.context or ReadingContext()
+        if not isinstance(value, str):
+            return value
+        if value not in context.points:
+            raise refuse([((), f"there is no point '{value}'", _known(value, context.points))])
+        return context.points[value]
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        name = {"type": "string", "description": "Name of a point under `points`."}
+        return {"anyOf": [name, handler(schema)]}
+
+
+def _known(name: str, points: Mapping[str, Any]) -> str:
+    from difflib import get_close_matches
+
+    near = get_close_matches(name, points, 1)
+    if near:
+        return f"did you mean '{near[0]}'?"
+    return f"the points are {', '.join(points)}" if points else "the job has no `points`"
+
+
+NamedTarget = Annotated[Target, _Named()]

@@ -1,0 +1,91 @@
+"""What planners from one joint state to another share: the target, and the limits they may need."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from trajcli.curves.piecewise import Array, constant
+from trajcli.errors import Amount, MissingLimitError, PlanningError, Problem
+from trajcli.kinematics.robot import QUANTITIES, Robot
+from trajcli.planners.fields import NamedTarget
+from trajcli.planners.planner import Planned, Planner
+from trajcli.planners.reading import refuse
+from trajcli.trajectory import State
+
+
+class PointToPoint(Planner):
+    """A planner whose target is a joint state.
+
+    Attributes:
+        imposes: Highest derivative that the planner imposes at the target: 0, 1 (velocity) or 2 (acceleration).
+        stops_anywhere: Whether a target may leave the position open.
+    """
+
+    imposes: ClassVar[int] = 2
+    stops_anywhere: ClassVar[bool] = False
+
+    to: Annotated[NamedTarget, Field(description="The state in which the move ends, or the name of a point.")]
+
+    @model_validator(mode="after")
+    def _can_impose_target(self) -> PointToPoint:
+        if self.to.joints is None and not self.stops_anywhere:
+            raise refuse([(("to",), f"{self.tag} needs `joints` in its target", "jerk_limited can stop anywhere")])
+        for order, name in ((1, "velocity"), (2, "acceleration")):
+            if order > self.imposes and any(getattr(self.to, name) or ()):
+                instead = "use quintic or jerk_limited, or leave it out"
+                raise refuse([(("to", name), f"{self.tag} does not impose the {name} at its end", instead)])
+        return self
+
+
+def standstill(state: State, duration: float) -> Planned:
+    """Return the move that stays in `state`, which is at rest, for `duration` seconds, which may be zero."""
+    return Planned(constant(state.position, duration), state)
+
+
+def same_state(a: State, b: State) -> bool:
+    """Return whether two states are equal in position, velocity and acceleration."""
+    return all(np.array_equal(getattr(a, k), getattr(b, k)) for k in ("position", "velocity", "acceleration"))
+
+
+def require_rest(planner: str, state: State, robot: Robot, *, where: str = "start") -> None:
+    """Refuse a start (or target) that is not at rest.
+
+    Raises:
+        PlanningError: Names the first joint that moves.
+    """
+    for order, values in ((1, state.velocity), (2, state.acceleration)):
+        if values.any():
+            joint = int(np.flatnonzero(values)[0])
+            name, quantity = robot.joint_names[joint], QUANTITIES[order]
+            message = f"{planner} {where}s at rest, but the {quantity} of {name} is {{value}} at its {where}"
+            hint = "let the move before end at rest, or use quintic or jerk_limited"
+            amounts = {"value": Amount(float(values[joint]), order, joint)}
+            raise PlanningError(Problem(message, hint, joint=name, value=float(values[joint]), amounts=amounts))
+
+
+def missing_limit(planner: str, quantity: str, joints: Sequence[int], robot: Robot, why: str, *also: str) -> MissingLimitError:
+    """Return the error that asks for a limit.
+
+    Args:
+        planner: Tag of the planner.
+        quantity: The missing one: "velocity", "acceleration" or "jerk".
+        joints: Indices of the joints that lack it.
+        robot: For the names.
+        why: What the limit is needed for.
+        also: Other ways out.
+    """
+    names = ", ".join(robot.joint_names[joint] for joint in joints)
+    ways = [f"add `limits: {{{quantity}: ...}}` to the job (null is unlimited too)", *also]
+    return MissingLimitError(
+        Problem(f"{planner} needs a limit on the {quantity} of {names} {why}", " or ".join(ways), joint=robot.joint_names[joints[0]])
+    )
+
+
+def bound_along(bounds: Array, direction: Array) -> Array:
+    """Return the magnitude (n,) of each joint's bound (n, 2) in its direction of motion (n,)."""
+    along: Array = np.where(direction < 0, -bounds[:, 0], bounds[:, 1])
+    return along

@@ -1,0 +1,196 @@
+"""Poses as they stand in a file: a position and one of several forms of orientation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pydantic.json_schema import JsonSchemaValue
+
+from trajcli.curves.piecewise import Array
+from trajcli.errors import InputError
+from trajcli.planners.reading import FieldType, FlawError, ReadingContext, read_number, shown
+from trajcli.units import Quantity
+
+SEQUENCES = ("XYX", "XYZ", "XZX", "XZY", "YXY", "YXZ", "YZX", "YZY", "ZXY", "ZXZ", "ZYX", "ZYZ")
+_ROTATIONS = ("rpy", "quat_wxyz", "matrix", "axis_angle", "euler")
+_ANGLE, _LENGTH, _RATIO = Quantity("angle"), Quantity("length"), Quantity("ratio")
+
+
+@dataclass(frozen=True)
+class Pose(FieldType):
+    """A full pose; what it leaves out is zero. It is read into a (4, 4) matrix, lengths in m."""
+
+    description: str
+
+    def read(self, value: Any, context: ReadingContext) -> Array:  # noqa: ANN401
+        """Return the pose, shape (4, 4)."""
+        if isinstance(value, np.ndarray):
+            return value
+        if not isinstance(value, Mapping):
+            raise FlawError(f"expected a pose such as {{xyz: [0, 0, 0], rpy: [0, 0, 0]}}, got {shown(value)}")
+        unknown = [key for key in value if key not in ("xyz", *_ROTATIONS)]
+        if unknown:
+            raise FlawError(f"unknown key '{unknown[0]}'", unknown[0], hint=f"a pose has xyz, {', '.join(_ROTATIONS)}")
+        given = [key for key in _ROTATIONS if key in value]
+        if len(given) > 1:
+            raise FlawError(f"{given[0]} and {given[1]} exclude each other", given[1], hint="leave one of them out")
+        return _pose(value, given[0] if given else None, context)
+
+    def json_schema(self) -> JsonSchemaValue:
+        """Return the schema of a pose."""
+        number = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": "^[-+.0-9]"}]}
+
+        def numbers(count: int) -> JsonSchemaValue:
+            return {"type": "array", "items": number, "minItems": count, "maxItems": count}
+
+        axis = {"anyOf": [{"enum": ["x", "y", "z"]}, numbers(3)]}
+        euler = {"sequence": {"enum": list(SEQUENCES)}, "frame": {"enum": ["current", "fixed"]}, "angles": numbers(3)}
+        rows = {"type": "array", "items": {"type": "array", "items": number, "minItems": 3, "maxItems": 4}}
+        described = {
+            "xyz": {**numbers(3), "description": "Position (length unit)."},
+            "rpy": {**numbers(3), "description": "Angles about the fixed axes x, y, z: R = Rz Ry Rx (angle unit)."},
+            "quat_wxyz": {**numbers(4), "description": "Unit quaternion, w first."},
+            "matrix": {**rows, "minItems": 3, "maxItems": 4, "description": "Rotation 3x3, or homogeneous 4x4."},
+            "axis_angle": _object({"axis": axis, "angle": number}, "Rotation by an angle about an axis."),
+            "euler": _object(euler, "Euler angles about current or fixed axes.", "sequence", "angles"),
+        }
+        return {"type": "object", "properties": described, "additionalProperties": False}
+
+
+def _object(properties: Mapping[str, Any], description: str, *required: str) -> JsonSchemaValue:
+    needed = list(required or properties)
+    shape = {"type": "object", "properties": dict(properties), "required": needed}
+    return {**shape, "additionalProperties": False, "description": description}
+
+
+def _pose(value: Mapping[str, Any], form: str | None, context: ReadingContext) -> Array:
+    pose = np.eye(4)
+    if form == "matrix" and isinstance(value["matrix"], list) and len(value["matrix"]) == 4:
+        if "xyz" in value:
+            raise FlawError("a 4x4 matrix already has a position", "xyz", hint="leave xyz out, or give a 3x3 matrix")
+        return _homogeneous(value["matrix"], context)
+    if form is not None:
+        try:
+            pose[:3, :3] = _READERS[form](value[form], context)
+        except InputError as error:
+            raise FlawError(str(error), form, hint=error.problems[0].hint) from None
+        except FlawError as error:
+            error.flaws = [((form, *path), text, hint) for path, text, hint in error.flaws]
+            raise
+    if "xyz" in value:
+        pose[:3, 3] = read_numbers(value["xyz"], 3, _LENGTH, context, "xyz")
+    return pose
+
+
+def read_numbers(value: Any, count: int, quantity: Quantity, context: ReadingContext, *path: str | int) -> Array:  # noqa: ANN401
+    """Return `count` numbers of one quantity in SI, shape (count,).
+
+    Raises:
+        FlawError: Names the first that does not fit.
+    """
+    if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != count:
+        got = f"{len(value)} values" if isinstance(value, list) else shown(value)
+        raise FlawError(f"expected {count} numbers, got {got}", *path)
+    numbers = np.empty(count)
+    for index, item in enumerate(value):
+        try:
+            numbers[index] = read_number(item, quantity, context.units)
+        except FlawError as error:
+            raise FlawError(str(error), *path, index) from None
+    return numbers
+
+
+def _homogeneous(rows: list[Any], context: ReadingContext) -> Array:
+    pose = np.eye(4)
+    for index in range(3):
+        row = rows[index] if isinstance(rows[index], list) else []
+        pose[index, :3] = read_numbers(row[:3], 3, _RATIO, context, "matrix", index)
+        pose[index, 3] = read_numbers(row[3:], 1, _LENGTH, context, "matrix", index)[0]
+    last = read_numbers(rows[3], 4, _RATIO, context, "matrix", 3)
+    if (last != [0, 0, 0, 1]).any():
+        raise FlawError("the last row of a 4x4 matrix must be [0, 0, 0, 1]", "matrix", 3)
+    pose[:3, :3] = _projected(pose[:3, :3])
+    return pose
+
+
+def _matrix(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401
+    if not isinstance(value, list) or len(value) != 3:
+        raise FlawError("expected a 3x3 or 4x4 matrix, row by row")
+    return _projected(np.stack([read_numbers(row, 3, _RATIO, context, i) for i, row in enumerate(value)]))
+
+
+def _projected(matrix: Array) -> Array:
+    from trajcli.geometry.rotation import check_rotation, nearest_rotation
+
+    try:
+        check_rotation(matrix)
+    except InputError as error:
+        raise FlawError(str(error), hint=error.problems[0].hint) from None
+    return nearest_rotation(matrix)
+
+
+def _rpy(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401
+    from trajcli.geometry.euler import matrix_from_rpy
+
+    return matrix_from_rpy(read_numbers(value, 3, _ANGLE, context))
+
+
+def _quaternion(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401
+    from trajcli.geometry.quaternion import check_quaternion, matrix_from_quaternion
+
+    numbers = read_numbers(value, 4, _RATIO, context)
+    check_quaternion(numbers)
+    return matrix_from_quaternion(numbers / np.linalg.norm(numbers))
+
+
+def _axis_angle(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401
+    from trajcli.geometry.axis_angle import matrix_from_axis_angle
+
+    fields = _exactly(value, ("axis", "angle"), ())
+    axis = read_axis(fields["axis"], context, "axis")
+    return matrix_from_axis_angle(axis, read_numbers([fields["angle"]], 1, _ANGLE, context, "angle")[0])
+
+
+def read_axis(value: Any, context: ReadingContext, *path: str) -> Array:  # noqa: ANN401
+    """Return a unit vector (3,) from x, y, z or three numbers.
+
+    Raises:
+        FlawError: When it is neither, or has no direction.
+    """
+    if isinstance(value, str) and value in ("x", "y", "z"):
+        return np.eye(3)["xyz".index(value)]
+    numbers = read_numbers(value, 3, _RATIO, context, *path)
+    length = float(np.linalg.norm(numbers))
+    if length == 0:
+        raise FlawError("an axis of length 0 has no direction", *path)
+    return numbers / length
+
+
+def _euler(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401
+    from trajcli.geometry.euler import matrix_from_euler
+
+    fields = _exactly(value, ("sequence", "angles"), ("frame",))
+    sequence, frame = fields["sequence"], fields.get("frame", "current")
+    if sequence not in SEQUENCES:
+        raise FlawError(f"unknown sequence {shown(sequence)}", "sequence", hint=f"one of {', '.join(SEQUENCES)}")
+    if frame not in ("current", "fixed"):
+        raise FlawError(f"expected current or fixed, got {shown(frame)}", "frame")
+    return matrix_from_euler(sequence, read_numbers(fields["angles"], 3, _ANGLE, context, "angles"), frame)
+
+
+def _exactly(value: Any, needed: tuple[str, ...], optional: tuple[str, ...]) -> Mapping[str, Any]:  # noqa: ANN401
+    if not isinstance(value, Mapping):
+        raise FlawError(f"expected {{{', '.join(needed)}}}, got {shown(value)}")
+    missing = [key for key in needed if key not in value]
+    if missing:
+        raise FlawError(f"`{missing[0]}` is missing")
+    unknown = [key for key in value if key not in (*needed, *optional)]
+    if unknown:
+        raise FlawError(f"unknown key '{unknown[0]}'", unknown[0], hint=f"the keys are {', '.join((*needed, *optional))}")
+    return value
+
+
+_READERS = {"rpy": _rpy, "quat_wxyz": _quaternion, "matrix": _matrix, "axis_angle": _axis_angle, "euler": _euler}

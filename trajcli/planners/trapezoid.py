@@ -1,0 +1,181 @@
+"""Trapezoidal velocity: the slides' 2-1-2, one law for all joints or one for each."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from trajcli.curves.compose import along_line, hold_until, merge_breaks
+from trajcli.curves.piecewise import Array
+from trajcli.curves.trapezoid import (
+    InfeasibleProfileError,
+    Profile,
+    Rates,
+    fastest_profile,
+    profile_of_speed,
+    signed_profile_of_duration,
+)
+from trajcli.errors import Amount, PlanningError, Problem
+from trajcli.kinematics.robot import Robot
+from trajcli.planners.fields import Duration, JointAccelerationMagnitudes, JointSpeeds, MinimumDuration
+from trajcli.planners.planner import Phase, Planned
+from trajcli.planners.point_to_point import PointToPoint, missing_limit, same_state, standstill
+from trajcli.planners.reading import refuse
+from trajcli.planners.trapezoid_errors import explain_infeasible
+from trajcli.trajectory import State
+
+
+class Trapezoid(PointToPoint):
+    """Speed up, cruise, slow down. The acceleration steps at the ends of the ramps.
+
+    Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.2.1.
+    """
+
+    continuity: ClassVar[Literal[1, 2]] = 1
+    imposes: ClassVar[int] = 1
+
+    planner: Literal["trapezoid"] = "trapezoid"
+    duration: Duration | None = None
+    velocity: JointSpeeds | None = None
+    acceleration: JointAccelerationMagnitudes | None = None
+    deceleration: JointAccelerationMagnitudes | None = None
+    minimum_duration: MinimumDuration | None = None
+    synchronize: Annotated[
+        Literal["time", "none"],
+        Field(description="time: one law for all joints, straight in joint space; none: each joint arrives by itself."),
+    ] = "time"
+    overshoot: Annotated[
+        bool, Field(description="A start too fast to stop in time may run past the target and return.")
+    ] = False
+
+    @model_validator(mode="after")
+    def _not_overdetermined(self) -> Trapezoid:
+        if self.duration and self.velocity and self.acceleration:
+            text = "duration, velocity and acceleration together ask too much of a trapezoid"
+            raise refuse([(("acceleration",), text, "leave one of the three out")])
+        if self.duration and self.minimum_duration:
+            raise refuse([(("minimum_duration",), "duration and minimum_duration exclude each other", None)])
+        return self
+
+    def plan(self, start: State, robot: Robot) -> Planned:
+        """Return the move to the target.
+
+        Raises:
+            MissingLimitError: When the acceleration follows neither from the fields nor from the limits.
+            PlanningError: When no such trapezoid exists; names the interval of what does.
+        """
+        end = self.to.as_state()
+        wanted = self.duration or self.minimum_duration or 0.0
+        if same_state(start, end) and (start.at_rest or not wanted):
+            return standstill(end, wanted)
+        return self._together(start, end, robot) if self.synchronize == "time" else self._each(start, end, robot)
+
+    def _together(self, start: State, end: State, robot: Robot) -> Planned:
+        displacement = end.position - start.position
+        initial, final = (_along(displacement, state.velocity, robot) for state in (start, end))
+        forward, backward = self._rates(displacement, robot)
+        size = np.where(displacement == 0, np.nan, np.abs(displacement))
+        law_rates = [Rates(*(float(np.nanmin(row / size)) for row in rows)) for rows in (forward, backward)]
+        try:
+            profile = self._profile(1.0, initial, final, law_rates[0], law_rates[1])
+        except InfeasibleProfileError as error:
+            joint = int(np.nanargmin(forward[0 if error.reason == "speed" else 1] / size))
+            raise explain_infeasible(error, joint, float(size[joint]), self, robot) from None
+        law = profile.curve(0.0, 1.0)
+        phases = tuple(Phase(*phase) for phase in profile.phases())
+        return Planned(along_line(start.position, displacement, law), end, law=law, phases=phases)
+
+    def _each(self, start: State, end: State, robot: Robot) -> Planned:
+        displacement = end.position - start.position
+        forward, backward = self._rates(np.ones_like(displacement), robot)
+        profiles = []
+        for joint, distance in enumerate(displacement.tolist()):
+            rates = [Rates(*(float(row[joint]) for row in rows)) for rows in (forward, backward)]
+            speeds = float(start.velocity[joint]), float(end.velocity[joint])
+            try:
+                profiles.append(self._profile(distance, *speeds, rates[0], rates[1]))
+            except InfeasibleProfileError as error:
+                raise explain_infeasible(error, joint, 1.0, self, robot) from None
+        duration = max(profile.duration for profile in profiles)
+        for joint, profile in enumerate(profiles):
+            if end.velocity[joint] and profile.duration < duration * (1 - 1e-12):
+                raise _cannot_wait(joint, profile.duration, duration, end, robot)
+        curves = [p.curve(float(start.position[j]), float(end.position[j])) for j, p in enumerate(profiles)]
+        phases = tuple(Phase(*phase, joint=j) for j, p in enumerate(profiles) for phase in p.phases())
+        joined = merge_breaks([hold_until(curve, duration) for curve in curves])
+        return Planned(joined, end, phases=phases, arrivals=tuple(p.duration for p in profiles))
+
+    def _profile(self, distance: float, initial: float, final: float, forward: Rates, backward: Rates) -> Profile:
+        """Return the profile of one variable from what the fields fix."""
+        if self.duration is not None:
+            if distance and self.velocity is not None:
+                return self._of_speed(distance, initial, final, forward if distance > 0 else backward)
+            return signed_profile_of_duration(distance, initial, final, self.duration, forward, backward)
+        profile = fastest_profile(distance, initial, final, forward, backward, overshoot=self.overshoot)
+        least = self.minimum_duration or 0.0
+        if profile.duration >= least or profile.duration == 0:
+            return profile
+        if initial == 0 and final == 0:
+            return profile.stretched(least / profile.duration)
+        return signed_profile_of_duration(distance, initial, final, least, forward, backward)
+
+    def _of_speed(self, distance: float, initial: float, final: float, rates: Rates) -> Profile:
+        sign = math.copysign(1.0, distance)
+        if sign * initial < 0 or sign * final < 0:
+            raise InfeasibleProfileError("turns")
+        deceleration = rates.deceleration if self.deceleration is not None else None
+        arguments = abs(distance), abs(initial), abs(final), self.duration or 0.0, rates.speed
+        profile = profile_of_speed(*arguments, deceleration)
+        return profile if sign > 0 else profile.mirrored()
+
+    def _rates(self, displacement: Array, robot: Robot) -> tuple[list[Array], list[Array]]:
+        """Return (speed, acceleration, deceleration), each (n,), along the displacement and against it."""
+        velocity, acceleration = robot.limits.velocity, robot.limits.acceleration
+        given = [None if v is None else np.array(v) for v in (self.velocity, self.acceleration, self.deceleration)]
+        slowing = given[2] if given[2] is not None else given[1]
+        ways = []
+        for sign in (1, -1):
+            back = (sign * displacement < 0)[:, None]
+            speed, faster = (np.where(back, -b[:, ::-1], b)[:, 1] for b in (velocity, acceleration))
+            slower = np.where(back, acceleration[:, ::-1], -acceleration)[:, 0]
+            rows = zip((given[0], given[1], slowing), (speed, faster, slower), strict=True)
+            ways.append([limit if value is None else value for value, limit in rows])
+        if self.duration is None or self.velocity is None:
+            self._require_acceleration(ways, displacement, robot)
+        return ways[0], ways[1]
+
+    def _require_acceleration(self, ways: list[list[Array]], displacement: Array, robot: Robot) -> None:
+        unbounded = ~np.isfinite(ways[0][1:] + ways[1][1:]).all(axis=0) & (displacement != 0)
+        if unbounded.any():
+            lacking = np.flatnonzero(unbounded).tolist()
+            also = "give the move an `acceleration`, or `duration` and `velocity`"
+            raise missing_limit(self.tag, "acceleration", lacking, robot, "for its ramps", also)
+
+
+def _along(displacement: Array, velocity: Array, robot: Robot) -> float:
+    """Return the speed of the law that has the given joint velocities."""
+    square = float(displacement @ displacement)
+    speed = float(velocity @ displacement) / square if square else 0.0
+    off = np.abs(velocity - speed * displacement)
+    if off.max() > 1e-9 * np.abs(velocity).max():
+        joint = int(off.argmax())
+        message = "trapezoid moves all joints along one straight line, but {velocity} of " + robot.joint_names[joint]
+        hint = "say `synchronize: none`, or use jerk_limited or cubic"
+        amounts = {"velocity": Amount(float(velocity[joint]), 1, joint)}
+        raise PlanningError(Problem(message + " leaves it", hint, joint=robot.joint_names[joint], amounts=amounts))
+    return speed
+
+
+def _cannot_wait(joint: int, arrival: float, duration: float, end: State, robot: Robot) -> PlanningError:
+    name = robot.joint_names[joint]
+    message = f"{name} arrives after {{arrival}} at {{velocity}} and cannot wait there until {{duration}}"
+    amounts = {
+        "arrival": Amount(arrival),
+        "velocity": Amount(float(end.velocity[joint]), 1, joint),
+        "duration": Amount(duration),
+    }
+    hint = "give the move a `duration`, end it at rest, or use jerk_limited"
+    return PlanningError(Problem(message, hint, joint=name, amounts=amounts))

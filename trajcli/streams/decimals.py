@@ -1,0 +1,159 @@
+"""Numbers to text with nine fixed decimals: the same bytes on every processor, and fast.
+
+A value is split into its whole and its fractional part, which is exact. The fraction is rounded to 1e-12
+first and from there to 1e-9, both on scaled integers and half to even: values that differ in their last bits
+only, because they were evaluated in another order, give the same digits even where they stand on a tie.
+
+Text is made of words of four bytes from tables: `-12`, `.345`, `6789`, `01,`. Shorter words are filled with
+NUL bytes, which are dropped from the whole block at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajcli.curves.piecewise import Array
+
+DECIMALS = 9
+
+Words = NDArray[np.uint32]
+Bools = NDArray[np.bool_]
+
+_VALUES = 16384  # values encoded at a time: their words stay in the processor's cache
+_NARROW = 1e3  # whole parts below this and their sign fit into one word
+_WIDE = 1e7  # into two words
+
+
+def encode_fixed(rows: Array, whole_numbers: Sequence[int] = ()) -> bytes:
+    """Return `rows` (N, m), finite, as lines of values separated by commas.
+
+    Args:
+        rows: Values.
+        whole_numbers: Columns that are written without decimals.
+    """
+    step = max(1, _VALUES // rows.shape[1])
+    return b"".join(_encode_block(rows[low : low + step], whole_numbers) for low in range(0, len(rows), step))
+
+
+def encode_full(rows: Array, whole_numbers: Sequence[int] = ()) -> bytes:
+    """Return the same with the fewest digits from which each float64 can be restored bit by bit."""
+    lines = []
+    for row in rows.tolist():
+        for column in whole_numbers:
+            row[column] = round(row[column])
+        lines.append(",".join(map(repr, row)))
+    return "".join(line + "\n" for line in lines).encode()
+
+
+def _encode_block(rows: Array, whole_numbers: Sequence[int]) -> bytes:
+    negative, whole, fraction = _rounded(rows.reshape(-1))
+    largest = whole.max()
+    if largest >= _WIDE:
+        return _encode_huge(negative, whole, fraction, rows.shape[1], whole_numbers)
+    words = np.empty((*rows.shape, 4 if largest < _NARROW else 5), dtype=np.uint32)
+    flat = words.reshape(rows.size, -1)
+    if largest < _NARROW:
+        whole += 1e3 * negative
+        flat[:, 0] = _signed_words()[whole.astype(np.intp)]
+    else:
+        _put_wide(flat, negative, whole)
+    _put_fraction(flat[:, -3:], fraction)
+    text = words.view(np.uint8)
+    text[:, -1, -2] = ord("\n")
+    text[:, list(whole_numbers), -12:-2] = 0
+    return words.tobytes().translate(None, b"\0")
+
+
+def _rounded(values: Array) -> tuple[Bools, Array, Array]:
+    """Return sign, whole part and fraction, in units of the last decimal, of the rounded values (N,).
+
+    A value that is rounded to zero has no sign.
+    """
+    magnitude = np.abs(values)
+    whole = np.floor(magnitude)
+    fraction = magnitude - whole
+    fraction *= 1e12
+    np.rint(fraction, out=fraction)
+    fraction /= 1e3
+    np.rint(fraction, out=fraction)
+    carried = fraction >= 1e9
+    if carried.any():
+        whole += carried
+        fraction[carried] = 0.0
+    return (values < 0) & (whole + fraction > 0), whole, fraction
+
+
+def _put_wide(words: Words, negative: Bools, whole: Array) -> None:
+    """Write whole parts below 1e7 into the first two columns of `words` (N, 2 or more)."""
+    high = np.floor(whole / 1e4)
+    low = whole - 1e4 * high
+    low += 1e4 * (high > 0)
+    high += 1e3 * negative
+    # A sign alone stands in the first word where there are no digits for it.
+    words[:, 0] = _leading_words()[high.astype(np.intp)]
+    words[:, 1] = _trailing_words()[low.astype(np.intp)]
+
+
+def _put_fraction(words: Words, fraction: Array) -> None:
+    """Write point, nine digits and a comma into `words` (N, 3); `fraction` (N,) is used up."""
+    # The quotients of whole numbers are off their next lower whole number by far less than the summand.
+    first = np.floor(fraction * 1e-6 + 1e-7)
+    fraction -= 1e6 * first
+    middle = np.floor(fraction * 1e-2 + 1e-3)
+    fraction -= 1e2 * middle
+    tenths, digits, ends = _fraction_tables()
+    words[:, 0] = tenths[first.astype(np.intp)]
+    words[:, 1] = digits[middle.astype(np.intp)]
+    words[:, 2] = ends[fraction.astype(np.intp)]
+
+
+def _encode_huge(
+    negative: Bools, whole: Array, fraction: Array, width: int, whole_numbers: Sequence[int]
+) -> bytes:
+    """Return the text of a block that holds numbers of any size; whole parts are exact."""
+    cells = [
+        f"{'-' if minus else ''}{int(digits)}.{int(decimals):09d}"
+        for minus, digits, decimals in zip(negative.tolist(), whole.tolist(), fraction.tolist(), strict=True)
+    ]
+    lines = [cells[low : low + width] for low in range(0, len(cells), width)]
+    for line in lines:
+        for column in whole_numbers:
+            line[column] = line[column].partition(".")[0]
+    return "".join(",".join(line) + "\n" for line in lines).encode()
+
+
+def _words(texts: Iterable[str]) -> Words:
+    """Return each text of at most four characters as a word, filled with NUL bytes in front."""
+    return np.frombuffer("".join(text.rjust(4, "\0") for text in texts).encode(), dtype=np.uint32)
+
+
+@cache
+def _signed_words() -> Words:
+    """Return the words of 0 to 999, then those of -0 to -999."""
+    return _words([f"{sign}{number}" for sign in ("", "-") for number in range(1000)])
+
+
+@cache
+def _leading_words() -> Words:
+    """Return the same words, without the digit of 0 and -0."""
+    return _words([f"{sign}{number or ''}" for sign in ("", "-") for number in range(1000)])
+
+
+@cache
+def _trailing_words() -> Words:
+    """Return the words of 0 to 9999, then the same of four digits each."""
+    return _words([form.format(number) for form in ("{}", "{:04d}") for number in range(10000)])
+
+
+@cache
+def _fraction_tables() -> tuple[Words, Words, Words]:
+    """Return the words of the first three decimals, of the next four, and of the last two with a comma."""
+    return (
+        _words(f".{number:03d}" for number in range(1000)),
+        _words(f"{number:04d}" for number in range(10000)),
+        _words(f"{number:02d},\0" for number in range(100)),
+    )

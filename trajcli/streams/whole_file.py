@@ -1,0 +1,125 @@
+"""Files that appear whole or not at all."""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import secrets
+import stat
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from io import UnsupportedOperation
+from pathlib import Path
+from typing import BinaryIO
+
+from trajcli.errors import FileError
+
+_DESCRIPTOR = re.compile(
+    r"/dev/(?:(?P<name>stdout|stderr)|fd/(?P<number>[0-9]+))|/proc/self/fd/(?P<other>[0-9]+)"
+)
+_NUMBERS = {"stdout": 1, "stderr": 2}
+
+
+@contextmanager
+def whole_file(path: str | Path) -> Iterator[BinaryIO]:
+    """Open `path` for writing; the file takes its place when the block ends, and only if it ends well.
+
+    The new file replaces an old one in one step and keeps its permissions; a symbolic link stays, and what it
+    points to is replaced. A device, a pipe or an open descriptor such as /dev/stdout is written to
+    directly: only then is the stream not `readable()`.
+
+    Raises:
+        FileError: When the file cannot be written; the old one is as it was.
+        BrokenPipeError: When the reader of a pipe has closed it.
+    """
+    with _named_errors(str(path)):
+        special = _open_special(str(path))
+        if special is not None:
+            with special:
+                yield special
+            return
+        target = Path(os.path.realpath(path))
+        mode = _mode_of(target)
+        # The name is short whatever the target's is, and its permissions are what the umask leaves.
+        temporary = target.with_name(f".trajcli-{secrets.token_hex(8)}.part")
+        try:
+            with temporary.open("x+b") as stream:
+                if mode is not None:
+                    os.fchmod(stream.fileno(), mode)
+                yield stream
+            temporary.replace(target)
+        except BaseException:
+            with suppress(OSError):
+                temporary.unlink(missing_ok=True)
+            raise
+
+
+@contextmanager
+def standard_output() -> Iterator[BinaryIO]:
+    """Open standard output for bytes; what is written has left when the block ends.
+
+    Raises:
+        FileError: When it cannot be written, as on a full disk.
+        BrokenPipeError: When its reader has closed it.
+    """
+    with _named_errors("standard output"):
+        if sys.stdout is None:
+            raise OSError(errno.EBADF, "it is closed")
+        try:
+            number = os.dup(sys.stdout.fileno())
+        except UnsupportedOperation:  # replaced by a stream in memory, as tests do
+            yield sys.stdout.buffer
+            return
+        # A stream of our own takes with it what could not be written: the interpreter will not try again.
+        with os.fdopen(number, "wb") as stream:
+            yield stream
+
+
+@contextmanager
+def _named_errors(name: str) -> Iterator[None]:
+    """Turn the system's errors into ours, which name the file. A closed pipe is no error of a file."""
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise FileError(f"cannot write {name}: {reason}", hint=_hint(error)) from error
+
+
+def _hint(error: OSError) -> str | None:
+    if isinstance(error, FileNotFoundError):
+        return "the directory must exist"
+    if isinstance(error, PermissionError):
+        return "the directory must be writable, and so must the file where there is one"
+    return None
+
+
+def _open_special(path: str) -> BinaryIO | None:
+    """Return a stream to what is not a regular file, unless it is one."""
+    descriptor = _DESCRIPTOR.fullmatch(path)
+    if descriptor:
+        number = descriptor["number"] or descriptor["other"] or _NUMBERS[descriptor["name"]]
+        # A duplicate shares the position: what was written before stays, what comes later follows.
+        return os.fdopen(os.dup(int(number)), "wb")
+    with suppress(FileNotFoundError):
+        kind = Path(path).stat().st_mode
+        if not stat.S_ISREG(kind):
+            return Path(path).open("wb")
+    return None
+
+
+def _mode_of(target: Path) -> int | None:
+    """Return the permissions of an existing file, which must be writable; None where there is none.
+
+    Raises:
+        PermissionError: When the file may not be written.
+    """
+    try:
+        mode = stat.S_IMODE(target.stat().st_mode)
+    except FileNotFoundError:
+        return None
+    with target.open("r+b"):
+        return mode

@@ -1,0 +1,163 @@
+"""Units: what a file's numbers are measured in, and strings that carry their own unit.
+
+Inside the house everything is SI. A number of a file is `value * factor(quantity, units)`; a string such as
+"120 deg/s" says its unit itself. The units that strings may use:
+
+| dimension | units |
+|---|---|
+| angle | rad, mrad, deg, °, rev; rpm for rev/min |
+| length | m, cm, mm, um |
+| time | s, ms, us, min |
+| frequency | Hz, kHz |
+
+A rate is an angle or a length over a time: `deg/s`, `mm/s^2`, `m/s³`, `rev/min`. Ratios have no unit.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+Dimension = Literal["angle", "length", "time", "frequency", "ratio"]
+AngleUnit = Literal["rad", "deg"]
+LengthUnit = Literal["m", "mm"]
+
+_ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180, "°": math.pi / 180, "rev": 2 * math.pi}
+_LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
+_TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
+_FREQUENCIES = {"Hz": 1.0, "kHz": 1e3}
+_UNITS = {"angle": _ANGLES, "length": _LENGTHS, "time": _TIMES, "frequency": _FREQUENCIES}
+
+_ALIASES = {"rpm": "rev/min"}
+_EXPONENTS = {"": 1, "^2": 2, "²": 2, "^3": 3, "³": 3}
+_RATES = ("", "/s", "/s^2", "/s^3")
+_ORDERS = ("", " per second", " per second squared", " per second cubed")
+_EXAMPLES = {"angle": "120 deg", "length": "250 mm", "time": "0.5 s", "frequency": "500 Hz"}
+_QUOTED = 40  # characters of the user's text that a message repeats
+
+_NUMBER = re.compile(r"\s*([-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*", re.DOTALL)
+_RATE = re.compile(r"([^\s/]+)\s*/\s*([a-z]+)(\^2|\^3|²|³|)")
+
+
+class UnitError(ValueError):
+    """A string is not a quantity of the wanted kind; the message says what was expected."""
+
+
+@dataclass(frozen=True)
+class Units:
+    """The units of a file's plain numbers; time is always in seconds, frequency in hertz."""
+
+    angle: AngleUnit = "rad"
+    length: LengthUnit = "m"
+
+    def __post_init__(self) -> None:
+        if self.angle not in ("rad", "deg") or self.length not in ("m", "mm"):
+            raise ValueError(
+                f"no such units: angle {self.angle!r}, length {self.length!r}; expected rad or deg, m or mm"
+            )
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What a number measures.
+
+    Attributes:
+        dimension: The kind of number.
+        order: Time derivative, for angles and lengths: 0 the value, 1 velocity, 2 acceleration, 3 jerk.
+    """
+
+    dimension: Dimension
+    order: int = 0
+
+    def __post_init__(self) -> None:
+        if self.order not in range(4 if self.dimension in ("angle", "length") else 1):
+            raise ValueError(f"a {self.dimension} has no time derivative of order {self.order}")
+
+
+def factor(quantity: Quantity, units: Units) -> float:
+    """Return the SI value of one user unit; exactly 1.0 where the user's unit is SI."""
+    if quantity.dimension == "angle":
+        return _ANGLES[units.angle]
+    return _LENGTHS[units.length] if quantity.dimension == "length" else 1.0
+
+
+def unit_name(quantity: Quantity, units: Units) -> str:
+    """Return the user's unit as messages say it, such as "deg/s" or "mm/s^2"; empty for a ratio."""
+    if quantity.dimension in ("time", "frequency", "ratio"):
+        return {"time": "s", "frequency": "Hz", "ratio": ""}[quantity.dimension]
+    return (units.angle if quantity.dimension == "angle" else units.length) + ("", "/s", "/s^2", "/s^3")[
+        quantity.order
+    ]
+
+
+def to_si(value: float, quantity: Quantity, units: Units) -> float:
+    """Return a number in user units as SI."""
+    return value * factor(quantity, units)
+
+
+def to_user(si: float, quantity: Quantity, units: Units) -> float:
+    """Return an SI number in user units."""
+    return si / factor(quantity, units)
+
+
+def parse_quantity(text: str, quantity: Quantity) -> float:
+    """Return a number with its unit, such as "120 deg/s", in SI.
+
+    Args:
+        text: A decimal number and a unit of the module's table, with or without a space between.
+        quantity: What it must measure.
+
+    Raises:
+        UnitError: When it is no such quantity, or too large for a float64.
+    """
+    match = _NUMBER.fullmatch(text)
+    if match is None:
+        raise UnitError(_expected(quantity, text))
+    number, unit = match.groups()
+    if not unit:
+        unitless = quantity.dimension == "ratio"
+        way = f"write {number} without quotes" + ("" if unitless else ", or give it a unit")
+        raise UnitError(f"{_expected(quantity, text)}: {way}")
+    scale = _scale(unit, quantity)
+    if scale is None:
+        raise UnitError(_expected(quantity, text) + _unknown(unit, quantity))
+    value = float(number) * scale
+    if not math.isfinite(value):
+        raise UnitError(f"{_shown(text)} is too large")
+    return value
+
+
+def _scale(unit: str, quantity: Quantity) -> float | None:
+    """Return the SI value of one `unit`; None when it does not measure the quantity."""
+    known = _UNITS.get(quantity.dimension, {})
+    if quantity.order == 0:
+        return known.get(unit)
+    rate = _RATE.fullmatch(_ALIASES.get(unit, unit))
+    if rate is None or _EXPONENTS[rate[3]] != quantity.order or rate[1] not in known or rate[2] not in _TIMES:
+        return None
+    return known[rate[1]] / _TIMES[rate[2]] ** quantity.order
+
+
+def _unknown(unit: str, quantity: Quantity) -> str:
+    """Return the words that name the quantity's units, after a unit which is none at all."""
+    names = [name for table in _UNITS.values() for name in table]
+    rate = _RATE.fullmatch(_ALIASES.get(unit, unit))
+    base, period = (rate[1], rate[2]) if rate else (unit, "s")
+    if (base in names and period in _TIMES) or quantity.dimension == "ratio":
+        return ""
+    periods = f", per {', '.join(_TIMES)}" if quantity.order else ""
+    return f" (units: {', '.join(_UNITS[quantity.dimension])}{periods})"
+
+
+def _expected(quantity: Quantity, text: str) -> str:
+    if quantity.dimension == "ratio":
+        return f"expected a number without a unit such as 0.5, got {_shown(text)}"
+    what = f"{'an' if quantity.dimension == 'angle' else 'a'} {quantity.dimension}{_ORDERS[quantity.order]}"
+    example = _EXAMPLES[quantity.dimension] + _RATES[quantity.order]
+    return f'expected {what} such as "{example}", got {_shown(text)}'
+
+
+def _shown(text: str) -> str:
+    return f'"{text}"' if len(text) <= _QUOTED else f'"{text[:_QUOTED]}..."'
