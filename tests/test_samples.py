@@ -86,7 +86,7 @@ def test_neighbouring_rows_never_show_the_same_time():
     for rate in (1e3, 1e5, 1e7):
         shown = [f"{time:.9f}" for time in times_of(UniformGrid(200.4 / rate, rate))]
         assert len(set(shown)) == len(shown)
-        near = [f"{time:.9f}" for time in times_of(UniformGrid(200 / rate + 5e-10, rate))]
+        near = [f"{time:.9f}" for time in times_of(UniformGrid(200 / rate + 4e-10, rate))]
         assert len(set(near)) == len(near)
 
 

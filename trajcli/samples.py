@@ -165,10 +165,10 @@ def _in_units(curve: PiecewisePolynomial, factors: Array) -> PiecewisePolynomial
 
 
 def _onto_breaks(local: Array, breaks: Array) -> Array:
-    """Return the times (N,) with those that rounding put just before a break moved onto it."""
+    """Return the times (N,) with those that rounding put just before a break moved onto it; the start stays."""
     following = breaks[np.minimum(np.searchsorted(breaks, local, "right"), breaks.size - 1)]
     near = max(_BREAK, 4 * float(np.spacing(breaks[-1])))
-    return np.where(following - local <= near, np.maximum(following, local), local)
+    return np.where((following - local <= near) & (local > breaks[0]), np.maximum(following, local), local)
 
 
 def _window(curve: PiecewisePolynomial, local: Array) -> PiecewisePolynomial:

@@ -47,6 +47,8 @@ def test_the_length_does_not_depend_on_the_unit_of_length():
     large = oracle.robot_of({"dh": rows, "convention": "std"})
     small = planar([0.3, 0.2])
     assert characteristic_length(small) == pytest.approx(0.5)
+    assert characteristic_length(UR5E) == pytest.approx(0.1625 + 0.425 + 0.3922 + 0.1333 + 0.0997 + 0.0996)
+    assert characteristic_length(PANDA) == pytest.approx(0.333 + 0.316 + 2 * 0.0825 + 0.384 + 0.088 + 0.107)
     q = [0.4, 1.1]
     np.testing.assert_allclose(dexterity(large, q).condition, dexterity(small, q).condition, rtol=1e-12)
 

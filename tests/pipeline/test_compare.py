@@ -2,43 +2,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tables import changed, cut, exactly, motion, table, without
 
 from trajcli.errors import InputError
-from trajcli.pipeline.column_tolerances import ALL, parse_tolerances
+from trajcli.pipeline.column_tolerances import ALL
 from trajcli.pipeline.compare import compare
 from trajcli.pipeline.difference import describe
 from trajcli.streams.table import Table
-
-
-def table(columns, file="a.csv"):
-    values = np.stack([np.asarray(column, dtype=float) for column in columns.values()], axis=1)
-    return Table(tuple(columns), values, np.full(len(columns), 9), file)
-
-
-def motion(count=101, period=0.01, file="a.csv", start=0.0, **more):
-    """q1 = sin 3t and its derivatives."""
-    t = start + np.arange(count) * period
-    columns = {"t": t, "q1": np.sin(3 * t), "qd1": 3 * np.cos(3 * t), "qdd1": -9 * np.sin(3 * t)}
-    return table(columns | {name: function(t) for name, function in more.items()}, file)
-
-
-def changed(source, name, row, by, file="b.csv"):
-    columns = source.columns.copy()
-    columns[row, source.names.index(name)] += by
-    return Table(source.names, columns, source.decimals, file)
-
-
-def without(source, *names, file="b.csv"):
-    kept = [place for place, name in enumerate(source.names) if name not in names]
-    return Table(tuple(source.names[k] for k in kept), source.columns[:, kept], source.decimals[kept], file)
-
-
-def cut(source, count, file="b.csv"):
-    return Table(source.names, source.columns[:count], source.decimals, file)
-
-
-def exactly(a, b, **options):
-    return compare(a, b, {}, {}, **options)
 
 
 def test_a_table_equals_itself_in_any_order_of_columns():
@@ -116,6 +86,13 @@ def test_the_worst_is_measured_by_its_tolerance():
     assert describe(found).splitlines()[1].endswith("0.01 apart (tolerance 0.1)")
 
 
+def test_the_worst_row_is_measured_by_its_tolerance():
+    a, b = table({"q1": [100.0, 1e-3, 1.0]}), table({"q1": [100.05, 1.5e-3, 1.0]}, "b.csv")
+    found = compare(a, b, {}, {"q": 1e-3})
+    assert (found.worst.row, found.columns[0].count) == (1, 1)
+    assert exactly(a, b).worst.row == 0
+
+
 def test_columns_in_other_units_are_converted():
     a = motion(q2=np.cos)
     b = motion(file="b.csv", q2=np.cos)
@@ -136,6 +113,12 @@ def test_the_same_name_is_paired_first():
     a = table({"q1": [1.0], "q1_deg": [2.0]})
     b = table({"q1_deg": [2.0], "q1": [1.0]}, "b.csv")
     assert exactly(a, b).equal
+
+
+def test_a_column_is_paired_once():
+    found = exactly(table({"q1_deg": [0.0], "q1_mm": [0.0]}), table({"q1": [0.0]}, "b.csv"))
+    assert [column.worst.column for column in found.columns] == ["q1_deg"]
+    assert found.missing == (("q1_mm", 1),)
 
 
 def test_an_angle_is_no_length():
@@ -222,127 +205,3 @@ def test_files_with_nothing_in_common_are_refused():
     with pytest.raises(InputError, match=r"a\.csv and b\.csv have no column in common") as caught:
         exactly(table({"t": [0.0]}), table({"x": [0.0]}, "b.csv"))
     assert caught.value.problems[0].hint == "the first has t; the second has x"
-
-
-def worst_of(found, kind):
-    return next(column.worst.difference for column in found.columns if column.worst.column == kind)
-
-
-def test_resampling_interpolates_with_what_derivatives_there_are():
-    a = motion(1001, 1e-3)
-    h = 0.01
-    b = motion(101, h, "b.csv")
-    found = exactly(a, b, resample=True)
-    # The errors of cubic Hermite, h^4/384 max|f''''|, and linear interpolation, h^2/8 max|f''|.
-    assert worst_of(found, "q1") < h**4 / 384 * 81 * 1.01
-    assert worst_of(found, "qd1") < h**4 / 384 * 243 * 1.01
-    assert h**2 / 8 * 81 * 0.5 < worst_of(found, "qdd1") < h**2 / 8 * 81 * 1.01
-    linear = exactly(without(a, "qd1", file="a.csv"), without(b, "qd1"), resample=True)
-    assert h**2 / 8 * 9 * 0.5 < worst_of(linear, "q1") < h**2 / 8 * 9 * 1.01
-    assert found.notes == (
-        "b.csv is interpolated from 0 s to 1 s (cubic for q, qd; linear for qdd); "
-        "a.csv lasts from 0 s to 1 s, b.csv lasts from 0 s to 1 s",
-    )
-    assert found.notes[0] in describe(found)
-    assert compare(a, b, {"q": 1e-8, "qd": 1e-7, "qdd": 2e-3}, {}, resample=True).equal
-
-
-def test_resampling_is_exact_where_rows_meet():
-    a, b = motion(101, 0.01), motion(51, 0.02, "b.csv")
-    for kept in ((), ("qd1", "qdd1")):
-        found = exactly(without(b, *kept, file="b.csv"), without(a, *kept, file="a.csv"), resample=True)
-        assert found.worst.difference < 1e-15
-
-
-def test_a_real_difference_survives_resampling():
-    a, b = motion(1001, 1e-3), motion(101, 0.01, "b.csv")
-    found = compare(a, changed(b, "q1", 40, 1e-4), {"q": 1e-8, ALL: 1.0}, {}, resample=True)
-    assert not found.equal
-    assert found.worst.column == "q1"
-    assert found.worst.time == pytest.approx(0.4)
-
-
-def test_resampling_keeps_to_the_common_interval_and_to_units():
-    a = motion(200, 0.01, start=0.2)
-    b = motion(101, 0.015, "b.csv")
-    b = Table(("t", "q1_deg", "qd1_deg", "qdd1_deg"), b.columns * [1, *[180 / np.pi] * 3], b.decimals, "b.csv")
-    found = compare(a, b, {"q": 1e-7, "qd": 1e-6, "qdd": 1e-2}, {}, resample=True)
-    assert found.equal
-    assert found.rows == 131  # from 0.2 s to 1.5 s
-    assert "from 0.2 s to 1.5 s" in found.notes[0]
-
-
-def test_a_count_is_never_interpolated():
-    a = table({"t": np.arange(11) / 10, "move": np.arange(11) >= 5})
-    b = table({"t": np.arange(6) / 5, "move": np.arange(6) >= 3}, "b.csv")
-    found = exactly(a, b, resample=True)
-    assert {found.worst.a, found.worst.b} == {0.0, 1.0}
-    assert "(the earlier row for move)" in found.notes[0]
-    assert found.columns[0].count == 1
-
-
-@pytest.mark.parametrize(
-    ("a", "b", "words"),
-    [
-        (motion(), motion(start=5.0, file="b.csv"), "no row of a.csv lies inside the times of b.csv"),
-        (motion(), without(motion(), "t"), "do not both have a column t"),
-        (
-            motion(),
-            table({"t": [0.0, 0.2, 0.2], "q1": [0, 0, 0]}, "b.csv"),
-            "0.2 s is followed by 0.2 s in row 2",
-        ),
-        (motion(), table({"t": [0.0, 1.0]}, "b.csv"), "no column in common but t"),
-    ],
-)
-def test_what_cannot_be_resampled_is_refused(a, b, words):
-    with pytest.raises(InputError) as caught:
-        exactly(a, b, resample=True)
-    assert words in str(caught.value)
-
-
-def test_one_row_is_resampled_by_itself():
-    found = exactly(motion(), motion(1, 1.0, "b.csv"), resample=True)
-    assert (found.equal, found.rows) == (True, 1)
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("1e-9", {ALL: 1e-9}),
-        ("q=1e-9,qd=1e-6", {"q": 1e-9, "qd": 1e-6}),
-        (" q1_deg = 0.5 , 0", {"q1_deg": 0.5, ALL: 0.0}),
-        ("*=2", {ALL: 2.0}),
-        ("a=b=1", {"a=b": 1.0}),
-    ],
-)
-def test_tolerances_are_read(text, expected):
-    assert parse_tolerances(text) == expected
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("", "does not end in a number"),
-        ("q", "'q' does not end in a number"),
-        ("q=", "does not end in a number"),
-        ("q=1,", "does not end in a number"),
-        ("q=-1", "'q=-1' is -1"),
-        ("q=nan", "is nan"),
-        ("inf", "is inf"),
-        ("=1", "names no column"),
-        ("q=1,q=2", "'q=2' comes after another one"),
-        ("1,2", "'2' comes after another one"),
-    ],
-)
-def test_wrong_tolerances_are_refused(text, words):
-    with pytest.raises(InputError) as caught:
-        parse_tolerances(text)
-    assert words in str(caught.value)
-
-
-def test_a_tolerance_for_nothing_is_refused():
-    with pytest.raises(InputError, match="'qe' fits no column") as caught:
-        compare(motion(), motion(), {"qe": 1.0}, {})
-    assert caught.value.problems[0].hint.startswith("did you mean 'q")
-    with pytest.raises(InputError, match="'move' fits no column"):
-        compare(motion(), motion(), {}, {"move": 1.0})

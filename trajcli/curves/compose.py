@@ -1,4 +1,4 @@
-"""Curves out of curves: merged breaks, stretched and reversed time, a law laid on a line, a rest at the end."""
+"""Curves out of curves: merged breaks, scaled and reversed time, a law laid on a line, a rest at the end."""
 
 from __future__ import annotations
 

@@ -26,7 +26,9 @@ def cycloid_law(duration: float) -> PiecewisePolynomial:
     u = np.linspace(0.0, 1.0, _PIECES + 1)
     angle = 2 * np.pi * u
     # sin and cos of whole quarters are exactly 0 or +-1, so rest at the ends is exact
-    sine, cosine = (np.where(np.isin(4 * u % 1, (0.0,)), np.rint(f(angle)), f(angle)) for f in (np.sin, np.cos))
+    sine, cosine = (
+        np.where(np.isin(4 * u % 1, (0.0,)), np.rint(f(angle)), f(angle)) for f in (np.sin, np.cos)
+    )
     unit = np.stack(
         [
             u - sine / (2 * np.pi),

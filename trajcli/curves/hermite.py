@@ -35,7 +35,9 @@ def hermite_pieces(breaks: ArrayLike, derivatives: ArrayLike) -> PiecewisePolyno
     """
     times = np.asarray(breaks, dtype=np.float64)
     given = np.asarray(derivatives, dtype=np.float64)
-    return PiecewisePolynomial(times, hermite_coefficients(given[:, :-1], given[:, 1:], np.diff(times)[:, None]))
+    return PiecewisePolynomial(
+        times, hermite_coefficients(given[:, :-1], given[:, 1:], np.diff(times)[:, None])
+    )
 
 
 def hermite_coefficients(start: Array, end: Array, duration: Array) -> Array:

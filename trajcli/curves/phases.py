@@ -1,4 +1,4 @@
-"""Motion of one variable in phases, in each of which one derivative is constant: jerk, acceleration or velocity.
+"""Motion of one variable in phases with one constant derivative each: jerk, acceleration or velocity.
 
 A solver hands its phases over with an error of its own. Newton's method on the durations lays the end of the
 motion exactly into its target: the least relative change of the durations that does it, so that phases of
@@ -17,9 +17,10 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 
-_GOAL = 4e-15  # relative to the scales: what summing a few phases leaves
+_GOAL = 4e-15  # relative: what summing a few phases leaves
 _ROUNDS = 12
 _RELUCTANCE = 1e-3
+_WEAK = 1e-5  # changes of constants with less than this influence on the end are left alone
 _LARGEST_STEP = 0.5
 _LEVEL = 1e-9  # of the peak: an acceleration below this in a phase without jerk means a cruise
 
@@ -55,7 +56,7 @@ class PhaseChain:
 
     @cached_property
     def _walk(self) -> tuple[Array, Array]:
-        """The states before each phase and at the end, (k + 1, order), and what cruises found instead of zero."""
+        """The states (k + 1, order) before each phase and at the end, and what cruises found instead of 0."""
         state = self.initial.tolist()
         rows, leftover = [], []
         for k, (time, constant) in enumerate(
@@ -75,16 +76,20 @@ class PhaseChain:
 
     @cached_property
     def peaks(self) -> Array:
-        """Largest magnitude of each derivative at the ends of phases, shape (order,)."""
-        return np.abs(self.states).max(axis=0)
+        """Largest magnitude of each derivative at the ends of phases and in the target, shape (order,)."""
+        peaks: Array = np.fmax(np.abs(self.states).max(axis=0), np.abs(self.final))
+        return peaks
 
-    @property
-    def scales(self) -> Array:
-        """The peaks, but for the position peak velocity times duration: rounding counts relative to that."""
-        scales = self.peaks.copy()
+    @cached_property
+    def _rounding(self) -> Array:
+        """What rounding is relative to: the peaks, or what the next derivative's peak adds up to."""
+        sizes = np.where(self.peaks > 0, self.peaks, 1.0)
         if self.order > 1:
-            scales[0] = max(scales[0], scales[1] * self.duration)
-        return np.where(scales > 0, scales, 1.0)
+            sizes[0] = max(sizes[0], sizes[1] * self.duration)
+        if self.order > 2:
+            driving = [time for k, time in enumerate(self.durations.tolist()) if k not in self.cruising]
+            sizes[1] = max(sizes[1], sizes[2] * math.fsum(driving))
+        return sizes
 
     def with_cruises(self) -> PhaseChain:
         """Return the motion with its cruises marked: phases without jerk and without acceleration."""
@@ -94,8 +99,13 @@ class PhaseChain:
         return replace(self, cruising=frozenset(np.flatnonzero(level).tolist()))
 
     def defect(self, duration: float | None = None) -> float:
-        """Return by how much the end misses its target, relative to `scales` (and to `duration` if given)."""
-        return float(np.abs(self._residual(self.scales, duration)).max(initial=0.0))
+        """Return by how much the end misses its target (and `duration`, if given).
+
+        Rates count relative to their peaks, the position relative to peak velocity times duration.
+        """
+        sizes = np.where(self.peaks > 0, self.peaks, 1.0)
+        sizes[0] = self._rounding[0]
+        return float(np.abs(self._residual(sizes, duration)).max(initial=0.0))
 
     def stretched(self, duration: float) -> PhaseChain:
         """Return the motion over the same positions in `duration`; boundary derivatives must be zero."""
@@ -108,25 +118,25 @@ class PhaseChain:
         Args:
             duration: Kept exactly if given; else the duration is free.
         """
-        best = self._corrected(1.0, 0.0, duration)
+        best = self.corrected(1.0, 0.0, duration)
         if best.defect(duration) > 10 * _GOAL and duration is not None:
-            other = self._corrected(1.0, _RELUCTANCE, duration)
+            other = self.corrected(1.0, _RELUCTANCE, duration)
             best = min(best, other, key=lambda chain: chain.defect(duration))
         return best
 
     def curve(self, position: float, duration: float) -> PiecewisePolynomial:
         """Return the motion from `position` as a curve (n = 1) over [0, `duration`].
 
-        Break times are rounded so that no phase but the longest gets shorter: no constant need grow. What that
-        does to the end is taken back by the constants, and what is left of the distance by the velocity of the
-        longest phase.
+        Break times are rounded so that no phase but the longest gets shorter: no constant need grow. What
+        that does to the end is taken back by the constants, and what is left of the distance by the velocity
+        of the longest phase.
         """
         if not self.durations.size:
             return PiecewisePolynomial(np.zeros(2), np.full((1, 1, 1), position))
         breaks = _rounded_breaks(self.durations.tolist(), duration)
         lengths = np.diff(breaks)
         chain = replace(self, durations=lengths, constants=self.constants * self.durations / lengths)
-        chain = chain._corrected(0.0, 1.0, None)
+        chain = chain.corrected(0.0, 1.0, None)
         states = chain.states[:-1]
         rows = np.stack([chain.constants, *states.T[::-1]])
         rows /= np.array([factorial(k) for k in range(self.order, -1, -1)])[:, None]
@@ -138,11 +148,17 @@ class PhaseChain:
         rows[-1] += position
         return PiecewisePolynomial(breaks, rows[:, :, None])
 
-    def _corrected(self, yield_duration: float, yield_constant: float, duration: float | None) -> PhaseChain:
-        """Return the chain after Newton steps that are least in the relative changes of durations and constants."""
-        chain, best, scales = self, self, self.scales
+    def corrected(self, yield_duration: float, yield_constant: float, duration: float | None) -> PhaseChain:
+        """Return the chain after Newton steps.
+
+        Args:
+            yield_duration: How willingly durations change, relative to themselves.
+            yield_constant: The same for the constants.
+            duration: Kept if given.
+        """
+        chain, best, scales = self, self, self._rounding
         weights = np.repeat([yield_duration, yield_constant], self.durations.size)
-        least = np.inf
+        weak, least = None if yield_duration else _WEAK, np.inf
         for _ in range(_ROUNDS):
             residual = chain._residual(scales, duration)
             miss = float(np.abs(residual).max(initial=0.0))
@@ -151,7 +167,7 @@ class PhaseChain:
             if miss <= _GOAL:
                 break
             matrix = chain._sensitivity(scales, duration) * weights
-            step = weights * np.linalg.lstsq(matrix, -residual, rcond=None)[0]
+            step = weights * np.linalg.lstsq(matrix, -residual, rcond=weak)[0]
             change = 1 + np.clip(step, -_LARGEST_STEP, _LARGEST_STEP).reshape(2, -1)
             chain = replace(
                 chain, durations=chain.durations * change[0], constants=chain.constants * change[1]
@@ -186,7 +202,7 @@ class PhaseChain:
 
 
 def _rounded_breaks(durations: list[float], end: float) -> Array:
-    """Return breaks from 0 to `end` between which all phases but the longest last at least their durations."""
+    """Return breaks from 0 to `end`: all phases but the longest last at least as long as given."""
     longest = durations.index(max(durations))
     before, after = [0.0], [end]
     for length in durations[:longest]:

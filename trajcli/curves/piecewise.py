@@ -130,7 +130,8 @@ class PiecewisePolynomial:
         if t.size and (np.isnan(t).any() or t.min() < self.start or t.max() > self.end):
             raise ValueError(f"time outside the curve's domain [{self.start!r}, {self.end!r}]")
         table = np.concatenate(
-            [_padded(derivative_coefficients(self.coefficients, order), self.degree) for order in orders], axis=2
+            [_padded(derivative_coefficients(self.coefficients, order), self.degree) for order in orders],
+            axis=2,
         )
         rows = np.empty((t.size, table.shape[2]))
         piece = np.clip(np.searchsorted(self.breaks, t, side) - 1, 0, self.pieces - 1)
@@ -208,7 +209,11 @@ def constant(value: ArrayLike, duration: float) -> PiecewisePolynomial:
 
 def _padded(coefficients: Array, degree: int) -> Array:
     missing = degree + 1 - coefficients.shape[0]
-    return np.concatenate([np.zeros((missing, *coefficients.shape[1:])), coefficients]) if missing else coefficients
+    return (
+        np.concatenate([np.zeros((missing, *coefficients.shape[1:])), coefficients])
+        if missing
+        else coefficients
+    )
 
 
 def _evaluate_block(breaks: Array, table: Array, t: Array, piece: NDArray[np.intp], out: Array) -> None:

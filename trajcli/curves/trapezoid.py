@@ -71,7 +71,9 @@ class Profile:
     def distance(self) -> float:
         """Signed distance covered."""
         velocities = [self.initial, *(velocity for _, velocity in self.knots)]
-        return math.fsum((velocities[i] + velocities[i + 1]) / 2 * knot[0] for i, knot in enumerate(self.knots))
+        return math.fsum(
+            (velocities[i] + velocities[i + 1]) / 2 * knot[0] for i, knot in enumerate(self.knots)
+        )
 
     def then(self, other: Profile) -> Profile:
         """Return this profile followed by another that starts with the velocity in which this one ends."""
@@ -107,7 +109,7 @@ class Profile:
         lengths = np.array([length for length, _ in knots])
         position = start + np.concatenate([[0.0], np.cumsum((velocity[1:] + velocity[:-1]) / 2 * lengths)])
         position[1:] += (end - position[-1]) * breaks[1:] / breaks[-1]
-        slope = np.diff(velocity) / lengths
+        slope = np.diff(velocity) / np.diff(breaks)  # so that velocities meet where breaks are rounded
         coefficients: Array = np.stack([slope / 2, velocity[:-1], position[:-1]])[:, :, None]
         return PiecewisePolynomial(breaks, coefficients)
 
@@ -133,7 +135,9 @@ def fastest_profile(
         return mirrored.mirrored()
     if initial < 0:
         brake = _ramp(initial, 0.0, backward)
-        return brake.then(fastest_profile(distance - brake.distance, 0.0, final, forward, backward, overshoot=overshoot))
+        return brake.then(
+            fastest_profile(distance - brake.distance, 0.0, final, forward, backward, overshoot=overshoot)
+        )
     if final < 0:
         if not overshoot:
             raise InfeasibleProfileError("turns")
@@ -143,7 +147,9 @@ def fastest_profile(
         if not overshoot:
             raise InfeasibleProfileError("too_fast", stopping)
         brake = _ramp(initial, 0.0, forward)
-        return brake.then(fastest_profile(distance - brake.distance, 0.0, final, forward, backward, overshoot=True))
+        return brake.then(
+            fastest_profile(distance - brake.distance, 0.0, final, forward, backward, overshoot=True)
+        )
     if -stopping * forward.deceleration / forward.acceleration > distance * (1 + 1e-12):
         if not overshoot:
             raise InfeasibleProfileError("too_slow", -stopping * forward.deceleration / forward.acceleration)
@@ -151,7 +157,9 @@ def fastest_profile(
     return _direct(distance, initial, final, forward)
 
 
-def profile_of_duration(distance: float, initial: float, final: float, duration: float, rates: Rates) -> Profile:
+def profile_of_duration(
+    distance: float, initial: float, final: float, duration: float, rates: Rates
+) -> Profile:
     """Return the profile over a positive `distance` that lasts `duration` with the given ramps.
 
     The cruise speed is what is looked for; it may lie below the boundary speeds. `rates.speed` is not used.
@@ -167,10 +175,14 @@ def profile_of_duration(distance: float, initial: float, final: float, duration:
         linear = duration + first * initial / up + second * final / down
         rest = distance + first * initial**2 / (2 * up) + second * final**2 / (2 * down)
         for cruise in _roots(square, -linear, rest):
-            fits = first * (cruise - initial) >= -1e-12 * cruise and second * (cruise - final) >= -1e-12 * cruise
+            fits = (
+                first * (cruise - initial) >= -1e-12 * cruise and second * (cruise - final) >= -1e-12 * cruise
+            )
             ramps = abs(cruise - initial) / up + abs(cruise - final) / down
             if cruise > 0 and fits and ramps <= duration * (1 + 1e-12):
-                return _three(initial, cruise, final, abs(cruise - initial) / up, abs(cruise - final) / down, duration)
+                return _three(
+                    initial, cruise, final, abs(cruise - initial) / up, abs(cruise - final) / down, duration
+                )
     if initial == 0 and final == 0:
         raise InfeasibleProfileError("acceleration", 2 * distance * (1 + a / d) / duration**2)
     shortest = fastest_profile(distance, initial, final, rates, rates).duration
@@ -199,12 +211,19 @@ def signed_profile_of_duration(
     brake = _ramp(initial, 0.0, backward)
     left = duration - brake.duration
     if left <= 0:
-        raise InfeasibleProfileError("duration", fastest_profile(distance, initial, final, forward, backward).duration)
+        raise InfeasibleProfileError(
+            "duration", fastest_profile(distance, initial, final, forward, backward).duration
+        )
     return brake.then(profile_of_duration(distance - brake.distance, 0.0, final, left, forward))
 
 
 def profile_of_speed(
-    distance: float, initial: float, final: float, duration: float, speed: float, deceleration: float | None = None
+    distance: float,
+    initial: float,
+    final: float,
+    duration: float,
+    speed: float,
+    deceleration: float | None = None,
 ) -> Profile:
     """Return the profile over a positive `distance` that lasts `duration` with cruise speed `speed`.
 
@@ -259,7 +278,9 @@ def _direct(distance: float, initial: float, final: float, rates: Rates) -> Prof
     rise = abs(cruise - initial) / (a if cruise >= initial else d)
     fall = abs(cruise - final) / (d if cruise >= final else a)
     covered = (initial + cruise) / 2 * rise + (cruise + final) / 2 * fall
-    return Profile(initial, ((rise, cruise), (max(0.0, (distance - covered) / cruise), cruise), (fall, final)))
+    return Profile(
+        initial, ((rise, cruise), (max(0.0, (distance - covered) / cruise), cruise), (fall, final))
+    )
 
 
 def _dip(distance: float, initial: float, final: float, rates: Rates) -> float:

@@ -35,7 +35,8 @@ class Node(NamedTuple):
         if isinstance(self.value, dict):
             return self.value.get(step) if isinstance(step, str) else None
         if isinstance(self.value, list) and isinstance(step, int) and 0 <= step < len(self.value):
-            return self.value[step]
+            items: list[Node] = self.value
+            return items[step]
         return None
 
     def plain(self) -> Any:  # noqa: ANN401

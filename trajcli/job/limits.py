@@ -23,7 +23,10 @@ def with_job_limits(robot: Robot, spec: LimitsSpec | None) -> tuple[Robot, list[
         after = _replaced(before, spec, order)
         for joint in _looser(before, after):
             message = f"the job's {name} limit of {robot.joint_names[joint]} is looser than the robot's: {{after}} instead of {{before}}"
-            amounts = {"after": _worst(after[joint], order, joint), "before": _worst(before[joint], order, joint)}
+            amounts = {
+                "after": _worst(after[joint], order, joint),
+                "before": _worst(before[joint], order, joint),
+            }
             events.append(Event("looser_limit", message, amounts=amounts))
         rows[name] = after * getattr(spec.scale, name, 1.0)
     return dataclasses.replace(robot, limits=Limits(**rows)), events
@@ -43,9 +46,14 @@ def with_move_limits(robot: Robot, spec: LimitsSpec | None, move: int) -> Robot:
         after = _replaced(before, spec, order)
         for joint in _looser(before, after):
             message = f"a move can only tighten limits: the {name} limit of {robot.joint_names[joint]} is {{before}}, got {{after}}"
-            amounts = {"after": _worst(after[joint], order, joint), "before": _worst(before[joint], order, joint)}
+            amounts = {
+                "after": _worst(after[joint], order, joint),
+                "before": _worst(before[joint], order, joint),
+            }
             hint = "raise it under the job's `limits`"
-            problems.append(Problem(message, hint, move=move, joint=robot.joint_names[joint], amounts=amounts))
+            problems.append(
+                Problem(message, hint, move=move, joint=robot.joint_names[joint], amounts=amounts)
+            )
         rows[name] = after * getattr(spec.scale, name, 1.0)
     if problems:
         raise InputError(*problems)

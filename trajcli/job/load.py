@@ -19,6 +19,7 @@ from yaml.events import (
     SequenceStartEvent,
     StreamEndEvent,
 )
+from yaml.scanner import ScannerError
 
 from trajcli.errors import InputError, Problem
 from trajcli.job.document import Document, Node, place
@@ -33,8 +34,6 @@ __all__ = ["MAX_DEPTH", "Document", "Node", "parse_document", "read_document"]
 
 MAX_DEPTH = 32
 
-# The pure parser lets ValueError and OverflowError out for escapes beyond Unicode.
-_SYNTAX_ERRORS = (yaml.YAMLError, ValueError, OverflowError)
 _MARKER = re.compile(r"[&*!][^\s,\[\]{}]*")
 _REPEATED = "put what is used twice under `points`, and name it there"
 
@@ -43,13 +42,22 @@ _START = Node(None, 1, 1, 1)
 
 
 class _PureLoader(yaml.SafeLoader):
-    """The parser in Python, made to take tabs between tokens as libyaml does."""
+    """The parser in Python, made to take tabs between tokens and to refuse escapes as libyaml does."""
 
     def scan_to_next_token(self) -> None:
         super().scan_to_next_token()
         while self.peek() == "\t":
             self.forward()
             super().scan_to_next_token()
+
+    def scan_flow_scalar_non_spaces(self, double: bool, start_mark: Any) -> Any:  # noqa: ANN401
+        mark = self.get_mark()
+        try:
+            chunks = super().scan_flow_scalar_non_spaces(double, start_mark)
+            "".join(chunks).encode()
+        except (ValueError, OverflowError):  # beyond Unicode, or half of a surrogate pair
+            raise ScannerError("in a quoted scalar", start_mark, "unknown escape", mark) from None
+        return chunks
 
 
 _Loader: Any = getattr(yaml, "CSafeLoader", _PureLoader)
@@ -113,7 +121,7 @@ class _Walk:
             return self._only_document()
         except _TooDeepError:
             pass
-        except _SYNTAX_ERRORS as error:
+        except yaml.YAMLError as error:
             if tabs is None:  # else they are the cause, or as likely as any other
                 self.problems.append(syntax_problem(error, self.file, self.lines))
         return None
@@ -142,7 +150,7 @@ class _Walk:
         if not isinstance(event, StreamEndEvent):
             hint = "keep one document a file"
             self._report("a second document begins here, expected one", self._marked(event), hint)
-        if root.value is None and not root.text:
+        elif root.value is None and not root.text:
             self._report("the document is empty", root)
         return root
 

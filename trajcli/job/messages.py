@@ -15,7 +15,12 @@ from trajcli.planners import PLANNERS
 from trajcli.planners.reading import Flaw, shown
 
 Path = tuple[str | int, ...]
-_KINDS = {"dict_type": "a mapping", "model_type": "a mapping", "list_type": "a list", "bool_type": "true or false"}
+_KINDS = {
+    "dict_type": "a mapping",
+    "model_type": "a mapping",
+    "list_type": "a list",
+    "bool_type": "true or false",
+}
 _KINDS |= {"string_type": "a text", "model_attributes_type": "a mapping", "int_type": "a whole number"}
 _KINDS |= {"bool_parsing": "true or false"}
 
@@ -55,7 +60,8 @@ def _flaws(
         return [(path, f"unknown key '{path[-1]}'", known, True)]
     if kind == "missing":
         return [(path, f"`{detail['loc'][-1]}` is missing", None, False)]
-    return [(path, *_text(kind, context, detail["input"]), False)]
+    at = (*path, "planner") if kind == "union_tag_invalid" else path
+    return [(at, *_text(kind, context, detail["input"]), False)]
 
 
 def _text(kind: str, context: Mapping[str, Any], value: object) -> tuple[str, str | None]:

@@ -18,6 +18,8 @@ from trajcli.planners.reading import FieldType, FlawError, Number, ReadingContex
 from trajcli.units import Quantity, Units
 
 
+ROBOT_DEFINITION = "a robot"
+"""Stands in a schema for the definition of a robot, which is made from another model."""
 
 
 class UnitsSpec(Model):
@@ -46,7 +48,7 @@ class RobotSource(FieldType):
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of the three forms."""
         file = {"type": "object", "properties": {"file": {"type": "string"}}, "required": ["file"]}
-        inline = {"$ref": "#/$defs/RobotModel"}
+        inline = {"$comment": ROBOT_DEFINITION}
         return {"anyOf": [{"type": "string"}, {**file, "additionalProperties": False}, inline]}
 
 
@@ -57,12 +59,17 @@ class Output(Model):
     """Which rows and columns are written."""
 
     rate: Annotated[float, Number(Quantity("frequency"), "Rows per second, Hz.", above=0.0)] = 1000.0
-    times: Annotated[list[Seconds] | None, Field(description="Times of the rows instead of a rate, s.")] = None
+    times: Annotated[list[Seconds] | None, Field(description="Times of the rows instead of a rate, s.")] = (
+        None
+    )
     start_time: Annotated[float, Number(Quantity("time"), "Time of the first row, s.")] = 0.0
     align: Annotated[bool, Field(description="Stretch each move to a whole number of periods.")] = False
     columns: Annotated[
         list[Group],
-        Field(min_length=1, description="Groups of columns, in this order: qd is the velocity, qdd the acceleration."),
+        Field(
+            min_length=1,
+            description="Groups of columns, in this order: qd is the velocity, qdd the acceleration.",
+        ),
     ] = ["t", "q", "qd", "qdd"]
 
     @model_validator(mode="after")
@@ -71,7 +78,9 @@ class Output(Model):
             raise refuse([(("times",), "rate and times exclude each other", "leave one of them out")])
         if self.times is not None and self.align:
             raise refuse([(("align",), "align needs a rate, not times", "leave one of them out")])
-        if self.times is not None and (not self.times or any(b <= a for a, b in zip(self.times, self.times[1:]))):  # noqa: B905, RUF007
+        if self.times is not None and (
+            not self.times or any(b <= a for a, b in zip(self.times, self.times[1:]))
+        ):  # noqa: B905, RUF007
             raise refuse([(("times",), "times must strictly increase, and there must be one", None)])
         if len(set(self.columns)) < len(self.columns):
             raise refuse([(("columns",), "a group of columns stands twice", None)])
@@ -85,13 +94,17 @@ class Job(Model):
     name: Annotated[str | None, Field(description="For reports; the file's stem when left out.")] = None
     units: UnitsSpec = UnitsSpec()
     robot: Annotated[Robot, RobotSource()]
-    limits: Annotated[LimitsSpec | None, Field(description="Replaces the robot's limits, then scales.")] = None
+    limits: Annotated[LimitsSpec | None, Field(description="Replaces the robot's limits, then scales.")] = (
+        None
+    )
     points: Annotated[dict[str, Target], Field(description="Named states.")] = {}
     start: Annotated[NamedTarget, Field(description="Where the arm stands before the first move.")]
     moves: Annotated[list[Move], Field(min_length=1, description="What to do, in order.")]
     when_over_limit: Annotated[
         WhenOverLimit,
-        Field(description="error: exit 1; slow: the smallest stretch of the move that verifies, which is reported."),
+        Field(
+            description="error: exit 1; slow: the smallest stretch of the move that verifies, which is reported."
+        ),
     ] = "error"
     output: Output = Output()
 

@@ -99,7 +99,9 @@ def _load(document: Document) -> LoadedJob:
     except ValidationError as error:
         problems += problems_of(error, Job, document)
     if robot is None and problems:
-        problems = [problem for problem in problems if not problem.message.startswith("expected a robot, got")]
+        problems = [
+            problem for problem in problems if not problem.message.startswith("expected a robot, got")
+        ]
     if problems or robot is None:
         raise InputError(*sorted(problems, key=_position))
     effective, events = with_job_limits(robot, job.limits)

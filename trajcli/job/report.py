@@ -22,7 +22,9 @@ class PeakReport(Model):
     high: Annotated[float, Field(description="Largest value, SI.")]
     high_time: Annotated[float, Field(description="Where it is, seconds from the start of the trajectory.")]
     limit: Annotated[tuple[float | None, float | None], Field(description="Bounds, SI; null is unlimited.")]
-    used: Annotated[float | None, Field(description="Largest part of the bound that is used; null if unlimited.")]
+    used: Annotated[
+        float | None, Field(description="Largest part of the bound that is used; null if unlimited.")
+    ]
 
 
 class BindingReport(Model):
@@ -36,9 +38,12 @@ class BindingReport(Model):
 class ReferenceReport(Model):
     """The shortest duration that any point-to-point move may have under the same limits, found by ruckig."""
 
-    duration: Seconds
-    ratio: Annotated[float | None, Field(description="Duration of the move over it; null where it is zero.")]
-    joint: Annotated[str | None, Field(description="The joint that needs it.")]
+    duration: Annotated[float | None, Field(description="Seconds; null where there is no bound.")]
+    ratio: Annotated[
+        float | None, Field(description="Duration of the move over it; null where that says nothing.")
+    ]
+    joint: Annotated[str | None, Field(description="The joint that needs it, or for which there is none.")]
+    reason: Annotated[str | None, Field(description="Why there is no bound.")] = None
 
 
 class MoveReport(Model):
@@ -49,7 +54,9 @@ class MoveReport(Model):
     start: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
     end: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
     duration: Seconds
-    continuity: Annotated[Literal[1, 2], Field(description="Derivatives that the planner joins without a jump.")]
+    continuity: Annotated[
+        Literal[1, 2], Field(description="Derivatives that the planner joins without a jump.")
+    ]
     stretch: Annotated[float, Field(description="How many times longer it lasts than its planner said.")]
     peaks: list[PeakReport]
     binding: BindingReport | None
@@ -66,7 +73,9 @@ class FindingReport(Model):
     limit: Annotated[float, Field(description="SI.")]
     time: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
     method: Annotated[Literal["exact", "bounded"], Field(description="How the value was found.")]
-    factor: Annotated[float | None, Field(description="The move must last this many times longer; null: no help.")]
+    factor: Annotated[
+        float | None, Field(description="The move must last this many times longer; null: no help.")
+    ]
     hint: str | None = None
 
 

@@ -24,7 +24,9 @@ _ANGLE, _LENGTH = Quantity("angle"), Quantity("length")
 class JointModel(Model):
     """One joint: its DH row and its limits."""
 
-    name: Annotated[str | None, Field(min_length=1, description="Unique name; j1, j2, ... when left out.")] = None
+    name: Annotated[
+        str | None, Field(min_length=1, description="Unique name; j1, j2, ... when left out.")
+    ] = None
     type: Annotated[Literal["revolute", "prismatic"], Field(description="How the joint moves.")] = "revolute"
     theta: Annotated[float, Number(_ANGLE, "Angle about z (angle unit).")] = 0.0
     d: Annotated[float, Number(_LENGTH, "Offset along z (length unit).")] = 0.0
@@ -33,7 +35,9 @@ class JointModel(Model):
     sign: Annotated[Literal[1, -1], Field(description="Direction in which the joint counts.")] = 1
     position: Annotated[Bound, JointBound(0, "Range [lower, upper] (angle or length unit).")] = UNLIMITED
     velocity: Annotated[Bound, JointBound(1, "Velocity limit, or [lower, upper], per s.")] = UNLIMITED
-    acceleration: Annotated[Bound, JointBound(2, "Acceleration limit, or [lower, upper], per s^2.")] = UNLIMITED
+    acceleration: Annotated[Bound, JointBound(2, "Acceleration limit, or [lower, upper], per s^2.")] = (
+        UNLIMITED
+    )
     jerk: Annotated[Bound, JointBound(3, "Jerk limit, or [lower, upper], per s^3.")] = UNLIMITED
 
     @model_validator(mode="before")
@@ -61,7 +65,9 @@ class _Counted:
             raise refuse([((), f"expected 1 to {MAX_JOINTS} joints, got {value}", None)])
         return [{} for _ in range(value)]
 
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
         return {"anyOf": [{"type": "integer", "minimum": 1, "maximum": MAX_JOINTS}, handler(schema)]}
 
 
@@ -69,7 +75,9 @@ class RobotModel(Model):
     """A robot: its joints as a Denavit-Hartenberg table with limits, base and tool."""
 
     name: Annotated[str, Field(description="For messages and reports.")] = "robot"
-    units: Annotated[UnitsSpec | None, Field(description="Only in a robot file; inline the job's units hold.")] = None
+    units: Annotated[
+        UnitsSpec | None, Field(description="Only in a robot file; inline the job's units hold.")
+    ] = None
     source: Annotated[str | None, Field(description="Where the numbers come from.")] = None
     licence: Annotated[str | None, Field(description="Licence of the source.")] = None
     note: Annotated[str | None, Field(description="What a user should know about the numbers.")] = None
@@ -79,7 +87,11 @@ class RobotModel(Model):
     ] = None
     joints: Annotated[
         list[JointModel],
-        Field(min_length=1, max_length=MAX_JOINTS, description="From the base on; a number: that many bare joints."),
+        Field(
+            min_length=1,
+            max_length=MAX_JOINTS,
+            description="From the base on; a number: that many bare joints.",
+        ),
         _Counted(),
     ]
     base: Annotated[np.ndarray, Pose("T_world_base.")] | None = None
@@ -102,7 +114,10 @@ class RobotModel(Model):
         """Return the robot that this describes."""
         models = self.joints
         joints = tuple(_joint(index, model) for index, model in enumerate(models, 1))
-        rows = {k: np.array([getattr(m, k) for m in models]) for k in ("position", "velocity", "acceleration", "jerk")}
+        rows = {
+            k: np.array([getattr(m, k) for m in models])
+            for k in ("position", "velocity", "acceleration", "jerk")
+        }
         base, tool = (np.eye(4) if pose is None else pose for pose in (self.base, self.tool))
         described = any(key in model.model_fields_set for model in models for key in _DH)
         return Robot(self.name, joints, Limits(**rows), self.convention if described else None, base, tool)

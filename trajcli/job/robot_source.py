@@ -46,7 +46,9 @@ def find_robot(value: Any, document: Document, units: Units) -> Robot:  # noqa: 
         raise InputError(Problem(message, valid_names(catalogue_names()), document.place(("robot",))))
     if "units" in value:
         place = document.place(("robot", "units"), key=True)
-        raise InputError(Problem("a robot inside a job uses the job's units", "leave `units` out here", place))
+        raise InputError(
+            Problem("a robot inside a job uses the job's units", "leave `units` out here", place)
+        )
     return _validated(value, document, ("robot",), units)
 
 

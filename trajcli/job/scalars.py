@@ -6,6 +6,7 @@ Source: YAML 1.2.2 specification, section 10.3.2 (tag resolution of the core sch
 from __future__ import annotations
 
 import re
+import sys
 
 Scalar = bool | int | float | str | None
 
@@ -15,11 +16,11 @@ _WORDS: dict[str, bool | None] = {
     **dict.fromkeys(("false", "False", "FALSE"), False),
 }
 _FIRST_OF_NUMBERS = frozenset("0123456789+-.")
-_DECIMAL = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
+_is_decimal = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?").fullmatch
 _RADIX = re.compile(r"0(?:o[0-7]+|x[0-9a-fA-F]+)")
 _NOT_FINITE = re.compile(r"[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)")
 _QUOTED = 40  # characters of a number that a message repeats
-_INFINITE = (float("inf"), float("-inf"))
+_LARGEST = sys.float_info.max
 
 
 class ScalarError(ValueError):
@@ -42,7 +43,9 @@ def resolve(text: str) -> Scalar:
     """
     if not text or text[0] not in _FIRST_OF_NUMBERS:
         return _WORDS.get(text, text)
-    if _DECIMAL.fullmatch(text):
+    if _is_decimal(text):
+        if "." in text and 0.0 < abs(value := float(text)) <= _LARGEST:
+            return value  # what nearly all numbers of a long file are
         return _int(text, 10) if text.lstrip("+-").isdigit() else _float(text)
     if _RADIX.fullmatch(text):
         return _int(text[2:], 8 if text[1] == "o" else 16)
@@ -54,7 +57,7 @@ def resolve(text: str) -> Scalar:
 
 def _float(text: str) -> float:
     value = float(text)
-    if value in _INFINITE:
+    if abs(value) > _LARGEST:
         raise ScalarError(f"{_shown(text)} is too large: a number is at most 1.8e308")
     if not value and text.lower().partition("e")[0].strip("+-0."):
         raise ScalarError(f"{_shown(text)} is too small: it would be read as 0")

@@ -144,6 +144,8 @@ def _no_key(complaint: _Complaint) -> _Verdict:
     here = complaint.here
     if here[:1] in ("]", "}"):
         return _Verdict(f"'{here[0]}' closes nothing", "remove it", complaint.problem)
+    if here.startswith(":"):
+        return _Verdict("a key is missing before the colon", None, complaint.problem)
     if before[-1:] in ("'", '"', "]", "}"):
         hint = "inside '...' write '' for a quote" if before[-1] == "'" else "check quotes and brackets"
         return _Verdict("text after the end of the value", hint, complaint.problem, len(here.rstrip()))
@@ -197,9 +199,10 @@ def _bad_escape(complaint: _Complaint) -> _Verdict:
 
 def _no_value(complaint: _Complaint) -> _Verdict:
     here = complaint.here[:1]
-    return _Verdict(
-        f"expected a value, got '{here}'" if here else "expected a value", None, complaint.problem
-    )
+    if here == ":":
+        return _Verdict("a key is missing before the colon", None, complaint.problem)
+    message = f"expected a value, got '{here}'" if here else "expected a value"
+    return _Verdict(message, None, complaint.problem)
 
 
 def _bad_item(complaint: _Complaint) -> _Verdict:
@@ -231,6 +234,8 @@ def _after_end(complaint: _Complaint) -> _Verdict:
         return glued
     if complaint.here[:1] in ("]", "}"):
         return _Verdict(f"'{complaint.here[0]}' closes nothing", "remove it", complaint.problem)
+    if complaint.here.startswith(":"):
+        return _Verdict("no space after the colon", "write `key: value`", complaint.problem)
     return _Verdict("text after the end of the document", None, complaint.problem, _word(complaint.here))
 
 
@@ -257,7 +262,7 @@ _RULES: tuple[tuple[re.Pattern[str], Callable[[_Complaint], _Verdict]], ...] = t
         (r"sequence entries are not allowed", _bad_item),
         (r"node content", _no_value),
         (r"document start", _after_end),
-        (r"block mapping", _no_key),
-        (r"block collection", _no_item),
+        (r"parsing a block mapping", _no_key),
+        (r"parsing a block collection", _no_item),
     )
 )

@@ -95,7 +95,7 @@ def tcp_acceleration(
 
 
 def _state(robot: Robot, q: ArrayLike, rates: ArrayLike) -> tuple[Array, Array]:
-    values, given = configurations(robot, q), configurations(robot, rates, "the joint rates")
+    values, given = configurations(robot, q), configurations(robot, rates, "the vector of joint rates")
     if values.shape != given.shape:
         raise InputError(f"the joint rates have shape {given.shape}, q has shape {values.shape}")
     return values, given

@@ -60,7 +60,9 @@ class Limits:
                 raise ValueError(f"{name} limits: expected shape (n, 2) without NaN, got {bounds.shape}")
             low, high = bounds[:, 0], bounds[:, 1]
             if (low > high).any() or (index and not ((low < 0) & (high > 0)).all()):
-                raise ValueError(f"{name} limits: lower must be below {'0 and 0 below upper' if index else 'upper'}")
+                raise ValueError(
+                    f"{name} limits: lower must be below {'0 and 0 below upper' if index else 'upper'}"
+                )
             object.__setattr__(self, name, bounds)
 
     def of_order(self, order: int) -> Array:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from difflib import get_close_matches
 from math import isfinite
 
 from trajcli.columns import Column
@@ -52,6 +51,8 @@ def require_known(tolerances: Mapping[str, float], columns: Iterable[Column]) ->
     names = list(dict.fromkeys(name for column in columns for name in (column.kind, column.name)))
     unknown = [name for name in tolerances if name != ALL and name not in names]
     if unknown:
+        from difflib import get_close_matches
+
         near = get_close_matches(unknown[0], names, 1)
         hint = f"did you mean '{near[0]}'?" if near else f"there are {', '.join(names)}"
         raise InputError(f"the tolerance for '{unknown[0]}' fits no column that both files have", hint=hint)

@@ -23,22 +23,11 @@ def interpolate_rows(a: Table, b: Table, pairs: tuple[Pair, ...]) -> Alignment:
         InputError: When not both tables have increasing times, when these share no interval, or when there is
             no other column.
     """
-    clock = time_pair(pairs)
-    if clock is None:
-        raise InputError(f"{a.file} and {b.file} do not both have a column t, so nothing can be interpolated")
-    times_a, times_b = a.columns[:, clock.place_a], b.columns[:, clock.place_b]
-    for table, times in ((a, times_a), (b, times_b)):
-        _require_increasing(table, times)
-    rest = tuple(pair for pair in pairs if pair is not clock)
+    rest = tuple(pair for pair in pairs if pair.a.kind != "t")
     if not rest:
         raise InputError(f"{a.file} and {b.file} have no column in common but t", hint="leave --resample out")
-    low, high = max(times_a[0], times_b[0]), min(times_a[-1], times_b[-1])
-    rows = slice(int(np.searchsorted(times_a, low)), int(np.searchsorted(times_a, high, "right")))
-    if rows.start >= rows.stop:
-        raise InputError(
-            f"no row of {a.file} lies inside the times of {b.file}",
-            hint=f"{_interval(a, times_a)}, {_interval(b, times_b)}",
-        )
+    times_a, times_b = _times(a, b, pairs)
+    rows = _common_rows(a, b, times_a, times_b)
     gaps = _Gaps(times_b, times_a[rows])
     values = np.empty((rows.stop - rows.start, len(rest)))
     methods: dict[str, list[str]] = {}
@@ -49,6 +38,29 @@ def interpolate_rows(a: Table, b: Table, pairs: tuple[Pair, ...]) -> Alignment:
     how = "; ".join(f"{method} for {', '.join(dict.fromkeys(kinds))}" for method, kinds in methods.items())
     note = f"{b.file} is interpolated from {times_a[rows][0]:.12g} s to {times_a[rows][-1]:.12g} s ({how}); "
     return Alignment(rest, rows, values, None, (note + f"{_interval(a, times_a)}, {_interval(b, times_b)}",))
+
+
+def _times(a: Table, b: Table, pairs: tuple[Pair, ...]) -> tuple[Array, Array]:
+    """Return the increasing times of both tables."""
+    clock = time_pair(pairs)
+    if clock is None:
+        raise InputError(f"{a.file} and {b.file} do not both have a column t, so nothing can be interpolated")
+    times_a, times_b = a.columns[:, clock.place_a], b.columns[:, clock.place_b]
+    _require_increasing(a, times_a)
+    _require_increasing(b, times_b)
+    return times_a, times_b
+
+
+def _common_rows(a: Table, b: Table, times_a: Array, times_b: Array) -> slice:
+    """Return the rows of the first table inside the times of the second."""
+    start, stop = np.searchsorted(times_a, times_b[0]), np.searchsorted(times_a, times_b[-1], "right")
+    rows = slice(int(start), int(stop))
+    if rows.start >= rows.stop:
+        raise InputError(
+            f"no row of {a.file} lies inside the times of {b.file}",
+            hint=f"{_interval(a, times_a)}, {_interval(b, times_b)}",
+        )
+    return rows
 
 
 class _Gaps:

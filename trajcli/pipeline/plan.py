@@ -61,7 +61,9 @@ def plan_job(loaded: LoadedJob) -> Plan:
     return Plan(loaded, tuple(moves), trajectory, verdict, said)
 
 
-def _plan_move(loaded: LoadedJob, index: int, planner: Planner, start: State) -> tuple[PlannedMove, list[Event]]:
+def _plan_move(
+    loaded: LoadedJob, index: int, planner: Planner, start: State
+) -> tuple[PlannedMove, list[Event]]:
     job = loaded.job
     robot = with_move_limits(loaded.robot, planner.limits, index)
     planned = planner.plan(start, robot)
@@ -99,5 +101,7 @@ def _errors_of(loaded: LoadedJob, index: int, planner: Planner) -> Iterator[None
         yield
     except TrajcliError as error:
         located = error.said_by(loaded.say).located(move=index, place=loaded.place_of_move(index))
-        problems = (replace(p, message=f"move {index} ({planner.tag}): {p.message}") for p in located.problems)
+        problems = (
+            replace(p, message=f"move {index} ({planner.tag}): {p.message}") for p in located.problems
+        )
         raise type(error)(*problems) from None

@@ -43,8 +43,9 @@ class NoBound:
 def fastest_duration(start: State, end: State, limits: Limits) -> Bound | NoBound:
     """Return the time that the slowest joint needs if each moves by itself, under exactly the given limits.
 
-    Without a jerk limit accelerations may step, and those at the ends do not count. Where the jerk limit differs by
-    direction the looser one holds both ways, so that the bound stays a bound. Position limits are left out.
+    Without a jerk limit accelerations may step, and those at the ends do not count. Where the jerk limit
+    differs by direction the looser one holds both ways, so that the bound stays a bound. Position limits are
+    left out.
 
     Args:
         start: State at the start.

@@ -22,7 +22,7 @@ from trajcli.job.report import (
 )
 from trajcli.kinematics.robot import QUANTITIES
 from trajcli.pipeline.plan import Plan
-from trajcli.pipeline.reference import fastest_duration
+from trajcli.pipeline.reference import NoBound, fastest_duration
 from trajcli.pipeline.stretch import PlannedMove
 
 _JUMPS = {"position_jump": 0, "velocity_jump": 1, "acceleration_jump": 2}
@@ -77,7 +77,9 @@ def _move(plan: Plan, index: int, *, reference: bool) -> MoveReport:
 def _peak(move: PlannedMove, joint: int, order: int, peaks: Peaks) -> PeakReport:
     low, high = float(peaks.low[joint]), float(peaks.high[joint])
     below, above = (float(bound) for bound in move.robot.limits.of_order(order)[joint])
-    parts = [value / bound for value, bound in ((low, below), (high, above)) if math.isfinite(bound) and bound]
+    parts = [
+        value / bound for value, bound in ((low, below), (high, above)) if math.isfinite(bound) and bound
+    ]
     return PeakReport(
         joint=move.robot.joint_names[joint],
         quantity=QUANTITIES[order],  # type: ignore[arg-type]
@@ -90,12 +92,12 @@ def _peak(move: PlannedMove, joint: int, order: int, peaks: Peaks) -> PeakReport
     )
 
 
-def reference_of(move: PlannedMove) -> ReferenceReport | None:
-    """Return how a move compares with the shortest duration under its limits; None where there is no bound."""
+def reference_of(move: PlannedMove) -> ReferenceReport:
+    """Return how a move compares with the shortest duration under its limits."""
     bound = fastest_duration(move.start, move.planned.end, move.robot.limits)
-    if bound.duration is None:
-        return None
     name = None if bound.joint is None else move.robot.joint_names[bound.joint]
+    if isinstance(bound, NoBound):
+        return ReferenceReport(duration=None, ratio=None, joint=name, reason=bound.reason)
     ratio = move.duration / bound.duration if bound.duration > 0 else None
     return ReferenceReport(duration=bound.duration, ratio=ratio, joint=name)
 

@@ -14,7 +14,9 @@ from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.planners.planner import Event, Planned, Planner
 from trajcli.trajectory import Span, State, Trajectory
 
-_LONGEST = 1e4  # times the planned duration; a move that needs more than that is not over its limit, it is wrong
+_LONGEST = (
+    1e4  # times the planned duration; a move that needs more than that is not over its limit, it is wrong
+)
 _SEARCH = 1.1  # ratio of neighbouring candidates before the bracket is halved
 _EXACT = 1e-12  # relative width at which halving ends
 _WHOLE = 1e-9  # of a period: what is this close to whole is whole

@@ -41,11 +41,15 @@ def read_bound(value: Any, quantity: Quantity, context: ReadingContext) -> Bound
         low, high = (read_number(item, quantity, context.units) for item in value)
         if (rate and not low < 0 < high) or low >= high:
             wanted = "a negative and a positive number" if rate else "the lower number first"
-            raise FlawError(f"expected a pair [lower, upper], {wanted}, got [{shown(value[0])}, {shown(value[1])}]")
+            raise FlawError(
+                f"expected a pair [lower, upper], {wanted}, got [{shown(value[0])}, {shown(value[1])}]"
+            )
         return low, high
     size = read_number(value, quantity, context.units)
     if size <= 0:
-        raise FlawError(f"expected a number above 0, a pair [lower, upper] or null (unlimited), got {shown(value)}")
+        raise FlawError(
+            f"expected a number above 0, a pair [lower, upper] or null (unlimited), got {shown(value)}"
+        )
     return -size, size
 
 
@@ -88,7 +92,11 @@ class Bounds(FieldType):
         try:
             return read_per_joint(value, context, read_one, None)
         except FlawError as error:
-            if isinstance(value, list | tuple) and len(value) == 2 and all(isinstance(v, int | float) for v in value):
+            if (
+                isinstance(value, list | tuple)
+                and len(value) == 2
+                and all(isinstance(v, int | float) for v in value)
+            ):
                 named = f"under `limits` a list has one entry for each joint: for a pair write {{NAME: {list(value)}}}"
                 error.flaws = [(path, text, named) for path, text, _ in error.flaws]
             raise
@@ -115,11 +123,15 @@ class Scale(Model):
 class LimitsSpec(Model):
     """Limits that replace or tighten others; what is left out stays as it is, null is unlimited."""
 
-    position: Annotated[tuple[Bound | None, ...], Bounds(0, "Range of each joint (angle or length unit).")] | None = None
-    velocity: Annotated[tuple[Bound | None, ...], Bounds(1, "Velocity limit of each joint, per s.")] | None = None
-    acceleration: Annotated[tuple[Bound | None, ...], Bounds(2, "Acceleration limit of each joint, per s^2.")] | None = (
-        None
-    )
+    position: (
+        Annotated[tuple[Bound | None, ...], Bounds(0, "Range of each joint (angle or length unit).")] | None
+    ) = None
+    velocity: (
+        Annotated[tuple[Bound | None, ...], Bounds(1, "Velocity limit of each joint, per s.")] | None
+    ) = None
+    acceleration: (
+        Annotated[tuple[Bound | None, ...], Bounds(2, "Acceleration limit of each joint, per s^2.")] | None
+    ) = None
     jerk: Annotated[tuple[Bound | None, ...], Bounds(3, "Jerk limit of each joint, per s^3.")] | None = None
     scale: Scale = Scale()
 

@@ -54,5 +54,7 @@ class Cycloidal(PointToPoint):
         lacking = np.flatnonzero((displacement != 0) & (bounded == 0))
         if lacking.size:
             why = "to find its fastest duration"
-            raise missing_limit(self.tag, "velocity", lacking.tolist(), robot, why, "give the move a `duration`")
+            raise missing_limit(
+                self.tag, "velocity", lacking.tolist(), robot, why, "give the move a `duration`"
+            )
         return float(bounded.max())

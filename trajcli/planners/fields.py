@@ -22,7 +22,9 @@ class Model(BaseModel):
 
 
 Duration = Annotated[float, Number(Quantity("time"), "Duration of the move, s.", above=0.0)]
-MinimumDuration = Annotated[float, Number(Quantity("time"), "The move lasts at least this long, s.", above=0.0)]
+MinimumDuration = Annotated[
+    float, Number(Quantity("time"), "The move lasts at least this long, s.", above=0.0)
+]
 JointPositions = Annotated[
     tuple[float, ...],
     PerJoint(0, "Position of each joint (angle or length unit): one for all, a list, or by joint name."),
@@ -33,11 +35,14 @@ JointVelocities = Annotated[
 ]
 JointAccelerations = Annotated[
     tuple[float, ...],
-    PerJoint(2, "Acceleration of each joint, per s^2; joints left out of a mapping are 0.", zero_missing=True),
+    PerJoint(
+        2, "Acceleration of each joint, per s^2; joints left out of a mapping are 0.", zero_missing=True
+    ),
 ]
 JointSpeeds = Annotated[tuple[float, ...], PerJoint(1, "Speed of each joint, per s, above 0.", above=0.0)]
 JointAccelerationMagnitudes = Annotated[
-    tuple[float, ...], PerJoint(2, "Magnitude of the acceleration of each joint, per s^2, above 0.", above=0.0)
+    tuple[float, ...],
+    PerJoint(2, "Magnitude of the acceleration of each joint, per s^2, above 0.", above=0.0),
 ]
 
 
@@ -83,7 +88,9 @@ class _Named:
             raise refuse([((), f"there is no point '{value}'", _known(value, context.points))])
         return context.points[value]
 
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
         name = {"type": "string", "description": "Name of a point under `points`."}
         return {"anyOf": [name, handler(schema)]}
 

@@ -30,7 +30,9 @@ _PARALLEL = 1e-12  # relative; what leaves the line by more is no rounding error
 class JerkLimited(PointToPoint):
     """Fastest motion within the limits, from any state to any state, or to a velocity.
 
-    Source: Berscheid and Kroeger, Jerk-limited Real-time Trajectory Generation with Arbitrary Target States, RSS 2021.
+    Source: Berscheid and Kroeger, Jerk-limited Real-time Trajectory Generation with Arbitrary Target States
+    (RSS 2021); Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008),
+    section 3.4.
     """
 
     continuity: ClassVar[Literal[1, 2]] = 2
@@ -41,13 +43,13 @@ class JerkLimited(PointToPoint):
     synchronize: Annotated[
         Literal["time", "phase", "none"],
         Field(
-            description="time: all joints arrive together; phase: one law for all joints, straight in joint space; "
-            "none: each joint arrives by itself."
+            description="time: all joints arrive together; phase: one law for all joints, straight in joint "
+            "space; none: each joint arrives by itself."
         ),
     ] = "time"
 
     def plan(self, start: State, robot: Robot) -> Planned:
-        """Return the move to the target; to the velocity of a target without joints as fast as the limits allow.
+        """Return the move to the target, or to its velocity where it has no joints.
 
         Raises:
             MissingLimitError: When a moving joint lacks a limit on velocity, acceleration or jerk.

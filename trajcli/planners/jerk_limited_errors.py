@@ -64,7 +64,7 @@ def _end_problems(task: Task, joint: int) -> list[Problem]:
 
 
 def _approach_problems(task: Task, joint: int) -> list[Problem]:
-    """The acceleration a at the end was built up from zero: before, the velocity was a |a| / (2 jerk) less."""
+    """The end acceleration a was built up from zero: before, the velocity was a |a| / (2 jerk) less."""
     velocity, acceleration = task.final[1:]
     before = velocity - acceleration * abs(acceleration) / (2 * float(np.abs(task.bounds[2]).min()))
     low, high = task.bounds[0].tolist()
@@ -72,8 +72,8 @@ def _approach_problems(task: Task, joint: int) -> list[Problem]:
         return []
     limit = low if before < 0 else high
     message = (
-        f"{task.name} would end with velocity {{velocity}} and acceleration {{acceleration}}: within the jerk limit "
-        "it must have moved at {before} just before, beyond its velocity limit {limit}"
+        f"{task.name} would end with velocity {{velocity}} and acceleration {{acceleration}}: within its "
+        "jerk limit it must have moved at {before} just before, beyond its velocity limit {limit}"
     )
     amounts = {
         "velocity": Amount(velocity, 1, joint),
@@ -88,7 +88,8 @@ def _approach_problems(task: Task, joint: int) -> list[Problem]:
 def leaves_line(value: float, order: int, joint: int, robot: Robot) -> PlanningError:
     """Return the error of a boundary velocity or acceleration that points away from the straight line."""
     name = robot.joint_names[joint]
-    message = f"`synchronize: phase` keeps all joints on one straight line, but {QUANTITIES[order]} {{value}} of {name} leaves it"
+    message = "`synchronize: phase` keeps all joints on one straight line, "
+    message += f"but {QUANTITIES[order]} {{value}} of {name} leaves it"
     amounts = {"value": Amount(value, order, joint)}
     return PlanningError(
         Problem(message, "say `synchronize: time`", joint=name, value=value, amounts=amounts)
@@ -97,7 +98,9 @@ def leaves_line(value: float, order: int, joint: int, robot: Robot) -> PlanningE
 
 def cannot_wait(task: Task, arrival: float, duration: float, joint: int) -> PlanningError:
     """Return the error of a joint that arrives first and moves in its end state."""
-    message = f"{task.name} arrives after {{arrival}}, still moves, and cannot wait until {{duration}} for the others"
+    message = (
+        f"{task.name} arrives after {{arrival}}, moves on, and cannot wait for the others until {{duration}}"
+    )
     amounts = {"arrival": Amount(arrival), "duration": Amount(duration)}
     hint = "say `synchronize: time`, or let it end at rest"
     return PlanningError(Problem(message, hint, joint=task.name, amounts=amounts))

@@ -94,7 +94,9 @@ class Planner(Model):
     continuity: ClassVar[Literal[1, 2]]
 
     limits: Annotated[LimitsSpec | None, Field(description="Tighter limits for this move.")] = None
-    when_over_limit: Annotated[WhenOverLimit | None, Field(description="Overrides the job's for this move.")] = None
+    when_over_limit: Annotated[
+        WhenOverLimit | None, Field(description="Overrides the job's for this move.")
+    ] = None
 
     @property
     def tag(self) -> str:

@@ -33,7 +33,9 @@ class PointToPoint(Planner):
     @model_validator(mode="after")
     def _can_impose_target(self) -> PointToPoint:
         if self.to.joints is None and not self.stops_anywhere:
-            raise refuse([(("to",), f"{self.tag} needs `joints` in its target", "jerk_limited can stop anywhere")])
+            raise refuse(
+                [(("to",), f"{self.tag} needs `joints` in its target", "jerk_limited can stop anywhere")]
+            )
         for order, name in ((1, "velocity"), (2, "acceleration")):
             if order > self.imposes and any(getattr(self.to, name) or ()):
                 instead = "use quintic or jerk_limited, or leave it out"
@@ -64,10 +66,14 @@ def require_rest(planner: str, state: State, robot: Robot, *, where: str = "star
             message = f"{planner} {where}s at rest, but the {quantity} of {name} is {{value}} at its {where}"
             hint = "let the move before end at rest, or use quintic or jerk_limited"
             amounts = {"value": Amount(float(values[joint]), order, joint)}
-            raise PlanningError(Problem(message, hint, joint=name, value=float(values[joint]), amounts=amounts))
+            raise PlanningError(
+                Problem(message, hint, joint=name, value=float(values[joint]), amounts=amounts)
+            )
 
 
-def missing_limit(planner: str, quantity: str, joints: Sequence[int], robot: Robot, why: str, *also: str) -> MissingLimitError:
+def missing_limit(
+    planner: str, quantity: str, joints: Sequence[int], robot: Robot, why: str, *also: str
+) -> MissingLimitError:
     """Return the error that asks for a limit.
 
     Args:
@@ -81,7 +87,11 @@ def missing_limit(planner: str, quantity: str, joints: Sequence[int], robot: Rob
     names = ", ".join(robot.joint_names[joint] for joint in joints)
     ways = [f"add `limits: {{{quantity}: ...}}` to the job (null is unlimited too)", *also]
     return MissingLimitError(
-        Problem(f"{planner} needs a limit on the {quantity} of {names} {why}", " or ".join(ways), joint=robot.joint_names[joints[0]])
+        Problem(
+            f"{planner} needs a limit on the {quantity} of {names} {why}",
+            " or ".join(ways),
+            joint=robot.joint_names[joints[0]],
+        )
     )
 
 

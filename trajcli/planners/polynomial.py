@@ -103,7 +103,12 @@ def _by_search(planner: str, start: Array, end: Array, robot: Robot) -> float:
         feasible = np.flatnonzero(_keeps_limits(start, end, candidates, robot.limits))
         if not feasible.size:
             message = f"no duration between {low:.3g} s and {high:.3g} s lets {planner} keep all limits between these states"
-            raise PlanningError(Problem(message, "a boundary velocity or acceleration asks too much: lower it, or use jerk_limited"))
+            raise PlanningError(
+                Problem(
+                    message,
+                    "a boundary velocity or acceleration asks too much: lower it, or use jerk_limited",
+                )
+            )
         first = int(feasible[0])
         low, high = float(candidates[max(first - 1, 0)]), float(candidates[first])
     return high

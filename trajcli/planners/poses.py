@@ -33,10 +33,14 @@ class Pose(FieldType):
             raise FlawError(f"expected a pose such as {{xyz: [0, 0, 0], rpy: [0, 0, 0]}}, got {shown(value)}")
         unknown = [key for key in value if key not in ("xyz", *_ROTATIONS)]
         if unknown:
-            raise FlawError(f"unknown key '{unknown[0]}'", unknown[0], hint=f"a pose has xyz, {', '.join(_ROTATIONS)}")
+            raise FlawError(
+                f"unknown key '{unknown[0]}'", unknown[0], hint=f"a pose has xyz, {', '.join(_ROTATIONS)}"
+            )
         given = [key for key in _ROTATIONS if key in value]
         if len(given) > 1:
-            raise FlawError(f"{given[0]} and {given[1]} exclude each other", given[1], hint="leave one of them out")
+            raise FlawError(
+                f"{given[0]} and {given[1]} exclude each other", given[1], hint="leave one of them out"
+            )
         return _pose(value, given[0] if given else None, context)
 
     def json_schema(self) -> JsonSchemaValue:
@@ -47,13 +51,25 @@ class Pose(FieldType):
             return {"type": "array", "items": number, "minItems": count, "maxItems": count}
 
         axis = {"anyOf": [{"enum": ["x", "y", "z"]}, numbers(3)]}
-        euler = {"sequence": {"enum": list(SEQUENCES)}, "frame": {"enum": ["current", "fixed"]}, "angles": numbers(3)}
+        euler = {
+            "sequence": {"enum": list(SEQUENCES)},
+            "frame": {"enum": ["current", "fixed"]},
+            "angles": numbers(3),
+        }
         rows = {"type": "array", "items": {"type": "array", "items": number, "minItems": 3, "maxItems": 4}}
         described = {
             "xyz": {**numbers(3), "description": "Position (length unit)."},
-            "rpy": {**numbers(3), "description": "Angles about the fixed axes x, y, z: R = Rz Ry Rx (angle unit)."},
+            "rpy": {
+                **numbers(3),
+                "description": "Angles about the fixed axes x, y, z: R = Rz Ry Rx (angle unit).",
+            },
             "quat_wxyz": {**numbers(4), "description": "Unit quaternion, w first."},
-            "matrix": {**rows, "minItems": 3, "maxItems": 4, "description": "Rotation 3x3, or homogeneous 4x4."},
+            "matrix": {
+                **rows,
+                "minItems": 3,
+                "maxItems": 4,
+                "description": "Rotation 3x3, or homogeneous 4x4.",
+            },
             "axis_angle": _object({"axis": axis, "angle": number}, "Rotation by an angle about an axis."),
             "euler": _object(euler, "Euler angles about current or fixed axes.", "sequence", "angles"),
         }
@@ -70,7 +86,9 @@ def _pose(value: Mapping[str, Any], form: str | None, context: ReadingContext) -
     pose = np.eye(4)
     if form == "matrix" and isinstance(value["matrix"], list) and len(value["matrix"]) == 4:
         if "xyz" in value:
-            raise FlawError("a 4x4 matrix already has a position", "xyz", hint="leave xyz out, or give a 3x3 matrix")
+            raise FlawError(
+                "a 4x4 matrix already has a position", "xyz", hint="leave xyz out, or give a 3x3 matrix"
+            )
         return _homogeneous(value["matrix"], context)
     if form is not None:
         try:
@@ -85,7 +103,9 @@ def _pose(value: Mapping[str, Any], form: str | None, context: ReadingContext) -
     return pose
 
 
-def read_numbers(value: Any, count: int, quantity: Quantity, context: ReadingContext, *path: str | int) -> Array:  # noqa: ANN401
+def read_numbers(
+    value: Any, count: int, quantity: Quantity, context: ReadingContext, *path: str | int
+) -> Array:  # noqa: ANN401
     """Return `count` numbers of one quantity in SI, shape (count,).
 
     Raises:
@@ -175,7 +195,9 @@ def _euler(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401
     fields = _exactly(value, ("sequence", "angles"), ("frame",))
     sequence, frame = fields["sequence"], fields.get("frame", "current")
     if sequence not in SEQUENCES:
-        raise FlawError(f"unknown sequence {shown(sequence)}", "sequence", hint=f"one of {', '.join(SEQUENCES)}")
+        raise FlawError(
+            f"unknown sequence {shown(sequence)}", "sequence", hint=f"one of {', '.join(SEQUENCES)}"
+        )
     if frame not in ("current", "fixed"):
         raise FlawError(f"expected current or fixed, got {shown(frame)}", "frame")
     return matrix_from_euler(sequence, read_numbers(fields["angles"], 3, _ANGLE, context, "angles"), frame)
@@ -189,8 +211,16 @@ def _exactly(value: Any, needed: tuple[str, ...], optional: tuple[str, ...]) -> 
         raise FlawError(f"`{missing[0]}` is missing")
     unknown = [key for key in value if key not in (*needed, *optional)]
     if unknown:
-        raise FlawError(f"unknown key '{unknown[0]}'", unknown[0], hint=f"the keys are {', '.join((*needed, *optional))}")
+        raise FlawError(
+            f"unknown key '{unknown[0]}'", unknown[0], hint=f"the keys are {', '.join((*needed, *optional))}"
+        )
     return value
 
 
-_READERS = {"rpy": _rpy, "quat_wxyz": _quaternion, "matrix": _matrix, "axis_angle": _axis_angle, "euler": _euler}
+_READERS = {
+    "rpy": _rpy,
+    "quat_wxyz": _quaternion,
+    "matrix": _matrix,
+    "axis_angle": _axis_angle,
+    "euler": _euler,
+}

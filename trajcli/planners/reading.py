@@ -59,7 +59,9 @@ class FlawError(ValueError):
 
 def refuse(flaws: Sequence[Flaw]) -> PydanticCustomError:
     """Return the error that carries the flaws of one value through pydantic."""
-    return PydanticCustomError("flaws", "{text}", {"text": "; ".join(flaw[1] for flaw in flaws), "flaws": list(flaws)})
+    return PydanticCustomError(
+        "flaws", "{text}", {"text": "; ".join(flaw[1] for flaw in flaws), "flaws": list(flaws)}
+    )
 
 
 def shown(value: object) -> str:
@@ -72,7 +74,13 @@ def shown(value: object) -> str:
         return "true" if value else "false"
     if isinstance(value, Mapping):
         return "a mapping"
-    return "a list" if isinstance(value, list | tuple) else f"{value:g}" if isinstance(value, float) else str(value)
+    return (
+        "a list"
+        if isinstance(value, list | tuple)
+        else f"{value:g}"
+        if isinstance(value, float)
+        else str(value)
+    )
 
 
 def read_number(value: object, quantity: Quantity, units: Units) -> float:
@@ -120,7 +128,9 @@ class FieldType:
 
         return core_schema.with_info_plain_validator_function(validate)
 
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
         return {**self.json_schema(), "description": self.description}
 
 
@@ -146,20 +156,25 @@ class Number(FieldType):
         """Return the number in SI."""
         number = read_number(value, self.quantity, context.units)
         unit = unit_name(self.quantity, context.units)
-        wanted = [
-            (self.above is not None and number <= self.above, f"above {self.above}"),
-            (self.at_least is not None and number < self.at_least, f"at least {self.at_least}"),
-            (self.at_most is not None and number > self.at_most, f"at most {self.at_most}"),
+        rules = [
+            ("above", self.above, number.__gt__),
+            ("at least", self.at_least, number.__ge__),
+            ("at most", self.at_most, number.__le__),
         ]
-        if any(broken for broken, _ in wanted):
-            bounds = " and ".join(text for _, text in wanted if not text.endswith("None"))
+        stated = [(word, bound, keeps) for word, bound, keeps in rules if bound is not None]
+        if not all(keeps(bound) for _, bound, keeps in stated):
+            bounds = " and ".join(f"{word} {bound:g}" for word, bound, _ in stated)
             raise FlawError(f"expected a number {bounds}{f' {unit}' if unit else ''}, got {shown(value)}")
         return number
 
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of a number or a string with its unit."""
         number: dict[str, Any] = {"type": "number"}
-        for key, bound in (("exclusiveMinimum", self.above), ("minimum", self.at_least), ("maximum", self.at_most)):
+        for key, bound in (
+            ("exclusiveMinimum", self.above),
+            ("minimum", self.at_least),
+            ("maximum", self.at_most),
+        ):
             if bound is not None:
                 number[key] = bound
         if self.quantity.dimension == "ratio":
@@ -190,7 +205,9 @@ def read_per_joint(
     elif isinstance(value, list | tuple):
         items = {i: (i, item) for i, item in enumerate(value)}
         if names is not None and len(value) != len(names):
-            raise FlawError(f"expected {len(names)} values, one for each joint, got {len(value)}", hint=_listed(names))
+            raise FlawError(
+                f"expected {len(names)} values, one for each joint, got {len(value)}", hint=_listed(names)
+            )
     elif names is None and context is SI:
         raise FlawError(f"expected a list with one value for each joint, got {shown(value)}")
     else:
@@ -205,7 +222,9 @@ def _listed(names: Sequence[str]) -> str:
 def _named_items(value: Mapping[str, Any], names: tuple[str, ...] | None) -> dict[int, tuple[str, Any]]:
     if names is None:
         return {i: (name, item) for i, (name, item) in enumerate(value.items())}
-    unknown: list[Flaw] = [((n,), f"the robot has no joint '{n}'", _listed(names)) for n in value if n not in names]
+    unknown: list[Flaw] = [
+        ((n,), f"the robot has no joint '{n}'", _listed(names)) for n in value if n not in names
+    ]
     if unknown:
         error = FlawError("")
         error.flaws = unknown

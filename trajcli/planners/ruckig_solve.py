@@ -1,10 +1,12 @@
 """Fastest motions of one variable under bounds on velocity, acceleration and jerk, solved by ruckig.
 
-Ruckig sees one variable at a time, from position zero, in units that suit it. What it returns are phases; the end
-of the motion is then laid into its target, which ruckig misses by up to 1e-8. Several variables arrive together
-in the shortest time in which each of them can arrive: that set may have gaps, so the time is raised until all agree.
+Ruckig sees one variable at a time, from position zero, in units that suit it. What it returns are phases; the
+end of the motion is then laid into its target, which ruckig misses by up to 1e-8. Several variables arrive
+together in the shortest time in which each can arrive: the set of such times may have gaps, so the time is
+raised until all agree.
 
-Source: Berscheid and Kroeger, Jerk-limited Real-time Trajectory Generation with Arbitrary Target States, RSS 2021.
+Source: Berscheid and Kroeger, Jerk-limited Real-time Trajectory Generation with Arbitrary Target States
+(RSS 2021).
 """
 
 from __future__ import annotations
@@ -23,7 +25,8 @@ from trajcli.planners.planner import Phase
 
 Control = Literal["position", "velocity"]
 
-_LANDED = 1e-12  # relative to the joint's peaks: a larger miss means that the phases are wrong
+_LANDED = 1e-12  # relative to the joint's peaks: a larger miss means that other units may do better
+_ACCEPTABLE = 1e-9  # the same: a larger miss is a jump, and the phases are wrong
 _ROUNDING = 1e-12
 _STILL = 1e-9  # of the peak velocity: less counts as rest
 
@@ -36,8 +39,8 @@ class Task:
         name: For messages.
         initial: (position, velocity, acceleration) at the start.
         final: The same at the end; the position is ignored under velocity control.
-        bounds: Shape (3, 2), lower and upper, of velocity, acceleration and jerk; infinite ones are allowed. Of the
-            two bounds of the jerk the smaller magnitude holds both ways.
+        bounds: Shape (3, 2), lower and upper, of velocity, acceleration and jerk; infinite ones are allowed.
+            Of the two bounds of the jerk the smaller magnitude holds both ways.
         control: Whether the final position is imposed.
     """
 
@@ -50,8 +53,8 @@ class Task:
     @property
     def order(self) -> int:
         """The derivative that is constant in each phase: the lowest above which nothing is bounded."""
-        finite = np.isfinite(self.bounds).all(axis=1)
-        return 3 if finite[2] else 2 if finite[1] else 1
+        _, acceleration, jerk = (bool(np.isfinite(bound).all()) for bound in self.bounds)
+        return 3 if jerk else 2 if acceleration else 1
 
     @property
     def displacement(self) -> float:
@@ -166,20 +169,21 @@ def together(
 def _solve(task: Task, duration: float | None) -> Profile:
     if task.steady or (task.done and duration is None):
         return _steady(task, duration or 0.0)
-    best: Profile | None = None
-    least = math.inf
+    best, least = None, _ACCEPTABLE
     for time_unit, length_unit in _units(task, duration):
         found = _ask_ruckig(task, duration, time_unit, length_unit)
         if found is None:
             continue
-        profile, miss = _landed(task, found, duration)
-        if miss < least:
-            best, least = profile, miss
+        profile, miss = _landed(found, duration)
         if miss <= _LANDED:
             return profile
+        if miss <= least:
+            best, least = profile, miss
     if duration is not None and not any((*task.initial[1:], *task.final[1:])) and task.control == "position":
         rested = fastest(task)
         return Profile(rested.position, rested.chain.stretched(duration), duration)
+    if best is not None:
+        return best
     message = f"{task.name}: no motion within the velocity, acceleration and jerk limits could be found"
     message += " that lasts {duration}" if duration else ""
     hint = "change the end velocity or acceleration, or the duration, or raise the limits"
@@ -196,7 +200,7 @@ def _steady(task: Task, duration: float) -> Profile:
     return Profile(task.initial[0], chain.with_cruises() if constants else chain, duration)
 
 
-def _landed(task: Task, found: Profile, duration: float | None) -> tuple[Profile, float]:
+def _landed(found: Profile, duration: float | None) -> tuple[Profile, float]:
     """Return the motion laid into its target, and by how much it still misses it."""
     free = found.chain.polished()
     if duration is None or (found.duration > duration * (1 + 1e-12) and free.duration > duration):
@@ -206,9 +210,10 @@ def _landed(task: Task, found: Profile, duration: float | None) -> tuple[Profile
 
 
 def _units(task: Task, duration: float | None) -> Iterator[tuple[float, float]]:
-    """Yield units of time (s) and length for ruckig: its tolerances are absolute, and it refuses durations above 7600.
+    """Yield units of time (s) and length for ruckig.
 
-    Powers of two change nothing else. Those of the task itself come first.
+    Its tolerances are absolute, and it refuses durations above 7600. Units that are powers of two change
+    nothing else. Those of the task itself come first.
     """
     bounds = np.abs(task.bounds).min(axis=1)
     change, distance = abs(task.final[1] - task.initial[1]), abs(task.displacement)
@@ -228,16 +233,14 @@ def _ask_ruckig(task: Task, duration: float | None, time_unit: float, length_uni
     """Return ruckig's answer, or None when it fails."""
     import ruckig
 
-    units = length_unit / time_unit ** np.arange(4)
+    units = np.array([length_unit / time_unit**order for order in range(4)])
     wanted = ruckig.InputParameter(1)
     interfaces = ruckig.ControlInterface
     wanted.control_interface = interfaces.Position if task.control == "position" else interfaces.Velocity
     wanted.current_position, wanted.target_position = [0.0], [task.displacement / length_unit]
     lower, upper = (task.bounds / units[1:, None]).T.tolist()
-    wanted.current_velocity, wanted.current_acceleration = (
-        [task.initial[1] / units[1]],
-        [task.initial[2] / units[2]],
-    )
+    wanted.current_velocity = [task.initial[1] / units[1]]
+    wanted.current_acceleration = [task.initial[2] / units[2]]
     wanted.target_velocity = [_inside(task.final[1] / units[1], lower[0], upper[0])]
     wanted.target_acceleration = [_inside(task.final[2] / units[2], lower[1], upper[1])]
     wanted.min_velocity, wanted.max_velocity = [lower[0]], [upper[0]]

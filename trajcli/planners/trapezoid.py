@@ -45,7 +45,9 @@ class Trapezoid(PointToPoint):
     minimum_duration: MinimumDuration | None = None
     synchronize: Annotated[
         Literal["time", "none"],
-        Field(description="time: one law for all joints, straight in joint space; none: each joint arrives by itself."),
+        Field(
+            description="time: one law for all joints, straight in joint space; none: each joint arrives by itself."
+        ),
     ] = "time"
     overshoot: Annotated[
         bool, Field(description="A start too fast to stop in time may run past the target and return.")
@@ -71,7 +73,9 @@ class Trapezoid(PointToPoint):
         wanted = self.duration or self.minimum_duration or 0.0
         if same_state(start, end) and (start.at_rest or not wanted):
             return standstill(end, wanted)
-        return self._together(start, end, robot) if self.synchronize == "time" else self._each(start, end, robot)
+        return (
+            self._together(start, end, robot) if self.synchronize == "time" else self._each(start, end, robot)
+        )
 
     def _together(self, start: State, end: State, robot: Robot) -> Planned:
         displacement = end.position - start.position
@@ -108,7 +112,9 @@ class Trapezoid(PointToPoint):
         joined = merge_breaks([hold_until(curve, duration) for curve in curves])
         return Planned(joined, end, phases=phases, arrivals=tuple(p.duration for p in profiles))
 
-    def _profile(self, distance: float, initial: float, final: float, forward: Rates, backward: Rates) -> Profile:
+    def _profile(
+        self, distance: float, initial: float, final: float, forward: Rates, backward: Rates
+    ) -> Profile:
         """Return the profile of one variable from what the fields fix."""
         if self.duration is not None:
             if distance and self.velocity is not None:
@@ -134,7 +140,9 @@ class Trapezoid(PointToPoint):
     def _rates(self, displacement: Array, robot: Robot) -> tuple[list[Array], list[Array]]:
         """Return (speed, acceleration, deceleration), each (n,), along the displacement and against it."""
         velocity, acceleration = robot.limits.velocity, robot.limits.acceleration
-        given = [None if v is None else np.array(v) for v in (self.velocity, self.acceleration, self.deceleration)]
+        given = [
+            None if v is None else np.array(v) for v in (self.velocity, self.acceleration, self.deceleration)
+        ]
         slowing = given[2] if given[2] is not None else given[1]
         ways = []
         for sign in (1, -1):
@@ -162,10 +170,15 @@ def _along(displacement: Array, velocity: Array, robot: Robot) -> float:
     off = np.abs(velocity - speed * displacement)
     if off.max() > 1e-9 * np.abs(velocity).max():
         joint = int(off.argmax())
-        message = "trapezoid moves all joints along one straight line, but {velocity} of " + robot.joint_names[joint]
+        message = (
+            "trapezoid moves all joints along one straight line, but {velocity} of "
+            + robot.joint_names[joint]
+        )
         hint = "say `synchronize: none`, or use jerk_limited or cubic"
         amounts = {"velocity": Amount(float(velocity[joint]), 1, joint)}
-        raise PlanningError(Problem(message + " leaves it", hint, joint=robot.joint_names[joint], amounts=amounts))
+        raise PlanningError(
+            Problem(message + " leaves it", hint, joint=robot.joint_names[joint], amounts=amounts)
+        )
     return speed
 
 

@@ -1,0 +1,57 @@
+# Everything below works on a machine with Python 3.11 (or later) and make alone.
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+PEERS := .venv-peers
+
+.PHONY: setup demo check format lint types test soak bench golden schema docs clean
+
+setup: $(STAMP)
+
+$(STAMP): pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	@touch $@
+
+demo: $(STAMP)  ## plan the main example and show the first rows
+	$(BIN)/trajcli plan examples/ur5e_pick.yaml --report ur5e_pick.report.json -o ur5e_pick.csv
+	@head -n 4 ur5e_pick.csv
+
+check: format lint types test  ## what .ci/run does
+
+format: $(STAMP)
+	$(BIN)/ruff format --check .
+
+lint: $(STAMP)
+	$(BIN)/ruff check .
+
+types: $(STAMP)
+	$(BIN)/mypy
+
+test: $(STAMP)
+	$(BIN)/python -m pytest -n auto
+
+soak: $(STAMP)  ## long random campaigns
+	$(BIN)/python -m pytest -n auto -m soak
+
+bench: $(STAMP) $(PEERS)/.installed  ## ratios against named peers, in one run
+	$(BIN)/python -m benchmarks --peers $(PEERS)/bin/python
+
+$(PEERS)/.installed: benchmarks/peers.txt
+	-$(PYTHON) -m venv $(PEERS) && $(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check -r benchmarks/peers.txt
+	@mkdir -p $(PEERS) && touch $@
+
+golden: $(STAMP)  ## the only way to change a golden file
+	$(BIN)/python -m tests.golden.regenerate
+
+schema: $(STAMP)  ## the committed JSON schemas
+	$(BIN)/trajcli schema job > schemas/job.schema.json
+	$(BIN)/trajcli schema robot > schemas/robot.schema.json
+	$(BIN)/trajcli schema report > schemas/report.schema.json
+
+docs: $(STAMP)  ## the reference pages that are generated from the models
+	$(BIN)/python -m docs.generate
+
+clean:
+	rm -rf $(VENV) $(PEERS) .mypy_cache .ruff_cache .pytest_cache .hypothesis ur5e_pick.csv ur5e_pick.report.json

@@ -1,0 +1,96 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tables import changed, exactly, motion, table, without
+
+from trajcli.errors import InputError
+from trajcli.pipeline.column_tolerances import ALL
+from trajcli.pipeline.compare import compare
+from trajcli.pipeline.difference import describe
+from trajcli.streams.table import Table
+
+
+def worst_of(found, kind):
+    return next(column.worst.difference for column in found.columns if column.worst.column == kind)
+
+
+def test_resampling_interpolates_with_what_derivatives_there_are():
+    a = motion(1001, 1e-3)
+    h = 0.01
+    b = motion(101, h, "b.csv")
+    found = exactly(a, b, resample=True)
+    # The errors of cubic Hermite, h^4/384 max|f''''|, and linear interpolation, h^2/8 max|f''|.
+    assert worst_of(found, "q1") < h**4 / 384 * 81 * 1.01
+    assert worst_of(found, "qd1") < h**4 / 384 * 243 * 1.01
+    assert h**2 / 8 * 81 * 0.5 < worst_of(found, "qdd1") < h**2 / 8 * 81 * 1.01
+    linear = exactly(without(a, "qd1", file="a.csv"), without(b, "qd1"), resample=True)
+    assert h**2 / 8 * 9 * 0.5 < worst_of(linear, "q1") < h**2 / 8 * 9 * 1.01
+    assert found.notes == (
+        (
+            "b.csv is interpolated from 0 s to 1 s (cubic for q, qd; linear for qdd); "
+            "a.csv lasts from 0 s to 1 s, b.csv lasts from 0 s to 1 s"
+        ),
+    )
+    assert found.notes[0] in describe(found)
+    assert compare(a, b, {"q": 1e-8, "qd": 1e-7, "qdd": 2e-3}, {}, resample=True).equal
+
+
+def test_resampling_is_exact_where_rows_meet():
+    a, b = motion(101, 0.01), motion(51, 0.02, "b.csv")
+    for kept in ((), ("qd1", "qdd1")):
+        found = exactly(without(b, *kept, file="b.csv"), without(a, *kept, file="a.csv"), resample=True)
+        assert found.worst.difference < 1e-15
+
+
+def test_a_real_difference_survives_resampling():
+    a, b = motion(1001, 1e-3), motion(101, 0.01, "b.csv")
+    found = compare(a, changed(b, "q1", 40, 1e-4), {"q": 1e-8, ALL: 1.0}, {}, resample=True)
+    assert not found.equal
+    assert found.worst.column == "q1"
+    assert found.worst.time == pytest.approx(0.4)
+
+
+def test_resampling_keeps_to_the_common_interval_and_to_units():
+    a = motion(200, 0.01, start=0.2)
+    b = motion(101, 0.015, "b.csv")
+    b = Table(
+        ("t", "q1_deg", "qd1_deg", "qdd1_deg"), b.columns * [1, *[180 / np.pi] * 3], b.decimals, "b.csv"
+    )
+    found = compare(a, b, {"q": 1e-7, "qd": 1e-6, "qdd": 1e-2}, {}, resample=True)
+    assert found.equal
+    assert found.rows == 131  # from 0.2 s to 1.5 s
+    assert "from 0.2 s to 1.5 s" in found.notes[0]
+
+
+def test_a_count_is_never_interpolated():
+    a = table({"t": np.arange(11) / 10, "move": np.arange(11) >= 5})
+    b = table({"t": np.arange(6) / 5, "move": np.arange(6) >= 3}, "b.csv")
+    found = exactly(a, b, resample=True)
+    assert {found.worst.a, found.worst.b} == {0.0, 1.0}
+    assert "(the earlier row for move)" in found.notes[0]
+    assert found.columns[0].count == 1
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "words"),
+    [
+        (motion(), motion(start=5.0, file="b.csv"), "no row of a.csv lies inside the times of b.csv"),
+        (motion(), without(motion(), "t"), "do not both have a column t"),
+        (
+            motion(),
+            table({"t": [0.0, 0.2, 0.2], "q1": [0, 0, 0]}, "b.csv"),
+            "0.2 s is followed by 0.2 s in row 2",
+        ),
+        (motion(), table({"t": [0.0, 1.0]}, "b.csv"), "no column in common but t"),
+    ],
+)
+def test_what_cannot_be_resampled_is_refused(a, b, words):
+    with pytest.raises(InputError) as caught:
+        exactly(a, b, resample=True)
+    assert words in str(caught.value)
+
+
+def test_one_row_is_resampled_by_itself():
+    found = exactly(motion(), motion(1, 1.0, "b.csv"), resample=True)
+    assert (found.equal, found.rows) == (True, 1)

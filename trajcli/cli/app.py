@@ -1,0 +1,151 @@
+"""The commands of the command line. Only typer is imported here: `--help` must stay fast."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import typer
+
+from trajcli.cli.outcome import guarded
+
+app = typer.Typer(
+    name="trajcli",
+    help="Trajectory planning for serial robots: a YAML job in, a verified sample stream out.",
+    epilog="Exit codes: 0 done and verified, 1 judged and found wrong, 2 wrong input, 3 no curve exists, "
+    "4 file trouble, 70 a bug in trajcli.",
+    rich_markup_mode=None,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+Errors = Annotated[
+    Literal["text", "json"], typer.Option("--errors", help="How errors are written to stderr.")
+]
+JobFile = Annotated[str, typer.Argument(metavar="JOB", help="The job file; - is standard input.")]
+Overrides = Annotated[
+    list[str],
+    typer.Option(
+        "--set", metavar="PATH=VALUE", help="Override a value of the job, such as moves.0.duration=3."
+    ),
+]
+
+
+def _show_version(value: bool) -> None:  # noqa: FBT001
+    if value:
+        from trajcli import __version__
+
+        typer.echo(f"trajcli {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _main(
+    version: Annotated[  # noqa: ARG001
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    pass
+
+
+@app.command()
+@guarded
+def plan(
+    job: JobFile,
+    output: Annotated[
+        str | None,
+        typer.Option("--output", "-o", metavar="FILE", help="Write rows to FILE.csv instead of stdout."),
+    ] = None,
+    report: Annotated[
+        str | None, typer.Option("--report", metavar="FILE", help="Write the verification report as JSON.")
+    ] = None,
+    rate: Annotated[str | None, typer.Option("--rate", metavar="HZ", help="Rows per second.")] = None,
+    override: Overrides = [],  # noqa: B006
+    digits: Annotated[
+        Literal["fixed", "full"], typer.Option("--digits", help="fixed: nine decimals; full: every bit.")
+    ] = "fixed",
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Exit 1 when a concession (event) was made.")
+    ] = False,
+    reference: Annotated[
+        bool, typer.Option("--reference", help="Compare each move with the fastest under the same limits.")
+    ] = False,
+    no_output: Annotated[bool, typer.Option("--no-output", help="Only judge: write no rows.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on stderr.")] = False,
+    errors: Errors = "text",  # noqa: ARG001
+) -> int:
+    """Plan a job, verify it, and write its samples as CSV."""
+    from trajcli.cli.plan import PlanOptions, run_plan
+
+    overrides = [*override, *([f"output.rate={rate}"] if rate is not None else [])]
+    options = PlanOptions(output, report, digits, strict, reference, no_output, quiet)
+    return run_plan(job, overrides, options)
+
+
+@app.command()
+@guarded
+def explain(
+    job: JobFile,
+    override: Overrides = [],  # noqa: B006
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for programs.")] = False,
+    errors: Errors = "text",  # noqa: ARG001
+) -> int:
+    """Say each move in words and formulas: polynomials, phases, peaks, and how fast it could be."""
+    from trajcli.cli.explain import run_explain
+
+    return run_explain(job, override, as_json=as_json)
+
+
+@app.command()
+@guarded
+def diff(
+    a: Annotated[str, typer.Argument(metavar="A", help="A CSV file; - is standard input.")],
+    b: Annotated[str, typer.Argument(metavar="B", help="The CSV file to compare it with.")],
+    atol: Annotated[
+        str,
+        typer.Option(
+            "--atol", metavar="TOL", help="Absolute tolerance: 1e-9, or by column: q=1e-9,qd1=1e-6."
+        ),
+    ] = "",
+    rtol: Annotated[
+        str, typer.Option("--rtol", metavar="TOL", help="Relative tolerance, in the same form.")
+    ] = "",
+    resample: Annotated[
+        bool, typer.Option("--resample", help="Interpolate B at the times of A when they differ.")
+    ] = False,
+    errors: Errors = "text",  # noqa: ARG001
+) -> int:
+    """Compare two CSV files column by column. Exit 0: equal, 1: different, 2: cannot be compared."""
+    from trajcli.cli.diff import run_diff
+
+    return run_diff(a, b, atol, rtol, resample=resample)
+
+
+@app.command()
+@guarded
+def schema(
+    kind: Annotated[
+        Literal["job", "robot", "report"], typer.Argument(help="Which schema.", show_default=True)
+    ] = "job",
+    errors: Errors = "text",  # noqa: ARG001
+) -> int:
+    """Print a JSON Schema, for completion and checking in an editor."""
+    from trajcli.job.schema import schema_text
+    from trajcli.streams.whole_file import standard_output
+
+    with standard_output() as out:
+        out.write(schema_text(kind).encode())
+    return 0
+
+
+@app.command()
+@guarded
+def init(
+    file: Annotated[str, typer.Argument(metavar="FILE", help="The file to write; - is stdout.")] = "job.yaml",
+    force: Annotated[bool, typer.Option("--force", help="Overwrite the file if it exists.")] = False,
+    errors: Errors = "text",  # noqa: ARG001
+) -> int:
+    """Write a commented starter job that plans as it stands."""
+    from trajcli.cli.init import run_init
+
+    return run_init(file, force=force)

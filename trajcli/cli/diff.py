@@ -1,0 +1,26 @@
+"""`trajcli diff`."""
+
+from __future__ import annotations
+
+from trajcli.errors import InputError
+from trajcli.pipeline.column_tolerances import parse_tolerances
+from trajcli.pipeline.compare import compare
+from trajcli.pipeline.difference import describe
+from trajcli.streams.table import read_csv
+from trajcli.streams.whole_file import standard_output
+
+
+def run_diff(a: str, b: str, atol: str, rtol: str, *, resample: bool) -> int:
+    """Compare two CSV files and print what differs; return 0 when nothing does, else 1.
+
+    Raises:
+        InputError: When they cannot be compared.
+        FileError: When one cannot be read.
+    """
+    if a == b == "-":
+        raise InputError("only one of the files can be standard input")
+    tolerances = [parse_tolerances(text) if text else {} for text in (atol, rtol)]
+    difference = compare(read_csv(a), read_csv(b), *tolerances, resample=resample)
+    with standard_output() as out:
+        out.write((describe(difference) + "\n").encode())
+    return 0 if difference.equal else 1

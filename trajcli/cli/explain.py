@@ -1,0 +1,117 @@
+"""`trajcli explain`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from trajcli.job.read import read_job
+from trajcli.pipeline.explain import closed_form, explanation, polynomial_text, stretches_of
+from trajcli.pipeline.plan import Plan, plan_job
+from trajcli.streams.whole_file import standard_output
+
+_SYMBOLS = {"position": "q", "velocity": "qd", "acceleration": "qdd", "jerk": "qddd"}
+
+
+def run_explain(job: str, overrides: Sequence[str], *, as_json: bool) -> int:
+    """Print what there is to say about each move; return the exit code.
+
+    Raises:
+        VerificationError: After printing, when the trajectory breaks a limit.
+        TrajcliError: When there is nothing to explain.
+    """
+    plan = plan_job(read_job(job, overrides))
+    told = explanation(plan)
+    text = json.dumps(told, indent=2, ensure_ascii=False) if as_json else "\n".join(_lines(plan, told))
+    with standard_output() as out:
+        out.write((text + "\n").encode())
+    if not plan.verdict.passed:
+        from trajcli.pipeline.report import verification_error
+
+        raise verification_error(plan)
+    return 0
+
+
+def _lines(plan: Plan, told: dict[str, Any]) -> Iterator[str]:
+    units = told["units"]
+    joints = ", ".join(f"q{i} = {name}" for i, name in enumerate(told["joints"], 1) if name != f"j{i}")
+    yield f"{told['job']} on {told['robot']}: {len(told['moves'])} moves, {told['duration']:.10g} s"
+    yield f"angles in {units['angle']}, lengths in {units['length']}, t in s from the start of each move" + (
+        f"; {joints}" if joints else ""
+    )
+    for index, move in enumerate(told["moves"]):
+        yield ""
+        yield f"move {index}: {move['planner']}, {move['duration']:.10g} s, from t = {move['start']:.10g} s"
+        yield from _polynomials(plan, index)
+        yield from _phases(move)
+        yield from _peaks(move)
+        yield from _speed(move)
+        yield from (
+            f"  {event['kind']}: {event['message']}" for event in told["events"] if event["move"] == index
+        )
+    general = [event for event in told["events"] if event["move"] is None]
+    yield from (f"{event['kind']}: {event['message']}" for event in general)
+
+
+def _polynomials(plan: Plan, index: int) -> Iterator[str]:
+    move, units = plan.moves[index], plan.loaded.units
+    formulas = closed_form(move, units)
+    if formulas is not None:
+        yield from (f"  q{i}(t) = {formula}" for i, formula in enumerate(formulas.values(), 1))
+        return
+    for number, rows in enumerate(stretches_of(move, units), 1):
+        for row in rows:
+            when = f"{row.start:.10g} <= t <= {row.end:.10g}: " if len(rows) > 1 else ""
+            yield f"  {when}q{number}(t) = {polynomial_text(row.absolute)}"
+
+
+def _phases(move: dict[str, Any]) -> Iterator[str]:
+    shown: dict[str | None, list[str]] = {}
+    for phase in move["phases"]:
+        shown.setdefault(phase["joint"], []).append(
+            f"{phase['name']} {phase['start']:.6g}..{phase['end']:.6g}"
+        )
+    for joint, phases in shown.items():
+        yield f"  phases{f' of {joint}' if joint else ''} (s): {', '.join(phases)}"
+    if move["arrivals"]:
+        alone = ", ".join(f"{name} {time:.6g}" for name, time in move["arrivals"].items())
+        yield f"  durations of each joint alone (s): {alone}"
+
+
+def _peaks(move: dict[str, Any]) -> Iterator[str]:
+    yield "  peaks:"
+    for peak in move["peaks"]:
+        if peak["low"] == peak["high"] == 0 and peak["quantity"] != "position":
+            continue
+        low, high = peak["limit"]
+        limit = "no limit" if low is None and high is None else f"limits {_bound(low)} .. {_bound(high)}"
+        used = (
+            f", {100 * peak['used']:.4g} % used"
+            if peak["used"] is not None and peak["quantity"] != "position"
+            else ""
+        )
+        ends = (
+            f"{peak['low']:.9g} (t = {peak['low_time'] - move['start']:.6g}) .. "
+            if peak["low"] != peak["high"]
+            else ""
+        )
+        ends += f"{peak['high']:.9g} (t = {peak['high_time'] - move['start']:.6g})"
+        yield f"    {peak['joint']} {_SYMBOLS[peak['quantity']]}: {ends} {peak['unit']}; {limit}{used}"
+
+
+def _bound(bound: float | None) -> str:
+    return "unlimited" if bound is None else f"{bound:.9g}"
+
+
+def _speed(move: dict[str, Any]) -> Iterator[str]:
+    binding, reference = move["binding"], move["reference"]
+    if binding and binding["used"] > 0:
+        yield f"  binding limit: {binding['quantity']} of {binding['joint']}, {100 * binding['used']:.4g} % used"
+    if move["stretch"] != 1:
+        yield f"  stretched {move['stretch']:.6g} times"
+    if reference["duration"] is None:
+        yield f"  no bound for the duration: {reference['joint']}, {reference['reason']}"
+    elif reference["ratio"] is not None:
+        fastest = f"{reference['duration']:.6g} s, {reference['joint']}"
+        yield f"  duration: {reference['ratio']:.4g} x the fastest under the same limits ({fastest})"

@@ -1,0 +1,142 @@
+"""Problems as people read them, with the line and a caret below it, and as machines do.
+
+Text of a file never reaches the terminal as control characters: they are shown as escapes.
+"""
+
+from __future__ import annotations
+
+import math
+import unicodedata
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from trajcli.errors import Place, Problem
+
+WIDTH = 100  # columns of the terminal that a line of a frame takes at most, without the line number
+
+_TAB = "    "
+_CUT = "..."
+_ESCAPED = (
+    "Cc",
+    "Cf",
+    "Cs",
+    "Co",
+    "Cn",
+    "Zl",
+    "Zp",
+)  # categories that show nothing, or something else than they are
+_RESET, _BOLD, _RED, _CYAN = "\x1b[0m", "\x1b[1m", "\x1b[1;31m", "\x1b[36m"
+
+
+class _Cell(NamedTuple):
+    """One character of a line as it is shown."""
+
+    text: str
+    width: int
+
+
+def render_problem(problem: Problem, *, color: bool) -> str:
+    """Return a problem for people: place and message, then the line with a caret, then what would fix it.
+
+    Args:
+        problem: Its amounts are said in SI unless they were said before.
+        color: Whether to use the terminal's colors.
+    """
+    paint = _painted if color else _plain
+    place, hint = problem.place, _shown(problem.hint) if problem.hint else ""
+    where = f"{_shown(place.file)}:{place.line}:{place.column}: " if place is not None else ""
+    rows = [f"{paint(where, _BOLD) if where else ''}{paint('error:', _RED)} {_shown(problem.text())}"]
+    if place is None or not place.source.strip():
+        return "\n".join([*rows, *([f"  {paint(hint, _CYAN)}"] if hint else [])])
+    source, offset, length = _window(place)
+    gutter = " " * max(4, len(str(place.line)))
+    rows.append(f"{place.line:>{len(gutter)}} | {source}")
+    carets = f"{gutter} | {' ' * offset}{paint('^' * length, _RED)}"
+    fits = offset + length + 1 + sum(cell.width for cell in map(_cell, hint)) <= WIDTH
+    if hint and fits:
+        carets += f" {paint(hint, _CYAN)}"
+    rows.append(carets)
+    if hint and not fits:
+        rows.append(f"{gutter} = {paint(hint, _CYAN)}")
+    return "\n".join(rows)
+
+
+def problem_as_json(problem: Problem) -> dict[str, Any]:
+    """Return a problem as a mapping that JSON can hold, with the same keys for every problem.
+
+    Lines and columns count from 1, moves from 0; `value` and `limit` are SI. What is not known, or not
+    finite, is None.
+    """
+    place = problem.place
+    return {
+        "message": problem.text(),
+        "hint": problem.hint,
+        "file": place.file if place is not None else None,
+        "line": place.line if place is not None else None,
+        "column": place.column if place is not None else None,
+        "length": place.length if place is not None else None,
+        "move": problem.move,
+        "joint": problem.joint,
+        "time": _finite(problem.time),
+        "value": _finite(problem.value),
+        "limit": _finite(problem.limit),
+    }
+
+
+def _finite(number: float | None) -> float | None:
+    return float(number) if number is not None and math.isfinite(number) else None
+
+
+def _painted(text: str, code: str) -> str:
+    return f"{code}{text}{_RESET}"
+
+
+def _plain(text: str, code: str) -> str:
+    return text
+
+
+def _shown(text: str) -> str:
+    """Return a text with its control characters as escapes."""
+    return (
+        text
+        if text.isascii() and text.isprintable()
+        else "".join(_cell(character).text for character in text)
+    )
+
+
+def _cell(character: str) -> _Cell:
+    """Return how a character is shown, and how many columns it takes."""
+    if " " <= character <= "~":
+        return _Cell(character, 1)
+    if character == "\t":
+        return _Cell(_TAB, len(_TAB))
+    category = unicodedata.category(character)
+    if category in _ESCAPED:
+        escape = character.encode("unicode_escape").decode("ascii")
+        return _Cell(escape, len(escape))
+    if category in ("Mn", "Me"):
+        return _Cell(character, 0)
+    return _Cell(character, 2 if unicodedata.east_asian_width(character) in ("W", "F") else 1)
+
+
+def _window(place: Place) -> tuple[str, int, int]:
+    """Return the line as it is shown, the column of the first caret in it, and the number of carets.
+
+    A line that is too long is cut behind the place, and before it only where the place would not fit.
+    """
+    start = place.column - 1
+    first = max(0, start - WIDTH)  # no need to measure a line of a million characters
+    line = place.source.rstrip()
+    cells = [_cell(character) for character in line[first : start + WIDTH]]
+    at = min(start - first, len(cells))
+    offset, total = sum(cell.width for cell in cells[:at]), sum(cell.width for cell in cells)
+    length = sum(cell.width for cell in cells[at : at + place.length])
+    right = _CUT if len(line) > start + WIDTH else ""
+    left = _CUT if first or (total > WIDTH and offset + length + len(_CUT) > WIDTH) else ""
+    while left and offset + len(left) > WIDTH // 3 and total + len(left + right) > WIDTH:
+        gone = cells.pop(0)
+        at, offset, total = at - 1, offset - gone.width, total - gone.width
+    while cells and total + len(left + right) > WIDTH:
+        total, right = total - cells.pop().width, _CUT
+    length = sum(cell.width for cell in cells[at : at + place.length])
+    return left + "".join(cell.text for cell in cells) + right, offset + len(left), max(length, 1)

@@ -1,0 +1,77 @@
+"""From what a command does to an exit code: errors are rendered here and nowhere else."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, NoReturn
+
+from trajcli.errors import TrajcliError
+
+INTERRUPTED, PIPE_CLOSED, BUG = 130, 141, 70
+
+
+def guarded(command: Callable[..., int]) -> Callable[..., NoReturn]:
+    """Return the command so that it exits with its code, and renders its errors on standard error."""
+
+    @wraps(command)
+    def run(*args: Any, **options: Any) -> NoReturn:  # noqa: ANN401
+        sys.exit(_outcome(command, args, options))
+
+    return run
+
+
+def _outcome(command: Callable[..., int], args: tuple[Any, ...], options: dict[str, Any]) -> int:
+    try:
+        return command(*args, **options)
+    except TrajcliError as error:
+        _render(error, as_json=options.get("errors") == "json")
+        return error.exit_code
+    except BrokenPipeError:
+        return PIPE_CLOSED
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except Exception as error:  # noqa: BLE001
+        return _bug(error, as_json=options.get("errors") == "json")
+
+
+def _render(error: TrajcliError, *, as_json: bool) -> None:
+    from trajcli.cli.frames import problem_as_json, render_problem
+
+    if as_json:
+        import json
+
+        problems = [problem_as_json(problem) for problem in error.problems]
+        said = {"error": type(error).__name__, "exit": error.exit_code, "problems": problems}
+        print(json.dumps(said, ensure_ascii=False), file=sys.stderr)  # noqa: T201
+        return
+    color = wants_color()
+    for problem in error.problems:
+        print(render_problem(problem, color=color), file=sys.stderr)  # noqa: T201
+
+
+def _bug(error: Exception, *, as_json: bool) -> int:
+    import traceback
+
+    if as_json:
+        import json
+
+        said = {
+            "error": type(error).__name__,
+            "exit": BUG,
+            "problems": [{"message": f"a bug in trajcli: {error}"}],
+        }
+        print(json.dumps(said), file=sys.stderr)  # noqa: T201
+        return BUG
+    traceback.print_exception(error)
+    print(
+        "This is a bug in trajcli. Please report it with the lines above and the job file.", file=sys.stderr
+    )  # noqa: T201
+    return BUG
+
+
+def wants_color() -> bool:
+    """Return whether standard error is a terminal that likes color."""
+    return sys.stderr.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
