@@ -10,7 +10,8 @@ from trajcli.cli.outcome import guarded
 
 app = typer.Typer(
     name="trajcli",
-    help="Trajectory planning for serial robots: a YAML job in, a verified sample stream out.",
+    help="Trajectory planning for serial robots: a YAML job in, a verified sample stream out. "
+    "`trajcli --version` prints the version.",
     epilog="Exit codes: 0 done and verified, 1 judged and found wrong, 2 wrong input, 3 no curve exists, "
     "4 file trouble, 70 a bug in trajcli.",
     rich_markup_mode=None,
@@ -31,23 +32,6 @@ Overrides = Annotated[
 ]
 
 
-def _show_version(value: bool) -> None:  # noqa: FBT001
-    if value:
-        from trajcli import __version__
-
-        typer.echo(f"trajcli {__version__}")
-        raise typer.Exit
-
-
-@app.callback()
-def _main(
-    version: Annotated[  # noqa: ARG001
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version.")
-    ] = False,
-) -> None:
-    pass
-
-
 @app.command()
 @guarded
 def plan(
@@ -58,6 +42,12 @@ def plan(
     ] = None,
     report: Annotated[
         str | None, typer.Option("--report", metavar="FILE", help="Write the verification report as JSON.")
+    ] = None,
+    resolved: Annotated[
+        str | None,
+        typer.Option(
+            "--resolved", metavar="FILE", help="Write the job as it was understood: names, units and limits."
+        ),
     ] = None,
     rate: Annotated[str | None, typer.Option("--rate", metavar="HZ", help="Rows per second.")] = None,
     override: Overrides = [],  # noqa: B006
@@ -72,14 +62,13 @@ def plan(
     ] = False,
     no_output: Annotated[bool, typer.Option("--no-output", help="Only judge: write no rows.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on stderr.")] = False,
-    errors: Errors = "text",  # noqa: ARG001
+    errors: Errors = "text",
 ) -> int:
     """Plan a job, verify it, and write its samples as CSV."""
     from trajcli.cli.plan import PlanOptions, run_plan
 
-    overrides = [*override, *([f"output.rate={rate}"] if rate is not None else [])]
-    options = PlanOptions(output, report, digits, strict, reference, no_output, quiet)
-    return run_plan(job, overrides, options)
+    options = PlanOptions(rate, output, report, resolved, digits, strict, reference, no_output, quiet)
+    return run_plan(job, override, options)
 
 
 @app.command()
@@ -88,7 +77,7 @@ def explain(
     job: JobFile,
     override: Overrides = [],  # noqa: B006
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON for programs.")] = False,
-    errors: Errors = "text",  # noqa: ARG001
+    errors: Errors = "text",
 ) -> int:
     """Say each move in words and formulas: polynomials, phases, peaks, and how fast it could be."""
     from trajcli.cli.explain import run_explain
@@ -113,7 +102,7 @@ def diff(
     resample: Annotated[
         bool, typer.Option("--resample", help="Interpolate B at the times of A when they differ.")
     ] = False,
-    errors: Errors = "text",  # noqa: ARG001
+    errors: Errors = "text",
 ) -> int:
     """Compare two CSV files column by column. Exit 0: equal, 1: different, 2: cannot be compared."""
     from trajcli.cli.diff import run_diff
@@ -127,7 +116,7 @@ def schema(
     kind: Annotated[
         Literal["job", "robot", "report"], typer.Argument(help="Which schema.", show_default=True)
     ] = "job",
-    errors: Errors = "text",  # noqa: ARG001
+    errors: Errors = "text",
 ) -> int:
     """Print a JSON Schema, for completion and checking in an editor."""
     from trajcli.job.schema import schema_text
@@ -143,7 +132,7 @@ def schema(
 def init(
     file: Annotated[str, typer.Argument(metavar="FILE", help="The file to write; - is stdout.")] = "job.yaml",
     force: Annotated[bool, typer.Option("--force", help="Overwrite the file if it exists.")] = False,
-    errors: Errors = "text",  # noqa: ARG001
+    errors: Errors = "text",
 ) -> int:
     """Write a commented starter job that plans as it stands."""
     from trajcli.cli.init import run_init

@@ -107,7 +107,8 @@ def _bound(bound: float | None) -> str:
 def _speed(move: dict[str, Any]) -> Iterator[str]:
     binding, reference = move["binding"], move["reference"]
     if binding and binding["used"] > 0:
-        yield f"  binding limit: {binding['quantity']} of {binding['joint']}, {100 * binding['used']:.4g} % used"
+        part = f"{100 * binding['used']:.4g} % used"
+        yield f"  binding limit: {binding['quantity']} of {binding['joint']}, {part}"
     if move["stretch"] != 1:
         yield f"  stretched {move['stretch']:.6g} times"
     if reference["duration"] is None:

@@ -66,9 +66,8 @@ def _bug(error: Exception, *, as_json: bool) -> int:
         print(json.dumps(said), file=sys.stderr)  # noqa: T201
         return BUG
     traceback.print_exception(error)
-    print(
-        "This is a bug in trajcli. Please report it with the lines above and the job file.", file=sys.stderr
-    )  # noqa: T201
+    request = "This is a bug in trajcli. Please report it with the lines above and the job file."
+    print(request, file=sys.stderr)  # noqa: T201
     return BUG
 
 

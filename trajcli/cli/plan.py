@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from trajcli.errors import InputError, Problem, VerificationError
-from trajcli.job.read import read_job
+from trajcli.job.read import LoadedJob, read_job
 from trajcli.pipeline.plan import Plan, plan_job
-from trajcli.pipeline.write import check_output_name, grid_of, write_rows
+from trajcli.pipeline.write import check_output_name, grid_of, write_rows, write_text
+from trajcli.planners.planner import Event
 
 
 @dataclass(frozen=True)
 class PlanOptions:
     """What the command line says beside the job; see `trajcli plan --help`."""
 
+    rate: str | None = None
     output: str | None = None
     report: str | None = None
+    resolved: str | None = None
     digits: Literal["fixed", "full"] = "fixed"
     strict: bool = False
     reference: bool = False
@@ -33,7 +37,10 @@ def run_plan(job: str, overrides: Sequence[str], options: PlanOptions) -> int:
         TrajcliError: When anything is wrong; then no rows were written.
     """
     _check_options(options)
-    plan = plan_job(read_job(job, overrides))
+    loaded = read_job(job, overrides, rate=options.rate)
+    if options.resolved is not None:
+        _write_resolved(loaded, options.resolved)
+    plan = plan_job(loaded)
     grid = grid_of(plan)
     if options.report is not None or options.reference:
         _report(plan, options)
@@ -42,9 +49,7 @@ def run_plan(job: str, overrides: Sequence[str], options: PlanOptions) -> int:
 
         raise verification_error(plan)
     if options.strict and plan.events:
-        raise VerificationError(
-            *(Problem(f"{event.kind}: {event.message}", move=event.move) for event in plan.events)
-        )
+        raise VerificationError(*(_problem(plan, event) for event in plan.events))
     if not options.quiet:
         _summarise(plan, grid.count, options)
     if not options.no_output:
@@ -52,22 +57,42 @@ def run_plan(job: str, overrides: Sequence[str], options: PlanOptions) -> int:
     return 0
 
 
+def _problem(plan: Plan, event: Event) -> Problem:
+    place = None if event.move is None else plan.loaded.place_of_move(event.move)
+    return Problem(f"{event.kind}: {event.message}", "leave --strict out to accept it", place, event.move)
+
+
 def _check_options(options: PlanOptions) -> None:
     if options.output is not None:
         if options.no_output:
             raise InputError("--no-output and --output exclude each other", hint="leave one of them out")
         check_output_name(options.output)
-    if options.report is not None and options.report == (options.output or "-") and not options.no_output:
-        raise InputError(f"rows and report cannot both go to {options.report}", hint="name another file")
+    rows = None if options.no_output else options.output or "-"
+    taken: dict[str, str] = {} if rows is None else {_real(rows): "the rows"}
+    for name, path in (("--report", options.report), ("--resolved", options.resolved)):
+        if path is None:
+            continue
+        other = taken.setdefault(_real(path), name)
+        if other != name:
+            raise InputError(f"{name} and {other} cannot both go to {path}", hint="name another file")
+
+
+def _real(path: str) -> str:
+    return path if path == "-" else os.path.realpath(path)
+
+
+def _write_resolved(loaded: LoadedJob, path: str) -> None:
+    from trajcli.job.dump import dump_job
+
+    write_text(dump_job(loaded), path)
 
 
 def _report(plan: Plan, options: PlanOptions) -> None:
     from trajcli.pipeline.report import report_of
-    from trajcli.pipeline.write import write_report
 
     report = report_of(plan, reference=options.reference)
     if options.report is not None:
-        write_report(report, options.report)
+        write_text(report.model_dump_json(indent=2) + "\n", options.report)
     for move in report.moves if options.reference and not options.quiet else []:
         bound = move.reference
         if bound is None:
@@ -77,7 +102,8 @@ def _report(plan: Plan, options: PlanOptions) -> None:
         elif bound.ratio is None:
             text = "nothing to move"
         else:
-            text = f"{move.duration:.6g} s, {bound.ratio:.4g} x the fastest under the same limits ({bound.duration:.6g} s)"
+            text = f"{move.duration:.6g} s, {bound.ratio:.4g} x the fastest under the same limits"
+            text += f" ({bound.duration:.6g} s)"
         print(f"move {move.index} ({move.planner}): {text}", file=sys.stderr)  # noqa: T201
 
 

@@ -83,12 +83,13 @@ class PhaseChain:
     @cached_property
     def _rounding(self) -> Array:
         """What rounding is relative to: the peaks, or what the next derivative's peak adds up to."""
-        sizes = np.where(self.peaks > 0, self.peaks, 1.0)
+        sizes = self.peaks.copy()
         if self.order > 1:
             sizes[0] = max(sizes[0], sizes[1] * self.duration)
         if self.order > 2:
             driving = [time for k, time in enumerate(self.durations.tolist()) if k not in self.cruising]
             sizes[1] = max(sizes[1], sizes[2] * math.fsum(driving))
+        sizes[sizes == 0] = 1.0
         return sizes
 
     def with_cruises(self) -> PhaseChain:
@@ -106,6 +107,13 @@ class PhaseChain:
         sizes = np.where(self.peaks > 0, self.peaks, 1.0)
         sizes[0] = self._rounding[0]
         return float(np.abs(self._residual(sizes, duration)).max(initial=0.0))
+
+    @property
+    def coarseness(self) -> float:
+        """What rounding a break does to the derivative below the last, relative to its peak."""
+        if self.order < 3 or not self.peaks[1]:
+            return 0.0
+        return float(np.spacing(self.duration) * self.peaks[2] / self.peaks[1])
 
     def stretched(self, duration: float) -> PhaseChain:
         """Return the motion over the same positions in `duration`; boundary derivatives must be zero."""
@@ -128,8 +136,8 @@ class PhaseChain:
         """Return the motion from `position` as a curve (n = 1) over [0, `duration`].
 
         Break times are rounded so that no phase but the longest gets shorter: no constant need grow. What
-        that does to the end is taken back by the constants, and what is left of the distance by the velocity
-        of the longest phase.
+        that does to the end is taken back by the constants, and what is left by steps of rounding size into
+        the longest phase.
         """
         if not self.durations.size:
             return PiecewisePolynomial(np.zeros(2), np.full((1, 1, 1), position))
@@ -137,16 +145,38 @@ class PhaseChain:
         lengths = np.diff(breaks)
         chain = replace(self, durations=lengths, constants=self.constants * self.durations / lengths)
         chain = chain.corrected(0.0, 1.0, None)
-        states = chain.states[:-1]
-        rows = np.stack([chain.constants, *states.T[::-1]])
+        rows = np.stack([chain.constants, *chain._landing_states().T[::-1]])  # noqa: SLF001
         rows /= np.array([factorial(k) for k in range(self.order, -1, -1)])[:, None]
-        if not np.isnan(self.final[0]):
-            longest = int(lengths.argmax())
-            missing = self.final[0] - chain.states[-1, 0]
-            rows[-2, longest] += missing / lengths[longest]
-            rows[-1, longest + 1 :] += missing
         rows[-1] += position
         return PiecewisePolynomial(breaks, rows[:, :, None])
+
+    def _landing_states(self) -> Array:
+        """Return the states before each phase, (k, order), shifted from the longest on to meet the end."""
+        longest = int(self.durations.argmax())
+        states = self.states[:-1].tolist()
+        phases = list(zip(self.constants.tolist(), self.durations.tolist(), strict=True))
+        lowest = 1 if np.isnan(self.final[0]) else 0
+        highest = 0 if longest in self.cruising else self.order - 2
+        for level in [*range(highest, lowest - 1, -1), None]:
+            end = self._walk_on(states, phases, longest)
+            if level is not None:
+                states[longest][level + 1] += (float(self.final[level]) - end[level]) / phases[longest][1]
+        shifted = np.array(states)
+        if lowest == 0:
+            shifted[longest + 1 :, 0] += self.final[0] - end[0]
+        return shifted
+
+    def _walk_on(
+        self, states: list[list[float]], phases: list[tuple[float, float]], first: int
+    ) -> list[float]:
+        """Lay the states after the phase `first` anew, and return the end."""
+        state = states[first]
+        for k in range(first, len(phases)):
+            if k in self.cruising:
+                state = [*state[:-1], 0.0]
+            states[k] = state
+            state = _after(state, *phases[k])
+        return state
 
     def corrected(self, yield_duration: float, yield_constant: float, duration: float | None) -> PhaseChain:
         """Return the chain after Newton steps.

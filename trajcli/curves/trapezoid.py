@@ -1,10 +1,9 @@
 """Trapezoidal velocity profiles of one variable: bounded speed and acceleration, given boundary velocities.
 
-A profile is a velocity that is linear between knots; its position is a chain of parabolas (the slides' 2-1-2).
-All functions look along the displacement: the distance is positive, or there is nothing to solve.
-
-With boundary speeds w0, w1 >= 0, cruise speed V, and ramps of rate a (speeding up) and d (slowing down), the
-motion covers D = V T - (V - w0)^2 / (2 a) - (V - w1)^2 / (2 d) in T = (V - w0)/a + (V - w1)/d + cruise.
+Along the displacement, with boundary speeds w0, w1 >= 0, cruise speed V, and ramps of rate a (speeding up) and d
+(slowing down), the motion covers D = V T - (V - w0)^2 / (2 a) - (V - w1)^2 / (2 d) in T = (V - w0)/a + (V - w1)/d +
+cruise. What runs away from the target at the start, or must run up from behind it at the end, is a ramp from or
+to rest before or after that.
 
 Source: Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), sections 3.2 and
 3.2.7; Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.2.1.
@@ -13,11 +12,12 @@ Source: Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-import numpy as np
+from trajcli.curves.velocity_profile import Profile, Rates
 
-from trajcli.curves.piecewise import Array, PiecewisePolynomial, increasing
+_ROUNDING = 1e-12  # relative: what a speed, a distance or a duration may miss its bound by
+_DOUBLE = 1e-15  # relative: a discriminant this small is zero, and both roots are one
 
 
 class InfeasibleProfileError(ValueError):
@@ -25,7 +25,7 @@ class InfeasibleProfileError(ValueError):
 
     Attributes:
         reason: "too_fast" (cannot stop in time), "too_slow" (cannot reach the final speed in time), "turns" (ends
-            against its direction), "speed" or "acceleration" (outside the interval), "duration" (too short).
+            against its direction), "speed" or "acceleration" (outside the interval), "duration" (too short or long).
         low: The number must be above this (or at least this, for accelerations and durations).
         high: The number must be at most this.
     """
@@ -33,85 +33,6 @@ class InfeasibleProfileError(ValueError):
     def __init__(self, reason: str, low: float = math.nan, high: float = math.inf) -> None:
         super().__init__(f"{reason}: outside [{low}, {high}]")
         self.reason, self.low, self.high = reason, low, high
-
-
-@dataclass(frozen=True)
-class Rates:
-    """What a motion in one direction may do: all positive; speed may be infinite.
-
-    Attributes:
-        speed: Largest speed.
-        acceleration: Rate of speeding up.
-        deceleration: Rate of slowing down.
-    """
-
-    speed: float
-    acceleration: float
-    deceleration: float
-
-
-@dataclass(frozen=True)
-class Profile:
-    """A velocity that is linear between knots.
-
-    Attributes:
-        knots: (duration of the stretch, velocity at its end) in order.
-        initial: Velocity at the start.
-    """
-
-    initial: float
-    knots: tuple[tuple[float, float], ...]
-
-    @property
-    def duration(self) -> float:
-        """Seconds."""
-        return math.fsum(length for length, _ in self.knots)
-
-    @property
-    def distance(self) -> float:
-        """Signed distance covered."""
-        velocities = [self.initial, *(velocity for _, velocity in self.knots)]
-        return math.fsum(
-            (velocities[i] + velocities[i + 1]) / 2 * knot[0] for i, knot in enumerate(self.knots)
-        )
-
-    def then(self, other: Profile) -> Profile:
-        """Return this profile followed by another that starts with the velocity in which this one ends."""
-        return Profile(self.initial, self.knots + other.knots)
-
-    def mirrored(self) -> Profile:
-        """Return the profile in the opposite direction."""
-        return Profile(-self.initial, tuple((length, -velocity) for length, velocity in self.knots))
-
-    def stretched(self, factor: float) -> Profile:
-        """Return the profile that takes `factor` times as long over the same distance."""
-        return Profile(self.initial / factor, tuple((t * factor, v / factor) for t, v in self.knots))
-
-    def phases(self) -> list[tuple[str, float, float]]:
-        """Return (name, start, end) of each stretch: accelerate, cruise, decelerate or rest."""
-        named, start, before = [], 0.0, self.initial
-        for length, velocity in self.knots:
-            change = abs(velocity) - abs(before)
-            flat = "cruise" if velocity else "rest"
-            name = flat if change == 0 else "accelerate" if change > 0 else "decelerate"
-            if length > 0:
-                named.append((name, start, start + length))
-            start, before = start + length, velocity
-        return named
-
-    def curve(self, start: float, end: float) -> PiecewisePolynomial:
-        """Return the position (n = 1) from `start`; the last piece is laid to end exactly in `end`."""
-        knots = [knot for knot in self.knots if knot[0] > 0]
-        if not knots:
-            return PiecewisePolynomial(np.zeros(2), np.full((1, 1, 1), start))
-        breaks = increasing(np.concatenate([[0.0], np.cumsum([length for length, _ in knots])]))
-        velocity = np.array([self.initial, *(v for _, v in knots)])
-        lengths = np.array([length for length, _ in knots])
-        position = start + np.concatenate([[0.0], np.cumsum((velocity[1:] + velocity[:-1]) / 2 * lengths)])
-        position[1:] += (end - position[-1]) * breaks[1:] / breaks[-1]
-        slope = np.diff(velocity) / np.diff(breaks)  # so that velocities meet where breaks are rounded
-        coefficients: Array = np.stack([slope / 2, velocity[:-1], position[:-1]])[:, :, None]
-        return PiecewisePolynomial(breaks, coefficients)
 
 
 def fastest_profile(
@@ -130,91 +51,39 @@ def fastest_profile(
     Raises:
         InfeasibleProfileError: When the boundary velocities do not let it end there without turning round.
     """
-    if distance < 0 or (distance == 0 and (initial < 0 or (initial == 0 and final < 0))):
-        mirrored = fastest_profile(-distance, -initial, -final, backward, forward, overshoot=overshoot)
-        return mirrored.mirrored()
-    if initial < 0:
-        brake = _ramp(initial, 0.0, backward)
-        return brake.then(
-            fastest_profile(distance - brake.distance, 0.0, final, forward, backward, overshoot=overshoot)
-        )
-    if final < 0:
-        if not overshoot:
-            raise InfeasibleProfileError("turns")
-        return _with_run_up(distance, initial, final, forward, backward)
-    stopping = (initial**2 - final**2) / (2 * forward.deceleration)
-    if stopping > distance * (1 + 1e-12):
-        if not overshoot:
-            raise InfeasibleProfileError("too_fast", stopping)
-        brake = _ramp(initial, 0.0, forward)
-        return brake.then(
-            fastest_profile(distance - brake.distance, 0.0, final, forward, backward, overshoot=True)
-        )
-    if -stopping * forward.deceleration / forward.acceleration > distance * (1 + 1e-12):
-        if not overshoot:
-            raise InfeasibleProfileError("too_slow", -stopping * forward.deceleration / forward.acceleration)
-        return _with_run_up(distance, initial, final, forward, backward)
-    return _direct(distance, initial, final, forward)
+    way = _way(distance, initial, final, forward, backward, overshoot=overshoot)
+    return way.with_middle(_fastest_middle(way))
 
 
 def profile_of_duration(
-    distance: float, initial: float, final: float, duration: float, rates: Rates
+    distance: float,
+    initial: float,
+    final: float,
+    duration: float,
+    forward: Rates,
+    backward: Rates,
+    *,
+    overshoot: bool = False,
 ) -> Profile:
-    """Return the profile over a positive `distance` that lasts `duration` with the given ramps.
+    """Return the profile over a signed `distance` that lasts `duration` with the given ramps.
 
-    The cruise speed is what is looked for; it may lie below the boundary speeds. `rates.speed` is not used.
+    The cruise speed is what is looked for; it may lie below the boundary speeds. The speeds of `forward` and
+    `backward` are not used. Other arguments are those of `fastest_profile`.
 
     Raises:
-        InfeasibleProfileError: When the ramps are too flat for so short a duration (or so long a one, where the
-            boundary speeds leave no room to stop); "acceleration" with the least one for rest to rest, else "duration".
+        InfeasibleProfileError: As `fastest_profile`; "acceleration" with the least one when from rest to rest equal
+            ramps are too flat; else "duration" with the shortest and the longest.
     """
-    a, d = rates.acceleration, rates.deceleration
-    for first, second in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
-        up, down = (a if first > 0 else d), (d if second > 0 else a)
-        square = first / (2 * up) + second / (2 * down)
-        linear = duration + first * initial / up + second * final / down
-        rest = distance + first * initial**2 / (2 * up) + second * final**2 / (2 * down)
-        for cruise in _roots(square, -linear, rest):
-            fits = (
-                first * (cruise - initial) >= -1e-12 * cruise and second * (cruise - final) >= -1e-12 * cruise
-            )
-            ramps = abs(cruise - initial) / up + abs(cruise - final) / down
-            if cruise > 0 and fits and ramps <= duration * (1 + 1e-12):
-                return _three(
-                    initial, cruise, final, abs(cruise - initial) / up, abs(cruise - final) / down, duration
-                )
-    if initial == 0 and final == 0:
-        raise InfeasibleProfileError("acceleration", 2 * distance * (1 + a / d) / duration**2)
-    shortest = fastest_profile(distance, initial, final, rates, rates).duration
-    slowest = math.sqrt(max(0.0, _dip(distance, initial, final, rates)))
-    longest = _three_through(initial, slowest, final, rates) if slowest else math.inf
-    raise InfeasibleProfileError("duration", shortest, longest)
-
-
-def signed_profile_of_duration(
-    distance: float, initial: float, final: float, duration: float, forward: Rates, backward: Rates
-) -> Profile:
-    """Return the profile of `profile_of_duration` for a signed distance; running away is stopped first.
-
-    Raises:
-        InfeasibleProfileError: As `profile_of_duration`, or "turns" when it ends against its direction.
-    """
-    if distance < 0 or (distance == 0 and initial < 0):
-        mirrored = signed_profile_of_duration(-distance, -initial, -final, duration, backward, forward)
-        return mirrored.mirrored()
-    if final < 0 or (distance == 0 and (initial or final)):
-        raise InfeasibleProfileError("turns")
-    if distance == 0:
-        return Profile(0.0, ((duration, 0.0),))
-    if initial >= 0:
-        return profile_of_duration(distance, initial, final, duration, forward)
-    brake = _ramp(initial, 0.0, backward)
-    left = duration - brake.duration
-    if left <= 0:
-        raise InfeasibleProfileError(
-            "duration", fastest_profile(distance, initial, final, forward, backward).duration
-        )
-    return brake.then(profile_of_duration(distance - brake.distance, 0.0, final, left, forward))
+    way = _way(distance, initial, final, forward, backward, overshoot=overshoot)
+    around = way.before.duration + way.after.duration
+    middle = _middle_of_duration(way, duration - around)
+    if middle is not None:
+        return way.with_middle(middle)
+    equal = way.rates.acceleration == way.rates.deceleration
+    if initial == 0 and final == 0 and equal:
+        raise InfeasibleProfileError("acceleration", 4 * abs(distance) / duration**2)
+    shortest = way.with_middle(_fastest_middle(way)).duration
+    raise InfeasibleProfileError("duration", shortest, around + _slowest_middle(way))
 
 
 def profile_of_speed(
@@ -227,30 +96,98 @@ def profile_of_speed(
 ) -> Profile:
     """Return the profile over a positive `distance` that lasts `duration` with cruise speed `speed`.
 
-    The rate of the ramps is what is looked for: both the same, or that of speeding up where `deceleration` is given.
+    The rate of the ramps is what is looked for: both the same, or that of speeding up where `deceleration` is
+    given. Boundary speeds are not negative, and not above the cruise speed.
 
     Raises:
-        InfeasibleProfileError: When the speed lies outside the interval that the duration allows.
+        InfeasibleProfileError: "speed", when it lies outside the interval that the duration allows.
     """
-    low = distance / duration
-    high = 2 * low - min(initial, final) if initial == final else math.inf
+    low, high = _speeds_of_duration(distance, initial, final, duration, deceleration)
     surplus = speed * duration - distance
+    if initial == final == speed and abs(surplus) <= _ROUNDING * distance:
+        return Profile(speed, ((duration, speed),))
     up, down = (speed - initial) ** 2 / 2, (speed - final) ** 2 / 2
-    if surplus <= 0 or speed > high * (1 + 1e-12) or speed < max(initial, final):
-        raise InfeasibleProfileError("speed", low, high)
-    inverse = (surplus - down / deceleration) / up if deceleration and up else surplus / (up + down)
+    if deceleration is not None:
+        surplus -= down / deceleration
+    weight = up if deceleration is not None else up + down
+    above = speed > low and speed >= max(initial, final) and surplus > _ROUNDING * distance
+    if not above or speed > high * (1 + _ROUNDING) or weight == 0:
+        raise InfeasibleProfileError("speed", max(low, initial, final), high)
+    inverse = surplus / weight
     rise = (speed - initial) * inverse
-    fall = (speed - final) / deceleration if deceleration else (speed - final) * inverse
-    if inverse <= 0 or rise + fall > duration * (1 + 1e-12):
-        raise InfeasibleProfileError("speed", low, high)
+    fall = (speed - final) * inverse if deceleration is None else (speed - final) / deceleration
     return _three(initial, speed, final, rise, fall, duration)
 
 
-def _three(initial: float, cruise: float, final: float, rise: float, fall: float, duration: float) -> Profile:
-    flat = duration - rise - fall
-    if flat <= 1e-12 * duration:
-        rise, flat = duration - fall, 0.0
-    return Profile(initial, ((rise, cruise), (flat, cruise), (fall, final)))
+def _speeds_of_duration(
+    distance: float, initial: float, final: float, duration: float, deceleration: float | None
+) -> tuple[float, float]:
+    """Return the interval of cruise speeds of `profile_of_speed`: infinitely steep ramps to no cruise at all."""
+    mean = distance / duration
+    if deceleration is None:
+        return mean, mean + math.hypot(mean - initial, mean - final) / math.sqrt(2)
+    change = (final - initial) / deceleration
+    roots = _roots(
+        0.5 / deceleration, -duration - final / deceleration, distance + final**2 / (2 * deceleration)
+    )
+    high = (2 * distance - initial * duration + final * change) / (duration + change)
+    return roots[0] if roots else math.inf, high
+
+
+@dataclass(frozen=True)
+class _Way:
+    """A motion in three parts, of which the middle goes straight to its end and is still to be found.
+
+    Attributes:
+        before: Up to the first rest, where the start needs one; signed.
+        after: From the last rest on, where the end needs one; signed.
+        direction: 1 or -1: that of the middle.
+        distance: Of the middle, along its direction; not negative, and long enough to change speed in.
+        initial: Speed in which the middle begins.
+        final: Speed in which it ends; the same as `initial` where the distance is zero.
+        rates: What the middle may do.
+    """
+
+    before: Profile
+    after: Profile
+    direction: int
+    distance: float
+    initial: float
+    final: float
+    rates: Rates
+
+    def mirrored(self) -> _Way:
+        """Return the way in the opposite direction."""
+        before, after = self.before.mirrored(), self.after.mirrored()
+        return replace(self, before=before, after=after, direction=-self.direction)
+
+    def with_middle(self, middle: Profile) -> Profile:
+        """Return the whole profile."""
+        signed = middle if self.direction > 0 else middle.mirrored()
+        return self.before.then(signed).then(self.after)
+
+
+def _way(
+    distance: float, initial: float, final: float, forward: Rates, backward: Rates, *, overshoot: bool
+) -> _Way:
+    if distance < 0 or (distance == 0 and (initial < 0 or (initial == 0 and final < 0))):
+        return _way(-distance, -initial, -final, backward, forward, overshoot=overshoot).mirrored()
+    change = (initial - final) * (initial + final) / 2
+    needed = change / forward.deceleration if change > 0 else -change / forward.acceleration
+    fits = needed <= distance * (1 + _ROUNDING)
+    if initial >= 0 and final >= 0 and fits:
+        before, after = Profile(initial), Profile(final)
+        return _Way(before, after, 1, distance, initial, final, forward)
+    if initial >= 0 and not overshoot:
+        reason = "turns" if final < 0 else "too_fast" if change > 0 else "too_slow"
+        raise InfeasibleProfileError(reason, needed)
+    if initial < 0 or (final >= 0 and change > 0):
+        brake = _ramp(initial, 0.0, forward if initial > 0 else backward)
+        rest = _way(distance - brake.distance, 0.0, final, forward, backward, overshoot=overshoot)
+        return replace(rest, before=brake.then(rest.before))
+    run_up = _ramp(0.0, final, forward if final > 0 else backward)
+    rest = _way(distance - run_up.distance, initial, 0.0, forward, backward, overshoot=overshoot)
+    return replace(rest, after=rest.after.then(run_up))
 
 
 def _ramp(initial: float, final: float, rates: Rates) -> Profile:
@@ -259,38 +196,67 @@ def _ramp(initial: float, final: float, rates: Rates) -> Profile:
     return Profile(initial, ((abs(final - initial) / rate, final),))
 
 
-def _with_run_up(distance: float, initial: float, final: float, forward: Rates, backward: Rates) -> Profile:
-    run_up = _ramp(0.0, final, forward if final > 0 else backward)
-    before = fastest_profile(distance - run_up.distance, initial, 0.0, forward, backward, overshoot=True)
-    return before.then(run_up)
-
-
-def _direct(distance: float, initial: float, final: float, rates: Rates) -> Profile:
+def _fastest_middle(way: _Way) -> Profile:
+    if way.distance == 0:
+        return Profile(way.initial)
+    distance, initial, final, rates = way.distance, way.initial, way.final, way.rates
     a, d = rates.acceleration, rates.deceleration
-    peak = math.sqrt(max(0.0, (2 * a * d * distance + d * initial**2 + a * final**2) / (a + d)))
-    peak = max(peak, initial, final)
-    if peak <= rates.speed:
-        rise, fall = (peak - initial) / a, (peak - final) / d
-        return Profile(initial, ((rise, peak), (fall, final)))
+    square = (2 * a * d * distance + d * initial**2 + a * final**2) / (a + d)
+    peak = max(math.sqrt(square), initial, final)
+    if peak <= rates.speed * (1 + _ROUNDING):
+        return Profile(initial, (((peak - initial) / a, peak), ((peak - final) / d, final)))
     cruise = rates.speed
     if min(initial, final) > cruise:
-        cruise = max(cruise, math.sqrt(max(0.0, _dip(distance, initial, final, rates))))
+        cruise = max(cruise, _lowest_speed(way))
     rise = abs(cruise - initial) / (a if cruise >= initial else d)
     fall = abs(cruise - final) / (d if cruise >= final else a)
     covered = (initial + cruise) / 2 * rise + (cruise + final) / 2 * fall
-    return Profile(
-        initial, ((rise, cruise), (max(0.0, (distance - covered) / cruise), cruise), (fall, final))
-    )
+    flat = max(0.0, (distance - covered) / cruise)
+    return Profile(initial, ((rise, cruise), (flat, cruise), (fall, final)))
 
 
-def _dip(distance: float, initial: float, final: float, rates: Rates) -> float:
-    """Return the square of the speed at which slowing down from `initial` meets speeding up to `final`."""
-    a, d = rates.acceleration, rates.deceleration
-    return (initial**2 / d + final**2 / a - 2 * distance) * a * d / (a + d)
+def _middle_of_duration(way: _Way, duration: float) -> Profile | None:
+    """Return the middle that lasts `duration`, or None; the four cases are cruise speeds above or below the ends."""
+    if way.distance == 0:
+        return Profile(0.0, ((duration, 0.0),)) if way.initial == 0 and duration >= 0 else None
+    if duration <= 0:
+        return None
+    a, d, initial, final = way.rates.acceleration, way.rates.deceleration, way.initial, way.final
+    for first, second in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+        up, down = (a if first > 0 else d), (d if second > 0 else a)
+        square = first / (2 * up) + second / (2 * down)
+        linear = duration + first * initial / up + second * final / down
+        rest = way.distance + first * initial**2 / (2 * up) + second * final**2 / (2 * down)
+        for cruise in _roots(square, -linear, rest):
+            room = _ROUNDING * cruise
+            rise, fall = abs(cruise - initial) / up, abs(cruise - final) / down
+            fits = first * (cruise - initial) >= -room and second * (cruise - final) >= -room
+            if cruise > 0 and fits and rise + fall <= duration * (1 + _ROUNDING):
+                return _three(initial, cruise, final, rise, fall, duration)
+    return None
 
 
-def _three_through(initial: float, cruise: float, final: float, rates: Rates) -> float:
-    return (initial - cruise) / rates.deceleration + (final - cruise) / rates.acceleration
+def _lowest_speed(way: _Way) -> float:
+    """Return the speed at which slowing down at once meets speeding up at last; 0 where there is time to stop."""
+    a, d = way.rates.acceleration, way.rates.deceleration
+    square = (way.initial**2 / d + way.final**2 / a - 2 * way.distance) * a * d / (a + d)
+    return math.sqrt(max(0.0, square))
+
+
+def _slowest_middle(way: _Way) -> float:
+    """Return how long the middle can last: as long as wanted where it may stop, or nearly so."""
+    lowest = _lowest_speed(way)
+    if lowest == 0:
+        return math.inf
+    slowing, speeding = way.initial - lowest, way.final - lowest
+    return max(0.0, slowing / way.rates.deceleration + speeding / way.rates.acceleration)
+
+
+def _three(initial: float, cruise: float, final: float, rise: float, fall: float, duration: float) -> Profile:
+    flat = duration - rise - fall
+    if flat <= _ROUNDING * duration:
+        rise, flat = duration - fall, 0.0
+    return Profile(initial, ((rise, cruise), (flat, cruise), (fall, final)))
 
 
 def _roots(a: float, b: float, c: float) -> list[float]:
@@ -298,7 +264,9 @@ def _roots(a: float, b: float, c: float) -> list[float]:
     if a == 0:
         return [-c / b] if b else []
     discriminant = b * b - 4 * a * c
-    if discriminant < -1e-12 * b * b:
+    if discriminant < -_ROUNDING * b * b:
         return []
-    q = -(b + math.copysign(math.sqrt(max(0.0, discriminant)), b)) / 2
-    return sorted({q / a, c / q} if q else {0.0})
+    if discriminant <= _DOUBLE * b * b:
+        return [-b / (2 * a)]
+    q = -(b + math.copysign(math.sqrt(discriminant), b)) / 2
+    return sorted({q / a, c / q})

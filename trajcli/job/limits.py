@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,24 +14,33 @@ from trajcli.kinematics.robot import QUANTITIES, Limits, Robot
 from trajcli.planners.bounds import LimitsSpec
 from trajcli.planners.planner import Event
 
+_ROUNDING = 1e-12  # relative: a limit that differs by less was meant to be the same, in another unit
+
+
+class Looser(NamedTuple):
+    """A bound that is looser than the one it replaces.
+
+    Attributes:
+        quantity: "position", "velocity", "acceleration" or "jerk".
+        joint: Index.
+        amounts: The bound "before" and "after", at the end that got looser.
+    """
+
+    quantity: str
+    joint: int
+    amounts: dict[str, Amount]
+
 
 def with_job_limits(robot: Robot, spec: LimitsSpec | None) -> tuple[Robot, list[Event]]:
-    """Return the robot with the job's limits in force, and an event for each that is looser than the robot's."""
+    """Return the robot with the job's limits in force, and an event for each looser than the robot's."""
     if spec is None:
         return robot, []
-    rows, events = {}, []
-    for order, name in enumerate(QUANTITIES):
-        before = robot.limits.of_order(order)
-        after = _replaced(before, spec, order)
-        for joint in _looser(before, after):
-            message = f"the job's {name} limit of {robot.joint_names[joint]} is looser than the robot's: {{after}} instead of {{before}}"
-            amounts = {
-                "after": _worst(after[joint], order, joint),
-                "before": _worst(before[joint], order, joint),
-            }
-            events.append(Event("looser_limit", message, amounts=amounts))
-        rows[name] = after * getattr(spec.scale, name, 1.0)
-    return dataclasses.replace(robot, limits=Limits(**rows)), events
+    events = []
+    for quantity, joint, amounts in looser_bounds(robot, spec):
+        whose = f"the job's {quantity} limit of {robot.joint_names[joint]}"
+        message = whose + " is looser than the robot's: {after} instead of {before}"
+        events.append(Event("looser_limit", message, amounts=amounts))
+    return _with_limits(robot, spec), events
 
 
 def with_move_limits(robot: Robot, spec: LimitsSpec | None, move: int) -> Robot:
@@ -40,40 +51,44 @@ def with_move_limits(robot: Robot, spec: LimitsSpec | None, move: int) -> Robot:
     """
     if spec is None:
         return robot
-    rows, problems = {}, []
-    for order, name in enumerate(QUANTITIES):
-        before = robot.limits.of_order(order)
-        after = _replaced(before, spec, order)
-        for joint in _looser(before, after):
-            message = f"a move can only tighten limits: the {name} limit of {robot.joint_names[joint]} is {{before}}, got {{after}}"
-            amounts = {
-                "after": _worst(after[joint], order, joint),
-                "before": _worst(before[joint], order, joint),
-            }
-            hint = "raise it under the job's `limits`"
-            problems.append(
-                Problem(message, hint, move=move, joint=robot.joint_names[joint], amounts=amounts)
-            )
-        rows[name] = after * getattr(spec.scale, name, 1.0)
+    problems = [looser_problem(robot, looser, move) for looser in looser_bounds(robot, spec)]
     if problems:
         raise InputError(*problems)
+    return _with_limits(robot, spec)
+
+
+def looser_bounds(robot: Robot, spec: LimitsSpec) -> Iterator[Looser]:
+    """Yield each bound that is looser than the robot's."""
+    for order, quantity in enumerate(QUANTITIES):
+        before = robot.limits.of_order(order)
+        after = _replaced(before, spec, order)
+        room = _ROUNDING * np.where(np.isfinite(before), np.abs(before), 0.0)
+        ends = (after[:, 0] < before[:, 0] - room[:, 0], after[:, 1] > before[:, 1] + room[:, 1])
+        for joint in np.flatnonzero(ends[0] | ends[1]).tolist():
+            end = 1 if ends[1][joint] else 0
+            said = {"before": float(before[joint, end]), "after": float(after[joint, end])}
+            yield Looser(quantity, joint, {key: Amount(v, order, joint) for key, v in said.items()})
+
+
+def looser_problem(robot: Robot, looser: Looser, move: int) -> Problem:
+    """Return what is wrong with a bound that a move loosens."""
+    quantity, joint, amounts = looser
+    name = robot.joint_names[joint]
+    message = f"a move can only tighten limits: the {quantity} limit of {name} is {{before}}, got {{after}}"
+    return Problem(message, "raise it under the job's `limits`", move=move, joint=name, amounts=amounts)
+
+
+def _with_limits(robot: Robot, spec: LimitsSpec) -> Robot:
+    rows = {
+        name: _replaced(robot.limits.of_order(order), spec, order) * getattr(spec.scale, name, 1.0)
+        for order, name in enumerate(QUANTITIES)
+    }
     return dataclasses.replace(robot, limits=Limits(**rows))
 
 
 def _replaced(bounds: Array, spec: LimitsSpec, order: int) -> Array:
-    given = spec.of_order(order)
     result = bounds.copy()
-    for joint, bound in enumerate(given or ()):
+    for joint, bound in enumerate(spec.of_order(order)):
         if bound is not None:
             result[joint] = bound
     return result
-
-
-def _looser(before: Array, after: Array) -> list[int]:
-    room = 1e-12 * np.where(np.isfinite(before), np.abs(before), 0.0)
-    outside = (after[:, 0] < before[:, 0] - room[:, 0]) | (after[:, 1] > before[:, 1] + room[:, 1])
-    return [int(joint) for joint in np.flatnonzero(outside)]
-
-
-def _worst(bound: Array, order: int, joint: int) -> Amount:
-    return Amount(float(np.abs(bound).max()), order, joint)

@@ -51,12 +51,11 @@ class _PureLoader(yaml.SafeLoader):
             super().scan_to_next_token()
 
     def scan_flow_scalar_non_spaces(self, double: bool, start_mark: Any) -> Any:  # noqa: ANN401
-        mark = self.get_mark()
         try:
             chunks = super().scan_flow_scalar_non_spaces(double, start_mark)
             "".join(chunks).encode()
         except (ValueError, OverflowError):  # beyond Unicode, or half of a surrogate pair
-            raise ScannerError("in a quoted scalar", start_mark, "unknown escape", mark) from None
+            raise ScannerError("in a quoted scalar", start_mark, "unknown escape", self.get_mark()) from None
         return chunks
 
 

@@ -1,4 +1,4 @@
-"""From pydantic's errors to problems that quote the file: line, column, what was expected, the nearest name."""
+"""From pydantic's errors to problems that quote the file: place, what was expected, the nearest name."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from trajcli.errors import Problem
@@ -16,13 +17,16 @@ from trajcli.planners.reading import Flaw, shown
 
 Path = tuple[str | int, ...]
 _KINDS = {
-    "dict_type": "a mapping",
-    "model_type": "a mapping",
-    "list_type": "a list",
+    "bool_parsing": "true or false",
     "bool_type": "true or false",
+    "dict_type": "a mapping",
+    "int_type": "a whole number",
+    "list_type": "a list",
+    "model_attributes_type": "a mapping",
+    "model_type": "a mapping",
+    "string_type": "a text",
+    "tuple_type": "a list",
 }
-_KINDS |= {"string_type": "a text", "model_attributes_type": "a mapping", "int_type": "a whole number"}
-_KINDS |= {"bool_parsing": "true or false"}
 
 
 def problems_of(
@@ -47,27 +51,35 @@ def problems_of(
 def _flaws(
     detail: ErrorDetails, model: type[BaseModel], document: Document, prefix: Path
 ) -> list[tuple[Path, str, str | None, bool]]:
-    kind, context = detail["type"], detail.get("ctx", {})
-    path, inside_name = _path_in_file(detail["loc"], document, prefix)
-    if inside_name:
-        return []  # the flaw is the named point's, and is reported where the point stands
+    """Return (path in the file, message, hint, whether the key itself is wrong) of each flaw of one error."""
+    kind, context, loc = detail["type"], detail.get("ctx", {}), detail["loc"]
+    path = _path_in_file(loc, document, prefix)
     if kind == "flaws":
         flaws: list[Flaw] = context["flaws"]
         return [((*path, *below), text, hint, False) for below, text, hint in flaws]
     if kind == "extra_forbidden":
-        names = _field_names(model, detail["loc"][:-1])
+        names = _field_names(model, loc[:-1])
         known = did_you_mean(str(path[-1]), names) or valid_names(names)
         return [(path, f"unknown key '{path[-1]}'", known, True)]
     if kind == "missing":
-        return [(path, f"`{detail['loc'][-1]}` is missing", None, False)]
-    at = (*path, "planner") if kind == "union_tag_invalid" else path
-    return [(at, *_text(kind, context, detail["input"]), False)]
+        field = _model_at(model, loc[:-1]).model_fields[str(loc[-1])]
+        return [(path, f"`{loc[-1]}` is missing", _described(field), False)]
+    if kind == "union_tag_invalid":
+        return [((*path, "planner"), *_unknown_planner(detail["input"]), False)]
+    message, hint = _text(kind, context, detail["input"])
+    if hint is None and kind in ("model_type", "model_attributes_type"):
+        hint = valid_names(_field_names(model, loc), "its keys")
+    return [(path, message, hint, False)]
+
+
+def _unknown_planner(move: object) -> tuple[str, str | None]:
+    tag = move.get("planner") if isinstance(move, Mapping) else move
+    if not isinstance(tag, str):
+        return f"expected a planner's name, got {shown(tag)}", valid_names(PLANNERS)
+    return f"unknown planner '{tag}'", did_you_mean(tag, PLANNERS) or valid_names(PLANNERS)
 
 
 def _text(kind: str, context: Mapping[str, Any], value: object) -> tuple[str, str | None]:
-    if kind == "union_tag_invalid":
-        tag = str(context["tag"])
-        return f"unknown planner '{tag}'", did_you_mean(tag, PLANNERS) or valid_names(PLANNERS)
     if kind == "union_tag_not_found":
         return "a move needs `planner`", valid_names(PLANNERS)
     if kind == "literal_error":
@@ -75,7 +87,7 @@ def _text(kind: str, context: Mapping[str, Any], value: object) -> tuple[str, st
         hint = did_you_mean(str(value), names)
         return f"expected {context['expected'].replace(chr(39), '')}, got {shown(value)}", hint
     if kind == "too_short":
-        return f"expected at least {context['min_length']}, got {context['actual_length']}", None
+        return f"the list is too short: expected at least {context['min_length']}", None
     if kind == "too_long":
         return f"expected at most {context['max_length']}, got {context['actual_length']}", None
     if kind == "string_too_short":
@@ -83,33 +95,40 @@ def _text(kind: str, context: Mapping[str, Any], value: object) -> tuple[str, st
     return f"expected {_KINDS.get(kind, 'another value')}, got {shown(value)}", None
 
 
-def _path_in_file(loc: Path, document: Document, prefix: Path) -> tuple[Path, bool]:
-    """Return the path of `loc` without the union tags, and whether it goes on below a point's name."""
+def _described(field: FieldInfo) -> str | None:
+    """Return what a field is for, as its annotation says."""
+    texts = (getattr(note, "description", None) for note in field.metadata)
+    text = field.description or next((text for text in texts if text), None)
+    return text and text[0].lower() + text[1:].rstrip(".")
+
+
+def _path_in_file(loc: Path, document: Document, prefix: Path) -> Path:
+    """Return the path of `loc` without the tags that pydantic puts in for the members of a union."""
     path = prefix
     for step in loc:
         node = document.node(path)
-        value = node.value if node is not None else None
-        if isinstance(value, dict):
-            is_tag = step in PLANNERS and "planner" in value and step not in value
-            if not is_tag:
-                path = (*path, step)
-        elif isinstance(value, list):
+        if node is None or not isinstance(node.value, dict | list):
+            break
+        is_tag = isinstance(node.value, dict) and step in PLANNERS and "planner" in node.value
+        if not is_tag or step in node.value:
             path = (*path, step)
-        elif isinstance(value, str):
-            return path, True
-    return path, False
+    return path
 
 
-def _field_names(model: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]:
+def _field_names(model: type[BaseModel], loc: Path) -> list[str]:
     """Return the keys that may stand at `loc`, read off the model."""
-    current: Any = model
+    return list(_model_at(model, loc).model_fields)
+
+
+def _model_at(model: type[BaseModel], loc: Path) -> type[BaseModel]:
+    """Return the model of the mapping at `loc`."""
+    current = model
     for step in loc:
         if isinstance(step, str) and step in PLANNERS:
             current = PLANNERS[step]
-        elif isinstance(step, str) and isinstance(current, type) and issubclass(current, BaseModel):
-            field = current.model_fields.get(step)
-            current = _model_in(field.annotation) if field is not None else current
-    return list(current.model_fields) if isinstance(current, type) and issubclass(current, BaseModel) else []
+        elif isinstance(step, str) and step in current.model_fields:
+            current = _model_in(current.model_fields[step].annotation) or current
+    return current
 
 
 def _model_in(annotation: Any) -> Any:  # noqa: ANN401

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
@@ -12,11 +13,10 @@ from trajcli.columns import Group
 from trajcli.kinematics.robot import Robot
 from trajcli.planners import Move
 from trajcli.planners.bounds import LimitsSpec
-from trajcli.planners.fields import Model, NamedTarget, Target
+from trajcli.planners.fields import Model, NamedTarget
 from trajcli.planners.planner import WhenOverLimit
 from trajcli.planners.reading import FieldType, FlawError, Number, ReadingContext, refuse, shown
 from trajcli.units import Quantity, Units
-
 
 ROBOT_DEFINITION = "a robot"
 """Stands in a schema for the definition of a robot, which is made from another model."""
@@ -59,18 +59,18 @@ class Output(Model):
     """Which rows and columns are written."""
 
     rate: Annotated[float, Number(Quantity("frequency"), "Rows per second, Hz.", above=0.0)] = 1000.0
-    times: Annotated[list[Seconds] | None, Field(description="Times of the rows instead of a rate, s.")] = (
-        None
-    )
+    times: Annotated[
+        tuple[Seconds, ...] | None, Field(min_length=1, description="Times of the rows instead of a rate, s.")
+    ] = None
     start_time: Annotated[float, Number(Quantity("time"), "Time of the first row, s.")] = 0.0
     align: Annotated[bool, Field(description="Stretch each move to a whole number of periods.")] = False
     columns: Annotated[
-        list[Group],
+        tuple[Group, ...],
         Field(
             min_length=1,
             description="Groups of columns, in this order: qd is the velocity, qdd the acceleration.",
         ),
-    ] = ["t", "q", "qd", "qdd"]
+    ] = ("t", "q", "qd", "qdd")
 
     @model_validator(mode="after")
     def _fits_together(self) -> Output:
@@ -78,32 +78,33 @@ class Output(Model):
             raise refuse([(("times",), "rate and times exclude each other", "leave one of them out")])
         if self.times is not None and self.align:
             raise refuse([(("align",), "align needs a rate, not times", "leave one of them out")])
-        if self.times is not None and (
-            not self.times or any(b <= a for a, b in zip(self.times, self.times[1:]))
-        ):  # noqa: B905, RUF007
-            raise refuse([(("times",), "times must strictly increase, and there must be one", None)])
-        if len(set(self.columns)) < len(self.columns):
-            raise refuse([(("columns",), "a group of columns stands twice", None)])
+        for index, (before, time) in enumerate(pairwise(self.times or ()), 1):
+            if time <= before:
+                text = f"times must increase, but {time:.12g} s comes after {before:.12g} s"
+                raise refuse([(("times", index), text, None)])
+        for index, group in enumerate(self.columns):
+            if group in self.columns[:index]:
+                raise refuse([(("columns", index), f"the columns '{group}' stand twice", "name them once")])
         return self
 
 
 class Job(Model):
     """One robot, named points, and the moves to plan."""
 
-    version: Annotated[Literal[1], Field(description="Version of the job language.")]
+    version: Annotated[Literal[1], Field(description="Version of the job language: 1.")]
     name: Annotated[str | None, Field(description="For reports; the file's stem when left out.")] = None
     units: UnitsSpec = UnitsSpec()
     robot: Annotated[Robot, RobotSource()]
     limits: Annotated[LimitsSpec | None, Field(description="Replaces the robot's limits, then scales.")] = (
         None
     )
-    points: Annotated[dict[str, Target], Field(description="Named states.")] = {}
+    points: dict[str, NamedTarget] = Field(default_factory=dict, description="Named states.")
     start: Annotated[NamedTarget, Field(description="Where the arm stands before the first move.")]
     moves: Annotated[list[Move], Field(min_length=1, description="What to do, in order.")]
     when_over_limit: Annotated[
         WhenOverLimit,
         Field(
-            description="error: exit 1; slow: the smallest stretch of the move that verifies, which is reported."
+            description="error: exit 1; slow: the smallest stretch of the move that verifies, and an event."
         ),
     ] = "error"
     output: Output = Output()

@@ -1,15 +1,43 @@
-"""`--set moves.0.duration=3`: values that replace what the file says, or add to it, and keep their own place."""
+"""`--set moves.0.duration=3`: values that replace what the file says, or add to it, with their own place."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from trajcli.errors import InputError, Place
 from trajcli.job.document import Document, Node
 from trajcli.job.load import parse_document
 
 _Steps = tuple[str | int, ...]
+
+
+class Setting(NamedTuple):
+    """What an option says about one value.
+
+    Attributes:
+        option: The option as the user wrote it, for messages.
+        path: Keys, and indices from 0.
+        value: YAML.
+    """
+
+    option: str
+    path: tuple[str | int, ...]
+    value: str
+
+
+def parse_setting(text: str) -> Setting:
+    """Return what `PATH=VALUE` says, such as "moves.0.duration=3".
+
+    Raises:
+        InputError: When it is not of that form.
+    """
+    name, equals, value = text.partition("=")
+    steps = tuple(int(step) if step.isdecimal() else step for step in name.strip().split("."))
+    if not equals or "" in steps:
+        raise InputError(f"--set {text}: expected PATH=VALUE", hint="such as --set moves.0.duration=3")
+    return Setting(f"--set {text}", steps, value or "null")
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,43 +60,41 @@ class PatchedDocument(Document):
         return super().place(path, key=key)
 
 
-def overridden(document: Document, overrides: Sequence[str]) -> Document:
-    """Return the document with `PATH=VALUE` put in, such as "moves.0.duration=3"; later ones win.
+def overridden(document: Document, settings: Sequence[Setting]) -> Document:
+    """Return the document with the settings put in; later ones win.
 
     Raises:
-        InputError: When one is not of that form, or its path leads through something that is no mapping or list.
+        InputError: When a path leads through something that is no mapping or list, or a value is no YAML.
     """
-    if not overrides:
+    if not settings:
         return document
-    root, patches = document.root, {}
-    for text in overrides:
-        name, equals, value = text.partition("=")
-        steps: _Steps = tuple(int(step) if step.isdigit() else step for step in name.strip().split("."))
-        if not equals or "" in steps:
-            raise InputError(f"--set {text}: expected PATH=VALUE", hint="such as --set moves.0.duration=3")
-        patch = parse_document(value or "null", f"--set {text}", any_root=True)
-        root = _with(root, steps, patch.root, text)
-        patches[steps] = patch
+    root = document.root
+    patches: dict[_Steps, Document] = {}
+    for setting in settings:
+        patch = parse_document(setting.value, setting.option, any_root=True)
+        root = _with(root, setting.path, patch.root, setting.option)
+        depth = len(setting.path)
+        patches = {path: p for path, p in patches.items() if path[:depth] != setting.path}
+        patches[setting.path] = patch
     return PatchedDocument(document.file, document.lines, root, patches)
 
 
-def _with(node: Node, steps: _Steps, new: Node, text: str) -> Node:
+def _with(node: Node, steps: _Steps, new: Node, option: str) -> Node:
     """Return the node with `new` at the path `steps` below it."""
     if not steps:
         return new
     step, value = steps[0], node.value
     if isinstance(value, list):
-        if not isinstance(step, int) or not 0 <= step < len(value):
+        if not isinstance(step, int) or step >= len(value):
+            entries = f"{len(value)} entr{'y' if len(value) == 1 else 'ies'}"
             raise InputError(
-                f"--set {text}: there is no '{step}' in a list of {len(value)} (they count from 0)"
+                f"{option}: there is no '{step}' in a list of {entries}", hint="they count from 0"
             )
-        return node._replace(
-            value=[_with(v, steps[1:], new, text) if i == step else v for i, v in enumerate(value)]
-        )
+        items = [_with(v, steps[1:], new, option) if i == step else v for i, v in enumerate(value)]
+        return node._replace(value=items)
     if not isinstance(value, dict):
-        raise InputError(
-            f"--set {text}: '{step}' would stand inside {node.text or 'a value'}, which holds no keys"
-        )
+        inside = node.text or "an empty value"
+        raise InputError(f"{option}: '{step}' would stand inside {inside}, which holds no keys")
     name = str(step)
     below = value.get(name, node._replace(value={}, keys={}))
-    return node._replace(value={**value, name: _with(below, steps[1:], new, text)})
+    return node._replace(value={**value, name: _with(below, steps[1:], new, option)})

@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import ValidationError
 
 from trajcli.errors import Amount, InputError, Place, Problem
-from trajcli.job.limits import with_job_limits
+from trajcli.job.limits import looser_bounds, looser_problem, with_job_limits
 from trajcli.job.load import Document, parse_document, read_document
 from trajcli.job.messages import problems_of
 from trajcli.job.model import Job, UnitsSpec
-from trajcli.job.override import overridden
+from trajcli.job.override import Setting, overridden, parse_setting
 from trajcli.job.robot_source import find_robot
-from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.robot import Robot, unlimited
 from trajcli.planners.planner import Event
 from trajcli.planners.reading import ReadingContext
 from trajcli.units import Quantity, Units, to_user, unit_name
+
+_UNREAD = Robot("unread", (), unlimited(0), None, np.eye(4), np.eye(4))
+"""Stands for a robot whose own flaws are known, while the rest of the job is read."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +52,8 @@ class LoadedJob:
 
     def say(self, amount: Amount) -> str:
         """Return a number of a message in the job's units."""
+        if math.isinf(amount.value):
+            return "unlimited"
         if amount.joint is None:
             return f"{amount.value:.9g} s"
         prismatic = self.robot.joint_types[amount.joint] == "prismatic"
@@ -58,18 +65,22 @@ class LoadedJob:
         return self.document.place(("moves", index))
 
 
-def read_job(path: str, overrides: Sequence[str] = ()) -> LoadedJob:
+def read_job(path: str | Path, overrides: Sequence[str] = (), *, rate: str | None = None) -> LoadedJob:
     """Return the job of a file; `-` is standard input.
 
     Args:
         path: The file.
         overrides: Such as "moves.0.duration=3"; they replace what the file says, or add to it.
+        rate: Replaces `output.rate`.
 
     Raises:
         InputError: With every flaw of the file at once.
         FileError: When it cannot be read.
     """
-    return _load(overridden(read_document(path), overrides))
+    settings = [parse_setting(text) for text in overrides]
+    if rate is not None:
+        settings.append(Setting(f"--rate {rate}", ("output", "rate"), rate))
+    return _load(overridden(read_document(str(path)), settings))
 
 
 def job_from_text(text: str, file: str = "<text>") -> LoadedJob:
@@ -91,22 +102,39 @@ def _load(document: Document) -> LoadedJob:
             robot = find_robot(plain["robot"], document, units)
         except InputError as error:
             problems += error.problems
+    given = {"robot": robot or _UNREAD} if "robot" in plain else {}
     context = ReadingContext(units, points=_points(plain.get("points")))
     if robot is not None:
         context.joint_names, context.joint_types = robot.joint_names, robot.joint_types
     try:
-        job = Job.model_validate({**plain, **({"robot": robot} if robot else {})}, context=context)
+        job = Job.model_validate({**plain, **given}, context=context)
     except ValidationError as error:
         problems += problems_of(error, Job, document)
-    if robot is None and problems:
-        problems = [
-            problem for problem in problems if not problem.message.startswith("expected a robot, got")
-        ]
     if problems or robot is None:
         raise InputError(*sorted(problems, key=_position))
     effective, events = with_job_limits(robot, job.limits)
     name = job.name or ("stdin" if document.file in ("-", "<stdin>") else Path(document.file).stem)
-    return LoadedJob(job, name, effective, document, tuple(events))
+    loaded = LoadedJob(job, name, effective, document, tuple(events))
+    looser = list(_loosened_by_moves(loaded))
+    if looser:
+        raise InputError(*looser)
+    return loaded
+
+
+def _loosened_by_moves(loaded: LoadedJob) -> Iterator[Problem]:
+    robot = loaded.robot
+    for index, move in enumerate(loaded.job.moves):
+        for looser in looser_bounds(robot, move.limits) if move.limits is not None else ():
+            problem = looser_problem(robot, looser, index)
+            path = ("moves", index, "limits", looser.quantity)
+            one = next((p for p in _of_joint(path, looser.joint, robot) if loaded.document.node(p)), path)
+            place = loaded.document.place(one)
+            yield replace(problem, message=problem.text(loaded.say), amounts={}, place=place)
+
+
+def _of_joint(path: tuple[str | int, ...], joint: int, robot: Robot) -> list[tuple[str | int, ...]]:
+    """Return where the value of one joint may stand below `path`."""
+    return [(*path, robot.joint_names[joint]), (*path, joint)]
 
 
 def _position(problem: Problem) -> tuple[str, int, int]:
@@ -116,7 +144,7 @@ def _position(problem: Problem) -> tuple[str, int, int]:
 def _units(value: Any) -> Units:  # noqa: ANN401
     """Return the file's units as far as they are right; what is wrong is reported with the rest."""
     given = value if isinstance(value, Mapping) else {}
-    right = {}
+    right: dict[str, Any] = {}
     for key in ("angle", "length"):
         try:
             right |= {key: getattr(UnitsSpec.model_validate({key: given[key]}), key)} if key in given else {}

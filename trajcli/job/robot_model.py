@@ -10,15 +10,15 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
 from trajcli.job.model import UnitsSpec
-from trajcli.kinematics.robot import Joint, Limits, Robot
-from trajcli.planners.bounds import UNLIMITED, Bound, JointBound
+from trajcli.kinematics.robot import QUANTITIES, Joint, Limits, Robot
+from trajcli.planners.bounds import UNLIMITED, Bound, JointBound, written_bound
 from trajcli.planners.fields import Model
 from trajcli.planners.poses import Pose
-from trajcli.planners.reading import MAX_JOINTS, Number, ReadingContext, refuse, shown
-from trajcli.units import Quantity
+from trajcli.planners.reading import MAX_JOINTS, Number, ReadingContext, refuse, shown, written_number
+from trajcli.units import Dimension, Quantity
 
-_DH = ("theta", "d", "a", "alpha")
 _ANGLE, _LENGTH = Quantity("angle"), Quantity("length")
+_DH = {"theta": _ANGLE, "d": _LENGTH, "a": _LENGTH, "alpha": _ANGLE}
 
 
 class JointModel(Model):
@@ -100,29 +100,52 @@ class RobotModel(Model):
     @model_validator(mode="after")
     def _is_consistent(self) -> RobotModel:
         joints = self.joints
-        names = [joint.name for joint in joints if joint.name is not None]
-        twice = sorted({name for name in names if names.count(name) > 1})
-        if twice:
-            raise refuse([(("joints",), f"joint names must be unique, '{twice[0]}' stands twice", None)])
+        names: list[str] = []
+        for index, name in enumerate(self.joint_names()):
+            if name in names:
+                where = (
+                    ("joints", index, "name") if joints[index].name else ("joints", names.index(name), "name")
+                )
+                raise refuse([(where, f"joint names must be unique, '{name}' stands twice", None)])
+            names.append(name)
         described = [joint for joint in joints if any(key in joint.model_fields_set for key in _DH)]
         if described and self.convention is None:
             text = "joints with theta, d, a or alpha need a `convention`"
             raise refuse([((), text, "say `convention: standard` or `convention: modified`")])
         return self
 
+    def joint_names(self) -> list[str]:
+        """Return the names of the joints: j1, j2, ... where none is given."""
+        return [joint.name or f"j{number}" for number, joint in enumerate(self.joints, 1)]
+
     def as_robot(self) -> Robot:
         """Return the robot that this describes."""
-        models = self.joints
-        joints = tuple(_joint(index, model) for index, model in enumerate(models, 1))
-        rows = {
-            k: np.array([getattr(m, k) for m in models])
-            for k in ("position", "velocity", "acceleration", "jerk")
-        }
+        joints = tuple(
+            Joint(name, m.type, m.theta, m.d, m.a, m.alpha, m.sign)
+            for name, m in zip(self.joint_names(), self.joints, strict=True)
+        )
+        rows = {quantity: np.array([getattr(m, quantity) for m in self.joints]) for quantity in QUANTITIES}
         base, tool = (np.eye(4) if pose is None else pose for pose in (self.base, self.tool))
-        described = any(key in model.model_fields_set for model in models for key in _DH)
-        return Robot(self.name, joints, Limits(**rows), self.convention if described else None, base, tool)
+        return Robot(self.name, joints, Limits(**rows), self.convention, base, tool)
 
 
-def _joint(index: int, model: JointModel) -> Joint:
-    name = model.name or f"j{index}"
-    return Joint(name, model.type, model.theta, model.d, model.a, model.alpha, model.sign)
+def robot_as_mapping(robot: Robot) -> dict[str, Any]:
+    """Return a robot as it may stand under `robot` in a job of any units, to be read bit by bit."""
+    described = robot.convention is not None
+    keys = {"convention": robot.convention} if described else {}
+    joints = [_joint_as_mapping(robot, index, described=described) for index in range(len(robot.joints))]
+    context = ReadingContext()
+    poses = {key: Pose("").write(getattr(robot, key), context) for key in ("base", "tool")}
+    return {"name": robot.name, **keys, "joints": joints, **poses}
+
+
+def _joint_as_mapping(robot: Robot, index: int, *, described: bool) -> dict[str, Any]:
+    joint = robot.joints[index]
+    row = {key: written_number(getattr(joint, key), _DH[key]) for key in _DH} if described else {}
+    dimension: Dimension = "length" if joint.type == "prismatic" else "angle"
+    bounds = [robot.limits.of_order(order)[index].tolist() for order in range(len(QUANTITIES))]
+    limits = {
+        quantity: written_bound((low, high), Quantity(dimension, order))
+        for order, (quantity, (low, high)) in enumerate(zip(QUANTITIES, bounds, strict=True))
+    }
+    return {"name": joint.name, "type": joint.type, **row, "sign": joint.sign, **limits}

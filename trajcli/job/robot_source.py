@@ -12,7 +12,7 @@ from trajcli.errors import FileError, InputError, Problem
 from trajcli.job.load import Document, read_document
 from trajcli.job.messages import problems_of
 from trajcli.job.robot_model import RobotModel
-from trajcli.job.suggest import did_you_mean, valid_names
+from trajcli.job.suggest import did_you_mean, nearest, valid_names
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.reading import ReadingContext, shown
 from trajcli.units import Units
@@ -42,13 +42,15 @@ def find_robot(value: Any, document: Document, units: Units) -> Robot:  # noqa: 
     if isinstance(value, Mapping) and "file" in value:
         return _from_file_entry(value, document)
     if not isinstance(value, Mapping):
-        message = f"expected a robot's name, {{file: PATH}} or a robot, got {shown(value)}"
-        raise InputError(Problem(message, valid_names(catalogue_names()), document.place(("robot",))))
-    if "units" in value:
-        place = document.place(("robot", "units"), key=True)
-        raise InputError(
-            Problem("a robot inside a job uses the job's units", "leave `units` out here", place)
-        )
+        raise InputError(_no_robot(value, document))
+    for key in value:
+        place = document.place(("robot", key), key=True)
+        if key == "units":
+            raise InputError(
+                Problem("a robot inside a job uses the job's units", "leave `units` out here", place)
+            )
+        if "joints" not in value and nearest(key, ["file", *RobotModel.model_fields]) == "file":
+            raise InputError(Problem(f"unknown key '{key}'", "did you mean 'file'?", place))
     return _validated(value, document, ("robot",), units)
 
 
@@ -67,6 +69,14 @@ def read_robot_file(path: str) -> Robot:
         "mm" if spec.get("length") == "mm" else "m",
     )
     return _validated({"name": Path(path).stem, **plain}, document, (), units)
+
+
+def _no_robot(value: object, document: Document) -> Problem:
+    hint = f"the catalogue has {', '.join(catalogue_names())}"
+    if isinstance(value, int) and not isinstance(value, bool):
+        hint = f"for {value} bare joints write {{joints: {value}}}"
+    message = f"expected a robot's name, {{file: PATH}} or a robot, got {shown(value)}"
+    return Problem(message, hint, document.place(("robot",)))
 
 
 def _from_catalogue(name: str, document: Document) -> Robot:

@@ -25,9 +25,9 @@ def schema_of(kind: SchemaKind) -> dict[str, Any]:
 def _job() -> dict[str, Any]:
     from trajcli.job.model import ROBOT_DEFINITION, Job
 
-    schema = _replaced(
-        Job.model_json_schema(), {"$comment": ROBOT_DEFINITION}, {"$ref": "#/$defs/RobotModel"}
-    )
+    reference = {"$ref": "#/$defs/RobotModel"}
+    own = _without_nulls(Job.model_json_schema())
+    schema: dict[str, Any] = _replaced(own, {"$comment": ROBOT_DEFINITION}, reference)
     robot = _robot()
     definitions = robot.pop("$defs", {})
     schema["$defs"] = dict(sorted({**schema["$defs"], **definitions, "RobotModel": robot}.items()))
@@ -37,7 +37,8 @@ def _job() -> dict[str, Any]:
 def _robot() -> dict[str, Any]:
     from trajcli.job.robot_model import RobotModel
 
-    return RobotModel.model_json_schema()
+    schema: dict[str, Any] = _without_nulls(RobotModel.model_json_schema())
+    return schema
 
 
 def _report() -> dict[str, Any]:
@@ -60,3 +61,19 @@ def _without_titles(node: Any) -> Any:  # noqa: ANN401
         kept = {key: value for key, value in node.items() if not (key == "title" and isinstance(value, str))}
         return {key: _without_titles(value) for key, value in kept.items()}
     return [_without_titles(item) for item in node] if isinstance(node, list) else node
+
+
+def _without_nulls(node: Any) -> Any:  # noqa: ANN401
+    """Return the schema of a file: what it may leave out is not written as null."""
+    if isinstance(node, list):
+        return [_without_nulls(item) for item in node]
+    if not isinstance(node, dict):
+        return node
+    schema = {key: _without_nulls(value) for key, value in node.items()}
+    if schema.get("default", ...) in ([], [None, None]):
+        del schema["default"]
+    if schema.get("default", ...) is not None:
+        return schema
+    del schema["default"]
+    forms = [form for form in schema.pop("anyOf", []) if form != {"type": "null"}]
+    return {**forms[0], **schema} if len(forms) == 1 else {**schema, "anyOf": forms}

@@ -205,6 +205,14 @@ def _no_value(complaint: _Complaint) -> _Verdict:
     return _Verdict(message, None, complaint.problem)
 
 
+def _glued_in_brackets(complaint: _Complaint) -> _Verdict:
+    return _Verdict("no space after the colon", "write `key: value`", complaint.problem)
+
+
+def _bad_question(complaint: _Complaint) -> _Verdict:
+    return _Verdict("a value cannot begin with ?", "put the text in quotes", complaint.problem)
+
+
 def _bad_item(complaint: _Complaint) -> _Verdict:
     hint = "begin the list in the next line, or write [a, b]"
     return _Verdict("a list item cannot begin here", hint, complaint.problem)
@@ -251,6 +259,8 @@ _RULES: tuple[tuple[re.Pattern[str], Callable[[_Complaint], _Verdict]], ...] = t
     (re.compile(pattern), judge)
     for pattern, judge in (
         (r"mapping values are not allowed", _stray_colon),
+        (r"unexpected ':'", _glued_in_brackets),
+        (r"mapping keys are not allowed", _bad_question),
         (r"could not find expected ':'", _no_colon),
         (r"flow (sequence|mapping).*expected ',' or", _open_bracket),
         (r"quoted scalar.*(end of stream|document (separator|indicator))", _open_quote),

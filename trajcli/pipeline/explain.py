@@ -13,7 +13,7 @@ from trajcli.job.report import PeakReport
 from trajcli.pipeline.plan import Plan
 from trajcli.pipeline.report import report_of
 from trajcli.pipeline.stretch import PlannedMove
-from trajcli.units import Quantity, Units, to_user, unit_name
+from trajcli.units import Dimension, Quantity, Units, to_user, unit_name
 
 _NOTHING = 1e-12  # of the largest term over the move: what is smaller came from rounding
 _SAME = 1e-9  # of the largest term: neighbouring pieces this close are one polynomial
@@ -148,7 +148,7 @@ def closed_form(move: PlannedMove, units: Units) -> dict[str, str] | None:
 def peak_in_units(peak: PeakReport, plan: Plan) -> dict[str, Any]:
     """Return the extremes of one quantity with its unit, in the job's units."""
     joint = plan.trajectory.joint_names.index(peak.joint)
-    dimension = "length" if plan.trajectory.joint_types[joint] == "prismatic" else "angle"
+    dimension: Dimension = "length" if plan.trajectory.joint_types[joint] == "prismatic" else "angle"
     order = ("position", "velocity", "acceleration", "jerk").index(peak.quantity)
     quantity, units = Quantity(dimension, order), plan.loaded.units
     said = {key: to_user(getattr(peak, key), quantity, units) for key in ("low", "high")}

@@ -8,7 +8,8 @@ import numpy as np
 
 from trajcli.errors import PlanningError
 from trajcli.kinematics.robot import QUANTITIES, Limits
-from trajcli.planners.ruckig_solve import Task, fastest
+from trajcli.planners.profile import Task
+from trajcli.planners.ruckig_solve import fastest
 from trajcli.trajectory import State
 
 _ROUNDING = 1e-12

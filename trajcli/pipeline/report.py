@@ -8,7 +8,7 @@ from dataclasses import asdict
 from trajcli import __version__
 from trajcli.checks.finding import Finding
 from trajcli.curves.extrema import Peaks
-from trajcli.errors import Amount, Problem, VerificationError
+from trajcli.errors import Amount, Problem, VerificationError, said
 from trajcli.job.report import (
     BindingReport,
     EventReport,
@@ -46,7 +46,7 @@ def report_of(plan: Plan, *, reference: bool = False) -> Report:
         findings=[FindingReport(**asdict(finding)) for finding in verdict.findings],
         events=[EventReport(kind=e.kind, message=e.message, move=e.move) for e in plan.events],
         steps=[StepReport(**asdict(step)) for step in verdict.steps],
-        unchecked=[UncheckedReport(joint=joint, quantity=quantity) for joint, quantity in verdict.unchecked],  # type: ignore[arg-type]
+        unchecked=[UncheckedReport(joint=joint, quantity=quantity) for joint, quantity in verdict.unchecked],
     )
 
 
@@ -82,7 +82,7 @@ def _peak(move: PlannedMove, joint: int, order: int, peaks: Peaks) -> PeakReport
     ]
     return PeakReport(
         joint=move.robot.joint_names[joint],
-        quantity=QUANTITIES[order],  # type: ignore[arg-type]
+        quantity=QUANTITIES[order],
         low=low,
         low_time=float(peaks.low_time[joint]),
         high=high,
@@ -115,21 +115,20 @@ def _problem(plan: Plan, finding: Finding) -> Problem:
     quantity = QUANTITIES[order]
     where = f"move {index} ({plan.moves[index].planner.tag}): "
     if finding.kind in _JUMPS:
-        text = f"{where}the {quantity} of {finding.joint} jumps by {{value}} at t = {finding.time:.9g} s"
-        hint = finding.hint
+        what, bound, hint = "jumps by", "", finding.hint
     else:
-        text = f"{where}the {quantity} of {finding.joint} reaches {{value}} at t = {finding.time:.9g} s, its limit is {{limit}}"
+        what, bound = "reaches", ", its limit is {limit}"
         hint = _remedy(plan.moves[index], finding)
-    problem = Problem(text, amounts=amounts)
+    text = f"{where}the {quantity} of {finding.joint} {what} {{value}} at t = {finding.time:.9g} s{bound}"
     return Problem(
-        problem.text(loaded.say),
+        said(text, amounts, loaded.say),
         hint,
-        loaded.place_of_move(index),
-        index,
-        finding.joint,
-        finding.time,
-        finding.value,
-        finding.limit,
+        place=loaded.place_of_move(index),
+        move=index,
+        joint=finding.joint,
+        time=finding.time - plan.trajectory.spans[index].start,
+        value=finding.value,
+        limit=finding.limit,
     )
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from trajcli.columns import column_names
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
-from trajcli.job.report import Report
 from trajcli.pipeline.plan import Plan
 from trajcli.samples import Grid, ListedGrid, UniformGrid, sample
 from trajcli.streams.csv import Digits, write_csv, write_verified
@@ -23,9 +24,13 @@ def grid_of(plan: Plan) -> Grid:
         InputError: When a listed time lies outside the trajectory, or the rate is too high for its times.
     """
     output, duration = plan.loaded.job.output, plan.trajectory.duration
-    if output.times is not None:
-        return ListedGrid(duration, output.times, output.start_time)
-    return UniformGrid(duration, output.rate, output.start_time)
+    try:
+        if output.times is not None:
+            return ListedGrid(duration, np.array(output.times), output.start_time)
+        return UniformGrid(duration, output.rate, output.start_time)
+    except InputError as error:
+        key = "rate" if output.times is None else "times"
+        raise error.located(place=plan.loaded.document.place(("output", key))) from None
 
 
 def check_output_name(path: str) -> None:
@@ -66,12 +71,12 @@ def write_rows(plan: Plan, grid: Grid, path: str | None, digits: Digits) -> None
         write_csv(rows(), names, out, digits)
 
 
-def write_report(report: Report, path: str) -> None:
-    """Write the report as JSON; `-` is standard output.
+def write_text(text: str, path: str) -> None:
+    """Write a text to a file, which appears whole or not at all; `-` is standard output.
 
     Raises:
         FileError: When it cannot be written.
+        BrokenPipeError: When the reader has closed the pipe.
     """
-    text = report.model_dump_json(indent=2) + "\n"
     with standard_output() if path == "-" else whole_file(path) as out:
         out.write(text.encode())

@@ -10,15 +10,15 @@ from pydantic.json_schema import JsonSchemaValue
 
 from trajcli.kinematics.robot import QUANTITIES
 from trajcli.planners.fields import Model
+from trajcli.planners.per_joint import per_joint_schema, read_per_joint
 from trajcli.planners.reading import (
     FieldType,
     FlawError,
     Number,
     ReadingContext,
-    per_joint_schema,
     read_number,
-    read_per_joint,
     shown,
+    written_number,
 )
 from trajcli.units import Quantity
 
@@ -38,7 +38,7 @@ def read_bound(value: Any, quantity: Quantity, context: ReadingContext) -> Bound
     if isinstance(value, list | tuple):
         if len(value) != 2:
             raise FlawError(f"expected a pair [lower, upper], got {len(value)} values")
-        low, high = (read_number(item, quantity, context.units) for item in value)
+        low, high = (_read_end(item, index, quantity, context) for index, item in enumerate(value))
         if (rate and not low < 0 < high) or low >= high:
             wanted = "a negative and a positive number" if rate else "the lower number first"
             raise FlawError(
@@ -51,6 +51,18 @@ def read_bound(value: Any, quantity: Quantity, context: ReadingContext) -> Bound
             f"expected a number above 0, a pair [lower, upper] or null (unlimited), got {shown(value)}"
         )
     return -size, size
+
+
+def _read_end(value: Any, index: int, quantity: Quantity, context: ReadingContext) -> float:  # noqa: ANN401
+    try:
+        return read_number(value, quantity, context.units)
+    except FlawError as error:
+        raise FlawError(str(error), index) from None
+
+
+def written_bound(bound: Bound, quantity: Quantity) -> list[float | str] | None:
+    """Return (lower, upper) in SI as it may stand in a file of any units, to be read bit by bit."""
+    return None if bound == UNLIMITED else [written_number(end, quantity) for end in bound]
 
 
 def _bound_schema(order: int) -> JsonSchemaValue:
@@ -78,7 +90,7 @@ class JointBound(FieldType):
 
 @dataclass(frozen=True)
 class Bounds(FieldType):
-    """One bound for all joints, a list with one entry each, or by joint name; None where a joint is left out."""
+    """One bound for all joints, a list, or a mapping by joint name; None where a joint is left out."""
 
     order: int
     description: str
@@ -90,16 +102,26 @@ class Bounds(FieldType):
             return read_bound(item, context.joint_quantity(joint, self.order), context)
 
         try:
-            return read_per_joint(value, context, read_one, None)
+            bounds = read_per_joint(value, context, read_one, None)
         except FlawError as error:
             if (
                 isinstance(value, list | tuple)
                 and len(value) == 2
                 and all(isinstance(v, int | float) for v in value)
             ):
-                named = f"under `limits` a list has one entry for each joint: for a pair write {{NAME: {list(value)}}}"
+                named = f"a list has one entry for each joint: for a pair write {{NAME: {list(value)}}}"
                 error.flaws = [(path, text, named) for path, text, _ in error.flaws]
             raise
+        return bounds if any(bound is not None for bound in bounds) else ()
+
+    def write(self, value: tuple[Bound | None, ...], context: ReadingContext) -> dict[str, Any]:
+        """Return the bounds by joint name; without names, nothing can be written."""
+        names = context.joint_names or ()
+        return {
+            name: written_bound(bound, context.joint_quantity(joint, self.order))
+            for joint, (name, bound) in enumerate(zip(names, value, strict=False))
+            if bound is not None
+        }
 
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of a bound for all joints, a list of bounds, or a mapping."""
@@ -123,18 +145,16 @@ class Scale(Model):
 class LimitsSpec(Model):
     """Limits that replace or tighten others; what is left out stays as it is, null is unlimited."""
 
-    position: (
-        Annotated[tuple[Bound | None, ...], Bounds(0, "Range of each joint (angle or length unit).")] | None
-    ) = None
-    velocity: (
-        Annotated[tuple[Bound | None, ...], Bounds(1, "Velocity limit of each joint, per s.")] | None
-    ) = None
-    acceleration: (
-        Annotated[tuple[Bound | None, ...], Bounds(2, "Acceleration limit of each joint, per s^2.")] | None
-    ) = None
-    jerk: Annotated[tuple[Bound | None, ...], Bounds(3, "Jerk limit of each joint, per s^3.")] | None = None
+    position: Annotated[
+        tuple[Bound | None, ...], Bounds(0, "Range of each joint (angle or length unit).")
+    ] = ()
+    velocity: Annotated[tuple[Bound | None, ...], Bounds(1, "Velocity limit of each joint, per s.")] = ()
+    acceleration: Annotated[
+        tuple[Bound | None, ...], Bounds(2, "Acceleration limit of each joint, per s^2.")
+    ] = ()
+    jerk: Annotated[tuple[Bound | None, ...], Bounds(3, "Jerk limit of each joint, per s^3.")] = ()
     scale: Scale = Scale()
 
-    def of_order(self, order: int) -> tuple[Bound | None, ...] | None:
-        """Return the bounds of the derivative of the given order, 0 (position) to 3 (jerk)."""
+    def of_order(self, order: int) -> tuple[Bound | None, ...]:
+        """Return the bounds of a derivative, of order 0 (position) to 3 (jerk); empty where none is given."""
         return getattr(self, QUANTITIES[order])  # type: ignore[no-any-return]

@@ -6,11 +6,20 @@ from collections.abc import Mapping
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    ValidationError,
+    ValidationInfo,
+    model_validator,
+)
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
-from trajcli.planners.reading import Number, PerJoint, ReadingContext, refuse
+from trajcli.planners.per_joint import PerJoint
+from trajcli.planners.reading import NULL, SI, Number, refuse, shown
 from trajcli.trajectory import State
 from trajcli.units import Quantity
 
@@ -19,6 +28,15 @@ class Model(BaseModel):
     """Base of everything that a job file may hold: frozen, and strict about unknown keys."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _nothing_left_empty(cls, data: Any, info: ValidationInfo) -> Any:  # noqa: ANN401
+        # `duration:` with nothing behind it is a slip of the pen: only what a file leaves out is left out
+        if info.context is None or not isinstance(data, dict) or None not in data.values():
+            return data
+        optional = {name for name, field in cls.model_fields.items() if field.default is None}
+        return {key: NULL if value is None and key in optional else value for key, value in data.items()}
 
 
 Duration = Annotated[float, Number(Quantity("time"), "Duration of the move, s.", above=0.0)]
@@ -77,22 +95,47 @@ class _Named:
     """Lets the name of a point stand for the point."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
-        return core_schema.with_info_before_validator_function(self._look_up, handler(source))
+        return core_schema.with_info_wrap_validator_function(self._read, handler(source))
 
     @staticmethod
-    def _look_up(value: Any, info: core_schema.ValidationInfo) -> Any:  # noqa: ANN401
-        context = info.context or ReadingContext()
+    def _read(
+        value: Any,  # noqa: ANN401
+        validate: core_schema.ValidatorFunctionWrapHandler,
+        info: core_schema.ValidationInfo,
+    ) -> Any:  # noqa: ANN401
         if not isinstance(value, str):
-            return value
-        if value not in context.points:
-            raise refuse([((), f"there is no point '{value}'", _known(value, context.points))])
-        return context.points[value]
+            if not isinstance(value, Mapping | Target):
+                hint = "write {joints: ...}, or the name of a point"
+                raise refuse([((), f"expected a state, got {shown(value)}", hint)])
+            return validate(value)
+        state = _look_up(value, (info.context or SI).points)
+        try:
+            return validate(state)
+        except ValidationError:
+            raise refuse([]) from None  # the flaw is the point's, and is reported where the point stands
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
         name = {"type": "string", "description": "Name of a point under `points`."}
         return {"anyOf": [name, handler(schema)]}
+
+
+def _look_up(name: str, points: Mapping[str, Any]) -> Any:  # noqa: ANN401
+    """Return the state that a point's name stands for; the point may itself be the name of another."""
+    state, seen = name, [name]
+    while state in points:
+        state = points[state]
+        if not isinstance(state, str):
+            return state
+        if state in seen:
+            raise refuse(
+                [((), f"the point '{state}' is named by itself ({' -> '.join([*seen, state])})", None)]
+            )
+        seen.append(state)
+    if len(seen) > 1:
+        raise refuse([])  # reported where the point that names it stands
+    raise refuse([((), f"there is no point '{name}'", _known(name, points))])
 
 
 def _known(name: str, points: Mapping[str, Any]) -> str:

@@ -21,7 +21,8 @@ from trajcli.planners.jerk_limited_errors import (
 )
 from trajcli.planners.planner import Event, Phase, Planned
 from trajcli.planners.point_to_point import PointToPoint
-from trajcli.planners.ruckig_solve import Control, Profile, Task, fastest, fastest_of, together
+from trajcli.planners.profile import Control, Profile, Task
+from trajcli.planners.ruckig_solve import fastest, fastest_of, together
 from trajcli.trajectory import State
 
 _PARALLEL = 1e-12  # relative; what leaves the line by more is no rounding error
@@ -157,7 +158,8 @@ def _bounds_along(direction: Array, limits: Limits) -> Array:
     moving = direction != 0
     bounds = []
     for order in (1, 2, 3):
-        scaled = limits.of_order(order)[moving] / direction[moving, None]
+        with np.errstate(over="ignore"):
+            scaled = limits.of_order(order)[moving] / direction[moving, None]
         scaled.sort(axis=1)
         bounds.append([scaled[:, 0].max(), scaled[:, 1].min()])
     return np.array(bounds)

@@ -13,7 +13,7 @@ from trajcli.planners.point_to_point import missing_limit
 
 if TYPE_CHECKING:
     from trajcli.kinematics.robot import Robot
-    from trajcli.planners.ruckig_solve import Task
+    from trajcli.planners.profile import Task
 
 _ROUNDING = 1e-12
 

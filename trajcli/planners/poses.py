@@ -11,11 +11,12 @@ from pydantic.json_schema import JsonSchemaValue
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
-from trajcli.planners.reading import FieldType, FlawError, ReadingContext, read_number, shown
+from trajcli.planners.reading import FieldType, FlawError, ReadingContext, read_number, shown, written_number
 from trajcli.units import Quantity
 
 SEQUENCES = ("XYX", "XYZ", "XZX", "XZY", "YXY", "YXZ", "YZX", "YZY", "ZXY", "ZXZ", "ZYX", "ZYZ")
 _ROTATIONS = ("rpy", "quat_wxyz", "matrix", "axis_angle", "euler")
+_ROUNDING = 1e-14  # a rotation written with all its digits stays as it stands, bit by bit
 _ANGLE, _LENGTH, _RATIO = Quantity("angle"), Quantity("length"), Quantity("ratio")
 
 
@@ -42,6 +43,11 @@ class Pose(FieldType):
                 f"{given[0]} and {given[1]} exclude each other", given[1], hint="leave one of them out"
             )
         return _pose(value, given[0] if given else None, context)
+
+    def write(self, value: Array, context: ReadingContext) -> dict[str, Any]:
+        """Return the pose as a rotation matrix and a position in metres."""
+        xyz = [written_number(length, _LENGTH) for length in value[:3, 3].tolist()]
+        return {"xyz": xyz, "matrix": value[:3, :3].tolist()}
 
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of a pose."""
@@ -104,8 +110,8 @@ def _pose(value: Mapping[str, Any], form: str | None, context: ReadingContext) -
 
 
 def read_numbers(
-    value: Any, count: int, quantity: Quantity, context: ReadingContext, *path: str | int
-) -> Array:  # noqa: ANN401
+    value: object, count: int, quantity: Quantity, context: ReadingContext, *path: str | int
+) -> Array:
     """Return `count` numbers of one quantity in SI, shape (count,).
 
     Raises:
@@ -149,7 +155,8 @@ def _projected(matrix: Array) -> Array:
         check_rotation(matrix)
     except InputError as error:
         raise FlawError(str(error), hint=error.problems[0].hint) from None
-    return nearest_rotation(matrix)
+    off = np.abs(matrix @ matrix.T - np.eye(3)).max()
+    return matrix if off <= _ROUNDING else nearest_rotation(matrix)
 
 
 def _rpy(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401
@@ -181,7 +188,8 @@ def read_axis(value: Any, context: ReadingContext, *path: str) -> Array:  # noqa
         FlawError: When it is neither, or has no direction.
     """
     if isinstance(value, str) and value in ("x", "y", "z"):
-        return np.eye(3)["xyz".index(value)]
+        unit: Array = np.eye(3)["xyz".index(value)]
+        return unit
     numbers = read_numbers(value, 3, _RATIO, context, *path)
     length = float(np.linalg.norm(numbers))
     if length == 0:

@@ -8,7 +8,7 @@ without one (a planner built in Python) values are SI.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -64,23 +64,26 @@ def refuse(flaws: Sequence[Flaw]) -> PydanticCustomError:
     )
 
 
+class _Null:
+    """Stands for a null where a file may leave a value out, but not empty."""
+
+
+NULL = _Null()
+
+
 def shown(value: object) -> str:
     """Return a value of a file as it is quoted in messages."""
     if isinstance(value, str):
         return f'"{value}"'
-    if value is None:
+    if value is None or value is NULL:
         return "null"
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, Mapping):
         return "a mapping"
-    return (
-        "a list"
-        if isinstance(value, list | tuple)
-        else f"{value:g}"
-        if isinstance(value, float)
-        else str(value)
-    )
+    if isinstance(value, list | tuple):
+        return "a list"
+    return f"{value:.15g}" if isinstance(value, float) else str(value)
 
 
 def read_number(value: object, quantity: Quantity, units: Units) -> float:
@@ -102,6 +105,13 @@ def read_number(value: object, quantity: Quantity, units: Units) -> float:
     return float(value) * factor(quantity, units)
 
 
+def written_number(value: float, quantity: Quantity) -> float | str:
+    """Return an SI number as it may stand in a file of any units, to be read bit by bit."""
+    if quantity.dimension in ("ratio", "time", "frequency"):
+        return value
+    return f"{value!r} {unit_name(quantity, Units())}"
+
+
 class FieldType:
     """Base of the annotations: pydantic calls `read`, the JSON schema is `json_schema`."""
 
@@ -115,6 +125,10 @@ class FieldType:
         """
         raise TypeError(type(self).__name__)
 
+    def write(self, value: Any, context: ReadingContext) -> Any:  # noqa: ANN401
+        """Return what `read` reads as this very value, bit by bit, whatever the file's units."""
+        return value
+
     def json_schema(self) -> JsonSchemaValue:
         """Return the JSON schema of what may stand in a file."""
         raise TypeError(type(self).__name__)
@@ -126,7 +140,12 @@ class FieldType:
             except FlawError as error:
                 raise refuse(error.flaws) from None
 
-        return core_schema.with_info_plain_validator_function(validate)
+        def serialize(value: Any, info: core_schema.SerializationInfo) -> Any:  # noqa: ANN401
+            context = info.context
+            return value if value is None or context is None else self.write(value, context)
+
+        serialization = core_schema.plain_serializer_function_ser_schema(serialize, info_arg=True)
+        return core_schema.with_info_plain_validator_function(validate, serialization=serialization)
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
@@ -167,131 +186,14 @@ class Number(FieldType):
             raise FlawError(f"expected a number {bounds}{f' {unit}' if unit else ''}, got {shown(value)}")
         return number
 
+    def write(self, value: float, context: ReadingContext) -> float | str:
+        """Return the number with its SI unit."""
+        return written_number(value, self.quantity)
+
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of a number or a string with its unit."""
-        number: dict[str, Any] = {"type": "number"}
-        for key, bound in (
-            ("exclusiveMinimum", self.above),
-            ("minimum", self.at_least),
-            ("maximum", self.at_most),
-        ):
-            if bound is not None:
-                number[key] = bound
+        bounds = {"exclusiveMinimum": self.above, "minimum": self.at_least, "maximum": self.at_most}
+        number = {"type": "number", **{key: bound for key, bound in bounds.items() if bound is not None}}
         if self.quantity.dimension == "ratio":
             return number
         return {"anyOf": [number, {"type": "string", "pattern": "^[-+.0-9]"}]}
-
-
-def read_per_joint(
-    value: Any,  # noqa: ANN401
-    context: ReadingContext,
-    read_one: Callable[[Any, int], Any],
-    missing: Any = ...,  # noqa: ANN401
-) -> tuple[Any, ...]:
-    """Return one value for each joint from one for all, a list, or a mapping by joint name.
-
-    Args:
-        value: As it stands in the file.
-        context: Which joints there are.
-        read_one: Reads the value of the joint with the given index.
-        missing: What a mapping leaves out; without it, leaving one out is a flaw.
-
-    Raises:
-        FlawError: With every flaw that was found.
-    """
-    names = context.joint_names
-    if isinstance(value, Mapping):
-        items = _named_items(value, names)
-    elif isinstance(value, list | tuple):
-        items = {i: (i, item) for i, item in enumerate(value)}
-        if names is not None and len(value) != len(names):
-            raise FlawError(
-                f"expected {len(names)} values, one for each joint, got {len(value)}", hint=_listed(names)
-            )
-    elif names is None and context is SI:
-        raise FlawError(f"expected a list with one value for each joint, got {shown(value)}")
-    else:
-        items = {i: (None, value) for i in range(len(names or ("",)))}
-    return _read_items(items, names, read_one, missing)
-
-
-def _listed(names: Sequence[str]) -> str:
-    return f"the joints are {', '.join(names)}"
-
-
-def _named_items(value: Mapping[str, Any], names: tuple[str, ...] | None) -> dict[int, tuple[str, Any]]:
-    if names is None:
-        return {i: (name, item) for i, (name, item) in enumerate(value.items())}
-    unknown: list[Flaw] = [
-        ((n,), f"the robot has no joint '{n}'", _listed(names)) for n in value if n not in names
-    ]
-    if unknown:
-        error = FlawError("")
-        error.flaws = unknown
-        raise error
-    return {names.index(name): (name, item) for name, item in value.items()}
-
-
-def _read_items(
-    items: Mapping[int, tuple[str | int | None, Any]],
-    names: tuple[str, ...] | None,
-    read_one: Callable[[Any, int], Any],
-    missing: Any,  # noqa: ANN401
-) -> tuple[Any, ...]:
-    count = len(names) if names is not None else len(items)
-    lacking = [index for index in range(count) if index not in items]
-    if lacking and missing is ...:
-        listed = ", ".join((names or ())[index] for index in lacking)
-        raise FlawError(f"no value for {listed}", hint="name every joint, or give a list")
-    values: list[Any] = [missing] * count
-    flaws: list[Flaw] = []
-    for index, (key, item) in items.items():
-        try:
-            values[index] = read_one(item, index)
-        except FlawError as error:
-            prefix: Path = () if key is None else (key,)
-            flaws += [((*prefix, *path), text, hint) for path, text, hint in error.flaws]
-            if key is None:
-                break
-    if flaws:
-        error = FlawError("")
-        error.flaws = flaws
-        raise error
-    return tuple(values)
-
-
-@dataclass(frozen=True)
-class PerJoint(FieldType):
-    """A joint value or one of its time derivatives, for each joint.
-
-    Attributes:
-        order: 0 for a position, 1 to 3 for its derivatives.
-        description: For the JSON schema.
-        zero_missing: Whether joints that a mapping leaves out are zero.
-        above: Each value must be above this, SI.
-    """
-
-    order: int
-    description: str
-    zero_missing: bool = False
-    above: float | None = None
-
-    def read(self, value: Any, context: ReadingContext) -> tuple[float, ...]:  # noqa: ANN401
-        """Return one number for each joint, in SI."""
-
-        def read_one(item: Any, joint: int) -> float:  # noqa: ANN401
-            number = Number(context.joint_quantity(joint, self.order), self.description, above=self.above)
-            return number.read(item, context)
-
-        return read_per_joint(value, context, read_one, 0.0 if self.zero_missing else ...)
-
-    def json_schema(self) -> JsonSchemaValue:
-        """Return the schema of one value for all joints, a list, or a mapping by joint name."""
-        one = Number(Quantity("angle", self.order), self.description, above=self.above).json_schema()
-        return per_joint_schema(one)
-
-
-def per_joint_schema(one: JsonSchemaValue) -> JsonSchemaValue:
-    """Return the schema of `one` for all joints, a list, or a mapping by joint name."""
-    listed = {"type": "array", "items": one, "minItems": 1, "maxItems": MAX_JOINTS}
-    return {"anyOf": [one, listed, {"type": "object", "additionalProperties": one}]}

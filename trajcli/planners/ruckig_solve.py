@@ -13,112 +13,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Literal
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from trajcli.curves.phases import PhaseChain
-from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount, PlanningError, Problem
-from trajcli.planners.planner import Phase
-
-Control = Literal["position", "velocity"]
+from trajcli.planners.profile import Profile, Task
 
 _LANDED = 1e-12  # relative to the joint's peaks: a larger miss means that other units may do better
 _ACCEPTABLE = 1e-9  # the same: a larger miss is a jump, and the phases are wrong
+_COARSE = 1e-11  # the same: what rounding times may do to the velocity
 _ROUNDING = 1e-12
-_STILL = 1e-9  # of the peak velocity: less counts as rest
-
-
-@dataclass(frozen=True, eq=False)
-class Task:
-    """What one variable shall do.
-
-    Attributes:
-        name: For messages.
-        initial: (position, velocity, acceleration) at the start.
-        final: The same at the end; the position is ignored under velocity control.
-        bounds: Shape (3, 2), lower and upper, of velocity, acceleration and jerk; infinite ones are allowed.
-            Of the two bounds of the jerk the smaller magnitude holds both ways.
-        control: Whether the final position is imposed.
-    """
-
-    name: str
-    initial: tuple[float, float, float]
-    final: tuple[float, float, float]
-    bounds: Array
-    control: Control = "position"
-
-    @property
-    def order(self) -> int:
-        """The derivative that is constant in each phase: the lowest above which nothing is bounded."""
-        _, acceleration, jerk = (bool(np.isfinite(bound).all()) for bound in self.bounds)
-        return 3 if jerk else 2 if acceleration else 1
-
-    @property
-    def displacement(self) -> float:
-        """Position to cover; zero under velocity control."""
-        return self.final[0] - self.initial[0] if self.control == "position" else 0.0
-
-    @property
-    def steady(self) -> bool:
-        """Whether constant velocity, or rest, is all that is asked."""
-        anywhere = self.control == "velocity" or self.displacement == self.initial[1] == 0
-        return anywhere and self.initial[1] == self.final[1] and self.initial[2] == self.final[2] == 0
-
-    @property
-    def done(self) -> bool:
-        """Whether the start is the target already."""
-        return self.displacement == 0 and self.initial[1:] == self.final[1:]
-
-
-@dataclass(frozen=True, eq=False)
-class Profile:
-    """The motion of one variable.
-
-    Attributes:
-        position: At the start.
-        chain: Its phases, relative to that position.
-        duration: Seconds.
-        braking: How many of the first phases only lead back into the bounds.
-    """
-
-    position: float
-    chain: PhaseChain
-    duration: float
-    braking: int = 0
-
-    def curve(self) -> PiecewisePolynomial:
-        """Return the position over [0, duration], n = 1."""
-        return self.chain.curve(self.position, self.duration)
-
-    def phases(self, joint: int | None) -> list[Phase]:
-        """Return the phases by name, equal neighbours joined."""
-        times = np.concatenate([[0.0], np.cumsum(self.chain.durations)])
-        times[-1] = self.duration
-        named: list[Phase] = []
-        for k, name in enumerate(self._names()):
-            start, end = float(times[k]), float(times[k + 1])
-            if named and named[-1].name == name:
-                start = named.pop().start
-            named.append(Phase(name, start, end, joint))
-        return named
-
-    def _names(self) -> list[str]:
-        chain, names = self.chain, []
-        for k, constant in enumerate(chain.constants.tolist()):
-            velocity, acceleration, jerk = (*chain.states[k][1:].tolist(), constant, 0.0, 0.0)[:3]
-            speed = chain.peaks[1] if chain.order > 1 else 1.0
-            if k < self.braking:
-                names.append("brake")
-            elif jerk:
-                names.append("jerk +" if jerk > 0 else "jerk -")
-            elif acceleration:
-                names.append("constant acceleration")
-            else:
-                names.append("cruise" if abs(velocity) > _STILL * speed else "rest")
-        return names
 
 
 def fastest(task: Task) -> Profile:
@@ -169,6 +77,28 @@ def together(
 def _solve(task: Task, duration: float | None) -> Profile:
     if task.steady or (task.done and duration is None):
         return _steady(task, duration or 0.0)
+    if task.rests and duration is not None:
+        return _slowed(task, fastest(task), duration)
+    return _found(task, duration)
+
+
+def _slowed(task: Task, quickest: Profile, duration: float) -> Profile:
+    """Return a motion from rest to rest that takes longer than it needs.
+
+    Full jerk for a tiny displacement in a long time would make phases that are too short for the resolution
+    of time; these, and what ruckig cannot do, are done by stretching the fastest motion.
+    """
+    try:
+        profile = _found(task, duration)
+    except PlanningError:
+        profile = None
+    if profile is not None and profile.chain.coarseness <= _COARSE:
+        return profile
+    longer = max(duration, quickest.duration)
+    return Profile(quickest.position, quickest.chain.stretched(longer), longer)
+
+
+def _found(task: Task, duration: float | None) -> Profile:
     best, least = None, _ACCEPTABLE
     for time_unit, length_unit in _units(task, duration):
         found = _ask_ruckig(task, duration, time_unit, length_unit)
@@ -179,9 +109,6 @@ def _solve(task: Task, duration: float | None) -> Profile:
             return profile
         if miss <= least:
             best, least = profile, miss
-    if duration is not None and not any((*task.initial[1:], *task.final[1:])) and task.control == "position":
-        rested = fastest(task)
-        return Profile(rested.position, rested.chain.stretched(duration), duration)
     if best is not None:
         return best
     message = f"{task.name}: no motion within the velocity, acceleration and jerk limits could be found"

@@ -12,12 +12,11 @@ from trajcli.curves.compose import along_line, hold_until, merge_breaks
 from trajcli.curves.piecewise import Array
 from trajcli.curves.trapezoid import (
     InfeasibleProfileError,
-    Profile,
-    Rates,
     fastest_profile,
+    profile_of_duration,
     profile_of_speed,
-    signed_profile_of_duration,
 )
+from trajcli.curves.velocity_profile import Profile, Rates
 from trajcli.errors import Amount, PlanningError, Problem
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.fields import Duration, JointAccelerationMagnitudes, JointSpeeds, MinimumDuration
@@ -60,6 +59,9 @@ class Trapezoid(PointToPoint):
             raise refuse([(("acceleration",), text, "leave one of the three out")])
         if self.duration and self.minimum_duration:
             raise refuse([(("minimum_duration",), "duration and minimum_duration exclude each other", None)])
+        if self.duration and self.velocity and self.overshoot:
+            text = "a trapezoid of given duration and velocity does not overshoot"
+            raise refuse([(("overshoot",), text, "leave one of the three out")])
         return self
 
     def plan(self, start: State, robot: Robot) -> Planned:
@@ -94,7 +96,8 @@ class Trapezoid(PointToPoint):
 
     def _each(self, start: State, end: State, robot: Robot) -> Planned:
         displacement = end.position - start.position
-        forward, backward = self._rates(np.ones_like(displacement), robot)
+        moving = (displacement != 0) | (start.velocity != 0) | (end.velocity != 0)
+        forward, backward = self._rates(moving.astype(np.float64), robot)
         profiles = []
         for joint, distance in enumerate(displacement.tolist()):
             rates = [Rates(*(float(row[joint]) for row in rows)) for rows in (forward, backward)]
@@ -119,14 +122,18 @@ class Trapezoid(PointToPoint):
         if self.duration is not None:
             if distance and self.velocity is not None:
                 return self._of_speed(distance, initial, final, forward if distance > 0 else backward)
-            return signed_profile_of_duration(distance, initial, final, self.duration, forward, backward)
+            return profile_of_duration(
+                distance, initial, final, self.duration, forward, backward, overshoot=self.overshoot
+            )
         profile = fastest_profile(distance, initial, final, forward, backward, overshoot=self.overshoot)
         least = self.minimum_duration or 0.0
         if profile.duration >= least or profile.duration == 0:
             return profile
         if initial == 0 and final == 0:
             return profile.stretched(least / profile.duration)
-        return signed_profile_of_duration(distance, initial, final, least, forward, backward)
+        return profile_of_duration(
+            distance, initial, final, least, forward, backward, overshoot=self.overshoot
+        )
 
     def _of_speed(self, distance: float, initial: float, final: float, rates: Rates) -> Profile:
         sign = math.copysign(1.0, distance)

@@ -1,0 +1,104 @@
+"""What was measured, what it should be, and the table of both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from statistics import median
+from typing import Any, Literal
+
+MEGABYTE = 1e6  # bytes
+
+_HEAD = ("benchmark", "against", "ours", "peer", "ratio", "goal", "")
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One measured comparison.
+
+    Attributes:
+        benchmark: What we did.
+        peer: What did the same, or what we start from.
+        ours: Each run, s or bytes.
+        theirs: Each run of the peer, s or bytes; empty when it was skipped.
+        goal: The largest quotient; for memory the largest difference, bytes.
+        aim: A quotient in reach, below the goal.
+        kind: "time" is judged by the quotient of the medians, "memory" by their difference.
+        skipped: Why there is nothing to compare with.
+    """
+
+    benchmark: str
+    peer: str
+    ours: Sequence[float]
+    theirs: Sequence[float]
+    goal: float
+    aim: float | None = None
+    kind: Literal["time", "memory"] = "time"
+    skipped: str | None = None
+
+    @property
+    def value(self) -> float | None:
+        """The quotient, or for memory the difference in bytes; None when the peer was skipped."""
+        if self.skipped is not None:
+            return None
+        ours, theirs = median(self.ours), median(self.theirs)
+        return ours / theirs if self.kind == "time" else ours - theirs
+
+    @property
+    def verdict(self) -> str:
+        """In a word whether the goal is met."""
+        if self.value is None:
+            return f"skipped: {self.skipped}"
+        text = "met" if self.value <= self.goal else "missed"
+        if self.aim is None or text == "missed":
+            return text
+        return f"{text}, and the aim of {self.aim:.2f}" + ("" if self.value <= self.aim else " missed")
+
+    def row(self) -> tuple[str, ...]:
+        """Return the cells of the table."""
+        ours, theirs = self._amount(self.ours), self._amount(self.theirs)
+        return (self.benchmark, self.peer, ours, theirs, *self._judged(), self.verdict)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return everything for a program: s or bytes, each run, and the smallest and largest quotient."""
+        pairs = list(zip(self.ours, self.theirs, strict=not self.skipped))
+        quotients = [ours / theirs for ours, theirs in pairs]
+        return {
+            "benchmark": self.benchmark,
+            "peer": self.peer,
+            "kind": self.kind,
+            "ours": median(self.ours) if self.ours else None,
+            "theirs": median(self.theirs) if self.theirs else None,
+            "value": self.value,
+            "goal": self.goal,
+            "aim": self.aim,
+            "met": None if self.value is None else self.value <= self.goal,
+            "skipped": self.skipped,
+            "quotients": [min(quotients), max(quotients)] if quotients else None,
+            "runs": {"ours": list(self.ours), "theirs": list(self.theirs)},
+        }
+
+    def _amount(self, runs: Sequence[float]) -> str:
+        if not runs:
+            return "-"
+        amount = median(runs)
+        return f"{amount / MEGABYTE:.1f} MB" if self.kind == "memory" else f"{amount * 1e3:.0f} ms"
+
+    def _judged(self) -> tuple[str, str]:
+        if self.kind == "memory":
+            value = "-" if self.value is None else f"{self.value / MEGABYTE:+.1f} MB"
+            return value, f"{self.goal / MEGABYTE:+.0f} MB"
+        return "-" if self.value is None else f"{self.value:.2f}", f"{self.goal:.2f}"
+
+
+def table(figures: Sequence[Figure]) -> str:
+    """Return the figures as lines of text, one each, below a line of titles."""
+    rows = [_HEAD, *(figure.row() for figure in figures)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return "\n".join(
+        "  ".join(
+            cell.rjust(width) if 2 <= place <= 5 else cell.ljust(width)
+            for place, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in rows
+    )

@@ -1,0 +1,28 @@
+"""`trajcli plan` as a user runs it: from the shell's prompt to the last row."""
+
+from __future__ import annotations
+
+import sys
+
+from benchmarks.contest import ROOT, Command, compete
+from benchmarks.figures import Figure
+
+NEEDED = "import numpy, yaml; from pydantic import BaseModel"  # what no program of this kind can do without
+
+
+def figures(peers: str | None, *, long: bool) -> list[Figure]:
+    """Return the figures: against the imports that are needed, and against the script of a toolbox's user."""
+    runs = compete(
+        {
+            "plan": Command(
+                [sys.executable, "-m", "trajcli", "plan", f"{ROOT}/benchmarks/quintic.yaml"], compared=True
+            ),
+            "imports": Command([sys.executable, "-c", NEEDED]),
+            "script": Command([peers, f"{ROOT}/benchmarks/toolbox_script.py"], peer=True, compared=True),
+        }
+    )
+    name, ours, script = "plan, whole process, 10001 x 19", runs["plan"].seconds, runs["script"]
+    return [
+        Figure(name, "import numpy, yaml, pydantic", ours, runs["imports"].seconds, 2.0),
+        Figure(name, "Robotics Toolbox jtraj + savetxt", ours, script.seconds, 1 / 6, skipped=script.skipped),
+    ]

@@ -1,0 +1,36 @@
+"""A process that calls one function of a benchmark module whenever it is asked to, and says how long it took.
+
+It runs in the peers' environment too, where trajcli is not installed. A line with `run` or `numbers` on
+standard input is answered with one line of JSON.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from importlib import import_module
+
+
+def main(module: str, name: str) -> None:
+    """Prepare the function, then answer until the input ends.
+
+    Args:
+        module: A benchmark module.
+        name: A function of it that returns two functions: the one that is timed, and one that takes its
+            result and returns a few of the numbers in it.
+    """
+    run, numbers = getattr(import_module(module), name)()
+    for line in sys.stdin:
+        if line.strip() == "numbers":
+            answer = [float(number) for number in numbers(run())]
+        else:
+            start = time.perf_counter()
+            result = run()
+            answer = time.perf_counter() - start
+            del result
+        print(json.dumps(answer), flush=True)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

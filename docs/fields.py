@@ -1,0 +1,165 @@
+"""What the documents say about a field of a model: its form, its unit, its default."""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from docs.markdown import first_sentence, table
+from trajcli.job.model import Output, RobotSource, UnitsSpec
+from trajcli.job.robot_model import JointModel
+from trajcli.planners import PLANNERS
+from trajcli.planners.bounds import UNLIMITED, Bounds, JointBound, LimitsSpec, Scale
+from trajcli.planners.fields import Target
+from trajcli.planners.per_joint import PerJoint
+from trajcli.planners.poses import Pose
+from trajcli.planners.reading import FieldType, Number
+from trajcli.units import Quantity, Units, unit_name
+
+SECTIONS: dict[type, str] = {
+    UnitsSpec: "[units](#units)",
+    LimitsSpec: "[limits](#limits)",
+    Scale: "[factors](#scale)",
+    Target: "[state](#states)",
+    Output: "[output](#output)",
+    JointModel: "[joint](#joints)",
+}
+"""Where a model that stands inside another one is described."""
+
+_BY_JOINT = "[for each joint](#values-by-joint)"
+_LEFT_OUT = "left out"
+
+
+def field_table(model: type[BaseModel], left_out: Mapping[str, str] | None = None) -> str:
+    """Return the table of a model's fields.
+
+    Args:
+        model: Fields that every planner has are not listed for a planner.
+        left_out: What it means that an optional field is left out, by field.
+    """
+    rows = [
+        [f"`{name}`", _form(field), _unit(field), _default(name, field, left_out or {}), _description(field)]
+        for name, field in model.model_fields.items()
+        if name not in hidden_fields(model)
+    ]
+    return table(["field", "what may stand there", "unit", "default", "meaning"], rows)
+
+
+def hidden_fields(model: type[BaseModel]) -> set[str]:
+    """Return the fields that every planner has, for a planner; they are described once."""
+    return {"planner", "limits", "when_over_limit"} if model in PLANNERS.values() else set()
+
+
+def field_type(field: FieldInfo) -> FieldType | None:
+    """Return what reads a field's value, where that is a type of the job language."""
+    return next((item for item in _annotations(field) if isinstance(item, FieldType)), None)
+
+
+def _annotations(field: FieldInfo) -> list[Any]:
+    nested = [
+        item
+        for arm in get_args(field.annotation)
+        if get_origin(arm) is Annotated
+        for item in get_args(arm)[1:]
+    ]
+    return [*field.metadata, *nested]
+
+
+def _form(field: FieldInfo) -> str:
+    reader = field_type(field)
+    return _type_form(field.annotation) if reader is None else _reader_form(reader)
+
+
+def _reader_form(reader: FieldType) -> str:
+    if isinstance(reader, Number):
+        return _number_form(reader)
+    if isinstance(reader, PerJoint):
+        above = "" if reader.above is None else f" above {reader.above:g}"
+        return f"number{above}, {_BY_JOINT}"
+    if isinstance(reader, Bounds):
+        return f"[bound](#bounds), {_BY_JOINT}"
+    forms: dict[type, str] = {
+        JointBound: "[bound](#bounds)",
+        Pose: "[pose](#poses)",
+        RobotSource: "[robot](#robot)",
+    }
+    return forms[type(reader)]
+
+
+def _number_form(number: Number) -> str:
+    rules = [("above", number.above), ("at least", number.at_least), ("at most", number.at_most)]
+    stated = " and ".join(f"{word} {bound:g}" for word, bound in rules if bound is not None)
+    return f"number {stated}".rstrip()
+
+
+def _bare(annotation: Any) -> Any:  # noqa: ANN401
+    """Return a type without its alternative None."""
+    if get_origin(annotation) is Annotated:
+        return _bare(get_args(annotation)[0])
+    if get_origin(annotation) in (Union, types.UnionType):
+        arms = [arm for arm in get_args(annotation) if arm is not type(None)]
+        return _bare(arms[0]) if len(arms) == 1 else annotation
+    return annotation
+
+
+def _type_form(annotation: Any) -> str:  # noqa: ANN401
+    bare = _bare(annotation)
+    origin, arms = get_origin(bare), get_args(bare)
+    if origin is Literal:
+        return " or ".join(f"`{arm}`" for arm in arms)
+    if origin in (list, tuple):
+        return f"list of {_type_form(arms[0])}"
+    if origin is dict:
+        return f"names, each with a {_type_form(arms[1])}"
+    if origin in (Union, types.UnionType):
+        return "[move](#moves)"
+    plain = {bool: "`true` or `false`", str: "text", float: "number"}
+    return plain[bare] if bare in plain else SECTIONS[bare]
+
+
+def _unit(field: FieldInfo) -> str:
+    reader = field_type(field)
+    if isinstance(reader, PerJoint | Bounds | JointBound):
+        return "joint" + ("", "/s", "/s^2", "/s^3")[reader.order]
+    if isinstance(reader, Number):
+        return _quantity_unit(reader.quantity)
+    listed = [item for item in get_args(_bare(field.annotation)) if get_origin(item) is Annotated]
+    inner = [item for arm in listed for item in get_args(arm) if isinstance(item, Number)]
+    return _quantity_unit(inner[0].quantity) if inner else ""
+
+
+def _quantity_unit(quantity: Quantity) -> str:
+    if quantity.dimension in ("angle", "length"):
+        return quantity.dimension
+    return unit_name(quantity, Units())
+
+
+def _default(name: str, field: FieldInfo, left_out: Mapping[str, str]) -> str:
+    if field.is_required():
+        return "required"
+    default = field.default
+    if name in left_out:
+        return left_out[name]
+    if default is None or default in ((), {}):
+        return _LEFT_OUT
+    if default == UNLIMITED:
+        return "unlimited"
+    if isinstance(default, BaseModel):
+        return "its defaults"
+    if isinstance(default, bool):
+        return f"`{str(default).lower()}`"
+    if isinstance(default, list | tuple):
+        return f"`[{', '.join(map(str, default))}]`"
+    return f"`{default:g}`" if isinstance(default, float) else f"`{default}`"
+
+
+def _description(field: FieldInfo) -> str:
+    reader, bare = field_type(field), _bare(field.annotation)
+    text = field.description or (reader.description if reader else "")
+    if not text and isinstance(bare, type) and issubclass(bare, BaseModel):
+        text = first_sentence(bare.__doc__)
+    return text

@@ -1,0 +1,131 @@
+"""What jerk_limited refuses, and what it says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from jerk_limited_moves import arm, move_to, state
+
+from trajcli.errors import MissingLimitError, PlanningError
+from trajcli.planners.profile import Task
+from trajcli.planners.ruckig_solve import fastest, fastest_of, together
+
+ROBOT = arm([1.0, 2.0], [2.0, 3.0], [5.0, 6.0])
+
+
+def refusal(end, error=PlanningError, start=None, robot=ROBOT, **fields):
+    with pytest.raises(error) as caught:
+        move_to(end, **fields).plan(start or state([0.0, 0.0]), robot)
+    return caught.value.problems
+
+
+@pytest.mark.parametrize("infinite", ["velocity", "acceleration", "jerk"])
+def test_missing_limit_names_joint_and_key(infinite):
+    bounds = {"velocity": [1.0, 1.0, 1.0], "acceleration": [1.0, 1.0, 1.0], "jerk": [1.0, 1.0, 1.0]}
+    bounds[infinite] = [1.0, np.inf, np.inf]
+    (problem,) = refusal(state([1.0, 2.0, 0.0]), MissingLimitError, state([0.0] * 3), arm(*bounds.values()))
+    assert infinite in problem.message
+    assert "j2" in problem.message
+    assert "j3" not in problem.message
+    assert f"limits: {{{infinite}: ...}}" in problem.hint
+    assert "null" in problem.hint
+
+
+def test_every_missing_limit_is_named_at_once():
+    robot = arm([np.inf, 1.0], [np.inf, 1.0], [np.inf, np.inf])
+    problems = refusal(state([1.0, 2.0]), MissingLimitError, robot=robot)
+    assert ["velocity" in problems[0].message, "acceleration" in problems[1].message] == [True, True]
+    assert "j1, j2" in problems[2].message
+
+
+def test_stop_needs_no_velocity_limit():
+    robot = arm([np.inf] * 2, [2.0] * 2, [3.0] * 2)
+    planned = move_to(state([0.0, 0.0]), joints=False).plan(state([0.0, 0.0], 1.0), robot)
+    assert planned.curve.duration > 0
+    problems = refusal(
+        state([0.0, 0.0]),
+        MissingLimitError,
+        state([0.0, 0.0], 1.0),
+        arm([1] * 2, [1] * 2, [np.inf] * 2),
+        joints=False,
+    )
+    assert "jerk" in problems[0].message
+
+
+@pytest.mark.parametrize(
+    ("end", "order", "value", "limit"),
+    [
+        (state([1.0, 2.0], [1.5, 0.0]), "velocity", 1.5, 1.0),
+        (state([1.0, 2.0], [0.0, -2.5]), "velocity", -2.5, -2.0),
+        (state([1.0, 2.0], 0.0, [-2.1, 0.0]), "acceleration", -2.1, -2.0),
+    ],
+)
+def test_end_beyond_a_limit(end, order, value, limit):
+    (problem,) = refusal(end)
+    assert (problem.value, problem.limit) == (value, limit)
+    assert order in problem.message
+    assert str(value) in problem.text()
+    assert str(limit).removesuffix(".0") in problem.text()
+    assert problem.joint == ("j2" if end.velocity[1] else "j1")
+    assert refusal(end, joints=False)[0].message == problem.message
+
+
+def test_end_that_can_only_be_reached_from_outside():
+    (problem,) = refusal(state([1.0, 2.0], [0.9, 0.0], [-1.5, 0.0]))
+    assert problem.value == pytest.approx(0.9 + 1.5**2 / (2 * 5.0), rel=1e-12)
+    assert problem.limit == 1.0
+    assert "j1" in problem.message
+    just = 0.99 * np.sqrt(2 * 5.0 * 0.1)
+    assert (
+        move_to(state([1.0, 2.0], [0.9, 0.0], [-just, 0.0])).plan(state([0.0, 0.0]), ROBOT).curve.duration > 0
+    )
+
+
+def test_end_velocity_at_its_limit_is_no_rounding_matter():
+    above = 1.0 + 5e-13
+    planned = move_to(state([1.0, 2.0], [above, 0.0])).plan(state([0.0, 0.0]), ROBOT)
+    np.testing.assert_allclose(planned.curve.piece_ends(1)[1][-1], [above, 0.0], rtol=1e-15, atol=1e-15)
+
+
+def test_phase_refuses_a_velocity_across_the_line():
+    (problem,) = refusal(state([1.0, 2.0], [0.5, 0.0]), synchronize="phase")
+    assert problem.hint == "say `synchronize: time`"
+    assert "velocity" in problem.message
+    (problem,) = refusal(state([1.0, 2.0]), start=state([0.0, 0.0], 0.0, [0.0, 1.0]), synchronize="phase")
+    assert "acceleration" in problem.message
+
+
+def test_joint_that_moves_at_its_end_cannot_wait():
+    (problem,) = refusal(state([0.1, 20.0], [0.5, 0.0]), synchronize="none")
+    assert problem.joint == "j1"
+    assert "synchronize: time" in problem.hint
+    assert problem.amounts["arrival"].value < problem.amounts["duration"].value
+    single = arm([1.0], [2.0], [5.0])
+    assert move_to(state([1.0], 0.5), synchronize="none").plan(state([0.0]), single).curve.duration > 0
+    (problem,) = refusal(
+        state([1.0], 0.5), start=state([0.0]), robot=single, synchronize="none", minimum_duration=9.0
+    )
+    assert problem.amounts["duration"].value == 9.0
+
+
+def test_solver_says_what_it_cannot_find():
+    bounds = np.array([[-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0]])
+    task = Task("j7", (0.0, 0.0, 0.0), (1.0, 3.0, 0.0), bounds)
+    with pytest.raises(PlanningError, match="j7: no motion within"):
+        fastest(task)
+    with pytest.raises(PlanningError, match="lasts 12"):
+        fastest_of(task, 12.0)
+
+
+def test_common_duration_leaps_over_gaps():
+    """A joint that passes through its target and one that is slow: the first must loop, or wait for long."""
+    bounds = np.array([[-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0]])
+    passing = Task("j1", (0.0, 0.9, 0.0), (1.0, 0.9, 0.0), bounds)
+    slow = Task("j2", (0.0, 0.0, 0.0), (0.3, 0.0, 0.0), bounds)
+    alone = [fastest(passing), fastest(slow)]
+    chosen = together([passing, slow], alone)
+    assert chosen[0].duration == chosen[1].duration
+    assert chosen[0].duration > max(profile.duration for profile in alone) + 0.1
+    for profile, task in zip(chosen, (passing, slow), strict=True):
+        ends = [float(profile.curve().piece_ends(order)[1][-1, 0]) for order in range(3)]
+        np.testing.assert_allclose(ends, task.final, atol=1e-14)

@@ -1,0 +1,89 @@
+"""A velocity of one variable that is linear between knots; its position is a chain of parabolas."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, increasing
+
+
+@dataclass(frozen=True)
+class Rates:
+    """What a motion in one direction may do: all positive; speed may be infinite.
+
+    Attributes:
+        speed: Largest speed.
+        acceleration: Rate of speeding up.
+        deceleration: Rate of slowing down.
+    """
+
+    speed: float
+    acceleration: float
+    deceleration: float
+
+
+@dataclass(frozen=True)
+class Profile:
+    """A velocity that is linear between knots.
+
+    Attributes:
+        initial: Velocity at the start.
+        knots: (duration of the stretch, velocity at its end) in order; without knots it has no length.
+    """
+
+    initial: float
+    knots: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def duration(self) -> float:
+        """Seconds."""
+        return math.fsum(length for length, _ in self.knots)
+
+    @property
+    def distance(self) -> float:
+        """Signed distance covered."""
+        velocities = [self.initial, *(velocity for _, velocity in self.knots)]
+        return math.fsum(
+            (velocities[i] + velocities[i + 1]) / 2 * knot[0] for i, knot in enumerate(self.knots)
+        )
+
+    def then(self, other: Profile) -> Profile:
+        """Return this profile followed by another that starts with the velocity in which this one ends."""
+        return Profile(self.initial, self.knots + other.knots)
+
+    def mirrored(self) -> Profile:
+        """Return the profile in the opposite direction."""
+        return Profile(-self.initial, tuple((length, -velocity) for length, velocity in self.knots))
+
+    def stretched(self, factor: float) -> Profile:
+        """Return the profile that takes `factor` times as long over the same distance."""
+        return Profile(self.initial / factor, tuple((t * factor, v / factor) for t, v in self.knots))
+
+    def phases(self) -> list[tuple[str, float, float]]:
+        """Return (name, start, end) of each stretch: accelerate, cruise, decelerate or rest."""
+        named, start, before = [], 0.0, self.initial
+        for length, velocity in self.knots:
+            change = abs(velocity) - abs(before)
+            flat = "cruise" if velocity else "rest"
+            name = flat if change == 0 else "accelerate" if change > 0 else "decelerate"
+            if length > 0:
+                named.append((name, start, start + length))
+            start, before = start + length, velocity
+        return named
+
+    def curve(self, start: float, end: float) -> PiecewisePolynomial:
+        """Return the position (n = 1) from `start`; its pieces are laid to end exactly in `end`."""
+        knots = [knot for knot in self.knots if knot[0] > 0]
+        if not knots:
+            return PiecewisePolynomial(np.zeros(2), np.full((1, 1, 1), start))
+        breaks = increasing(np.concatenate([[0.0], np.cumsum([length for length, _ in knots])]))
+        velocity = np.array([self.initial, *(v for _, v in knots)])
+        lengths = np.array([length for length, _ in knots])
+        position = start + np.concatenate([[0.0], np.cumsum((velocity[1:] + velocity[:-1]) / 2 * lengths)])
+        position[1:] += (end - position[-1]) * breaks[1:] / breaks[-1]
+        slope = np.diff(velocity) / np.diff(breaks)  # so that velocities meet where breaks are rounded
+        coefficients: Array = np.stack([slope / 2, velocity[:-1], position[:-1]])[:, :, None]
+        return PiecewisePolynomial(breaks, coefficients)

@@ -1,0 +1,94 @@
+"""Write a job as it was understood: points in the place of their names, limits in force, numbers in SI.
+
+Each number carries its SI unit with all its digits, so that reading the text gives the same job bit by bit.
+The job's own units are kept: they decide how rows are written.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import unicodedata
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from trajcli.job.read import LoadedJob
+from trajcli.job.robot_model import robot_as_mapping
+from trajcli.planners.reading import ReadingContext
+
+_PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+_YAML_WORDS = {"null", "true", "false"}
+_INVISIBLE = ("Cc", "Cf", "Zl", "Zp", "Cn", "Co")
+
+
+def dump_job(loaded: LoadedJob) -> str:
+    """Return a job as YAML that reads as the same job: robot and limits in force, points, moves, output.
+
+    Limits of the job have become the robot's, and overrides are part of what they changed.
+    """
+    robot, job = loaded.robot, loaded.job
+    context = ReadingContext(loaded.units, robot.joint_names, robot.joint_types)
+    written = job.model_dump(context=context, exclude={"robot", "limits"}, exclude_none=True)
+    moves = [{"planner": move.pop("planner"), **move} for move in written["moves"]]
+    ordered = {
+        "version": job.version,
+        "name": loaded.name,
+        "units": written["units"],
+        "robot": robot_as_mapping(robot),
+        "points": written["points"],
+        "start": written["start"],
+        "moves": moves,
+        "when_over_limit": job.when_over_limit,
+        "output": written["output"],
+    }
+    if job.output.times is not None:
+        ordered["output"].pop("rate")
+    return "\n".join(_block(_without_empty(ordered))) + "\n"
+
+
+def _without_empty(value: Any) -> Any:  # noqa: ANN401
+    """Return the value without the keys that hold an empty mapping: none is different from leaving it out."""
+    if isinstance(value, list):
+        return [_without_empty(item) for item in value]
+    if not isinstance(value, Mapping):
+        return value
+    kept = {key: _without_empty(item) for key, item in value.items()}
+    return {key: item for key, item in kept.items() if item != {}}
+
+
+def _block(mapping: Mapping[str, Any], indent: str = "", depth: int = 2) -> Iterator[str]:
+    """Yield the lines of a mapping: its upper levels as blocks, one line for what is deeper."""
+    for key, value in mapping.items():
+        name = f"{indent}{_key(key)}:"
+        if depth and isinstance(value, Mapping) and any(isinstance(v, dict | list) for v in value.values()):
+            yield name
+            yield from _block(value, indent + "  ", depth - 1)
+        elif isinstance(value, list) and value and isinstance(value[0], dict):
+            yield name
+            yield from (f"{indent}  - {_flow(item)}" for item in value)
+        else:
+            yield f"{name} {_flow(value)}"
+
+
+def _flow(value: Any) -> str:  # noqa: ANN401
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{_key(key)}: {_flow(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_flow, value)) + "]"
+    return _text(value) if isinstance(value, str) else json.dumps(value)
+
+
+def _key(name: str) -> str:
+    return name if _PLAIN.fullmatch(name) and name.lower() not in _YAML_WORDS else _quoted(name)
+
+
+def _text(text: str) -> str:
+    return _key(text) if " " not in text else _quoted(text)
+
+
+def _quoted(text: str) -> str:
+    """Return a text in double quotes, with what shows nothing as escapes."""
+    return "".join(
+        f"\\U{ord(char):08X}" if unicodedata.category(char) in _INVISIBLE else char
+        for char in json.dumps(text, ensure_ascii=False)
+    )

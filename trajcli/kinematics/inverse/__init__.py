@@ -1,0 +1,1 @@
+"""Inverse kinematics: one file a closed-form family, one numeric solver, one list of them. numpy only."""

@@ -1,0 +1,83 @@
+"""Two turns about parallel axes in their plane, and the elbow arm that stands on them.
+
+The pair: R2 (l + R3 v) = w with l from axis 2 to axis 3, v from axis 3 to the point, all at right angles to
+the axes. Lengths give l . R3 v = (|w|^2 - |l|^2 - |v|^2) / 2, two answers for the third angle, mirror images
+of each other in the line of w; the second angle follows from the direction of w.
+
+The elbow arm (axes 2 and 3 parallel, axis 1 not): turns about axes 2 and 3 do not change the component along
+them, so that h2 . R1^-1 t = h2 . p holds with the shoulder's offset and a1 in it. It has two answers for the
+first angle, the shoulder reaching forward or backward over itself; with the pair's two there are four.
+
+"Left" reaches to the side of the first link's x axis, which is forward where the table is drawn with positive
+lengths; "up" has the elbow above the line from shoulder to point, seen along axis 1.
+
+Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning and Control (2009), section
+2.12.4, here without assuming right angles or lengths.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from trajcli.kinematics.columns import Column, difference, dot, minus, plus, product
+from trajcli.kinematics.inverse.lines import Floats, Line, across_floats, parallel
+from trajcli.kinematics.inverse.subproblems import Turn, Watch, across, levels, onto, turned, turned_back, unit
+
+
+def same_way(a: Line, b: Line) -> float:
+    """Return 1 or -1 for parallel lines of the same or the opposite direction."""
+    return float(np.sign(dot(a.direction, b.direction)))
+
+
+def parallel_pair(
+    two: Line, three: Line, point: Column, aim: Column, watch: Watch, up: Floats | None = None
+) -> tuple[Turn, Turn]:
+    """Return the turns about two parallel lines that bring `point` to `aim`, both (2, ..., B).
+
+    The first answer has the elbow on the side of h2 x w if `up` is None, else on the side where w . up counts
+    it as up: up is axis 1 x axis 2.
+    """
+    axis = two.direction
+    link = across(minus(three.point, two.point), axis)
+    hand = across(minus(point, three.point), axis)
+    way = across(minus(aim, two.point), axis)
+    level = product(0.5, difference(difference(dot(way, way), dot(hand, hand)), dot(link, link)))
+    turning = -same_way(two, three)
+    sign = turning if up is None else product(turning, dot(way, up))
+    third = levels(three.direction, hand, link, level, watch, watch.length**2, sign)
+    reached = plus(link, turned(hand, three.direction, third))
+    return unit(onto(axis, reached, way), watch, watch.length**2), third
+
+
+def shoulder_turn(one: Line, normal: Column, point: Column, target: Column, watch: Watch, sign: float) -> Turn:
+    """Return the turns (2, ..., B) about line one that give normal . R1^-1 (t - o) the value of the point."""
+    level = dot(normal, minus(point, one.point))
+    return levels(one.opposite.direction, minus(target, one.point), normal, level, watch, watch.length, sign)
+
+
+def before(one: Line, target: Column, turn: Turn) -> Column:
+    """Return where a point was before the turn about a line."""
+    return plus(turned_back(minus(target, one.point), one.direction, turn), one.point)
+
+
+def forward_sign(one: Line, two: Line, forward: Floats) -> float:
+    """Return the sign with which the first answer of `shoulder_turn` reaches along `forward`."""
+    return float(np.copysign(1.0, dot(forward, across_floats(two.direction, one.direction))))
+
+
+def elbow(
+    lines: Sequence[Line], point: Column, target: Column, watch: Watch, forward: Floats
+) -> tuple[Turn, Turn, Turn]:
+    """Return the turns that bring `point` (at zero) to `target`: choices shoulder, then elbow."""
+    one, two, three = lines
+    first = shoulder_turn(one, two.direction, point, target, watch, forward_sign(one, two, forward))
+    up = across_floats(one.direction, two.direction)
+    second, third = parallel_pair(two, three, point, before(one, target, first), watch, up)
+    return first, second, third
+
+
+def is_elbow(lines: Sequence[Line]) -> bool:
+    """Return whether `elbow` fits."""
+    return parallel(lines[1], lines[2]) and not parallel(lines[0], lines[1])

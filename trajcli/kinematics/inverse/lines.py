@@ -1,0 +1,181 @@
+"""An arm as lines in space: the axes of its joints where every joint stands at zero.
+
+exp(S1 q1) ... exp(Sn qn) H is the pose of the tcp, H the pose at zero and S_i the screw of joint i there.
+Conventions, offsets and signs of the DH table are all in the lines, so that what is parallel or meets is seen
+alike in every table of the same arm.
+
+Source: Murray, Li and Sastry, A Mathematical Introduction to Robotic Manipulation (1994), section 3.2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from trajcli.curves.piecewise import Array
+from trajcli.kinematics.chain import links_of, travel
+from trajcli.kinematics.columns import Column, Entry, combine, cross, dot, minus, plus, scaled
+from trajcli.kinematics.dexterity import characteristic_length
+from trajcli.kinematics.robot import Robot
+
+PARALLEL = 1e-9  # sine of the angle: an alpha typed with ten digits is meant to be a right angle
+MEETING = 1e-9  # of the arm's length: a picometre, where drawings say a tenth of a millimetre
+_DUST = 1e-15  # what products of exact zeros and ones leave
+
+Floats = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Line:
+    """The axis of one joint at zero: unit direction, pointing as the joint counts, and a point on it, m."""
+
+    prismatic: bool
+    direction: Floats
+    point: Floats
+
+    @property
+    def opposite(self) -> Line:
+        """The same line for the joint read backwards: its motion is undone by the same value."""
+        x, y, z = self.direction
+        return Line(self.prismatic, (-x + 0.0, -y + 0.0, -z + 0.0), self.point)
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """The lines of all joints, the tcp's pose at zero in the base, and lengths to judge by.
+
+    Attributes:
+        lines: One for each joint, in the frame of the base.
+        home: T_base_tcp at zero, shape (4, 4).
+        base: T_world_base, shape (4, 4).
+        forward: Direction of the first link's x axis at zero: where the arm reaches with the shoulder left.
+        length: The arm's characteristic length, m.
+    """
+
+    lines: tuple[Line, ...]
+    home: Array
+    base: Array
+    forward: Floats
+    length: float
+
+    @property
+    def kinds(self) -> str:
+        """Joint types from the base on: R or P for each."""
+        return "".join("P" if line.prismatic else "R" for line in self.lines)
+
+
+def arm_of(robot: Robot) -> Arm:
+    """Return the lines of a robot.
+
+    Raises:
+        InputError: When the robot has no geometry.
+    """
+    links = links_of(robot)
+    axes, tcp = travel(links, np.eye(4), robot.tool, cast("Sequence[Array]", [0.0] * len(links)))
+    lines = tuple(Line(axis.prismatic, _clean(axis.direction), _clean(axis.point)) for axis in axes)
+    home = np.eye(4)
+    home[:3] = np.array([_clean(column) for column in (tcp.x, tcp.y, tcp.z, tcp.p)]).T
+    turn = links[0].theta
+    forward = _clean((float(np.cos(turn)), float(np.sin(turn)), 0.0))
+    return Arm(lines, home, robot.base, forward, characteristic_length(robot))
+
+
+class Goal:
+    """One block of target poses as the displacement from zero: G with G H = T, whatever base and tool.
+
+    Attributes:
+        x, y, z, p: Columns of the targets in world, each entry an array (B,).
+    """
+
+    def __init__(self, arm: Arm, rows: Sequence[Array]) -> None:
+        """Take the twelve upper entries of the poses, row by row, each an array (B,)."""
+        self.x, self.y, self.z, self.p = ((rows[i], rows[4 + i], rows[8 + i]) for i in range(4))
+        self._into_base = [cast("Floats", tuple(row)) for row in arm.base[:3, :3].T.tolist()]
+        self._base = cast("Floats", tuple(arm.base[:3, 3].tolist()))
+        self._home = arm.home
+
+    def direction(self, vector: Column) -> Column:
+        """Return where the displacement turns a direction that was `vector` at zero."""
+        return self._in_base(self._turned(np.asarray(vector) @ self._home[:3, :3]))
+
+    def point(self, point: Column) -> Column:
+        """Return where the displacement takes a point of the tool that was at `point` at zero."""
+        local = (np.asarray(point) - self._home[:3, 3]) @ self._home[:3, :3]
+        return self._in_base(minus(plus(self._turned(local), self.p), self._base))
+
+    def _turned(self, local: Array) -> Column:
+        a, b, c = (0.0 if abs(entry) < _DUST else float(entry) for entry in local)
+        return plus(combine(a, self.x, b, self.y), scaled(c, self.z))
+
+    def _in_base(self, vector: Column) -> Column:
+        first, second, third = (dot(row, vector) for row in self._into_base)
+        return first, second, third
+
+
+class InverseGoal(Goal):
+    """The inverse displacements of a goal, for arms that are read from the tool to the base."""
+
+    def __init__(self, goal: Goal) -> None:
+        """Take the goal to invert."""
+        self._columns = [goal.direction(axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
+        self._origin = goal.point((0.0, 0.0, 0.0))
+
+    def direction(self, vector: Column) -> Column:
+        """Return where the inverse displacement turns a direction."""
+        first, second, third = (dot(column, vector) for column in self._columns)
+        return first, second, third
+
+    def point(self, point: Column) -> Column:
+        """Return where the inverse displacement takes a point."""
+        return self.direction(minus(point, self._origin))
+
+
+def parallel(*lines: Line) -> bool:
+    """Return whether all lines have one direction, or the opposite one."""
+    first = np.array(lines[0].direction)
+    return all(np.linalg.norm(np.cross(first, line.direction)) <= PARALLEL for line in lines[1:])
+
+
+def perpendicular(a: Line, b: Line) -> bool:
+    """Return whether two directions are at right angles."""
+    return abs(float(np.dot(a.direction, b.direction))) <= PARALLEL
+
+
+def meeting_point(a: Line, b: Line, length: float) -> Floats | None:
+    """Return the point where two lines that are not parallel meet within 1e-9 of `length`; None elsewhere."""
+    if parallel(a, b):
+        return None
+    (ua, pa), (ub, pb) = ((np.array(line.direction), np.array(line.point)) for line in (a, b))
+    normal = np.cross(ua, ub)
+    between = pb - pa
+    if abs(float(between @ normal)) > MEETING * length * float(np.linalg.norm(normal)):
+        return None
+    along = float(np.cross(between, ub) @ normal / (normal @ normal))
+    return _clean(tuple(pa + along * ua))
+
+
+def contains(line: Line, point: Floats, length: float) -> bool:
+    """Return whether a point lies on a line within 1e-9 of `length`."""
+    offset = np.cross(np.subtract(point, line.point), line.direction)
+    return float(np.linalg.norm(offset)) <= MEETING * length
+
+
+def common_point(lines: Sequence[Line], length: float) -> Floats | None:
+    """Return the point in which three lines meet, neighbours not parallel; None where they do not."""
+    point = meeting_point(lines[0], lines[1], length)
+    if point is None or parallel(lines[1], lines[2]) or not contains(lines[2], point, length):
+        return None
+    return point
+
+
+def across_floats(a: Floats, b: Floats) -> Floats:
+    """Return the vector product of two constant vectors."""
+    return _clean(cross(a, b))
+
+
+def _clean(vector: Sequence[Entry]) -> Floats:
+    x, y, z = (0.0 if abs(entry) < _DUST else float(entry) for entry in vector)
+    return x, y, z

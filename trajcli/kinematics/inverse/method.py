@@ -1,0 +1,60 @@
+"""What a family of arms answers for one arm: how it solves, how many branches it has and what they are called."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Literal
+
+from trajcli.kinematics.columns import Entry
+from trajcli.kinematics.inverse.lines import Goal
+from trajcli.kinematics.inverse.subproblems import Watch
+
+Choice = Literal["shoulder", "elbow", "wrist"]
+Solver = Callable[[Goal, Watch], Sequence[Entry]]
+NAMES = {"shoulder": ("left", "right"), "elbow": ("up", "down"), "wrist": ("no_flip", "flip")}
+
+
+@dataclass(frozen=True)
+class Branch:
+    """The name of one branch, in the words of a job's `configuration`; None where the arm has no such choice."""
+
+    shoulder: str | None = None
+    elbow: str | None = None
+    wrist: str | None = None
+
+    def __str__(self) -> str:
+        return " ".join(name for name in (self.shoulder, self.elbow, self.wrist) if name) or "only"
+
+
+@dataclass(frozen=True, eq=False)
+class Method:
+    """How the inverse kinematics of one arm is found.
+
+    Attributes:
+        name: For people, as "spherical wrist over elbow".
+        family: Name of the closed form, or "numeric".
+        choices: Which choices there are, in the order in which the solver finds them.
+        reason: Why it was chosen, one sentence.
+        solve: Values of all joints for a block of goals, each of a shape that broadcasts to (2, ..., 2, B)
+            with one axis for each choice, the last choice first. None for the numeric method.
+        needs: Whether the closed form uses the whole pose or the position alone.
+    """
+
+    name: str
+    family: str
+    choices: tuple[Choice, ...]
+    reason: str
+    solve: Solver | None = None
+    needs: Literal["pose", "position"] = "pose"
+
+    @property
+    def branches(self) -> tuple[Branch, ...]:
+        """Names of the branches, in the order of the solutions; none for the numeric method."""
+        if self.solve is None:
+            return ()
+        order: tuple[Choice, ...] = ("shoulder", "elbow", "wrist")
+        present = [choice for choice in order if choice in self.choices]
+        rows = product(*(NAMES[choice] for choice in present))
+        return tuple(Branch(**dict(zip(present, row, strict=True))) for row in rows)

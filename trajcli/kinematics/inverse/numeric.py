@@ -1,0 +1,163 @@
+"""Inverse kinematics of any chain: damped Newton steps from many seeds, all seeds of all targets at once.
+
+Every step solves (J^T J + m I) dq = J^T e for all running rows together, with the damping m = |e|^2 / 2: it
+vanishes with the error, so that the end is quadratic, and keeps steps short where the arm is singular. With
+more joints than coordinates the same step is J^T (J J^T + m I)^-1 e, which turns no joint in vain. Lengths are
+divided by the arm's characteristic length.
+
+An arm with as many joints as coordinates has finitely many answers: limits do not enter the search, and every
+answer that some seed finds is kept. One with more has a family of answers: each joint is held inside its
+limits while searching, and the answers nearest to the given configuration are kept.
+
+Source: Sugihara, Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method, IEEE Trans.
+Robotics 27 (2011).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trajcli.curves.piecewise import Array
+from trajcli.geometry.rotation import Flags
+from trajcli.kinematics.dexterity import characteristic_length
+from trajcli.kinematics.forward import forward
+from trajcli.kinematics.inverse.target import Target, residual_jacobian, residuals
+from trajcli.kinematics.inverse.turns import FULL, revolute
+from trajcli.kinematics.jacobian import jacobian
+from trajcli.kinematics.robot import Robot
+
+SEEDS = 64
+ROUNDS = 4  # of seeds, for targets that found nothing
+ITERATIONS = 60
+DONE = 1e-13  # of the scaled error: a few roundings
+_FLOOR = 1e-13  # damping that keeps an exactly singular system solvable
+_LONGEST = 1.0  # rad, or arm lengths, a joint goes in one step
+SAME = 1e-6  # rad or m, within which two answers are one
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """What the search found for a flat batch.
+
+    Attributes:
+        joints: Shape (N, seeds, n), turns not chosen yet.
+        found: Shape (N, seeds), whether a row met its target.
+    """
+
+    joints: Array
+    found: Flags
+
+
+def linearised(robot: Robot, target: Target, q: Array) -> tuple[Array, Array]:
+    """Return scaled residuals (K, m) and their Jacobian (K, m, n) at joint values (K, n)."""
+    poses = forward(robot, q)
+    errors, slopes = residuals(target, poses), residual_jacobian(target, poses, jacobian(robot, q))
+    scale = np.ones(errors.shape[1])
+    scale[: sum(target.position)] = 1.0 / characteristic_length(robot)
+    return errors * scale, slopes * scale[:, None]
+
+
+def damped_step(errors: Array, slopes: Array, damping: Array) -> Array:
+    """Return the joint steps (K, n)."""
+    rows, joints = slopes.shape[1:]
+    transposed = np.swapaxes(slopes, 1, 2)
+    if joints > rows:
+        system = slopes @ transposed + damping[:, None, None] * np.eye(rows)
+        return np.asarray((transposed @ np.linalg.solve(system, errors[..., None]))[..., 0])
+    system = transposed @ slopes + damping[:, None, None] * np.eye(joints)
+    return np.asarray(np.linalg.solve(system, transposed @ errors[..., None])[..., 0])
+
+
+def refine(robot: Robot, target: Target, q: Array, iterations: int = 4) -> Array:
+    """Return joint values (K, n) moved by undamped least-squares steps, each kept only where it gains."""
+    errors, slopes = linearised(robot, target, q)
+    for _ in range(iterations):
+        inverse = np.linalg.pinv(slopes, rcond=1e-9)
+        candidate = q + np.clip((inverse @ errors[..., None])[..., 0], -_LONGEST, _LONGEST)
+        new_errors, new_slopes = linearised(robot, target, candidate)
+        gains = np.square(new_errors).sum(axis=1) < np.square(errors).sum(axis=1)
+        if not gains.any():
+            break
+        q = np.where(gains[:, None], candidate, q)
+        errors = np.where(gains[:, None], new_errors, errors)
+        slopes = np.where(gains[:, None, None], new_slopes, slopes)
+    return q
+
+
+def descend(robot: Robot, target: Target, q: Array, bounds: Array | None) -> tuple[Array, Flags]:
+    """Return joint values (K, n) after the search from seeds (K, n), and which met their targets.
+
+    Args:
+        robot: The arm.
+        target: A flat batch of K.
+        q: The seeds.
+        bounds: Limits (n, 2) that hold the joints while searching; None for none.
+    """
+    result, found = q.copy(), np.zeros(len(q), dtype=bool)
+    running = np.arange(len(q))
+    for _ in range(ITERATIONS):
+        values = result[running]
+        errors, slopes = linearised(robot, target.rows(running), values)
+        square = np.square(errors).sum(axis=1)
+        done = square <= DONE**2
+        found[running[done]] = True
+        running, values = running[~done], values[~done]
+        if not len(running):
+            break
+        step = damped_step(errors[~done], slopes[~done], 0.5 * square[~done] + _FLOOR)
+        longest = np.abs(step).max(axis=1, keepdims=True)
+        values = values + step * np.minimum(1.0, _LONGEST / np.maximum(longest, _LONGEST))
+        result[running] = values if bounds is None else np.clip(values, bounds[:, 0], bounds[:, 1])
+    return result, found
+
+
+def search(robot: Robot, target: Target, near: Array | None) -> Search:
+    """Return what all seeds find for flat targets (N); `near` (N, n) is the first seed where given."""
+    count, joints = target.poses.shape[0], len(robot.joints)
+    redundant = joints > target.coordinates
+    bounds = robot.limits.position if redundant else None
+    result, found = np.zeros((count, SEEDS, joints)), np.zeros((count, SEEDS), dtype=bool)
+    for attempt in range(ROUNDS):
+        missing = np.flatnonzero(~found.any(axis=1))
+        if not len(missing):
+            break
+        if attempt == ROUNDS - 1:
+            bounds = None
+        starts = np.repeat(seeds(robot, attempt)[None], len(missing), axis=0)
+        if near is not None:
+            starts[:, 0] = near[missing]
+        pairs = np.repeat(missing, SEEDS)
+        values, met = descend(robot, target.rows(pairs), starts.reshape(-1, joints), bounds)
+        result[missing] = values.reshape(-1, SEEDS, joints)
+        found[missing] = met.reshape(-1, SEEDS)
+    return Search(result, found)
+
+
+def seeds(robot: Robot, attempt: int) -> Array:
+    """Return the starting configurations (SEEDS, n), the same in every run, spread over the limits.
+
+    A joint without limits is spread over a full turn, a slide over the arm's length.
+    """
+    turning = revolute(robot)
+    reach = np.where(turning, np.pi, characteristic_length(robot))
+    low, high = robot.limits.position.T
+    low, high = np.where(np.isfinite(low), low, -reach), np.where(np.isfinite(high), high, reach)
+    wide = turning & (high - low > FULL)
+    low, high = np.where(wide, -np.pi, low), np.where(wide, np.pi, high)
+    generator = np.random.default_rng(attempt)
+    spread = (generator.permuted(np.tile(np.arange(SEEDS), (len(low), 1)), axis=1).T + 0.5) / SEEDS
+    return np.asarray(low + (high - low) * spread)
+
+
+def distinct(robot: Robot, joints: Array, usable: Flags) -> Flags:
+    """Return which rows (N, S) are usable and no repetition of an earlier one, full turns apart counted as equal."""
+    turning = revolute(robot)
+    keep = usable.copy()
+    for i in range(1, joints.shape[1]):
+        gap = joints[:, :i] - joints[:, i, None]
+        gap = np.where(turning, gap - FULL * np.round(gap / FULL), gap)
+        same = (np.abs(gap).max(axis=-1) <= SAME) & keep[:, :i]
+        keep[:, i] &= ~same.any(axis=1)
+    return keep

@@ -1,0 +1,101 @@
+"""Arms that turn about parallel axes, in their plane and along it: planar 2R, 3R, RP and RPR, SCARA.
+
+Seen along the axes k the arm is planar; slides along k commute with all of it, wherever they stand in the
+chain. The angle of the tool about k is the sum of the turns.
+
+* 2R and RP: the tcp's place in the plane, two solutions each.
+* 3R (and a slide: RRPR, RRRP, PRRR, RPRR): the place of the third axis is that of a point of the tool, joints
+  1 and 2 bring it there, two solutions; joint 3 is what lacks to the angle of the tool, the slide is the
+  difference in height.
+* RPR: the same with a turn and a slide in the plane: two solutions.
+
+"Up" has the elbow on the left of the line from shoulder to point, seen against k of the first turn; of a
+slide it is the longer one.
+
+Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning and Control (2009), section
+2.12.1; Craig, Introduction to Robotics (2005), chapter 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from trajcli.kinematics.columns import Entry, dot, minus
+from trajcli.kinematics.inverse.elbow import parallel_pair, same_way
+from trajcli.kinematics.inverse.lines import Arm, Floats, Goal, Line, parallel, perpendicular
+from trajcli.kinematics.inverse.method import Method
+from trajcli.kinematics.inverse.slides import turn_and_slide
+from trajcli.kinematics.inverse.subproblems import Turn, Watch, across, added, angle, onto, unit
+
+_NAMES = {"RR": "planar 2R", "RP": "planar RP", "RRR": "planar 3R", "RPR": "planar RPR"}
+
+
+@dataclass(frozen=True, eq=False)
+class Planar:
+    """The solver of one arm.
+
+    Attributes:
+        plane: The joints that move in the plane: RR, RP, RRR or RPR.
+        places: Where they stand in the chain.
+        rise: Index of the slide along k; None where there is none.
+        lines: All joints.
+        tip: The tcp at zero.
+    """
+
+    plane: tuple[Line, ...]
+    places: tuple[int, ...]
+    rise: int | None
+    lines: tuple[Line, ...]
+    tip: Floats
+
+    def __call__(self, goal: Goal, watch: Watch) -> Sequence[Entry]:
+        """Return the joints: choice elbow."""
+        one, two, *rest = self.plane
+        point = rest[0].point if rest else self.tip
+        aim = goal.point(point)
+        first: Turn
+        values: list[Entry] = [0.0] * len(self.lines)
+        if two.prismatic:
+            first, slide = turn_and_slide(one, two, point, aim, watch)
+            total, values[self.places[1]] = first, slide
+        else:
+            first, second = parallel_pair(one, two, point, aim, watch)
+            total = added(first, second, same_way(one, two))
+            values[self.places[1]] = angle(second)
+        values[self.places[0]] = angle(first)
+        if rest:
+            lacking = added(_angle_of_tool(one, goal, watch), total, -1.0)
+            values[self.places[2]] = angle((lacking[0], np.asarray(lacking[1]) * same_way(one, rest[0])))
+        if self.rise is not None:
+            slide_axis = self.lines[self.rise].direction
+            values[self.rise] = dot(slide_axis, minus(aim, point))
+        return values
+
+
+def _angle_of_tool(one: Line, goal: Goal, watch: Watch) -> Turn:
+    axis = one.direction
+    marker = across(min(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), key=lambda e: abs(float(dot(e, axis)))), axis)
+    return unit(onto(axis, marker, goal.direction(marker)), watch)
+
+
+def match(arm: Arm) -> Method | None:
+    """Return the method where all turns are about parallel axes and the slides stand as in the list above."""
+    turns = [line for line in arm.lines if not line.prismatic]
+    if not turns or not parallel(*turns):
+        return None
+    rises = [i for i, line in enumerate(arm.lines) if line.prismatic and parallel(line, turns[0])]
+    places = tuple(i for i in range(len(arm.lines)) if i not in rises)
+    plane = tuple(arm.lines[i] for i in places)
+    kinds = "".join("RP"[line.prismatic] for line in plane)
+    if kinds not in _NAMES or len(rises) > (1 if kinds == "RRR" else 0):
+        return None
+    if "P" in kinds and not perpendicular(plane[0], plane[1]):
+        return None
+    tip = (float(arm.home[0, 3]), float(arm.home[1, 3]), float(arm.home[2, 3]))
+    solver = Planar(plane, places, rises[0] if rises else None, arm.lines, tip)
+    name = "SCARA" if rises else _NAMES[kinds]
+    reason = "all turns are about parallel axes" + (", and the slide runs along them" if rises else "")
+    return Method(name, name, ("elbow",), reason, solver, "pose" if len(plane) == 3 else "position")

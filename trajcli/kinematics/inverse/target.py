@@ -1,0 +1,209 @@
+"""What the tcp shall reach: a whole pose, or fewer than six of its coordinates.
+
+A target is met where its residuals vanish. They are the differences from the tcp's pose to the target in
+world: of the fixed coordinates of the position, m, and of what is fixed of the orientation, rad.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from trajcli.curves.piecewise import Array
+from trajcli.errors import InputError
+from trajcli.geometry.axis_angle import log
+from trajcli.geometry.rotation import AXES, Axis
+
+Fixed = Literal["all", "direction", "yaw", "pitch", "none"]
+_WHOLE = (True, True, True)
+_ALMOST_UPRIGHT = 1e-12  # of a unit vector: the heading of a vertical direction is not defined
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """Targets of one kind.
+
+    Attributes:
+        poses: Shape (*batch, 4, 4), T_world_tcp; entries that are not fixed do not matter.
+        position: Which of x, y and z in world are fixed.
+        orientation: What is fixed of the orientation: "all"; the "direction" of a tool axis; its "yaw", the
+            heading atan2(y, x) in world; its "pitch", the elevation asin(z) above the plane of x and y; "none".
+        tool_axis: Which axis of the tcp is meant by direction, yaw and pitch.
+        aims: Shape (*batch, 3) unit directions, (*batch, 1) angles in rad, (*batch, 0) otherwise.
+    """
+
+    poses: Array
+    position: tuple[bool, bool, bool]
+    orientation: Fixed
+    tool_axis: Axis
+    aims: Array
+
+    @property
+    def whole(self) -> bool:
+        """Whether all six coordinates are fixed."""
+        return self.orientation == "all" and self.position == _WHOLE
+
+    @property
+    def coordinates(self) -> int:
+        """How many coordinates are fixed."""
+        return sum(self.position) + {"all": 3, "direction": 2, "yaw": 1, "pitch": 1, "none": 0}[self.orientation]
+
+    @property
+    def batch(self) -> tuple[int, ...]:
+        """Shape of the batch."""
+        return self.poses.shape[:-2]
+
+    def rows(self, index: ArrayLike | slice) -> Target:
+        """Return the targets of some rows of a flat batch."""
+        return replace(self, poses=self.poses[index], aims=self.aims[index])  # type: ignore[index]
+
+    def flat(self) -> Target:
+        """Return the same targets with one batch dimension."""
+        aims = self.aims.reshape(-1, self.aims.shape[-1]) if self.aims.shape[-1] else self.aims.reshape(self.poses.size // 16, 0)
+        return replace(self, poses=self.poses.reshape(-1, 4, 4), aims=aims)
+
+
+def pose_target(poses: ArrayLike) -> Target:
+    """Return targets that fix the whole pose (*batch, 4, 4).
+
+    Raises:
+        InputError: When the shape is another or an entry is not finite.
+    """
+    values = np.asarray(poses, dtype=np.float64)
+    if values.shape[-2:] != (4, 4) or not np.isfinite(values).all():
+        raise InputError(f"a pose has 4x4 finite entries, this array has shape {values.shape}")
+    return Target(values, _WHOLE, "all", "z", np.empty((*values.shape[:-2], 0)))
+
+
+def partial_target(
+    position: ArrayLike | None = None,
+    *,
+    fixed: tuple[bool, bool, bool] = _WHOLE,
+    rotation: ArrayLike | None = None,
+    direction: ArrayLike | None = None,
+    yaw: ArrayLike | None = None,
+    pitch: ArrayLike | None = None,
+    tool_axis: Axis = "z",
+) -> Target:
+    """Return targets that leave coordinates free.
+
+    Args:
+        position: Shape (*batch, 3), m; None leaves it free.
+        fixed: Which coordinates of the position count.
+        rotation: Matrices (*batch, 3, 3).
+        direction: Where the tool axis points, (*batch, 3), any length but zero.
+        yaw: Heading of the tool axis, (*batch,), rad.
+        pitch: Elevation of the tool axis, (*batch,), rad, within a quarter turn.
+        tool_axis: The axis of the tcp that is meant.
+
+    Raises:
+        InputError: When more than one of rotation, direction, yaw and pitch is given, or nothing at all, a
+            direction has no length, a pitch is out of range, or a number is not finite.
+    """
+    given = {"rotation": rotation, "direction": direction, "yaw": yaw, "pitch": pitch}
+    named = {name: np.asarray(value, dtype=np.float64) for name, value in given.items() if value is not None}
+    if len(named) > 1:
+        raise InputError(f"a target has one kind of orientation, not {' and '.join(named)}")
+    place = None if position is None else np.asarray(position, dtype=np.float64)
+    _check(place, named)
+    kind, value = next(iter(named.items()), ("none", np.empty(0)))
+    tail = {"rotation": 2, "direction": 1}.get(kind, 0)
+    shapes = [] if place is None else [place.shape[:-1]]
+    shapes += [value.shape[: value.ndim - tail]] if named else []
+    batch = np.broadcast_shapes(*shapes)
+    poses = np.broadcast_to(np.eye(4), (*batch, 4, 4)).copy()
+    if place is not None:
+        poses[..., :3, 3] = place
+    counts = fixed if place is not None else (False, False, False)
+    if kind == "rotation":
+        poses[..., :3, :3] = value
+        return Target(poses, counts, "all", tool_axis, np.empty((*batch, 0)))
+    aims = np.broadcast_to(_aims(kind, value), (*batch, {"none": 0, "direction": 3}.get(kind, 1)))
+    return Target(poses, counts, kind, tool_axis, aims)  # type: ignore[arg-type]
+
+
+def residuals(target: Target, poses: Array) -> Array:
+    """Return the differences (K, m) of flat targets from the tcp's poses (K, 4, 4), position first."""
+    parts = [(target.poses[:, :3, 3] - poses[:, :3, 3])[:, list(target.position)]]
+    axis = poses[:, :3, AXES.index(target.tool_axis)]
+    match target.orientation:
+        case "all":
+            parts.append(log(target.poses[:, :3, :3] @ np.swapaxes(poses[:, :3, :3], 1, 2)))
+        case "direction":
+            parts.append(_turn_between(axis, target.aims))
+        case "yaw":
+            parts.append(_wrapped(target.aims - np.arctan2(axis[:, 1:2], axis[:, :1])))
+        case "pitch":
+            parts.append(target.aims - np.arctan2(axis[:, 2:], np.hypot(axis[:, :1], axis[:, 1:2])))
+    return np.concatenate(parts, axis=1)
+
+
+def residual_jacobian(target: Target, poses: Array, jacobians: Array) -> Array:
+    """Return how the joints change the tcp's part of the residuals, (K, m, n), from J (K, 6, n) in world."""
+    linear, angular = jacobians[:, :3][:, list(target.position)], jacobians[:, 3:]
+    axis = poses[:, :3, AXES.index(target.tool_axis)]
+    level = np.maximum(np.square(axis[:, :2]).sum(axis=1), _ALMOST_UPRIGHT)[:, None]
+    match target.orientation:
+        case "all":
+            turning = angular
+        case "direction":
+            turning = angular - axis[:, :, None] * (axis[:, None, :] @ angular)
+        case "yaw":
+            flat = np.stack([-axis[:, 1], axis[:, 0], np.zeros(len(axis))], axis=1) / level
+            turning = np.cross(axis, flat)[:, None, :] @ angular
+        case "pitch":
+            turning = (np.cross(axis, [0.0, 0.0, 1.0]) / np.sqrt(level))[:, None, :] @ angular
+        case _:
+            return np.asarray(linear)
+    return np.concatenate([linear, turning], axis=1)
+
+
+def closure_of(target: Target, poses: Array) -> Array:
+    """Return by how much flat targets are missed (K, 2): m, and rad."""
+    differences = residuals(target, poses)
+    split = sum(target.position)
+    parts = differences[:, :split], differences[:, split:]
+    return np.stack([np.linalg.norm(part, axis=1) for part in parts], axis=1)
+
+
+def _turn_between(axis: Array, aim: Array) -> Array:
+    """Return the rotation vectors (K, 3) that turn unit vectors to their aims the shorter way."""
+    normal = np.cross(axis, aim)
+    sine = np.linalg.norm(normal, axis=1, keepdims=True)
+    angle = np.arctan2(sine, np.einsum("ki,ki->k", axis, aim)[:, None])
+    smallest = np.eye(3)[np.argmin(np.abs(axis), axis=1)]
+    aside = np.cross(axis, smallest)
+    aside /= np.linalg.norm(aside, axis=1, keepdims=True)
+    clear = sine > _ALMOST_UPRIGHT
+    return np.where(clear, normal / np.where(clear, sine, 1.0), aside) * angle
+
+
+def _wrapped(angles: Array) -> Array:
+    result: Array = angles - 2 * np.pi * np.round(angles / (2 * np.pi))
+    return result
+
+
+def _aims(kind: str, value: Array) -> Array:
+    if kind == "direction":
+        return np.asarray(value / np.linalg.norm(value, axis=-1, keepdims=True))
+    return value if kind == "none" else value[..., None]
+
+
+def _check(place: Array | None, named: dict[str, Array]) -> None:
+    if place is None and not named:
+        raise InputError("the target fixes nothing", hint="give a position, an orientation or both")
+    arrays = {**named} if place is None else {"position": place, **named}
+    for name, array in arrays.items():
+        if not np.isfinite(array).all():
+            raise InputError(f"the {name} of the target is not finite")
+    if place is not None and place.shape[-1:] != (3,):
+        raise InputError(f"a position has 3 coordinates, this array has shape {place.shape}")
+    direction, pitch = named.get("direction"), named.get("pitch")
+    if direction is not None and not np.linalg.norm(direction, axis=-1).all():
+        raise InputError("the direction of the target has length zero")
+    if pitch is not None and (np.abs(pitch) > np.pi / 2).any():
+        worst = float(np.abs(pitch).max())
+        raise InputError(f"a pitch is an elevation within pi/2 of level, this one is {worst:.6g} rad")

@@ -1,0 +1,129 @@
+"""Arms whose joints 2, 3 and 4 turn about parallel axes: elbow and pitch (4R), and roll (5R), UR (6R).
+
+Turns about the three do not change what lies along them, h = h2:
+
+1. h . R1^-1 (G w - o1) = h . (w - o1) gives joint 1, for a point w that the joints after the fourth do not
+   move: the tcp (4R), a point of axis 5 (5R), the point where axes 5 and 6 meet (6R). Two answers.
+2. What is left, R1^-1 G = R(h, s) R5 R6, tells the sum s of the three angles and the joints after: with six
+   joints the last axis is brought to its direction by s and joint 5, two answers; with fewer, s is the angle
+   of one vector. The last joint is found from how the tool sees h.
+3. The place of axis 4 is then known, and joints 2 and 3 are a pair of parallel turns. Two answers; joint 4 is
+   what lacks to s.
+
+Four solutions for the 4R and 5R arms, eight for the 6R. Where axis 6 is parallel to h only three of the four
+angles about that direction are fixed. A 4R arm meets a pose only if its tool can stand so, a 5R arm likewise;
+closure tells by how much it cannot.
+
+Source: Hawkins, Analytic inverse kinematics for the Universal Robots UR-5/UR-10 arms (2013), here from lines
+instead of lengths; Siciliano, Sciavicco, Villani and Oriolo, Robotics (2009), section 2.12.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from trajcli.kinematics.columns import Column, Entry, cross, dot, minus
+from trajcli.kinematics.inverse.elbow import before, forward_sign, parallel_pair, same_way, shoulder_turn
+from trajcli.kinematics.inverse.lines import (
+    Arm,
+    Floats,
+    Goal,
+    across_floats,
+    meeting_point,
+    parallel,
+)
+from trajcli.kinematics.inverse.method import Choice, Method
+from trajcli.kinematics.inverse.spherical_wrist import last_angle
+from trajcli.kinematics.inverse.subproblems import (
+    Turn,
+    Watch,
+    across,
+    added,
+    angle,
+    noted_angle,
+    onto,
+    turned,
+    turned_back,
+    two_turns,
+    unit,
+)
+
+_NAMES = {4: "elbow and pitch", 5: "elbow, pitch and roll", 6: "three parallel axes (UR)"}
+
+
+@dataclass(frozen=True, eq=False)
+class ThreeParallel:
+    """The solver of one arm.
+
+    Attributes:
+        arm: Four to six joints, the second to fourth about parallel axes.
+        point: A point, at zero, that the joints after the fourth do not move.
+    """
+
+    arm: Arm
+    point: Floats
+
+    def __call__(self, goal: Goal, watch: Watch) -> Sequence[Entry]:
+        """Return the joints: choices shoulder, wrist where there are six joints, elbow."""
+        one, two, three, four = self.arm.lines[:4]
+        axis = two.direction
+        target = goal.point(self.point)
+        sign = forward_sign(one, two, self.arm.forward)
+        first = shoulder_turn(one, axis, self.point, target, watch, sign)
+        total, after = self._sum(goal, first, watch)
+        aim = minus(before(one, target, first), turned(minus(self.point, four.point), axis, total))
+        up = across_floats(one.direction, axis)
+        second, third = parallel_pair(two, three, four.point, aim, watch, up)
+        rest = added(added(total, second, -1.0), third, -same_way(two, three))
+        fourth = rest[0], np.asarray(rest[1]) * same_way(two, four)
+        return [*(angle(turn) for turn in (first, second, third, fourth)), *after]
+
+    def _sum(self, goal: Goal, first: Turn, watch: Watch) -> tuple[Turn, list[Entry]]:
+        """Return the turn about h that joints 2 to 4 make together, and the angles of the joints after."""
+        one, two, *_, last = self.arm.lines
+        axis = two.direction
+        seen = turned(axis, one.direction, first)
+        if len(self.arm.lines) == 6:
+            five = self.arm.lines[4].direction
+            aim = turned_back(goal.direction(last.direction), one.direction, first)
+            bends = two_turns(axis, five, last.direction, aim, watch)
+            after = [angle(bends.second), last_angle((axis, five, last.direction), bends, seen, goal)]
+            return unit(bends.first, watch), after
+        marker = last.direction if len(self.arm.lines) == 5 else across_floats(one.direction, axis)
+        aim = turned_back(goal.direction(marker), one.direction, first)
+        total = unit(onto(axis, marker, aim), watch)
+        return total, [_roll(goal, last.direction, axis, seen, watch)] if len(self.arm.lines) == 5 else []
+
+
+def _roll(goal: Goal, last: Floats, axis: Floats, seen: Column, watch: Watch) -> Entry:
+    """Return the angle about the last axis after which the tool sees h where it points."""
+    cosine = dot(goal.direction(across(axis, last)), seen)
+    sine = dot(goal.direction(cross(axis, last)), seen)
+    return noted_angle((cosine, sine), watch)
+
+
+def match(arm: Arm) -> Method | None:
+    """Return the method where axes 2, 3 and 4 are parallel, 1 is not, and the rest fits."""
+    count, lines = len(arm.lines), arm.lines
+    if not 4 <= count <= 6 or set(arm.kinds) != {"R"} or not parallel(*lines[1:4]) or parallel(*lines[:2]):
+        return None
+    reason, choices = "axes 2, 3 and 4 are parallel", ["shoulder", "elbow"]
+    point: Floats | None = (float(arm.home[0, 3]), float(arm.home[1, 3]), float(arm.home[2, 3]))
+    if count > 4 and parallel(lines[3], lines[4]):
+        return None
+    if count == 5:
+        point = lines[4].point
+        reason += " and axis 5 is not"
+    if count == 6:
+        if parallel(lines[4], lines[5]):
+            return None
+        point = meeting_point(lines[4], lines[5], arm.length)
+        choices.insert(1, "wrist")
+        reason += " and axes 5 and 6 meet"
+    if point is None:
+        return None
+    names: tuple[Choice, ...] = tuple(choices)  # type: ignore[arg-type]
+    return Method(_NAMES[count], _NAMES[count], names, reason, ThreeParallel(arm, point))

@@ -1,0 +1,80 @@
+"""Which turn of a joint is meant: angles are found modulo a full turn, limits and neighbours decide.
+
+A value counts as inside while it is within `limit * (1 + 1e-9) + 1e-12`, as everywhere.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trajcli.curves.piecewise import Array
+from trajcli.geometry.rotation import Flags
+from trajcli.kinematics.robot import Robot
+
+FULL = 2.0 * np.pi
+
+
+def widened(bounds: Array) -> Array:
+    """Return position limits (n, 2) with the tolerance of a limit added."""
+    room = np.where(np.isfinite(bounds), np.abs(bounds) * 1e-9 + 1e-12, 0.0)
+    return np.asarray(bounds + room * [-1.0, 1.0])
+
+
+def beyond(joints: Array, bounds: Array) -> Array:
+    """Return by how much joints (..., n) are outside their limits, negative below; zero inside."""
+    wide = widened(bounds)
+    over, under = joints - bounds[:, 1], joints - bounds[:, 0]
+    return np.where(joints > wide[:, 1], over, np.where(joints < wide[:, 0], under, 0.0))
+
+
+def revolute(robot: Robot) -> Flags:
+    """Return which joints turn, shape (n,)."""
+    return np.array([kind == "revolute" for kind in robot.joint_types])
+
+
+def choose_turns(robot: Robot, joints: Array, near: Array | None) -> None:
+    """Move revolute joints (K, n), in place, by full turns into their limits.
+
+    Of several turns inside the limits the one nearest to `near` (K, n), or to zero, is taken; of none the one
+    with the smallest excess.
+    """
+    wide = widened(robot.limits.position)
+    for i in np.flatnonzero(revolute(robot)):
+        low, high = wide[i]
+        values = joints[:, i]
+        if near is None:
+            rows = np.flatnonzero((values < low) | (values > high) | (np.abs(values) > np.pi))
+            aim = np.zeros(len(rows))
+        else:
+            rows, aim = np.arange(len(values)), near[:, i]
+        if len(rows):
+            values[rows] = _turned(values[rows], aim, low, high)
+
+
+def _turned(values: Array, aim: Array, low: float, high: float) -> Array:
+    first, last = np.ceil((low - values) / FULL), np.floor((high - values) / FULL)
+    wanted = np.round((aim - values) / FULL)
+    inside = np.minimum(np.maximum(wanted, first), last)
+    below, above = values + FULL * last, values + FULL * first
+    outside = np.where(low - below <= above - high, last, first)
+    with np.errstate(invalid="ignore"):
+        result: Array = values + FULL * np.where(first <= last, inside, outside)
+    return result
+
+
+def all_turns(robot: Robot, joints: Array) -> Array:
+    """Return one configuration (n,) with every choice of turns inside the limits, shape (choices, n).
+
+    A joint without limits keeps its value; so does one that no turn brings inside.
+    """
+    wide = widened(robot.limits.position)
+    choices = []
+    for i, turns in enumerate(revolute(robot)):
+        value = float(joints[i])
+        low, high = wide[i]
+        options = [value]
+        if turns and np.isfinite([low, high]).all():
+            steps = np.arange(np.ceil((low - value) / FULL), np.floor((high - value) / FULL) + 1)
+            options = [value + FULL * float(step) for step in steps] or options
+        choices.append(options)
+    return np.stack(np.meshgrid(*choices, indexing="ij"), axis=-1).reshape(-1, len(choices))

@@ -1,0 +1,147 @@
+"""Values by joint: one for all joints, a list, or a mapping by joint name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic.json_schema import JsonSchemaValue
+
+from trajcli.planners.reading import (
+    MAX_JOINTS,
+    SI,
+    FieldType,
+    Flaw,
+    FlawError,
+    Number,
+    Path,
+    ReadingContext,
+    shown,
+    written_number,
+)
+from trajcli.units import Quantity
+
+
+def read_per_joint(
+    value: Any,  # noqa: ANN401
+    context: ReadingContext,
+    read_one: Callable[[Any, int], Any],
+    missing: Any = ...,  # noqa: ANN401
+) -> tuple[Any, ...]:
+    """Return one value for each joint from one for all, a list, or a mapping by joint name.
+
+    Args:
+        value: As it stands in the file.
+        context: Which joints there are.
+        read_one: Reads the value of the joint with the given index.
+        missing: What a mapping leaves out; without it, leaving one out is a flaw.
+
+    Raises:
+        FlawError: With every flaw that was found.
+    """
+    names = context.joint_names
+    items: dict[int, tuple[str | int | None, Any]]
+    if isinstance(value, Mapping):
+        items = _named_items(value, names)
+    elif isinstance(value, list | tuple):
+        items = {i: (i, item) for i, item in enumerate(value)}
+        if names is not None and len(value) != len(names):
+            raise FlawError(
+                f"expected {len(names)} values, one for each joint, got {len(value)}", hint=_listed(names)
+            )
+    elif names is None and context is SI:
+        raise FlawError(f"expected a list with one value for each joint, got {shown(value)}")
+    else:
+        items = dict.fromkeys(range(len(names or ("",))), (None, value))
+    return _read_items(items, names, read_one, missing)
+
+
+def _listed(names: Sequence[str]) -> str:
+    return f"the joints are {', '.join(names)}"
+
+
+def _named_items(
+    value: Mapping[str, Any], names: tuple[str, ...] | None
+) -> dict[int, tuple[str | int | None, Any]]:
+    if names is None:
+        return {i: (name, item) for i, (name, item) in enumerate(value.items())}
+    unknown: list[Flaw] = [
+        ((n,), f"the robot has no joint '{n}'", _listed(names)) for n in value if n not in names
+    ]
+    if unknown:
+        raise _flawed(unknown)
+    return {names.index(name): (name, item) for name, item in value.items()}
+
+
+def _read_items(
+    items: Mapping[int, tuple[str | int | None, Any]],
+    names: tuple[str, ...] | None,
+    read_one: Callable[[Any, int], Any],
+    missing: Any,  # noqa: ANN401
+) -> tuple[Any, ...]:
+    count = len(names) if names is not None else len(items)
+    lacking = [index for index in range(count) if index not in items]
+    if lacking and missing is ...:
+        listed = ", ".join((names or ())[index] for index in lacking)
+        raise FlawError(f"no value for {listed}", hint="name every joint, or give a list")
+    values: list[Any] = [missing] * count
+    flaws: list[Flaw] = []
+    for index, (key, item) in items.items():
+        try:
+            values[index] = read_one(item, index)
+        except FlawError as error:
+            prefix: Path = () if key is None else (key,)
+            flaws += [((*prefix, *path), text, hint) for path, text, hint in error.flaws]
+            if key is None:
+                break
+    if flaws:
+        raise _flawed(flaws)
+    return tuple(values)
+
+
+def _flawed(flaws: list[Flaw]) -> FlawError:
+    error = FlawError("; ".join(flaw[1] for flaw in flaws))
+    error.flaws = flaws
+    return error
+
+
+@dataclass(frozen=True)
+class PerJoint(FieldType):
+    """A joint value or one of its time derivatives, for each joint.
+
+    Attributes:
+        order: 0 for a position, 1 to 3 for its derivatives.
+        description: For the JSON schema.
+        zero_missing: Whether joints that a mapping leaves out are zero.
+        above: Each value must be above this, SI.
+    """
+
+    order: int
+    description: str
+    zero_missing: bool = False
+    above: float | None = None
+
+    def read(self, value: Any, context: ReadingContext) -> tuple[float, ...]:  # noqa: ANN401
+        """Return one number for each joint, in SI."""
+
+        def read_one(item: Any, joint: int) -> float:  # noqa: ANN401
+            number = Number(context.joint_quantity(joint, self.order), self.description, above=self.above)
+            return number.read(item, context)
+
+        return read_per_joint(value, context, read_one, 0.0 if self.zero_missing else ...)
+
+    def write(self, value: tuple[float, ...], context: ReadingContext) -> list[float | str]:
+        """Return a list with the SI unit of each joint."""
+        return [written_number(v, context.joint_quantity(i, self.order)) for i, v in enumerate(value)]
+
+    def json_schema(self) -> JsonSchemaValue:
+        """Return the schema of one value for all joints, a list, or a mapping by joint name."""
+        one = Number(Quantity("angle", self.order), self.description, above=self.above).json_schema()
+        return per_joint_schema(one)
+
+
+def per_joint_schema(one: JsonSchemaValue) -> JsonSchemaValue:
+    """Return the schema of `one` for all joints, a list, or a mapping by joint name."""
+    listed = {"type": "array", "items": one, "minItems": 1, "maxItems": MAX_JOINTS}
+    return {"anyOf": [one, listed, {"type": "object", "additionalProperties": one}]}
