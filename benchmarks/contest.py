@@ -16,12 +16,13 @@ from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 REPEATS = 5
 ROOT = Path(__file__).parent.parent
 NO_PEERS = "no environment with peers"
 
+_ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 _KILOBYTE = 1 if sys.platform == "darwin" else 1024  # unit of ru_maxrss, bytes
 
 
@@ -47,6 +48,12 @@ class Runs:
     peaks: list[float] = field(default_factory=list)
     skipped: str | None = None
 
+    def add(self, seconds: float, peak: float | None) -> None:
+        """Count one run."""
+        self.seconds.append(seconds)
+        if peak is not None:
+            self.peaks.append(peak)
+
 
 class Contestant(Protocol):
     """Something that can be run again and again."""
@@ -60,7 +67,7 @@ class Contestant(Protocol):
         """Return the duration of one run, s, and its peak memory, bytes."""
 
     def numbers(self) -> list[float]:
-        """Return numbers that must be the same for all contestants; none where there is nothing to compare."""
+        """Return numbers that must be the same for all contestants; none where nothing can be compared."""
 
 
 @dataclass
@@ -106,13 +113,13 @@ class Command:
 
     def _start(self, **streams: object) -> subprocess.Popen[bytes]:
         try:
-            return subprocess.Popen(list(self.arguments), cwd=ROOT, **streams)
+            return subprocess.Popen(list(self.arguments), cwd=ROOT, env=_environment(), **streams)
         except OSError as error:
-            raise _failure(self.peer)(f"{self.arguments[0]}: {error.strerror}") from error
+            raise _failure(self.peer, b"", f"{self.arguments[0]}: {error.strerror}") from error
 
     def _require(self, code: int, complaints: bytes) -> None:
         if code:
-            raise _failure(self.peer)(_last_line(complaints) or f"exit code {code}")
+            raise _failure(self.peer, complaints, f"exit code {code}")
 
 
 @dataclass
@@ -135,20 +142,19 @@ class Function:
         """Start the process, and wait until it has prepared itself."""
         if self.python is None:
             raise PeerError(NO_PEERS)
-        self._complaints = stack.enter_context(tempfile.TemporaryFile())
-        one_thread = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+        self._complaints = stack.enter_context(tempfile.TemporaryFile())  # noqa: SIM115
         try:
             self._process = subprocess.Popen(
                 [self.python, "-m", "benchmarks.worker", self.module, self.name],
                 cwd=ROOT,
-                env={**os.environ, **one_thread},
+                env=_environment() | _ONE_THREAD,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=self._complaints,
                 text=True,
             )
         except OSError as error:
-            raise _failure(self.peer)(f"{self.python}: {error.strerror}") from error
+            raise _failure(self.peer, b"", f"{self.python}: {error.strerror}") from error
         stack.callback(self._close)
 
     def run(self) -> tuple[float, float | None]:
@@ -159,7 +165,7 @@ class Function:
         """Return some of the numbers that the function makes."""
         return list(map(float, self._ask("numbers")))
 
-    def _ask(self, word: str):
+    def _ask(self, word: str) -> Any:
         with suppress(BrokenPipeError):
             self._process.stdin.write(word + "\n")
             self._process.stdin.flush()
@@ -168,7 +174,7 @@ class Function:
                 return json.loads(answer)
         self._process.wait()
         self._complaints.seek(0)
-        raise _failure(self.peer)(_last_line(self._complaints.read()) or "it ended without a word")
+        raise _failure(self.peer, self._complaints.read(), "it ended without a word")
 
     def _close(self) -> None:
         with suppress(BrokenPipeError):
@@ -201,25 +207,31 @@ def compete(contestants: dict[str, Contestant], repeats: int = REPEATS) -> dict[
             _require_equal(numbers, expected, name)
             left[name] = contestant
         for _ in range(repeats):
-            for name, contestant in left.items():
-                seconds, peak = contestant.run()
-                results[name].seconds.append(seconds)
-                results[name].peaks += [] if peak is None else [peak]
+            for name, contestant in list(left.items()):
+                try:
+                    results[name].add(*contestant.run())
+                except PeerError as error:
+                    results[name] = Runs(skipped=str(error))
+                    del left[name]
     return results
+
+
+def _environment() -> dict[str, str]:
+    """Return the environment of a child: without byte code ours would be compiled anew in each run."""
+    return {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
 
 
 def _require_equal(numbers: Sequence[float], expected: Sequence[float], name: str) -> None:
     if not numbers:
         return
+    if len(numbers) != len(expected):
+        raise ContestError(f"{name} makes {len(numbers)} numbers where the first makes {len(expected)}")
     worst = max(abs(a - b) for a, b in zip(numbers, expected, strict=True))
     if not worst <= 2e-9:  # two roundings to nine decimals
         raise ContestError(f"{name} does not compute the same: the numbers differ by {worst:.3g}")
 
 
-def _failure(peer: bool) -> type[ContestError]:
-    return PeerError if peer else ContestError
-
-
-def _last_line(text: bytes) -> str:
-    lines = text.decode(errors="replace").split("\n")
-    return next((line.strip() for line in reversed(lines) if line.strip()), "")
+def _failure(peer: bool, complaints: bytes, otherwise: str) -> ContestError:
+    """Return the error of a contestant: of a peer the last line says enough, of ours all is wanted."""
+    text = complaints.decode(errors="replace").strip() or otherwise
+    return PeerError(text.splitlines()[-1].strip()) if peer else ContestError(text)

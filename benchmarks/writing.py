@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import sys
+from pathlib import Path
 
 from benchmarks.contest import ROOT, Command, Function, compete
 from benchmarks.figures import MEGABYTE, Figure
@@ -23,7 +24,7 @@ def writer():
     blocks = [rows[low : low + SIZE] for low in range(0, ROWS, SIZE)]
 
     def run():
-        with open(os.devnull, "wb") as out:
+        with Path(os.devnull).open("wb") as out:
             write_csv(blocks, NAMES, out)
 
     def numbers(_):
@@ -42,7 +43,7 @@ def savetxt():
     options = {"fmt": "%.9f", "delimiter": ",", "header": ",".join(NAMES), "comments": ""}
 
     def run():
-        with open(os.devnull, "wb") as out:
+        with Path(os.devnull).open("wb") as out:
             np.savetxt(out, rows, **options)
 
     def numbers(_):

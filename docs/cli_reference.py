@@ -49,7 +49,8 @@ class CommandParameter:
         value = self.info.metavar or "|".join(self.choices)
         if isinstance(self.info, ArgumentInfo):
             return f"`{value if self.info.metavar else self.name.upper()}`"
-        names = sorted(self.info.param_decls or (), key=len, reverse=True)
+        # inside Annotated, typer takes the first name for what used to be the default
+        names = sorted(map(str, [self.info.default, *(self.info.param_decls or ())]), key=len)
         return f"`{', '.join(names)}{f' {value}' if value else ''}`"
 
     @property
@@ -83,7 +84,8 @@ def cli_reference() -> str:
 
 
 def _callback(command: Any) -> Callable[..., Any]:  # noqa: ANN401
-    return unwrap(command.callback)
+    callback: Callable[..., Any] = unwrap(command.callback)
+    return callback
 
 
 def _command(function: Callable[..., Any]) -> Iterator[str]:
@@ -102,7 +104,9 @@ def _command(function: Callable[..., Any]) -> Iterator[str]:
 
 def _help(item: CommandParameter) -> str:
     several = isinstance(item.default, list)
-    choices = f" One of {', '.join(item.choices)}." if item.choices and not item.info.param_decls else ""
+    choices = (
+        f" One of {', '.join(item.choices)}." if item.choices and isinstance(item.info, ArgumentInfo) else ""
+    )
     return f"{item.info.help}{choices}{' May stand several times.' if several else ''}"
 
 

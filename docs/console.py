@@ -1,8 +1,8 @@
 """The ```console blocks of a document: run as they stand, in the folder that its ```yaml blocks describe.
 
-A line that begins with `$ ` is a command for bash; what follows is its output, standard error included. A line
-`...` of the output stands for any number of lines. A command must succeed; one that shall not says `; echo $?`.
-Blocks that set up the project itself, with make, git, pip or python, are not run.
+A line that begins with `$ ` is a command for bash; what follows is its output, standard error included.
+A line `...` of the output stands for any number of lines. A command must succeed; one that shall not says
+`; echo $?`. Blocks that set up the project itself, with make, git or pip, are not run.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pathlib import Path
 
 from docs.markdown import ROOT, Block, blocks
 
-_SET_UP = ("make", "git", "pip", "python", ".venv")
+_SET_UP = ("make", "git", "pip")
 _PROMPT = "$ "
 _ANYTHING = "..."
 _SECONDS = 60

@@ -112,7 +112,7 @@ def _type_form(annotation: Any) -> str:  # noqa: ANN401
     if origin is Literal:
         return " or ".join(f"`{arm}`" for arm in arms)
     if origin in (list, tuple):
-        return f"list of {_type_form(arms[0])}"
+        return f"list of {_type_form(arms[0])}".replace("number", "numbers")
     if origin is dict:
         return f"names, each with a {_type_form(arms[1])}"
     if origin in (Union, types.UnionType):

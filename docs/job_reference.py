@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Iterator
+from pathlib import Path
 
 import trajcli.units
 from docs.fields import field_table
-from docs.markdown import first_sentence, table
+from docs.markdown import ROOT, first_sentence, table
 from docs.planner_examples import EXAMPLES, LEFT_OUT, NOTES
 from trajcli.columns import GROUPS, Group
 from trajcli.job.load import read_document
@@ -70,8 +71,9 @@ zero.
 | `quat_wxyz` | unit quaternion, w first |
 | `matrix` | 3x3, or 4x4 with the position inside |
 | `axis_angle` | `{{axis: x, y, z or [x, y, z], angle}}` |
-| `euler` | `{{sequence, angles, frame}}`: one of {", ".join(SEQUENCES)}; three angles; axes `current` (default) or `fixed` |
-"""
+| `euler` | `{{sequence, angles, frame}}`: three angles about `current` axes (the default) or `fixed` ones |
+
+The sequences of Euler angles are {", ".join(SEQUENCES)}."""
 
 _MOVES = """\
 Each move starts in the state in which the one before it ended: position and velocity, and the
@@ -109,7 +111,7 @@ def job_reference() -> str:
     parts += ["## Limits", _LIMITS, field_table(LimitsSpec)]
     parts += ["### Scale", first_sentence(Scale.__doc__), field_table(Scale), "### Bounds", _BOUNDS]
     parts += ["## Robot", _ROBOT, field_table(RobotModel)]
-    parts += ["### Joints", _JOINTS, field_table(JointModel), "### Poses", _POSES.rstrip()]
+    parts += ["### Joints", _JOINTS, field_table(JointModel), "### Poses", _POSES]
     parts += ["### Catalogue", _catalogue()]
     parts += ["## Moves", _MOVES.rstrip(), _common_fields()]
     for tag, planner in PLANNERS.items():
@@ -142,6 +144,20 @@ def _planner(tag: str, planner: type[Planner]) -> Iterator[str]:
     if source:
         yield f"Source: {' '.join(source.split())}"
     yield f"```yaml\n{EXAMPLES[tag]}```"
+    used = [f"[{path.name}](../examples/{path.name})" for path in _examples_of(tag)]
+    yield f"Used in {', '.join(used)}."
+
+
+def _examples_of(tag: str) -> list[Path]:
+    """Return the examples with a move of a planner; each planner has one."""
+    found = [
+        path
+        for path in sorted((ROOT / "examples").glob("*.yaml"))
+        if any(move["planner"] == tag for move in read_document(str(path)).plain()["moves"])
+    ]
+    if not found:
+        raise RuntimeError(f"there is no example of the planner {tag} in examples/")
+    return found
 
 
 def _continuity(planner: type[Planner]) -> str:

@@ -52,8 +52,9 @@ With `synchronize: time` one law moves all joints, so the path is a straight lin
 `synchronize: none` each joint has its own ramps and arrives by itself.""",
     "jerk_limited": """\
 `to` may leave `joints` out: `{velocity: 0}` stops the arm as fast as the limits allow, `{velocity: 30}`
-is a run-up. A joint that moves needs limits on velocity, acceleration and jerk; `null` says unlimited
-on purpose. Where a joint cannot last just the common time, the time is raised to the next one that all
-joints can.""",
+is a run-up. Joints that move need limits on velocity, acceleration and jerk (a stop needs none on
+velocity). With `synchronize: time` all joints arrive together, in the shortest time in which every one
+of them can; with `phase` they follow one law and the path is a straight line in joint space, which the
+velocities and accelerations of start and target must not leave; with `none` each arrives by itself.""",
     "hold": "It starts and ends at rest; a start that moves is refused (exit 3).",
 }

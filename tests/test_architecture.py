@@ -79,12 +79,11 @@ def imports_of_file(path: Path, *, inside: bool = True) -> list[tuple[str, int]]
 
 
 def room_of(name: str) -> str:
-    """Return the package (or top-level module) below trajcli that a file, or an absolute import, belongs to."""
-    first = name.split("/")[0] if name.endswith(".py") else (name.split(".") + [""])[1]
-    if name.endswith(".py"):
-        first = first.removesuffix(".py")
-        return "" if first == "__init__" else first
-    return first
+    """Return the package (or top-level module) below trajcli of a file, or of an absolute import."""
+    if not name.endswith(".py"):
+        return [*name.split("."), ""][1]
+    first = name.split("/", maxsplit=1)[0].removesuffix(".py")
+    return "" if first == "__init__" else first
 
 
 def is_package(room: str) -> bool:
@@ -220,7 +219,16 @@ def modules_after(*arguments: str) -> set[str]:
 
 def test_help_imports_no_numbers() -> None:
     modules = modules_after("--help")
-    assert not modules & {"numpy", "scipy", "pydantic", "pydantic_core", "ruckig", "toppra", "matplotlib", "yaml"}
+    assert not modules & {
+        "numpy",
+        "scipy",
+        "pydantic",
+        "pydantic_core",
+        "ruckig",
+        "toppra",
+        "matplotlib",
+        "yaml",
+    }
 
 
 def test_a_small_plan_imports_nothing_heavy() -> None:

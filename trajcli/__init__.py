@@ -1,3 +1,119 @@
-"""Trajectory planning for serial robots: a YAML job in, a verified sample stream out."""
+"""Trajectory planning for serial robots: a YAML job in, a verified sample stream out.
+
+What the command line does, from Python:
+
+    import trajcli
+
+    plan = trajcli.plan_job(trajcli.load_job("job.yaml"))
+    if not plan.verdict.passed:
+        raise trajcli.verification_error(plan)
+    q = plan.trajectory.curve.evaluate([0.0, 0.5, 1.0])  # shape (3, n), rad or m
+    qd = plan.trajectory.curve.evaluate([0.0, 0.5, 1.0], order=1)
+
+All numbers are SI: rad, m, s. Importing this module costs nothing: each name is loaded when it is first used.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from trajcli.checks.finding import Finding
+    from trajcli.checks.verify import Verdict
+    from trajcli.curves.piecewise import PiecewisePolynomial
+    from trajcli.errors import (
+        FileError,
+        InputError,
+        MissingLimitError,
+        Place,
+        PlanningError,
+        Problem,
+        TrajcliError,
+        VerificationError,
+    )
+    from trajcli.job.dump import dump_job
+    from trajcli.job.model import Job
+    from trajcli.job.read import LoadedJob, job_from_text, load_job
+    from trajcli.job.report import Report
+    from trajcli.job.robot_source import catalogue_names, load_robot
+    from trajcli.kinematics.robot import Joint, Limits, Robot
+    from trajcli.pipeline.plan import Plan, plan_job
+    from trajcli.pipeline.report import report_of, verification_error
+    from trajcli.pipeline.write import write_plan
+    from trajcli.trajectory import State, Trajectory
 
 __version__ = "0.1.0"
+
+_HOMES = {
+    "trajcli.checks.finding": ("Finding",),
+    "trajcli.checks.verify": ("Verdict",),
+    "trajcli.curves.piecewise": ("PiecewisePolynomial",),
+    "trajcli.errors": (
+        "FileError",
+        "InputError",
+        "MissingLimitError",
+        "Place",
+        "PlanningError",
+        "Problem",
+        "TrajcliError",
+        "VerificationError",
+    ),
+    "trajcli.job.dump": ("dump_job",),
+    "trajcli.job.model": ("Job",),
+    "trajcli.job.read": ("LoadedJob", "job_from_text", "load_job"),
+    "trajcli.job.report": ("Report",),
+    "trajcli.job.robot_source": ("catalogue_names", "load_robot"),
+    "trajcli.kinematics.robot": ("Joint", "Limits", "Robot"),
+    "trajcli.pipeline.plan": ("Plan", "plan_job"),
+    "trajcli.pipeline.report": ("report_of", "verification_error"),
+    "trajcli.pipeline.write": ("write_plan",),
+    "trajcli.trajectory": ("State", "Trajectory"),
+}
+_MODULES = {name: module for module, names in _HOMES.items() for name in names}
+
+__all__ = [
+    "FileError",
+    "Finding",
+    "InputError",
+    "Job",
+    "Joint",
+    "Limits",
+    "LoadedJob",
+    "MissingLimitError",
+    "PiecewisePolynomial",
+    "Place",
+    "Plan",
+    "PlanningError",
+    "Problem",
+    "Report",
+    "Robot",
+    "State",
+    "TrajcliError",
+    "Trajectory",
+    "Verdict",
+    "VerificationError",
+    "__version__",
+    "catalogue_names",
+    "dump_job",
+    "job_from_text",
+    "load_job",
+    "load_robot",
+    "plan_job",
+    "report_of",
+    "verification_error",
+    "write_plan",
+]
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401
+    if name not in _MODULES:
+        raise AttributeError(f"module 'trajcli' has no attribute '{name}'")
+    from importlib import import_module
+
+    value = getattr(import_module(_MODULES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

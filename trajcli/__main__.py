@@ -8,10 +8,9 @@ import sys
 
 def main() -> None:
     """Run the command line."""
-    # One thread is faster for arrays this small, and starts faster; whoever asks for more gets them.
+    # One BLAS thread is faster for arrays this small, and starts faster; whoever asks for more gets them.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    # pydantic asks the machine for plugins each time it starts; there are none here.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     if sys.argv[1:] == ["--version"]:  # typer would import pydantic to read an option of its own
         from trajcli import __version__
@@ -19,7 +18,9 @@ def main() -> None:
         print(f"trajcli {__version__}")  # noqa: T201
         return
     from trajcli.cli.app import app
+    from trajcli.cli.metadata_later import load_metadata_later
 
+    load_metadata_later()
     app()
 
 

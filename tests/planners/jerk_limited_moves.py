@@ -80,7 +80,7 @@ def drift(curve, joint):
         p, v, a = p + v * t + a * t**2 / 2 + j * t**3 / 6, v + a * t + j * t**2 / 2, a + j * t
     scale = np.where(peaks(curve) > 0, peaks(curve), 1.0)[:, joint]
     ends = [curve.piece_ends(order)[1][-1, joint] for order in (0, 1, 2)]
-    # an acceleration off by rounding moves the rest of the motion
+    # an acceleration that is off by rounding moves the rest of the motion
     scale[1] = max(scale[1], scale[2] * curve.duration)
     scale[0] = max(scale[0], scale[1] * curve.duration)
     return [abs(float(x) - y) / s for x, y, s in zip((p, v, a), ends, scale[:3], strict=True)]

@@ -154,7 +154,9 @@ def test_trapezoid_212(case: Case) -> None:
     close(lengths(plan)["accelerate"], expected["tc"], case)
     close(lengths(plan)["decelerate"], expected["tc"], case)
     close(2 * coefficients_of_first_piece(plan)[2], expected["acceleration"], case)
-    velocities = [plan.trajectory.curve.evaluate(expected["tc"], 1, side=side)[0] for side in ("left", "right")]
+    velocities = [
+        plan.trajectory.curve.evaluate(expected["tc"], 1, side=side)[0] for side in ("left", "right")
+    ]
     close(np.array(velocities) / unit(case), expected["cruise_velocity"], case)
 
 

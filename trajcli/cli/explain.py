@@ -6,12 +6,14 @@ import json
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from trajcli.job.read import read_job
-from trajcli.pipeline.explain import closed_form, explanation, polynomial_text, stretches_of
+from trajcli.job.read import load_job
+from trajcli.pipeline.explain import closed_form, explanation, stretches_of
 from trajcli.pipeline.plan import Plan, plan_job
 from trajcli.streams.whole_file import standard_output
 
 _SYMBOLS = {"position": "q", "velocity": "qd", "acceleration": "qdd", "jerk": "qddd"}
+_ROUNDING = 1e-12
+_TIME_DECIMALS = 12
 
 
 def run_explain(job: str, overrides: Sequence[str], *, as_json: bool) -> int:
@@ -21,7 +23,7 @@ def run_explain(job: str, overrides: Sequence[str], *, as_json: bool) -> int:
         VerificationError: After printing, when the trajectory breaks a limit.
         TrajcliError: When there is nothing to explain.
     """
-    plan = plan_job(read_job(job, overrides))
+    plan = plan_job(load_job(job, overrides))
     told = explanation(plan)
     text = json.dumps(told, indent=2, ensure_ascii=False) if as_json else "\n".join(_lines(plan, told))
     with standard_output() as out:
@@ -36,7 +38,9 @@ def run_explain(job: str, overrides: Sequence[str], *, as_json: bool) -> int:
 def _lines(plan: Plan, told: dict[str, Any]) -> Iterator[str]:
     units = told["units"]
     joints = ", ".join(f"q{i} = {name}" for i, name in enumerate(told["joints"], 1) if name != f"j{i}")
-    yield f"{told['job']} on {told['robot']}: {len(told['moves'])} moves, {told['duration']:.10g} s"
+    count = len(told["moves"])
+    moves = f"{count} move{'s' * (count != 1)}"
+    yield f"{told['job']} on {told['robot']}: {moves}, {told['duration']:.10g} s"
     yield f"angles in {units['angle']}, lengths in {units['length']}, t in s from the start of each move" + (
         f"; {joints}" if joints else ""
     )
@@ -63,7 +67,7 @@ def _polynomials(plan: Plan, index: int) -> Iterator[str]:
     for number, rows in enumerate(stretches_of(move, units), 1):
         for row in rows:
             when = f"{row.start:.10g} <= t <= {row.end:.10g}: " if len(rows) > 1 else ""
-            yield f"  {when}q{number}(t) = {polynomial_text(row.absolute)}"
+            yield f"  {when}q{number}(t) = {row.text}"
 
 
 def _phases(move: dict[str, Any]) -> Iterator[str]:
@@ -84,20 +88,26 @@ def _peaks(move: dict[str, Any]) -> Iterator[str]:
     for peak in move["peaks"]:
         if peak["low"] == peak["high"] == 0 and peak["quantity"] != "position":
             continue
-        low, high = peak["limit"]
-        limit = "no limit" if low is None and high is None else f"limits {_bound(low)} .. {_bound(high)}"
-        used = (
-            f", {100 * peak['used']:.4g} % used"
-            if peak["used"] is not None and peak["quantity"] != "position"
-            else ""
-        )
-        ends = (
-            f"{peak['low']:.9g} (t = {peak['low_time'] - move['start']:.6g}) .. "
-            if peak["low"] != peak["high"]
-            else ""
-        )
-        ends += f"{peak['high']:.9g} (t = {peak['high_time'] - move['start']:.6g})"
-        yield f"    {peak['joint']} {_SYMBOLS[peak['quantity']]}: {ends} {peak['unit']}; {limit}{used}"
+        symbol = _SYMBOLS[peak["quantity"]]
+        yield f"    {peak['joint']} {symbol}: {_extent(peak, move['start'])} {peak['unit']}; {_limit(peak)}"
+
+
+def _extent(peak: dict[str, Any], start: float) -> str:
+    """Return the extremes with their times in the move; what is nothing beside the other one is rounding."""
+    size = max(abs(peak["low"]), abs(peak["high"]))
+    said = []
+    for end in ("low", "high"):
+        value = peak[end] if abs(peak[end]) > _ROUNDING * size else 0.0
+        said.append(f"{value:.9g} (t = {round(peak[f'{end}_time'] - start, _TIME_DECIMALS):.6g})")
+    return said[0] if peak["low"] == peak["high"] else " .. ".join(said)
+
+
+def _limit(peak: dict[str, Any]) -> str:
+    low, high = peak["limit"]
+    if low is None and high is None:
+        return "no limit"
+    tells = peak["used"] is not None and peak["quantity"] != "position"
+    return f"limits {_bound(low)} .. {_bound(high)}" + (f", {100 * peak['used']:.4g} % used" if tells else "")
 
 
 def _bound(bound: float | None) -> str:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from trajcli.errors import InputError, Problem, VerificationError
-from trajcli.job.read import LoadedJob, read_job
+from trajcli.job.read import LoadedJob, load_job
 from trajcli.pipeline.plan import Plan, plan_job
 from trajcli.pipeline.write import check_output_name, grid_of, write_rows, write_text
 from trajcli.planners.planner import Event
@@ -37,7 +37,7 @@ def run_plan(job: str, overrides: Sequence[str], options: PlanOptions) -> int:
         TrajcliError: When anything is wrong; then no rows were written.
     """
     _check_options(options)
-    loaded = read_job(job, overrides, rate=options.rate)
+    loaded = load_job(job, overrides, rate=options.rate)
     if options.resolved is not None:
         _write_resolved(loaded, options.resolved)
     plan = plan_job(loaded)

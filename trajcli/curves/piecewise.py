@@ -48,7 +48,7 @@ class PiecewisePolynomial:
             )
         if not (np.isfinite(breaks).all() and np.isfinite(coefficients).all()):
             raise ValueError("breaks and coefficients must be finite")
-        if breaks.size > 2 and not (np.diff(breaks) > 0).all() or breaks[-1] < breaks[0]:
+        if (breaks.size > 2 and not (np.diff(breaks) > 0).all()) or breaks[-1] < breaks[0]:
             raise ValueError("breaks must strictly increase")
         object.__setattr__(self, "breaks", breaks)
         object.__setattr__(self, "coefficients", coefficients)

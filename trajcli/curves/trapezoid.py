@@ -1,12 +1,12 @@
 """Trapezoidal velocity profiles of one variable: bounded speed and acceleration, given boundary velocities.
 
-Along the displacement, with boundary speeds w0, w1 >= 0, cruise speed V, and ramps of rate a (speeding up) and d
-(slowing down), the motion covers D = V T - (V - w0)^2 / (2 a) - (V - w1)^2 / (2 d) in T = (V - w0)/a + (V - w1)/d +
-cruise. What runs away from the target at the start, or must run up from behind it at the end, is a ramp from or
-to rest before or after that.
+Along the displacement, with boundary speeds w0, w1 >= 0, cruise speed V, and ramps of rate a (speeding up)
+and d (slowing down), the motion covers D = V T - (V - w0)^2 / (2 a) - (V - w1)^2 / (2 d) in the time
+T = (V - w0)/a + (V - w1)/d + cruise. What runs away from the target at the start, or must run up from
+behind it at the end, is a ramp to or from rest before or after that.
 
-Source: Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), sections 3.2 and
-3.2.7; Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.2.1.
+Source: Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), sections 3.2
+and 3.2.7; Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.2.1.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ class InfeasibleProfileError(ValueError):
     """No profile exists.
 
     Attributes:
-        reason: "too_fast" (cannot stop in time), "too_slow" (cannot reach the final speed in time), "turns" (ends
-            against its direction), "speed" or "acceleration" (outside the interval), "duration" (too short or long).
+        reason: "too_fast" (cannot stop in time), "too_slow" (cannot reach the final speed in time), "turns"
+            (ends against its direction), "speed", "acceleration" or "duration" (outside the interval).
         low: The number must be above this (or at least this, for accelerations and durations).
         high: The number must be at most this.
     """
@@ -71,8 +71,8 @@ def profile_of_duration(
     `backward` are not used. Other arguments are those of `fastest_profile`.
 
     Raises:
-        InfeasibleProfileError: As `fastest_profile`; "acceleration" with the least one when from rest to rest equal
-            ramps are too flat; else "duration" with the shortest and the longest.
+        InfeasibleProfileError: As `fastest_profile`; "acceleration" with the least one when from rest to rest
+            equal ramps are too flat; else "duration" with the shortest and the longest.
     """
     way = _way(distance, initial, final, forward, backward, overshoot=overshoot)
     around = way.before.duration + way.after.duration
@@ -122,7 +122,7 @@ def profile_of_speed(
 def _speeds_of_duration(
     distance: float, initial: float, final: float, duration: float, deceleration: float | None
 ) -> tuple[float, float]:
-    """Return the interval of cruise speeds of `profile_of_speed`: infinitely steep ramps to no cruise at all."""
+    """Return the interval of speeds of `profile_of_speed`, from infinitely steep ramps to no cruise."""
     mean = distance / duration
     if deceleration is None:
         return mean, mean + math.hypot(mean - initial, mean - final) / math.sqrt(2)
@@ -216,7 +216,7 @@ def _fastest_middle(way: _Way) -> Profile:
 
 
 def _middle_of_duration(way: _Way, duration: float) -> Profile | None:
-    """Return the middle that lasts `duration`, or None; the four cases are cruise speeds above or below the ends."""
+    """Return the middle that lasts `duration`, or None; a ramp may lead up to the cruise or down to it."""
     if way.distance == 0:
         return Profile(0.0, ((duration, 0.0),)) if way.initial == 0 and duration >= 0 else None
     if duration <= 0:
@@ -237,7 +237,7 @@ def _middle_of_duration(way: _Way, duration: float) -> Profile | None:
 
 
 def _lowest_speed(way: _Way) -> float:
-    """Return the speed at which slowing down at once meets speeding up at last; 0 where there is time to stop."""
+    """Return where slowing down at once meets speeding up at the end; 0 where there is time to stop."""
     a, d = way.rates.acceleration, way.rates.deceleration
     square = (way.initial**2 / d + way.final**2 / a - 2 * way.distance) * a * d / (a + d)
     return math.sqrt(max(0.0, square))

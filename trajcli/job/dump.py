@@ -56,18 +56,24 @@ def _without_empty(value: Any) -> Any:  # noqa: ANN401
     return {key: item for key, item in kept.items() if item != {}}
 
 
-def _block(mapping: Mapping[str, Any], indent: str = "", depth: int = 2) -> Iterator[str]:
-    """Yield the lines of a mapping: its upper levels as blocks, one line for what is deeper."""
+def _block(mapping: Mapping[str, Any], indent: str = "") -> Iterator[str]:
+    """Yield the lines of a mapping: a line for each value that holds no further mappings."""
     for key, value in mapping.items():
-        name = f"{indent}{_key(key)}:"
-        if depth and isinstance(value, Mapping) and any(isinstance(v, dict | list) for v in value.values()):
+        name, deeper = f"{indent}{_key(key)}:", indent + "  "
+        if isinstance(value, Mapping) and any(map(_holds_mappings, value.values())):
             yield name
-            yield from _block(value, indent + "  ", depth - 1)
-        elif isinstance(value, list) and value and isinstance(value[0], dict):
+            yield from _block(value, deeper)
+        elif isinstance(value, list) and _holds_mappings(value):
             yield name
-            yield from (f"{indent}  - {_flow(item)}" for item in value)
+            yield from (f"{deeper}- {_flow(item)}" for item in value)
         else:
             yield f"{name} {_flow(value)}"
+
+
+def _holds_mappings(value: object) -> bool:
+    return isinstance(value, Mapping) or (
+        isinstance(value, list) and bool(value) and isinstance(value[0], Mapping)
+    )
 
 
 def _flow(value: Any) -> str:  # noqa: ANN401

@@ -25,7 +25,6 @@ from trajcli.errors import InputError, Problem
 from trajcli.job.document import Document, Node, place
 from trajcli.job.scalars import ScalarError, resolve
 from trajcli.job.source import STDIN, check_characters, decode, read_bytes, split_lines, tab_problem
-from trajcli.job.syntax import spaced, syntax_problem
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -122,6 +121,8 @@ class _Walk:
             pass
         except yaml.YAMLError as error:
             if tabs is None:  # else they are the cause, or as likely as any other
+                from trajcli.job.syntax import syntax_problem
+
                 self.problems.append(syntax_problem(error, self.file, self.lines))
         return None
 
@@ -213,6 +214,8 @@ class _Walk:
         if key.text == "<<":
             message, hint = "merge keys are not read", _REPEATED
         elif glued and (value.line, value.column) == (key.line, key.column + key.length):
+            from trajcli.job.syntax import spaced
+
             message, hint = f"no space after the colon in '{name}'", spaced(str(name))
         elif isinstance(name, str):
             return name

@@ -84,7 +84,8 @@ def _text(kind: str, context: Mapping[str, Any], value: object) -> tuple[str, st
         return "a move needs `planner`", valid_names(PLANNERS)
     if kind == "literal_error":
         names = [word.strip().strip("'") for word in context["expected"].replace(" or ", ", ").split(",")]
-        hint = did_you_mean(str(value), names)
+        quoted = isinstance(value, str) and value in names  # "1" where 1 is meant
+        hint = f"write {value} without quotes" if quoted else did_you_mean(str(value), names)
         return f"expected {context['expected'].replace(chr(39), '')}, got {shown(value)}", hint
     if kind == "too_short":
         return f"the list is too short: expected at least {context['min_length']}", None

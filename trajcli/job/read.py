@@ -65,7 +65,7 @@ class LoadedJob:
         return self.document.place(("moves", index))
 
 
-def read_job(path: str | Path, overrides: Sequence[str] = (), *, rate: str | None = None) -> LoadedJob:
+def load_job(path: str | Path, overrides: Sequence[str] = (), *, rate: str | None = None) -> LoadedJob:
     """Return the job of a file; `-` is standard input.
 
     Args:

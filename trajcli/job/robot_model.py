@@ -134,9 +134,10 @@ def robot_as_mapping(robot: Robot) -> dict[str, Any]:
     described = robot.convention is not None
     keys = {"convention": robot.convention} if described else {}
     joints = [_joint_as_mapping(robot, index, described=described) for index in range(len(robot.joints))]
-    context = ReadingContext()
-    poses = {key: Pose("").write(getattr(robot, key), context) for key in ("base", "tool")}
-    return {"name": robot.name, **keys, "joints": joints, **poses}
+    poses = {key: getattr(robot, key) for key in ("base", "tool")}
+    turned = {key: pose for key, pose in poses.items() if not np.array_equal(pose, np.eye(4))}
+    written = {key: Pose("").write(pose, ReadingContext()) for key, pose in turned.items()}
+    return {"name": robot.name, **keys, "joints": joints, **written}
 
 
 def _joint_as_mapping(robot: Robot, index: int, *, described: bool) -> dict[str, Any]:

@@ -54,6 +54,21 @@ def find_robot(value: Any, document: Document, units: Units) -> Robot:  # noqa: 
     return _validated(value, document, ("robot",), units)
 
 
+def load_robot(name: str | Path) -> Robot:
+    """Return a robot of the catalogue by its name, or the robot of a file by its path.
+
+    Raises:
+        InputError: When the catalogue has no such robot, or with every flaw of the file.
+        FileError: When the file cannot be read.
+    """
+    names = catalogue_names()
+    if str(name) in names:
+        return read_robot_file(str(CATALOGUE / f"{name}.yaml"))
+    if isinstance(name, Path) or _looks_like_a_path(name):
+        return read_robot_file(str(name))
+    raise InputError(f"the catalogue has no robot '{name}'", hint=_suggestion(name, names))
+
+
 def read_robot_file(path: str) -> Robot:
     """Return the robot of a robot file, which has its own units.
 
@@ -83,10 +98,16 @@ def _from_catalogue(name: str, document: Document) -> Robot:
     names = catalogue_names()
     if name in names:
         return read_robot_file(str(CATALOGUE / f"{name}.yaml"))
-    hint = did_you_mean(name, names) or valid_names(names)
-    if "/" in name or name.endswith((".yaml", ".yml")):
-        hint = f"a file is named by {{file: {name}}}"
+    hint = f"a file is named by {{file: {name}}}" if _looks_like_a_path(name) else _suggestion(name, names)
     raise InputError(Problem(f"the catalogue has no robot '{name}'", hint, document.place(("robot",))))
+
+
+def _looks_like_a_path(name: str) -> bool:
+    return "/" in name or "\\" in name or name.endswith((".yaml", ".yml"))
+
+
+def _suggestion(name: str, names: list[str]) -> str | None:
+    return did_you_mean(name, names) or valid_names(names, "its robots")
 
 
 def _from_file_entry(value: Mapping[str, Any], document: Document) -> Robot:

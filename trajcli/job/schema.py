@@ -70,8 +70,8 @@ def _without_nulls(node: Any) -> Any:  # noqa: ANN401
     if not isinstance(node, dict):
         return node
     schema = {key: _without_nulls(value) for key, value in node.items()}
-    if schema.get("default", ...) in ([], [None, None]):
-        del schema["default"]
+    if isinstance(schema.get("default"), dict) or schema.get("default", ...) in ([], [None, None]):
+        del schema["default"]  # the parts of the value carry their own
     if schema.get("default", ...) is not None:
         return schema
     del schema["default"]

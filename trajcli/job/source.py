@@ -5,7 +5,6 @@ from __future__ import annotations
 import codecs
 import re
 import sys
-import unicodedata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,10 +18,9 @@ MAX_BYTES = 5_000_000
 STDIN = "<stdin>"
 
 _BREAK = re.compile(r"\r\n|\r|\n")
+_PLAIN = bytes([*b"\t\n\r", *range(0x20, 0x7F)])
 # What YAML calls printable, less what shows as nothing or ends lines for some programs only.
-_FORBIDDEN = re.compile(
-    "[^\t\n\r\x20-\x7e\xa0-\u2027\u202a-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]"
-)
+_FORBIDDEN = "[^\t\n\r\x20-\x7e\xa0-\u2027\u202a-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]"
 _WIDE_MARKS = (  # the marks of UTF-32 first: UTF-16's little-endian one is the beginning of theirs
     (codecs.BOM_UTF32_LE, "UTF-32"),
     (codecs.BOM_UTF32_BE, "UTF-32"),
@@ -110,8 +108,9 @@ def check_characters(text: str, file: str, lines: Sequence[str]) -> None:
     Raises:
         InputError: Naming the first of them, and how many there are.
     """
-    if not text.isascii() or _FORBIDDEN.search(text):
-        found = [(number, m) for number, line in enumerate(lines, 1) for m in _FORBIDDEN.finditer(line)]
+    if not text.isascii() or text.encode().translate(None, _PLAIN):
+        forbidden = re.compile(_FORBIDDEN)  # slow to compile, and nearly never needed
+        found = [(number, m) for number, line in enumerate(lines, 1) for m in forbidden.finditer(line)]
         if not found:
             return
         number, first = found[0]
@@ -126,6 +125,8 @@ def check_characters(text: str, file: str, lines: Sequence[str]) -> None:
 
 
 def _character(character: str) -> str:
+    import unicodedata
+
     name = unicodedata.name(character, "").lower()
     kind = "the NUL byte" if character == "\0" else "the control character"
     kind = kind if ord(character) < 0xA0 else "the invisible character"

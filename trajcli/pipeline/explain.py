@@ -16,6 +16,7 @@ from trajcli.pipeline.stretch import PlannedMove
 from trajcli.units import Dimension, Quantity, Units, to_user, unit_name
 
 _NOTHING = 1e-12  # of the largest term over the move: what is smaller came from rounding
+_CANCELS = 1e4  # times larger than what they add up to: of ten digits, six are left
 _SAME = 1e-9  # of the largest term: neighbouring pieces this close are one polynomial
 
 
@@ -34,6 +35,16 @@ class Stretch:
     end: float
     local: Array
     absolute: Array
+
+    @property
+    def text(self) -> str:
+        """The polynomial in powers of t, or of (t - start) where the former would lose its digits."""
+        powers = np.arange(self.local.size)
+        terms = np.abs(self.local) * (self.end - self.start) ** powers
+        cancelling = np.abs(self.absolute) * self.end**powers
+        if cancelling.max() <= _CANCELS * terms.max():
+            return polynomial_text(self.absolute)
+        return polynomial_text(self.local, f"(t - {self.start:.10g})")
 
 
 def stretches_of(move: PlannedMove, units: Units) -> list[list[Stretch]]:
@@ -72,7 +83,7 @@ def _equal(a: Array, b: Array, duration: float) -> bool:
 
 
 def explanation(plan: Plan) -> dict[str, Any]:
-    """Return what `trajcli explain --json` prints: the report with polynomials and phases, in the job's units."""
+    """Return what `trajcli explain --json` prints: report, polynomials and phases, in the job's units."""
     units = plan.loaded.units
     report = report_of(plan, reference=True)
     return {
@@ -156,15 +167,15 @@ def peak_in_units(peak: PeakReport, plan: Plan) -> dict[str, Any]:
     return {**peak.model_dump(), **said, "limit": limit, "unit": unit_name(quantity, units)}
 
 
-def polynomial_text(coefficients: Array) -> str:
+def polynomial_text(coefficients: Array, variable: str = "t") -> str:
     """Return ascending coefficients as a textbook prints them: "20 + 90 t^2 - 60 t^3"."""
     text = ""
     for power, coefficient in enumerate(coefficients.tolist()):
         size = f"{abs(coefficient):.10g}"
         if size == "0":
             continue
-        variable = ("", "t", f"t^{power}")[min(power, 2)]
-        term = variable if size == "1" and power else f"{size} {variable}".strip()
+        factor = ("", variable, f"{variable}^{power}")[min(power, 2)]
+        term = factor if size == "1" and power else f"{size} {factor}".strip()
         sign = "-" if coefficient < 0 else "+"
         text += f" {sign} {term}" if text else ("-" if sign == "-" else "") + term
     return text or "0"

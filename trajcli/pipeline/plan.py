@@ -51,9 +51,9 @@ def plan_job(loaded: LoadedJob) -> Plan:
     for index, planner in enumerate(loaded.job.moves):
         start = _handed_over(state, before, planner)
         with _errors_of(loaded, index, planner):
-            move, concessions = _plan_move(loaded, index, planner, start)
+            move = _plan_move(loaded, index, planner, start)
         moves.append(move)
-        events += concessions
+        events += [replace(event, move=index) for event in move.planned.events]
         state, before = move.planned.end, planner
     trajectory = _joined(moves, loaded)
     verdict = verify(trajectory, [move.robot.limits for move in moves])
@@ -61,20 +61,16 @@ def plan_job(loaded: LoadedJob) -> Plan:
     return Plan(loaded, tuple(moves), trajectory, verdict, said)
 
 
-def _plan_move(
-    loaded: LoadedJob, index: int, planner: Planner, start: State
-) -> tuple[PlannedMove, list[Event]]:
+def _plan_move(loaded: LoadedJob, index: int, planner: Planner, start: State) -> PlannedMove:
     job = loaded.job
     robot = with_move_limits(loaded.robot, planner.limits, index)
     planned = planner.plan(start, robot)
     move = PlannedMove(index, planner, start, robot, planned)
-    events = [replace(event, move=index) for event in planned.events]
     if (planner.when_over_limit or job.when_over_limit) == "slow":
-        move, more = slowed(move)
-        events += more
+        move = slowed(move)
     if job.output.align:
         move = aligned(move, job.output.rate)
-    return move, events
+    return move
 
 
 def _handed_over(state: State, before: Planner | None, after: Planner) -> State:

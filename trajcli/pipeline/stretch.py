@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import ceil
 
+import numpy as np
+
 from trajcli.checks.finding import Finding
+from trajcli.checks.limits import peaks_by_move
 from trajcli.checks.verify import Verdict, verify
 from trajcli.curves.compose import scale_time
+from trajcli.curves.feasible import smallest_feasible
+from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount, PlanningError
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.planners.planner import Event, Planned, Planner
+from trajcli.planners.point_to_point import share_of_limits
 from trajcli.trajectory import Span, State, Trajectory
 
-_LONGEST = (
-    1e4  # times the planned duration; a move that needs more than that is not over its limit, it is wrong
-)
-_SEARCH = 1.1  # ratio of neighbouring candidates before the bracket is halved
-_EXACT = 1e-12  # relative width at which halving ends
+_LONGEST = 1e4  # times the planned duration: a move that needs more is not over its limit, it is wrong
+_ROOM = 1e-10  # relative; a tenth of the tolerance of limits, so that rounding does not tip the later verdict
+_BLOCK = 8  # stretches tried at once: each costs a plan of its own
 _WHOLE = 1e-9  # of a period: what is this close to whole is whole
 _TRIES = 50
 
@@ -70,14 +73,18 @@ def lasting(move: PlannedMove, duration: float) -> PlannedMove:
     factor = duration / move.duration
     if move.start.at_rest and move.planned.end.at_rest:
         return replace(move, planned=_scaled(move.planned, factor), stretch=move.stretch * factor)
-    fields = type(move.planner).model_fields
-    field = next((name for name in ("minimum_duration", "duration") if name in fields), None)
-    if field is None:
-        raise PlanningError(f"{move.planner.tag} cannot last longer than it does")
-    again = {name: None for name in ("duration",) if name in fields} | {field: duration}
-    planned = move.planner.model_copy(update=again).plan(move.start, move.robot)
+    planned = _told_to_last(move.planner, duration).plan(move.start, move.robot)
     stretch = move.stretch * planned.curve.duration / move.duration
     return replace(move, planned=planned, stretch=stretch)
+
+
+def _told_to_last(planner: Planner, duration: float) -> Planner:
+    fields = type(planner).model_fields
+    names = [name for name in ("duration", "minimum_duration") if name in fields]
+    if not names:
+        raise PlanningError(f"{planner.tag} cannot last longer than it does")
+    given = [name for name in names if getattr(planner, name) is not None]
+    return planner.model_copy(update={(given or names[::-1])[0]: duration})
 
 
 def _scaled(planned: Planned, factor: float) -> Planned:
@@ -90,77 +97,68 @@ def _scaled(planned: Planned, factor: float) -> Planned:
     )
 
 
-def slowed(move: PlannedMove) -> tuple[PlannedMove, list[Event]]:
-    """Return the smallest stretch of the move that keeps its limits, and an event if it is one.
+def slowed(move: PlannedMove) -> PlannedMove:
+    """Return the smallest stretch of the move that keeps its limits, with an event if it is one.
 
-    Where slowing down does not help (a position limit, a boundary velocity over its limit), the move comes back as
-    it was: the verdict on the whole trajectory will say so.
+    Where slowing down does not help (a position limit, a boundary velocity over its limit), the move comes
+    back as it was: the verdict on the whole trajectory will say so.
     """
     over = _over_limit(move)
-    if not over or any(finding.factor is None for finding in over) or move.duration == 0:
-        return move, []
-    worst = max(over, key=lambda finding: finding.factor or 0.0)
+    if not over or move.duration == 0:
+        return move
     if move.start.at_rest and move.planned.end.at_rest:
-        slower = lasting(move, move.duration * (worst.factor or 1.0))
+        factors = [finding.factor for finding in over]
+        factor = None if None in factors else max(f for f in factors if f is not None)
     else:
-        found = _search(move)
-        if found is None:
-            return move, []
-        slower = found
-    message = f"stretched {slower.stretch:.6g} times, from {{before}} to {{after}}, to keep the {worst.kind} limit of {worst.joint}"
+        factor = smallest_feasible(lambda factors: _excess(move, factors), 1.0, _LONGEST, block=_BLOCK)
+    if factor is None:
+        return move
+    slower = lasting(move, move.duration * factor)
+    worst = max(over, key=lambda finding: finding.factor or 0.0)
+    message = (
+        f"stretched {slower.stretch:.6g} times, from {{before}} to {{after}}, "
+        f"to keep the {worst.kind} limit of {worst.joint}"
+    )
     amounts = {"before": Amount(move.duration), "after": Amount(slower.duration)}
-    return slower, [Event("slowed", message, move.index, amounts), *slower.planned.events]
+    event = Event("slowed", message, move.index, amounts)
+    return replace(slower, planned=replace(slower.planned, events=(event, *slower.planned.events)))
 
 
 def _over_limit(move: PlannedMove) -> list[Finding]:
     return [finding for finding in move.verdict().findings if finding.kind in QUANTITIES]
 
 
-def _search(move: PlannedMove) -> PlannedMove | None:
-    """Return the shortest stretch that verifies: the first of a geometric row, then halving."""
-
-    def attempt(factor: float) -> PlannedMove | None:
-        try:
-            longer = lasting(move, move.duration * factor)
-        except PlanningError:
-            return None
-        return None if _over_limit(longer) else longer
-
-    low, high = 1.0, _SEARCH
-    best = attempt(high)
-    while best is None and high < _LONGEST:
-        low, high = high, high * _SEARCH
-        best = attempt(high)
-    return best and _halved(attempt, low, high, best)
+def _excess(move: PlannedMove, factors: Array) -> Array:
+    """Return by how much of a limit the move is over its limits when stretched by each of the factors."""
+    return np.array([_excess_of(move, move.duration * factor) for factor in factors.tolist()])
 
 
-def _halved(
-    attempt: Callable[[float], PlannedMove | None], low: float, high: float, best: PlannedMove
-) -> PlannedMove:
-    while high - low > _EXACT * high:
-        middle = (low + high) / 2
-        if middle in (low, high):
-            break
-        better = attempt(middle)
-        low, high, best = (low, middle, better) if better is not None else (middle, high, best)
-    return best
+def _excess_of(move: PlannedMove, duration: float) -> float:
+    try:
+        longer = lasting(move, duration)
+    except PlanningError:
+        return np.inf
+    (peaks,) = peaks_by_move(longer.alone())
+    return float(share_of_limits([(p.low, p.high) for p in peaks], move.robot.limits)) - (1 + _ROOM)
 
 
 def aligned(move: PlannedMove, rate: float) -> PlannedMove:
-    """Return the move stretched to a whole number of periods.
+    """Return the move stretched to a whole number of periods; a move that keeps its limits goes on doing so.
 
     Raises:
         PlanningError: When the planner cannot last that long.
     """
     if move.duration == 0:
         return move
-    periods = ceil(move.duration * rate - _WHOLE)
+    periods = max(1, ceil(move.duration * rate - _WHOLE))
+    was_over = bool(_over_limit(move))
     for extra in range(_TRIES):
         wanted = (periods + extra) / rate
         longer = lasting(move, wanted) if wanted != move.duration else move
-        if abs(longer.duration - wanted) <= _WHOLE / rate:
+        whole = abs(longer.duration - wanted) <= _WHOLE / rate
+        if whole and (was_over or not _over_limit(longer)):
             return longer
     raise PlanningError(
-        f"{move.planner.tag} cannot last a whole number of periods at {rate:g} Hz",
+        f"{move.planner.tag} cannot last a whole number of periods at {rate:g} Hz within its limits",
         hint="leave `align` out, or change the rate",
     )

@@ -71,6 +71,29 @@ def write_rows(plan: Plan, grid: Grid, path: str | None, digits: Digits) -> None
         write_csv(rows(), names, out, digits)
 
 
+def write_plan(plan: Plan, path: str | None = None, digits: Digits = "fixed") -> None:
+    """Write the rows of a plan that verifies, as `trajcli plan` does.
+
+    Args:
+        plan: The plan.
+        path: A CSV file, which appears whole or not at all; None or "-" is standard output.
+        digits: "fixed" for nine decimals, "full" for all bits.
+
+    Raises:
+        VerificationError: When the plan breaks a limit; nothing is written.
+        InputError: When the rows that the job asks for cannot be given.
+        FileError: When the file cannot be written.
+        BrokenPipeError: When the reader has closed the pipe.
+    """
+    if not plan.verdict.passed:
+        from trajcli.pipeline.report import verification_error
+
+        raise verification_error(plan)
+    if path is not None:
+        check_output_name(path)
+    write_rows(plan, grid_of(plan), path, digits)
+
+
 def write_text(text: str, path: str) -> None:
     """Write a text to a file, which appears whole or not at all; `-` is standard output.
 

@@ -1,4 +1,4 @@
-"""Planners: one file each. The union below is their registration; schema, messages, tests and docs read it."""
+"""Planners: one file each. The union below is their registration; schema, messages, tests, docs read it."""
 
 from __future__ import annotations
 

@@ -11,15 +11,22 @@ from trajcli.curves.cycloid import PEAKS, cycloid_law
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.fields import Duration
 from trajcli.planners.planner import Planned
-from trajcli.planners.point_to_point import PointToPoint, bound_along, missing_limit, require_rest, standstill
+from trajcli.planners.point_to_point import (
+    PointToPoint,
+    bound_along,
+    missing_limit,
+    require_rest,
+    same_state,
+    standstill,
+)
 from trajcli.trajectory import State
 
 
 class Cycloidal(PointToPoint):
     """Rest to rest with a sine-shaped acceleration, zero at both ends.
 
-    Source: Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), section 2.2.2;
-    Siciliano et al., Robotics: Modelling, Planning and Control (2009), problem 4.2.
+    Source: Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), section
+    2.2.2; Siciliano et al., Robotics: Modelling, Planning and Control (2009), problem 4.2.
     """
 
     continuity: ClassVar[Literal[1, 2]] = 2
@@ -37,9 +44,9 @@ class Cycloidal(PointToPoint):
         """
         require_rest(self.tag, start, robot)
         end = self.to.as_state()
-        displacement = end.position - start.position
-        if not displacement.any():
+        if same_state(start, end):
             return standstill(end, self.duration or 0.0)
+        displacement = end.position - start.position
         law = cycloid_law(self.duration or self._fastest(displacement, robot))
         return Planned(along_line(start.position, displacement, law), end, law=law, closed_form="cycloid")
 

@@ -2,30 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
-from trajcli.curves.compose import along_line, coast_until, hold_until, merge_breaks
-from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.errors import Amount
-from trajcli.kinematics.robot import Limits, Robot
+from trajcli.kinematics.robot import Robot
 from trajcli.planners.fields import MinimumDuration
-from trajcli.planners.jerk_limited_errors import (
-    cannot_wait,
-    leaves_line,
-    require_limits,
-    require_possible_end,
-)
-from trajcli.planners.planner import Event, Phase, Planned
+from trajcli.planners.planner import Planned
 from trajcli.planners.point_to_point import PointToPoint
-from trajcli.planners.profile import Control, Profile, Task
-from trajcli.planners.ruckig_solve import fastest, fastest_of, together
 from trajcli.trajectory import State
-
-_PARALLEL = 1e-12  # relative; what leaves the line by more is no rounding error
 
 
 class JerkLimited(PointToPoint):
@@ -56,20 +42,16 @@ class JerkLimited(PointToPoint):
             MissingLimitError: When a moving joint lacks a limit on velocity, acceleration or jerk.
             PlanningError: When no such motion exists.
         """
-        end = self._end(start)
-        tasks = _joint_tasks(start, end, robot, "velocity" if self.to.joints is None else "position")
-        require_limits(self.tag, tasks, robot)
-        require_possible_end(tasks, robot)
-        least = self.minimum_duration or 0.0
-        if self.synchronize == "phase" and not all(task.steady for task in tasks):
-            planned = self._on_one_line(start, end, least, tasks, robot)
-        else:
-            planned = self._each(end, least, tasks, robot)
-        if self.to.joints is not None:
-            return planned
-        reached = planned.curve.piece_ends()[1][-1]
-        end = State(reached, end.velocity, end.acceleration)
-        return Planned(planned.curve, end, None, planned.phases, planned.events, planned.arrivals)
+        from trajcli.planners.jerk_limited_motion import Request, plan_motion
+
+        request = Request(
+            start=start,
+            end=self._end(start),
+            control="velocity" if self.to.joints is None else "position",
+            synchronize=self.synchronize,
+            minimum_duration=self.minimum_duration or 0.0,
+        )
+        return plan_motion(request, robot)
 
     def _end(self, start: State) -> State:
         """Return the target; under velocity control its position means nothing."""
@@ -79,110 +61,3 @@ class JerkLimited(PointToPoint):
         return State(
             start.position, np.array(self.to.velocity or zero), np.array(self.to.acceleration or zero)
         )
-
-    def _each(self, end: State, least: float, tasks: Sequence[Task], robot: Robot) -> Planned:
-        alone = [fastest(task) for task in tasks]
-        profiles = together(tasks, alone, least) if self.synchronize == "time" else alone
-        duration = max([least, *(profile.duration for profile in profiles)])
-        curves, phases = [], []
-        for joint, (task, profile) in enumerate(zip(tasks, profiles, strict=True)):
-            phases += profile.phases(joint)
-            if profile.duration == duration:
-                curves.append(profile.curve())
-                continue
-            curves.append(_waiting(task, profile, duration, joint))
-            phases.append(Phase("cruise" if task.final[1] else "rest", profile.duration, duration, joint))
-        phases.sort(key=lambda phase: (phase.start, phase.joint or 0))
-        arrivals = tuple(profile.duration for profile in alone)
-        events = (*_duration_events(least, duration, max(arrivals)), *_jerk_events(tasks))
-        return Planned(merge_breaks(curves), end, phases=tuple(phases), events=events, arrivals=arrivals)
-
-    def _on_one_line(
-        self, start: State, end: State, least: float, tasks: Sequence[Task], robot: Robot
-    ) -> Planned:
-        displacement = np.array([task.displacement for task in tasks])
-        rates = [start.velocity, end.velocity, start.acceleration, end.acceleration]
-        direction = next(values for values in (displacement, *rates) if values.any())
-        on_line = [_along(direction, values, 1 + k // 2, robot) for k, values in enumerate(rates)]
-        length = 1.0 if displacement.any() else 0.0
-        initial, final = (0.0, on_line[0], on_line[2]), (length, on_line[1], on_line[3])
-        bounds = _bounds_along(direction, robot.limits)
-        position_counts: Control = tasks[0].control
-        task = Task("the common law", initial, final, bounds, position_counts)
-        alone = fastest(task)
-        profile = fastest_of(task, least) if alone.duration < least else alone
-        law = profile.curve()
-        events = (*_duration_events(least, profile.duration, alone.duration), *_jerk_events(tasks))
-        curve = along_line(start.position, direction, law)
-        return Planned(curve, end, law if length else None, tuple(profile.phases(None)), events)
-
-
-def _joint_tasks(start: State, end: State, robot: Robot, control: Control) -> list[Task]:
-    bounds = np.stack([robot.limits.of_order(order) for order in (1, 2, 3)], axis=1)
-    states = [np.stack([s.position, s.velocity, s.acceleration], axis=1).tolist() for s in (start, end)]
-    rows = zip(robot.joint_names, *states, bounds, strict=True)
-    return [Task(name, tuple(first), tuple(last), bound, control) for name, first, last, bound in rows]
-
-
-def _waiting(task: Task, profile: Profile, duration: float, joint: int) -> PiecewisePolynomial:
-    """Return the curve of a joint that keeps its end state until the others have arrived.
-
-    Raises:
-        PlanningError: When it cannot, because it moves.
-    """
-    if task.steady:
-        return fastest_of(task, duration).curve()
-    if not task.final[1] and not task.final[2]:
-        return hold_until(profile.curve(), duration)
-    if task.control == "velocity" and not task.final[2]:
-        return coast_until(profile.curve(), duration)
-    raise cannot_wait(task, profile.duration, duration, joint)
-
-
-def _along(direction: Array, values: Array, order: int, robot: Robot) -> float:
-    """Return the rate of the law under which the joints have the given rates.
-
-    Raises:
-        PlanningError: When these are not parallel to the direction.
-    """
-    rate = float(values @ direction) / float(direction @ direction)
-    off = np.abs(values - rate * direction)
-    joint = int(off.argmax())
-    if off[joint] > _PARALLEL * np.abs(values).max():
-        raise leaves_line(float(values[joint]), order, joint, robot)
-    return rate
-
-
-def _bounds_along(direction: Array, limits: Limits) -> Array:
-    """Return the bounds (3, 2) of a law that moves the joints along a line within their limits."""
-    moving = direction != 0
-    bounds = []
-    for order in (1, 2, 3):
-        with np.errstate(over="ignore"):
-            scaled = limits.of_order(order)[moving] / direction[moving, None]
-        scaled.sort(axis=1)
-        bounds.append([scaled[:, 0].max(), scaled[:, 1].min()])
-    return np.array(bounds)
-
-
-def _duration_events(least: float, duration: float, alone: float) -> list[Event]:
-    """Return what to say when a minimum duration that would be long enough is exceeded."""
-    if duration <= least or alone > least or not least:
-        return []
-    message = (
-        "no motion within the limits lasts just {wanted}, the minimum duration: this one lasts {duration}"
-    )
-    return [
-        Event("longer_than_minimum", message, amounts={"wanted": Amount(least), "duration": Amount(duration)})
-    ]
-
-
-def _jerk_events(tasks: Sequence[Task]) -> list[Event]:
-    """Return what to say of jerk limits that differ by direction."""
-    names = [task.name for task in tasks if not task.steady and task.bounds[2, 0] != -task.bounds[2, 1]]
-    if not names:
-        return []
-    message = (
-        f"the jerk limit of {', '.join(names)} differs by direction: the smaller magnitude is kept both ways"
-    )
-    return [Event("jerk_limit_both_ways", message)]

@@ -10,18 +10,21 @@ from pydantic import Field, model_validator
 
 from trajcli.curves.piecewise import Array, constant
 from trajcli.errors import Amount, MissingLimitError, PlanningError, Problem
-from trajcli.kinematics.robot import QUANTITIES, Robot
+from trajcli.kinematics.robot import QUANTITIES, Limits, Robot
 from trajcli.planners.fields import NamedTarget
 from trajcli.planners.planner import Planned, Planner
 from trajcli.planners.reading import refuse
 from trajcli.trajectory import State
+
+_NOTHING = 1e-15  # rad or m: a move this short is none; a thousandth of what counts as a jump
+_SMALL_POSITION = 1e-3  # rad or m: what goes beyond a position bound smaller than this is relative to this
 
 
 class PointToPoint(Planner):
     """A planner whose target is a joint state.
 
     Attributes:
-        imposes: Highest derivative that the planner imposes at the target: 0, 1 (velocity) or 2 (acceleration).
+        imposes: Highest derivative that the planner imposes at the target: 0, 1 or 2 (acceleration).
         stops_anywhere: Whether a target may leave the position open.
     """
 
@@ -49,8 +52,10 @@ def standstill(state: State, duration: float) -> Planned:
 
 
 def same_state(a: State, b: State) -> bool:
-    """Return whether two states are equal in position, velocity and acceleration."""
-    return all(np.array_equal(getattr(a, k), getattr(b, k)) for k in ("position", "velocity", "acceleration"))
+    """Return whether two states are equal: positions up to rounding, velocities and accelerations exactly."""
+    apart = _NOTHING + 4 * np.spacing(np.maximum(np.abs(a.position), np.abs(b.position)))
+    close = bool((np.abs(a.position - b.position) <= apart).all())
+    return close and all(np.array_equal(getattr(a, k), getattr(b, k)) for k in ("velocity", "acceleration"))
 
 
 def require_rest(planner: str, state: State, robot: Robot, *, where: str = "start") -> None:
@@ -93,6 +98,29 @@ def missing_limit(
             joint=robot.joint_names[joints[0]],
         )
     )
+
+
+def share_of_limits(extremes: Sequence[tuple[Array, Array]], limits: Limits) -> Array:
+    """Return how much of its limits a motion uses: above 1 where it breaks one, shape (...).
+
+    Args:
+        extremes: Lowest and highest value, each (..., n), of position, velocity, acceleration and jerk.
+        limits: Those of the n joints. Position counts as 1 plus what it goes beyond, relative to the bound.
+    """
+    shares = []
+    for order, (low, high) in enumerate(extremes):
+        lower, upper = limits.of_order(order).T
+        if order:
+            shares.append(np.maximum(low / lower, high / upper).max(axis=-1))
+            continue
+        beyond = np.maximum((lower - low) / _scale(lower), (high - upper) / _scale(upper))
+        shares.append(1 + np.maximum(beyond.max(axis=-1), -1.0))
+    share: Array = np.max(shares, axis=0)
+    return share
+
+
+def _scale(bound: Array) -> Array:
+    return np.where(np.isfinite(bound), np.maximum(np.abs(bound), _SMALL_POSITION), 1.0)
 
 
 def bound_along(bounds: Array, direction: Array) -> Array:

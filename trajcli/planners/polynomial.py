@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+from math import factorial
 from typing import ClassVar
 
 import numpy as np
 
 from trajcli.curves.extrema import piece_extremes
+from trajcli.curves.feasible import smallest_feasible
 from trajcli.curves.hermite import hermite_coefficients
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import PlanningError, Problem
 from trajcli.kinematics.robot import Limits, Robot
 from trajcli.planners.fields import Duration
 from trajcli.planners.planner import Planned
-from trajcli.planners.point_to_point import PointToPoint, missing_limit, same_state, standstill
+from trajcli.planners.point_to_point import (
+    PointToPoint,
+    missing_limit,
+    same_state,
+    share_of_limits,
+    standstill,
+)
 from trajcli.trajectory import State
 
 _ROOM = 1e-10  # relative; a tenth of the tolerance with which limits are verified
-_CANDIDATES = 256
-_ROUNDS = 7
+_AMPLE = 1e4  # times the time scale of a move: no longer durations are tried
 
 
 class PolynomialPlanner(PointToPoint):
@@ -77,7 +84,7 @@ def fastest_duration(planner: str, start: Array, end: Array, robot: Robot) -> fl
 
 
 def _from_rest_to_rest(start: Array, end: Array, limits: Limits) -> float:
-    """Peaks of the normalised polynomial scale with displacement / duration^order: each limit gives a duration."""
+    """Peaks of the normalised polynomial scale with displacement / duration^order; limits give durations."""
     k, displacement = start.shape[0], end[0] - start[0]
     unit_end = np.zeros((k, 1))
     unit_end[0] = 1.0
@@ -92,46 +99,61 @@ def _from_rest_to_rest(start: Array, end: Array, limits: Limits) -> float:
 
 
 def _by_search(planner: str, start: Array, end: Array, robot: Robot) -> float:
-    """Return the shortest feasible duration; with moving ends the set of feasible ones need not be an interval.
+    """Return the shortest feasible duration; with moving ends these need not form one interval."""
+    low, high = _least_duration(start, end, robot.limits), _ample_duration(start, end, robot.limits)
+    if low == 0:
+        joints = np.flatnonzero((start != end).any(axis=0) | start[1:].any(axis=0)).tolist()
+        quantity = "jerk" if np.isfinite(robot.limits.acceleration[joints]).all() else "acceleration"
+        why = "to find its fastest duration"
+        raise missing_limit(planner, quantity, joints, robot, why, "give the move a `duration`")
 
-    A geometric grid brackets the first feasible candidate, and is laid again into the bracket until it is closed.
+    def excess(durations: Array) -> Array:
+        return _share(start, end, durations, robot.limits) - (1 + _ROOM)
+
+    duration = smallest_feasible(excess, low, high)
+    if duration is None:
+        message = f"no duration up to {high:.3g} s lets {planner} keep all limits between these states"
+        hint = "a boundary velocity or acceleration asks too much: lower it, or use jerk_limited"
+        raise PlanningError(Problem(message, hint))
+    return duration
+
+
+def _least_duration(start: Array, end: Array, limits: Limits) -> float:
+    """Return a duration below which no motion whatever gets from `start` to `end`; 0 where none is known.
+
+    By Taylor's formula derivative b changes in the time T by at most sum_i |q^(i)(0)| T^(i-b) / (i-b)!, i
+    from b + 1 up to m - 1, plus L_m T^(m-b) / (m-b)! where |q^(m)| <= L_m: one term makes up its share.
     """
-    scale = _time_scale(start, end, robot.limits)
-    low, high = scale * 1e-2, scale * 1e4
-    for _ in range(_ROUNDS):
-        candidates = np.geomspace(low, high, _CANDIDATES)
-        feasible = np.flatnonzero(_keeps_limits(start, end, candidates, robot.limits))
-        if not feasible.size:
-            message = f"no duration between {low:.3g} s and {high:.3g} s lets {planner} keep all limits between these states"
-            raise PlanningError(
-                Problem(
-                    message,
-                    "a boundary velocity or acceleration asks too much: lower it, or use jerk_limited",
-                )
-            )
-        first = int(feasible[0])
-        low, high = float(candidates[max(first - 1, 0)]), float(candidates[first])
-    return high
-
-
-def _time_scale(start: Array, end: Array, limits: Limits) -> float:
-    """Return the longest of the times that the displacement and each change of a derivative ask for."""
-    change = np.abs(end - start)
-    scale = 0.0
+    largest = [np.abs(limits.of_order(order)).max(axis=1) for order in range(4)]
+    longest = 0.0
     for order in (1, 2, 3):
-        size = np.min(np.abs(limits.of_order(order)), axis=1)
         for below in range(min(order, start.shape[0])):
-            scale = max(scale, float(np.max((change[below] / size) ** (1 / (order - below)))))
-    return scale or 1e-3
+            sizes = [np.abs(start[i]) if i < start.shape[0] else largest[i] for i in range(below + 1, order)]
+            change, count = np.abs(end[below] - start[below]), order - below
+            with np.errstate(divide="ignore", invalid="ignore"):
+                times = [
+                    (change / count * factorial(power) / size) ** (1 / power)
+                    for power, size in enumerate([*sizes, largest[order]], 1)
+                ]
+            longest = max(longest, float(np.where(change > 0, np.min(times, axis=0), 0.0).max()))
+    return longest
 
 
-def _keeps_limits(start: Array, end: Array, durations: Array, limits: Limits) -> Array:
+def _ample_duration(start: Array, end: Array, limits: Limits) -> float:
+    """Return a duration far above the times that the displacement and the boundary rates ask for."""
+    sizes = np.abs(start) + np.abs(end)
+    sizes[0] = np.abs(end[0] - start[0])
+    scale = _least_duration(start, end, limits)
+    for order in (1, 2, 3):
+        bound = np.abs(limits.of_order(order)).min(axis=1)
+        for below in range(min(order, start.shape[0])):
+            scale = max(scale, float(np.max((sizes[below] / bound) ** (1 / (order - below)))))
+    return _AMPLE * scale
+
+
+def _share(start: Array, end: Array, durations: Array, limits: Limits) -> Array:
+    """Return how much of the limits the polynomials of the given durations use, shape (k,)."""
     shape = (start.shape[0], durations.size, start.shape[1])
     first, last = (np.broadcast_to(ends[:, None, :], shape) for ends in (start, end))
     coefficients = hermite_coefficients(first, last, durations[:, None])
-    kept = np.ones(durations.size, dtype=bool)
-    for order, (low, high) in enumerate(piece_extremes(coefficients, durations, (0, 1, 2, 3))):
-        bounds = limits.of_order(order)
-        room = _ROOM * np.where(np.isfinite(bounds), np.abs(bounds), 0.0) + 1e-13
-        kept &= ((low >= bounds[:, 0] - room[:, 0]) & (high <= bounds[:, 1] + room[:, 1])).all(axis=1)
-    return kept
+    return share_of_limits(piece_extremes(coefficients, durations, (0, 1, 2, 3)), limits)

@@ -10,7 +10,8 @@ from trajcli.planners.polynomial import PolynomialPlanner
 class Septic(PolynomialPlanner):
     """Seventh degree: position, velocity and acceleration imposed at both ends, jerk zero there.
 
-    Source: Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), section 2.1.5.
+    Source: Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), section
+    2.1.5.
     """
 
     continuity: ClassVar[Literal[1, 2]] = 2

@@ -26,6 +26,9 @@ from trajcli.planners.reading import refuse
 from trajcli.planners.trapezoid_errors import explain_infeasible
 from trajcli.trajectory import State
 
+_OFF = 1e-9  # relative: a velocity this little off the line is on it
+_STILL = 1e-15  # per s: a thousandth of what counts as a jump
+
 
 class Trapezoid(PointToPoint):
     """Speed up, cruise, slow down. The acceleration steps at the ends of the ramps.
@@ -45,7 +48,8 @@ class Trapezoid(PointToPoint):
     synchronize: Annotated[
         Literal["time", "none"],
         Field(
-            description="time: one law for all joints, straight in joint space; none: each joint arrives by itself."
+            description="time: one law for all joints, straight in joint space; "
+            "none: each joint arrives by itself."
         ),
     ] = "time"
     overshoot: Annotated[
@@ -120,7 +124,7 @@ class Trapezoid(PointToPoint):
     ) -> Profile:
         """Return the profile of one variable from what the fields fix."""
         if self.duration is not None:
-            if distance and self.velocity is not None:
+            if self.velocity is not None and (distance or initial or final):
                 return self._of_speed(distance, initial, final, forward if distance > 0 else backward)
             return profile_of_duration(
                 distance, initial, final, self.duration, forward, backward, overshoot=self.overshoot
@@ -137,7 +141,7 @@ class Trapezoid(PointToPoint):
 
     def _of_speed(self, distance: float, initial: float, final: float, rates: Rates) -> Profile:
         sign = math.copysign(1.0, distance)
-        if sign * initial < 0 or sign * final < 0:
+        if distance == 0 or sign * initial < 0 or sign * final < 0:
             raise InfeasibleProfileError("turns")
         deceleration = rates.deceleration if self.deceleration is not None else None
         arguments = abs(distance), abs(initial), abs(final), self.duration or 0.0, rates.speed
@@ -175,7 +179,7 @@ def _along(displacement: Array, velocity: Array, robot: Robot) -> float:
     square = float(displacement @ displacement)
     speed = float(velocity @ displacement) / square if square else 0.0
     off = np.abs(velocity - speed * displacement)
-    if off.max() > 1e-9 * np.abs(velocity).max():
+    if off.max() > _OFF * np.abs(velocity).max() + _STILL:
         joint = int(off.argmax())
         message = (
             "trapezoid moves all joints along one straight line, but {velocity} of "

@@ -17,7 +17,8 @@ _HINTS = {
     "duration": "choose a duration inside the interval",
     "too_fast": "say `overshoot: true`, raise the deceleration, or start slower",
     "too_slow": "raise the acceleration, end slower, or say `overshoot: true`",
-    "turns": "say `overshoot: true`, or give the end velocity the direction of the motion",
+    "turns": "say `overshoot: true` and at most one of duration and velocity, or let the arm start and end "
+    "in the direction of the motion",
 }
 
 
@@ -55,13 +56,15 @@ def explain_infeasible(
 def _message(error: InfeasibleProfileError, name: str) -> str:
     unbounded = error.high == float("inf")
     return {
-        "speed": f"no trapezoid of {{duration}}: the velocity of {name} must be above {{low}} and at most {{high}}, got {{given}}",
-        "acceleration": f"no trapezoid of {{duration}}: the acceleration of {name} must be at least {{low}}, got {{given}}",
+        "speed": f"no trapezoid of {{duration}}: the velocity of {name} must be above {{low}} "
+        "and at most {high}, got {given}",
+        "acceleration": f"no trapezoid of {{duration}}: the acceleration of {name} must be at least {{low}}, "
+        "got {given}",
         "duration": f"no trapezoid for {name}: its duration must be at least {{low}}"
         + ("" if unbounded else " and at most {high}"),
         "too_fast": f"{name} is too fast to end in the target: it needs {{needed}} to slow down",
         "too_slow": f"{name} cannot reach its end velocity in time: it needs {{needed}} to speed up",
-        "turns": f"{name} would have to pass the target and return to end with the given velocity",
+        "turns": f"{name} would have to turn round to start and end with the given velocities",
     }[error.reason]
 
 

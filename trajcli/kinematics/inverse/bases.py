@@ -22,14 +22,13 @@ from functools import partial
 
 import numpy as np
 
-from trajcli.kinematics.columns import Column, Entry
+from trajcli.kinematics.columns import Column
 from trajcli.kinematics.inverse import slides
 from trajcli.kinematics.inverse.elbow import elbow, is_elbow
 from trajcli.kinematics.inverse.lines import Arm, Floats, Line, meeting_point, parallel, perpendicular
 from trajcli.kinematics.inverse.method import Choice
-from trajcli.kinematics.inverse.subproblems import Turn, Watch, angle
+from trajcli.kinematics.inverse.subproblems import Value, Watch
 
-Value = Turn | Entry
 Reach = Callable[[Column, Column, Watch], Sequence[Value]]
 Found = tuple[str, tuple[Choice, ...], Reach]
 
@@ -63,11 +62,6 @@ def base_of(arm: Arm) -> Base | None:
                 name, choices, reach = found
                 return Base(name, choices, partial(_restored, reach, order, backwards), lines)
     return None
-
-
-def value_of(value: Value) -> Entry:
-    """Return an angle or a slide."""
-    return angle(value) if isinstance(value, tuple) else value
 
 
 def _restored(

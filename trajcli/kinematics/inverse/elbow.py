@@ -23,7 +23,16 @@ import numpy as np
 
 from trajcli.kinematics.columns import Column, difference, dot, minus, plus, product
 from trajcli.kinematics.inverse.lines import Floats, Line, across_floats, parallel
-from trajcli.kinematics.inverse.subproblems import Turn, Watch, across, levels, onto, turned, turned_back, unit
+from trajcli.kinematics.inverse.subproblems import (
+    Turn,
+    Watch,
+    across,
+    levels,
+    onto,
+    turned,
+    turned_back,
+    unit,
+)
 
 
 def same_way(a: Line, b: Line) -> float:
@@ -51,7 +60,9 @@ def parallel_pair(
     return unit(onto(axis, reached, way), watch, watch.length**2), third
 
 
-def shoulder_turn(one: Line, normal: Column, point: Column, target: Column, watch: Watch, sign: float) -> Turn:
+def shoulder_turn(
+    one: Line, normal: Column, point: Column, target: Column, watch: Watch, sign: float
+) -> Turn:
     """Return the turns (2, ..., B) about line one that give normal . R1^-1 (t - o) the value of the point."""
     level = dot(normal, minus(point, one.point))
     return levels(one.opposite.direction, minus(target, one.point), normal, level, watch, watch.length, sign)

@@ -26,6 +26,7 @@ MEETING = 1e-9  # of the arm's length: a picometre, where drawings say a tenth o
 _DUST = 1e-15  # what products of exact zeros and ones leave
 
 Floats = tuple[float, float, float]
+_AXES: tuple[Floats, Floats, Floats] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True)
@@ -90,8 +91,8 @@ class Goal:
         x, y, z, p: Columns of the targets in world, each entry an array (B,).
     """
 
-    def __init__(self, arm: Arm, rows: Sequence[Array]) -> None:
-        """Take the twelve upper entries of the poses, row by row, each an array (B,)."""
+    def __init__(self, arm: Arm, rows: Array) -> None:
+        """Take the twelve upper entries of the poses, row by row, shape (12, B)."""
         self.x, self.y, self.z, self.p = ((rows[i], rows[4 + i], rows[8 + i]) for i in range(4))
         self._into_base = [cast("Floats", tuple(row)) for row in arm.base[:3, :3].T.tolist()]
         self._base = cast("Floats", tuple(arm.base[:3, 3].tolist()))
@@ -105,6 +106,11 @@ class Goal:
         """Return where the displacement takes a point of the tool that was at `point` at zero."""
         local = (np.asarray(point) - self._home[:3, 3]) @ self._home[:3, :3]
         return self._in_base(minus(plus(self._turned(local), self.p), self._base))
+
+    def view(self, vector: Column) -> Column:
+        """Return what the displacement turns to `vector`: the inverse of `direction`."""
+        first, second, third = (dot(self.direction(axis), vector) for axis in _AXES)
+        return first, second, third
 
     def _turned(self, local: Array) -> Column:
         a, b, c = (0.0 if abs(entry) < _DUST else float(entry) for entry in local)
@@ -120,7 +126,7 @@ class InverseGoal(Goal):
 
     def __init__(self, goal: Goal) -> None:
         """Take the goal to invert."""
-        self._columns = [goal.direction(axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
+        self._columns = [goal.direction(axis) for axis in _AXES]
         self._origin = goal.point((0.0, 0.0, 0.0))
 
     def direction(self, vector: Column) -> Column:
@@ -136,7 +142,7 @@ class InverseGoal(Goal):
 def parallel(*lines: Line) -> bool:
     """Return whether all lines have one direction, or the opposite one."""
     first = np.array(lines[0].direction)
-    return all(np.linalg.norm(np.cross(first, line.direction)) <= PARALLEL for line in lines[1:])
+    return all(float(np.linalg.norm(np.cross(first, line.direction))) <= PARALLEL for line in lines[1:])
 
 
 def perpendicular(a: Line, b: Line) -> bool:

@@ -1,4 +1,4 @@
-"""What a family of arms answers for one arm: how it solves, how many branches it has and what they are called."""
+"""What a family of arms answers for one arm: how it solves, its branches and what they are called."""
 
 from __future__ import annotations
 
@@ -7,18 +7,17 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Literal
 
-from trajcli.kinematics.columns import Entry
 from trajcli.kinematics.inverse.lines import Goal
-from trajcli.kinematics.inverse.subproblems import Watch
+from trajcli.kinematics.inverse.subproblems import Value, Watch
 
 Choice = Literal["shoulder", "elbow", "wrist"]
-Solver = Callable[[Goal, Watch], Sequence[Entry]]
+Solver = Callable[[Goal, Watch], Sequence[Value]]
 NAMES = {"shoulder": ("left", "right"), "elbow": ("up", "down"), "wrist": ("no_flip", "flip")}
 
 
 @dataclass(frozen=True)
 class Branch:
-    """The name of one branch, in the words of a job's `configuration`; None where the arm has no such choice."""
+    """The name of a branch, in the words of a job's `configuration`; None where there is no such choice."""
 
     shoulder: str | None = None
     elbow: str | None = None

@@ -21,14 +21,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from trajcli.kinematics.columns import Entry, dot, minus
+from trajcli.kinematics.columns import dot, minus, product
 from trajcli.kinematics.inverse.elbow import parallel_pair, same_way
 from trajcli.kinematics.inverse.lines import Arm, Floats, Goal, Line, parallel, perpendicular
 from trajcli.kinematics.inverse.method import Method
 from trajcli.kinematics.inverse.slides import turn_and_slide
-from trajcli.kinematics.inverse.subproblems import Turn, Watch, across, added, angle, onto, unit
+from trajcli.kinematics.inverse.subproblems import Turn, Value, Watch, across, added, onto, unit
 
 _NAMES = {"RR": "planar 2R", "RP": "planar RP", "RRR": "planar 3R", "RPR": "planar RPR"}
 
@@ -51,24 +49,24 @@ class Planar:
     lines: tuple[Line, ...]
     tip: Floats
 
-    def __call__(self, goal: Goal, watch: Watch) -> Sequence[Entry]:
+    def __call__(self, goal: Goal, watch: Watch) -> Sequence[Value]:
         """Return the joints: choice elbow."""
         one, two, *rest = self.plane
         point = rest[0].point if rest else self.tip
         aim = goal.point(point)
         first: Turn
-        values: list[Entry] = [0.0] * len(self.lines)
+        values: list[Value] = [0.0] * len(self.lines)
         if two.prismatic:
             first, slide = turn_and_slide(one, two, point, aim, watch)
             total, values[self.places[1]] = first, slide
         else:
             first, second = parallel_pair(one, two, point, aim, watch)
             total = added(first, second, same_way(one, two))
-            values[self.places[1]] = angle(second)
-        values[self.places[0]] = angle(first)
+            values[self.places[1]] = second
+        values[self.places[0]] = first
         if rest:
             lacking = added(_angle_of_tool(one, goal, watch), total, -1.0)
-            values[self.places[2]] = angle((lacking[0], np.asarray(lacking[1]) * same_way(one, rest[0])))
+            values[self.places[2]] = lacking[0], product(same_way(one, rest[0]), lacking[1])
         if self.rise is not None:
             slide_axis = self.lines[self.rise].direction
             values[self.rise] = dot(slide_axis, minus(aim, point))
@@ -77,7 +75,9 @@ class Planar:
 
 def _angle_of_tool(one: Line, goal: Goal, watch: Watch) -> Turn:
     axis = one.direction
-    marker = across(min(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), key=lambda e: abs(float(dot(e, axis)))), axis)
+    marker = across(
+        min(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), key=lambda e: abs(float(dot(e, axis)))), axis
+    )
     return unit(onto(axis, marker, goal.direction(marker)), watch)
 
 

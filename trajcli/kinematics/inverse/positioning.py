@@ -9,11 +9,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from trajcli.kinematics.columns import Entry
-from trajcli.kinematics.inverse.bases import Base, base_of, value_of
+from trajcli.kinematics.inverse.bases import Base, base_of
 from trajcli.kinematics.inverse.lines import Arm, Floats, Goal
 from trajcli.kinematics.inverse.method import Method
-from trajcli.kinematics.inverse.subproblems import Watch
+from trajcli.kinematics.inverse.subproblems import Value, Watch
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,10 +22,9 @@ class Positioning:
     base: Base
     tip: Floats
 
-    def __call__(self, goal: Goal, watch: Watch) -> Sequence[Entry]:
+    def __call__(self, goal: Goal, watch: Watch) -> Sequence[Value]:
         """Return the joints, with the choices of the base."""
-        values = self.base.reach(self.tip, goal.point(self.tip), watch)
-        return [value_of(value) for value in values]
+        return self.base.reach(self.tip, goal.point(self.tip), watch)
 
 
 def match(arm: Arm) -> Method | None:

@@ -9,7 +9,8 @@ the joints, turns as (cosine, sine). Two answers come along a new first axis.
 * `stanford`: as the elbow, with (d + b)^2 = |w|^2 - |p|^2 + b^2 in the plane, b = p . h3, for the slide d.
   "Up" is the longer slide. Four solutions.
 * `scara`: the height gives the slide, then a pair of parallel turns. Two solutions.
-* `ball`: axes 1 and 2 meet in o, so |joint 3 (p) - o| = |t - o|: two answers, each with two for joints 1 and 2.
+* `ball`: axes 1 and 2 meet in o, so |joint 3 (p) - o| = |t - o|: two answers, each with two
+  for joints 1 and 2.
 
 Source: Spong, Hutchinson and Vidyasagar, Robot Modeling and Control (2006), section 3.3; Pieper, The
 Kinematics of Manipulators under Computer Control (1968).
@@ -30,7 +31,6 @@ from trajcli.kinematics.inverse.subproblems import (
     Turn,
     Watch,
     across,
-    both,
     levels,
     onto,
     turned,
@@ -45,13 +45,15 @@ def ahead_of(one: Line, two: Line) -> Floats:
     return across_floats(two.direction, one.direction)
 
 
-def cartesian(lines: Sequence[Line], point: Column, target: Column, watch: Watch) -> tuple[Entry, ...]:  # noqa: ARG001
+def cartesian(lines: Sequence[Line], point: Column, target: Column, watch: Watch) -> tuple[Entry, ...]:
     """Return the slides of three independent prismatic joints."""
     way = minus(target, point)
     return tuple(dot(row, way) for row in _rows([line.direction for line in lines]))
 
 
-def cylindrical(lines: Sequence[Line], point: Column, target: Column, watch: Watch) -> tuple[Turn, Entry, Entry]:
+def cylindrical(
+    lines: Sequence[Line], point: Column, target: Column, watch: Watch
+) -> tuple[Turn, Entry, Entry]:
     """Return a turn and two slides."""
     one, two, three = lines
     normal = across_floats(two.direction, three.direction)
@@ -73,7 +75,10 @@ def stanford(
 
 def turn_and_slide(turn: Line, slide: Line, point: Column, aim: Column, watch: Watch) -> tuple[Turn, Array]:
     """Return the turns and slides (2, ..., B) in one plane that bring `point` to `aim`."""
-    hand, way = across(minus(point, turn.point), turn.direction), across(minus(aim, turn.point), turn.direction)
+    hand, way = (
+        across(minus(point, turn.point), turn.direction),
+        across(minus(aim, turn.point), turn.direction),
+    )
     ahead = dot(hand, slide.direction)
     rest = plus_square(difference(dot(way, way), dot(hand, hand)), ahead)
     distance = difference(_lengths(rest, watch), ahead)
@@ -85,7 +90,7 @@ def scara(lines: Sequence[Line], point: Column, target: Column, watch: Watch) ->
     """Return two turns about parallel axes and a slide that is not at right angles to them."""
     one, two, three = lines
     height = dot(one.direction, minus(target, point))
-    slide = product(1.0 / float(dot(one.direction, three.direction)), height)  # type: ignore[arg-type]
+    slide = product(1.0 / float(dot(one.direction, three.direction)), height)
     first, second = parallel_pair(one, two, advance(point, slide, three.direction), target, watch)
     return first, second, slide
 
@@ -121,13 +126,13 @@ def plus_square(value: Entry, root: Entry) -> Array:
 def _lengths(square: Array, watch: Watch) -> Array:
     """Return plus and minus the root along a new first axis, zero where the square is negative."""
     watch.note(np.abs(square) <= (TANGENT * watch.length) ** 2)
-    return both(np.sqrt(np.maximum(square, 0.0)))
+    return watch.both(np.sqrt(np.maximum(square, 0.0)))
 
 
 def _rows(columns: Sequence[Floats]) -> list[Floats]:
     """Return the rows of the inverse of the matrix with the given columns."""
     a, b, c = columns
-    volume = float(dot(a, cross(b, c)))  # type: ignore[arg-type]
+    volume = float(dot(a, cross(b, c)))
     rows = []
     for u, v in ((b, c), (c, a), (a, b)):
         x, y, z = across_floats(u, v)

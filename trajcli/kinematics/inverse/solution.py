@@ -55,22 +55,23 @@ class Solutions:
 
     @property
     def excess(self) -> Array:
-        """By how much each joint is outside its limits, shape (*batch, branches, n), negative below the lower."""
+        """By how much joints are outside their limits, shape (*batch, branches, n), negative below."""
         return beyond(self.joints, self.bounds)
 
     @property
     def shortfall(self) -> Array:
-        """How far the nearest branch stays from the target, shape (*batch, 2), m and rad; zero where one is valid.
+        """How far the nearest branch stays away, shape (*batch, 2), m and rad; zero where one is valid.
 
         The wrist of a closed form then stands where it can come nearest to its aim, with the orientation met.
         """
         size = np.where(np.isfinite(self.closure), self.closure, np.inf).sum(axis=-1)
-        best = np.argmin(size, axis=-1)[..., None, None]
+        best = np.asarray(np.argmin(size, axis=-1))[..., None, None]
         nearest = np.take_along_axis(self.closure, best, axis=-2)[..., 0, :]
-        return np.where(self.valid.any(axis=-1)[..., None], 0.0, nearest)
+        reached = np.asarray(self.valid.any(axis=-1))
+        return np.where(reached[..., None], 0.0, nearest)
 
     def nearest(self, near: Array, within_limits: bool = True) -> NDArray[np.intp]:
-        """Return the index (*batch,) of the branch nearest to joint values `near` (*batch, n), -1 where none is.
+        """Return the index (*batch,) of the branch nearest to `near` (*batch, n), rad or m; -1 for none.
 
         The distance is the largest difference of any joint.
         """

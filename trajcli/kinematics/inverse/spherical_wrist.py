@@ -2,8 +2,8 @@
 
 The point does not move with the wrist, so the first three joints bring it to G w: as many answers as the base
 has (`bases`: four for the elbow and Stanford bases, two for the cylindrical, one for the Cartesian). With
-their rotation R the wrist has to make R^-1 G: joints 4 and 5 bring axis 6 to its direction, two answers, joint 6
-turns the rest. Eight solutions over a base with four.
+their rotation R the wrist has to make R^-1 G: joints 4 and 5 bring axis 6 to its direction, two answers, and
+joint 6 turns the rest. Eight solutions over a base with four.
 
 Where axis 5 is at right angles to both others the two answers differ by half a turn of joints 4 and 6 and the
 sign of joint 5's bend: "no_flip" is the positive one. Where the bend vanishes only the sum (or difference) of
@@ -21,8 +21,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-from trajcli.kinematics.columns import Column, Entry, cross, dot
-from trajcli.kinematics.inverse.bases import Base, Value, base_of, value_of
+from trajcli.kinematics.columns import Column, cross, dot
+from trajcli.kinematics.inverse.bases import Base, base_of
 from trajcli.kinematics.inverse.elbow import same_way
 from trajcli.kinematics.inverse.lines import (
     Arm,
@@ -36,18 +36,18 @@ from trajcli.kinematics.inverse.lines import (
 )
 from trajcli.kinematics.inverse.method import Method
 from trajcli.kinematics.inverse.subproblems import (
+    Mirrored,
+    Opposed,
     Turn,
-    TwoTurns,
+    Value,
     Watch,
     across,
     added,
-    angle,
-    flipped_angles,
-    both,
     square_wrist,
     turned,
     turned_back,
     two_turns,
+    unit,
 )
 
 
@@ -59,7 +59,7 @@ class SphericalWrist:
     lines: tuple[Line, ...]
     center: Floats
 
-    def __call__(self, goal: Goal, watch: Watch) -> Sequence[Entry]:
+    def __call__(self, goal: Goal, watch: Watch) -> Sequence[Value]:
         """Return the joints: choices of the base, then wrist."""
         four, five, six = (line.direction for line in self.lines)
         values = self.base.reach(self.center, goal.point(self.center), watch)
@@ -67,32 +67,34 @@ class SphericalWrist:
         aim = goal.direction(six)
         for axis, turn in turns:
             aim = turned_back(aim, axis, turn)
-        bends = two_turns(four, five, six, aim, watch)
+        fourth, fifth = two_turns(four, five, six, aim, watch)
         axis_four: Column = four
         for axis, turn in reversed(turns):
             axis_four = turned(axis_four, axis, turn)
-        last = last_angle((four, five, six), bends, axis_four, goal)
-        return [*(value_of(value) for value in values), bends.first_angle(), angle(bends.second), last]
+        last = last_turn((four, five, six), fifth, axis_four, goal, watch)
+        return [*values, fourth, fifth, last]
 
 
-def last_angle(axes: tuple[Floats, Floats, Floats], bends: TwoTurns, first_axis: Column, goal: Goal) -> Entry:
-    """Return the angle about the last axis: it brings the tool's view of the first axis to where it must be.
+def last_turn(
+    axes: tuple[Floats, Floats, Floats], bend: Turn | Opposed, first_axis: Column, goal: Goal, watch: Watch
+) -> Turn | Mirrored:
+    """Return the turn about the last axis: it brings the tool's view of the first axis to where it must be.
 
     Args:
         axes: The three axes at zero.
-        bends: The turns about the first two.
+        bend: The turns about the second.
         first_axis: Where the first axis points.
         goal: The displacement of the tool.
+        watch: Right after the turns about the first two, so that their choice is its last.
     """
     first, second, last = axes
     if square_wrist(first, second, last):
-        side = across_floats(last, second)
-        seen = dot(goal.direction(side), first_axis), dot(goal.direction(second), first_axis)
-        return flipped_angles((both(seen[0]), both(seen[1])))
-    tool_x, tool_y, tool_z = (goal.direction(e) for e in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
-    view = dot(tool_x, first_axis), dot(tool_y, first_axis), dot(tool_z, first_axis)
-    bent = turned_back(first, second, bends.second)
-    return angle((dot(across(bent, last), view), dot(cross(bent, last), view)))
+        side = goal.direction(across_floats(last, second))
+        seen = dot(side, first_axis), dot(goal.direction(second), first_axis)
+        return watch.mirrored(unit(seen, watch))
+    view = goal.view(first_axis)
+    bent = turned_back(first, second, bend.both() if isinstance(bend, Opposed) else bend)
+    return unit((dot(across(bent, last), view), dot(cross(bent, last), view)), watch)
 
 
 def match(arm: Arm) -> Method | None:
@@ -102,8 +104,10 @@ def match(arm: Arm) -> Method | None:
         if solver is None:
             continue
         base = solver.base
-        joints = "3, 2 and 1 meet in one point, and joints 6 to 4" if backwards else (
-            "4, 5 and 6 meet in one point, and joints 1 to 3"
+        joints = (
+            "3, 2 and 1 meet in one point, and joints 6 to 4"
+            if backwards
+            else ("4, 5 and 6 meet in one point, and joints 1 to 3")
         )
         reason = f"axes {joints} ({''.join('RP'[line.prismatic] for line in base.lines)}) are a {base.name}"
         name = f"spherical {'shoulder under' if backwards else 'wrist over'} {base.name}"
@@ -126,7 +130,7 @@ def _solver(arm: Arm) -> SphericalWrist | None:
     return SphericalWrist(base, arm.lines[3:], center)
 
 
-def _backwards(solver: SphericalWrist, goal: Goal, watch: Watch) -> Sequence[Entry]:
+def _backwards(solver: SphericalWrist, goal: Goal, watch: Watch) -> Sequence[Value]:
     return list(solver(InverseGoal(goal), watch))[::-1]
 
 

@@ -43,11 +43,26 @@ class Watch:
     Attributes:
         rows: Shape (B,), True where something was noted.
         length: The arm's length, m, that lengths are compared with.
+        choices: How many choices were met so far: every value has at most that many axes before the poses.
     """
 
     def __init__(self, count: int, length: float) -> None:
         self.rows: Flags = np.zeros(count, dtype=bool)
         self.length = length
+        self.choices = 0
+
+    def both(self, value: Entry) -> Array:
+        """Return plus and minus a value (..., B) along the new first axis of one more choice."""
+        self.choices += 1
+        values = np.asarray(value)
+        full = values.reshape((1,) * (self.choices - values.ndim) + values.shape)
+        return np.stack([full, -full])
+
+    def mirrored(self, turn: Turn) -> Mirrored:
+        """Return a turn (..., B) as the first answer of the last choice, with axes for the choices before."""
+        cosine, sine = np.broadcast_arrays(*turn)
+        shape = (1,) * (self.choices - cosine.ndim) + cosine.shape
+        return Mirrored((cosine.reshape(shape), sine.reshape(shape)))
 
     def note(self, where: Flags) -> None:
         """Note the poses of `where` (..., B)."""
@@ -91,9 +106,17 @@ def added(first: Turn, second: Turn, sign: float = 1.0) -> Turn:
 
 
 def angle(turn: Turn) -> Array:
-    """Return angles in (-pi, pi] of pairs of any length."""
-    result: Array = np.arctan2(total(turn[1], 0.0), turn[0])
-    return np.asarray(result)
+    """Return angles in [-pi, pi] of turns of length 1.
+
+    tan(t / 2) = sin t / (1 + cos t), taken from the half turn where the cosine is negative, so that nothing
+    cancels: two roundings from the arc tangent of both, in half its time.
+    """
+    cosine, sine = np.asarray(turn[0]), np.asarray(turn[1]) + 0.0
+    half = np.arctan(sine / (1.0 + np.abs(cosine)))
+    result: Array = half + half
+    behind = cosine < 0.0
+    np.subtract(np.copysign(np.pi, sine), result, out=result, where=behind)
+    return result
 
 
 def half_turn_more(angles: Array) -> Array:
@@ -110,7 +133,7 @@ def onto(axis: Floats, vector: Column, aim: Column) -> Turn:
 
 
 def unit(turn: Turn, watch: Watch, scale: float = 1.0) -> Turn:
-    """Return a turn of length 1; where it has none (below 1e-8 `scale`) the angle is free, and zero is taken."""
+    """Return a turn of length 1; where it has none (1e-8 `scale`) the angle is free, zero is taken."""
     size = np.sqrt(np.square(turn[0]) + np.square(turn[1]))
     free = np.asarray(size < FREE * scale)
     if free.any():
@@ -120,20 +143,14 @@ def unit(turn: Turn, watch: Watch, scale: float = 1.0) -> Turn:
     return turn[0] / size, turn[1] / size
 
 
-def noted_angle(turn: Turn, watch: Watch, scale: float = 1.0) -> Array:
-    """Return the angle of a turn of any length, noting where it is free."""
-    watch.note(np.asarray(np.square(turn[0]) + np.square(turn[1]) < (FREE * scale) ** 2))
-    return angle(turn)
-
-
-def both(value: Entry) -> Array:
-    """Return plus and minus a value along a new first axis."""
-    values = np.asarray(value)
-    return np.stack([values, -values])
-
-
 def levels(
-    axis: Floats, vector: Column, normal: Column, level: Entry, watch: Watch, scale: float = 1.0, sign: Entry = 1.0
+    axis: Floats,
+    vector: Column,
+    normal: Column,
+    level: Entry,
+    watch: Watch,
+    scale: float = 1.0,
+    sign: Entry = 1.0,
 ) -> Turn:
     """Return the two turns about `axis` after which normal . vector is `level` (or comes nearest to it).
 
@@ -159,12 +176,14 @@ def _solved(
     a: Entry, b: Entry, x: Entry, square: Array, rest: Array, watch: Watch, scale_sign: tuple[float, Entry]
 ) -> Turn:
     scale, sign = scale_sign
+    watch.note(np.abs(rest) <= TANGENT**2 * square)
     out = rest < 0.0
     if out.any():
         x = np.where(out, np.copysign(np.sqrt(square), x), x)
         rest = np.where(out, 0.0, rest)
-    watch.note(rest <= TANGENT**2 * square)
-    y = both(product(sign, np.sqrt(rest)) if isinstance(sign, float) else np.copysign(np.sqrt(rest), sign))
+    y = watch.both(
+        product(sign, np.sqrt(rest)) if isinstance(sign, float) else np.copysign(np.sqrt(rest), sign)
+    )
     free = square < (FREE * scale) ** 2
     if free.any():
         square = np.where(free, 1.0, square)
@@ -175,32 +194,51 @@ def _solved(
 
 
 @dataclass(frozen=True, eq=False)
-class TwoTurns:
-    """Turns about two axes, the second carried out first.
+class Mirrored:
+    """Turns of two answers half a turn apart: of a choice whose second answer mirrors the first.
 
     Attributes:
-        first: Turns of any length, shape (2, ..., B).
-        second: Turns of length 1, shape (2, ..., B).
-        mirrored: Whether the two answers for the first are half a turn apart.
+        turn: The turns of the first answer, of length 1, with axes for the choices before.
     """
 
-    first: Turn
-    second: Turn
-    mirrored: bool
+    turn: tuple[Array, Array]
 
-    def first_angle(self) -> Array:
-        """Return the angles about the first axis."""
-        return flipped_angles(self.first) if self.mirrored else angle(self.first)
+    def angles(self) -> Array:
+        """Return both answers' angles, shape (2, ..., B)."""
+        one = angle(self.turn)
+        return np.stack([one, half_turn_more(one)])
 
-
-def flipped_angles(turn: Turn) -> Array:
-    """Return the angles (2, ...) of turns whose second answer is the first and half a turn."""
-    one = angle((np.asarray(turn[0])[0], np.asarray(turn[1])[0]))
-    return np.stack([one, half_turn_more(one)])
+    def both(self) -> Turn:
+        """Return both answers as turns (2, ..., B)."""
+        cosine, sine = self.turn
+        return np.stack([cosine, -cosine]), np.stack([sine, -sine])
 
 
-def two_turns(first: Floats, second: Floats, vector: Floats, aim: Column, watch: Watch) -> TwoTurns:
-    """Return the turns about `second` and then about `first` that bring `vector` to `aim`.
+@dataclass(frozen=True, eq=False)
+class Opposed:
+    """Turns of two answers by the same angle in opposite directions.
+
+    Attributes:
+        turn: The turns of the first answer, of length 1, with axes for the choices before.
+    """
+
+    turn: tuple[Array, Array]
+
+    def angles(self) -> Array:
+        """Return both answers' angles, shape (2, ..., B)."""
+        one = angle(self.turn)
+        return np.stack([one, -one])
+
+    def both(self) -> Turn:
+        """Return both answers as turns (2, ..., B)."""
+        cosine, sine = self.turn
+        return np.stack([cosine, cosine]), np.stack([sine, -sine])
+
+
+def two_turns(
+    first: Floats, second: Floats, vector: Floats, aim: Column, watch: Watch
+) -> tuple[Turn | Mirrored, Turn | Opposed]:
+    """Return the turns about `first`, and those about `second` before, that bring `vector` to `aim`.
 
     Two answers; all are unit vectors. In the first one `vector` stands on the positive side of the plane of
     both axes: second . (first x vector) >= 0. Where the axes are at right angles, and the vector to the
@@ -209,16 +247,21 @@ def two_turns(first: Floats, second: Floats, vector: Floats, aim: Column, watch:
     """
     if not square_wrist(first, second, vector):
         turn = levels(second, vector, first, dot(first, aim), watch)
-        return TwoTurns(onto(first, turned(vector, second, turn), aim), turn, mirrored=False)
+        return unit(onto(first, turned(vector, second, turn), aim), watch), turn
     side = across_floats(second, first)
     away = across(aim, first)
     sine = np.sqrt(np.asarray(dot(away, away)))
-    watch.note(sine < FREE)
-    start = dot(vector, first), dot(vector, side)
-    turns = added((np.asarray(dot(first, aim)), both(sine)), start, -1.0)
-    return TwoTurns((both(dot(side, aim)), both(dot(second, aim))), turns, mirrored=True)
+    watch.choices += 1
+    around = watch.mirrored(unit((dot(side, aim), dot(second, aim)), watch))
+    bend = Opposed(watch.mirrored((dot(first, aim), sine)).turn)
+    if dot(vector, side) == 0.0 and dot(vector, first) == 1.0:
+        return around, bend
+    return around, added(bend.both(), (dot(vector, first), dot(vector, side)), -1.0)
 
 
 def square_wrist(first: Floats, second: Floats, vector: Floats) -> bool:
     """Return whether `second` is at right angles to both others."""
     return max(abs(float(dot(first, second))), abs(float(dot(second, vector)))) <= PARALLEL
+
+
+Value = Turn | Entry | Mirrored | Opposed

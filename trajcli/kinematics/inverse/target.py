@@ -30,7 +30,7 @@ class Target:
         poses: Shape (*batch, 4, 4), T_world_tcp; entries that are not fixed do not matter.
         position: Which of x, y and z in world are fixed.
         orientation: What is fixed of the orientation: "all"; the "direction" of a tool axis; its "yaw", the
-            heading atan2(y, x) in world; its "pitch", the elevation asin(z) above the plane of x and y; "none".
+            heading atan2(y, x) in world; its "pitch", the elevation asin(z) above the x-y plane; "none".
         tool_axis: Which axis of the tcp is meant by direction, yaw and pitch.
         aims: Shape (*batch, 3) unit directions, (*batch, 1) angles in rad, (*batch, 0) otherwise.
     """
@@ -49,7 +49,9 @@ class Target:
     @property
     def coordinates(self) -> int:
         """How many coordinates are fixed."""
-        return sum(self.position) + {"all": 3, "direction": 2, "yaw": 1, "pitch": 1, "none": 0}[self.orientation]
+        return (
+            sum(self.position) + {"all": 3, "direction": 2, "yaw": 1, "pitch": 1, "none": 0}[self.orientation]
+        )
 
     @property
     def batch(self) -> tuple[int, ...]:
@@ -62,7 +64,11 @@ class Target:
 
     def flat(self) -> Target:
         """Return the same targets with one batch dimension."""
-        aims = self.aims.reshape(-1, self.aims.shape[-1]) if self.aims.shape[-1] else self.aims.reshape(self.poses.size // 16, 0)
+        aims = (
+            self.aims.reshape(-1, self.aims.shape[-1])
+            if self.aims.shape[-1]
+            else self.aims.reshape(self.poses.size // 16, 0)
+        )
         return replace(self, poses=self.poses.reshape(-1, 4, 4), aims=aims)
 
 
@@ -188,8 +194,9 @@ def _wrapped(angles: Array) -> Array:
 
 def _aims(kind: str, value: Array) -> Array:
     if kind == "direction":
-        return np.asarray(value / np.linalg.norm(value, axis=-1, keepdims=True))
-    return value if kind == "none" else value[..., None]
+        length: Array = np.linalg.norm(value, axis=-1, keepdims=True)
+        return np.asarray(value / length)
+    return value if kind == "none" else np.asarray(value[..., None])
 
 
 def _check(place: Array | None, named: dict[str, Array]) -> None:

@@ -23,9 +23,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from trajcli.kinematics.columns import Column, Entry, cross, dot, minus
+from trajcli.kinematics.columns import Column, cross, dot, minus, product
 from trajcli.kinematics.inverse.elbow import before, forward_sign, parallel_pair, same_way, shoulder_turn
 from trajcli.kinematics.inverse.lines import (
     Arm,
@@ -36,14 +34,14 @@ from trajcli.kinematics.inverse.lines import (
     parallel,
 )
 from trajcli.kinematics.inverse.method import Choice, Method
-from trajcli.kinematics.inverse.spherical_wrist import last_angle
+from trajcli.kinematics.inverse.spherical_wrist import last_turn
 from trajcli.kinematics.inverse.subproblems import (
+    Mirrored,
     Turn,
+    Value,
     Watch,
     across,
     added,
-    angle,
-    noted_angle,
     onto,
     turned,
     turned_back,
@@ -66,7 +64,7 @@ class ThreeParallel:
     arm: Arm
     point: Floats
 
-    def __call__(self, goal: Goal, watch: Watch) -> Sequence[Entry]:
+    def __call__(self, goal: Goal, watch: Watch) -> Sequence[Value]:
         """Return the joints: choices shoulder, wrist where there are six joints, elbow."""
         one, two, three, four = self.arm.lines[:4]
         axis = two.direction
@@ -78,31 +76,32 @@ class ThreeParallel:
         up = across_floats(one.direction, axis)
         second, third = parallel_pair(two, three, four.point, aim, watch, up)
         rest = added(added(total, second, -1.0), third, -same_way(two, three))
-        fourth = rest[0], np.asarray(rest[1]) * same_way(two, four)
-        return [*(angle(turn) for turn in (first, second, third, fourth)), *after]
+        fourth = rest[0], product(same_way(two, four), rest[1])
+        return [first, second, third, fourth, *after]
 
-    def _sum(self, goal: Goal, first: Turn, watch: Watch) -> tuple[Turn, list[Entry]]:
-        """Return the turn about h that joints 2 to 4 make together, and the angles of the joints after."""
+    def _sum(self, goal: Goal, first: Turn, watch: Watch) -> tuple[Turn, list[Value]]:
+        """Return the turn about h that joints 2 to 4 make together, and the turns of the joints after."""
         one, two, *_, last = self.arm.lines
         axis = two.direction
         seen = turned(axis, one.direction, first)
         if len(self.arm.lines) == 6:
             five = self.arm.lines[4].direction
             aim = turned_back(goal.direction(last.direction), one.direction, first)
-            bends = two_turns(axis, five, last.direction, aim, watch)
-            after = [angle(bends.second), last_angle((axis, five, last.direction), bends, seen, goal)]
-            return unit(bends.first, watch), after
+            total, fifth = two_turns(axis, five, last.direction, aim, watch)
+            sixth = last_turn((axis, five, last.direction), fifth, seen, goal, watch)
+            return total.both() if isinstance(total, Mirrored) else total, [fifth, sixth]
         marker = last.direction if len(self.arm.lines) == 5 else across_floats(one.direction, axis)
         aim = turned_back(goal.direction(marker), one.direction, first)
-        total = unit(onto(axis, marker, aim), watch)
-        return total, [_roll(goal, last.direction, axis, seen, watch)] if len(self.arm.lines) == 5 else []
+        return unit(onto(axis, marker, aim), watch), [_roll(goal, last.direction, axis, seen, watch)] if len(
+            self.arm.lines
+        ) == 5 else []
 
 
-def _roll(goal: Goal, last: Floats, axis: Floats, seen: Column, watch: Watch) -> Entry:
+def _roll(goal: Goal, last: Floats, axis: Floats, seen: Column, watch: Watch) -> Turn:
     """Return the angle about the last axis after which the tool sees h where it points."""
     cosine = dot(goal.direction(across(axis, last)), seen)
     sine = dot(goal.direction(cross(axis, last)), seen)
-    return noted_angle((cosine, sine), watch)
+    return unit((cosine, sine), watch)
 
 
 def match(arm: Arm) -> Method | None:

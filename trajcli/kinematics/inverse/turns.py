@@ -33,25 +33,26 @@ def revolute(robot: Robot) -> Flags:
 
 
 def choose_turns(robot: Robot, joints: Array, near: Array | None) -> None:
-    """Move revolute joints (K, n), in place, by full turns into their limits.
+    """Move revolute joints (n, branches, N), in place, by full turns into their limits.
 
-    Of several turns inside the limits the one nearest to `near` (K, n), or to zero, is taken; of none the one
+    Of several turns inside the limits the one nearest to `near` (n, N), or to zero, is taken; of none the one
     with the smallest excess.
     """
     wide = widened(robot.limits.position)
     for i in np.flatnonzero(revolute(robot)):
         low, high = wide[i]
-        values = joints[:, i]
-        if near is None:
-            rows = np.flatnonzero((values < low) | (values > high) | (np.abs(values) > np.pi))
-            aim = np.zeros(len(rows))
-        else:
-            rows, aim = np.arange(len(values)), near[:, i]
-        if len(rows):
-            values[rows] = _turned(values[rows], aim, low, high)
+        values = joints[i]
+        if near is not None:
+            values[:] = _turned(values, near[i], low, high)
+            continue
+        outside = np.abs(values) > np.pi
+        if low > -np.pi or high < np.pi:
+            outside |= (values < low) | (values > high)
+        if outside.any():
+            values[outside] = _turned(values[outside], 0.0, low, high)
 
 
-def _turned(values: Array, aim: Array, low: float, high: float) -> Array:
+def _turned(values: Array, aim: Array | float, low: float, high: float) -> Array:
     first, last = np.ceil((low - values) / FULL), np.floor((high - values) / FULL)
     wanted = np.round((aim - values) / FULL)
     inside = np.minimum(np.maximum(wanted, first), last)

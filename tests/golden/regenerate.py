@@ -1,0 +1,53 @@
+"""Write the golden files: `make golden` is the only way to change one, and the change is then read in review."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+GOLDEN = Path(__file__).parent
+EXAMPLES = GOLDEN.parent.parent / "examples"
+
+
+def golden_file(example: Path) -> Path:
+    """Return where the rows of an example are kept."""
+    return GOLDEN / f"{example.stem}.csv"
+
+
+def rows_of(example: Path) -> bytes:
+    """Return what `trajcli plan EXAMPLE` writes to standard output."""
+    from trajcli.columns import column_names
+    from trajcli.job.read import load_job
+    from trajcli.pipeline.plan import plan_job
+    from trajcli.pipeline.write import grid_of
+    from trajcli.samples import sample
+    from trajcli.streams.csv import write_csv
+
+    loaded = load_job(example)
+    plan = plan_job(loaded)
+    if not plan.verdict.passed:
+        raise SystemExit(f"{example} does not verify: {plan.verdict.findings}")
+    groups = loaded.job.output.columns
+    out = io.BytesIO()
+    names = column_names(groups, loaded.robot.joint_types, loaded.units)
+    write_csv(sample(plan.trajectory, grid_of(plan), groups, loaded.units), names, out)
+    return out.getvalue()
+
+
+def main() -> None:
+    """Write one golden file for each example, and remove those of examples that are gone."""
+    written = set()
+    for example in sorted(EXAMPLES.glob("*.yaml")):
+        target = golden_file(example)
+        text = rows_of(example)
+        written.add(target)
+        if not target.exists() or target.read_bytes() != text:
+            target.write_bytes(text)
+            print(f"{target.relative_to(GOLDEN.parent.parent)} written, {len(text)} bytes")
+    for stale in set(GOLDEN.glob("*.csv")) - written:
+        stale.unlink()
+        print(f"{stale.relative_to(GOLDEN.parent.parent)} removed: it has no example")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,85 @@
+"""The robots of the catalogue against published tables, joint chains and limits."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from trajcli.errors import FileError, InputError
+from trajcli.job.robot_source import CATALOGUE, catalogue_names, load_robot
+from trajcli.kinematics.forward import forward
+
+ORACLES = Path(__file__).parents[1] / "oracles"
+ARMS = {"ur5e": "C-ur5e", "cobra600": "C-cobra600", "scorbot": "C-scorbot"}
+
+
+@cache
+def oracle(file: str, key: str, name: str) -> dict[str, Any]:
+    rows = yaml.safe_load((ORACLES / file).read_text(encoding="utf-8"))[key]
+    found: dict[str, Any] = next(row for row in rows if row["id"] == ARMS[name])
+    return found
+
+
+def test_every_robot_has_its_oracle() -> None:
+    assert catalogue_names() == sorted(ARMS)
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_rows(name: str) -> None:
+    expected, robot = oracle("robots.yaml", "robots", name), load_robot(name)
+    assert robot.convention == {"std": "standard", "mdh": "modified"}[expected["convention"]]
+    for joint, row in zip(robot.joints, expected["dh"], strict=True):
+        assert joint.type == {"R": "revolute", "P": "prismatic"}[row["type"]]
+        values = [joint.theta, joint.d, joint.a, joint.alpha]
+        assert values == pytest.approx([row[key] for key in ("theta", "d", "a", "alpha")], abs=1e-15)
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_poses(name: str) -> None:
+    expected, robot = oracle("robots.yaml", "robots", name), load_robot(name)
+    assert len(expected["fk"]) >= 4
+    for case in expected["fk"]:
+        assert forward(robot, case["q"]) == pytest.approx(np.array(case["T"]), abs=1e-12), case["id"]
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_limits(name: str) -> None:
+    robot = load_robot(name)
+    for joint, row in enumerate(oracle("limits.yaml", "limits", name)["limits"]):
+        low, high = (np.inf if row[key] is None else row[key] for key in ("lower", "upper"))
+        speed = np.inf if row["velocity"] is None else row["velocity"]
+        assert robot.limits.position[joint].tolist() == pytest.approx(
+            [low if np.isfinite(low) else -np.inf, high]
+        )
+        assert robot.limits.velocity[joint].tolist() == pytest.approx([-speed, speed])
+    assert np.isinf(robot.limits.acceleration).all()  # nobody publishes these
+    assert np.isinf(robot.limits.jerk).all()
+
+
+def test_joint_names_of_the_ur5e_are_those_of_its_description() -> None:
+    chain = oracle("robots.yaml", "robots", "ur5e")["chain"]
+    assert list(load_robot("ur5e").joint_names) == [row["name"] for row in chain if row["type"] == "revolute"]
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_sources_are_named(name: str) -> None:
+    plain = yaml.safe_load((CATALOGUE / f"{name}.yaml").read_text(encoding="utf-8"))
+    assert plain["source"]
+    assert plain["licence"]
+    assert plain["note"]
+
+
+def test_load_robot_from_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "arm.yaml"
+    path.write_text("joints: 3\n")
+    assert load_robot(path).name == load_robot(str(path)).name == "arm"
+    with pytest.raises(FileError):
+        load_robot(tmp_path / "none.yaml")
+    with pytest.raises(InputError, match="the catalogue has no robot 'ur5'") as caught:
+        load_robot("ur5")
+    assert caught.value.problems[0].hint == "did you mean 'ur5e'?"

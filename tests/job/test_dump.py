@@ -1,0 +1,121 @@
+"""A job that is written as it was understood reads as the same job, bit by bit."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from random_jobs import jobs
+
+from trajcli.job.dump import dump_job
+from trajcli.job.read import LoadedJob, job_from_text, load_job
+from trajcli.pipeline.plan import plan_job
+
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.yaml"))
+
+
+def assert_same(a: LoadedJob, b: LoadedJob) -> None:
+    """Everything that planning, judging and writing look at is equal."""
+    assert (a.name, a.units) == (b.name, b.units)
+    for key in ("name", "joints", "convention"):
+        assert getattr(a.robot, key) == getattr(b.robot, key)
+    for key in ("base", "tool"):
+        assert np.array_equal(getattr(a.robot, key), getattr(b.robot, key))
+    for order in range(4):
+        assert np.array_equal(a.robot.limits.of_order(order), b.robot.limits.of_order(order))
+    for key in ("points", "start", "moves", "when_over_limit", "output"):
+        assert getattr(a.job, key) == getattr(b.job, key), key
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(jobs())
+def test_load_dump_load_is_identity(plain: dict[str, Any]) -> None:
+    first = job_from_text(json.dumps(plain, ensure_ascii=False))
+    text = dump_job(first)
+    second = job_from_text(text)
+    assert_same(first, second)
+    assert dump_job(second) == text
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_the_resolved_example_gives_the_same_curve(example: Path) -> None:
+    first = load_job(example)
+    second = job_from_text(dump_job(first))
+    assert_same(first, second)
+    curves = [plan_job(loaded).trajectory.curve for loaded in (first, second)]
+    assert np.array_equal(curves[0].breaks, curves[1].breaks)
+    assert np.array_equal(curves[0].coefficients, curves[1].coefficients)
+
+
+def test_what_a_resolved_job_looks_like() -> None:
+    text = dump_job(
+        job_from_text(
+            """
+version: 1
+name: a job
+units: {angle: deg}
+robot: {joints: [{name: turn, velocity: 180}, {name: "null", type: prismatic}]}
+limits: {scale: {velocity: 0.5}}
+points: {home: {joints: [0, 1]}}
+start: home
+moves: [{planner: quintic, to: home, duration: 20 ms, limits: {velocity: {turn: [-1 rad/s, 0.5 rad/s]}}}]
+"""
+        )
+    )
+    assert (
+        text
+        == """\
+version: 1
+name: "a job"
+units: {angle: deg, length: m}
+robot:
+  name: robot
+  joints:
+    - {name: turn, type: revolute, sign: 1, position: null, velocity: ["-1.5707963267948966 rad/s", \
+"1.5707963267948966 rad/s"], acceleration: null, jerk: null}
+    - {name: "null", type: prismatic, sign: 1, position: null, velocity: null, acceleration: null, jerk: null}
+points:
+  home: {joints: ["0.0 rad", "1.0 m"]}
+start: {joints: ["0.0 rad", "1.0 m"]}
+moves:
+  - {planner: quintic, limits: {velocity: {turn: ["-1.0 rad/s", "0.5 rad/s"]}, scale: {velocity: 1.0, \
+acceleration: 1.0, jerk: 1.0}}, to: {joints: ["0.0 rad", "1.0 m"]}, duration: 0.02}
+when_over_limit: error
+output: {rate: 1000.0, start_time: 0.0, align: false, columns: [t, q, qd, qdd]}
+"""
+    )
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "true",
+        "~",
+        "1",
+        "1e3",
+        "-",
+        "a: b",
+        'q"\\',
+        "#",
+        "\x07",
+        "\u2028",
+        "\u00e9\u0301",
+        "\U0001f600",
+        "0x1",
+        " ",
+    ],
+)
+def test_names_survive(name: str) -> None:
+    plain = {
+        "version": 1,
+        "name": name,
+        "robot": {"joints": [{"name": name}]},
+        "start": {"joints": {name: 1}},
+    }
+    plain |= {"points": {name: {"joints": 2}}, "moves": [{"planner": "cubic", "to": name, "duration": 1}]}
+    first = job_from_text(json.dumps(plain, ensure_ascii=name.isascii() or not name.isprintable()))
+    assert_same(first, job_from_text(dump_job(first)))

@@ -1,0 +1,126 @@
+"""Wrong jobs: what is said about each, and where."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from trajcli.errors import InputError, Problem
+from trajcli.job.read import job_from_text
+
+JOB = """\
+version: 1
+units: {angle: deg, length: mm}
+robot: cobra600
+points:
+  home: {joints: [0, 0, 0, 0]}
+start: home
+moves:
+  - {planner: quintic, to: {joints: [10, 10, 10, 10]}, duration: 2}
+"""
+TO = "{joints: [10, 10, 10, 10]}"
+DURATION = "duration: 2"
+
+
+def problems_of(text: str) -> list[Problem]:
+    with pytest.raises(InputError) as caught:
+        job_from_text(text, "job.yaml")
+    assert caught.value.exit_code == 2
+    return list(caught.value.problems)
+
+
+def underlined(problem: Problem) -> str:
+    place = problem.place
+    assert place is not None
+    assert place.source[place.column - 1 : place.column] != " "
+    return place.source[place.column - 1 : place.column - 1 + place.length]
+
+
+def changed(old: str, new: str) -> str:
+    assert JOB.count(old) == 1, old
+    return JOB.replace(old, new)
+
+
+CASES = yaml.safe_load((Path(__file__).parent / "wrong_jobs.yaml").read_text(encoding="utf-8"))
+SEVERAL = [
+    ("moves:\n  - ", "moves: []\nmove:\n  "),  # the old list is now an unknown key
+    ("{joints: [0, 0, 0, 0]}", "home"),  # a circle is said of each name in it
+]
+
+
+@pytest.mark.parametrize(("old", "new", "line", "text", "message", "hint"), CASES)
+def test_one_flaw(old: str, new: str, line: int, text: str, message: str, hint: str | None) -> None:
+    problem = problems_of(changed(old, new))[0]
+    assert problem.place is not None
+    assert (problem.place.file, problem.place.line) == ("job.yaml", line)
+    if text:
+        assert underlined(problem) == text
+    assert problem.message == message
+    assert problem.hint is None if hint is None else hint in (problem.hint or "")
+
+
+@pytest.mark.parametrize(("old", "new"), [case[:2] for case in CASES if tuple(case[:2]) not in SEVERAL])
+def test_one_flaw_is_one_problem(old: str, new: str) -> None:
+    assert len(problems_of(changed(old, new))) == 1
+
+
+def test_all_flaws_at_once_in_the_order_of_the_file() -> None:
+    problems = problems_of("""\
+units: {angle: degree, length: mm}
+robot:
+  joints: [{velocity: 0}, {type: prismatic, jerk: x}]
+  tool: {xyz: [0, 0]}
+limits: {velocity: true, scale: {jerk: 0}}
+points:
+  a: {joints: [1, oops]}
+  b: {joint: 3}
+start: c
+moves:
+  - {planner: quintic, to: a, duration: -1}
+  - {planner: quintc, to: a}
+  - {to: a}
+  - {planner: hold, duration: 1, speed: 2}
+output: {rate: fast, columns: [t, p]}
+extra: 1
+""")
+    found = [(p.place.line, p.message) for p in problems if p.place is not None]
+    assert found == [
+        (1, "`version` is missing"),
+        (1, 'expected rad or deg, got "degree"'),
+        (3, "expected a number above 0, a pair [lower, upper] or null (unlimited), got 0"),
+        (3, 'expected a length per second cubed such as "250 mm/s^3", got "x"'),
+        (4, "expected 3 numbers, got 2 values"),
+        (5, "expected a number (rad/s), got true"),
+        (5, "expected a number above 0 and at most 1, got 0"),
+        (7, 'expected an angle such as "120 deg", got "oops"'),
+        (8, "unknown key 'joint'"),
+        (9, "there is no point 'c'"),
+        (11, "expected a number above 0 s, got -1"),
+        (12, "unknown planner 'quintc'"),
+        (13, "a move needs `planner`"),
+        (14, "unknown key 'speed'"),
+        (15, 'expected a frequency such as "500 Hz", got "fast"'),
+        (15, 'expected t, q, qd, qdd, qddd or move, got "p"'),
+        (16, "unknown key 'extra'"),
+    ]
+
+
+def test_a_flaw_of_a_point_is_said_once_where_the_point_stands() -> None:
+    text = changed("[0, 0, 0, 0]", "[0, 0, 0]").replace(TO, "home")
+    assert [(p.place and p.place.line) for p in problems_of(text)] == [5]
+
+
+def test_all_limits_that_moves_loosen_come_at_once() -> None:
+    text = changed("start: home", "start: home\nlimits: {velocity: 4}")
+    text = text.replace(DURATION, "limits: {position: [50, 89, [0, 210], null], velocity: {j2: 5, j3: 3}}")
+    text += "  - {planner: hold, duration: 1, limits: {velocity: null}}\n"
+    assert [(p.place and p.place.line, underlined(p), p.move, p.joint) for p in problems_of(text)] == [
+        (9, "89", 0, "j2"),
+        (9, "5", 0, "j2"),
+        (10, "null", 1, "j1"),
+        (10, "null", 1, "j2"),
+        (10, "null", 1, "j3"),
+        (10, "null", 1, "j4"),
+    ]

@@ -1,0 +1,119 @@
+"""`--set` and `--rate`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from trajcli.errors import InputError
+from trajcli.job.read import LoadedJob, load_job
+
+JOB = """\
+version: 1
+units: {angle: deg}
+robot: {joints: 2}
+points: {a: {joints: [0, 0]}}
+start: a
+moves:
+  - {planner: quintic, to: {joints: [10, 10]}, duration: 2}
+"""
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    file = tmp_path / "job.yaml"
+    file.write_text(JOB)
+    return file
+
+
+def moved(loaded: LoadedJob) -> object:
+    move = loaded.job.moves[0].model_dump(exclude_none=True)
+    return {key: move[key] for key in ("planner", "duration") if key in move}
+
+
+SETTINGS = [  # settings, what came of them
+    (["moves.0.duration=3"], {"planner": "quintic", "duration": 3.0}),
+    (["moves.0.duration=3 ms"], {"planner": "quintic", "duration": 0.003}),
+    (["moves.0.duration=3", "moves.0.duration=4"], {"planner": "quintic", "duration": 4.0}),
+    (["moves.0={planner: hold, duration: 5}"], {"planner": "hold", "duration": 5.0}),
+    (["moves.0={planner: hold}", "moves.0.duration=6"], {"planner": "hold", "duration": 6.0}),
+    (["moves.0.planner=cubic"], {"planner": "cubic", "duration": 2.0}),
+]
+
+
+@pytest.mark.parametrize(("settings", "expected"), SETTINGS)
+def test_values_are_replaced(path: Path, settings: list[str], expected: object) -> None:
+    assert moved(load_job(path, settings)) == expected
+
+
+def test_values_are_added(path: Path) -> None:
+    loaded = load_job(
+        path, ["output.columns=[t, q]", "limits.velocity=30", "name=x=y", "points.b={joints: 3}"]
+    )
+    assert (loaded.job.output.columns, loaded.name) == (("t", "q"), "x=y")
+    assert loaded.robot.limits.velocity[0, 1] == pytest.approx(0.5235987755982988)
+    assert set(loaded.job.points) == {"a", "b"}
+
+
+@pytest.mark.parametrize(("rate", "hertz"), [("250", 250.0), ("1 kHz", 1000.0), ("2.5e2", 250.0)])
+def test_rate(path: Path, rate: str, hertz: float) -> None:
+    assert load_job(path, ["output.rate=7"], rate=rate).job.output.rate == hertz
+
+
+WRONG = [  # settings, rate, message, place
+    (["moves.0.duration"], None, "--set moves.0.duration: expected PATH=VALUE", None),
+    (["=3"], None, "--set =3: expected PATH=VALUE", None),
+    (["moves..duration=3"], None, "--set moves..duration=3: expected PATH=VALUE", None),
+    (["moves.1.duration=3"], None, "--set moves.1.duration=3: there is no '1' in a list of 1 entry", None),
+    (["moves.x=3"], None, "--set moves.x=3: there is no 'x' in a list of 1 entry", None),
+    (["moves.-1=3"], None, "--set moves.-1=3: there is no '-1' in a list of 1 entry", None),
+    (
+        ["start.joints=3"],
+        None,
+        "--set start.joints=3: 'joints' would stand inside a, which holds no keys",
+        None,
+    ),
+    (["moves.0.duration=-3"], None, "expected a number above 0 s, got -3", "--set moves.0.duration=-3:1:1"),
+    (["moves.0.speed=3"], None, "unknown key 'speed'", "--set moves.0.speed=3:1:1"),
+    (
+        ["moves.0={planner: hold, duration: 1, durtion: 1}"],
+        None,
+        "unknown key 'durtion'",
+        "--set moves.0={planner: hold, duration: 1, durtion: 1}:1:30",
+    ),
+    (["moves.0.duration="], None, "expected a number (s), got null", "--set moves.0.duration=:1:1"),
+    (["moves.0.duration=[1"], None, "'[' is never closed", "--set moves.0.duration=[1:1:1"),
+    (
+        ["moves.0.duration=-1", "moves.0={planner: quintic, to: a, duration: -2}"],
+        None,
+        "expected a number above 0 s, got -2",
+        "--set moves.0={planner: quintic, to: a, duration: -2}:1:37",
+    ),
+    ([], "fast", 'expected a frequency such as "500 Hz", got "fast"', "--rate fast:1:1"),
+    ([], "0", "expected a number above 0 Hz, got 0", "--rate 0:1:1"),
+]
+
+
+@pytest.mark.parametrize(("settings", "rate", "message", "place"), WRONG)
+def test_wrong_settings(
+    path: Path, settings: list[str], rate: str | None, message: str, place: str | None
+) -> None:
+    with pytest.raises(InputError) as caught:
+        load_job(path, settings, rate=rate)
+    problem = caught.value.problems[0]
+    assert problem.message == message
+    assert (str(problem.place) if problem.place else None) == place
+
+
+def test_a_rate_against_times(path: Path) -> None:
+    path.write_text(JOB + "output: {times: [0, 1]}\n")
+    with pytest.raises(InputError, match="rate and times exclude each other"):
+        load_job(path, rate="5")
+
+
+def test_the_rest_of_the_file_keeps_its_places(path: Path) -> None:
+    path.write_text(JOB.replace("to: {joints: [10, 10]}", "to: b"))
+    with pytest.raises(InputError) as caught:
+        load_job(path, ["moves.0.duration=3"])
+    assert str(caught.value.problems[0].place) == f"{path}:7:28"

@@ -1,0 +1,213 @@
+"""Jobs become SI values: units, points by name, values by joint, robots from everywhere."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from trajcli.errors import FileError, InputError
+from trajcli.job.read import LoadedJob, job_from_text, load_job
+from trajcli.planners.hold import Hold
+from trajcli.planners.quintic import Quintic
+from trajcli.planners.trapezoid import Trapezoid
+
+DEG = math.pi / 180
+
+
+def job(moves: str = "{planner: hold, duration: 1}", **keys: str) -> LoadedJob:
+    parts = {"version": "1", "robot": "{joints: 2}", "start": "{joints: 0}", **keys}
+    return job_from_text("\n".join(f"{k}: {v}" for k, v in parts.items()) + f"\nmoves: [{moves}]\n", "j.yaml")
+
+
+def test_a_job_in_si() -> None:
+    loaded = job("{planner: quintic, to: {joints: [1, 2], velocity: [0.5, 0], acceleration: 3}, duration: 4}")
+    (move,) = loaded.job.moves
+    assert isinstance(move, Quintic)
+    assert (move.duration, move.to.joints, move.to.velocity) == (4.0, (1.0, 2.0), (0.5, 0.0))
+    assert move.to.acceleration == (3.0, 3.0)
+    assert (loaded.name, loaded.robot.name, loaded.robot.joint_names) == ("j", "robot", ("j1", "j2"))
+    assert loaded.job.output.rate == 1000
+    assert loaded.job.output.columns == ("t", "q", "qd", "qdd")
+    assert loaded.events == ()
+
+
+UNITS = [  # in the file, units, SI
+    ("90", "{angle: deg}", 90 * DEG),
+    ("90", "{}", 90.0),
+    ("-90.5", "{angle: deg, length: mm}", -90.5 * DEG),
+    ("90 deg", "{}", 90 * DEG),
+    ("90deg", "{angle: deg}", 90 * DEG),
+    ("0.25 rev", "{angle: deg}", math.pi / 2),
+    ("1e2 mrad", "{angle: deg}", 0.1),
+]
+
+
+@pytest.mark.parametrize(("text", "units", "si"), UNITS)
+def test_units_of_angles(text: str, units: str, si: float) -> None:
+    loaded = job(units=units, start=f"{{joints: [{text}, 0]}}")
+    assert loaded.job.start.joints is not None
+    assert loaded.job.start.joints[0] == pytest.approx(si, rel=1e-15)
+
+
+MIXED = "{joints: [{name: turn}, {name: lift, type: prismatic}]}"
+FORMS = ["90", "[90, 90]", "{lift: 90, turn: 90}", "[90 deg, 9 cm]", '{turn: "90 deg", lift: 0.09 m}']
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_values_by_joint_in_every_form_on_mixed_joints(form: str) -> None:
+    loaded = job(robot=MIXED, units="{angle: deg, length: mm}", start=f"{{joints: {form}}}")
+    assert loaded.job.start.joints == pytest.approx((math.pi / 2, 0.09), rel=1e-15)
+
+
+RATES = [
+    ("velocity", "1 rev/s", "10 mm/s", "/s"),
+    ("velocity", "60 rpm", "0.6 m/min", "/min"),
+    ("acceleration", "1 rev/s^2", "10 mm/s²", "/s^2"),
+]
+
+
+@pytest.mark.parametrize(("key", "turn", "lift", "_unit"), RATES)
+def test_rates_on_mixed_joints(key: str, turn: str, lift: str, _unit: str) -> None:
+    loaded = job(
+        robot=MIXED,
+        start=f"{{joints: 0, {key}: {{turn: {turn}, lift: {lift}}}}}",
+        moves="""
+      {planner: quintic, to: {joints: 0}, duration: 1}""",
+    )
+    assert getattr(loaded.job.start, key) == pytest.approx((2 * math.pi, 0.01), rel=1e-15)
+
+
+def test_joints_that_a_mapping_of_rates_leaves_out_are_zero() -> None:
+    loaded = job(
+        robot=MIXED,
+        start="{joints: 0, velocity: {lift: 2}}",
+        moves="""
+      {planner: jerk_limited, to: {velocity: {turn: 1}}}""",
+    )
+    assert loaded.job.start.velocity == (0.0, 2.0)
+    assert loaded.job.moves[0].to.velocity == (1.0, 0.0)  # type: ignore[union-attr]
+
+
+def test_points_by_name() -> None:
+    loaded = job(
+        "{planner: cubic, to: there, duration: 1}, {planner: cubic, to: here, duration: 1}",
+        points="{there: {joints: [1, 2]}, here: {joints: 3, velocity: 1}, again: there}",
+        start="again",
+    )
+    assert loaded.job.start.joints == (1.0, 2.0)
+    assert [m.to.joints for m in loaded.job.moves] == [(1.0, 2.0), (3.0, 3.0)]  # type: ignore[union-attr]
+    assert loaded.job.moves[1].to.velocity == (1.0, 1.0)  # type: ignore[union-attr]
+
+
+def test_bare_joints_have_no_geometry_and_no_limits() -> None:
+    robot = job(robot="{joints: 12}").robot
+    assert (robot.convention, len(robot.joints), set(robot.joint_types)) == (None, 12, {"revolute"})
+    assert all(np.isinf(robot.limits.of_order(order)).all() for order in range(4))
+
+
+def test_an_inline_robot_uses_the_units_of_the_job() -> None:
+    robot = job(
+        units="{angle: deg, length: mm}",
+        robot="""{name: arm, convention: modified, joints: [{d: 100, alpha: 90, position: [-90, 45], velocity: 30},
+          {type: prismatic, theta: 90, a: 2.5, sign: -1, position: [0, 300], acceleration: [-10, 20], jerk: null}],
+          base: {xyz: [1000, 0, 0]}, tool: {xyz: [0, 0, 5], rpy: [0, 0, 90]}}""",
+    ).robot
+    first, second = robot.joints
+    assert (robot.name, robot.convention, second.sign) == ("arm", "modified", -1)
+    assert (first.d, first.alpha, second.theta, second.a) == pytest.approx(
+        (0.1, math.pi / 2, math.pi / 2, 0.0025)
+    )
+    assert robot.limits.position == pytest.approx(np.array([[-math.pi / 2, math.pi / 4], [0, 0.3]]))
+    assert robot.limits.velocity[0] == pytest.approx([-30 * DEG, 30 * DEG])
+    assert robot.limits.acceleration[1] == pytest.approx([-0.01, 0.02])
+    assert np.isinf(robot.limits.jerk).all()
+    assert robot.base[:3, 3] == pytest.approx([1, 0, 0])
+    quarter_turn = [[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0.005], [0, 0, 0, 1]]
+    assert robot.tool == pytest.approx(np.array(quarter_turn), abs=1e-15)
+
+
+ROBOT_FILE = "units: {angle: deg, length: mm}\njoints: [{velocity: 90}, {type: prismatic, velocity: 250}]\n"
+
+
+@pytest.mark.parametrize("by", ["relative", "absolute", "from another folder"])
+def test_a_robot_file_has_its_own_units(tmp_path: Path, by: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "jobs").mkdir()
+    (tmp_path / "arms").mkdir()
+    file = tmp_path / "arms" / "slider.yaml"
+    file.write_text(ROBOT_FILE)
+    path = tmp_path / "jobs" / "job.yaml"
+    named = str(file) if by == "absolute" else "../arms/slider.yaml"
+    path.write_text(
+        f"version: 1\nrobot: {{file: {named}}}\nstart: {{joints: 1}}\nmoves: [{{planner: hold, duration: 1}}]\n"
+    )
+    if by != "relative":
+        monkeypatch.chdir("/")
+        loaded = load_job(str(path))
+    else:
+        monkeypatch.chdir(tmp_path)
+        loaded = load_job("jobs/job.yaml")
+    assert loaded.robot.name == "slider"
+    assert loaded.robot.limits.velocity[:, 1] == pytest.approx([math.pi / 2, 0.25])
+    assert loaded.job.start.joints == (1.0, 1.0)  # the units of the job, not those of the robot's file
+
+
+def test_flaws_of_a_robot_file_come_with_those_of_the_job(tmp_path: Path) -> None:
+    (tmp_path / "arm.yaml").write_text("units: {angle: deg}\njoints: [{velocity: -3}]\n")
+    path = tmp_path / "job.yaml"
+    path.write_text(
+        "version: 1\nrobot: {file: arm.yaml}\nstart: {joints: 1}\nmoves: [{planner: hold, duration: 0}]\n"
+    )
+    with pytest.raises(InputError) as caught:
+        load_job(path)
+    places = [
+        (Path(p.place.file).name, p.place.line, p.place.column) for p in caught.value.problems if p.place
+    ]
+    assert places == [("arm.yaml", 2, 21), ("job.yaml", 4, 35)]
+
+
+def test_a_missing_robot_file_is_said_where_it_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "job.yaml"
+    path.write_text(
+        "version: 1\nrobot: {file: arm.yaml}\nstart: {joints: 1}\nmoves: [{planner: hold, duration: 1}]\n"
+    )
+    with pytest.raises(FileError) as caught:
+        load_job(path)
+    (problem,) = caught.value.problems
+    assert "arm.yaml" in problem.message
+    assert problem.place is not None
+    assert (problem.place.file, problem.place.line, problem.place.column) == (str(path), 2, 15)
+
+
+def test_fields_of_a_trapezoid_and_a_hold() -> None:
+    loaded = job(
+        "{planner: trapezoid, to: {joints: 1}, velocity: [1, 2], overshoot: true}, {planner: hold, duration: 3 ms}"
+    )
+    trapezoid, hold = loaded.job.moves
+    assert isinstance(trapezoid, Trapezoid)
+    assert isinstance(hold, Hold)
+    assert (trapezoid.velocity, trapezoid.overshoot, trapezoid.synchronize) == ((1.0, 2.0), True, "time")
+    assert hold.duration == pytest.approx(0.003)
+
+
+def test_the_name_of_a_job() -> None:
+    assert job().name == "j"
+    assert job(name="pick").name == "pick"
+
+
+SAID = [
+    ((math.pi, 0, 0), "180 deg"),
+    ((0.25, 1, 1), "250 mm/s"),
+    ((math.pi, 3, 0), "180 deg/s^3"),
+    ((1.5, 0, None), "1.5 s"),
+    ((math.inf, 2, 1), "unlimited"),
+]
+
+
+@pytest.mark.parametrize(("amount", "text"), SAID)
+def test_amounts_are_said_in_the_units_of_the_job(amount: tuple[float, int, int | None], text: str) -> None:
+    from trajcli.errors import Amount
+
+    assert job(robot=MIXED, units="{angle: deg, length: mm}").say(Amount(*amount)) == text

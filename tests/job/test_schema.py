@@ -1,0 +1,166 @@
+"""The JSON Schemas: current, valid, and of one mind with the reader."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from jsonschema import Draft202012Validator
+from random_jobs import jobs
+
+from trajcli.cli.init import STARTER
+from trajcli.job.dump import dump_job
+from trajcli.job.load import read_document
+from trajcli.job.read import job_from_text
+from trajcli.job.robot_source import CATALOGUE
+from trajcli.job.schema import KINDS, SchemaKind, schema_of, schema_text
+from trajcli.planners import PLANNERS
+
+ROOT = Path(__file__).parents[2]
+JOBS = [*sorted((ROOT / "examples").glob("*.yaml")), STARTER]
+ROBOTS = [*sorted(CATALOGUE.glob("*.yaml")), *sorted((ROOT / "examples/robots").glob("*.yaml"))]
+VALIDATORS = {kind: Draft202012Validator(schema_of(kind)) for kind in KINDS}
+
+
+def flaws(kind: SchemaKind, plain: Any) -> list[str]:
+    return [f"{error.json_path}: {error.message}" for error in VALIDATORS[kind].iter_errors(plain)]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_committed_schemas_are_current(kind: SchemaKind) -> None:
+    committed = (ROOT / "schemas" / f"{kind}.schema.json").read_text(encoding="utf-8")
+    assert committed == schema_text(kind), "run `make schema`"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_schemas_are_valid(kind: SchemaKind) -> None:
+    schema = schema_of(kind)
+    assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+    Draft202012Validator.check_schema(schema)
+    json.loads(schema_text(kind), parse_constant=pytest.fail)  # NaN and infinity are no JSON
+
+
+@pytest.mark.parametrize("path", JOBS, ids=lambda path: path.stem)
+def test_jobs_are_accepted(path: Path) -> None:
+    assert flaws("job", read_document(str(path)).plain()) == []
+
+
+@pytest.mark.parametrize("path", JOBS[:-1], ids=lambda path: path.stem)
+def test_examples_name_their_schema_and_say_what_they_show(path: Path) -> None:
+    first, second, *_ = path.read_text(encoding="utf-8").splitlines()
+    assert first == "# yaml-language-server: $schema=../schemas/job.schema.json"
+    assert second.startswith("# ")
+
+
+@pytest.mark.parametrize("path", ROBOTS, ids=lambda path: path.stem)
+def test_robots_are_accepted(path: Path) -> None:
+    assert flaws("robot", read_document(str(path)).plain()) == []
+
+
+def test_there_is_an_example_for_each_planner() -> None:
+    used = {move["planner"] for path in JOBS[:-1] for move in read_document(str(path)).plain()["moves"]}
+    assert used == set(PLANNERS)
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(jobs())
+def test_random_jobs_are_accepted_as_the_reader_does(plain: dict[str, Any]) -> None:
+    loaded = job_from_text(json.dumps(plain, ensure_ascii=False))
+    assert flaws("job", plain) == []
+    from trajcli.job.load import parse_document
+
+    assert flaws("job", parse_document(dump_job(loaded), "resolved").plain()) == []
+
+
+JOB: dict[str, Any] = {
+    "version": 1,
+    "robot": {"joints": 2},
+    "start": {"joints": 0},
+    "moves": [{"planner": "quintic", "to": {"joints": [1, 2]}, "duration": 3}],
+}
+MOVE = JOB["moves"][0]
+WRONG = [
+    {"version": 2},
+    {"verson": 1},
+    {"units": {"angle": "degrees"}},
+    {"units": None},
+    {"robot": 4},
+    {"robot": {"joints": 13}},
+    {"robot": {"joints": 0}},
+    {"robot": {"joints": [{"typ": "prismatic"}]}},
+    {"robot": {"joints": [{"velocity": 0}]}},
+    {"robot": {"joints": [{"sign": 2}]}},
+    {"robot": {"joints": [{"velocity": [1, 2, 3]}]}},
+    {"robot": {"joints": 2, "base": {"xyz": [1, 2]}}},
+    {"robot": {"joints": 2, "base": {"euler": {"sequence": "ABC", "angles": [1, 2, 3]}}}},
+    {"robot": {"file": "x", "tool": {}}},
+    {"start": [0, 0]},
+    {"start": None},
+    {"start": {"joints": True}},
+    {"start": {"joints": [None, 1]}},
+    {"start": {"joints": ["fast", 1]}},
+    {"start": {"jonts": 1}},
+    {"moves": []},
+    {"moves": {}},
+    {"moves": [{**MOVE, "planner": "quintc"}]},
+    {"moves": [{"to": {"joints": 1}}]},
+    {"moves": [{**MOVE, "duration": 0}]},
+    {"moves": [{**MOVE, "duration": -1}]},
+    {"moves": [{**MOVE, "duration": None}]},
+    {"moves": [{**MOVE, "duration": [1]}]},
+    {"moves": [{**MOVE, "speed": 1}]},
+    {"moves": [{**MOVE, "when_over_limit": "stop"}]},
+    {"moves": [{"planner": "quintic", "duration": 1}]},
+    {"moves": [{"planner": "hold"}]},
+    {"moves": [{"planner": "hold", "duration": 1, "to": "x"}]},
+    {"moves": [{"planner": "trapezoid", "to": {"joints": 1}, "velocity": 0}]},
+    {"moves": [{"planner": "trapezoid", "to": {"joints": 1}, "overshoot": "yes"}]},
+    {"moves": [{"planner": "jerk_limited", "to": {"joints": 1}, "synchronize": "both"}]},
+    {"limits": {"velocty": 1}},
+    {"limits": {"velocity": -1}},
+    {"limits": {"velocity": True}},
+    {"limits": {"scale": {"velocity": 1.5}}},
+    {"limits": {"scale": {"velocity": 0}}},
+    {"output": {"rate": 0}},
+    {"output": {"columns": ["t", "pos"]}},
+    {"output": {"columns": []}},
+    {"output": {"times": []}},
+    {"output": {"times": [True]}},
+    {"when_over_limit": "never"},
+    {"points": {"a": [1, 2]}},
+]
+
+
+@pytest.mark.parametrize("change", WRONG, ids=str)
+def test_wrong_jobs_are_refused_by_schema_and_reader(change: dict[str, Any]) -> None:
+    from trajcli.errors import InputError
+
+    assert flaws("job", JOB) == []
+    plain = {**JOB, **change}
+    assert flaws("job", plain)
+    with pytest.raises(InputError):
+        job_from_text(json.dumps(plain))
+
+
+def _described(schema: Any, path: str = "") -> list[str]:
+    """The properties without a description, of the schema or of what they refer to."""
+    lacking = []
+    for name, field in schema.get("properties", {}).items():
+        told = (
+            "description" in field
+            or "$ref" in field
+            or any("$ref" in form for form in field.get("anyOf", []))
+        )
+        if not told and "const" not in field:
+            lacking.append(f"{path}.{name}")
+    return lacking
+
+
+@pytest.mark.parametrize("kind", ["job", "robot"])
+def test_every_field_is_described(kind: SchemaKind) -> None:
+    schema = schema_of(kind)
+    parts = {"": schema, **schema["$defs"]}
+    assert [lack for name, part in parts.items() for lack in _described(part, name)] == []

@@ -1,0 +1,516 @@
+"""Laws that hold for every motion of their kind: derivatives, symmetry, scaling, and the fastest duration."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from numpy.polynomial import polynomial
+from random_jobs import MOST_JOINTS, RATES, TAGS, loaded, only_move, random_job
+
+from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.errors import InputError, PlanningError
+from trajcli.planners.planner import Planned
+
+POLYNOMIALS = {"cubic": 3, "quintic": 5, "septic": 7}
+LAWS = [*POLYNOMIALS, "cycloidal", "trapezoid"]
+SEEDS = st.integers(0, 2**32 - 1)
+few = settings(max_examples=40, deadline=None)
+
+
+def plan_of(job: dict[str, Any]) -> Planned | None:
+    """Return the plan of the job's only move, or None where there is none."""
+    planner, start, robot = only_move(job)
+    try:
+        return planner.plan(start, robot)
+    except (PlanningError, InputError):
+        return None
+
+
+def some_plan(seed: int, tag: str, joints: int, *, rest: bool = False) -> tuple[dict[str, Any], Planned]:
+    """Return a random job that can be planned."""
+    for k in range(20):
+        job = random_job(np.random.default_rng([seed, k]), tag, joints, rest=rest, unlimited=0.05)
+        planned = plan_of(job)
+        if planned is not None and planned.curve.duration > 0:
+            return job, planned
+    assume(False)
+    raise AssertionError
+
+
+def derivative_of(curve: PiecewisePolynomial, piece: int, joint: int, order: int, local: np.ndarray) -> Any:
+    """Differentiate and evaluate with numpy's own polynomials."""
+    ascending = curve.coefficients[::-1, piece, joint]
+    return polynomial.polyval(local, polynomial.polyder(ascending, order))
+
+
+@few
+@given(seed=SEEDS, tag=st.sampled_from(TAGS), joints=st.integers(1, MOST_JOINTS))
+def test_derivatives_are_those_of_the_position(seed: int, tag: str, joints: int) -> None:
+    _, planned = some_plan(seed, tag, joints)
+    curve = planned.curve
+    step = 1e-4
+    for piece in np.flatnonzero(curve.lengths > 1e-9 * curve.duration).tolist():
+        length = float(curve.lengths[piece])
+        inside = length * np.linspace(0.05, 0.95, 7)
+        values = curve.evaluate_orders(curve.breaks[piece] + inside, range(4))
+        around = [curve.evaluate(curve.breaks[piece] + inside + sign * step * length) for sign in (-1, 1)]
+        difference = (around[1] - around[0]) / (2 * step * length)
+        for joint in range(joints):
+            for order in range(4):
+                exact = derivative_of(curve, piece, joint, order, inside)
+                scale = np.abs(derivative_of(curve, piece, joint, 0, inside)).max() / length**order
+                assert np.abs(values[:, order, joint] - exact).max() <= 1e-9 * max(np.abs(exact).max(), scale)
+            # central differences miss by q''' h^2 / 6, and by the rounding of q over h
+            jerk = np.abs(derivative_of(curve, piece, joint, 3, length * np.linspace(0, 1, 50))).max()
+            rounding = 1e-15 * max(np.abs(values[:, 0, joint]).max(), curve.end * np.abs(difference).max())
+            room = jerk * (step * length) ** 2 / 5 + rounding / (step * length)
+            assert np.abs(values[:, 1, joint] - difference[:, joint]).max() <= room + 1e-12
+
+
+@few
+@given(seed=SEEDS, tag=st.sampled_from(LAWS), joints=st.integers(1, MOST_JOINTS))
+def test_reversed_time_is_the_way_back(seed: int, tag: str, joints: int) -> None:
+    job, _ = some_plan(seed, tag, joints, rest=True)
+    (move,) = job["moves"]
+    if "synchronize" in move:
+        move["synchronize"] = "time"  # those who arrive by themselves wait at the end, not at the start
+    there = plan_of(job)
+    assume(there is not None)
+    assert there is not None
+    limits = job["robot"]["joints"]
+    for row in limits:  # backwards in time velocity and jerk change sign, acceleration does not
+        for quantity in ("velocity", "jerk"):
+            if isinstance(row[quantity], list):
+                row[quantity] = [-row[quantity][1], -row[quantity][0]]
+    job["start"], move["to"] = move["to"], job["start"]
+    if "acceleration" in move or "deceleration" in move:
+        up = move.get("acceleration")
+        move["acceleration"], move["deceleration"] = move.get("deceleration", up), up
+        assume(None not in (move["acceleration"], move["deceleration"]))
+    back = plan_of(job)
+    assert back is not None
+    assert back.curve.duration == pytest.approx(there.curve.duration, rel=1e-12)
+    u = np.linspace(0, 1, 30)
+    for order, sign in enumerate((1, -1, 1)):
+        want = there.curve.evaluate(there.curve.end * (1 - u), order, side="left")
+        got = back.curve.evaluate(back.curve.end * u, order)
+        if order == 2 and tag == "trapezoid":
+            continue  # its steps lie a rounding apart
+        scale = np.abs(want).max()
+        np.testing.assert_allclose(sign * got, want, rtol=0, atol=1e-10 * max(scale, 1.0))
+
+
+@few
+@given(seed=SEEDS, tag=st.sampled_from([*POLYNOMIALS, "cycloidal"]), factor=st.floats(0.05, 20))
+def test_longer_by_k_is_slower_by_k(seed: int, tag: str, factor: float) -> None:
+    job, _ = some_plan(seed, tag, 3, rest=True)
+    curves = []
+    for duration in (1.3, 1.3 * factor):
+        job["moves"][0]["duration"] = duration
+        planned = plan_of(job)
+        assert planned is not None
+        curves.append(planned.curve)
+    u = np.linspace(0, 1, 40)
+    for order in range(4):
+        first, second = (curve.evaluate(np.minimum(u * curve.end, curve.end), order) for curve in curves)
+        np.testing.assert_allclose(
+            second * (curves[1].end / curves[0].end) ** order, first, rtol=0, atol=1e-9 * np.abs(first).max()
+        )
+
+
+@few
+@given(seed=SEEDS, factor=st.floats(0.05, 20))
+def test_scaled_limits_scale_the_fastest_trapezoid(seed: int, factor: float) -> None:
+    rng = np.random.default_rng(seed)
+    speed, rate, distance = rng.uniform(0.2, 3, 3).tolist()
+    fast = trapezoid(distance, velocity=speed, acceleration=rate)
+    slow = trapezoid(distance, velocity=speed / factor, acceleration=rate / factor**2)
+    assert fast is not None
+    assert slow is not None
+    assert slow.curve.end == pytest.approx(fast.curve.end * factor, rel=1e-12)
+    u = np.linspace(0, 1, 40)
+    first, second = (c.evaluate(np.minimum(u * c.end, c.end), 1) for c in (fast.curve, slow.curve))
+    np.testing.assert_allclose(second * factor, first, rtol=0, atol=1e-11 * speed)
+
+
+def worst_ratio(planned: Planned, limits: list[dict[str, Any]]) -> np.ndarray:
+    """Return the largest share of the limits that each order 1..3 uses, from the roots of numpy's polynomials."""
+    curve, ratios = planned.curve, np.zeros(3)
+    for joint, row in enumerate(limits):
+        for order, quantity in enumerate(RATES, 1):
+            if row.get(quantity) is None:
+                continue
+            bound = row[quantity]
+            low, high = bound if isinstance(bound, list) else (-bound, bound)
+            for piece in range(curve.pieces):
+                values = extreme_values(curve, piece, joint, order)
+                ratios[order - 1] = max(ratios[order - 1], values.max() / high, values.min() / low)
+    return ratios
+
+
+def extreme_values(curve: PiecewisePolynomial, piece: int, joint: int, order: int) -> np.ndarray:
+    length = float(curve.lengths[piece])
+    # over unit time, so that the companion matrix is well scaled
+    ascending = curve.coefficients[::-1, piece, joint] * length ** np.arange(curve.degree + 1)
+    of_order = polynomial.polyder(ascending, order)
+    slope = polynomial.polytrim(polynomial.polyder(of_order), 1e-14 * max(np.abs(of_order).max(), 1e-300))
+    roots = polynomial.polyroots(slope)
+    inside = np.clip(roots[np.abs(roots.imag) < 1e-6].real, 0, 1) if roots.size else roots.real
+    return polynomial.polyval(np.concatenate([inside, [0.0, 1.0]]), of_order) / length**order
+
+
+@few
+@given(seed=SEEDS, tag=st.sampled_from(LAWS), joints=st.integers(1, MOST_JOINTS))
+def test_the_fastest_from_rest_to_rest_touches_a_limit(seed: int, tag: str, joints: int) -> None:
+    job = random_job(np.random.default_rng(seed), tag, joints, rest=True, unlimited=0.2)
+    job["moves"] = [{"planner": tag, "to": job["moves"][0]["to"]}]
+    planned = plan_of(job)
+    assume(planned is not None and planned.curve.duration > 0)
+    assert planned is not None
+    ratios = worst_ratio(planned, job["robot"]["joints"])
+    if tag == "trapezoid":  # its own law knows no jerk, and has none but in its steps
+        ratios = ratios[:2]
+    assert ratios.max() == pytest.approx(1, abs=1e-9)
+    if tag != "trapezoid":
+        job["moves"][0]["duration"] = planned.curve.duration * (1 - 1e-6)
+        shorter = plan_of(job)
+        assert shorter is not None
+        assert worst_ratio(shorter, job["robot"]["joints"]).max() > 1 + 5e-7
+
+
+@few
+@given(seed=SEEDS, tag=st.sampled_from(sorted(POLYNOMIALS)), joints=st.integers(1, 4))
+def test_the_fastest_between_moving_states_touches_a_limit(seed: int, tag: str, joints: int) -> None:
+    job = random_job(np.random.default_rng(seed), tag, joints, unlimited=0.1)
+    job["moves"][0].pop("duration", None)
+    planned = plan_of(job)
+    assume(planned is not None and planned.curve.duration > 0)
+    assert planned is not None
+    limits = job["robot"]["joints"]
+    assert worst_ratio(planned, limits).max() <= 1 + 1e-9
+    shorter = [1 - 1e-6, *np.geomspace(0.999, 0.01, 60)]
+    for factor in shorter:
+        job["moves"][0]["duration"] = planned.curve.duration * factor
+        attempt = plan_of(job)
+        assert attempt is not None
+        assert worst_ratio(attempt, limits).max() > 1, f"{factor} of the fastest duration would do"
+
+
+@pytest.mark.parametrize("tag", sorted(POLYNOMIALS))
+def test_the_fastest_is_found_in_a_narrow_interval(tag: str) -> None:
+    """Nearly constant speed: only durations within 1e-4 of distance over speed keep the acceleration."""
+    job = {
+        "version": 1,
+        "robot": {"joints": 1},
+        "limits": {"velocity": 11, "acceleration": 0.01},
+        "start": {"joints": [0], "velocity": 10},
+        "moves": [{"planner": tag, "to": {"joints": [1], "velocity": 10}}],
+    }
+    planned = plan_of(job)
+    assert planned is not None
+    assert planned.curve.duration == pytest.approx(0.1, rel=1e-4)
+
+
+def test_a_loose_direction_does_not_hide_the_fastest() -> None:
+    job = {
+        "version": 1,
+        "robot": {"joints": [{"velocity": [-0.001, 10], "acceleration": 1e4}]},
+        "start": {"joints": [0], "velocity": [1]},
+        "moves": [{"planner": "cubic", "to": {"joints": [10], "velocity": [1]}}],
+    }
+    planned = plan_of(job)
+    assert planned is not None
+    # mean speed 10/T with ends at 1: the peak 1.5 * 10 / T - 0.5 * 1 is at its limit of 10
+    assert planned.curve.duration == pytest.approx(15 / 10.5, rel=1e-9)
+
+
+@pytest.mark.parametrize("tag", sorted(POLYNOMIALS))
+def test_an_impossible_boundary_velocity_has_no_fastest(tag: str) -> None:
+    job = {
+        "version": 1,
+        "robot": {"joints": 1},
+        "limits": {"velocity": 1, "acceleration": 1, "jerk": 1},
+        "start": {"joints": [0], "velocity": 2},
+        "moves": [{"planner": tag, "to": {"joints": [1]}}],
+    }
+    planner, start, robot = only_move(job)
+    with pytest.raises(PlanningError, match="no duration"):
+        planner.plan(start, robot)
+
+
+def test_a_change_of_acceleration_alone_needs_a_limit_to_have_a_fastest_duration() -> None:
+    job = {
+        "version": 1,
+        "robot": {"joints": 1},
+        "limits": {"velocity": 1, "acceleration": 1},
+        "start": {"joints": [0]},
+        "moves": [{"planner": "quintic", "to": {"joints": [0], "acceleration": 0.1}}],
+    }
+    planner, start, robot = only_move(job)
+    with pytest.raises(InputError, match="jerk of j1"):
+        planner.plan(start, robot)
+
+
+def trapezoid(distance: float, start_velocity: float = 0.0, end_velocity: float = 0.0, **fields: Any) -> Any:
+    """Plan a trapezoid of one joint from 0 without limits."""
+    job = {
+        "version": 1,
+        "robot": {"joints": 1},
+        "start": {"joints": [0], "velocity": [start_velocity]},
+        "moves": [
+            {"planner": "trapezoid", "to": {"joints": [distance], "velocity": [end_velocity]}, **fields}
+        ],
+    }
+    return plan_of(job)
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    distance=st.floats(0.01, 100).flatmap(lambda d: st.sampled_from([d, -d])),
+    duration=st.floats(0.05, 50),
+    share=st.floats(-0.5, 1.5),
+)
+def test_trapezoid_feasibility_interval(distance: float, duration: float, share: float) -> None:
+    mean = abs(distance) / duration
+    assume(min(abs(share), abs(share - 1)) > 1e-9)
+    speed = mean * (1 + share)
+    planned = trapezoid(distance, duration=duration, velocity=speed)
+    assert (planned is not None) == (0 < share <= 1)
+    if planned is not None:
+        velocities = planned.curve.evaluate(np.linspace(0, planned.curve.end, 101), 1)
+        ramp = duration - abs(distance) / speed
+        assert planned.curve.evaluate(duration / 2, 1)[0] == pytest.approx(
+            math.copysign(speed, distance), rel=1e-9
+        )
+        assert np.abs(velocities).max() <= speed * (1 + 1e-9)
+        rate = planned.curve.evaluate(ramp / 2, 2)[0]
+        assert rate == pytest.approx(math.copysign(speed / ramp, distance), rel=1e-6)
+    least = 4 * mean / duration
+    for factor, possible in ((1 - 1e-9, False), (1.0, True), (1 + share**2, True)):
+        got = trapezoid(distance, duration=duration, acceleration=least * factor)
+        assert (got is not None) == possible
+
+
+@pytest.mark.parametrize(("share", "possible"), [(0.0, False), (1.0, True)])
+@pytest.mark.parametrize("duration", [0.7, 3.0, 4.0, 11.1])
+def test_trapezoid_feasibility_at_the_ends_of_the_interval(
+    share: float, possible: bool, duration: float
+) -> None:
+    for distance in (0.1, 1 / 3, 7.7, -80.0):
+        planned = trapezoid(distance, duration=duration, velocity=abs(distance) / duration * (1 + share))
+        assert (planned is not None) == possible
+
+
+def covered(speed: float, first: float, last: float, rise: float, fall: float, duration: float) -> float:
+    """Integrate a velocity that goes from `first` over `speed` to `last` with the given rates."""
+    up, down = abs(speed - first) / rise, abs(speed - last) / fall
+    times = np.array([0.0, up, duration - down, duration])
+    velocities = np.array([first, speed, speed, last])
+    return float(np.sum((velocities[1:] + velocities[:-1]) / 2 * np.diff(times)))
+
+
+def bisected(function: Any, low: float, high: float) -> float:
+    """Return where an increasing function crosses zero."""
+    for _ in range(200):
+        middle = (low + high) / 2
+        low, high = (low, middle) if function(middle) > 0 else (middle, high)
+    return high
+
+
+def decimals(low: float, high: float) -> st.SearchStrategy[float]:
+    """Draw numbers of three decimals."""
+    return st.integers(round(1000 * low), round(1000 * high)).map(lambda thousandths: thousandths / 1000)
+
+
+boundary = decimals(0.0, 3.0)
+rates = decimals(0.2, 8.0)
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    first=boundary, last=boundary, rise=rates, fall=rates, cap=decimals(3.0, 6.0), distance=decimals(0.1, 40)
+)
+def test_fastest_trapezoid_with_boundary_speeds(
+    first: float, last: float, rise: float, fall: float, cap: float, distance: float
+) -> None:
+    fields = {"velocity": cap, "acceleration": rise, "deceleration": fall}
+    planned = trapezoid(distance, first, last, **fields)
+    needed = (first**2 - last**2) / (2 * fall) if first > last else (last**2 - first**2) / (2 * rise)
+    assume(abs(needed - distance) > 1e-9 * distance)
+    assert (planned is not None) == (needed <= distance)
+    if planned is None:
+        return
+
+    def ramps(speed: float) -> float:
+        return (speed - first) / rise + (speed - last) / fall
+
+    def surplus(speed: float) -> float:
+        return covered(speed, first, last, rise, fall, ramps(speed)) - distance
+
+    peak = min(cap, bisected(surplus, max(first, last), 1e3))
+    duration = ramps(peak) - surplus(peak) / peak
+    assert planned.curve.end == pytest.approx(duration, rel=1e-9)
+    t = np.linspace(0, planned.curve.end, 500)
+    velocity, acceleration = (planned.curve.evaluate(t, order)[:, 0] for order in (1, 2))
+    assert velocity.max() <= peak * (1 + 1e-9)
+    assert -fall * (1 + 1e-6) <= acceleration.min()
+    assert acceleration.max() <= rise * (1 + 1e-6)
+    assert velocity[[0, -1]] == pytest.approx([first, last], abs=1e-9)
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    first=boundary, last=boundary, rise=rates, fall=rates, duration=decimals(0.1, 20), share=decimals(0.02, 1)
+)
+def test_trapezoid_of_given_duration_with_boundary_speeds(
+    first: float, last: float, rise: float, fall: float, duration: float, share: float
+) -> None:
+    """Pick a cruise speed, cover what it covers, and find it again from distance and duration."""
+
+    def length(speed: float) -> float:
+        up = abs(speed - first) / (rise if speed > first else fall)
+        return up + abs(speed - last) / (fall if speed > last else rise)
+
+    low, high = min(first, last), max(first, last) + duration * max(rise, fall)
+    between = length(low) if low < high else 0.0
+    assume(max(between, length(max(first, last))) < 0.9 * duration)
+    top = bisected(lambda speed: length(speed) - duration, max(first, last), high)
+    speed = share * top
+    assume(length(speed) < duration * (1 - 1e-6))
+    up, down = (rise if speed > first else fall), (fall if speed > last else rise)
+    distance = covered(speed, first, last, up, down, duration)
+    assume(distance > 1e-3)
+    planned = trapezoid(distance, first, last, duration=duration, acceleration=rise, deceleration=fall)
+    assert planned is not None
+    assert planned.curve.end == pytest.approx(duration, rel=1e-12)
+    after = abs(speed - first) / up
+    middle = (after + duration - abs(speed - last) / down) / 2
+    assert planned.curve.evaluate(middle, 1)[0] == pytest.approx(speed, rel=1e-6)
+
+
+@settings(max_examples=60, deadline=None)
+@given(first=boundary, last=boundary, duration=decimals(0.2, 10), share=decimals(0.01, 0.99))
+def test_trapezoid_of_given_duration_and_speed_with_boundary_speeds(
+    first: float, last: float, duration: float, share: float
+) -> None:
+    """Pick a rate and a cruise speed, cover what they cover, and find the rate again."""
+    speed = max(first, last) + share
+    rate = (2 * speed - first - last) / (duration * (0.05 + 0.9 * share))
+    distance = covered(speed, first, last, rate, rate, duration)
+    planned = trapezoid(distance, first, last, duration=duration, velocity=speed)
+    assert planned is not None
+    rise = (speed - first) / rate
+    assert planned.curve.evaluate(rise / 2, 2)[0] == pytest.approx(rate, rel=1e-6)
+    too_fast = distance / duration + math.hypot(distance / duration - first, distance / duration - last)
+    assert trapezoid(distance, first, last, duration=duration, velocity=too_fast) is None
+
+
+def test_constant_speed_is_a_trapezoid() -> None:
+    planned = trapezoid(6.0, 2.0, 2.0, duration=3.0, velocity=2.0)
+    assert planned is not None
+    assert [phase.name for phase in planned.phases] == ["cruise"]
+    assert trapezoid(6.1, 2.0, 2.0, duration=3.0, velocity=2.0) is None
+    assert trapezoid(5.9, 2.0, 2.0, duration=3.0, velocity=2.0) is None
+
+
+@settings(max_examples=100, deadline=None)
+@given(distance=decimals(-3, 3), first=decimals(-3, 3), last=decimals(-3, 3), rise=rates, fall=rates)
+def test_overshoot_always_arrives(
+    distance: float, first: float, last: float, rise: float, fall: float
+) -> None:
+    assume(abs(distance) > 1e-6)
+    fields = {"velocity": 4.0, "acceleration": rise, "deceleration": fall, "overshoot": True}
+    free = trapezoid(distance, first, last, **fields)
+    assert free is not None
+    curve = free.curve
+    assert curve.piece_ends(0)[1][-1, 0] == pytest.approx(distance, abs=1e-12)
+    assert curve.piece_ends(1)[1][-1, 0] == pytest.approx(last, abs=1e-9)
+    for order in (0, 1):  # joined without a jump
+        start, end = curve.piece_ends(order)
+        np.testing.assert_allclose(start[1:], end[:-1], rtol=0, atol=1e-9)
+    assert np.abs(curve.evaluate(np.linspace(0, curve.end, 300), 1)).max() <= 4.0 * (1 + 1e-9)
+    strict = trapezoid(distance, first, last, **{**fields, "overshoot": False})
+    if strict is not None:
+        assert strict.curve.breaks.tobytes() == curve.breaks.tobytes()
+        assert strict.curve.coefficients.tobytes() == curve.coefficients.tobytes()
+        return
+    beyond = curve.evaluate(np.linspace(0, curve.end, 2000))[:, 0] * math.copysign(1, distance)
+    assert beyond.max() > abs(distance) or beyond.min() < 0
+    del fields["velocity"]
+    longer = trapezoid(distance, first, last, **fields, duration=curve.end + 5.0)
+    if longer is not None:
+        assert longer.curve.end == pytest.approx(curve.end + 5.0, rel=1e-12)
+        assert longer.curve.piece_ends(0)[1][-1, 0] == pytest.approx(distance, abs=1e-12)
+
+
+def test_unsynchronised_joints_arrive_by_themselves() -> None:
+    job = {
+        "version": 1,
+        "robot": {"joints": 3},
+        "limits": {"velocity": [1, 2, 3], "acceleration": [4, 5, None]},
+        "start": {"joints": [0, 0, 1]},
+        "moves": [{"planner": "trapezoid", "to": {"joints": [2, -3, 1]}, "synchronize": "none"}],
+    }
+    planned = plan_of(job)
+    assert planned is not None, "the joint that rests needs no acceleration limit"
+    alone = (2 / 1 + 1 / 4, 3 / 2 + 2 / 5, 0.0)  # distance over speed plus speed over rate
+    assert planned.arrivals == pytest.approx(alone, rel=1e-12)
+    assert planned.curve.end == pytest.approx(max(alone), rel=1e-12)
+    after = planned.curve.evaluate(np.linspace(alone[1], alone[0], 10))
+    np.testing.assert_allclose(after[:, 1], -3, rtol=0, atol=1e-12)
+    assert (planned.curve.evaluate(np.linspace(0, planned.curve.end, 20))[:, 2] == 1).all()
+
+
+def test_a_joint_that_arrives_moving_cannot_wait() -> None:
+    job = {
+        "version": 1,
+        "robot": {"joints": 2},
+        "limits": {"velocity": 1, "acceleration": 4},
+        "start": {"joints": [0, 0]},
+        "moves": [
+            {
+                "planner": "trapezoid",
+                "to": {"joints": [1, 3], "velocity": [0.5, 0]},
+                "synchronize": "none",
+            }
+        ],
+    }
+    planner, start, robot = only_move(job)
+    with pytest.raises(PlanningError, match="j1 arrives .* cannot wait"):
+        planner.plan(start, robot)
+
+
+@pytest.mark.parametrize(
+    ("fields", "match"),
+    [
+        ({"start_velocity": 3.0, "acceleration": 1.0}, "too fast"),
+        ({"end_velocity": 3.0, "acceleration": 1.0}, "cannot reach its end velocity"),
+        ({"end_velocity": -1.0, "acceleration": 1.0}, "turn round"),
+        ({"duration": 1.0, "velocity": 3.0}, "above 1 rad/s and at most 2 rad/s, got 3 rad/s"),
+        ({"duration": 1.0, "velocity": 3.0, "start_velocity": 3.0, "end_velocity": 3.0}, "above 3 rad/s"),
+        ({"duration": 1.0, "velocity": 3.0, "start_velocity": -1.0}, "turn round"),
+        ({"duration": 1.0, "acceleration": 3.0}, r"at least 4 rad/s\^2, got 3 rad/s\^2"),
+        ({"duration": 1.0, "acceleration": 2.0, "deceleration": 3.0}, "at least 1.29099445 s"),
+        ({"duration": 9.0, "acceleration": 2.0, "start_velocity": 2.0, "end_velocity": 1.0}, "and at most"),
+    ],
+)
+def test_what_is_impossible_is_explained(fields: dict[str, float], match: str) -> None:
+    fields = dict(fields)
+    velocities = [fields.pop(name, 0.0) for name in ("start_velocity", "end_velocity")]
+    job = {
+        "version": 1,
+        "robot": {"joints": 1},
+        "start": {"joints": [0], "velocity": velocities[:1]},
+        "moves": [{"planner": "trapezoid", "to": {"joints": [1], "velocity": velocities[1:]}, **fields}],
+    }
+    planner, start, robot = only_move(job)
+    with pytest.raises(PlanningError) as caught:
+        planner.plan(start, robot)
+    text = str(caught.value.said_by(loaded(job).say))
+    assert re.search(match, text), text

@@ -1,0 +1,159 @@
+"""Random jobs of one move, for every planner and for arms of every kind. SI."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+
+from trajcli.job.read import LoadedJob, job_from_text
+from trajcli.kinematics.robot import Robot
+from trajcli.planners import PLANNERS, Planner
+from trajcli.trajectory import State
+
+Fields = dict[str, Any]
+RATES = ("velocity", "acceleration", "jerk")
+MOST_JOINTS = 12
+
+
+def random_bound(rng: np.random.Generator, unlimited: float) -> Any:
+    """Return a magnitude, a pair by direction, or None with the given probability."""
+    if rng.random() < unlimited:
+        return None
+    low, high = np.exp(rng.uniform(np.log(0.3), np.log(30.0), 2)).tolist()
+    return [-low, high] if rng.random() < 0.3 else high
+
+
+def random_robot(rng: np.random.Generator, joints: int, unlimited: float) -> Fields:
+    """Return an inline robot of revolute and prismatic joints with limits of their own."""
+    rows = [
+        {
+            "type": str(rng.choice(["revolute", "prismatic"])),
+            **{quantity: random_bound(rng, unlimited) for quantity in RATES},
+        }
+        for _ in range(joints)
+    ]
+    return {"joints": rows}
+
+
+def random_values(rng: np.random.Generator, joints: int, size: float) -> list[float]:
+    values: list[float] = np.where(rng.random(joints) < 0.2, 0.0, rng.uniform(-size, size, joints)).tolist()
+    return values
+
+
+def random_duration(rng: np.random.Generator) -> float:
+    return float(np.exp(rng.uniform(np.log(0.1), np.log(20.0))))
+
+
+def random_job(
+    rng: np.random.Generator, tag: str, joints: int, *, rest: bool = False, unlimited: float = 0.2
+) -> Fields:
+    """Return a job of one move; it need not be possible.
+
+    Args:
+        rng: Everything comes from here.
+        tag: The planner.
+        joints: How many.
+        rest: Whether the move starts and ends at rest.
+        unlimited: Probability of a limit to be missing.
+    """
+    start = {"joints": rng.uniform(-3, 3, joints).tolist()}
+    move = {"planner": tag, **_FIELDS[tag](rng, start, joints, rest)}
+    return {
+        "version": 1,
+        "robot": random_robot(rng, joints, unlimited),
+        "start": start,
+        "moves": [move],
+    }
+
+
+def _target(rng: np.random.Generator, start: Fields) -> Fields:
+    """Return a target, of which some joints stay where they are."""
+    joints = len(start["joints"])
+    change = np.where(rng.random(joints) < 0.2, 0.0, rng.uniform(-3, 3, joints))
+    return {"joints": (np.array(start["joints"]) + change).tolist()}
+
+
+def _maybe(rng: np.random.Generator, **fields: Any) -> Fields:
+    return {name: value for name, value in fields.items() if rng.random() < 0.5}
+
+
+def _polynomial(rng: np.random.Generator, start: Fields, joints: int, rest: bool, orders: int) -> Fields:
+    target = _target(rng, start)
+    for state in () if rest else (start, target):
+        for quantity in RATES[:orders]:
+            state |= _maybe(rng, **{quantity: random_values(rng, joints, 0.3)})
+    return {"to": target, **_maybe(rng, duration=random_duration(rng))}
+
+
+def _cubic(rng: np.random.Generator, start: Fields, joints: int, rest: bool) -> Fields:
+    return _polynomial(rng, start, joints, rest, 1)
+
+
+def _quintic(rng: np.random.Generator, start: Fields, joints: int, rest: bool) -> Fields:
+    return _polynomial(rng, start, joints, rest, 2)
+
+
+def _cycloidal(rng: np.random.Generator, start: Fields, joints: int, rest: bool) -> Fields:
+    return _polynomial(rng, start, joints, True, 0)
+
+
+def _trapezoid(rng: np.random.Generator, start: Fields, joints: int, rest: bool) -> Fields:
+    target = _target(rng, start)
+    together = rng.random() < 0.5
+    change = np.array(target["joints"]) - start["joints"]
+    for state in () if rest else (start, target):
+        along = (change * rng.uniform(0.0, 0.3)).tolist()
+        state |= _maybe(rng, velocity=along if together else random_values(rng, joints, 0.3))
+    fields = _maybe(
+        rng,
+        duration=random_duration(rng),
+        velocity=float(rng.uniform(0.1, 2.0)),
+        acceleration=float(rng.uniform(0.5, 10.0)),
+        deceleration=float(rng.uniform(0.5, 10.0)),
+        overshoot=True,
+    )
+    if {"duration", "velocity"} <= fields.keys():
+        del fields[rng.choice(["duration", "velocity"])]
+    if "duration" not in fields:
+        fields |= _maybe(rng, minimum_duration=random_duration(rng))
+    return {"to": target, **fields, "synchronize": "time" if together else "none"}
+
+
+def _jerk_limited(rng: np.random.Generator, start: Fields, joints: int, rest: bool) -> Fields:
+    target = _target(rng, start)
+    if not rest:
+        start |= _maybe(rng, velocity=random_values(rng, joints, 0.25))
+        target |= _maybe(rng, velocity=random_values(rng, joints, 0.25))
+        if rng.random() < 0.2:
+            target = {"velocity": random_values(rng, joints, 0.25)}
+    fields = _maybe(rng, minimum_duration=random_duration(rng))
+    return {"to": target, **fields, "synchronize": str(rng.choice(["time", "none"]))}
+
+
+def _hold(rng: np.random.Generator, start: Fields, joints: int, rest: bool) -> Fields:
+    return {"duration": random_duration(rng)}
+
+
+_FIELDS = {
+    "cubic": _cubic,
+    "quintic": _quintic,
+    "septic": _quintic,
+    "cycloidal": _cycloidal,
+    "trapezoid": _trapezoid,
+    "jerk_limited": _jerk_limited,
+    "hold": _hold,
+}
+TAGS = sorted(_FIELDS)
+assert set(TAGS) == set(PLANNERS), "say here how a move of the new planner is drawn"
+
+
+def loaded(job: Fields) -> LoadedJob:
+    return job_from_text(json.dumps(job))
+
+
+def only_move(job: Fields) -> tuple[Planner, State, Robot]:
+    """Return the planner, the start and the robot of a job of one move."""
+    read = loaded(job)
+    return read.job.moves[0], read.job.start.as_state(), read.robot
