@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import sys
 
-
 def main() -> None:
     """Run the command line."""
     # One BLAS thread is faster for arrays this small, and starts faster; whoever asks for more gets them.
@@ -18,11 +17,8 @@ def main() -> None:
         print(f"trajcli {__version__}")  # noqa: T201
         return
     from trajcli.cli.app import app
-    from trajcli.cli.metadata_later import load_metadata_later
 
-    load_metadata_later()
     app()
-
 
 if __name__ == "__main__":
     main()

@@ -165,7 +165,7 @@ def _in_units(curve: PiecewisePolynomial, factors: Array) -> PiecewisePolynomial
 
 
 def _onto_breaks(local: Array, breaks: Array) -> Array:
-    """Return the times (N,) with those that rounding put just before a break moved onto it; the start stays."""
+    """Return the times (N,), those that rounding put just before a break moved onto it; the start stays."""
     following = breaks[np.minimum(np.searchsorted(breaks, local, "right"), breaks.size - 1)]
     near = max(_BREAK, 4 * float(np.spacing(breaks[-1])))
     return np.where((following - local <= near) & (local > breaks[0]), np.maximum(following, local), local)

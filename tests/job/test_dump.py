@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
-from random_jobs import jobs
+from random_mappings import jobs
 
 from trajcli.job.dump import dump_job
 from trajcli.job.read import LoadedJob, job_from_text, load_job

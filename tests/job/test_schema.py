@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from jsonschema import Draft202012Validator
-from random_jobs import jobs
+from random_mappings import jobs
 
 from trajcli.cli.init import STARTER
 from trajcli.job.dump import dump_job
@@ -67,7 +67,7 @@ def test_there_is_an_example_for_each_planner() -> None:
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(jobs())
-def test_random_jobs_are_accepted_as_the_reader_does(plain: dict[str, Any]) -> None:
+def test_random_mappings_are_accepted_as_the_reader_does(plain: dict[str, Any]) -> None:
     loaded = job_from_text(json.dumps(plain, ensure_ascii=False))
     assert flaws("job", plain) == []
     from trajcli.job.load import parse_document
@@ -117,7 +117,7 @@ WRONG = [
     {"moves": [{"planner": "hold"}]},
     {"moves": [{"planner": "hold", "duration": 1, "to": "x"}]},
     {"moves": [{"planner": "trapezoid", "to": {"joints": 1}, "velocity": 0}]},
-    {"moves": [{"planner": "trapezoid", "to": {"joints": 1}, "overshoot": "yes"}]},
+    {"moves": [{"planner": "trapezoid", "to": {"joints": 1}, "overshoot": 2}]},
     {"moves": [{"planner": "jerk_limited", "to": {"joints": 1}, "synchronize": "both"}]},
     {"limits": {"velocty": 1}},
     {"limits": {"velocity": -1}},
@@ -128,6 +128,14 @@ WRONG = [
     {"output": {"columns": ["t", "pos"]}},
     {"output": {"columns": []}},
     {"output": {"times": []}},
+    {"output": {"align": "yes"}},
+    {"output": {"align": 1}},
+    {"version": True},
+    {"version": "1"},
+    {"robot": {"joints": [{"sign": True}]}},
+    {"robot": {"joints": [{"name": 1}]}},
+    {"robot": {"joints": True}},
+    {"name": True},
     {"output": {"times": [True]}},
     {"when_over_limit": "never"},
     {"points": {"a": [1, 2]}},

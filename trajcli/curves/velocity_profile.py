@@ -74,14 +74,22 @@ class Profile:
             start, before = start + length, velocity
         return named
 
-    def curve(self, start: float, end: float) -> PiecewisePolynomial:
-        """Return the position (n = 1) from `start`; its pieces are laid to end exactly in `end`."""
+    def curve(self, start: float, end: float, duration: float | None = None) -> PiecewisePolynomial:
+        """Return the position (n = 1) from `start`; its pieces are laid to end exactly in `end`.
+
+        Args:
+            start: Where it begins.
+            end: Where it ends: `start` plus the distance, rounding apart.
+            duration: When it ends: the duration, rounding apart.
+        """
         knots = [knot for knot in self.knots if knot[0] > 0]
         if not knots:
             return PiecewisePolynomial(np.zeros(2), np.full((1, 1, 1), start))
-        breaks = increasing(np.concatenate([[0.0], np.cumsum([length for length, _ in knots])]))
-        velocity = np.array([self.initial, *(v for _, v in knots)])
         lengths = np.array([length for length, _ in knots])
+        velocity = np.array([self.initial, *(v for _, v in knots)])
+        breaks = np.concatenate([[0.0], np.cumsum(lengths)])
+        breaks[-1] = breaks[-1] if duration is None else duration
+        breaks = increasing(breaks)
         position = start + np.concatenate([[0.0], np.cumsum((velocity[1:] + velocity[:-1]) / 2 * lengths)])
         position[1:] += (end - position[-1]) * breaks[1:] / breaks[-1]
         slope = np.diff(velocity) / np.diff(breaks)  # so that velocities meet where breaks are rounded

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 from pydantic.json_schema import JsonSchemaValue
 
 from trajcli.columns import Group
@@ -63,7 +63,7 @@ class Output(Model):
         tuple[Seconds, ...] | None, Field(min_length=1, description="Times of the rows instead of a rate, s.")
     ] = None
     start_time: Annotated[float, Number(Quantity("time"), "Time of the first row, s.")] = 0.0
-    align: Annotated[bool, Field(description="Stretch each move to a whole number of periods.")] = False
+    align: Annotated[bool, Field(strict=True, description="Stretch each move to a whole number of periods.")] = False
     columns: Annotated[
         tuple[Group, ...],
         Field(
@@ -108,6 +108,13 @@ class Job(Model):
         ),
     ] = "error"
     output: Output = Output()
+
+    @field_validator("version", mode="before")
+    @classmethod
+    def _version_is_a_number(cls, value: Any) -> Any:  # noqa: ANN401
+        if isinstance(value, bool):  # true equals 1 in Python
+            raise refuse([((), f"expected 1, got {shown(value)}", None)])
+        return value
 
     @model_validator(mode="after")
     def _start_is_a_place(self) -> Job:

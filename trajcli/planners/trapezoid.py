@@ -27,6 +27,7 @@ from trajcli.planners.trapezoid_errors import explain_infeasible
 from trajcli.trajectory import State
 
 _OFF = 1e-9  # relative: a velocity this little off the line is on it
+_SAME_TIME = 1e-12  # relative: joints that arrive this close to each other arrive together
 _STILL = 1e-15  # per s: a thousandth of what counts as a jump
 
 
@@ -94,7 +95,7 @@ class Trapezoid(PointToPoint):
         except InfeasibleProfileError as error:
             joint = int(np.nanargmin(forward[0 if error.reason == "speed" else 1] / size))
             raise explain_infeasible(error, joint, float(size[joint]), self, robot) from None
-        law = profile.curve(0.0, 1.0)
+        law = profile.curve(0.0, 1.0, self.duration)
         phases = tuple(Phase(*phase) for phase in profile.phases())
         return Planned(along_line(start.position, displacement, law), end, law=law, phases=phases)
 
@@ -110,14 +111,18 @@ class Trapezoid(PointToPoint):
                 profiles.append(self._profile(distance, *speeds, rates[0], rates[1]))
             except InfeasibleProfileError as error:
                 raise explain_infeasible(error, joint, 1.0, self, robot) from None
-        duration = max(profile.duration for profile in profiles)
+        duration = self.duration or max(profile.duration for profile in profiles)
+        curves, arrivals = [], []
         for joint, profile in enumerate(profiles):
-            if end.velocity[joint] and profile.duration < duration * (1 - 1e-12):
+            last = profile.duration >= duration * (1 - _SAME_TIME)
+            arrivals.append(duration if last else profile.duration)
+            if end.velocity[joint] and not last:
                 raise _cannot_wait(joint, profile.duration, duration, end, robot)
-        curves = [p.curve(float(start.position[j]), float(end.position[j])) for j, p in enumerate(profiles)]
+            ends = float(start.position[joint]), float(end.position[joint])
+            curve = profile.curve(*ends, arrivals[joint])
+            curves.append(curve if last else hold_until(curve, duration))
         phases = tuple(Phase(*phase, joint=j) for j, p in enumerate(profiles) for phase in p.phases())
-        joined = merge_breaks([hold_until(curve, duration) for curve in curves])
-        return Planned(joined, end, phases=phases, arrivals=tuple(p.duration for p in profiles))
+        return Planned(merge_breaks(curves), end, phases=phases, arrivals=tuple(arrivals))
 
     def _profile(
         self, distance: float, initial: float, final: float, forward: Rates, backward: Rates

@@ -44,7 +44,9 @@ class Candidates:
 
 def candidates(robot: Robot, arm: Arm, method: Method, poses: Array) -> Candidates:
     """Return all branches of poses (N, 4, 4) by a method that has a closed form."""
-    np.empty(_WORKSPACE)  # freed at once: the allocator then keeps blocks of this size instead of returning them
+    np.empty(
+        _WORKSPACE
+    )  # freed at once: the allocator then keeps blocks of this size instead of returning them
     count, links, twos = len(poses), links_of(robot), (2,) * len(method.choices)
     joints, gaps = np.empty((len(links), *twos, count)), np.empty((2, *twos, count))
     watched = np.zeros(count, dtype=bool)

@@ -142,7 +142,8 @@ class InverseGoal(Goal):
 def parallel(*lines: Line) -> bool:
     """Return whether all lines have one direction, or the opposite one."""
     first = np.array(lines[0].direction)
-    return all(float(np.linalg.norm(np.cross(first, line.direction))) <= PARALLEL for line in lines[1:])
+    sines = [float(np.linalg.norm(np.cross(first, np.array(line.direction)))) for line in lines[1:]]
+    return max(sines, default=0.0) <= PARALLEL
 
 
 def perpendicular(a: Line, b: Line) -> bool:
@@ -183,5 +184,5 @@ def across_floats(a: Floats, b: Floats) -> Floats:
 
 
 def _clean(vector: Sequence[Entry]) -> Floats:
-    x, y, z = (0.0 if abs(entry) < _DUST else float(entry) for entry in vector)
+    x, y, z = (0.0 if abs(value) < _DUST else value for value in map(float, vector))
     return x, y, z

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Literal
 
-from trajcli.kinematics.inverse.lines import Goal
+from trajcli.kinematics.inverse.lines import Floats, Goal
 from trajcli.kinematics.inverse.subproblems import Value, Watch
 
 Choice = Literal["shoulder", "elbow", "wrist"]
@@ -39,6 +39,8 @@ class Method:
         solve: Values of all joints for a block of goals, each of a shape that broadcasts to (2, ..., 2, B)
             with one axis for each choice, the last choice first. None for the numeric method.
         needs: Whether the closed form uses the whole pose or the position alone.
+        idle: A direction in the base along which the position does not matter to the closed form; None
+            where all of it does.
     """
 
     name: str
@@ -47,6 +49,7 @@ class Method:
     reason: str
     solve: Solver | None = None
     needs: Literal["pose", "position"] = "pose"
+    idle: Floats | None = None
 
     @property
     def branches(self) -> tuple[Branch, ...]:

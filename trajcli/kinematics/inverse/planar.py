@@ -98,4 +98,6 @@ def match(arm: Arm) -> Method | None:
     solver = Planar(plane, places, rises[0] if rises else None, arm.lines, tip)
     name = "SCARA" if rises else _NAMES[kinds]
     reason = "all turns are about parallel axes" + (", and the slide runs along them" if rises else "")
-    return Method(name, name, ("elbow",), reason, solver, "pose" if len(plane) == 3 else "position")
+    if len(plane) == 3:
+        return Method(name, name, ("elbow",), reason, solver)
+    return Method(name, name, ("elbow",), reason, solver, "position", turns[0].direction)

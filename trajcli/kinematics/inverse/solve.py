@@ -15,7 +15,7 @@ from trajcli.kinematics.chain import configurations
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.choose import method_for
 from trajcli.kinematics.inverse.closed_form import candidates
-from trajcli.kinematics.inverse.lines import Arm, arm_of
+from trajcli.kinematics.inverse.lines import PARALLEL, Arm, arm_of
 from trajcli.kinematics.inverse.method import Method
 from trajcli.kinematics.inverse.numeric import distinct, refine, search
 from trajcli.kinematics.inverse.singular import families
@@ -69,7 +69,7 @@ def solve(
     wanted = target if isinstance(target, Target) else pose_target(target)
     method, arm, flat = method_for(robot), arm_of(robot), wanted.flat()
     close_to = _near(robot, near, wanted.batch)
-    if method.solve is not None and fits(method, wanted):
+    if method.solve is not None and fits(method, wanted, robot.base):
         found = _closed(robot, arm, method, flat, tolerance)
     else:
         method = method if method.solve is None else numeric_instead(method, wanted)
@@ -87,9 +87,13 @@ def _batch_first(array: NDArray[Any], batch: tuple[int, ...]) -> NDArray[Any]:
     return np.moveaxis(array.reshape(*array.shape[:2], *batch), (0, 1), (-1, -2))
 
 
-def fits(method: Method, target: Target) -> bool:
-    """Return whether a closed form answers targets of this kind."""
-    return target.whole or (method.needs == "position" and all(target.position))
+def fits(method: Method, target: Target, base: Array) -> bool:
+    """Return whether a closed form answers targets of this kind, with T_world_base (4, 4)."""
+    if method.needs == "pose":
+        return target.whole
+    idle = np.zeros(3) if method.idle is None else base[:3, :3] @ np.array(method.idle)
+    unfixed = ~np.array(target.position)
+    return not unfixed.any() or bool(np.abs(idle[unfixed]).min() >= 1.0 - PARALLEL)
 
 
 def numeric_instead(method: Method, target: Target) -> Method:

@@ -184,12 +184,11 @@ def _turn_between(axis: Array, aim: Array) -> Array:
     aside = np.cross(axis, smallest)
     aside /= np.linalg.norm(aside, axis=1, keepdims=True)
     clear = sine > _ALMOST_UPRIGHT
-    return np.where(clear, normal / np.where(clear, sine, 1.0), aside) * angle
+    return np.asarray(np.where(clear, normal / np.where(clear, sine, 1.0), aside) * angle)
 
 
 def _wrapped(angles: Array) -> Array:
-    result: Array = angles - 2 * np.pi * np.round(angles / (2 * np.pi))
-    return result
+    return np.asarray(angles - 2 * np.pi * np.round(angles / (2 * np.pi)))
 
 
 def _aims(kind: str, value: Array) -> Array:

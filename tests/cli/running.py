@@ -1,0 +1,55 @@
+"""Run the command line, in a process of its own or in this one."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = ROOT / "examples"
+COMMAND = [sys.executable, "-m", "trajcli"]
+
+JOB = """\
+version: 1
+units: {angle: deg}
+robot: {joints: [{velocity: 90}]}
+start: {joints: 0}
+moves:
+  - {planner: quintic, to: {joints: 30}, duration: 1}
+output: {rate: 10, columns: [t, q]}
+"""
+FAST = JOB.replace("duration: 1", "duration: 0.25")  # 225 deg/s
+SLOWED = FAST.replace("duration: 0.25", "duration: 0.25, when_over_limit: slow")
+IMPOSSIBLE = JOB.replace("quintic, to: {joints: 30}", "trapezoid, to: {joints: 30}, velocity: 20")
+ENDLESS = JOB.replace("rate: 10", "rate: 1e6")
+
+
+class Outcome(NamedTuple):
+    """What a command left behind."""
+
+    code: int
+    out: str
+    err: str
+
+
+def run(*arguments: str | Path, stdin: str = "", **options: Any) -> Outcome:
+    """Run the command in a process of its own."""
+    words = [*COMMAND, *map(str, arguments)]
+    done = subprocess.run(
+        words, input=stdin, capture_output=True, text=True, timeout=60, check=False, **options
+    )
+    return Outcome(done.returncode, done.stdout, done.stderr)
+
+
+def call(capfd: pytest.CaptureFixture[str], *arguments: str | Path) -> Outcome:
+    """Run the command in this process: quicker, with the same exit."""
+    from trajcli.cli.app import app
+
+    capfd.readouterr()
+    with pytest.raises(SystemExit) as left:
+        app([str(argument) for argument in arguments])
+    return Outcome(left.value.code or 0, *capfd.readouterr())  # type: ignore[arg-type]

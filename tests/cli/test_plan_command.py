@@ -1,0 +1,206 @@
+"""`trajcli plan`: files, reports, options."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from jsonschema import Draft202012Validator
+from running import EXAMPLES, FAST, JOB, ROOT, SLOWED, call
+
+from trajcli.errors import TrajcliError
+
+Capture = pytest.CaptureFixture[str]
+
+
+@pytest.fixture
+def job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "job.yaml"
+    path.write_text(JOB)
+    return path
+
+
+def read_report(path: Path) -> dict[str, Any]:
+    report: dict[str, Any] = json.loads(path.read_text(), parse_constant=pytest.fail)
+    schema = json.loads((ROOT / "schemas/report.schema.json").read_text())
+    assert [error.message for error in Draft202012Validator(schema).iter_errors(report)] == []
+    return report
+
+
+def test_a_file_holds_what_standard_output_would(job: Path, capfd: Capture) -> None:
+    rows = call(capfd, "plan", job).out
+    outcome = call(capfd, "plan", job, "-o", "rows.csv")
+    assert outcome.code == 0
+    assert outcome.out == ""
+    assert Path("rows.csv").read_text() == rows
+
+
+def test_a_failed_plan_leaves_an_earlier_file(job: Path, capfd: Capture) -> None:
+    Path("rows.csv").write_text("kept")
+    job.write_text(FAST)
+    assert call(capfd, "plan", job, "-o", "rows.csv").code == 1
+    assert Path("rows.csv").read_text() == "kept"
+    assert {path.name for path in Path().iterdir()} == {"job.yaml", "rows.csv"}
+
+
+def test_a_report_of_a_verified_plan(job: Path, capfd: Capture) -> None:
+    code, out, _ = call(capfd, "plan", job, "--report", "r.json", "--reference")
+    assert (code, out[:8]) == (0, "t,q1_deg")
+    report = read_report(Path("r.json"))
+    assert (report["verdict"], report["job"], report["findings"]) == ("verified", "job", [])
+    (move,) = report["moves"]
+    assert (move["planner"], move["start"], move["end"], move["stretch"]) == ("quintic", 0, 1, 1)
+    assert move["binding"]["quantity"] == "velocity"
+    assert move["binding"]["used"] == pytest.approx(30 * 1.875 / 90)  # a quintic peaks at 15/8 of its mean
+    assert move["reference"]["duration"] is None
+    assert "acceleration" in move["reference"]["reason"]
+    assert {(row["joint"], row["quantity"]) for row in report["unchecked"]} == {
+        ("j1", "position"),
+        ("j1", "acceleration"),
+        ("j1", "jerk"),
+    }
+
+
+def test_a_report_of_a_violation_is_written_and_rows_are_not(job: Path, capfd: Capture) -> None:
+    job.write_text(FAST)
+    code, out, err = call(capfd, "plan", job, "--report", "r.json", "-o", "rows.csv")
+    assert (code, out) == (1, "")
+    assert f"{job}:6:5: error: move 0 (quintic): the velocity of j1 reaches 225 deg/s" in err
+    assert "it must last 2.5 times longer (0.625 s), or say `when_over_limit: slow`" in err
+    assert not Path("rows.csv").exists()
+    report = read_report(Path("r.json"))
+    (finding,) = report["findings"]
+    assert report["verdict"] == "violated"
+    assert (finding["move"], finding["joint"], finding["kind"], finding["method"]) == (
+        0,
+        "j1",
+        "velocity",
+        "exact",
+    )
+    values = [finding[key] for key in ("value", "limit", "time", "factor")]
+    assert values == pytest.approx([3.9269908169872414, 1.5707963267948966, 0.125, 2.5])
+
+
+def test_a_slowed_move_is_an_event(job: Path, capfd: Capture) -> None:
+    job.write_text(SLOWED)
+    code, _, err = call(capfd, "plan", job, "--report", "r.json")
+    assert code == 0
+    assert "slowed: move 0: stretched 2.5 times, from 0.25 s to 0.625 s" in err
+    report = read_report(Path("r.json"))
+    assert [event["kind"] for event in report["events"]] == ["slowed"]
+    assert report["moves"][0]["stretch"] == pytest.approx(2.5)
+    code, out, err = call(capfd, "plan", job, "--strict", "-o", "rows.csv")
+    assert (code, out, Path("rows.csv").exists()) == (1, "", False)
+    assert f"{job}:6:5: error: slowed: stretched 2.5 times" in err
+
+
+@pytest.mark.parametrize("example", sorted(EXAMPLES.glob("*.yaml")), ids=lambda path: path.stem)
+def test_every_example_verifies_and_reports(example: Path, tmp_path: Path, capfd: Capture) -> None:
+    path = tmp_path / "r.json"
+    assert call(capfd, "plan", example, "--no-output", "--report", path, "--reference").code == 0
+    assert read_report(path)["verdict"] == "verified"
+
+
+def test_no_output_judges_only(job: Path, capfd: Capture) -> None:
+    code, out, err = call(capfd, "plan", job, "--no-output")
+    assert (code, out) == (0, "")
+    assert err.startswith("job: verified, 1 move, 1 s\n")
+    job.write_text(FAST)
+    assert call(capfd, "plan", job, "--no-output").code == 1
+
+
+def test_quiet(job: Path, capfd: Capture) -> None:
+    outcome = call(capfd, "plan", job, "-q", "--reference")
+    assert (outcome.code, outcome.err) == (0, "")
+
+
+def test_reference_is_told(job: Path, capfd: Capture) -> None:
+    job.write_text(JOB.replace("velocity: 90", "velocity: 60, acceleration: 360, jerk: 3600"))
+    code, _, err = call(capfd, "plan", job, "--reference")
+    assert code == 0
+    # with a cruise: distance / velocity + velocity / acceleration + acceleration / jerk
+    assert "move 0 (quintic): 1 s, 1.304 x the fastest under the same limits (0.766667 s)" in err
+
+
+def test_set_and_rate(job: Path, capfd: Capture) -> None:
+    code, out, _ = call(
+        capfd, "plan", job, "--set", "moves.0.duration=2", "--rate", "2", "--set", "output.rate=50"
+    )
+    assert code == 0
+    assert [line.split(",")[0] for line in out.splitlines()[1:]] == [f"{t / 2:.9f}" for t in range(5)]
+
+
+def test_the_resolved_job(job: Path, capfd: Capture) -> None:
+    rows = call(capfd, "plan", job, "--set", "name=x", "--resolved", "resolved.yaml").out
+    assert "name: x\n" in Path("resolved.yaml").read_text()
+    assert call(capfd, "plan", "resolved.yaml").out == rows
+    text = call(capfd, "plan", "resolved.yaml", "--no-output", "--resolved", "-").out
+    assert text == Path("resolved.yaml").read_text()
+
+
+WRONG_OPTIONS = [
+    (("--no-output", "-o", "a.csv"), "--no-output and --output exclude each other"),
+    (("-o", "a.mcap"), "rows are written as CSV, not as .mcap"),
+    (("--report", "-"), "--report and the rows cannot both go to -"),
+    (("-o", "a.csv", "--report", "./a.csv"), "--report and the rows cannot both go to ./a.csv"),
+    (("--report", "a", "--resolved", "a"), "--resolved and --report cannot both go to a"),
+    (("--rate", "x"), 'expected a frequency such as "500 Hz", got "x"'),
+    (("--set", "x"), "--set x: expected PATH=VALUE"),
+]
+
+
+@pytest.mark.parametrize(("options", "message"), WRONG_OPTIONS)
+def test_wrong_options(options: tuple[str, ...], message: str, job: Path, capfd: Capture) -> None:
+    code, out, err = call(capfd, "plan", job, *options)
+    assert (code, out) == (2, "")
+    assert message in err
+    assert {path.name for path in Path().iterdir()} == {"job.yaml"}
+
+
+def test_errors_for_machines(job: Path, capfd: Capture) -> None:
+    job.write_text(FAST)
+    code, out, err = call(capfd, "plan", job, "--errors", "json")
+    said = json.loads(err)
+    assert (code, out, said["exit"], said["error"]) == (1, "", 1, "VerificationError")
+    (problem,) = said["problems"]
+    assert (problem["file"], problem["line"], problem["column"], problem["move"]) == (str(job), 6, 5, 0)
+    assert (problem["joint"], problem["time"]) == ("j1", 0.125)
+    job.write_text(JOB.replace("quintic", "quintc").replace("rate", "rte"))
+    code, _, err = call(capfd, "plan", job, "--errors", "json")
+    assert (code, [problem["hint"] for problem in json.loads(err)["problems"]]) == (
+        2,
+        ["did you mean 'quintic'?", "did you mean 'rate'?"],
+    )
+
+
+@pytest.mark.parametrize("form", ["text", "json"])
+def test_a_bug_is_70(form: str, job: Path, capfd: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> None:
+        raise RuntimeError("it broke")
+
+    monkeypatch.setattr("trajcli.cli.plan.plan_job", broken)
+    code, out, err = call(capfd, "plan", job, "--errors", form)
+    assert (code, out) == (70, "")
+    if form == "json":
+        assert json.loads(err)["problems"][0]["message"] == "a bug in trajcli: it broke"
+    else:
+        assert "RuntimeError: it broke" in err
+        assert "This is a bug in trajcli." in err
+
+
+def test_an_error_of_no_branch_is_a_bug(job: Path, capfd: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> None:
+        raise TrajcliError("the file read back differs")
+
+    monkeypatch.setattr("trajcli.cli.plan.write_rows", broken)
+    assert call(capfd, "plan", job).code == 70
+
+
+def test_times_outside_the_trajectory_are_said_in_their_place(job: Path, capfd: Capture) -> None:
+    job.write_text(JOB.replace("rate: 10", "times: [0, 5]"))
+    code, _, err = call(capfd, "plan", job)
+    assert code == 2
+    assert f"{job}:7:17: error: the time 5 s lies outside the trajectory" in err

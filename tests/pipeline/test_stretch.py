@@ -1,0 +1,252 @@
+"""Moves that are made to last longer: `when_over_limit: slow`, and `align`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from independent_judge import KINDS, extremes
+from random_jobs import TAGS, loaded, random_job
+
+from trajcli.errors import InputError, PlanningError
+from trajcli.kinematics.robot import Limits
+from trajcli.pipeline.plan import Plan, plan_job
+from trajcli.pipeline.stretch import PlannedMove, lasting
+
+SEEDS = st.integers(0, 2**32 - 1)
+few = settings(max_examples=25, deadline=None)
+
+
+def plan_of(job: dict[str, Any]) -> Plan | None:
+    """Return the plan, or None where some move is impossible."""
+    try:
+        return plan_job(loaded(job))
+    except (PlanningError, InputError):
+        return None
+
+
+def share(move: PlannedMove) -> float:
+    """Return the largest share of a limit that the move uses: 1 at the limit, by an independent judge."""
+    limits: Limits = move.robot.limits
+    shares = []
+    for order in range(len(KINDS)):
+        low, high = extremes(move.planned.curve, order)
+        lower, upper = limits.of_order(order).T
+        shares += [low / lower, high / upper] if order else [1 + high - upper, 1 + lower - low]
+    return float(np.max(shares))
+
+
+def loose(move: dict[str, Any], duration: float) -> dict[str, Any]:
+    """Return the move with nothing that ties its timing to the limits."""
+    kept = {key: value for key, value in move.items() if key in ("planner", "to", "synchronize", "overshoot")}
+    return {**kept, "duration": duration}
+
+
+def without_jerk_limits(job: dict[str, Any]) -> None:
+    for row in job["robot"]["joints"]:
+        row["jerk"] = None
+
+
+@few
+@given(seed=SEEDS, tag=st.sampled_from(["cubic", "quintic", "septic", "cycloidal", "trapezoid"]))
+def test_slow_is_the_smallest_stretch_from_rest_to_rest(seed: int, tag: str) -> None:
+    job = random_job(np.random.default_rng(seed), tag, 3, rest=True, unlimited=0.1)
+    job["moves"] = [loose(job["moves"][0], 0.05)]
+    if tag in ("cubic", "trapezoid"):
+        without_jerk_limits(job)
+    if tag == "trapezoid":
+        job["moves"][0]["velocity"] = 1e3
+        (target,) = [job["moves"][0].pop("to")["joints"]]
+        moved = float(np.abs(np.subtract(target, job["start"]["joints"])).max())
+        assume(moved > 1e-3)
+        job["moves"][0] |= {"to": {"joints": target}, "synchronize": "time", "velocity": 1.5 * moved / 0.05}
+        job["moves"][0]["velocity"] = [job["moves"][0]["velocity"]] * 3
+    over = plan_of(job)
+    assume(over is not None and not over.verdict.passed)
+    slow = plan_of({**job, "when_over_limit": "slow"})
+    assert slow is not None
+    assert slow.verdict.passed
+    (move,) = slow.moves
+    assert move.duration == pytest.approx(0.05 * move.stretch, rel=1e-12)
+    assert share(move) == pytest.approx(1, abs=1e-9)
+    assert share(lasting(move, move.duration * (1 - 1e-6))) > 1 + 5e-7
+    (event,) = slow.events
+    assert event.kind == "slowed"
+    assert event.move == 0
+    assert f"stretched {move.stretch:.6g} times" in event.message
+    assert "{" not in event.message
+
+
+@settings(max_examples=15, deadline=None)
+@given(seed=SEEDS, tag=st.sampled_from(["cubic", "quintic", "septic", "trapezoid"]), joints=st.integers(1, 3))
+def test_slow_is_the_smallest_stretch_between_moving_states(seed: int, tag: str, joints: int) -> None:
+    rng = np.random.default_rng(seed)
+    job = random_job(rng, tag, joints, unlimited=0.1)
+    job["moves"] = [loose(job["moves"][0], float(rng.uniform(0.05, 0.5)))]
+    for state in (job["start"], job["moves"][0]["to"]):
+        state["velocity"] = rng.uniform(-0.25, 0.25, joints).tolist()
+        if tag in ("cubic", "trapezoid"):
+            state.pop("acceleration", None)
+    if tag in ("cubic", "trapezoid"):
+        without_jerk_limits(job)
+    if tag == "trapezoid":
+        job["moves"][0] |= {"acceleration": 100.0, "overshoot": True, "synchronize": "none"}
+    over = plan_of(job)
+    assume(over is not None and not over.verdict.passed)
+    slow = plan_of({**job, "when_over_limit": "slow"})
+    assert slow is not None
+    assume(slow.events)
+    assert slow.verdict.passed
+    (move,) = slow.moves
+    assert share(move) <= 1 + 1e-9
+    assert np.array_equal(move.planned.end.velocity, job["moves"][0]["to"]["velocity"])
+    for factor in [1 - 1e-6, *np.geomspace(1 / move.stretch, 0.999, 30)]:
+        assert share(lasting(move, move.duration * factor)) > 1, f"{factor} of the stretch would do"
+
+
+def test_slow_finds_a_stretch_that_keeps_a_position_limit_too() -> None:
+    """A cubic that starts away from the target first swings out: further, the longer it lasts."""
+    job = {
+        "version": 1,
+        "robot": {"joints": 1},
+        "limits": {"position": 10, "velocity": 3, "acceleration": 20},
+        "start": {"joints": [0], "velocity": [-1]},
+        "moves": [{"planner": "cubic", "to": {"joints": [4]}, "duration": 1}],
+        "when_over_limit": "slow",
+    }
+    plan = plan_of(job)
+    assert plan is not None
+    assert plan.verdict.passed
+    assert plan.moves[0].duration > 1
+
+
+@pytest.mark.parametrize(
+    ("limits", "start", "kind"),
+    [
+        ({"position": 0.5, "velocity": 1}, {"joints": [0]}, "position"),
+        ({"velocity": 1}, {"joints": [0], "velocity": [1.5]}, "velocity"),
+    ],
+)
+def test_slow_does_not_help_against_everything(
+    limits: dict[str, float], start: dict[str, Any], kind: str
+) -> None:
+    job = {
+        "version": 1,
+        "robot": {"joints": 1},
+        "limits": limits,
+        "start": start,
+        "moves": [{"planner": "quintic", "to": {"joints": [1]}, "duration": 0.7}],
+        "when_over_limit": "slow",
+    }
+    plan = plan_of(job)
+    assert plan is not None
+    assert not plan.verdict.passed
+    assert kind in {finding.kind for finding in plan.verdict.findings}
+    assert plan.events == ()
+    assert plan.trajectory.duration == 0.7
+
+
+def test_a_move_overrides_the_job() -> None:
+    over = {"planner": "quintic", "to": {"joints": [1]}, "duration": 0.5}
+    job = {
+        "version": 1,
+        "robot": {"joints": 1},
+        "limits": {"velocity": 1},
+        "start": {"joints": [0]},
+        "moves": [{**over, "when_over_limit": "error"}, {**over, "to": {"joints": [0]}}],
+        "when_over_limit": "slow",
+    }
+    plan = plan_of(job)
+    assert plan is not None
+    assert [finding.move for finding in plan.verdict.findings] == [0]
+    assert [move.duration for move in plan.moves] == pytest.approx([0.5, 1.875], rel=1e-12)
+    assert [event.move for event in plan.events] == [1]
+
+
+@few
+@given(
+    seed=SEEDS,
+    tags=st.lists(st.sampled_from(TAGS), min_size=1, max_size=3),
+    rate=st.sampled_from([1000.0, 500.0, 250.0, 30.0, 7.0]),
+)
+def test_align_gives_whole_periods(seed: int, tags: list[str], rate: float) -> None:
+    rng = np.random.default_rng(seed)
+    jobs = [random_job(rng, tag, 2, rest=True, unlimited=0.0) for tag in tags]
+    job = {**jobs[0], "moves": [one["moves"][0] for one in jobs]}
+    without_jerk_limits(job) if {"cubic", "trapezoid"} & set(tags) and "jerk_limited" not in tags else None
+    free, aligned = plan_of(job), plan_of({**job, "output": {"align": True, "rate": rate}})
+    assume(free is not None)
+    assert free is not None
+    assert aligned is not None
+    for span, before in zip(aligned.trajectory.spans, free.moves, strict=True):
+        for time in (span.start, span.end):
+            assert time * rate == pytest.approx(round(time * rate), abs=1e-6)
+        assert -1e-9 <= (span.duration - before.duration) * rate < 1 + 1e-6
+    kinds = {(finding.move, finding.joint, finding.kind) for finding in aligned.verdict.findings}
+    assert kinds <= {(finding.move, finding.joint, finding.kind) for finding in free.verdict.findings}
+
+
+def test_align_between_moving_states_plans_again() -> None:
+    job = {
+        "version": 1,
+        "robot": {"joints": 1},
+        "start": {"joints": [0], "velocity": [0.5]},
+        "moves": [
+            {"planner": "cubic", "to": {"joints": [1], "velocity": [0.2]}, "duration": 1.2345},
+            {"planner": "trapezoid", "to": {"joints": [2]}, "acceleration": 0.9, "velocity": 0.8},
+            {"planner": "jerk_limited", "to": {"joints": [0]}},
+        ],
+        "limits": {"velocity": 2, "acceleration": 5, "jerk": None},
+        "output": {"align": True, "rate": 10},
+    }
+    job["limits"]["jerk"] = 50
+    plan = plan_of(job)
+    assert plan is not None
+    assert [round(span.end * 10, 9) % 1 for span in plan.trajectory.spans] == [0, 0, 0]
+    assert plan.moves[0].duration == 1.3
+    curve = plan.trajectory.curve
+    assert curve.evaluate(0.0, 1)[0] == 0.5
+    assert curve.evaluate(1.3, 1)[0] == pytest.approx(0.2, rel=1e-9)
+
+
+def test_align_does_not_push_a_move_over_its_limit() -> None:
+    """The joint swings out before it turns: one period more would take it past its position limit."""
+    job: dict[str, Any] = {
+        "version": 1,
+        "robot": {"joints": 1},
+        "start": {"joints": [0], "velocity": [-1]},
+        "moves": [{"planner": "cubic", "to": {"joints": [1]}, "duration": 1.01}],
+    }
+    free = plan_of(job)
+    assert free is not None
+    lowest = float(extremes(free.trajectory.curve, 0)[0][0])
+    job["limits"] = {"position": 1.0}
+    job["robot"] = {"joints": [{"position": [lowest * (1 + 1e-6), 2]}]}
+    del job["limits"]
+    allowed = plan_of(job)
+    assert allowed is not None
+    assert allowed.verdict.passed
+    job["output"] = {"align": True, "rate": 1}
+    with pytest.raises(PlanningError, match="whole number of periods"):
+        plan_job(loaded(job))
+
+
+def test_align_of_a_move_far_shorter_than_a_period() -> None:
+    job = {
+        "version": 1,
+        "robot": {"joints": 1},
+        "start": {"joints": [0]},
+        "limits": {"velocity": 1},
+        "moves": [
+            {"planner": "cubic", "to": {"joints": [1e-13]}},
+            {"planner": "cubic", "to": {"joints": [1e-13]}},
+        ],
+        "output": {"align": True, "rate": 1000},
+    }
+    plan = plan_of(job)
+    assert plan is not None
+    assert [move.duration for move in plan.moves] == [0.001, 0.0]
+    assert plan.verdict.passed
