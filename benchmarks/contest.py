@@ -109,7 +109,7 @@ class Command:
         text, complaints = child.communicate()
         self._require(child.returncode, complaints)
         lines = text.decode().splitlines()[1:]
-        return [float(cell) for line in lines[:: len(lines) // 4] for cell in line.split(",")]
+        return [float(cell) for line in lines[:: max(1, len(lines) // 4)] for cell in line.split(",")]
 
     def _start(self, **streams: object) -> subprocess.Popen[bytes]:
         try:

@@ -31,7 +31,9 @@ def test_rows_are_the_golden_ones(example: Path, tmp_path: Path) -> None:
     assert now.read_bytes() == golden_file(example).read_bytes()
 
 
-def _by_horner(breaks: np.ndarray, table: np.ndarray, t: np.ndarray, piece: np.ndarray, out: np.ndarray) -> None:
+def _by_horner(
+    breaks: np.ndarray, table: np.ndarray, t: np.ndarray, piece: np.ndarray, out: np.ndarray
+) -> None:
     out[:] = piecewise.horner(table[:, piece, :], (t - breaks[piece])[:, None])
 
 

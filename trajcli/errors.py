@@ -30,7 +30,7 @@ class Amount:
 
     Attributes:
         value: SI.
-        order: 0 for a joint's position, 1 to 3 for its time derivatives; without a joint the value is in seconds.
+        order: 0 for a joint's position, 1 to 3 for its time derivatives; without a joint it is a time.
         joint: Index of the joint that says whether angle or length is meant.
     """
 

@@ -84,6 +84,18 @@ def test_a_closed_pipe_is_141_and_silent(tmp_path: Path) -> None:
     assert process.wait(timeout=30) == 141
 
 
+@pytest.mark.parametrize("job", [JOB, FAST])
+def test_errors_that_nobody_reads_are_141(job: str) -> None:
+    read, write = os.pipe()
+    os.close(read)
+    words = [*COMMAND, "plan", "-", "--no-output"]
+    done = subprocess.run(
+        words, input=job.encode(), stderr=write, stdout=subprocess.PIPE, timeout=60, check=False
+    )
+    os.close(write)
+    assert (done.returncode, done.stdout) == (141, b"")
+
+
 def test_a_full_disk_is_4() -> None:
     if not Path("/dev/full").exists():
         pytest.skip("without /dev/full")

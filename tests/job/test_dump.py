@@ -31,7 +31,7 @@ def assert_same(a: LoadedJob, b: LoadedJob) -> None:
         assert getattr(a.job, key) == getattr(b.job, key), key
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(jobs())
 def test_load_dump_load_is_identity(plain: dict[str, Any]) -> None:
     first = job_from_text(json.dumps(plain, ensure_ascii=False))

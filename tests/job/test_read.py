@@ -211,3 +211,25 @@ def test_amounts_are_said_in_the_units_of_the_job(amount: tuple[float, int, int 
     from trajcli.errors import Amount
 
     assert job(robot=MIXED, units="{angle: deg, length: mm}").say(Amount(*amount)) == text
+
+
+QUARTER = "0.7071067811865476"
+POSES = [  # the same pose in every form
+    "{xyz: [1, 2, 3], rpy: [0, 0, 90]}",
+    f"{{xyz: [1, 2, 3], quat_wxyz: [{QUARTER}, 0, 0, {QUARTER}]}}",
+    f"{{xyz: [1, 2, 3], quat_wxyz: [-{QUARTER}, 0, 0, -{QUARTER}]}}",
+    "{xyz: [1, 2, 3], matrix: [[0, -1, 0], [1, 0, 0], [0, 0, 1]]}",
+    "{matrix: [[0, -1, 0, 1], [1, 0, 0, 2 mm], [0, 0, 1, 3], [0, 0, 0, 1]]}",
+    "{xyz: [1, 2, 0.3 cm], axis_angle: {axis: z, angle: 90}}",
+    "{xyz: [1, 2, 3], axis_angle: {axis: [0, 0, -2], angle: -0.25 rev}}",
+    "{xyz: [1, 2, 3], euler: {sequence: ZYX, angles: [90, 0, 0]}}",
+    "{xyz: [1, 2, 3], euler: {sequence: XYZ, frame: fixed, angles: [0, 0, 90]}}",
+]
+
+
+@pytest.mark.parametrize("form", POSES)
+def test_poses_in_every_form(form: str) -> None:
+    robot = job(units="{angle: deg, length: mm}", robot=f"{{joints: 2, tool: {form}}}").robot
+    expected = [[0, -1, 0, 0.001], [1, 0, 0, 0.002], [0, 0, 1, 0.003], [0, 0, 0, 1]]
+    assert robot.tool == pytest.approx(np.array(expected), abs=1e-15)
+    assert np.array_equal(robot.base, np.eye(4))

@@ -65,7 +65,7 @@ def test_there_is_an_example_for_each_planner() -> None:
     assert used == set(PLANNERS)
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(jobs())
 def test_random_mappings_are_accepted_as_the_reader_does(plain: dict[str, Any]) -> None:
     loaded = job_from_text(json.dumps(plain, ensure_ascii=False))

@@ -81,7 +81,7 @@ def step_breakers(trajectory: Trajectory, limits: Sequence[Limits]) -> set[str]:
     )
     before = np.concatenate([trajectory.start.acceleration[None], last])
     after = np.concatenate([first, trajectory.end.acceleration[None]])
-    peak = np.maximum(np.abs(first).max(axis=0), np.abs(last).max(axis=0))
+    peak = np.abs(extremes(curve, 2)).max(axis=0)
     steps = (np.abs(after - before) > 1e-8 * peak + 1e-11).any(axis=0)
     limited = np.isfinite(limits[0].jerk).any(axis=1)
     return {

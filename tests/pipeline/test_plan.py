@@ -46,7 +46,7 @@ def job_of(*moves: dict[str, Any], start: Any = None, **rest: Any) -> dict[str, 
     }
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(seed=SEEDS, joints=st.integers(1, 4), moves=st.integers(1, 3), unlimited=st.sampled_from([0.1, 0.6]))
 def test_the_verdict_is_that_of_an_independent_judge(
     seed: int, joints: int, moves: int, unlimited: float
@@ -110,7 +110,7 @@ def test_a_limit_is_broken_from_one_billionth_on(
         assert finding.value == pytest.approx(max(at, after) if upper else min(at, after), rel=1e-9)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(
     seed=SEEDS,
     tag=st.sampled_from([tag for tag in TAGS if tag != "hold"]),

@@ -17,7 +17,7 @@ from trajcli.pipeline.plan import Plan, plan_job
 from trajcli.pipeline.stretch import PlannedMove, lasting
 
 SEEDS = st.integers(0, 2**32 - 1)
-few = settings(max_examples=25, deadline=None)
+few = settings(max_examples=15, deadline=None)
 
 
 def plan_of(job: dict[str, Any]) -> Plan | None:
@@ -58,12 +58,10 @@ def test_slow_is_the_smallest_stretch_from_rest_to_rest(seed: int, tag: str) -> 
     if tag in ("cubic", "trapezoid"):
         without_jerk_limits(job)
     if tag == "trapezoid":
-        job["moves"][0]["velocity"] = 1e3
-        (target,) = [job["moves"][0].pop("to")["joints"]]
-        moved = float(np.abs(np.subtract(target, job["start"]["joints"])).max())
-        assume(moved > 1e-3)
-        job["moves"][0] |= {"to": {"joints": target}, "synchronize": "time", "velocity": 1.5 * moved / 0.05}
-        job["moves"][0]["velocity"] = [job["moves"][0]["velocity"]] * 3
+        moved = np.abs(np.subtract(job["moves"][0]["to"]["joints"], job["start"]["joints"]))
+        assume(moved.max() > 1e-3)
+        speeds = (1.5 * np.maximum(moved, 1e-3) / 0.05).tolist()
+        job["moves"][0] |= {"synchronize": "time", "velocity": speeds}
     over = plan_of(job)
     assume(over is not None and not over.verdict.passed)
     slow = plan_of({**job, "when_over_limit": "slow"})
@@ -80,7 +78,7 @@ def test_slow_is_the_smallest_stretch_from_rest_to_rest(seed: int, tag: str) -> 
     assert "{" not in event.message
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(seed=SEEDS, tag=st.sampled_from(["cubic", "quintic", "septic", "trapezoid"]), joints=st.integers(1, 3))
 def test_slow_is_the_smallest_stretch_between_moving_states(seed: int, tag: str, joints: int) -> None:
     rng = np.random.default_rng(seed)
@@ -103,7 +101,7 @@ def test_slow_is_the_smallest_stretch_between_moving_states(seed: int, tag: str,
     (move,) = slow.moves
     assert share(move) <= 1 + 1e-9
     assert np.array_equal(move.planned.end.velocity, job["moves"][0]["to"]["velocity"])
-    for factor in [1 - 1e-6, *np.geomspace(1 / move.stretch, 0.999, 30)]:
+    for factor in [1 - 1e-6, *np.geomspace(1 / move.stretch, 0.999, 12)]:
         assert share(lasting(move, move.duration * factor)) > 1, f"{factor} of the stretch would do"
 
 
@@ -176,7 +174,6 @@ def test_align_gives_whole_periods(seed: int, tags: list[str], rate: float) -> N
     rng = np.random.default_rng(seed)
     jobs = [random_job(rng, tag, 2, rest=True, unlimited=0.0) for tag in tags]
     job = {**jobs[0], "moves": [one["moves"][0] for one in jobs]}
-    without_jerk_limits(job) if {"cubic", "trapezoid"} & set(tags) and "jerk_limited" not in tags else None
     free, aligned = plan_of(job), plan_of({**job, "output": {"align": True, "rate": rate}})
     assume(free is not None)
     assert free is not None
@@ -199,10 +196,9 @@ def test_align_between_moving_states_plans_again() -> None:
             {"planner": "trapezoid", "to": {"joints": [2]}, "acceleration": 0.9, "velocity": 0.8},
             {"planner": "jerk_limited", "to": {"joints": [0]}},
         ],
-        "limits": {"velocity": 2, "acceleration": 5, "jerk": None},
+        "limits": {"velocity": 2, "acceleration": 5, "jerk": 50},
         "output": {"align": True, "rate": 10},
     }
-    job["limits"]["jerk"] = 50
     plan = plan_of(job)
     assert plan is not None
     assert [round(span.end * 10, 9) % 1 for span in plan.trajectory.spans] == [0, 0, 0]
@@ -223,9 +219,7 @@ def test_align_does_not_push_a_move_over_its_limit() -> None:
     free = plan_of(job)
     assert free is not None
     lowest = float(extremes(free.trajectory.curve, 0)[0][0])
-    job["limits"] = {"position": 1.0}
     job["robot"] = {"joints": [{"position": [lowest * (1 + 1e-6), 2]}]}
-    del job["limits"]
     allowed = plan_of(job)
     assert allowed is not None
     assert allowed.verdict.passed

@@ -20,7 +20,7 @@ from trajcli.planners.planner import Planned
 POLYNOMIALS = {"cubic": 3, "quintic": 5, "septic": 7}
 LAWS = [*POLYNOMIALS, "cycloidal", "trapezoid"]
 SEEDS = st.integers(0, 2**32 - 1)
-few = settings(max_examples=40, deadline=None)
+few = settings(max_examples=20, deadline=None)
 
 
 def plan_of(job: dict[str, Any]) -> Planned | None:
@@ -194,7 +194,7 @@ def test_the_fastest_between_moving_states_touches_a_limit(seed: int, tag: str, 
     assert planned is not None
     limits = job["robot"]["joints"]
     assert worst_ratio(planned, limits).max() <= 1 + 1e-9
-    shorter = [1 - 1e-6, *np.geomspace(0.999, 0.01, 60)]
+    shorter = [1 - 1e-6, *np.geomspace(0.999, 0.01, 25)]
     for factor in shorter:
         job["moves"][0]["duration"] = planned.curve.duration * factor
         attempt = plan_of(job)
@@ -270,7 +270,7 @@ def trapezoid(distance: float, start_velocity: float = 0.0, end_velocity: float 
     return plan_of(job)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(
     distance=st.floats(0.01, 100).flatmap(lambda d: st.sampled_from([d, -d])),
     duration=st.floats(0.05, 50),
@@ -332,7 +332,7 @@ boundary = decimals(0.0, 3.0)
 rates = decimals(0.2, 8.0)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(
     first=boundary, last=boundary, rise=rates, fall=rates, cap=decimals(3.0, 6.0), distance=decimals(0.1, 40)
 )
@@ -364,7 +364,7 @@ def test_fastest_trapezoid_with_boundary_speeds(
     assert velocity[[0, -1]] == pytest.approx([first, last], abs=1e-9)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(
     first=boundary, last=boundary, rise=rates, fall=rates, duration=decimals(0.1, 20), share=decimals(0.02, 1)
 )
@@ -394,7 +394,7 @@ def test_trapezoid_of_given_duration_with_boundary_speeds(
     assert planned.curve.evaluate(middle, 1)[0] == pytest.approx(speed, rel=1e-6)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(first=boundary, last=boundary, duration=decimals(0.2, 10), share=decimals(0.01, 0.99))
 def test_trapezoid_of_given_duration_and_speed_with_boundary_speeds(
     first: float, last: float, duration: float, share: float
@@ -419,7 +419,7 @@ def test_constant_speed_is_a_trapezoid() -> None:
     assert trapezoid(5.9, 2.0, 2.0, duration=3.0, velocity=2.0) is None
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(distance=decimals(-3, 3), first=decimals(-3, 3), last=decimals(-3, 3), rise=rates, fall=rates)
 def test_overshoot_always_arrives(
     distance: float, first: float, last: float, rise: float, fall: float

@@ -18,7 +18,11 @@ def guarded(command: Callable[..., int]) -> Callable[..., NoReturn]:
 
     @wraps(command)
     def run(*args: Any, **options: Any) -> NoReturn:  # noqa: ANN401
-        sys.exit(_outcome(command, args, options))
+        try:
+            code = _outcome(command, args, options)
+        except BrokenPipeError:  # nobody reads the errors either
+            code = PIPE_CLOSED
+        sys.exit(code)
 
     return run
 

@@ -222,11 +222,11 @@ def _evaluate_block(breaks: Array, table: Array, t: Array, piece: NDArray[np.int
     if (piece[1:] < piece[:-1]).any() or (last - first + 1) * _FEW > t.size:
         out[:] = horner(table[:, piece, :], local[:, None])
         return
-    monomials = np.empty((t.size, table.shape[0]))
-    monomials[:, -1] = 1.0
+    monomials = np.empty((table.shape[0], t.size))
+    monomials[-1] = 1.0
     for power in range(table.shape[0] - 2, -1, -1):
-        np.multiply(monomials[:, power + 1], local, out=monomials[:, power])
+        np.multiply(monomials[power + 1], local, out=monomials[power])
     edges = np.searchsorted(piece, np.arange(first, last + 2))
     for k in range(first, last + 1):
         rows = slice(edges[k - first], edges[k - first + 1])
-        np.matmul(monomials[rows], table[:, k, :], out=out[rows])
+        np.matmul(monomials[:, rows].T, table[:, k, :], out=out[rows])

@@ -13,7 +13,7 @@ from trajcli.errors import Problem
 from trajcli.job.load import Document
 from trajcli.job.suggest import did_you_mean, valid_names
 from trajcli.planners import PLANNERS
-from trajcli.planners.reading import Flaw, shown
+from trajcli.planners.reading import AT_KEY, Flaw, shown
 
 Path = tuple[str | int, ...]
 _KINDS = {
@@ -56,7 +56,7 @@ def _flaws(
     path = _path_in_file(loc, document, prefix)
     if kind == "flaws":
         flaws: list[Flaw] = context["flaws"]
-        return [((*path, *below), text, hint, False) for below, text, hint in flaws]
+        return [_flaw((*path, *below), text, hint) for below, text, hint in flaws]
     if kind == "extra_forbidden":
         names = _field_names(model, loc[:-1])
         known = did_you_mean(str(path[-1]), names) or valid_names(names)
@@ -70,6 +70,11 @@ def _flaws(
     if hint is None and kind in ("model_type", "model_attributes_type"):
         hint = valid_names(_field_names(model, loc), "its keys")
     return [(path, message, hint, False)]
+
+
+def _flaw(path: Path, text: str, hint: str | None) -> tuple[Path, str, str | None, bool]:
+    at_key = path[-1:] == (AT_KEY,)
+    return path[:-1] if at_key else path, text, hint, at_key
 
 
 def _unknown_planner(move: object) -> tuple[str, str | None]:

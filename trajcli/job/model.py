@@ -63,7 +63,9 @@ class Output(Model):
         tuple[Seconds, ...] | None, Field(min_length=1, description="Times of the rows instead of a rate, s.")
     ] = None
     start_time: Annotated[float, Number(Quantity("time"), "Time of the first row, s.")] = 0.0
-    align: Annotated[bool, Field(strict=True, description="Stretch each move to a whole number of periods.")] = False
+    align: Annotated[
+        bool, Field(strict=True, description="Stretch each move to a whole number of periods.")
+    ] = False
     columns: Annotated[
         tuple[Group, ...],
         Field(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,27 @@ from trajcli.planners.reading import ReadingContext, shown
 from trajcli.units import Units
 
 CATALOGUE = Path(__file__).parent.parent / "catalogue"
+
+
+@dataclass(frozen=True, eq=False)
+class RobotSheet:
+    """A robot file: the robot, and what the file says beside it.
+
+    Attributes:
+        robot: In SI.
+        units: Of the file's plain numbers.
+        source: Where the numbers come from; None where the file does not say, as below.
+        licence: Of the source.
+        note: What a user should know about the numbers.
+        text: The file as it stands.
+    """
+
+    robot: Robot
+    units: Units
+    source: str | None
+    licence: str | None
+    note: str | None
+    text: str
 
 
 def catalogue_names() -> list[str]:
@@ -51,7 +73,7 @@ def find_robot(value: Any, document: Document, units: Units) -> Robot:  # noqa: 
             )
         if "joints" not in value and nearest(key, ["file", *RobotModel.model_fields]) == "file":
             raise InputError(Problem(f"unknown key '{key}'", "did you mean 'file'?", place))
-    return _validated(value, document, ("robot",), units)
+    return _validated(value, document, ("robot",), units).as_robot()
 
 
 def load_robot(name: str | Path) -> Robot:
@@ -61,16 +83,36 @@ def load_robot(name: str | Path) -> Robot:
         InputError: When the catalogue has no such robot, or with every flaw of the file.
         FileError: When the file cannot be read.
     """
+    return load_sheet(name).robot
+
+
+def load_sheet(name: str | Path) -> RobotSheet:
+    """Return the sheet of a robot of the catalogue by its name, or of a robot file by its path.
+
+    Raises:
+        InputError: When the catalogue has no such robot, or with every flaw of the file.
+        FileError: When the file cannot be read.
+    """
     names = catalogue_names()
     if str(name) in names:
-        return read_robot_file(str(CATALOGUE / f"{name}.yaml"))
+        return read_sheet(str(CATALOGUE / f"{name}.yaml"))
     if isinstance(name, Path) or _looks_like_a_path(name):
-        return read_robot_file(str(name))
+        return read_sheet(str(name))
     raise InputError(f"the catalogue has no robot '{name}'", hint=_suggestion(name, names))
 
 
 def read_robot_file(path: str) -> Robot:
     """Return the robot of a robot file, which has its own units.
+
+    Raises:
+        InputError: With every flaw of the file.
+        FileError: When it cannot be read.
+    """
+    return read_sheet(path).robot
+
+
+def read_sheet(path: str) -> RobotSheet:
+    """Return the sheet of a robot file.
 
     Raises:
         InputError: With every flaw of the file.
@@ -83,7 +125,9 @@ def read_robot_file(path: str) -> Robot:
         "deg" if spec.get("angle") == "deg" else "rad",
         "mm" if spec.get("length") == "mm" else "m",
     )
-    return _validated({"name": Path(path).stem, **plain}, document, (), units)
+    model = _validated({"name": Path(path).stem, **plain}, document, (), units)
+    text = "\n".join(document.lines)
+    return RobotSheet(model.as_robot(), units, model.source, model.licence, model.note, text)
 
 
 def _no_robot(value: object, document: Document) -> Problem:
@@ -126,9 +170,8 @@ def _from_file_entry(value: Mapping[str, Any], document: Document) -> Robot:
         raise error.located(place=document.place(("robot", "file"))) from None
 
 
-def _validated(value: Mapping[str, Any], document: Document, at: tuple[str, ...], units: Units) -> Robot:
+def _validated(value: Mapping[str, Any], document: Document, at: tuple[str, ...], units: Units) -> RobotModel:
     try:
-        model = RobotModel.model_validate(value, context=ReadingContext(units))
+        return RobotModel.model_validate(value, context=ReadingContext(units))
     except ValidationError as error:
         raise InputError(*problems_of(error, RobotModel, document, at)) from None
-    return model.as_robot()

@@ -21,7 +21,7 @@ from trajcli.trajectory import Span, State, Trajectory
 
 _LONGEST = 1e4  # times the planned duration: a move that needs more is not over its limit, it is wrong
 _ROOM = 1e-10  # relative; a tenth of the tolerance of limits, so that rounding does not tip the later verdict
-_BLOCK = 8  # stretches tried at once: each costs a plan of its own
+_ONE_BY_ONE = 1  # stretches tried at once: each costs a plan of its own
 _WHOLE = 1e-9  # of a period: what is this close to whole is whole
 _TRIES = 50
 
@@ -110,7 +110,7 @@ def slowed(move: PlannedMove) -> PlannedMove:
         factors = [finding.factor for finding in over]
         factor = None if None in factors else max(f for f in factors if f is not None)
     else:
-        factor = smallest_feasible(lambda factors: _excess(move, factors), 1.0, _LONGEST, block=_BLOCK)
+        factor = smallest_feasible(lambda factors: _excess(move, factors), 1.0, _LONGEST, block=_ONE_BY_ONE)
     if factor is None:
         return move
     slower = lasting(move, move.duration * factor)

@@ -9,6 +9,7 @@ from typing import Any
 from pydantic.json_schema import JsonSchemaValue
 
 from trajcli.planners.reading import (
+    AT_KEY,
     MAX_JOINTS,
     SI,
     FieldType,
@@ -67,7 +68,7 @@ def _named_items(
     if names is None:
         return {i: (name, item) for i, (name, item) in enumerate(value.items())}
     unknown: list[Flaw] = [
-        ((n,), f"the robot has no joint '{n}'", _listed(names)) for n in value if n not in names
+        ((n, AT_KEY), f"the robot has no joint '{n}'", _listed(names)) for n in value if n not in names
     ]
     if unknown:
         raise _flawed(unknown)

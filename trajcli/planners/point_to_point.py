@@ -90,7 +90,7 @@ def missing_limit(
         also: Other ways out.
     """
     names = ", ".join(robot.joint_names[joint] for joint in joints)
-    ways = [f"add `limits: {{{quantity}: ...}}` to the job (null is unlimited too)", *also]
+    ways = [f"add `limits: {{{quantity}: ...}}` to the job (a number: null means unlimited)", *also]
     return MissingLimitError(
         Problem(
             f"{planner} needs a limit on the {quantity} of {names} {why}",

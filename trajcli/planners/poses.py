@@ -11,7 +11,15 @@ from pydantic.json_schema import JsonSchemaValue
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
-from trajcli.planners.reading import FieldType, FlawError, ReadingContext, read_number, shown, written_number
+from trajcli.planners.reading import (
+    AT_KEY,
+    FieldType,
+    FlawError,
+    ReadingContext,
+    read_number,
+    shown,
+    written_number,
+)
 from trajcli.units import Quantity
 
 SEQUENCES = ("XYX", "XYZ", "XZX", "XZY", "YXY", "YXZ", "YZX", "YZY", "ZXY", "ZXZ", "ZYX", "ZYZ")
@@ -35,7 +43,10 @@ class Pose(FieldType):
         unknown = [key for key in value if key not in ("xyz", *_ROTATIONS)]
         if unknown:
             raise FlawError(
-                f"unknown key '{unknown[0]}'", unknown[0], hint=f"a pose has xyz, {', '.join(_ROTATIONS)}"
+                f"unknown key '{unknown[0]}'",
+                unknown[0],
+                AT_KEY,
+                hint=f"a pose has xyz, {', '.join(_ROTATIONS)}",
             )
         given = [key for key in _ROTATIONS if key in value]
         if len(given) > 1:
@@ -131,8 +142,10 @@ def read_numbers(
 
 def _homogeneous(rows: list[Any], context: ReadingContext) -> Array:
     pose = np.eye(4)
-    for index in range(3):
-        row = rows[index] if isinstance(rows[index], list) else []
+    for index, row in enumerate(rows[:3]):
+        if not isinstance(row, list) or len(row) != 4:
+            got = f"{len(row)} values" if isinstance(row, list) else shown(row)
+            raise FlawError(f"expected a row of 4 numbers, got {got}", "matrix", index)
         pose[index, :3] = read_numbers(row[:3], 3, _RATIO, context, "matrix", index)
         pose[index, 3] = read_numbers(row[3:], 1, _LENGTH, context, "matrix", index)[0]
     last = read_numbers(rows[3], 4, _RATIO, context, "matrix", 3)
@@ -220,7 +233,10 @@ def _exactly(value: Any, needed: tuple[str, ...], optional: tuple[str, ...]) -> 
     unknown = [key for key in value if key not in (*needed, *optional)]
     if unknown:
         raise FlawError(
-            f"unknown key '{unknown[0]}'", unknown[0], hint=f"the keys are {', '.join((*needed, *optional))}"
+            f"unknown key '{unknown[0]}'",
+            unknown[0],
+            AT_KEY,
+            hint=f"the keys are {', '.join((*needed, *optional))}",
         )
     return value
 

@@ -21,6 +21,9 @@ from trajcli.units import Quantity, UnitError, Units, factor, parse_quantity, un
 MAX_JOINTS = 12
 Path = tuple[str | int, ...]
 Flaw = tuple[Path, str, str | None]
+"""Where below a value something is wrong, what, and what would fix it."""
+AT_KEY = "\0key"
+"""Last step of a path that means a key itself, not the value behind it."""
 
 
 @dataclass

@@ -54,7 +54,10 @@ class Trapezoid(PointToPoint):
         ),
     ] = "time"
     overshoot: Annotated[
-        bool, Field(description="A start too fast to stop in time may run past the target and return.")
+        bool,
+        Field(
+            strict=True, description="A start too fast to stop in time may run past the target and return."
+        ),
     ] = False
 
     @model_validator(mode="after")

@@ -152,8 +152,17 @@ def _trailing_words() -> Words:
 @cache
 def _fraction_tables() -> tuple[Words, Words, Words]:
     """Return the words of the first three decimals, of the next four, and of the last two with a comma."""
-    return (
-        _words(f".{number:03d}" for number in range(1000)),
-        _words(f"{number:04d}" for number in range(10000)),
-        _words(f"{number:02d},\0" for number in range(100)),
-    )
+    first, last = _digits(1000, 4), _digits(100, 4)
+    first[:, 0] = ord(".")
+    last[:] = np.column_stack([last[:, 2:], np.full(100, ord(",")), np.zeros(100)])
+    return _as_words(first), _as_words(_digits(10000, 4)), _as_words(last)
+
+
+def _digits(count: int, width: int) -> NDArray[np.uint8]:
+    """Return the numbers below `count` as digits, shape (count, width), with leading zeros."""
+    powers = 10 ** np.arange(width - 1, -1, -1)
+    return (np.arange(count)[:, None] // powers % 10 + ord("0")).astype(np.uint8)
+
+
+def _as_words(characters: NDArray[np.uint8]) -> Words:
+    return np.ascontiguousarray(characters).view(np.uint32)[:, 0]

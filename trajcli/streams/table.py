@@ -6,7 +6,7 @@ import errno
 import re
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from math import isfinite
@@ -81,9 +81,56 @@ def read_csv(source: str | Path) -> Table:
         raise InputError(*reader.problems)
     columns = np.concatenate(blocks)
     if len(columns) == 0:
-        place = Place(file, 1, 1, ",".join(names))
-        raise InputError(Problem("the file has no rows, only the columns' names", place=place))
+        raise InputError(_no_rows(file, names))
     return Table(names, columns, reader.decimals, file)
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """A CSV file that is read block by block, so that memory does not grow with its length.
+
+    Attributes:
+        names: The m columns' names.
+        blocks: Each of shape (N, m), N >= 1, in the units that the names say; they can be taken once.
+        file: Its name, for messages.
+    """
+
+    names: tuple[str, ...]
+    blocks: Iterator[Array]
+    file: str
+
+
+def open_rows(source: str | Path) -> Rows:
+    """Open a CSV file as `read_csv` reads it; what is wrong with a row shows when its block is taken.
+
+    Raises:
+        FileError: When it cannot be read.
+        InputError: When it is not such a file.
+    """
+    file = "stdin" if str(source) == "-" else str(source)
+    with ExitStack() as stack:
+        stream = stack.enter_context(_opened(source, file))
+        names = _read_names(stream, file)
+        return Rows(names, _blocks(stack.pop_all(), stream, file, names), file)
+
+
+def _blocks(opened: ExitStack, stream: BinaryIO, file: str, names: tuple[str, ...]) -> Iterator[Array]:
+    reader, empty = _Reader(file, names), True
+    with opened:
+        for text in _chunks(stream):
+            block = reader.read(text)
+            if reader.problems:
+                raise InputError(*reader.problems)
+            if len(block):
+                empty = False
+                yield block
+    if empty:
+        raise InputError(_no_rows(file, names))
+
+
+def _no_rows(file: str, names: Sequence[str]) -> Problem:
+    place = Place(file, 1, 1, ",".join(names))
+    return Problem("the file has no rows, only the columns' names", place=place)
 
 
 @contextmanager

@@ -4,7 +4,7 @@ import zlib
 
 import numpy as np
 import pytest
-from inverse_arms import FAMILIES, arm, counts_by_search, gap, random_joints
+from inverse_arms import FAMILIES, arm, counts_by_search, gap, random_joints, turning
 
 from trajcli.kinematics.dh import in_convention
 from trajcli.kinematics.forward import forward
@@ -53,6 +53,22 @@ def test_closed_forms_hold_for_ten_thousand_poses(name):
     few = slice(0, 200)
     same = found.count[few] == counts_by_search(robot, poses[few])
     assert np.count_nonzero(~same) <= 1  # a branch whose basin no seed meets
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_right_angles_everywhere_are_solved_where_the_arm_is(name):
+    robot, rng = arm(name), generator(name)
+    size = (60, len(robot.joints))
+    quarters, slides = rng.integers(-1, 3, size) * np.pi / 2, rng.choice([0.0, 0.2, 0.4], size)
+    joints = np.where(turning(robot), quarters, slides)
+    poses = forward(robot, joints)
+    found = solve(robot, poses, near=joints)
+    there = np.where(found.valid, gap(robot, found.joints, joints[:, None]), np.inf).min(axis=1)
+    assert there.max() < 1e-6
+    off = np.abs(forward(robot, found.joints) - poses[:, None]).max(axis=(-2, -1))
+    assert off[found.valid].max() < 1e-9
+    alone = solve(robot, poses)
+    assert (alone.count > 0).all()
 
 
 @pytest.mark.parametrize("name", NAMES)

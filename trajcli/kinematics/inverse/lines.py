@@ -183,6 +183,13 @@ def across_floats(a: Floats, b: Floats) -> Floats:
     return _clean(cross(a, b))
 
 
+def aside(axis: Floats) -> Floats:
+    """Return a vector at right angles to a unit axis, not shorter than 0.8."""
+    values = np.array(axis)
+    nearest = np.eye(3)[int(np.argmin(np.abs(values)))]
+    return _clean((nearest - (nearest @ values) * values).tolist())
+
+
 def _clean(vector: Sequence[Entry]) -> Floats:
     x, y, z = (0.0 if abs(value) < _DUST else value for value in map(float, vector))
     return x, y, z

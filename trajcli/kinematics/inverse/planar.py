@@ -23,10 +23,10 @@ from dataclasses import dataclass
 
 from trajcli.kinematics.columns import dot, minus, product
 from trajcli.kinematics.inverse.elbow import parallel_pair, same_way
-from trajcli.kinematics.inverse.lines import Arm, Floats, Goal, Line, parallel, perpendicular
+from trajcli.kinematics.inverse.lines import Arm, Floats, Goal, Line, aside, parallel, perpendicular
 from trajcli.kinematics.inverse.method import Method
 from trajcli.kinematics.inverse.slides import turn_and_slide
-from trajcli.kinematics.inverse.subproblems import Turn, Value, Watch, across, added, onto, unit
+from trajcli.kinematics.inverse.subproblems import Turn, Value, Watch, added, onto, unit
 
 _NAMES = {"RR": "planar 2R", "RP": "planar RP", "RRR": "planar 3R", "RPR": "planar RPR"}
 
@@ -74,11 +74,8 @@ class Planar:
 
 
 def _angle_of_tool(one: Line, goal: Goal, watch: Watch) -> Turn:
-    axis = one.direction
-    marker = across(
-        min(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), key=lambda e: abs(float(dot(e, axis)))), axis
-    )
-    return unit(onto(axis, marker, goal.direction(marker)), watch)
+    marker = aside(one.direction)
+    return unit(onto(one.direction, marker, goal.direction(marker)), watch)
 
 
 def match(arm: Arm) -> Method | None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.geometry.rotation import Flags
-from trajcli.kinematics.inverse.numeric import linearised, refine
+from trajcli.kinematics.inverse.numeric import SAME, linearised, refine
 from trajcli.kinematics.inverse.target import Target
 from trajcli.kinematics.inverse.turns import FULL, revolute
 from trajcli.kinematics.robot import Robot
@@ -23,6 +23,7 @@ _STEP = 0.05  # rad or m: large against what a correction may lose
 _MET = 1e-10  # scaled error with which a member still meets the target
 _PART = 1e-6  # of a unit direction: a joint with less takes no part
 _MOVES = 30
+_IN_LINE = 2  # joints that two axes in line leave free together
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +67,29 @@ def families(robot: Robot, target: Target, joints: Array, near: Array | None) ->
     if near is not None and len(rows):
         result[rows] = _nearest_member(robot, target.rows(rows), joints[rows], near[rows])
     return Families(result, singular, free)
+
+
+def one_of_each(robot: Robot, joints: Array, valid: Flags, free: Flags, near: Array | None) -> Flags:
+    """Return the valid branches (N, branches) without further members of a family already there.
+
+    Where one joint or two (whose axes are in line) are free and the others agree, two answers are members of
+    one family; the nearer to `near` (N, n) is kept, or the first. With more free joints a family may have
+    parts that do not hang together, and all are kept.
+    """
+    keep, turning = valid.copy(), revolute(robot)
+    few = (free.sum(axis=2) > 0) & (free.sum(axis=2) <= _IN_LINE)
+    way = np.zeros(joints.shape) if near is None else joints - near[:, None]
+    distance = np.abs(np.where(turning, way - FULL * np.round(way / FULL), way)).max(axis=2)
+    for i in range(1, valid.shape[1]):
+        for j in range(i):
+            gap = joints[:, i] - joints[:, j]
+            gap = np.where(turning, gap - FULL * np.round(gap / FULL), gap)
+            agree = ((np.abs(gap) <= SAME) | free[:, i]).all(axis=1) & (free[:, i] == free[:, j]).all(axis=1)
+            same = agree & few[:, i] & keep[:, i] & keep[:, j]
+            further = distance[:, i] >= distance[:, j] - SAME
+            keep[:, i] &= ~(same & further)
+            keep[:, j] &= ~(same & ~further)
+    return keep
 
 
 def _null_space(robot: Robot, target: Target, joints: Array) -> Array:

@@ -15,10 +15,11 @@ from trajcli.kinematics.chain import configurations
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.choose import method_for
 from trajcli.kinematics.inverse.closed_form import candidates
+from trajcli.kinematics.inverse.complete import complete
 from trajcli.kinematics.inverse.lines import PARALLEL, Arm, arm_of
 from trajcli.kinematics.inverse.method import Method
 from trajcli.kinematics.inverse.numeric import distinct, refine, search
-from trajcli.kinematics.inverse.singular import families
+from trajcli.kinematics.inverse.singular import families, one_of_each
 from trajcli.kinematics.inverse.solution import Solutions
 from trajcli.kinematics.inverse.target import Target, closure_of, pose_target
 from trajcli.kinematics.inverse.turns import beyond, choose_turns
@@ -40,12 +41,14 @@ class _Found:
         closure: Shape (2, branches, N), m and rad.
         valid: Shape (branches, N).
         suspect: Shape (N,): poses whose answers may be singular or repeat each other.
+        closed: Whether a closed form found them.
     """
 
     joints: Array
     closure: Array
     valid: Flags
     suspect: Flags
+    closed: bool
 
 
 def solve(
@@ -128,7 +131,7 @@ def _closed(robot: Robot, arm: Arm, method: Method, target: Target, tolerance: f
         joints[:, branches, rows] = better.T
         closure[:, branches, rows] = closure_of(some, forward(robot, better)).T
         worst = np.maximum(closure[0], closure[1])
-    found = _Found(joints, closure, worst <= tolerance, raw.watched)
+    found = _Found(joints, closure, worst <= tolerance, raw.watched, closed=True)
     missed = np.flatnonzero(~found.valid.any(axis=0))
     if len(missed):
         found.closure[..., missed] = _closures(robot, target.rows(missed), joints[..., missed])
@@ -138,7 +141,9 @@ def _closed(robot: Robot, arm: Arm, method: Method, target: Target, tolerance: f
 def _searched(robot: Robot, target: Target, near: Array | None, tolerance: float) -> _Found:
     search_result = search(robot, target, near)
     joints = np.ascontiguousarray(np.moveaxis(search_result.joints, 0, -1).swapaxes(0, 1))
-    found = _Found(joints, _closures(robot, target, joints), search_result.found.T, np.ones(0, dtype=bool))
+    found = _Found(
+        joints, _closures(robot, target, joints), search_result.found.T, np.ones(0, dtype=bool), closed=False
+    )
     found.valid = found.valid & (found.closure.max(axis=0) <= tolerance)
     _turn(robot, found, near)
     found.valid = distinct(robot, joints.transpose(2, 1, 0), found.valid.T).T
@@ -152,7 +157,11 @@ def _searched(robot: Robot, target: Target, near: Array | None, tolerance: float
     columns = np.arange(kept.shape[1])
     suspect = np.ones(kept.shape[1], dtype=bool)
     return _Found(
-        joints[:, kept, columns], found.closure[:, kept, columns], found.valid[kept, columns], suspect
+        joints[:, kept, columns],
+        found.closure[:, kept, columns],
+        found.valid[kept, columns],
+        suspect,
+        closed=False,
     )
 
 
@@ -170,21 +179,41 @@ def _resolve(
     """Find the families of suspect poses, move to their nearest members, and drop repetitions."""
     singular, free = np.zeros(found.valid.shape, dtype=bool), np.zeros(found.joints.shape, dtype=bool)
     suspects = np.flatnonzero(found.suspect)
-    places, columns = np.nonzero(found.valid[:, suspects])
-    if not len(columns):
+    if not len(suspects):
         return singular, free
-    rows = suspects[columns]
-    some = target.rows(rows)
-    answer = families(robot, some, found.joints[:, places, rows].T, None if near is None else near[rows])
-    closure = closure_of(some, forward(robot, answer.joints))
-    kept = closure.max(axis=-1) <= tolerance
-    places, rows = places[kept], rows[kept]
-    found.joints[:, places, rows] = answer.joints[kept].T
-    found.closure[:, places, rows] = closure[kept].T
-    singular[places, rows], free[:, places, rows] = answer.singular[kept], answer.free[kept].T
-    some_joints = found.joints[:, :, suspects].transpose(2, 1, 0)
-    found.valid[:, suspects] = distinct(robot, some_joints, found.valid[:, suspects].T).T
+    some, close_to = target.rows(suspects), None if near is None else near[suspects]
+    joints, valid = found.joints[:, :, suspects].transpose(2, 1, 0).copy(), found.valid[:, suspects].T.copy()
+    lost, freed = _to_nearest_members(robot, some, joints, valid, close_to)
+    valid = distinct(robot, joints, valid)
+    if found.closed and complete(robot, some, joints, valid, lost, close_to):
+        lost, freed = _to_nearest_members(robot, some, joints, valid, close_to)
+    closure = _closures(robot, some, joints.transpose(2, 1, 0))
+    met = closure.max(axis=0) <= tolerance
+    valid = distinct(robot, joints, valid & met.T)
+    if found.closed:
+        valid = one_of_each(robot, joints, valid, freed, close_to)
+    found.joints[:, :, suspects], found.closure[:, :, suspects] = joints.transpose(2, 1, 0), closure
+    found.valid[:, suspects] = valid.T
+    singular[:, suspects], free[:, :, suspects] = (lost & valid).T, freed.transpose(2, 1, 0)
     return singular, free
+
+
+def _to_nearest_members(
+    robot: Robot, target: Target, joints: Array, valid: Flags, near: Array | None
+) -> tuple[Flags, Flags]:
+    """Move valid joints (N, branches, n), in place; return what is singular (N, branches), and free."""
+    lost, freed = np.zeros(valid.shape, dtype=bool), np.zeros(joints.shape, dtype=bool)
+    rows, places = np.nonzero(valid)
+    if len(rows):
+        answer = families(
+            robot, target.rows(rows), joints[rows, places], None if near is None else near[rows]
+        )
+        joints[rows, places], lost[rows, places], freed[rows, places] = (
+            answer.joints,
+            answer.singular,
+            answer.free,
+        )
+    return lost, freed
 
 
 def _turn(robot: Robot, found: _Found, near: Array | None) -> None:

@@ -21,33 +21,27 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-from trajcli.kinematics.columns import Column, cross, dot
+from trajcli.kinematics.columns import Column
 from trajcli.kinematics.inverse.bases import Base, base_of
 from trajcli.kinematics.inverse.elbow import same_way
+from trajcli.kinematics.inverse.hand import hand
 from trajcli.kinematics.inverse.lines import (
     Arm,
     Floats,
     Goal,
     InverseGoal,
     Line,
-    across_floats,
     common_point,
     parallel,
 )
 from trajcli.kinematics.inverse.method import Method
 from trajcli.kinematics.inverse.subproblems import (
-    Mirrored,
-    Opposed,
     Turn,
     Value,
     Watch,
-    across,
     added,
-    square_wrist,
     turned,
     turned_back,
-    two_turns,
-    unit,
 )
 
 
@@ -64,37 +58,11 @@ class SphericalWrist:
         four, five, six = (line.direction for line in self.lines)
         values = self.base.reach(self.center, goal.point(self.center), watch)
         turns = _turns(self.base.lines, values)
-        aim = goal.direction(six)
-        for axis, turn in turns:
-            aim = turned_back(aim, axis, turn)
-        fourth, fifth = two_turns(four, five, six, aim, watch)
         axis_four: Column = four
         for axis, turn in reversed(turns):
             axis_four = turned(axis_four, axis, turn)
-        last = last_turn((four, five, six), fifth, axis_four, goal, watch)
-        return [*values, fourth, fifth, last]
-
-
-def last_turn(
-    axes: tuple[Floats, Floats, Floats], bend: Turn | Opposed, first_axis: Column, goal: Goal, watch: Watch
-) -> Turn | Mirrored:
-    """Return the turn about the last axis: it brings the tool's view of the first axis to where it must be.
-
-    Args:
-        axes: The three axes at zero.
-        bend: The turns about the second.
-        first_axis: Where the first axis points.
-        goal: The displacement of the tool.
-        watch: Right after the turns about the first two, so that their choice is its last.
-    """
-    first, second, last = axes
-    if square_wrist(first, second, last):
-        side = goal.direction(across_floats(last, second))
-        seen = dot(side, first_axis), dot(goal.direction(second), first_axis)
-        return watch.mirrored(unit(seen, watch))
-    view = goal.view(first_axis)
-    bent = turned_back(first, second, bend.both() if isinstance(bend, Opposed) else bend)
-    return unit((dot(across(bent, last), view), dot(cross(bent, last), view)), watch)
+        back = partial(_back, turns)
+        return [*values, *hand((four, five, six), back, axis_four, goal, watch)]
 
 
 def match(arm: Arm) -> Method | None:
@@ -109,7 +77,9 @@ def match(arm: Arm) -> Method | None:
             if backwards
             else ("4, 5 and 6 meet in one point, and joints 1 to 3")
         )
-        reason = f"axes {joints} ({''.join('RP'[line.prismatic] for line in base.lines)}) are a {base.name}"
+        reason = (
+            f"axes {joints} ({''.join('RP'[line.prismatic] for line in base.lines)}) place it ({base.name})"
+        )
         name = f"spherical {'shoulder under' if backwards else 'wrist over'} {base.name}"
         run = partial(_backwards, solver) if backwards else solver
         return Method(name, "spherical wrist", (*base.choices, "wrist"), reason, run)
@@ -132,6 +102,13 @@ def _solver(arm: Arm) -> SphericalWrist | None:
 
 def _backwards(solver: SphericalWrist, goal: Goal, watch: Watch) -> Sequence[Value]:
     return list(solver(InverseGoal(goal), watch))[::-1]
+
+
+def _back(turns: Sequence[tuple[Floats, Turn]], vector: Column) -> Column:
+    """Return a direction as it was before the turns."""
+    for axis, turn in turns:
+        vector = turned_back(vector, axis, turn)
+    return vector
 
 
 def _turns(lines: Sequence[Line], values: Sequence[Value]) -> list[tuple[Floats, Turn]]:

@@ -22,9 +22,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from trajcli.kinematics.columns import Column, cross, dot, minus, product
 from trajcli.kinematics.inverse.elbow import before, forward_sign, parallel_pair, same_way, shoulder_turn
+from trajcli.kinematics.inverse.hand import hand
 from trajcli.kinematics.inverse.lines import (
     Arm,
     Floats,
@@ -34,7 +36,6 @@ from trajcli.kinematics.inverse.lines import (
     parallel,
 )
 from trajcli.kinematics.inverse.method import Choice, Method
-from trajcli.kinematics.inverse.spherical_wrist import last_turn
 from trajcli.kinematics.inverse.subproblems import (
     Mirrored,
     Turn,
@@ -45,7 +46,6 @@ from trajcli.kinematics.inverse.subproblems import (
     onto,
     turned,
     turned_back,
-    two_turns,
     unit,
 )
 
@@ -86,9 +86,10 @@ class ThreeParallel:
         seen = turned(axis, one.direction, first)
         if len(self.arm.lines) == 6:
             five = self.arm.lines[4].direction
-            aim = turned_back(goal.direction(last.direction), one.direction, first)
-            total, fifth = two_turns(axis, five, last.direction, aim, watch)
-            sixth = last_turn((axis, five, last.direction), fifth, seen, goal, watch)
+            axes = axis, five, last.direction
+            total, fifth, sixth = hand(
+                axes, partial(turned_back, axis=one.direction, turn=first), seen, goal, watch
+            )
             return total.both() if isinstance(total, Mirrored) else total, [fifth, sixth]
         marker = last.direction if len(self.arm.lines) == 5 else across_floats(one.direction, axis)
         aim = turned_back(goal.direction(marker), one.direction, first)

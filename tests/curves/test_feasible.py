@@ -1,0 +1,55 @@
+"""The smallest number within a bound, among intervals of every width."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from trajcli.curves.feasible import smallest_feasible
+
+
+def outside(*intervals: tuple[float, float]):
+    """Return by what part x is outside the nearest interval."""
+
+    def excess(x: np.ndarray) -> np.ndarray:
+        return np.min([np.maximum(low / x, x / high) - 1 for low, high in intervals], axis=0)
+
+    return excess
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    left=st.floats(1.01, 900),
+    width=st.floats(-11, 0).map(lambda power: 10.0**power),
+    gap=st.floats(1.2, 50),
+    block=st.sampled_from([1, 3, 64]),
+)
+def test_the_left_end_of_the_first_interval_is_found(
+    left: float, width: float, gap: float, block: int
+) -> None:
+    first = (left, left * (1 + width))
+    found = smallest_feasible(
+        outside(first, (gap * first[1], 5000.0 + gap * first[1])), 1.0, 1e6, block=block
+    )
+    assert found == pytest.approx(left, rel=1e-12)
+
+
+def test_a_feasible_start_is_the_answer() -> None:
+    assert smallest_feasible(outside((0.5, 3.0)), 1.0, 10.0) == 1.0
+
+
+@pytest.mark.parametrize("block", [1, 64])
+def test_nothing_feasible_gives_nothing(block: int) -> None:
+    assert smallest_feasible(lambda x: 0.1 + (x - 3) ** 2, 1.0, 10.0, block=block) is None
+    assert smallest_feasible(lambda x: np.full_like(x, np.inf), 1.0, 10.0, block=block) is None
+    assert smallest_feasible(outside((20.0, 30.0)), 1.0, 10.0, block=block) is None
+
+
+@pytest.mark.parametrize("block", [1, 64])
+def test_infinite_stretches_do_not_hide_what_follows(block: int) -> None:
+    def excess(x: np.ndarray) -> np.ndarray:
+        return np.where((x > 2) & (x < 4), np.inf, 7.0 - x)
+
+    assert smallest_feasible(excess, 1.0, 100.0, block=block) == pytest.approx(7.0, rel=1e-12)

@@ -1,0 +1,73 @@
+"""`trajcli fk`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from trajcli.cli.matrix_text import pose_lines
+from trajcli.cli.printing import print_json, print_lines
+from trajcli.errors import InputError
+from trajcli.kinematics.forward import forward, link_poses
+from trajcli.pipeline.arm import Arm, open_arm
+from trajcli.pipeline.pose_view import pose_view
+from trajcli.streams.csv import Digits, write_csv
+from trajcli.streams.whole_file import standard_output
+
+
+@dataclass(frozen=True)
+class FkOptions:
+    """What the command line says beside robot and joints; see `trajcli fk --help`."""
+
+    tool: str | None = None
+    frame: Literal["world", "base"] = "world"
+    links: bool = False
+    si: bool = False
+    as_json: bool = False
+    digits: Digits = "fixed"
+
+
+def run_fk(robot: str, words: Sequence[str], options: FkOptions) -> int:
+    """Print the pose of the tcp, or one for each row of standard input; return the exit code.
+
+    Raises:
+        InputError: When robot, joints, tool or rows are not as they should be.
+        FileError: When a file cannot be read, or standard output not written.
+    """
+    arm = open_arm(robot, options.tool, si=options.si, frame=options.frame)
+    if list(words) == ["-"]:
+        return _stream(arm, options)
+    q = arm.joint_values(words)
+    told: dict[str, Any] = pose_view(forward(arm.robot, q), arm.units)
+    if options.links:
+        frames = link_poses(arm.robot, q)[1:-1]
+        names = arm.robot.joint_names
+        told["links"] = [
+            {"name": name, **pose_view(pose, arm.units)} for name, pose in zip(names, frames, strict=True)
+        ]
+    if options.as_json:
+        print_json(told)
+    else:
+        print_lines(_lines(arm, told, options.frame))
+    return 0
+
+
+def _lines(arm: Arm, told: dict[str, Any], frame: str) -> list[str]:
+    lines = [f"pose of the tcp of {arm.robot.name} in {frame}:", *pose_lines(told, arm.units)]
+    for link in told.get("links", []):
+        lines += ["", f"frame of link {link['name']} in {frame}:", *pose_lines(link, arm.units)]
+    return lines
+
+
+def _stream(arm: Arm, options: FkOptions) -> int:
+    from trajcli.pipeline.joint_stream import poses_of
+    from trajcli.streams.table import open_rows
+
+    for name, given in (("--json", options.as_json), ("--links", options.links)):
+        if given:
+            raise InputError(f"{name} is for one configuration, rows from standard input become a CSV")
+    names, blocks = poses_of(arm, open_rows("-"))
+    with standard_output() as out:
+        write_csv(blocks, names, out, options.digits)
+    return 0

@@ -1,0 +1,90 @@
+"""`trajcli jacobian`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from trajcli.cli.matrix_text import matrix_lines, number, numbers
+from trajcli.cli.printing import print_json, print_lines
+from trajcli.errors import InputError
+from trajcli.kinematics.jacobian import ReferenceFrame
+from trajcli.pipeline.arm import Arm, open_arm
+from trajcli.pipeline.differential import differential
+from trajcli.streams.whole_file import standard_output
+
+_COMPONENTS = ("vx", "vy", "vz", "wx", "wy", "wz")
+
+
+@dataclass(frozen=True)
+class JacobianOptions:
+    """What the command line says beside robot and joints; see `trajcli jacobian --help`."""
+
+    tool: str | None = None
+    frame: ReferenceFrame = "world"
+    rates: str | None = None
+    si: bool = False
+    as_json: bool = False
+
+
+def run_jacobian(robot: str, words: Sequence[str], options: JacobianOptions) -> int:
+    """Print the Jacobian and what it says about the arm; return the exit code.
+
+    Raises:
+        InputError: When robot, joints, rates, tool or rows are not as they should be.
+        FileError: When a file cannot be read, or standard output not written.
+    """
+    arm = open_arm(robot, options.tool, si=options.si)
+    if list(words) == ["-"]:
+        return _stream(arm, options)
+    q = arm.joint_values(words)
+    qd = None if options.rates is None else arm.joint_values([options.rates], "--qd", 1)
+    told = differential(arm, q, options.frame, qd)
+    if options.as_json:
+        print_json(told)
+    else:
+        print_lines(_lines(arm, told, options.frame))
+    return 0
+
+
+def _lines(arm: Arm, told: dict[str, Any], frame: str) -> Iterator[str]:
+    length, angle = arm.units.length, arm.units.angle
+    rates = ", ".join(dict.fromkeys(arm.joint_unit(i, 1) for i in range(len(arm.robot.joints))))
+    yield f"Jacobian of {arm.robot.name} in the axes of the {frame} frame"
+    yield f"(rows vx vy vz in {length}/s, wx wy wz in {angle}/s; joint rates in {rates}):"
+    yield from matrix_lines(told["jacobian"])
+    yield f"manipulability: {number(told['manipulability'])} (in m and rad)"
+    condition = "infinite" if told["condition"] is None else number(told["condition"])
+    yield f"condition number: {condition} (lengths divided by the length of the arm)"
+    yield f"rank: {told['rank']}"
+    for direction in told["singular_directions"]:
+        yield f"always zero: {_sum(direction, _COMPONENTS)} (in m/s and rad/s)"
+    for motion in told["idle_motions"]:
+        rate = _sum(motion, [f"d/dt {name}" for name in arm.robot.joint_names])
+        yield f"moves nothing: {rate} (in rad/s and m/s)"
+    if "jdot_qd" in told:
+        units = f"{length}/s^2 and {angle}/s^2"
+        yield f"acceleration at constant joint rates ({units}): {numbers(told['jdot_qd'])}"
+
+
+def _sum(factors: Sequence[float], names: Sequence[str]) -> str:
+    terms = [(factor, name) for factor, name in zip(factors, names, strict=True) if factor]
+    if len(terms) == 1:
+        return terms[0][1]
+    text = " ".join(f"{'-' if factor < 0 else '+'} {abs(factor):.6g} {name}" for factor, name in terms)
+    return text.removeprefix("+ ")
+
+
+def _stream(arm: Arm, options: JacobianOptions) -> int:
+    from trajcli.pipeline.joint_stream import jacobians_of
+    from trajcli.streams.csv import write_csv
+    from trajcli.streams.table import open_rows
+
+    for name, given in (("--json", options.as_json), ("--qd", options.rates is not None)):
+        if given:
+            raise InputError(f"{name} is for one configuration, rows from standard input become a CSV")
+    names, blocks = jacobians_of(arm, open_rows("-"), options.frame)
+    with standard_output() as out:
+        write_csv(blocks, names, out)
+    return 0

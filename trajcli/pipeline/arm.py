@@ -1,0 +1,139 @@
+"""An arm as the kinematic commands use it: a robot with geometry, and the units its numbers are said in."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from trajcli.columns import joint_factors
+from trajcli.curves.piecewise import Array
+from trajcli.errors import InputError
+from trajcli.job.inline import inline_pose
+from trajcli.job.robot_source import RobotSheet, catalogue_names, load_sheet
+from trajcli.kinematics.chain import links_of
+from trajcli.kinematics.robot import Robot
+from trajcli.units import Quantity, UnitError, Units, factor, parse_quantity, unit_name
+
+_NUMBER = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """A robot that has geometry.
+
+    Attributes:
+        robot: With the tool in use.
+        units: Of the numbers that the user gives and gets.
+    """
+
+    robot: Robot
+    units: Units
+
+    @property
+    def joint_factors(self) -> Array:
+        """SI per user unit of each joint's value, shape (n,)."""
+        return joint_factors(self.robot.joint_types, self.units)
+
+    @property
+    def length_factor(self) -> float:
+        """Metres per user unit of length."""
+        return factor(Quantity("length"), self.units)
+
+    @property
+    def angle_factor(self) -> float:
+        """Radians per user unit of angle."""
+        return factor(Quantity("angle"), self.units)
+
+    @property
+    def twist_factors(self) -> Array:
+        """SI per user unit of a twist's or an acceleration's entries, linear ones first, shape (6,)."""
+        return np.repeat([self.length_factor, self.angle_factor], 3)
+
+    def joint_unit(self, joint: int, order: int = 0) -> str:
+        """Return the unit of a joint's value, or of its time derivative of the given order."""
+        return unit_name(self._quantity(joint, order), self.units)
+
+    def joint_values(self, words: Sequence[str], name: str = "q", order: int = 0) -> Array:
+        """Return values of all joints in SI, shape (n,).
+
+        Args:
+            words: A number, in the arm's units or with its own unit, for each joint; commas separate too.
+            name: What the values are called in messages.
+            order: 0 for positions, 1 for velocities.
+
+        Raises:
+            InputError: When there is not one for each joint, or one is no such number.
+        """
+        values = [value for word in words for value in word.replace(",", " , ").split(" , ") if value.strip()]
+        count = len(self.robot.joints)
+        if len(values) != count:
+            units = ", ".join(
+                f"{joint} ({self.joint_unit(i, order)})" for i, joint in enumerate(self.robot.joint_names)
+            )
+            raise InputError(
+                f"{name} has {len(values)} value{'s' * (len(values) != 1)}, "
+                f"{self.robot.name} has {count} joint{'s' * (count != 1)}",
+                hint=f"they are {units}",
+            )
+        return np.array([self._value(text.strip(), i, name, order) for i, text in enumerate(values)])
+
+    def _value(self, text: str, joint: int, name: str, order: int) -> float:
+        quantity = self._quantity(joint, order)
+        where = f"{name} of {self.robot.joint_names[joint]}"
+        if _NUMBER.fullmatch(text):
+            value = float(text) * factor(quantity, self.units)
+        else:
+            try:
+                value = parse_quantity(text, quantity)
+            except UnitError as error:
+                said = f"expected a number ({unit_name(quantity, self.units)}), got {text}"
+                option = text.startswith("--")
+                message = f"there is no option {text.partition('=')[0]}" if option else f"{where}: {said}"
+                raise InputError(message, hint="--help lists the options" if option else str(error)) from None
+        if not np.isfinite(value):
+            raise InputError(f"{where}: {text} is too large")
+        return value
+
+    def _quantity(self, joint: int, order: int) -> Quantity:
+        prismatic = self.robot.joint_types[joint] == "prismatic"
+        return Quantity("length" if prismatic else "angle", order)
+
+
+def open_sheet(name: str) -> RobotSheet:
+    """Return the sheet of a robot of the catalogue, or of a robot file of any name.
+
+    Raises:
+        InputError: When there is no such robot, or with every flaw of the file.
+        FileError: When the file cannot be read.
+    """
+    is_file = name not in catalogue_names() and Path(name).is_file()
+    return load_sheet(Path(name) if is_file else name)
+
+
+def open_arm(
+    name: str, tool: str | None = None, *, si: bool = False, frame: Literal["world", "base"] = "world"
+) -> Arm:
+    """Return an arm of the catalogue or of a file.
+
+    Args:
+        name: Of a robot in the catalogue, or the path of a robot file.
+        tool: T_flange_tcp as YAML or @FILE, instead of the robot's own.
+        si: Whether numbers are in rad and m, whatever units the robot's file has.
+        frame: "base" counts poses from the robot's base, as if it stood at the world's origin.
+
+    Raises:
+        InputError: When there is no such robot, it has no geometry, or the tool is no pose.
+        FileError: When a file cannot be read.
+    """
+    sheet = open_sheet(name)
+    units = Units() if si else sheet.units
+    robot = sheet.robot
+    links_of(robot)  # refuses bare joints before anything is read or written
+    if tool is not None:
+        robot = replace(robot, tool=inline_pose(tool, "--tool", units))
+    return Arm(replace(robot, base=np.eye(4)) if frame == "base" else robot, units)
