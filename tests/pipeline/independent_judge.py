@@ -12,7 +12,7 @@ from trajcli.kinematics.robot import Limits
 from trajcli.trajectory import Trajectory
 
 KINDS = ("position", "velocity", "acceleration", "jerk")
-CELLS, ROUNDS = 24, 20
+CELLS, ROUNDS = 16, 14
 SURE, DOUBT = 2e-9, 5e-10  # a limit is broken above one billionth; the judge is good for a tenth of that
 
 

@@ -411,6 +411,20 @@ def test_trapezoid_of_given_duration_and_speed_with_boundary_speeds(
     assert trapezoid(distance, first, last, duration=duration, velocity=too_fast) is None
 
 
+@pytest.mark.parametrize(("first", "last", "needed"), [(2.0, 0.0, 1.0), (3.0, 1.0, 2.0), (1.0, 3.0, 1.0)])
+def test_trapezoid_at_the_border_of_what_boundary_speeds_allow(
+    first: float, last: float, needed: float
+) -> None:
+    fields = {"acceleration": 4.0, "deceleration": 2.0, "velocity": 5.0}
+    assert trapezoid(needed * (1 - 1e-9), first, last, **fields) is None
+    at, above = (trapezoid(needed * (1 + more), first, last, **fields) for more in (0.0, 1e-9))
+    assert at is not None
+    assert above is not None
+    assert len(at.phases) == 1
+    assert at.curve.end == pytest.approx(abs(first - last) / (2.0 if first > last else 4.0), rel=1e-12)
+    assert above.curve.end == pytest.approx(at.curve.end, rel=1e-6)
+
+
 def test_constant_speed_is_a_trapezoid() -> None:
     planned = trapezoid(6.0, 2.0, 2.0, duration=3.0, velocity=2.0)
     assert planned is not None

@@ -1,7 +1,9 @@
-"""Poses that stand in a word of the command line: YAML as in a job, or @FILE for the file that holds it."""
+"""Numbers and poses in words of the command line: YAML as in a job, or @FILE for the file that holds it."""
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -11,9 +13,32 @@ from trajcli.job.document import Document
 from trajcli.job.load import parse_document, read_document
 from trajcli.planners.poses import Pose
 from trajcli.planners.reading import AT_KEY, FlawError, ReadingContext
-from trajcli.units import Units
+from trajcli.units import Quantity, UnitError, Units, factor, parse_quantity, unit_name
 
 T = TypeVar("T")
+_NUMBER = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
+
+
+def inline_number(word: str, name: str, quantity: Quantity, units: Units) -> float:
+    """Return a plain number in the given units, or one with its own unit such as "90deg", in SI.
+
+    Raises:
+        InputError: When the word is no such number, or it is too large.
+    """
+    unit = unit_name(quantity, units)
+    if _NUMBER.fullmatch(word):
+        value = float(word) * factor(quantity, units)
+        if math.isfinite(value):
+            return value
+        raise InputError(f"{name}: {word} is too large")
+    if word.startswith("--"):
+        raise InputError(f"there is no option {word.partition('=')[0]}", hint="--help lists the options")
+    try:
+        return parse_quantity(word, quantity)
+    except UnitError as error:
+        raise InputError(
+            f"{name}: expected a number{f' ({unit})' if unit else ''}, got {word[:40]}", hint=str(error)
+        ) from None
 
 
 def inline_document(word: str, name: str) -> Document:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,13 +12,11 @@ import numpy as np
 from trajcli.columns import joint_factors
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
-from trajcli.job.inline import inline_pose
+from trajcli.job.inline import inline_number, inline_pose
 from trajcli.job.robot_source import RobotSheet, catalogue_names, load_sheet
 from trajcli.kinematics.chain import links_of
 from trajcli.kinematics.robot import Robot
-from trajcli.units import Quantity, UnitError, Units, factor, parse_quantity, unit_name
-
-_NUMBER = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
+from trajcli.units import Quantity, Units, factor, unit_name
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +66,7 @@ class Arm:
         Raises:
             InputError: When there is not one for each joint, or one is no such number.
         """
-        values = [value for word in words for value in word.replace(",", " , ").split(" , ") if value.strip()]
+        values = [value for word in words for value in word.replace(",", " ").split()]
         count = len(self.robot.joints)
         if len(values) != count:
             units = ", ".join(
@@ -80,24 +77,13 @@ class Arm:
                 f"{self.robot.name} has {count} joint{'s' * (count != 1)}",
                 hint=f"they are {units}",
             )
-        return np.array([self._value(text.strip(), i, name, order) for i, text in enumerate(values)])
-
-    def _value(self, text: str, joint: int, name: str, order: int) -> float:
-        quantity = self._quantity(joint, order)
-        where = f"{name} of {self.robot.joint_names[joint]}"
-        if _NUMBER.fullmatch(text):
-            value = float(text) * factor(quantity, self.units)
-        else:
-            try:
-                value = parse_quantity(text, quantity)
-            except UnitError as error:
-                said = f"expected a number ({unit_name(quantity, self.units)}), got {text}"
-                option = text.startswith("--")
-                message = f"there is no option {text.partition('=')[0]}" if option else f"{where}: {said}"
-                raise InputError(message, hint="--help lists the options" if option else str(error)) from None
-        if not np.isfinite(value):
-            raise InputError(f"{where}: {text} is too large")
-        return value
+        names = [f"{name} of {joint}" for joint in self.robot.joint_names]
+        return np.array(
+            [
+                inline_number(text, names[i], self._quantity(i, order), self.units)
+                for i, text in enumerate(values)
+            ]
+        )
 
     def _quantity(self, joint: int, order: int) -> Quantity:
         prismatic = self.robot.joint_types[joint] == "prismatic"

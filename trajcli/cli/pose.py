@@ -1,0 +1,117 @@
+"""`trajcli pose`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from trajcli.cli.matrix_text import number, numbers, pose_lines
+from trajcli.cli.printing import print_json, print_lines
+from trajcli.errors import InputError
+from trajcli.geometry.pose import invert
+from trajcli.geometry.rotation import rotation_defect
+from trajcli.job.inline import inline_number
+from trajcli.pipeline.pose_path import End, Orientation, parse_fractions, pose_path
+from trajcli.pipeline.pose_report import parse_sequence, parse_units, pose_report
+from trajcli.pipeline.pose_steps import composed, read_step, read_steps
+from trajcli.units import Quantity, Units
+
+_ROUNDING = 1e-9  # of R^T R: above it is told, since it comes from rounded entries
+
+
+@dataclass(frozen=True)
+class PoseOptions:
+    """What the command line says beside the steps; see `trajcli pose --help`."""
+
+    units: str = ""
+    inverse: bool = False
+    point: tuple[str, str, str] | None = None
+    euler: str | None = None
+    to: str | None = None
+    s: str | None = None
+    path: Literal["line", "screw"] | None = None
+    orientation: Orientation | None = None
+    as_json: bool = False
+
+
+def run_pose(words: Sequence[str], options: PoseOptions) -> int:
+    """Print the pose that the steps lead to, or poses on the way to another; return the exit code.
+
+    Raises:
+        InputError: When a step or an option is not as it should be.
+        FileError: When a file cannot be read, or standard output not written.
+    """
+    units = parse_units(options.units)
+    euler = None if options.euler is None else parse_sequence(options.euler)
+    point = None if options.point is None else _point(options.point, units)
+    start = _start(words, options, units)
+    if options.to is None:
+        _require_target(options)
+        told = pose_report(start.pose, units, euler, point)
+        if options.as_json:
+            print_json(told)
+        else:
+            print_lines(_lines(told, units, options, float(rotation_defect(start.pose[:3, :3]))))
+        return 0
+    target = read_step(options.to, "--to", units)
+    s = parse_fractions("0,0.5,1" if options.s is None else options.s)
+    poses = pose_path(
+        start,
+        End(target.pose, target.typed),
+        s,
+        options.path or "line",
+        options.orientation or "axis_angle",
+        euler,
+    )
+    reports = [
+        {"s": value, **pose_report(pose, units, euler, point)}
+        for value, pose in zip(s.tolist(), poses, strict=True)
+    ]
+    if options.as_json:
+        print_json(reports)
+    else:
+        print_lines(line for told in reports for line in _on_the_way(told, units, options))
+    return 0
+
+
+def _start(words: Sequence[str], options: PoseOptions, units: Units) -> End:
+    steps = read_steps(words, units)
+    pose = composed(steps)
+    if options.inverse:
+        return End(invert(pose), None)
+    return End(pose, steps[0].typed if len(steps) == 1 else None)
+
+
+def _point(words: Sequence[str], units: Units) -> list[float]:
+    return [inline_number(word, "--point", Quantity("length"), units) for word in words]
+
+
+def _require_target(options: PoseOptions) -> None:
+    for name, value in (("--s", options.s), ("--path", options.path), ("--orientation", options.orientation)):
+        if value is not None:
+            raise InputError(f"{name} is about the way to another pose", hint="name that pose with --to")
+
+
+def _lines(
+    told: dict[str, Any], units: Units, options: PoseOptions, defect: float = 0.0
+) -> Iterator[str]:
+    yield from pose_lines(told, units, "")
+    about = told["axis_angle"]
+    yield f"axis_angle: axis {numbers(about['axis'])}, angle {number(about['angle'])} {units.angle}"
+    if "euler" in told:
+        first, second = map(numbers, told["euler"])
+        yield f"euler {options.euler} ({units.angle}): {first}"
+        yield f"  or: {second}"
+    yield f"determinant: {number(told['determinant'])}"
+    if defect > _ROUNDING:
+        yield f"the matrix is off a rotation by {defect:.3g}: angles are read off its entries as they are"
+    if "point" in told:
+        yield f"point ({units.length}): {numbers(told['point'])}"
+    for name, text in told.get("singular", {}).items():
+        yield f"{name}: {text}"
+
+
+def _on_the_way(told: dict[str, Any], units: Units, options: PoseOptions) -> Iterator[str]:
+    yield f"s = {number(told['s'])}"
+    yield from ("  " + line for line in _lines(told, units, options))
