@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from trajcli.errors import InputError, PlanningError
 from trajcli.job.read import LoadedJob, job_from_text
 from trajcli.kinematics.robot import Robot
 from trajcli.planners import PLANNERS, Planner
+from trajcli.planners.planner import Planned
 from trajcli.trajectory import State
 
 Fields = dict[str, Any]
@@ -157,3 +159,12 @@ def only_move(job: Fields) -> tuple[Planner, State, Robot]:
     """Return the planner, the start and the robot of a job of one move."""
     read = loaded(job)
     return read.job.moves[0], read.job.start.as_state(), read.robot
+
+
+def plan_of(job: Fields) -> Planned | None:
+    """Return the plan of a job's only move, or None where it is impossible."""
+    planner, start, robot = only_move(job)
+    try:
+        return planner.plan(start, robot)
+    except (PlanningError, InputError):
+        return None

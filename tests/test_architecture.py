@@ -17,6 +17,7 @@ HOUSE = ROOT / "trajcli"
 
 FLOORS = {
     "errors": 0,
+    "suggest": 0,
     "units": 0,
     "curves": 1,
     "geometry": 1,

@@ -14,7 +14,7 @@ from trajcli.geometry.rotation import rotation_defect
 from trajcli.job.inline import inline_number
 from trajcli.pipeline.pose_path import End, Orientation, parse_fractions, pose_path
 from trajcli.pipeline.pose_report import parse_sequence, parse_units, pose_report
-from trajcli.pipeline.pose_steps import composed, read_step, read_steps
+from trajcli.pipeline.pose_steps import composed, read_end, read_steps
 from trajcli.units import Quantity, Units
 
 _ROUNDING = 1e-9  # of R^T R: above it is told, since it comes from rounded entries
@@ -54,7 +54,7 @@ def run_pose(words: Sequence[str], options: PoseOptions) -> int:
         else:
             print_lines(_lines(told, units, options, float(rotation_defect(start.pose[:3, :3]))))
         return 0
-    target = read_step(options.to, "--to", units)
+    target = read_end(options.to, "--to", units)
     s = parse_fractions("0,0.5,1" if options.s is None else options.s)
     poses = pose_path(
         start,

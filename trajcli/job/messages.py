@@ -11,7 +11,7 @@ from pydantic_core import ErrorDetails
 
 from trajcli.errors import Problem
 from trajcli.job.load import Document
-from trajcli.job.suggest import did_you_mean, valid_names
+from trajcli.suggest import did_you_mean, valid_names
 from trajcli.planners import PLANNERS
 from trajcli.planners.reading import AT_KEY, Flaw, shown
 

@@ -74,6 +74,16 @@ def read_step(word: str, name: str, units: Units) -> Step:
     return read_at(inline_document(word, name), units, _step)
 
 
+def read_end(word: str, name: str, units: Units) -> Step:
+    """Return the pose that one word describes, without `frame` and `invert`.
+
+    Raises:
+        InputError: When it is no pose.
+        FileError: When its file cannot be read.
+    """
+    return read_at(inline_document(word, name), units, _end)
+
+
 def composed(steps: Sequence[Step]) -> Array:
     """Return the pose (4, 4) that the steps lead to, each about its own axes."""
     return compose_turns([(step.pose, step.frame) for step in steps], 4)
@@ -86,14 +96,20 @@ def _step(value: Mapping[str, Any], context: ReadingContext) -> Step:
     if not isinstance(inverted, bool):
         raise FlawError(f"expected true or false, got {shown(inverted)}", "invert")
     fields = {key: item for key, item in value.items() if key not in _OWN_KEYS}
+    step = _end(fields, context)
+    if inverted:
+        return Step(invert(step.pose), cast("Frame", frame), None)
+    return Step(step.pose, cast("Frame", frame), step.typed)
+
+
+def _end(fields: Mapping[str, Any], context: ReadingContext) -> Step:
     if not fields:
         hint = "such as {rpy: [0, 0, 90]} or {xyz: [1, 0, 0]}"
-        raise FlawError("the step has neither a position nor an orientation", hint=hint)
-    pose = np.array(Pose("step").read(fields, context))
+        raise FlawError("neither a position nor an orientation is given", hint=hint)
+    pose = np.array(Pose("pose").read(fields, context))
     if "matrix" in fields:
         pose[:3, :3] = [row[:3] for row in fields["matrix"][:3]]
-    typed = None if inverted else _typed(fields, context)
-    return Step(invert(pose) if inverted else pose, cast("Frame", frame), typed)
+    return Step(pose, "current", _typed(fields, context))
 
 
 def _typed(fields: Mapping[str, Any], context: ReadingContext) -> TypedAngles | None:

@@ -20,6 +20,7 @@ from pydantic_core import CoreSchema, core_schema
 
 from trajcli.planners.per_joint import PerJoint
 from trajcli.planners.reading import NULL, SI, Number, refuse, shown
+from trajcli.suggest import did_you_mean, valid_names
 from trajcli.trajectory import State
 from trajcli.units import Quantity
 
@@ -139,12 +140,7 @@ def _look_up(name: str, points: Mapping[str, Any]) -> Any:  # noqa: ANN401
 
 
 def _known(name: str, points: Mapping[str, Any]) -> str:
-    from difflib import get_close_matches
-
-    near = get_close_matches(name, points, 1)
-    if near:
-        return f"did you mean '{near[0]}'?"
-    return f"the points are {', '.join(points)}" if points else "the job has no `points`"
+    return did_you_mean(name, points) or valid_names(points, "points") or "the job has no `points`"
 
 
 NamedTarget = Annotated[Target, _Named()]

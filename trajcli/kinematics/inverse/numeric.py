@@ -5,10 +5,10 @@ vanishes with the error, so that the end is quadratic, and keeps steps short whe
 more joints than coordinates the same step is J^T (J J^T + m I)^-1 e, which turns no joint in vain. Lengths
 are divided by the arm's characteristic length.
 
-An arm with as many joints as coordinates has finitely many answers: limits do not enter the search, and every
-answer that some seed finds is kept. Nothing proves that none is missing: an xArm 6 lacked one in about one
-pose of a hundred with 64 seeds, hence 192. An arm with more joints has a family of answers: each joint is held
-inside its limits while searching, and the answers nearest to the given configuration are kept.
+An arm with as many joints as coordinates has finitely many answers: limits do not enter the search, and
+every answer that some seed finds is kept. Nothing proves that none is missing: an xArm 6 lacked one in about
+one pose of a hundred with 64 seeds, hence 192. An arm with more joints has a family of answers: each joint is
+held inside its limits while searching, and the answers nearest to the given configuration are kept.
 
 Source: Sugihara, Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method, IEEE Trans.
 Robotics 27 (2011).

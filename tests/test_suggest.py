@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from trajcli.job.suggest import did_you_mean, nearest, valid_names
+from trajcli.suggest import did_you_mean, nearest, valid_names
 
 PLANNERS = ["cubic", "quintic", "septic", "jerk_limited", "hold"]
 

@@ -1,0 +1,298 @@
+"""Trapezoids: where they exist, how long they last, and what is said where there is none."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from random_jobs import loaded, only_move, plan_of
+
+from trajcli.errors import PlanningError
+
+
+def trapezoid(distance: float, start_velocity: float = 0.0, end_velocity: float = 0.0, **fields: Any) -> Any:
+    """Plan a trapezoid of one joint from 0 without limits."""
+    job = {
+        "version": 1,
+        "robot": {"joints": 1},
+        "start": {"joints": [0], "velocity": [start_velocity]},
+        "moves": [
+            {"planner": "trapezoid", "to": {"joints": [distance], "velocity": [end_velocity]}, **fields}
+        ],
+    }
+    return plan_of(job)
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), factor=st.floats(0.05, 20))
+def test_scaled_limits_scale_the_fastest_trapezoid(seed: int, factor: float) -> None:
+    rng = np.random.default_rng(seed)
+    speed, rate, distance = rng.uniform(0.2, 3, 3).tolist()
+    fast = trapezoid(distance, velocity=speed, acceleration=rate)
+    slow = trapezoid(distance, velocity=speed / factor, acceleration=rate / factor**2)
+    assert fast is not None
+    assert slow is not None
+    assert slow.curve.end == pytest.approx(fast.curve.end * factor, rel=1e-12)
+    u = np.linspace(0, 1, 40)
+    first, second = (c.evaluate(np.minimum(u * c.end, c.end), 1) for c in (fast.curve, slow.curve))
+    np.testing.assert_allclose(second * factor, first, rtol=0, atol=1e-11 * speed)
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    distance=st.floats(0.01, 100).flatmap(lambda d: st.sampled_from([d, -d])),
+    duration=st.floats(0.05, 50),
+    share=st.floats(-0.5, 1.5),
+)
+def test_trapezoid_feasibility_interval(distance: float, duration: float, share: float) -> None:
+    mean = abs(distance) / duration
+    assume(min(abs(share), abs(share - 1)) > 1e-9)
+    speed = mean * (1 + share)
+    planned = trapezoid(distance, duration=duration, velocity=speed)
+    assert (planned is not None) == (0 < share <= 1)
+    if planned is not None:
+        velocities = planned.curve.evaluate(np.linspace(0, duration, 101), 1)
+        ramp = duration - abs(distance) / speed
+        middle = planned.curve.evaluate(duration / 2, 1)[0]
+        assert middle == pytest.approx(math.copysign(speed, distance), rel=1e-9)
+        assert np.abs(velocities).max() <= speed * (1 + 1e-9)
+        rate = planned.curve.evaluate(ramp / 2, 2)[0]
+        assert rate == pytest.approx(math.copysign(speed / ramp, distance), rel=1e-6)
+    least = 4 * mean / duration
+    for factor, possible in ((1 - 1e-9, False), (1.0, True), (1 + share**2, True)):
+        got = trapezoid(distance, duration=duration, acceleration=least * factor)
+        assert (got is not None) == possible
+
+
+@pytest.mark.parametrize(("share", "possible"), [(0.0, False), (1.0, True)])
+@pytest.mark.parametrize("duration", [0.7, 3.0, 4.0, 11.1])
+def test_trapezoid_feasibility_at_the_ends_of_the_interval(
+    share: float, possible: bool, duration: float
+) -> None:
+    for distance in (0.1, 1 / 3, 7.7, -80.0):
+        planned = trapezoid(distance, duration=duration, velocity=abs(distance) / duration * (1 + share))
+        assert (planned is not None) == possible
+
+
+def covered(speed: float, first: float, last: float, rise: float, fall: float, duration: float) -> float:
+    """Integrate a velocity that goes from `first` over `speed` to `last` with the given rates."""
+    up, down = abs(speed - first) / rise, abs(speed - last) / fall
+    times = np.array([0.0, up, duration - down, duration])
+    velocities = np.array([first, speed, speed, last])
+    return float(np.sum((velocities[1:] + velocities[:-1]) / 2 * np.diff(times)))
+
+
+def bisected(function: Any, low: float, high: float) -> float:
+    """Return where an increasing function crosses zero."""
+    for _ in range(200):
+        middle = (low + high) / 2
+        low, high = (low, middle) if function(middle) > 0 else (middle, high)
+    return high
+
+
+def decimals(low: float, high: float) -> st.SearchStrategy[float]:
+    """Draw numbers of three decimals."""
+    return st.integers(round(1000 * low), round(1000 * high)).map(lambda thousandths: thousandths / 1000)
+
+
+boundary = decimals(0.0, 3.0)
+rates = decimals(0.2, 8.0)
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    first=boundary, last=boundary, rise=rates, fall=rates, cap=decimals(3.0, 6.0), distance=decimals(0.1, 40)
+)
+def test_fastest_trapezoid_with_boundary_speeds(
+    first: float, last: float, rise: float, fall: float, cap: float, distance: float
+) -> None:
+    fields = {"velocity": cap, "acceleration": rise, "deceleration": fall}
+    planned = trapezoid(distance, first, last, **fields)
+    needed = (first**2 - last**2) / (2 * fall) if first > last else (last**2 - first**2) / (2 * rise)
+    assume(abs(needed - distance) > 1e-9 * distance)
+    assert (planned is not None) == (needed <= distance)
+    if planned is None:
+        return
+
+    def ramps(speed: float) -> float:
+        return (speed - first) / rise + (speed - last) / fall
+
+    def surplus(speed: float) -> float:
+        return covered(speed, first, last, rise, fall, ramps(speed)) - distance
+
+    peak = min(cap, bisected(surplus, max(first, last), 1e3))
+    duration = ramps(peak) - surplus(peak) / peak
+    assert planned.curve.end == pytest.approx(duration, rel=1e-9)
+    t = np.linspace(0, planned.curve.end, 500)
+    velocity, acceleration = (planned.curve.evaluate(t, order)[:, 0] for order in (1, 2))
+    assert velocity.max() <= peak * (1 + 1e-9)
+    assert -fall * (1 + 1e-6) <= acceleration.min()
+    assert acceleration.max() <= rise * (1 + 1e-6)
+    assert velocity[[0, -1]] == pytest.approx([first, last], abs=1e-9)
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    first=boundary, last=boundary, rise=rates, fall=rates, duration=decimals(0.1, 20), share=decimals(0.02, 1)
+)
+def test_trapezoid_of_given_duration_with_boundary_speeds(
+    first: float, last: float, rise: float, fall: float, duration: float, share: float
+) -> None:
+    """Pick a cruise speed, cover what it covers, and find it again from distance and duration."""
+
+    def length(speed: float) -> float:
+        up = abs(speed - first) / (rise if speed > first else fall)
+        return up + abs(speed - last) / (fall if speed > last else rise)
+
+    low, high = min(first, last), max(first, last) + duration * max(rise, fall)
+    between = length(low) if low < high else 0.0
+    assume(max(between, length(max(first, last))) < 0.9 * duration)
+    top = bisected(lambda speed: length(speed) - duration, max(first, last), high)
+    speed = share * top
+    assume(length(speed) < duration * (1 - 1e-6))
+    up, down = (rise if speed > first else fall), (fall if speed > last else rise)
+    distance = covered(speed, first, last, up, down, duration)
+    assume(distance > 1e-3)
+    planned = trapezoid(distance, first, last, duration=duration, acceleration=rise, deceleration=fall)
+    assert planned is not None
+    assert planned.curve.end == duration
+    after = abs(speed - first) / up
+    middle = (after + duration - abs(speed - last) / down) / 2
+    assert planned.curve.evaluate(middle, 1)[0] == pytest.approx(speed, rel=1e-6)
+
+
+@settings(max_examples=40, deadline=None)
+@given(first=boundary, last=boundary, duration=decimals(0.2, 10), share=decimals(0.01, 0.99))
+def test_trapezoid_of_given_duration_and_speed_with_boundary_speeds(
+    first: float, last: float, duration: float, share: float
+) -> None:
+    """Pick a rate and a cruise speed, cover what they cover, and find the rate again."""
+    speed = max(first, last) + share
+    rate = (2 * speed - first - last) / (duration * (0.05 + 0.9 * share))
+    distance = covered(speed, first, last, rate, rate, duration)
+    planned = trapezoid(distance, first, last, duration=duration, velocity=speed)
+    assert planned is not None
+    rise = (speed - first) / rate
+    assert planned.curve.evaluate(rise / 2, 2)[0] == pytest.approx(rate, rel=1e-6)
+    too_fast = distance / duration + math.hypot(distance / duration - first, distance / duration - last)
+    assert trapezoid(distance, first, last, duration=duration, velocity=too_fast) is None
+
+
+@pytest.mark.parametrize(("first", "last", "needed"), [(2.0, 0.0, 1.0), (3.0, 1.0, 2.0), (1.0, 3.0, 1.0)])
+def test_trapezoid_at_the_border_of_what_boundary_speeds_allow(
+    first: float, last: float, needed: float
+) -> None:
+    fields = {"acceleration": 4.0, "deceleration": 2.0, "velocity": 5.0}
+    assert trapezoid(needed * (1 - 1e-9), first, last, **fields) is None
+    at, above = (trapezoid(needed * (1 + more), first, last, **fields) for more in (0.0, 1e-9))
+    assert at is not None
+    assert above is not None
+    assert len(at.phases) == 1
+    assert at.curve.end == pytest.approx(abs(first - last) / (2.0 if first > last else 4.0), rel=1e-12)
+    assert above.curve.end == pytest.approx(at.curve.end, rel=1e-6)
+
+
+def test_constant_speed_is_a_trapezoid() -> None:
+    planned = trapezoid(6.0, 2.0, 2.0, duration=3.0, velocity=2.0)
+    assert planned is not None
+    assert [phase.name for phase in planned.phases] == ["cruise"]
+    assert trapezoid(6.1, 2.0, 2.0, duration=3.0, velocity=2.0) is None
+    assert trapezoid(5.9, 2.0, 2.0, duration=3.0, velocity=2.0) is None
+
+
+@settings(max_examples=50, deadline=None)
+@given(distance=decimals(-3, 3), first=decimals(-3, 3), last=decimals(-3, 3), rise=rates, fall=rates)
+def test_overshoot_always_arrives(
+    distance: float, first: float, last: float, rise: float, fall: float
+) -> None:
+    assume(abs(distance) > 1e-6)
+    fields = {"velocity": 4.0, "acceleration": rise, "deceleration": fall, "overshoot": True}
+    free = trapezoid(distance, first, last, **fields)
+    assert free is not None
+    curve = free.curve
+    assert curve.piece_ends(0)[1][-1, 0] == pytest.approx(distance, abs=1e-12)
+    assert curve.piece_ends(1)[1][-1, 0] == pytest.approx(last, abs=1e-9)
+    for order in (0, 1):  # joined without a jump
+        start, end = curve.piece_ends(order)
+        np.testing.assert_allclose(start[1:], end[:-1], rtol=0, atol=1e-9)
+    assert np.abs(curve.evaluate(np.linspace(0, curve.end, 300), 1)).max() <= 4.0 * (1 + 1e-9)
+    strict = trapezoid(distance, first, last, **{**fields, "overshoot": False})
+    if strict is not None:
+        assert strict.curve.breaks.tobytes() == curve.breaks.tobytes()
+        assert strict.curve.coefficients.tobytes() == curve.coefficients.tobytes()
+        return
+    beyond = curve.evaluate(np.linspace(0, curve.end, 2000))[:, 0] * math.copysign(1, distance)
+    assert beyond.max() > abs(distance) or beyond.min() < 0
+    del fields["velocity"]
+    longer = trapezoid(distance, first, last, **fields, duration=curve.end + 5.0)
+    if longer is not None:
+        assert longer.curve.end == pytest.approx(curve.end + 5.0, rel=1e-12)
+        assert longer.curve.piece_ends(0)[1][-1, 0] == pytest.approx(distance, abs=1e-12)
+
+
+def test_unsynchronised_joints_arrive_by_themselves() -> None:
+    job = {
+        "version": 1,
+        "robot": {"joints": 3},
+        "limits": {"velocity": [1, 2, 3], "acceleration": [4, 5, None]},
+        "start": {"joints": [0, 0, 1]},
+        "moves": [{"planner": "trapezoid", "to": {"joints": [2, -3, 1]}, "synchronize": "none"}],
+    }
+    planned = plan_of(job)
+    assert planned is not None, "the joint that rests needs no acceleration limit"
+    alone = (2 / 1 + 1 / 4, 3 / 2 + 2 / 5, 0.0)  # distance over speed plus speed over rate
+    assert planned.arrivals == pytest.approx(alone, rel=1e-12)
+    assert planned.curve.end == pytest.approx(max(alone), rel=1e-12)
+    after = planned.curve.evaluate(np.linspace(alone[1], alone[0], 10))
+    np.testing.assert_allclose(after[:, 1], -3, rtol=0, atol=1e-12)
+    assert (planned.curve.evaluate(np.linspace(0, planned.curve.end, 20))[:, 2] == 1).all()
+
+
+def test_a_joint_that_arrives_moving_cannot_wait() -> None:
+    job = {
+        "version": 1,
+        "robot": {"joints": 2},
+        "limits": {"velocity": 1, "acceleration": 4},
+        "start": {"joints": [0, 0]},
+        "moves": [
+            {"planner": "trapezoid", "to": {"joints": [1, 3], "velocity": [0.5, 0]}, "synchronize": "none"}
+        ],
+    }
+    planner, start, robot = only_move(job)
+    with pytest.raises(PlanningError, match=r"j1 arrives .* cannot wait"):
+        planner.plan(start, robot)
+
+
+@pytest.mark.parametrize(
+    ("fields", "match"),
+    [
+        ({"start_velocity": 3.0, "acceleration": 1.0}, "too fast"),
+        ({"end_velocity": 3.0, "acceleration": 1.0}, "cannot reach its end velocity"),
+        ({"end_velocity": -1.0, "acceleration": 1.0}, "turn round"),
+        ({"duration": 1.0, "velocity": 3.0}, "above 1 rad/s and at most 2 rad/s, got 3 rad/s"),
+        ({"duration": 1.0, "velocity": 3.0, "start_velocity": 3.0, "end_velocity": 3.0}, "above 3 rad/s"),
+        ({"duration": 1.0, "velocity": 3.0, "start_velocity": -1.0}, "turn round"),
+        ({"duration": 1.0, "acceleration": 3.0}, r"at least 4 rad/s\^2, got 3 rad/s\^2"),
+        ({"duration": 1.0, "acceleration": 2.0, "deceleration": 3.0}, "at least 1.29099445 s"),
+        ({"duration": 9.0, "acceleration": 2.0, "start_velocity": 2.0, "end_velocity": 1.0}, "and at most"),
+    ],
+)
+def test_what_is_impossible_is_explained(fields: dict[str, float], match: str) -> None:
+    fields = dict(fields)
+    velocities = [fields.pop(name, 0.0) for name in ("start_velocity", "end_velocity")]
+    job = {
+        "version": 1,
+        "robot": {"joints": 1},
+        "start": {"joints": [0], "velocity": velocities[:1]},
+        "moves": [{"planner": "trapezoid", "to": {"joints": [1], "velocity": velocities[1:]}, **fields}],
+    }
+    planner, start, robot = only_move(job)
+    with pytest.raises(PlanningError) as caught:
+        planner.plan(start, robot)
+    text = str(caught.value.said_by(loaded(job).say))
+    assert re.search(match, text), text

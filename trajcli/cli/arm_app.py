@@ -1,0 +1,185 @@
+"""The commands about arms and poses. Only typer is imported here: `--help` must stay fast."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import typer
+
+from trajcli.cli.number_words import NumbersCommand
+from trajcli.cli.outcome import guarded
+
+Errors = Annotated[
+    Literal["text", "json"], typer.Option("--errors", help="How errors are written to stderr.")
+]
+RobotName = Annotated[
+    str, typer.Option("--robot", "-r", metavar="NAME|FILE", help="A robot of the catalogue, or a robot file.")
+]
+Tool = Annotated[
+    str | None,
+    typer.Option(
+        "--tool", metavar="POSE", help="T_flange_tcp as YAML or @FILE, instead of the robot's own."
+    ),
+]
+Si = Annotated[
+    bool, typer.Option("--si", help="Numbers in rad and m, whatever units the robot's file has.")
+]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
+Joints = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="Q...", help="A value for each joint, in the units of the robot's file; - reads a CSV."
+    ),
+]
+Digits = Annotated[
+    Literal["fixed", "full"],
+    typer.Option("--digits", help="Of a CSV. fixed: nine decimals; full: every bit."),
+]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands fk, ik, jacobian, pose and robots."""
+    app.command(cls=NumbersCommand)(fk)
+    app.command(cls=NumbersCommand)(ik)
+    app.command(cls=NumbersCommand)(jacobian)
+    app.command(cls=NumbersCommand)(pose)
+    app.command()(robots)
+
+
+@guarded
+def fk(
+    robot: RobotName,
+    joints: Joints,
+    tool: Tool = None,
+    frame: Annotated[
+        Literal["world", "base"], typer.Option("--frame", help="Where the pose is counted from.")
+    ] = "world",
+    links: Annotated[bool, typer.Option("--links", help="Also the frame of each link.")] = False,
+    si: Si = False,
+    as_json: Json = False,
+    digits: Digits = "fixed",
+    errors: Errors = "text",
+) -> int:
+    """Say where the tool is: its pose for given joint values, or for each row of a CSV."""
+    from trajcli.cli.fk import FkOptions, run_fk
+
+    return run_fk(robot, joints, FkOptions(tool, frame, links, si, as_json, digits))
+
+
+@guarded
+def ik(
+    robot: RobotName,
+    rows: Annotated[
+        list[str] | None, typer.Argument(metavar="[-]", help="- reads poses from a CSV.")
+    ] = None,
+    pose: Annotated[
+        str | None,
+        typer.Option(
+            "--pose", metavar="POSE", help="T_world_tcp as YAML or @FILE; what it leaves out is free."
+        ),
+    ] = None,
+    near: Annotated[
+        str | None,
+        typer.Option("--near", metavar="Q...", help="Joint values to be near to, instead of zero."),
+    ] = None,
+    every: Annotated[bool, typer.Option("--all", help="Also answers outside the limits.")] = False,
+    turns: Annotated[
+        bool, typer.Option("--turns", help="Also every full turn of a joint that its limits allow.")
+    ] = False,
+    tolerance: Annotated[
+        float, typer.Option("--tolerance", metavar="TOL", help="What an answer may miss by, m and rad.")
+    ] = 1e-6,
+    tool: Tool = None,
+    si: Si = False,
+    as_json: Json = False,
+    digits: Digits = "fixed",
+    errors: Errors = "text",
+) -> int:
+    """Find all joint values that bring the tool to a pose; of a CSV of poses, the way that stays nearest."""
+    from trajcli.cli.ik import IkOptions, run_ik
+
+    options = IkOptions(pose, near, every, turns, tolerance, tool, si, as_json, digits)
+    return run_ik(robot, rows or [], options)
+
+
+@guarded
+def jacobian(
+    robot: RobotName,
+    joints: Joints,
+    tool: Tool = None,
+    frame: Annotated[
+        Literal["world", "base", "tcp"], typer.Option("--frame", help="In whose axes the rows are written.")
+    ] = "world",
+    rates: Annotated[
+        str | None,
+        typer.Option(
+            "--qd", metavar="V...", help="A rate for each joint, for the acceleration they cause."
+        ),
+    ] = None,
+    si: Si = False,
+    as_json: Json = False,
+    errors: Errors = "text",
+) -> int:
+    """Say how the tool moves with the joints: the Jacobian, manipulability, rank, what is lost."""
+    from trajcli.cli.jacobian import JacobianOptions, run_jacobian
+
+    return run_jacobian(robot, joints, JacobianOptions(tool, frame, rates, si, as_json))
+
+
+@guarded
+def pose(
+    steps: Annotated[
+        list[str],
+        typer.Argument(metavar="STEP...", help="Poses as YAML or @FILE, with `frame` and `invert` beside."),
+    ],
+    units: Annotated[
+        str, typer.Option("--units", metavar="UNITS", help="Of plain numbers, such as deg,mm; else rad and m.")
+    ] = "",
+    inverse: Annotated[bool, typer.Option("--inverse", help="Take the inverse of the result.")] = False,
+    point: Annotated[
+        tuple[str, str, str] | None,
+        typer.Option("--point", metavar="X Y Z", help="A point in the pose's frame, to be said in the first."),
+    ] = None,
+    euler: Annotated[
+        str | None,
+        typer.Option("--euler", metavar="ZYZ[:fixed]", help="Also both triples of these angles."),
+    ] = None,
+    to: Annotated[
+        str | None, typer.Option("--to", metavar="POSE", help="Print poses on the way to this one.")
+    ] = None,
+    s: Annotated[
+        str | None, typer.Option("--s", metavar="S,...", help="Where on the way, from 0 to 1.")
+    ] = None,
+    path: Annotated[
+        Literal["line", "screw"] | None,
+        typer.Option("--path", help="line: the origin goes straight; screw: constant twist."),
+    ] = None,
+    orientation: Annotated[
+        Literal["axis_angle", "euler"] | None,
+        typer.Option("--orientation", help="On a line: about one axis, or by even Euler angles."),
+    ] = None,
+    as_json: Json = False,
+    errors: Errors = "text",
+) -> int:
+    """Multiply rotations and displacements about fixed and current axes; print every representation."""
+    from trajcli.cli.pose import PoseOptions, run_pose
+
+    options = PoseOptions(units, inverse, point, euler, to, s, path, orientation, as_json)
+    return run_pose(steps, options)
+
+
+@guarded
+def robots(
+    name: Annotated[
+        str | None, typer.Argument(metavar="[NAME|FILE]", help="One robot; without it all are listed.")
+    ] = None,
+    as_yaml: Annotated[
+        bool, typer.Option("--yaml", help="Print the robot's file, to start a new one from.")
+    ] = False,
+    as_json: Json = False,
+    errors: Errors = "text",
+) -> int:
+    """List the catalogue, or show a robot: DH table, limits, reach, inverse kinematics, source."""
+    from trajcli.cli.robots import run_robots
+
+    return run_robots(name, as_yaml=as_yaml, as_json=as_json)
