@@ -90,13 +90,20 @@ _MEANINGS: dict[Group, str] = {
     "qd": "velocity of each joint",
     "qdd": "acceleration of each joint",
     "qddd": "jerk of each joint",
+    "pose": "`x y z qw qx qy qz`: position and unit quaternion of the tcp in world",
+    "twist": "`vx vy vz wx wy wz`: velocity at the tcp and angular velocity, in world",
+    "twistd": "`ax ay az ex ey ez`: time derivative of the twist",
     "move": "index of the move, from 0; at the border of two moves, that of the later one",
 }
 
 _COLUMNS = """\
 A group is written for all joints: `q` becomes `q1, q2, ...`. A column in SI units has its plain name;
-any other carries its unit: `q1_deg`, `qd1_deg` (deg/s), `q3_mm`. The columns are in the units of the
-job.
+any other carries its unit: `q1_deg`, `qd1_deg` (deg/s), `q3_mm`, `x_mm`, `wx_deg` (deg/s). The columns
+are in the units of the job; quaternions have none.
+
+The tcp is that of the robot with its base and tool: `pose`, `twist` and `twistd` need a robot with
+geometry. The quaternion begins with w >= 0 (where w is zero but for rounding, with the first other
+component above zero) and never jumps to the other sign from one row to the next.
 
 Rows stand at `start_time + k / rate`; the last row is exactly the end."""
 

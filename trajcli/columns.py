@@ -1,13 +1,14 @@
 """What the columns of a sample stream are called, and what a column's name says.
 
 A column in SI has its plain name (`q1`, `qd1`, `x`), any other carries its unit (`q1_deg`, `qd1_deg`,
-`q3_mm`).
+`q3_mm`). What is about the tool is said in world: its pose T_world_tcp, its velocity at the tcp, and the
+time derivative of that.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -16,11 +17,17 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.kinematics.robot import JointType
-from trajcli.units import Quantity, Units, factor
+from trajcli.units import Dimension, Quantity, Units, factor, unit_name
 
-Group = Literal["t", "q", "qd", "qdd", "qddd", "move"]
+Group = Literal["t", "q", "qd", "qdd", "qddd", "pose", "twist", "twistd", "move"]
 JOINT_ORDERS = {"q": 0, "qd": 1, "qdd": 2, "qddd": 3}
-GROUPS: tuple[Group, ...] = ("t", "q", "qd", "qdd", "qddd", "move")
+TOOL_COLUMNS: dict[str, dict[str, Dimension]] = {
+    "pose": {**dict.fromkeys(("x", "y", "z"), "length"), **dict.fromkeys(("qw", "qx", "qy", "qz"), "ratio")},
+    "twist": {**dict.fromkeys(("vx", "vy", "vz"), "length"), **dict.fromkeys(("wx", "wy", "wz"), "angle")},
+    "twistd": {**dict.fromkeys(("ax", "ay", "az"), "length"), **dict.fromkeys(("ex", "ey", "ez"), "angle")},
+}
+"""What the columns of a group about the tool are called, and of what dimension each is, times apart."""
+GROUPS: tuple[Group, ...] = ("t", "q", "qd", "qdd", "qddd", "pose", "twist", "twistd", "move")
 
 _UNIT_FACTORS = {
     "deg": factor(Quantity("angle"), Units(angle="deg")),
@@ -86,7 +93,11 @@ def column_names(groups: Sequence[Group], joint_types: Sequence[JointType], unit
     names: list[str] = []
     for group in groups:
         if group in JOINT_ORDERS:
-            names += [Column(group, k, _suffix(kind, units)).name for k, kind in enumerate(joint_types)]
+            suffixes = [_suffix(_dimension(kind), units) for kind in joint_types]
+            names += [Column(group, k, suffix).name for k, suffix in enumerate(suffixes)]
+        elif group in TOOL_COLUMNS:
+            measured = TOOL_COLUMNS[group].items()
+            names += [Column(kind, None, _suffix(dimension, units)).name for kind, dimension in measured]
         else:
             names.append(group)
     return names
@@ -110,8 +121,12 @@ def check_groups(groups: Sequence[str]) -> None:
 
 def joint_factors(joint_types: Sequence[JointType], units: Units) -> Array:
     """Return SI per user unit for each joint's position and its time derivatives, shape (n,)."""
-    quantities = [Quantity("length" if kind == "prismatic" else "angle") for kind in joint_types]
-    return np.array([factor(quantity, units) for quantity in quantities], dtype=np.float64)
+    return _factors((_dimension(kind) for kind in joint_types), units)
+
+
+def tool_factors(group: str, units: Units) -> Array:
+    """Return SI per user unit for each column of a group of `TOOL_COLUMNS`, shape (columns,)."""
+    return _factors(TOOL_COLUMNS[group].values(), units)
 
 
 def whole_number_columns(names: Sequence[str]) -> tuple[int, ...]:
@@ -119,6 +134,14 @@ def whole_number_columns(names: Sequence[str]) -> tuple[int, ...]:
     return tuple(place for place, name in enumerate(names) if parse_column(name).whole_numbers)
 
 
-def _suffix(joint_type: JointType, units: Units) -> str | None:
-    unit = units.length if joint_type == "prismatic" else units.angle
+def _dimension(joint_type: JointType) -> Dimension:
+    return "length" if joint_type == "prismatic" else "angle"
+
+
+def _factors(dimensions: Iterable[Dimension], units: Units) -> Array:
+    return np.array([factor(Quantity(dimension), units) for dimension in dimensions], dtype=np.float64)
+
+
+def _suffix(dimension: Dimension, units: Units) -> str | None:
+    unit = unit_name(Quantity(dimension), units)
     return unit if unit in _UNIT_FACTORS else None

@@ -11,9 +11,13 @@ from math import ceil, isfinite
 
 import numpy as np
 
-from trajcli.columns import JOINT_ORDERS, Group, check_groups, joint_factors
+from trajcli.columns import JOINT_ORDERS, TOOL_COLUMNS, Group, check_groups, joint_factors, tool_factors
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, read_only
 from trajcli.errors import InputError
+from trajcli.geometry.quaternion import quaternion_from_matrix, without_jumps
+from trajcli.kinematics.forward import forward
+from trajcli.kinematics.jacobian import tcp_acceleration, tcp_twist
+from trajcli.kinematics.robot import Robot
 from trajcli.trajectory import Trajectory
 from trajcli.units import Units
 
@@ -22,6 +26,8 @@ ROWS = 4096  # rows of a block: long enough to hide the cost of a call, short en
 _NANOSECOND = 1e-9  # the last decimal of a time in a file: rows closer than this would show the same time
 _END = 1e-6  # of a period: an end this close to a grid time takes that row's place
 _BREAK = 1e-12  # s: a row this close before a break is at it; rounding decides no row's side
+
+_TOOL_ORDERS = {"pose": 0, "twist": 1, "twistd": 2}  # the highest derivative of q that each group is made of
 
 
 @dataclass(frozen=True)
@@ -128,26 +134,31 @@ def sample(
     groups: Sequence[Group],
     units: Units | None = None,
     *,
+    robot: Robot | None = None,
     size: int = ROWS,
 ) -> Iterator[Array]:
     """Yield blocks of at most `size` rows, each of shape (N, columns).
 
     At a break the later piece speaks, and at a border the later move; the end belongs to what ends there.
+    The quaternion of the pose never jumps to the other sign, from the first row, where w >= 0, to the last.
 
     Args:
         trajectory: What is sampled.
         grid: Where; of the trajectory's duration.
         groups: Groups of columns in the order wanted, named by `column_names`.
         units: Units of the rows; SI if left out.
+        robot: Whose tool it is, base and tool included; needed for the groups of `TOOL_COLUMNS` only.
         size: Most rows of a block.
 
     Raises:
-        InputError: When `groups` is empty, or holds an unknown group or one twice.
+        InputError: When `groups` is empty, or holds an unknown group or one twice, or one about the tool of
+            no robot or of one without geometry.
     """
     units = units or Units()
     check_groups(groups)
-    curve = _in_units(trajectory.curve, joint_factors(trajectory.joint_types, units))
-    orders = [JOINT_ORDERS[group] for group in groups if group in JOINT_ORDERS] or [0]
+    factors = joint_factors(trajectory.joint_types, units)
+    curve = _in_units(trajectory.curve, factors)
+    orders, last = _orders(groups), None
     for times, local in grid.blocks(size):
         local = _onto_breaks(local, curve.breaks)
         motion = _window(curve, local).evaluate_orders(local, orders)
@@ -155,9 +166,37 @@ def sample(
         for group in groups:
             if group in JOINT_ORDERS:
                 parts.append(motion[:, orders.index(JOINT_ORDERS[group])])
+            elif group in TOOL_COLUMNS:
+                part = _of_tool(group, robot, motion * factors)
+                if group == "pose":
+                    part[:, 3:] = without_jumps(part[:, 3:], last)
+                    last = part[-1, 3:]
+                parts.append(part / tool_factors(group, units))
             else:
                 parts.append((times if group == "t" else _moves(trajectory, local))[:, None])
         yield np.concatenate(parts, axis=1)
+
+
+def _orders(groups: Sequence[Group]) -> list[int]:
+    """Return the orders of derivatives that `groups` are made of, rising; at least one."""
+    orders = {JOINT_ORDERS[group] for group in groups if group in JOINT_ORDERS}
+    for group in groups:
+        orders |= set(range(_TOOL_ORDERS.get(group, -1) + 1))
+    return sorted(orders) or [0]
+
+
+def _of_tool(group: Group, robot: Robot | None, motion: Array) -> Array:
+    """Return a group of `TOOL_COLUMNS`, (N, columns), for q, qd and qdd as needed, (N, orders, n), all SI."""
+    if robot is None:
+        raise InputError(
+            f"the columns '{group}' are about a tool, and there is no robot", hint="give the robot"
+        )
+    if group == "twist":
+        return tcp_twist(robot, motion[:, 0], motion[:, 1])
+    if group == "twistd":
+        return tcp_acceleration(robot, motion[:, 0], motion[:, 1], motion[:, 2])
+    poses = forward(robot, motion[:, 0])
+    return np.concatenate([poses[:, :3, 3], quaternion_from_matrix(poses[:, :3, :3])], axis=1)
 
 
 def _in_units(curve: PiecewisePolynomial, factors: Array) -> PiecewisePolynomial:

@@ -30,7 +30,8 @@ def rows_of(example: Path) -> bytes:
     groups = loaded.job.output.columns
     out = io.BytesIO()
     names = column_names(groups, loaded.robot.joint_types, loaded.units)
-    write_csv(sample(plan.trajectory, grid_of(plan), groups, loaded.units), names, out)
+    rows = sample(plan.trajectory, grid_of(plan), groups, loaded.units, robot=loaded.robot)
+    write_csv(rows, names, out)
     return out.getvalue()
 
 

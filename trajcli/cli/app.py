@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from trajcli.cli.arm_app import register
 from trajcli.cli.outcome import guarded
 
 app = typer.Typer(
@@ -138,3 +139,6 @@ def init(
     from trajcli.cli.init import run_init
 
     return run_init(file, force=force)
+
+
+register(app)

@@ -17,13 +17,9 @@ RobotName = Annotated[
 ]
 Tool = Annotated[
     str | None,
-    typer.Option(
-        "--tool", metavar="POSE", help="T_flange_tcp as YAML or @FILE, instead of the robot's own."
-    ),
+    typer.Option("--tool", metavar="POSE", help="T_flange_tcp as YAML or @FILE, instead of the robot's own."),
 ]
-Si = Annotated[
-    bool, typer.Option("--si", help="Numbers in rad and m, whatever units the robot's file has.")
-]
+Si = Annotated[bool, typer.Option("--si", help="Numbers in rad and m, whatever units the robot's file has.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
 Joints = Annotated[
     list[str],
@@ -69,9 +65,7 @@ def fk(
 @guarded
 def ik(
     robot: RobotName,
-    rows: Annotated[
-        list[str] | None, typer.Argument(metavar="[-]", help="- reads poses from a CSV.")
-    ] = None,
+    rows: Annotated[list[str] | None, typer.Argument(metavar="[-]", help="- reads poses from a CSV.")] = None,
     pose: Annotated[
         str | None,
         typer.Option(
@@ -112,9 +106,7 @@ def jacobian(
     ] = "world",
     rates: Annotated[
         str | None,
-        typer.Option(
-            "--qd", metavar="V...", help="A rate for each joint, for the acceleration they cause."
-        ),
+        typer.Option("--qd", metavar="V...", help="A rate for each joint, for the acceleration they cause."),
     ] = None,
     si: Si = False,
     as_json: Json = False,
@@ -133,12 +125,15 @@ def pose(
         typer.Argument(metavar="STEP...", help="Poses as YAML or @FILE, with `frame` and `invert` beside."),
     ],
     units: Annotated[
-        str, typer.Option("--units", metavar="UNITS", help="Of plain numbers, such as deg,mm; else rad and m.")
+        str,
+        typer.Option("--units", metavar="UNITS", help="Of plain numbers, such as deg,mm; else rad and m."),
     ] = "",
     inverse: Annotated[bool, typer.Option("--inverse", help="Take the inverse of the result.")] = False,
     point: Annotated[
         tuple[str, str, str] | None,
-        typer.Option("--point", metavar="X Y Z", help="A point in the pose's frame, to be said in the first."),
+        typer.Option(
+            "--point", metavar="X Y Z", help="A point in the pose's frame, to be said in the first."
+        ),
     ] = None,
     euler: Annotated[
         str | None,

@@ -41,9 +41,7 @@ def table_lines(rows: Sequence[Sequence[str]], indent: str = "  ") -> Iterator[s
     width = [max(map(len, column)) for column in zip(*rows, strict=True)]
     right = [all(_is_number(cell) for cell in column[1:]) for column in zip(*rows, strict=True)]
     for row in rows:
-        cells = [
-            cell.rjust(width[i]) if right[i] else cell.ljust(width[i]) for i, cell in enumerate(row)
-        ]
+        cells = [cell.rjust(width[i]) if right[i] else cell.ljust(width[i]) for i, cell in enumerate(row)]
         yield (indent + "  ".join(cells)).rstrip()
 
 

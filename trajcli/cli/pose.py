@@ -93,9 +93,7 @@ def _require_target(options: PoseOptions) -> None:
             raise InputError(f"{name} is about the way to another pose", hint="name that pose with --to")
 
 
-def _lines(
-    told: dict[str, Any], units: Units, options: PoseOptions, defect: float = 0.0
-) -> Iterator[str]:
+def _lines(told: dict[str, Any], units: Units, options: PoseOptions, defect: float = 0.0) -> Iterator[str]:
     yield from pose_lines(told, units, "")
     about = told["axis_angle"]
     yield f"axis_angle: axis {numbers(about['axis'])}, angle {number(about['angle'])} {units.angle}"

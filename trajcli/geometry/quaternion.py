@@ -12,6 +12,7 @@ from trajcli.errors import InputError
 from trajcli.geometry.rotation import Array
 
 QUATERNION_DEFECT = 1e-4  # of the length, as for matrices
+_NOISE = 1e-12  # a component as small as this says nothing by its sign: rounding made it
 
 
 def check_quaternion(quaternion: ArrayLike) -> float:
@@ -104,3 +105,21 @@ def quaternion_from_matrix(matrix: Array) -> Array:
     largest = np.argmax(np.einsum("...ii->...i", products), axis=-1)[..., None, None]
     row = np.take_along_axis(products, largest, axis=-2)[..., 0, :]
     return canonical(row / np.linalg.norm(row, axis=-1, keepdims=True))
+
+
+def without_jumps(quaternions: Array, last: Array | None) -> Array:
+    """Return unit quaternions (N, 4) with signs such that each is on the side of the one before.
+
+    Args:
+        quaternions: Unit quaternions, N at least 1.
+        last: The one before the first, (4,); None makes the first canonical, components up to 1e-12 taken as
+            zero: where w is zero but for rounding, as in half turns, its sign would be a different one on
+            every processor.
+    """
+    first = quaternions[0]
+    side = canonical(np.where(np.abs(first) > _NOISE, first, 0.0)) if last is None else last
+    before = np.concatenate([side[None], quaternions[:-1]])
+    turned = np.einsum("ni,ni->n", before, quaternions) < 0.0
+    # each sign is against the given neighbour; the product carries it on
+    signs = np.cumprod(np.where(turned, -1.0, 1.0))
+    return np.asarray(quaternions * signs[:, None])

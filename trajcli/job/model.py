@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field, field_validator, model_validator
 from pydantic.json_schema import JsonSchemaValue
 
@@ -13,8 +14,10 @@ from trajcli.columns import Group
 from trajcli.kinematics.robot import Robot
 from trajcli.planners import Move
 from trajcli.planners.bounds import LimitsSpec
-from trajcli.planners.fields import Model, NamedTarget
+from trajcli.planners.fields import NamedTarget
+from trajcli.planners.model import Model
 from trajcli.planners.planner import WhenOverLimit
+from trajcli.planners.poses import Pose
 from trajcli.planners.reading import FieldType, FlawError, Number, ReadingContext, refuse, shown
 from trajcli.units import Quantity, Units
 
@@ -70,7 +73,7 @@ class Output(Model):
         tuple[Group, ...],
         Field(
             min_length=1,
-            description="Groups of columns, in this order: qd is the velocity, qdd the acceleration.",
+            description="Groups of columns, in this order; pose, twist and twistd need a robot with geometry.",
         ),
     ] = ("t", "q", "qd", "qdd")
 
@@ -97,6 +100,7 @@ class Job(Model):
     name: Annotated[str | None, Field(description="For reports; the file's stem when left out.")] = None
     units: UnitsSpec = UnitsSpec()
     robot: Annotated[Robot, RobotSource()]
+    tool: Annotated[np.ndarray, Pose("T_flange_tcp, instead of the robot's own.")] | None = None
     limits: Annotated[LimitsSpec | None, Field(description="Replaces the robot's limits, then scales.")] = (
         None
     )
@@ -120,8 +124,8 @@ class Job(Model):
 
     @model_validator(mode="after")
     def _start_is_a_place(self) -> Job:
-        if self.start.joints is None:
-            raise refuse([(("start",), "the start needs `joints`", None)])
+        if not self.start.is_place:
+            raise refuse([(("start",), "the start needs `joints` or a pose", None)])
         first = self.moves[0]
         if first.continuity == 1 and any(self.start.acceleration or ()):
             hint = "use quintic or jerk_limited for the first move, or leave it out"

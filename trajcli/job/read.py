@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
+from trajcli.columns import TOOL_COLUMNS
 from trajcli.errors import Amount, InputError, Place, Problem
 from trajcli.job.limits import looser_bounds, looser_problem, with_job_limits
 from trajcli.job.load import Document, parse_document, read_document
@@ -112,12 +113,13 @@ def _load(document: Document) -> LoadedJob:
         problems += problems_of(error, Job, document)
     if problems or robot is None:
         raise InputError(*sorted(problems, key=_position))
-    effective, events = with_job_limits(robot, job.limits)
+    tooled = robot if job.tool is None else replace(robot, tool=job.tool)
+    effective, events = with_job_limits(tooled, job.limits)
     name = job.name or ("stdin" if document.file in ("-", "<stdin>") else Path(document.file).stem)
     loaded = LoadedJob(job, name, effective, document, tuple(events))
-    looser = list(_loosened_by_moves(loaded))
-    if looser:
-        raise InputError(*looser)
+    flaws = [*_loosened_by_moves(loaded), *_columns_without_geometry(loaded)]
+    if flaws:
+        raise InputError(*sorted(flaws, key=_position))
     return loaded
 
 
@@ -130,6 +132,14 @@ def _loosened_by_moves(loaded: LoadedJob) -> Iterator[Problem]:
             one = next((p for p in _of_joint(path, looser.joint, robot) if loaded.document.node(p)), path)
             place = loaded.document.place(one)
             yield replace(problem, message=problem.text(loaded.say), amounts={}, place=place)
+
+
+def _columns_without_geometry(loaded: LoadedJob) -> Iterator[Problem]:
+    for index, group in enumerate(loaded.job.output.columns):
+        if group in TOOL_COLUMNS and loaded.robot.convention is None:
+            message = f"the columns '{group}' need a robot with geometry, {loaded.robot.name} has bare joints"
+            hint = "give each joint its DH row (theta, d, a, alpha) and the robot its convention"
+            yield Problem(message, hint, loaded.document.place(("output", "columns", index)))
 
 
 def _of_joint(path: tuple[str | int, ...], joint: int, robot: Robot) -> list[tuple[str | int, ...]]:

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from trajcli.planners.fields import Model
+from trajcli.planners.model import Model
 
 Seconds = Annotated[float, Field(description="Seconds.")]
 Quantity = Literal["position", "velocity", "acceleration", "jerk"]

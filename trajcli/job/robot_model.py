@@ -12,7 +12,7 @@ from pydantic_core import CoreSchema, core_schema
 from trajcli.job.model import UnitsSpec
 from trajcli.kinematics.robot import QUANTITIES, Joint, Limits, Robot
 from trajcli.planners.bounds import UNLIMITED, Bound, JointBound, written_bound
-from trajcli.planners.fields import Model
+from trajcli.planners.model import Model
 from trajcli.planners.poses import Pose
 from trajcli.planners.reading import MAX_JOINTS, Number, ReadingContext, refuse, shown, written_number
 from trajcli.units import Dimension, Quantity

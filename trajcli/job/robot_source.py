@@ -13,9 +13,9 @@ from trajcli.errors import FileError, InputError, Problem
 from trajcli.job.load import Document, read_document
 from trajcli.job.messages import problems_of
 from trajcli.job.robot_model import RobotModel
-from trajcli.suggest import did_you_mean, nearest, valid_names
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.reading import ReadingContext, shown
+from trajcli.suggest import did_you_mean, nearest, valid_names
 from trajcli.units import Units
 
 CATALOGUE = Path(__file__).parent.parent / "catalogue"

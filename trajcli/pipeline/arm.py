@@ -11,12 +11,12 @@ import numpy as np
 
 from trajcli.columns import joint_factors
 from trajcli.curves.piecewise import Array
-from trajcli.errors import InputError
+from trajcli.errors import Amount, InputError
 from trajcli.job.inline import inline_number, inline_pose
 from trajcli.job.robot_source import RobotSheet, catalogue_names, load_sheet
 from trajcli.kinematics.chain import links_of
 from trajcli.kinematics.robot import Robot
-from trajcli.units import Quantity, Units, factor, unit_name
+from trajcli.units import Quantity, Units, factor, to_user, unit_name
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +84,13 @@ class Arm:
                 for i, text in enumerate(values)
             ]
         )
+
+    def say(self, amount: Amount) -> str:
+        """Return a number of a message in the arm's units."""
+        if amount.joint is None:
+            return str(amount)
+        quantity = self._quantity(amount.joint, amount.order)
+        return f"{to_user(amount.value, quantity, self.units):.9g} {unit_name(quantity, self.units)}"
 
     def _quantity(self, joint: int, order: int) -> Quantity:
         prismatic = self.robot.joint_types[joint] == "prismatic"

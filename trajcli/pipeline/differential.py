@@ -19,11 +19,12 @@ _DUST = 1e-12  # of a unit vector: what rounding leaves of a zero
 def differential(arm: Arm, q: Array, frame: ReferenceFrame, qd: Array | None = None) -> dict[str, Any]:
     """Return {jacobian, manipulability, condition, rank, singular_directions, idle_motions, jdot_qd?}.
 
-    With joint rates in the arm's units, `jacobian` (6, n) gives the tcp's linear velocity in the unit of length
-    and its angular one in the unit of angle, by second. `manipulability` is in m and rad; `condition` is of the
-    Jacobian scaled by the arm's length, None where the rank is lost. `singular_directions` are unit vectors u
-    with u J = 0 for the J in m and rad: components of the velocity (v, w), in the axes of `frame`, that are
-    zero for all joint rates. `idle_motions` are unit vectors of joint rates, in rad and m, that leave the tcp at rest.
+    With joint rates in the arm's units, `jacobian` (6, n) gives the tcp's linear velocity in the unit of
+    length and its angular one in the unit of angle, by second. `manipulability` is in m and rad; `condition`
+    is of the Jacobian scaled by the arm's length, None where the rank is lost. `singular_directions` are unit
+    vectors u with u J = 0 for the J in m and rad: components of the velocity (v, w), in the axes of `frame`,
+    that are zero for all joint rates. `idle_motions` are unit vectors of joint rates, in rad and m, that leave
+    the tcp at rest.
 
     Args:
         arm: The arm.
@@ -43,7 +44,7 @@ def differential(arm: Arm, q: Array, frame: ReferenceFrame, qd: Array | None = N
         "condition": condition if np.isfinite(condition) else None,
         "rank": int(measures.rank),
         "singular_directions": plain(_directions(arm, q, frame, lost.blocked, lost.length)),
-        "idle_motions": plain(_simplest(lost.idle)),
+        "idle_motions": plain(simplest(lost.idle)),
     }
     if qd is not None:
         result["jdot_qd"] = plain(jacobian_dot_qd(arm.robot, q, qd, frame) / arm.twist_factors)
@@ -53,11 +54,11 @@ def differential(arm: Arm, q: Array, frame: ReferenceFrame, qd: Array | None = N
 def _directions(arm: Arm, q: Array, frame: ReferenceFrame, blocked: Array, length: float) -> Array:
     axes = {"world": np.eye(3), "base": arm.robot.base[:3, :3]}.get(frame)
     turn = forward(arm.robot, q)[:3, :3] if axes is None else axes
-    return _simplest(np.hstack([blocked[:, :3] / length @ turn, blocked[:, 3:] @ turn]))
+    return simplest(np.hstack([blocked[:, :3] / length @ turn, blocked[:, 3:] @ turn]))
 
 
-def _simplest(rows: Array) -> Array:
-    """Return unit vectors (k, m) that span the same space as `rows`, with as many zeros as elimination gives."""
+def simplest(rows: Array) -> Array:
+    """Return unit vectors (k, m) that span the same space as `rows`, with the zeros that elimination gives."""
     left = np.array(rows)
     done: list[int] = []
     for _ in range(len(left)):
@@ -69,6 +70,6 @@ def _simplest(rows: Array) -> Array:
         left[others] -= np.outer(left[others, column], left[row])
         done.append(row)
     left[np.abs(left) < _DUST] = 0.0
-    order = np.argsort([np.argmax(row != 0.0) for row in left], kind="stable") if len(left) else []
+    first = np.array([np.argmax(row != 0.0) for row in left], dtype=np.intp)
     unit: Array = left / np.linalg.norm(left, axis=1, keepdims=True)
-    return unit[order]
+    return unit[np.argsort(first, kind="stable")]

@@ -11,6 +11,9 @@ from trajcli.pipeline.alignment import Alignment, Pair, time_pair
 from trajcli.streams.table import Table
 
 _DERIVATIVES = {"q": "qd", "qd": "qdd", "qdd": "qddd", "s": "sd", "sd": "sdd"}
+_DERIVATIVES |= {
+    kind + axis: rate + axis for kind, rate in (("", "v"), ("v", "a"), ("w", "e")) for axis in "xyz"
+}
 
 
 def interpolate_rows(a: Table, b: Table, pairs: tuple[Pair, ...]) -> Alignment:

@@ -1,4 +1,4 @@
-"""Joint values from the columns of a CSV, in whatever units the columns say, and what is computed from them."""
+"""Joint values from the columns of a CSV, in whatever units they say, and what is computed from them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from trajcli.columns import Column, parse_column
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Place, Problem
-from trajcli.geometry.quaternion import quaternion_from_matrix
+from trajcli.geometry.quaternion import quaternion_from_matrix, without_jumps
 from trajcli.kinematics.dexterity import dexterity
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.jacobian import ReferenceFrame, jacobian
@@ -54,7 +54,7 @@ def poses_of(arm: Arm, rows: Rows) -> Stream:
     """Return t, where there is one, and the tcp's pose (x y z qw qx qy qz) for each row of joint values.
 
     Lengths are in the arm's unit, which the names say. The sign of the quaternion is such that it never
-    jumps from row to row.
+    jumps from row to row, and that w >= 0 in the first.
 
     Raises:
         InputError: When a joint has no column, or one of another unit; when taken, if a row is wrong.
@@ -74,25 +74,11 @@ def _poses(arm: Arm, rows: Rows, wanted: _Wanted) -> Iterator[Array]:
         yield np.hstack([wanted.times(block), poses[:, :3, 3] / arm.length_factor, quaternions])
 
 
-def without_jumps(quaternions: Array, last: Array | None) -> Array:
-    """Return quaternions (N, 4) with signs such that each is on the side of the one before.
-
-    Args:
-        quaternions: Unit quaternions.
-        last: The one before the first, (4,); None leaves the first as it is.
-    """
-    before = np.concatenate([quaternions[:1] if last is None else last[None], quaternions[:-1]])
-    turned = np.einsum("ni,ni->n", before, quaternions) < 0.0
-    # each sign is against the given neighbour; the product carries it on
-    signs = np.cumprod(np.where(turned, -1.0, 1.0))
-    return np.asarray(quaternions * signs[:, None])
-
-
 def jacobians_of(arm: Arm, rows: Rows, frame: ReferenceFrame) -> Stream:
     """Return t, where there is one, measures and the Jacobian, row by row, for each row of joint values.
 
-    All is in SI: manipulability; inverse_condition, the smallest over the largest singular value of the scaled
-    Jacobian, zero where it loses rank; J11 to J6n.
+    All is in SI: manipulability; inverse_condition, the smallest over the largest singular value of the
+    scaled Jacobian, zero where it loses rank; J11 to J6n.
 
     Raises:
         InputError: As `poses_of`.

@@ -10,11 +10,13 @@ import numpy as np
 
 from trajcli.checks.verify import Verdict, verify
 from trajcli.curves.piecewise import concatenate
-from trajcli.errors import TrajcliError
+from trajcli.errors import Place, TrajcliError
 from trajcli.job.limits import with_move_limits
 from trajcli.job.read import LoadedJob
+from trajcli.pipeline.reach import start_state, with_joints
 from trajcli.pipeline.stretch import PlannedMove, aligned, slowed
 from trajcli.planners.planner import Event, Planner
+from trajcli.planners.point_to_point import PointToPoint
 from trajcli.trajectory import Span, State, Trajectory
 
 
@@ -46,13 +48,17 @@ def plan_job(loaded: LoadedJob) -> Plan:
     """
     moves: list[PlannedMove] = []
     events = list(loaded.events)
-    state = loaded.job.start.as_state()
+    with _errors_at(loaded, loaded.document.place(("start",))):
+        state, mended = start_state(loaded.job.start, loaded.robot)
+    events += mended
     before: Planner | None = None
     for index, planner in enumerate(loaded.job.moves):
         start = _handed_over(state, before, planner)
         with _errors_of(loaded, index, planner):
-            move = _plan_move(loaded, index, planner, start)
+            reachable, mended = _with_joints(planner, loaded, state)
+            move = _plan_move(loaded, index, reachable, start)
         moves.append(move)
+        events += [replace(event, move=index) for event in mended]
         events += [replace(event, move=index) for event in move.planned.events]
         state, before = move.planned.end, planner
     trajectory = _joined(moves, loaded)
@@ -71,6 +77,14 @@ def _plan_move(loaded: LoadedJob, index: int, planner: Planner, start: State) ->
     if job.output.align:
         move = aligned(move, job.output.rate)
     return move
+
+
+def _with_joints(planner: Planner, loaded: LoadedJob, state: State) -> tuple[Planner, list[Event]]:
+    """Return the planner with joints in the place of a pose to go to, on the branch nearest to `state`."""
+    if not isinstance(planner, PointToPoint):
+        return planner, []
+    target, mended = with_joints(planner.to, loaded.robot, state.position)
+    return planner.model_copy(update={"to": target}), mended
 
 
 def _handed_over(state: State, before: Planner | None, after: Planner) -> State:
@@ -94,10 +108,20 @@ def _joined(moves: list[PlannedMove], loaded: LoadedJob) -> Trajectory:
 def _errors_of(loaded: LoadedJob, index: int, planner: Planner) -> Iterator[None]:
     """Give errors the move they are about, its place in the file, and the job's units."""
     try:
-        yield
+        with _errors_at(loaded, loaded.place_of_move(index)):
+            yield
     except TrajcliError as error:
-        located = error.said_by(loaded.say).located(move=index, place=loaded.place_of_move(index))
         problems = (
-            replace(p, message=f"move {index} ({planner.tag}): {p.message}") for p in located.problems
+            replace(p, message=f"move {index} ({planner.tag}): {p.message}", move=index)
+            for p in error.problems
         )
         raise type(error)(*problems) from None
+
+
+@contextmanager
+def _errors_at(loaded: LoadedJob, place: Place) -> Iterator[None]:
+    """Give errors their place in the file, and the job's units."""
+    try:
+        yield
+    except TrajcliError as error:
+        raise error.said_by(loaded.say).located(place=place) from None

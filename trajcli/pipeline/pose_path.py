@@ -67,9 +67,9 @@ def pose_path(
         end: At s = 1.
         s: From 0 to 1.
         way: "line" for a straight line of the origin, "screw" for constant twist.
-        orientation: On a line: about one fixed axis, or "euler" for angles that change evenly, in the sequence
-            of the end; where the end was not typed as angles, in that of `euler`, else as rpy. Angles that
-            were not typed are those of the two triples, and their turns, which are nearer to the other end's.
+        orientation: On a line: about one fixed axis, or "euler" for angles that change evenly, in the
+            sequence of the end; where the end was not typed as angles, in that of `euler`, else as rpy. Of
+            angles that were not typed, the triple and the turns nearest to the other end's are taken.
         euler: Sequence and frame.
 
     Raises:

@@ -13,8 +13,8 @@ from trajcli.geometry.axis_angle import axis_angle_from_matrix
 from trajcli.geometry.euler import EulerAngles, check_sequence, euler_from_matrix, rpy_from_matrix
 from trajcli.geometry.pose import transform_points
 from trajcli.geometry.rotation import Frame
-from trajcli.suggest import did_you_mean
 from trajcli.pipeline.pose_view import plain, pose_view
+from trajcli.suggest import did_you_mean
 from trajcli.units import AngleUnit, LengthUnit, Quantity, Units, factor
 
 

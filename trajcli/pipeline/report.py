@@ -24,6 +24,7 @@ from trajcli.kinematics.robot import QUANTITIES
 from trajcli.pipeline.plan import Plan
 from trajcli.pipeline.reference import NoBound, fastest_duration
 from trajcli.pipeline.stretch import PlannedMove
+from trajcli.planners.point_to_point import PointToPoint
 
 _JUMPS = {"position_jump": 0, "velocity_jump": 1, "acceleration_jump": 2}
 
@@ -94,6 +95,10 @@ def _peak(move: PlannedMove, joint: int, order: int, peaks: Peaks) -> PeakReport
 
 def reference_of(move: PlannedMove) -> ReferenceReport:
     """Return how a move compares with the shortest duration under its limits."""
+    if isinstance(move.planner, PointToPoint) and not move.planner.to.is_place:
+        # to where a velocity is reached fastest, another way may lead a little faster
+        reason = "the move leaves its end position open"
+        return ReferenceReport(duration=None, ratio=None, joint=move.robot.joint_names[0], reason=reason)
     bound = fastest_duration(move.start, move.planned.end, move.robot.limits)
     name = None if bound.joint is None else move.robot.joint_names[bound.joint]
     if isinstance(bound, NoBound):

@@ -62,7 +62,7 @@ def write_rows(plan: Plan, grid: Grid, path: str | None, digits: Digits) -> None
     names = column_names(groups, loaded.robot.joint_types, loaded.units)
 
     def rows() -> Iterator[Array]:
-        return sample(plan.trajectory, grid, groups, loaded.units)
+        return sample(plan.trajectory, grid, groups, loaded.units, robot=loaded.robot)
 
     if path is not None and path != "-":
         write_verified(path, rows, names, digits)

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from pydantic.json_schema import JsonSchemaValue
 
 from trajcli.kinematics.robot import QUANTITIES
-from trajcli.planners.fields import Model
+from trajcli.planners.model import Model
 from trajcli.planners.per_joint import per_joint_schema, read_per_joint
 from trajcli.planners.reading import (
     FieldType,

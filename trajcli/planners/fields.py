@@ -7,38 +7,20 @@ from typing import Annotated, Any
 
 import numpy as np
 from pydantic import (
-    BaseModel,
-    ConfigDict,
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     ValidationError,
-    ValidationInfo,
     model_validator,
 )
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
 from trajcli.planners.per_joint import PerJoint
-from trajcli.planners.reading import NULL, SI, Number, refuse, shown
+from trajcli.planners.pose_fields import PoseFields
+from trajcli.planners.reading import SI, Number, refuse, shown
 from trajcli.suggest import did_you_mean, valid_names
 from trajcli.trajectory import State
 from trajcli.units import Quantity
-
-
-class Model(BaseModel):
-    """Base of everything that a job file may hold: frozen, and strict about unknown keys."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _nothing_left_empty(cls, data: Any, info: ValidationInfo) -> Any:  # noqa: ANN401
-        # `duration:` with nothing behind it is a slip of the pen: only what a file leaves out is left out
-        if info.context is None or not isinstance(data, dict) or None not in data.values():
-            return data
-        optional = {name for name, field in cls.model_fields.items() if field.default is None}
-        return {key: NULL if value is None and key in optional else value for key, value in data.items()}
-
 
 Duration = Annotated[float, Number(Quantity("time"), "Duration of the move, s.", above=0.0)]
 MinimumDuration = Annotated[
@@ -65,8 +47,8 @@ JointAccelerationMagnitudes = Annotated[
 ]
 
 
-class Target(Model):
-    """The state that a point names, or that a move starts from or ends in."""
+class Target(PoseFields):
+    """The state that a point names, or that a move starts from or ends in: by its joints, or by a pose."""
 
     joints: JointPositions | None = None
     velocity: JointVelocities | None = None
@@ -74,9 +56,18 @@ class Target(Model):
 
     @model_validator(mode="after")
     def _says_something(self) -> Target:
-        if self.joints is None and self.velocity is None:
-            raise refuse([((), "a state needs `joints` (or `velocity` alone, for a stop)", None)])
+        if self.joints is not None and self.gives_pose:
+            key = self.pose_keys[0]
+            raise refuse([((key,), f"joints and {key} exclude each other", "leave one of them out")])
+        if self.joints is None and self.velocity is None and not self.gives_pose:
+            text = "a state needs `joints` or a pose (or `velocity` alone, for a stop)"
+            raise refuse([((), text, None)])
         return self
+
+    @property
+    def is_place(self) -> bool:
+        """Whether it says where to be, and not only how fast."""
+        return self.joints is not None or self.gives_pose
 
     def as_state(self) -> State:
         """Return the state; what is not given is zero.

@@ -12,7 +12,7 @@ from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.errors import Amount, said
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.bounds import LimitsSpec
-from trajcli.planners.fields import Model
+from trajcli.planners.model import Model
 from trajcli.trajectory import State
 
 WhenOverLimit = Literal["error", "slow"]

@@ -35,9 +35,15 @@ class PointToPoint(Planner):
 
     @model_validator(mode="after")
     def _can_impose_target(self) -> PointToPoint:
-        if self.to.joints is None and not self.stops_anywhere:
+        if not self.to.is_place and not self.stops_anywhere:
             raise refuse(
-                [(("to",), f"{self.tag} needs `joints` in its target", "jerk_limited can stop anywhere")]
+                [
+                    (
+                        ("to",),
+                        f"{self.tag} needs `joints` or a pose in its target",
+                        "jerk_limited can stop anywhere",
+                    )
+                ]
             )
         for order, name in ((1, "velocity"), (2, "acceleration")):
             if order > self.imposes and any(getattr(self.to, name) or ()):

@@ -1,0 +1,101 @@
+"""`trajcli ik`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from trajcli.cli.matrix_text import number, numbers
+from trajcli.cli.printing import print_json, print_lines
+from trajcli.curves.piecewise import Array
+from trajcli.errors import InputError
+from trajcli.job.inline import inline_document, read_at
+from trajcli.kinematics.inverse.solution import Solutions
+from trajcli.pipeline.arm import Arm, open_arm
+from trajcli.pipeline.inverse_answers import answers, find_answers, require_answer
+from trajcli.planners.aims import read_aim
+from trajcli.streams.csv import Digits
+
+
+@dataclass(frozen=True)
+class IkOptions:
+    """What the command line says beside the robot; see `trajcli ik --help`."""
+
+    pose: str | None = None
+    near: str | None = None
+    every: bool = False
+    turns: bool = False
+    tolerance: float = 1e-6
+    tool: str | None = None
+    si: bool = False
+    as_json: bool = False
+    digits: Digits = "fixed"
+
+
+def run_ik(robot: str, words: Sequence[str], options: IkOptions) -> int:
+    """Print all joint values for a pose, or one row of them for each pose of a CSV; return the exit code.
+
+    Raises:
+        InputError: When robot, pose, tool or rows are not as they should be.
+        PlanningError: After printing, when no answer is within the limits.
+        FileError: When a file cannot be read, or standard output not written.
+    """
+    _check(words, options)
+    arm = open_arm(robot, options.tool, si=options.si)
+    near = None if options.near is None else arm.joint_values([options.near], "--near")
+    if options.pose is None:
+        return _stream(arm, near, options)
+    aim = read_at(inline_document(options.pose, "--pose"), arm.units, read_aim)
+    found, chosen = find_answers(arm, aim, near, options.tolerance)
+    told = answers(arm, found, chosen, aim.target, near, every=options.every, turns=options.turns)
+    if options.as_json:
+        print_json(told)
+    elif told:
+        print_lines(_lines(arm, found, told))
+    require_answer(arm, found, chosen, aim.configuration)
+    return 0
+
+
+def _check(words: Sequence[str], options: IkOptions) -> None:
+    if list(words) not in ([], ["-"]):
+        raise InputError(
+            f"there is no place for {words[0]}", hint="poses are given by --pose, or as - for a CSV"
+        )
+    if bool(words) == (options.pose is not None):
+        raise InputError("say either --pose POSE, or - to read poses from a CSV")
+    if not 0.0 < options.tolerance < math.inf:
+        raise InputError(f"--tolerance must be above 0, got {options.tolerance:.6g}")
+    given = {"--all": options.every, "--turns": options.turns, "--json": options.as_json}
+    for name, value in given.items() if words else ():
+        if value:
+            raise InputError(f"{name} is for one pose, rows from standard input become a CSV")
+
+
+def _lines(arm: Arm, found: Solutions, told: Sequence[dict[str, Any]]) -> Iterator[str]:
+    units = dict.fromkeys(arm.joint_unit(i) for i in range(len(arm.robot.joints)))
+    count = f"{len(told)} answer{'s' * (len(told) != 1)}"
+    yield f"{count} for {arm.robot.name} ({', '.join(units)}), by {found.method.name}:"
+    for answer in told:
+        names = " ".join(answer["branch"].values())
+        notes = [names] if names else []
+        notes += [] if answer["within_limits"] else ["outside the limits"]
+        if answer["singular"]:
+            notes.append(f"singular: free along {numbers(answer['free_direction'])}")
+        joints = numbers(answer["joints"])
+        yield f"  {joints}" + (f"   ({', '.join(notes)})" if notes else "")
+    worst = max(answer["closure"] for answer in told)
+    yield f"they miss the pose by at most {number(worst) if worst > 1e-12 else '1e-12'} (m, rad)"
+
+
+def _stream(arm: Arm, near: Array | None, options: IkOptions) -> int:
+    from trajcli.pipeline.pose_stream import joints_of
+    from trajcli.streams.csv import write_csv
+    from trajcli.streams.table import open_rows
+    from trajcli.streams.whole_file import standard_output
+
+    names, blocks = joints_of(arm, open_rows("-"), near, options.tolerance)
+    with standard_output() as out:
+        write_csv(blocks, names, out, options.digits)
+    return 0

@@ -1,0 +1,125 @@
+"""`trajcli robots`."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from trajcli.cli.matrix_text import number, numbers, table_lines
+from trajcli.cli.printing import print_json, print_lines
+from trajcli.errors import InputError
+from trajcli.job.robot_source import catalogue_names
+from trajcli.pipeline.arm import open_sheet
+from trajcli.pipeline.robot_card import robot_card, robot_row
+
+_WIDTH, _SOURCE = 100, 60  # columns of a paragraph, and of a source in the list
+_DH = ("theta", "d", "a", "alpha")
+_LIMITS = ("position", "velocity", "acceleration", "jerk")
+
+
+def run_robots(name: str | None, *, as_yaml: bool, as_json: bool) -> int:
+    """Print the catalogue, or what there is to say about one robot; return the exit code.
+
+    Raises:
+        InputError: When there is no such robot, or the options exclude each other.
+        FileError: When a file cannot be read, or standard output not written.
+    """
+    if as_yaml and (as_json or name is None):
+        message = "--yaml and --json exclude each other" if as_json else "--yaml prints the file of one robot"
+        raise InputError(message, hint="leave one out" if as_json else "such as trajcli robots ur5e --yaml")
+    if name is None:
+        rows = [robot_row(each, open_sheet(each)) for each in catalogue_names()]
+        if as_json:
+            print_json(rows)
+        else:
+            print_lines(_list_lines(rows))
+        return 0
+    sheet = open_sheet(name)
+    if as_yaml:
+        print_lines([sheet.text.rstrip("\n")])
+    elif as_json:
+        print_json(robot_card(name, sheet))
+    else:
+        print_lines(_card_lines(robot_card(name, sheet)))
+    return 0
+
+
+def _list_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    head = ["name", "joints", "kind", "reach (m)", "source"]
+    cells = [
+        [
+            row["name"],
+            str(row["joints"]),
+            row["kind"],
+            "unlimited" if row["reach"] is None else f"{row['reach']:.3f}",
+            textwrap.shorten(row["source"] or "-", _SOURCE, placeholder=" ..."),
+        ]
+        for row in rows
+    ]
+    yield from table_lines([head, *cells], "")
+
+
+def _card_lines(card: Mapping[str, Any]) -> Iterator[str]:
+    yield f"{card['title']}: {card['kind']}"
+    for key in ("source", "licence", "note"):
+        if card[key]:
+            yield from textwrap.wrap(f"{key}: {card[key]}", _WIDTH, subsequent_indent="  ")
+    angle, length = card["units"]["angle"], card["units"]["length"]
+    yield ""
+    if card["convention"] is None:
+        yield f"bare joints without geometry ({angle}, {length}):"
+    else:
+        yield f"{card['convention']} Denavit-Hartenberg table ({angle}, {length}):"
+        yield from table_lines([["joint", "type", *_DH, "sign"], *map(_dh_row, card["joints"])])
+    yield ""
+    yield f"limits ({angle} or {length}, per s, s^2, s^3):"
+    yield from table_lines([["joint", *_LIMITS], *map(_limit_row, card["joints"])])
+    for key, name in (("base", "base in world"), ("tool", "tool in the flange")):
+        pose = card[key]
+        if any(pose["xyz"]) or any(pose["rpy"]):
+            yield f"{name}: xyz {numbers(pose['xyz'])} {length}, rpy {numbers(pose['rpy'])} {angle}"
+    yield from _reach_lines(card, length)
+    yield from _inverse_lines(card["ik"])
+
+
+def _dh_row(joint: Mapping[str, Any]) -> list[str]:
+    cells = [number(joint[key]) for key in _DH]
+    cells[1 if joint["type"] == "prismatic" else 0] += " + q" if joint["sign"] > 0 else " - q"
+    return [joint["name"], joint["type"], *cells, str(joint["sign"])]
+
+
+def _limit_row(joint: Mapping[str, Any]) -> list[str]:
+    return [joint["name"], *(_range(joint[key]) for key in _LIMITS)]
+
+
+def _range(bounds: Sequence[float | None] | None) -> str:
+    if bounds is None:
+        return "-"
+    low, high = bounds
+    if low is not None and high == -low:
+        return f"+-{number(high)}"
+    ends = ("unlimited" if end is None else number(end) for end in (low, high))
+    return " .. ".join(ends)
+
+
+def _reach_lines(card: Mapping[str, Any], length: str) -> Iterator[str]:
+    reach = card["reach"]
+    if reach is None:
+        return
+    if reach["sampled"] is None:
+        yield "reach: unlimited, as a slide has no limits"
+        return
+    found, bound = number(round(reach["sampled"], 6)), number(round(reach["bound"], 6))
+    yield f"reach from the base to the tcp: {found} {length} (sampled), at most {bound} {length} (bound)"
+
+
+def _inverse_lines(card: Mapping[str, Any] | None) -> Iterator[str]:
+    if card is None:
+        return
+    yield f"inverse kinematics: {card['method']}"
+    yield from textwrap.wrap(f"because {card['reason']}", _WIDTH, initial_indent="  ", subsequent_indent="  ")
+    names = [" ".join(branch.values()) or "only" for branch in card["branches"]]
+    if names:
+        text = f"{len(names)} branch{'es' * (len(names) > 1)}: {', '.join(names)}"
+        yield from textwrap.wrap(text, _WIDTH, initial_indent="  ", subsequent_indent="  ")

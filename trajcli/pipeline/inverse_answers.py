@@ -1,0 +1,134 @@
+"""Every answer of inverse kinematics for one target, in the user's units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from trajcli.curves.piecewise import Array
+from trajcli.errors import InputError, PlanningError
+from trajcli.geometry.rotation import Flags
+from trajcli.kinematics.dexterity import RANK_TOLERANCE, characteristic_length
+from trajcli.kinematics.forward import forward
+from trajcli.kinematics.inverse.method import Branch
+from trajcli.kinematics.inverse.solution import Solutions
+from trajcli.kinematics.inverse.solve import solve
+from trajcli.kinematics.inverse.target import Target, residual_jacobian
+from trajcli.kinematics.inverse.turns import all_turns
+from trajcli.kinematics.inverse.verdict import check_reachable
+from trajcli.kinematics.jacobian import jacobian
+from trajcli.pipeline.arm import Arm
+from trajcli.pipeline.differential import simplest
+from trajcli.pipeline.pose_view import plain
+from trajcli.planners.aims import Aim
+
+_LOST = max(RANK_TOLERANCE, 1e-7)  # of the largest singular value: answers meet their target within rounding
+
+
+def find_answers(arm: Arm, aim: Aim, near: Array | None, tolerance: float) -> tuple[Solutions, Flags]:
+    """Return all branches of one target, and which of them are answers as it is asked for, shape (branches,).
+
+    Args:
+        arm: The arm.
+        aim: One target, with or without names of branches.
+        near: Joint values (n,), rad or m; zero if absent.
+        tolerance: What an answer may miss the target by, m and rad.
+
+    Raises:
+        InputError: When the target asks for a choice that the arm does not have.
+    """
+    found = solve(arm.robot, aim.target, near, tolerance)
+    wanted = {choice: name for choice, name in asdict(aim.configuration).items() if name is not None}
+    for choice in wanted:
+        if getattr(found.names[0], choice) is None:
+            raise InputError(
+                f"{arm.robot.name} has no choice of {choice} for this target: {found.method.reason}",
+                hint=f"leave {choice} out of `configuration`",
+            )
+    fits = [all(getattr(name, key) == value for key, value in wanted.items()) for name in found.names]
+    return found, found.valid & np.array(fits)
+
+
+def answers(
+    arm: Arm,
+    found: Solutions,
+    chosen: Flags,
+    target: Target,
+    near: Array | None = None,
+    *,
+    every: bool = False,
+    turns: bool = False,
+) -> list[dict[str, Any]]:
+    """Return [{joints, branch, within_limits, closure, singular, free_direction?}] of one target.
+
+    `closure` is the larger of the miss in m and in rad. `free_direction` is a unit vector of joint values:
+    the arm can move along it while the tcp rests.
+
+    Args:
+        arm: The arm.
+        found: All branches.
+        chosen: Which of them to return, shape (branches,).
+        target: What was asked for.
+        near: Joint values (n,): the nearest answer comes first.
+        every: Whether answers outside the limits count too.
+        turns: Whether every full turn that the limits allow is an answer of its own.
+    """
+    usable = chosen if every else chosen & found.within_limits
+    told = [
+        (joints, _answer(arm, found, branch, joints, target))
+        for branch in np.flatnonzero(usable).tolist()
+        for joints in (all_turns(arm.robot, found.joints[branch]) if turns else [found.joints[branch]])
+    ]
+    if near is not None:
+        told.sort(key=lambda pair: float(np.abs(pair[0] - near).max()))
+    return [answer for _, answer in told]
+
+
+def require_answer(arm: Arm, found: Solutions, chosen: Flags, configuration: Branch) -> None:
+    """Do nothing when one of the chosen branches is within the limits.
+
+    Raises:
+        PlanningError: By how much the target is out of reach; or which joint is outside its limits.
+    """
+    if (chosen & found.within_limits).any():
+        return
+    if found.valid.any() and configuration != Branch():
+        others = [str(name) for name, fine in zip(found.names, found.within_limits, strict=True) if fine]
+        only = "only outside the limits" if chosen.any() else "not at all"
+        raise PlanningError(
+            f"{arm.robot.name} reaches the pose with {configuration} {only}",
+            hint=f"within the limits: {'; '.join(others)}" if others else "no other branch is inside either",
+        )
+    try:
+        check_reachable(arm.robot, found)
+    except PlanningError as error:
+        raise error.said_by(arm.say) from None
+
+
+def _answer(arm: Arm, found: Solutions, branch: int, joints: Array, target: Target) -> dict[str, Any]:
+    names = {choice: name for choice, name in asdict(found.names[branch]).items() if name is not None}
+    told = {
+        "joints": plain(joints / arm.joint_factors),
+        "branch": names,
+        "within_limits": bool(found.within_limits[branch]),
+        "closure": float(found.closure[branch].max()),
+        "singular": bool(found.singular[branch]),
+    }
+    if told["singular"]:
+        told["free_direction"] = plain(next(_free_directions(arm, joints, target)))
+    return told
+
+
+def _free_directions(arm: Arm, joints: Array, target: Target) -> Iterator[Array]:
+    """Yield unit vectors (n,) of joint values, in the user's units, that leave what is fixed of the pose."""
+    flat = target.flat()
+    held = residual_jacobian(flat, forward(arm.robot, joints[None]), jacobian(arm.robot, joints[None]))[0]
+    held[: sum(target.position)] /= characteristic_length(arm.robot)
+    _, values, right = np.linalg.svd(held)
+    rank = min(int(np.count_nonzero(values > _LOST * values[0])), len(joints) - 1)
+    for direction in simplest(right[rank:]):
+        shown = direction / arm.joint_factors
+        yield shown / np.linalg.norm(shown)

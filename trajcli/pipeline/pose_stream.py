@@ -1,0 +1,164 @@
+"""Poses from the columns of a CSV, and the joint values that follow them without jumps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from trajcli.columns import Column, column_names, parse_column
+from trajcli.curves.piecewise import Array
+from trajcli.errors import InputError, Place, PlanningError, Problem
+from trajcli.geometry.quaternion import QUATERNION_DEFECT, matrix_from_quaternion
+from trajcli.geometry.rotation import Flags
+from trajcli.kinematics.inverse.choose import method_for
+from trajcli.kinematics.inverse.solution import Solutions
+from trajcli.kinematics.inverse.solve import fits, solve
+from trajcli.kinematics.inverse.target import Target, partial_target
+from trajcli.kinematics.inverse.turns import FULL, choose_turns, revolute
+from trajcli.kinematics.inverse.verdict import check_reachable
+from trajcli.pipeline.arm import Arm
+from trajcli.pipeline.joint_stream import Stream
+from trajcli.streams.table import Rows
+
+_AXES, _QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
+
+
+class _Wanted(NamedTuple):
+    """Index of the time; index and metres per unit of x, y, z; indices of the quaternion, or none."""
+
+    time: int | None
+    position: list[int]
+    factors: Array
+    rotation: list[int]
+
+
+def joints_of(arm: Arm, rows: Rows, near: Array | None, tolerance: float) -> Stream:
+    """Return t, where there is one, and joint values for each row of poses (x y z, and qw qx qy qz or none).
+
+    Of all answers within the limits the one nearest to the row before is taken, in the first row the one
+    nearest to `near`; the distance is the largest difference of any joint.
+
+    Raises:
+        InputError: When a column is missing; when taken, if a row is wrong.
+        PlanningError: When taken, if a row cannot be reached within the limits.
+    """
+    wanted = _wanted(rows)
+    names = column_names(("q",), arm.robot.joint_types, arm.units)
+    return Stream(
+        [*([] if wanted.time is None else ["t"]), *names], _follow(arm, rows, wanted, near, tolerance)
+    )
+
+
+def _follow(arm: Arm, rows: Rows, wanted: _Wanted, near: Array | None, tolerance: float) -> Iterator[Array]:
+    last = np.zeros(len(arm.robot.joints)) if near is None else near
+    done = 0
+    for block in rows.blocks:
+        target = _targets(block, wanted, done, rows.file)
+        followed = _Follower(arm, target, last, tolerance)
+        joints = np.empty((len(block), len(last)))
+        for row in range(len(block)):
+            try:
+                last = joints[row] = followed.next(row, last)
+            except PlanningError as error:
+                raise _of_row(arm, error, block, wanted, row, done) from None
+        done += len(block)
+        times = block[:, :0] if wanted.time is None else block[:, [wanted.time]]
+        yield np.hstack([times, joints / arm.joint_factors])
+
+
+class _Follower:
+    """Takes the nearest answer row by row; a closed form solves the rows of a block together."""
+
+    def __init__(self, arm: Arm, target: Target, last: Array, tolerance: float) -> None:
+        self._arm, self._target, self._tolerance = arm, target, tolerance
+        self._turning = revolute(arm.robot)
+        method = method_for(arm.robot)
+        self._found: Solutions | None = None
+        if method.solve is not None and fits(method, target, arm.robot.base):
+            self._found = solve(arm.robot, target, last, tolerance)
+            self._usable = self._found.within_limits
+            alone = self._found.singular.any(axis=-1) | ~self._usable.any(axis=-1)
+            self._alone: Flags = np.asarray(alone)
+
+    def next(self, row: int, last: Array) -> Array:
+        """Return the answer (n,) of a row that is nearest to `last` (n,).
+
+        Raises:
+            PlanningError: When there is none within the limits.
+        """
+        if self._found is None or self._alone[row]:
+            return self._solved_alone(row, last)
+        joints = self._found.joints[row][self._usable[row]]
+        apart = joints - last
+        wrapped = np.where(self._turning, apart - FULL * np.round(apart / FULL), apart)
+        best = int(np.argmin(np.abs(wrapped).max(axis=1)))
+        if (wrapped[best] == apart[best]).all():
+            return np.array(joints[best])
+        turned = np.ascontiguousarray(joints.T)[..., None]
+        choose_turns(self._arm.robot, turned, last[:, None])
+        best = int(np.argmin(np.abs(turned[..., 0] - last[:, None]).max(axis=0)))
+        return np.array(turned[:, best, 0])
+
+    def _solved_alone(self, row: int, last: Array) -> Array:
+        found = solve(self._arm.robot, self._target.rows([row]), last, self._tolerance)
+        check_reachable(self._arm.robot, found)
+        return np.array(found.joints[0, int(found.nearest(last)[0])])
+
+
+def _of_row(
+    arm: Arm, error: PlanningError, block: Array, wanted: _Wanted, row: int, done: int
+) -> PlanningError:
+    """Return the error with the row's number and time said in front."""
+    when = "" if wanted.time is None else f" (t = {block[row, wanted.time]:.9g} s)"
+    problems = error.said_by(arm.say).problems
+    first = replace(problems[0], message=f"row {done + row}{when}: {problems[0].message}")
+    return PlanningError(first, *problems[1:])
+
+
+def _targets(block: Array, wanted: _Wanted, done: int, file: str) -> Target:
+    position = block[:, wanted.position] * wanted.factors
+    if not wanted.rotation:
+        return partial_target(position)
+    quaternions = block[:, wanted.rotation]
+    length = np.linalg.norm(quaternions, axis=1)
+    wrong = np.flatnonzero(np.abs(length - 1.0) > QUATERNION_DEFECT)
+    if wrong.size:
+        row = int(wrong[0])
+        raise InputError(
+            f"{file}, row {done + row}: the quaternion has length {length[row]:.6g} instead of 1",
+            hint=f"the allowed difference is {QUATERNION_DEFECT:g}; the columns are qw, qx, qy, qz",
+        )
+    return partial_target(position, rotation=matrix_from_quaternion(quaternions))
+
+
+def _wanted(rows: Rows) -> _Wanted:
+    found: dict[str, tuple[int, Column]] = {}
+    for index, name in enumerate(rows.names):
+        column = parse_column(name)
+        usual = column.unit is None or (column.unit == "mm" and column.kind in _AXES)
+        if column.joint is None and column.kind in ("t", *_AXES, *_QUATERNION) and usual:
+            if column.kind in found:
+                raise _refused(
+                    rows, f"{found[column.kind][1].name} and {name} are columns of the same number"
+                )
+            found[column.kind] = index, column
+    missing = [name for name in _AXES if name not in found]
+    part = [name for name in _QUATERNION if name in found]
+    if part and len(part) < len(_QUATERNION):
+        missing += [name for name in _QUATERNION if name not in found]
+    if missing:
+        raise _refused(
+            rows, f"a pose has x, y, z and qw, qx, qy, qz: there is no column {', '.join(missing)}"
+        )
+    position = [found[name] for name in _AXES]
+    time = found["t"][0] if "t" in found else None
+    factors = np.array([column.factor for _, column in position])
+    return _Wanted(time, [index for index, _ in position], factors, [found[name][0] for name in part])
+
+
+def _refused(rows: Rows, message: str) -> InputError:
+    hint = "x_mm, y_mm, z_mm are in mm; without quaternion the orientation is free"
+    return InputError(Problem(message, hint, Place(rows.file, 1, 1, ",".join(rows.names))))

@@ -1,0 +1,124 @@
+"""From a pose that a job names to the joints that reach it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from trajcli.curves.piecewise import Array
+from trajcli.errors import InputError, PlanningError, Problem
+from trajcli.kinematics.robot import Robot
+from trajcli.planners.fields import Target
+from trajcli.planners.planner import Event
+from trajcli.planners.pose_fields import Configuration
+from trajcli.trajectory import State
+
+if TYPE_CHECKING:
+    from trajcli.kinematics.inverse.target import Target as Goal
+
+_NOTED = 1e-12  # a smaller defect of a rotation matrix is rounding
+_CHOICES = ("shoulder", "elbow", "wrist")
+
+
+def with_joints(target: Target, robot: Robot, near: Array) -> tuple[Target, list[Event]]:
+    """Return the target with joints in the place of its pose, and an event where its rotation was mended.
+
+    The branch is the one that the target's configuration names; without one, that nearest to `near`.
+
+    Args:
+        target: With joints or a pose; one with neither comes back as it is.
+        robot: Its base, tool and position limits count.
+        near: Joint values (n,) of where the arm comes from, rad or m.
+
+    Raises:
+        InputError: When the robot has no geometry, or the configuration names what its arm has not.
+        PlanningError: When no branch reaches the pose within the limits.
+    """
+    if not target.gives_pose:
+        return target, []
+    if robot.convention is None:
+        hint = "give its joints theta, d, a and alpha, or the target `joints`"
+        raise InputError(f"{robot.name} has no geometry, so it reaches no pose", hint=hint)
+    joints = _nearest_branch(target, robot, near)
+    kept = {"velocity": target.velocity, "acceleration": target.acceleration}
+    return Target.model_construct(joints=tuple(joints.tolist()), **kept), _mended(target)
+
+
+def start_state(target: Target, robot: Robot) -> tuple[State, list[Event]]:
+    """Return the state in which a job starts; a pose is reached near to where all joints are zero.
+
+    Raises:
+        InputError: As `with_joints`.
+        PlanningError: As `with_joints`.
+    """
+    reached, events = with_joints(target, robot, np.zeros(len(robot.joints)))
+    return reached.as_state(), events
+
+
+def _nearest_branch(target: Target, robot: Robot, near: Array) -> Array:
+    from trajcli.kinematics.inverse.solve import solve
+    from trajcli.kinematics.inverse.verdict import check_reachable
+
+    found = solve(robot, _wanted(target), near)
+    check_reachable(robot, found)
+    chosen = _of_configuration(
+        target.configuration, [str(name) for name in found.names], robot, found.method.name
+    )
+    usable = found.within_limits & chosen
+    if not usable.any():
+        words = " ".join(_asked(target.configuration))
+        others = sorted({str(found.names[k]) for k in np.flatnonzero(found.within_limits)})
+        message = f"{robot.name} does not reach the pose within its limits in the configuration {words}"
+        raise PlanningError(Problem(message, f"it does in: {', '.join(others)}"))
+    distance = np.where(usable, np.abs(found.joints - near).max(axis=-1), np.inf)
+    return np.asarray(found.joints[int(distance.argmin())])
+
+
+def _of_configuration(wanted: Configuration | None, names: list[str], robot: Robot, method: str) -> Array:
+    """Return which branches have the wanted names."""
+    chosen = np.ones(len(names), dtype=bool)
+    for word in _asked(wanted):
+        has = np.array([word in name.split() for name in names])
+        if not has.any():
+            known = sorted({part for name in names for part in name.split()} - {"only"})
+            hint = f"it has {', '.join(known)}" if known else f"its branches have no names ({method})"
+            raise InputError(f"{robot.name} has no configuration '{word}'", hint=hint)
+        chosen &= has
+    return chosen
+
+
+def _asked(wanted: Configuration | None) -> list[str]:
+    return [word for choice in _CHOICES if (word := getattr(wanted, choice, None)) is not None]
+
+
+def _wanted(target: Target) -> Goal:
+    from trajcli.kinematics.inverse.target import partial_target, pose_target
+
+    pose = target.full_pose()
+    if target.gives_position and target.rotation_form is not None:
+        return pose_target(pose)
+    position = pose[:3, 3] if target.gives_position else None
+    if target.rotation_form is not None:
+        return partial_target(position, rotation=pose[:3, :3])
+    return partial_target(
+        position,
+        direction=target.direction,
+        yaw=target.yaw,
+        pitch=target.pitch,
+        tool_axis=target.tool_axis or "z",
+    )
+
+
+def _mended(target: Target) -> list[Event]:
+    """Return the event that a matrix was not quite a rotation and stands for the nearest one."""
+    if target.matrix is None:
+        return []
+    from trajcli.geometry.rotation import rotation_defect
+
+    defect = float(rotation_defect(np.array([row[:3] for row in target.matrix[:3]])))
+    if defect <= _NOTED:
+        return []
+    return [
+        Event("nearest_rotation", f"the matrix is off a rotation by {defect:.3g}: the nearest one is taken")
+    ]

@@ -1,0 +1,224 @@
+"""The fields of a pose target: what it leaves out is free."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+from pydantic.json_schema import JsonSchemaValue
+
+from trajcli.curves.piecewise import Array
+from trajcli.planners.model import Model
+from trajcli.planners.poses import Pose, read_numbers
+from trajcli.planners.reading import (
+    SI,
+    FieldType,
+    FlawError,
+    Number,
+    ReadingContext,
+    refuse,
+    shown,
+    written_number,
+)
+from trajcli.units import Quantity
+
+_ANGLE, _LENGTH, _RATIO = Quantity("angle"), Quantity("length"), Quantity("ratio")
+_ROTATIONS = ("rpy", "quat_wxyz", "matrix", "axis_angle", "euler")
+_AIMS = ("yaw", "pitch", "direction")
+_NUMBER: JsonSchemaValue = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": "^[-+.0-9]"}]}
+
+Axis = Literal["x", "y", "z"]
+Row = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Numbers(FieldType):
+    """A given count of numbers of one quantity.
+
+    Attributes:
+        count: How many.
+        quantity: What each measures.
+        description: For the JSON schema.
+    """
+
+    count: int
+    quantity: Quantity
+    description: str
+
+    def read(self, value: Any, context: ReadingContext) -> Row:  # noqa: ANN401
+        """Return the numbers in SI."""
+        return tuple(read_numbers(value, self.count, self.quantity, context).tolist())
+
+    def write(self, value: Row, context: ReadingContext) -> list[float | str]:
+        """Return the numbers with their unit."""
+        return [written_number(number, self.quantity) for number in value]
+
+    def json_schema(self) -> JsonSchemaValue:
+        """Return the schema of the list."""
+        return {"type": "array", "items": _NUMBER, "minItems": self.count, "maxItems": self.count}
+
+
+@dataclass(frozen=True)
+class Direction(FieldType):
+    """The name of an axis, or three numbers."""
+
+    description: str
+
+    def read(self, value: Any, context: ReadingContext) -> Row:  # noqa: ANN401
+        """Return the three numbers."""
+        if isinstance(value, str) and value in ("x", "y", "z"):
+            return tuple(float(name == value) for name in "xyz")
+        numbers = tuple(read_numbers(value, 3, _RATIO, context).tolist())
+        if not any(numbers):
+            raise FlawError("an axis of length 0 has no direction")
+        return numbers
+
+    def write(self, value: Row, context: ReadingContext) -> list[float]:
+        """Return the three numbers."""
+        return list(value)
+
+    def json_schema(self) -> JsonSchemaValue:
+        """Return the schema of a name or three numbers."""
+        return {
+            "anyOf": [
+                {"enum": ["x", "y", "z"]},
+                {"type": "array", "items": _NUMBER, "minItems": 3, "maxItems": 3},
+            ]
+        }
+
+
+@dataclass(frozen=True)
+class Matrix(FieldType):
+    """A rotation matrix, or a homogeneous one whose last column is a position."""
+
+    description: str
+
+    def read(self, value: Any, context: ReadingContext) -> tuple[Row, ...]:  # noqa: ANN401
+        """Return its rows, the position in m."""
+        if not isinstance(value, Sequence) or isinstance(value, str) or len(value) not in (3, 4):
+            raise FlawError(f"expected a 3x3 or 4x4 matrix, row by row, got {shown(value)}")
+        size = len(value)
+        rows = []
+        for index, row in enumerate(value):
+            if not isinstance(row, Sequence) or isinstance(row, str) or len(row) != size:
+                raise FlawError(f"expected a row of {size} numbers, got {shown(row)}", index)
+            numbers = read_numbers(row[:3], 3, _RATIO, context, index).tolist()
+            last = _RATIO if index == 3 else _LENGTH
+            rows.append((*numbers, *read_numbers(row[3:], size - 3, last, context, index).tolist()))
+        return tuple(rows)
+
+    def write(self, value: tuple[Row, ...], context: ReadingContext) -> list[list[float | str]]:
+        """Return its rows, the position with its unit."""
+        return [
+            [*row[:3], *(written_number(number, _RATIO if index == 3 else _LENGTH) for number in row[3:])]
+            for index, row in enumerate(value)
+        ]
+
+    def json_schema(self) -> JsonSchemaValue:
+        """Return the schema of three or four rows."""
+        row = {"type": "array", "items": _NUMBER, "minItems": 3, "maxItems": 4}
+        return {"type": "array", "items": row, "minItems": 3, "maxItems": 4}
+
+
+class AxisAngle(Model):
+    """A rotation by an angle about an axis."""
+
+    axis: Annotated[Row, Direction("x, y, z, or three numbers; only the direction counts.")]
+    angle: Annotated[float, Number(_ANGLE, "Angle, right-handed about the axis (angle unit).")]
+
+
+class Euler(Model):
+    """Euler angles."""
+
+    sequence: Annotated[
+        Literal["XYX", "XYZ", "XZX", "XZY", "YXY", "YXZ", "YZX", "YZY", "ZXY", "ZXZ", "ZYX", "ZYZ"],
+        Field(description="The axes, in the order of the angles."),
+    ]
+    frame: Annotated[Literal["current", "fixed"], Field(description="Whose axes they are.")] = "current"
+    angles: Annotated[Row, Numbers(3, _ANGLE, "The three angles (angle unit).")]
+
+
+class Configuration(Model):
+    """Which branch of the inverse kinematics is meant; what is left out does not matter."""
+
+    shoulder: Annotated[Literal["left", "right"] | None, Field(description="Side of the arm.")] = None
+    elbow: Annotated[Literal["up", "down"] | None, Field(description="Side of the elbow.")] = None
+    wrist: Annotated[Literal["flip", "no_flip"] | None, Field(description="Side of the wrist.")] = None
+
+
+class PoseFields(Model):
+    """A pose of the tcp in world: a position, an orientation or a part of one, or both."""
+
+    xyz: Annotated[Row, Numbers(3, _LENGTH, "Position of the tcp in world (length unit).")] | None = None
+    rpy: (
+        Annotated[Row, Numbers(3, _ANGLE, "Angles about fixed x, y, z: R = Rz Ry Rx (angle unit).")] | None
+    ) = None
+    quat_wxyz: Annotated[Row, Numbers(4, _RATIO, "Unit quaternion, w first.")] | None = None
+    matrix: (
+        Annotated[tuple[Row, ...], Matrix("Rotation 3x3, or homogeneous 4x4 with the position.")] | None
+    ) = None
+    axis_angle: AxisAngle | None = None
+    euler: Euler | None = None
+    yaw: Annotated[float, Number(_ANGLE, "Heading of the tool axis in world (angle unit).")] | None = None
+    pitch: (
+        Annotated[float, Number(_ANGLE, "Elevation of the tool axis over the x-y plane (angle unit).")] | None
+    ) = None
+    direction: Annotated[Row, Direction("Where the tool axis points, in world.")] | None = None
+    tool_axis: Annotated[
+        Axis | None,
+        Field(description="The axis of the tcp that yaw, pitch and direction mean; z if left out."),
+    ] = None
+    configuration: Configuration | None = None
+
+    @model_validator(mode="after")
+    def _is_one_pose(self) -> PoseFields:
+        given = [key for key in (*_ROTATIONS, *_AIMS) if getattr(self, key) is not None]
+        if len(given) > 1:
+            text = f"{given[0]} and {given[1]} exclude each other"
+            raise refuse([((given[1],), text, "leave one of them out")])
+        if self.matrix is not None and len(self.matrix) == 4 and self.xyz is not None:
+            raise refuse(
+                [(("xyz",), "a 4x4 matrix already has a position", "leave xyz out, or give a 3x3 matrix")]
+            )
+        if given and given[0] in _ROTATIONS:
+            try:
+                self.full_pose()
+            except FlawError as error:
+                raise refuse(error.flaws) from None
+        if not self.gives_pose and (self.configuration is not None or self.tool_axis is not None):
+            key = "configuration" if self.configuration is not None else "tool_axis"
+            raise refuse([((key,), f"{key} says something about a pose, and there is none", "leave it out")])
+        return self
+
+    @property
+    def pose_keys(self) -> tuple[str, ...]:
+        """The keys of a pose that are given."""
+        return tuple(key for key in ("xyz", *_ROTATIONS, *_AIMS) if getattr(self, key) is not None)
+
+    @property
+    def gives_pose(self) -> bool:
+        """Whether any part of a pose is given."""
+        return bool(self.pose_keys)
+
+    @property
+    def rotation_form(self) -> str | None:
+        """The key that gives a full orientation, if one does."""
+        return next((key for key in _ROTATIONS if getattr(self, key) is not None), None)
+
+    @property
+    def gives_position(self) -> bool:
+        """Whether the position is fixed."""
+        return self.xyz is not None or (self.matrix is not None and len(self.matrix) == 4)
+
+    def full_pose(self) -> Array:
+        """Return the pose (4, 4), lengths in m; what is not given is zero."""
+        written: dict[str, Any] = {} if self.xyz is None else {"xyz": self.xyz}
+        form = self.rotation_form
+        if form is not None:
+            value = getattr(self, form)
+            written[form] = value.model_dump(context=SI) if isinstance(value, Model) else value
+        if form == "matrix":
+            written[form] = [list(row) for row in written[form]]
+        return Pose("").read(written, SI)
