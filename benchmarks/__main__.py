@@ -15,9 +15,9 @@ from pathlib import Path
 from benchmarks.contest import REPEATS, ContestError
 from benchmarks.figures import Figure, table
 
-BENCHMARKS = ("planning", "help", "writing", "evaluation", "forward_kinematics")
+BENCHMARKS = ("planning", "help", "writing", "evaluation", "forward_kinematics", "inverse_kinematics")
 OURS = ("trajcli", "numpy", "pydantic", "pyyaml", "typer")
-THEIRS = ("roboticstoolbox-python", "numpy", "scipy")
+THEIRS = ("roboticstoolbox-python", "eaik", "numpy", "scipy")
 _VERSIONS = """
 import json, platform, sys
 from importlib.metadata import version

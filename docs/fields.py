@@ -16,6 +16,7 @@ from trajcli.planners import PLANNERS
 from trajcli.planners.bounds import UNLIMITED, Bounds, JointBound, LimitsSpec, Scale
 from trajcli.planners.fields import Target
 from trajcli.planners.per_joint import PerJoint
+from trajcli.planners.pose_fields import AxisAngle, Configuration, Direction, Euler, Matrix, Numbers
 from trajcli.planners.poses import Pose
 from trajcli.planners.reading import FieldType, Number
 from trajcli.units import Quantity, Units, unit_name
@@ -27,6 +28,9 @@ SECTIONS: dict[type, str] = {
     Target: "[state](#states)",
     Output: "[output](#output)",
     JointModel: "[joint](#joints)",
+    AxisAngle: "[axis and angle](#axis-and-angle)",
+    Euler: "[Euler angles](#euler-angles)",
+    Configuration: "[configuration](#configuration)",
 }
 """Where a model that stands inside another one is described."""
 
@@ -82,7 +86,11 @@ def _reader_form(reader: FieldType) -> str:
         return f"number{above}, {_BY_JOINT}"
     if isinstance(reader, Bounds):
         return f"[bound](#bounds), {_BY_JOINT}"
+    if isinstance(reader, Numbers):
+        return f"list of {reader.count} numbers"
     forms: dict[type, str] = {
+        Direction: "`x` or `y` or `z` or a list of 3 numbers",
+        Matrix: "3 rows of 3 numbers, or 4 of 4",
         JointBound: "[bound](#bounds)",
         Pose: "[pose](#poses)",
         RobotSource: "[robot](#robot)",
@@ -125,7 +133,7 @@ def _unit(field: FieldInfo) -> str:
     reader = field_type(field)
     if isinstance(reader, PerJoint | Bounds | JointBound):
         return "joint" + ("", "/s", "/s^2", "/s^3")[reader.order]
-    if isinstance(reader, Number):
+    if isinstance(reader, Number | Numbers):
         return _quantity_unit(reader.quantity)
     listed = [item for item in get_args(_bare(field.annotation)) if get_origin(item) is Annotated]
     inner = [item for arm in listed for item in get_args(arm) if isinstance(item, Number)]

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from kinematics import oracle_robots as oracle
 from scipy.spatial.transform import Rotation
 from test_samples import random_curve, rows_of, trajectory_of
 
-from kinematics import oracle_robots as oracle
 from trajcli.columns import column_names
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.errors import InputError
@@ -24,7 +24,7 @@ from trajcli.streams.table import read_csv
 from trajcli.units import Units
 
 TOOL = ("pose", "twist", "twistd")
-STEP = 1e-4  # s
+STEP = 1e-3  # s
 EXAMPLE = Path(__file__).parents[1] / "examples" / "ur5e_pose_columns.yaml"
 ARMS = [
     oracle.random_arm(np.random.default_rng(seed), joints, convention)
@@ -36,10 +36,9 @@ EACH_ARM = pytest.mark.parametrize("arm", ARMS, ids=lambda arm: f"{len(arm.joint
 
 
 def motion_of(arm, seed=0):
-    """A smooth motion of the arm, one polynomial of degree 5 in 2 s."""
-    curve = PiecewisePolynomial(
-        np.array([0.0, 2.0]), np.random.default_rng(seed).normal(size=(6, 1, len(arm.joints))) / 4
-    )
+    """A smooth motion of the arm, one polynomial of degree 5 in 1 s."""
+    coefficients = np.random.default_rng(seed).normal(size=(6, 1, len(arm.joints))) / 2
+    curve = PiecewisePolynomial(np.array([0.0, 1.0]), coefficients)
     return trajectory_of(curve, types=arm.joint_types)
 
 
@@ -51,10 +50,14 @@ def poses_at(arm, trajectory, times):
 
 
 def twists_at(arm, trajectory, times):
-    """The velocities (N, 6) of the tcp in world, by differences of poses."""
-    low, high = (poses_at(arm, trajectory, times + step) for step in (-STEP, STEP))
-    turn = Rotation.from_matrix(high[:, :3, :3] @ np.swapaxes(low[:, :3, :3], 1, 2)).as_rotvec()
-    return np.hstack([high[:, :3, 3] - low[:, :3, 3], turn]) / (2 * STEP)
+    """The velocities (N, 6) of the tcp in world, by differences of poses, extrapolated to order 4."""
+
+    def change(step):
+        low, high = (poses_at(arm, trajectory, times + sign * step) for sign in (-1, 1))
+        turn = Rotation.from_matrix(high[:, :3, :3] @ np.swapaxes(low[:, :3, :3], 1, 2)).as_rotvec()
+        return np.hstack([high[:, :3, 3] - low[:, :3, 3], turn])
+
+    return (8 * change(STEP) - change(2 * STEP)) / (12 * STEP)
 
 
 def turning(rate, axis_x, duration, tilt=0.0):
@@ -77,28 +80,27 @@ def test_the_pose_is_that_of_the_screws(arm):
     np.testing.assert_allclose(rows[:, 1:4], expected[:, :3, 3], rtol=0, atol=1e-12)
     turned = Rotation.from_quat(rows[:, 4:], scalar_first=True).as_matrix()
     np.testing.assert_allclose(turned, expected[:, :3, :3], rtol=0, atol=1e-12)
-    np.testing.assert_allclose(np.linalg.norm(rows[:, 4:], axis=1), 1.0, rtol=0, atol=1e-15 * 4)
+    np.testing.assert_allclose(np.linalg.norm(rows[:, 4:], axis=1), 1.0, rtol=0, atol=4e-15)
     assert rows[0, 4] >= 0
 
 
 @EACH_ARM
 def test_the_twist_is_the_difference_quotient_of_the_pose(arm):
     trajectory = motion_of(arm, 1)
-    times = np.linspace(0.1, 1.9, 23)
-    rows = rows_of(trajectory, ListedGrid(2.0, times), ("twist",), robot=arm)
+    times = np.linspace(0.05, 0.95, 23)
+    rows = rows_of(trajectory, ListedGrid(1.0, times), ("twist",), robot=arm)
     expected = twists_at(arm, trajectory, times)
-    np.testing.assert_allclose(rows, expected, rtol=0, atol=1e-6 * (1 + np.abs(expected).max()))
+    np.testing.assert_allclose(rows, expected, rtol=0, atol=1e-8 * (1 + np.abs(expected).max()))
 
 
 @EACH_ARM
 def test_the_derivative_of_the_twist_is_the_difference_quotient_of_twists(arm):
     trajectory = motion_of(arm, 2)
-    times = np.linspace(0.1, 1.9, 23)
-    rows = rows_of(trajectory, ListedGrid(2.0, times), ("twistd",), robot=arm)
-    low, high = (twists_at(arm, trajectory, times + step) for step in (-1e-3, 1e-3))
-    expected = (high - low) / 2e-3
-    np.testing.assert_allclose(rows, expected, rtol=0, atol=3e-5 * (1 + np.abs(expected).max()))
-    # Each row is in world, not in the turning axes of the tcp: there, the derivative is another one.
+    times = np.linspace(0.05, 0.95, 23)
+    rows = rows_of(trajectory, ListedGrid(1.0, times), ("twistd",), robot=arm)
+    lower, low, high, higher = (twists_at(arm, trajectory, times + k * STEP) for k in (-2, -1, 1, 2))
+    expected = (8 * (high - low) - (higher - lower)) / (12 * STEP)
+    np.testing.assert_allclose(rows, expected, rtol=0, atol=1e-7 * (1 + np.abs(expected).max()))
     assert np.abs(expected).max() > 0.1
 
 
@@ -115,14 +117,14 @@ def test_the_quaternion_goes_on_through_whole_turns_and_across_blocks():
         assert rows[-1, 4] == pytest.approx(-1)
 
 
-@pytest.mark.parametrize("size", [1, 2, 13, 4096])
+@pytest.mark.parametrize("size", [1, 13, 4096])
 def test_no_size_of_blocks_changes_a_sign(size):
     arm = ARMS[2]
     curve = random_curve(5, pieces=6, n=6)
     trajectory = trajectory_of(
         PiecewisePolynomial(curve.breaks, curve.coefficients * 3), types=arm.joint_types
     )
-    grid = UniformGrid(trajectory.duration, 300.0)
+    grid = UniformGrid(trajectory.duration, 60.0)
     whole = rows_of(trajectory, grid, TOOL, robot=arm, size=10**6)
     np.testing.assert_allclose(
         rows_of(trajectory, grid, TOOL, robot=arm, size=size), whole, rtol=1e-9, atol=1e-9
@@ -193,13 +195,13 @@ def test_memory_does_not_grow_with_the_rows():
 
     def peak(rows):
         tracemalloc.start()
-        for _ in sample(trajectory, UniformGrid(2.0, rows / 2.0), TOOL, robot=arm):
+        for _ in sample(trajectory, UniformGrid(1.0, rows), TOOL, robot=arm):
             pass
         result = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         return result
 
-    few, many = peak(1e4), peak(1e5)
+    few, many = peak(1e4), peak(5e4)
     assert many < 1.1 * few + 1e5
 
 

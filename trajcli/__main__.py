@@ -39,7 +39,7 @@ def _run() -> int:
 
 
 def _leave(code: int) -> NoReturn:
-    """End the process once all output has left it: taking the interpreter apart costs more than a small plan."""
+    """End the process once all output has left it: taking the interpreter apart costs more than planning."""
     try:
         sys.stdout.flush()
         sys.stderr.flush()

@@ -14,9 +14,6 @@ import numpy as np
 from trajcli.columns import JOINT_ORDERS, TOOL_COLUMNS, Group, check_groups, joint_factors, tool_factors
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, read_only
 from trajcli.errors import InputError
-from trajcli.geometry.quaternion import quaternion_from_matrix, without_jumps
-from trajcli.kinematics.forward import forward
-from trajcli.kinematics.jacobian import tcp_acceleration, tcp_twist
 from trajcli.kinematics.robot import Robot
 from trajcli.trajectory import Trajectory
 from trajcli.units import Units
@@ -167,10 +164,8 @@ def sample(
             if group in JOINT_ORDERS:
                 parts.append(motion[:, orders.index(JOINT_ORDERS[group])])
             elif group in TOOL_COLUMNS:
-                part = _of_tool(group, robot, motion * factors)
-                if group == "pose":
-                    part[:, 3:] = without_jumps(part[:, 3:], last)
-                    last = part[-1, 3:]
+                part = _of_tool(group, robot, motion * factors, last)
+                last = part[-1, 3:] if group == "pose" else last
                 parts.append(part / tool_factors(group, units))
             else:
                 parts.append((times if group == "t" else _moves(trajectory, local))[:, None])
@@ -185,8 +180,20 @@ def _orders(groups: Sequence[Group]) -> list[int]:
     return sorted(orders) or [0]
 
 
-def _of_tool(group: Group, robot: Robot | None, motion: Array) -> Array:
-    """Return a group of `TOOL_COLUMNS`, (N, columns), for q, qd and qdd as needed, (N, orders, n), all SI."""
+def _of_tool(group: Group, robot: Robot | None, motion: Array, last: Array | None) -> Array:
+    """Return a group of `TOOL_COLUMNS`, shape (N, columns), in SI.
+
+    Args:
+        group: Which.
+        robot: Whose tool.
+        motion: q and as many of its derivatives as the group needs, SI, shape (N, orders, n).
+        last: Quaternion of the row before, (4,); None before the first.
+    """
+    # a plan without these columns does not pay for the imports
+    from trajcli.geometry.quaternion import quaternion_from_matrix, without_jumps
+    from trajcli.kinematics.forward import forward
+    from trajcli.kinematics.jacobian import tcp_acceleration, tcp_twist
+
     if robot is None:
         raise InputError(
             f"the columns '{group}' are about a tool, and there is no robot", hint="give the robot"
@@ -196,7 +203,8 @@ def _of_tool(group: Group, robot: Robot | None, motion: Array) -> Array:
     if group == "twistd":
         return tcp_acceleration(robot, motion[:, 0], motion[:, 1], motion[:, 2])
     poses = forward(robot, motion[:, 0])
-    return np.concatenate([poses[:, :3, 3], quaternion_from_matrix(poses[:, :3, :3])], axis=1)
+    quaternions = without_jumps(quaternion_from_matrix(poses[:, :3, :3]), last)
+    return np.concatenate([poses[:, :3, 3], quaternions], axis=1)
 
 
 def _in_units(curve: PiecewisePolynomial, factors: Array) -> PiecewisePolynomial:

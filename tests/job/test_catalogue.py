@@ -15,7 +15,29 @@ from trajcli.job.robot_source import CATALOGUE, catalogue_names, load_robot
 from trajcli.kinematics.forward import forward
 
 ORACLES = Path(__file__).parents[1] / "oracles"
-ARMS = {"ur5e": "C-ur5e", "cobra600": "C-cobra600", "scorbot": "C-scorbot"}
+ARMS = {
+    "cobra600": "C-cobra600",
+    "irb120": "C-irb120",
+    "panda": "C-panda",
+    "puma560": "C-puma560",
+    "scorbot": "C-scorbot",
+    "stanford": "C-stanford",
+    "ur10e": "C-ur10e",
+    "ur5e": "C-ur5e",
+}
+EXAMPLES = {  # arms of the lecture notes: the cases of forward.yaml that they come from
+    "cartesian": ("A-bt3-fk", "A-bt7-fk"),
+    "cartesian_wrist": ("A-bt4-fk",),
+    "cylindrical": ("A-bt2-fk",),
+    "elbow": ("A-vd2.10",),
+    "elbow4r": ("A-vd2.14",),
+    "elbow6r": ("A-vd2.16",),
+    "elbow_offset": ("A-vd2.11",),
+    "planar2r": ("A-eq2.35",),
+    "planar3r": ("A-vd2.09",),
+    "rpr": ("A-vd2.13",),
+    "rrp": ("A-vd2.12",),
+}
 
 
 @cache
@@ -26,7 +48,7 @@ def oracle(file: str, key: str, name: str) -> dict[str, Any]:
 
 
 def test_every_robot_has_its_oracle() -> None:
-    assert catalogue_names() == sorted(ARMS)
+    assert catalogue_names() == sorted([*ARMS, *EXAMPLES])
 
 
 @pytest.mark.parametrize("name", ARMS)
@@ -47,6 +69,19 @@ def test_poses(name: str) -> None:
         assert forward(robot, case["q"]) == pytest.approx(np.array(case["T"]), abs=1e-12), case["id"]
 
 
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_poses_of_the_lecture_notes(name: str) -> None:
+    cases = yaml.safe_load((ORACLES / "forward.yaml").read_text(encoding="utf-8"))["cases"]
+    found = [case for case in cases if case["id"] in EXAMPLES[name]]
+    assert len(found) == len(EXAMPLES[name])
+    robot = load_robot(name)
+    for case in found:
+        tool = np.array(case["inputs"].get("tool", np.eye(4)))
+        pose = forward(robot, case["inputs"]["q"]) @ tool
+        assert pose == pytest.approx(np.array(case["expected"]["T"]), abs=1e-12), case["id"]
+    assert all(np.isinf(robot.limits.of_order(order)).all() for order in range(4))  # none are given
+
+
 @pytest.mark.parametrize("name", ARMS)
 def test_limits(name: str) -> None:
     robot = load_robot(name)
@@ -57,8 +92,9 @@ def test_limits(name: str) -> None:
             [low if np.isfinite(low) else -np.inf, high]
         )
         assert robot.limits.velocity[joint].tolist() == pytest.approx([-speed, speed])
-    assert np.isinf(robot.limits.acceleration).all()  # nobody publishes these
-    assert np.isinf(robot.limits.jerk).all()
+        for quantity in ("acceleration", "jerk"):  # hardly anybody publishes these
+            bound = row.get(quantity) or np.inf
+            assert getattr(robot.limits, quantity)[joint].tolist() == [-bound, bound]
 
 
 def test_joint_names_of_the_ur5e_are_those_of_its_description() -> None:
@@ -66,7 +102,7 @@ def test_joint_names_of_the_ur5e_are_those_of_its_description() -> None:
     assert list(load_robot("ur5e").joint_names) == [row["name"] for row in chain if row["type"] == "revolute"]
 
 
-@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize("name", [*ARMS, *EXAMPLES])
 def test_sources_are_named(name: str) -> None:
     plain = yaml.safe_load((CATALOGUE / f"{name}.yaml").read_text(encoding="utf-8"))
     assert plain["source"]

@@ -11,11 +11,10 @@ from trajcli.cli.matrix_text import number, numbers
 from trajcli.cli.printing import print_json, print_lines
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
-from trajcli.job.inline import inline_document, read_at
+from trajcli.job.inline import inline_target
 from trajcli.kinematics.inverse.solution import Solutions
 from trajcli.pipeline.arm import Arm, open_arm
-from trajcli.pipeline.inverse_answers import answers, find_answers, require_answer
-from trajcli.planners.aims import read_aim
+from trajcli.pipeline.inverse_answers import answers, find_answers, goal_of, require_answer
 from trajcli.streams.csv import Digits
 
 
@@ -47,14 +46,15 @@ def run_ik(robot: str, words: Sequence[str], options: IkOptions) -> int:
     near = None if options.near is None else arm.joint_values([options.near], "--near")
     if options.pose is None:
         return _stream(arm, near, options)
-    aim = read_at(inline_document(options.pose, "--pose"), arm.units, read_aim)
-    found, chosen = find_answers(arm, aim, near, options.tolerance)
-    told = answers(arm, found, chosen, aim.target, near, every=options.every, turns=options.turns)
+    asked = inline_target(options.pose, "--pose", arm.units)
+    target = goal_of(asked)
+    found, chosen = find_answers(arm, target, asked.configuration, near, options.tolerance)
+    told = answers(arm, found, chosen, target, near, every=options.every, turns=options.turns)
     if options.as_json:
         print_json(told)
     elif told:
         print_lines(_lines(arm, found, told))
-    require_answer(arm, found, chosen, aim.configuration)
+    require_answer(arm, found, chosen, asked.configuration)
     return 0
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 
 import typer
 import typer.core
@@ -17,12 +18,19 @@ class NumbersCommand(typer.core.TyperCommand):
 
     def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]
         """Return what is left of the words when options are taken away."""
-        ctx.ignore_unknown_options = True
-        return super().parse_args(ctx, joined(args))
+        takes: dict[str, int] = {}
+        for parameter in self.get_params(ctx):
+            if getattr(parameter, "is_flag", None) is not None:  # an option
+                count = 0 if parameter.is_flag else parameter.nargs  # type: ignore[attr-defined]
+                takes |= dict.fromkeys(parameter.opts, count)
+        return super().parse_args(ctx, sorted_words(joined(args), takes))
 
 
 def joined(args: list[str]) -> list[str]:
-    """Return the words with the numbers behind each of `JOINED` put into one word, separated by commas."""
+    """Return the words with the numbers behind each of `JOINED` put into one word, separated by commas.
+
+    A word that has commas itself holds all the numbers.
+    """
     words: list[str] = []
     rest = list(args)
     while rest and rest[0] != "--":
@@ -32,7 +40,28 @@ def joined(args: list[str]) -> list[str]:
             words.append(word)
             continue
         values = [value] if equals else []
-        while rest and _NUMBER_LIKE.fullmatch(rest[0]):
+        while rest and _NUMBER_LIKE.fullmatch(rest[0]) and "," not in "".join(values):
             values.append(rest.pop(0))
         words += [f"{name}={','.join(values)}"] if values else [word]
     return words + rest
+
+
+def sorted_words(args: list[str], takes: Mapping[str, int]) -> list[str]:
+    """Return the words with options first, then `--`, then everything else in its order.
+
+    Args:
+        args: The words as they were typed.
+        takes: How many words each option takes.
+    """
+    options: list[str] = []
+    others: list[str] = []
+    rest = list(args)
+    while rest and rest[0] != "--":
+        word = rest.pop(0)
+        if word == "-" or not word.startswith("-") or _NUMBER_LIKE.fullmatch(word):
+            others.append(word)
+            continue
+        count = takes.get(word, 0)
+        options += [word, *rest[:count]]
+        rest = rest[count:]
+    return [*options, "--", *others, *rest[1:]]

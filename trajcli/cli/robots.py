@@ -79,14 +79,22 @@ def _card_lines(card: Mapping[str, Any]) -> Iterator[str]:
         pose = card[key]
         if any(pose["xyz"]) or any(pose["rpy"]):
             yield f"{name}: xyz {numbers(pose['xyz'])} {length}, rpy {numbers(pose['rpy'])} {angle}"
+    yield f"mobility: {card['mobility']}, one for each joint of an open chain"
     yield from _reach_lines(card, length)
     yield from _inverse_lines(card["ik"])
 
 
 def _dh_row(joint: Mapping[str, Any]) -> list[str]:
     cells = [number(joint[key]) for key in _DH]
-    cells[1 if joint["type"] == "prismatic" else 0] += " + q" if joint["sign"] > 0 else " - q"
+    place = 1 if joint["type"] == "prismatic" else 0
+    cells[place] = _with_q(cells[place], joint["sign"])
     return [joint["name"], joint["type"], *cells, str(joint["sign"])]
+
+
+def _with_q(offset: str, sign: int) -> str:
+    if offset == "0":
+        return "q" if sign > 0 else "-q"
+    return f"{offset} {'+' if sign > 0 else '-'} q"
 
 
 def _limit_row(joint: Mapping[str, Any]) -> list[str]:

@@ -7,10 +7,14 @@ import re
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+from pydantic import ValidationError
+
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Problem
 from trajcli.job.document import Document
 from trajcli.job.load import parse_document, read_document
+from trajcli.job.messages import problems_of
+from trajcli.planners.pose_fields import PoseFields
 from trajcli.planners.poses import Pose
 from trajcli.planners.reading import AT_KEY, FlawError, ReadingContext
 from trajcli.units import Quantity, UnitError, Units, factor, parse_quantity, unit_name
@@ -31,8 +35,6 @@ def inline_number(word: str, name: str, quantity: Quantity, units: Units) -> flo
         if math.isfinite(value):
             return value
         raise InputError(f"{name}: {word} is too large")
-    if word.startswith("--"):
-        raise InputError(f"there is no option {word.partition('=')[0]}", hint="--help lists the options")
     try:
         return parse_quantity(word, quantity)
     except UnitError as error:
@@ -69,6 +71,29 @@ def inline_pose(word: str, name: str, units: Units) -> Array:
     """
     document = inline_document(word, name)
     return read_at(document, units, Pose(name).read)
+
+
+def inline_target(word: str, name: str, units: Units) -> PoseFields:
+    """Return the target that a word describes; what it leaves out is free.
+
+    Args:
+        word: YAML, or @FILE.
+        name: What the word is called in messages.
+        units: Of plain numbers.
+
+    Raises:
+        InputError: When it is no pose, or says nothing.
+        FileError: When the file cannot be read.
+    """
+    document = inline_document(word, name)
+    try:
+        target = PoseFields.model_validate(document.plain(), context=ReadingContext(units))
+    except ValidationError as error:
+        raise InputError(*problems_of(error, PoseFields, document)) from None
+    if not target.gives_pose:
+        hint = "give a position, an orientation or both, such as {xyz: [0.4, 0, 0.3], rpy: [0, 0, 0]}"
+        raise InputError(Problem("the target fixes nothing", hint, document.place(())))
+    return target
 
 
 def read_at(document: Document, units: Units, read: Callable[[Any, ReadingContext], T]) -> T:

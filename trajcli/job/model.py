@@ -73,7 +73,7 @@ class Output(Model):
         tuple[Group, ...],
         Field(
             min_length=1,
-            description="Groups of columns, in this order; pose, twist and twistd need a robot with geometry.",
+            description="Groups of columns, in this order; pose, twist, twistd need a robot with geometry.",
         ),
     ] = ("t", "q", "qd", "qdd")
 

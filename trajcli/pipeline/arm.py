@@ -66,7 +66,7 @@ class Arm:
         Raises:
             InputError: When there is not one for each joint, or one is no such number.
         """
-        values = [value for word in words for value in word.replace(",", " ").split()]
+        values = [value.strip() for word in words for value in word.split(",")]
         count = len(self.robot.joints)
         if len(values) != count:
             units = ", ".join(

@@ -23,8 +23,8 @@ def differential(arm: Arm, q: Array, frame: ReferenceFrame, qd: Array | None = N
     length and its angular one in the unit of angle, by second. `manipulability` is in m and rad; `condition`
     is of the Jacobian scaled by the arm's length, None where the rank is lost. `singular_directions` are unit
     vectors u with u J = 0 for the J in m and rad: components of the velocity (v, w), in the axes of `frame`,
-    that are zero for all joint rates. `idle_motions` are unit vectors of joint rates, in rad and m, that leave
-    the tcp at rest.
+    that are zero for all joint rates. `idle_motions` are unit vectors of joint rates, in rad and m, that
+    leave the tcp at rest.
 
     Args:
         arm: The arm.
@@ -58,7 +58,7 @@ def _directions(arm: Arm, q: Array, frame: ReferenceFrame, blocked: Array, lengt
 
 
 def simplest(rows: Array) -> Array:
-    """Return unit vectors (k, m) that span the same space as `rows`, with the zeros that elimination gives."""
+    """Return unit vectors (k, m) that span the space of `rows`, with the zeros that elimination gives."""
     left = np.array(rows)
     done: list[int] = []
     for _ in range(len(left)):

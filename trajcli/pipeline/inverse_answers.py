@@ -13,35 +13,52 @@ from trajcli.errors import InputError, PlanningError
 from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.dexterity import RANK_TOLERANCE, characteristic_length
 from trajcli.kinematics.forward import forward
-from trajcli.kinematics.inverse.method import Branch
 from trajcli.kinematics.inverse.solution import Solutions
 from trajcli.kinematics.inverse.solve import solve
-from trajcli.kinematics.inverse.target import Target, residual_jacobian
+from trajcli.kinematics.inverse.target import Target, partial_target, residual_jacobian
 from trajcli.kinematics.inverse.turns import all_turns
 from trajcli.kinematics.inverse.verdict import check_reachable
 from trajcli.kinematics.jacobian import jacobian
 from trajcli.pipeline.arm import Arm
 from trajcli.pipeline.differential import simplest
 from trajcli.pipeline.pose_view import plain
-from trajcli.planners.aims import Aim
+from trajcli.planners.pose_fields import Configuration, PoseFields
 
 _LOST = max(RANK_TOLERANCE, 1e-7)  # of the largest singular value: answers meet their target within rounding
 
 
-def find_answers(arm: Arm, aim: Aim, near: Array | None, tolerance: float) -> tuple[Solutions, Flags]:
+def goal_of(fields: PoseFields) -> Target:
+    """Return the coordinates of the tcp's pose that a target fixes."""
+    pose = fields.full_pose()
+    position = pose[:3, 3] if fields.gives_position else None
+    if fields.rotation_form is not None:
+        return partial_target(position, rotation=pose[:3, :3])
+    return partial_target(
+        position,
+        direction=fields.direction,
+        yaw=fields.yaw,
+        pitch=fields.pitch,
+        tool_axis=fields.tool_axis or "z",
+    )
+
+
+def find_answers(
+    arm: Arm, target: Target, configuration: Configuration | None, near: Array | None, tolerance: float
+) -> tuple[Solutions, Flags]:
     """Return all branches of one target, and which of them are answers as it is asked for, shape (branches,).
 
     Args:
         arm: The arm.
-        aim: One target, with or without names of branches.
+        target: One target.
+        configuration: The names that a branch must have.
         near: Joint values (n,), rad or m; zero if absent.
         tolerance: What an answer may miss the target by, m and rad.
 
     Raises:
-        InputError: When the target asks for a choice that the arm does not have.
+        InputError: When a choice is asked for that the arm does not have for this target.
     """
-    found = solve(arm.robot, aim.target, near, tolerance)
-    wanted = {choice: name for choice, name in asdict(aim.configuration).items() if name is not None}
+    found = solve(arm.robot, target, near, tolerance)
+    wanted = _named(configuration)
     for choice in wanted:
         if getattr(found.names[0], choice) is None:
             raise InputError(
@@ -50,6 +67,12 @@ def find_answers(arm: Arm, aim: Aim, near: Array | None, tolerance: float) -> tu
             )
     fits = [all(getattr(name, key) == value for key, value in wanted.items()) for name in found.names]
     return found, found.valid & np.array(fits)
+
+
+def _named(configuration: Configuration | None) -> dict[str, str]:
+    """Return the choices that are named."""
+    given = {} if configuration is None else configuration.model_dump()
+    return {choice: name for choice, name in given.items() if name is not None}
 
 
 def answers(
@@ -87,7 +110,7 @@ def answers(
     return [answer for _, answer in told]
 
 
-def require_answer(arm: Arm, found: Solutions, chosen: Flags, configuration: Branch) -> None:
+def require_answer(arm: Arm, found: Solutions, chosen: Flags, configuration: Configuration | None) -> None:
     """Do nothing when one of the chosen branches is within the limits.
 
     Raises:
@@ -95,11 +118,12 @@ def require_answer(arm: Arm, found: Solutions, chosen: Flags, configuration: Bra
     """
     if (chosen & found.within_limits).any():
         return
-    if found.valid.any() and configuration != Branch():
+    named = " ".join(_named(configuration).values())
+    if found.valid.any() and named:
         others = [str(name) for name, fine in zip(found.names, found.within_limits, strict=True) if fine]
         only = "only outside the limits" if chosen.any() else "not at all"
         raise PlanningError(
-            f"{arm.robot.name} reaches the pose with {configuration} {only}",
+            f"{arm.robot.name} reaches the pose with {named} {only}",
             hint=f"within the limits: {'; '.join(others)}" if others else "no other branch is inside either",
         )
     try:

@@ -13,7 +13,7 @@ from trajcli.geometry.axis_angle import axis_angle_from_matrix
 from trajcli.geometry.euler import EulerAngles, check_sequence, euler_from_matrix, rpy_from_matrix
 from trajcli.geometry.pose import transform_points
 from trajcli.geometry.rotation import Frame
-from trajcli.pipeline.pose_view import plain, pose_view
+from trajcli.pipeline.pose_view import angles_view, plain, pose_view
 from trajcli.suggest import did_you_mean
 from trajcli.units import AngleUnit, LengthUnit, Quantity, Units, factor
 
@@ -71,7 +71,7 @@ def pose_report(
     if euler is not None:
         sequence, frame = euler
         found = euler_from_matrix(sequence, rotation, frame)
-        told["euler"] = [plain(found.angles / angle), plain(found.alternative / angle)]
+        told["euler"] = [angles_view(found.angles, units), angles_view(found.alternative, units)]
         singular |= _at_lock("euler", ("the first axis", "the third"), found, units)
     if about.axis_free:
         singular["axis_angle"] = "the angle is zero: any axis is right"

@@ -17,12 +17,13 @@ from trajcli.kinematics.inverse.choose import method_for
 from trajcli.kinematics.inverse.solution import Solutions
 from trajcli.kinematics.inverse.solve import fits, solve
 from trajcli.kinematics.inverse.target import Target, partial_target
-from trajcli.kinematics.inverse.turns import FULL, choose_turns, revolute
+from trajcli.kinematics.inverse.turns import FULL, beyond, choose_turns, revolute
 from trajcli.kinematics.inverse.verdict import check_reachable
 from trajcli.pipeline.arm import Arm
 from trajcli.pipeline.joint_stream import Stream
 from trajcli.streams.table import Rows
 
+_STRETCH = 256  # rows that are looked at together
 _AXES, _QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
 
 
@@ -56,14 +57,16 @@ def _follow(arm: Arm, rows: Rows, wanted: _Wanted, near: Array | None, tolerance
     last = np.zeros(len(arm.robot.joints)) if near is None else near
     done = 0
     for block in rows.blocks:
-        target = _targets(block, wanted, done, rows.file)
-        followed = _Follower(arm, target, last, tolerance)
+        follower = _Follower(arm, _targets(block, wanted, done, rows.file), last, tolerance)
         joints = np.empty((len(block), len(last)))
-        for row in range(len(block)):
+        row = 0
+        while row < len(block):
             try:
-                last = joints[row] = followed.next(row, last)
+                found = follower.take(row, last)
             except PlanningError as error:
                 raise _of_row(arm, error, block, wanted, row, done) from None
+            joints[row : row + len(found)] = found
+            row, last = row + len(found), found[-1]
         done += len(block)
         times = block[:, :0] if wanted.time is None else block[:, [wanted.time]]
         yield np.hstack([times, joints / arm.joint_factors])
@@ -83,23 +86,44 @@ class _Follower:
             alone = self._found.singular.any(axis=-1) | ~self._usable.any(axis=-1)
             self._alone: Flags = np.asarray(alone)
 
-    def next(self, row: int, last: Array) -> Array:
-        """Return the answer (n,) of a row that is nearest to `last` (n,).
+    def take(self, row: int, last: Array) -> Array:
+        """Return the answers (k, n), k >= 1, of the rows from `row` on, each nearest to the one before.
+
+        Args:
+            row: Of the block.
+            last: Joint values (n,) of the row before.
 
         Raises:
-            PlanningError: When there is none within the limits.
+            PlanningError: When the row has none within the limits.
         """
         if self._found is None or self._alone[row]:
-            return self._solved_alone(row, last)
-        joints = self._found.joints[row][self._usable[row]]
-        apart = joints - last
-        wrapped = np.where(self._turning, apart - FULL * np.round(apart / FULL), apart)
-        best = int(np.argmin(np.abs(wrapped).max(axis=1)))
-        if (wrapped[best] == apart[best]).all():
-            return np.array(joints[best])
-        turned = np.ascontiguousarray(joints.T)[..., None]
+            return self._solved_alone(row, last)[None]
+        stretch = self._on_one_branch(self._found, row, last)
+        return stretch if len(stretch) else self._nearest(self._found, row, last)[None]
+
+    def _on_one_branch(self, found: Solutions, row: int, last: Array) -> Array:
+        """Return the answers while one branch stays the nearest and inside the limits; maybe none."""
+        rows = slice(row, row + _STRETCH)
+        joints, usable = found.joints[rows], self._usable[rows]
+        branch = int(self._apart(joints[0] - last, usable[0]).argmin())
+        along = joints[:, branch]
+        gaps = joints - np.concatenate([last[None], along[:-1]])[:, None]
+        same = self._apart(gaps, usable).argmin(axis=1) == branch
+        turns = np.where(self._turning, np.round(gaps[:, branch] / FULL), 0.0).cumsum(axis=0)
+        values = along - FULL * turns
+        inside = (beyond(values, found.bounds) == 0.0).all(axis=1)
+        ends = np.flatnonzero(~(same & inside & ~self._alone[rows]))
+        return np.asarray(values[: ends[0]] if len(ends) else values)
+
+    def _apart(self, gaps: Array, usable: Flags) -> Array:
+        """Return the largest difference of any joint, whole turns left out; infinite where not usable."""
+        wrapped = np.where(self._turning, gaps - FULL * np.round(gaps / FULL), gaps)
+        return np.where(usable, np.abs(wrapped).max(axis=-1), np.inf)
+
+    def _nearest(self, found: Solutions, row: int, last: Array) -> Array:
+        turned = np.ascontiguousarray(found.joints[row][self._usable[row]].T)[..., None]
         choose_turns(self._arm.robot, turned, last[:, None])
-        best = int(np.argmin(np.abs(turned[..., 0] - last[:, None]).max(axis=0)))
+        best = int(np.abs(turned[..., 0] - last[:, None]).max(axis=0).argmin())
         return np.array(turned[:, best, 0])
 
     def _solved_alone(self, row: int, last: Array) -> Array:

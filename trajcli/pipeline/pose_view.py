@@ -25,9 +25,15 @@ def pose_view(pose: Array, units: Units) -> dict[str, Any]:
     return {
         "matrix": plain(shown),
         "xyz": plain(shown[:3, 3]),
-        "rpy": plain(rpy_from_matrix(rotation).angles / factor(Quantity("angle"), units)),
+        "rpy": angles_view(rpy_from_matrix(rotation).angles, units),
         "quat_wxyz": plain(quaternion_from_matrix(rotation)),
     }
+
+
+def angles_view(angles: Array, units: Units) -> list[float]:
+    """Return angles, rad, in the given units; of half a turn the positive one, which is the same."""
+    shown: list[float] = plain(np.where(angles == -np.pi, np.pi, angles) / factor(Quantity("angle"), units))
+    return shown
 
 
 def plain(values: ArrayLike) -> Any:  # noqa: ANN401

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, PlanningError, Problem
@@ -41,8 +42,10 @@ def with_joints(target: Target, robot: Robot, near: Array) -> tuple[Target, list
         hint = "give its joints theta, d, a and alpha, or the target `joints`"
         raise InputError(f"{robot.name} has no geometry, so it reaches no pose", hint=hint)
     joints = _nearest_branch(target, robot, near)
-    kept = {"velocity": target.velocity, "acceleration": target.acceleration}
-    return Target.model_construct(joints=tuple(joints.tolist()), **kept), _mended(target)
+    reached = Target(
+        joints=tuple(joints.tolist()), velocity=target.velocity, acceleration=target.acceleration
+    )
+    return reached, _mended(target)
 
 
 def start_state(target: Target, robot: Robot) -> tuple[State, list[Event]]:
@@ -75,7 +78,9 @@ def _nearest_branch(target: Target, robot: Robot, near: Array) -> Array:
     return np.asarray(found.joints[int(distance.argmin())])
 
 
-def _of_configuration(wanted: Configuration | None, names: list[str], robot: Robot, method: str) -> Array:
+def _of_configuration(
+    wanted: Configuration | None, names: list[str], robot: Robot, method: str
+) -> NDArray[np.bool_]:
     """Return which branches have the wanted names."""
     chosen = np.ones(len(names), dtype=bool)
     for word in _asked(wanted):

@@ -56,7 +56,7 @@ def reach_of(robot: Robot) -> Reach | None:
 
 
 def _furthest(robot: Robot, ranges: Array) -> float:
-    """Return the largest distance of the tcp from the base: random draws, then ever closer around the best."""
+    """Return the largest distance of the tcp from the base: random draws, then ever closer to the best."""
     draws = np.random.default_rng(_SEED)
     low, high = ranges.T
     best = draws.uniform(low, high, (_DRAWN, len(ranges)))
@@ -97,6 +97,7 @@ def robot_card(name: str, sheet: RobotSheet) -> dict[str, Any]:
         "joints": [_joint_card(sheet, index) for index in range(len(robot.joints))],
         "base": pose_view(robot.base, units),
         "tool": pose_view(robot.tool, units),
+        "mobility": len(robot.joints),
         "reach": reach and {key: _finite(value / length) for key, value in asdict(reach).items()},
         "ik": None if robot.convention is None else _inverse_card(robot),
     }

@@ -1,0 +1,39 @@
+"""Words that are numbers, and options that take several of them."""
+
+from __future__ import annotations
+
+import pytest
+
+from trajcli.cli.number_words import joined, sorted_words
+
+TAKES = {"--robot": 1, "-r": 1, "--json": 0, "--point": 3}
+
+JOINED = [
+    ("--qd 1 -2 .5 -- 3 -4", "--qd=1,-2,.5 -- 3 -4"),
+    ("3 -4 --qd 1 -2", "3 -4 --qd=1,-2"),
+    ("--qd 1,-2 3 -4", "--qd=1,-2 3 -4"),
+    ("--qd=1 -2 --json 3", "--qd=1,-2 --json 3"),
+    ("--near --json", "--near --json"),
+    ("--near 10deg -5mm --json", "--near=10deg,-5mm --json"),
+    ("-- --qd 1", "-- --qd 1"),
+]
+
+
+@pytest.mark.parametrize(("given", "expected"), JOINED)
+def test_numbers_behind_an_option_are_joined(given: str, expected: str) -> None:
+    assert joined(given.split()) == expected.split()
+
+
+SORTED = [
+    ("--robot ur5e 0 -90 --json 90", "--robot ur5e --json -- 0 -90 90"),
+    ("-90 -r ur5e -- -1 --json", "-r ur5e -- -90 -1 --json"),
+    ("{a} --point -2 1 1 {b}", "--point -2 1 1 -- {a} {b}"),
+    ("- --robot=ur5e", "--robot=ur5e -- -"),
+    ("--jsn 1", "--jsn -- 1"),
+    ("--robot", "--robot --"),
+]
+
+
+@pytest.mark.parametrize(("given", "expected"), SORTED)
+def test_negative_numbers_are_no_options(given: str, expected: str) -> None:
+    assert sorted_words(given.split(), TAKES) == expected.split()

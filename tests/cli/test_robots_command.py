@@ -1,0 +1,139 @@
+"""`trajcli robots`: the list, one robot in words and as data, and files that read as the same robot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from arm_calls import Arms
+
+from trajcli.job.robot_source import CATALOGUE, catalogue_names, load_robot
+from trajcli.kinematics.forward import forward
+
+
+@pytest.fixture
+def arms(capfd, monkeypatch):
+    return Arms(capfd, monkeypatch)
+
+
+def test_the_list(arms):
+    code, out, err = arms.call("robots")
+    head, *lines = out.splitlines()
+    assert (code, err) == (0, "")
+    assert head.split() == ["name", "joints", "kind", "reach", "(m)", "source"]
+    assert [line.split()[0] for line in lines] == catalogue_names()
+    told = arms.json("robots")
+    assert [row["name"] for row in told] == catalogue_names()
+    assert {"name", "title", "joints", "kind", "reach", "source"} == set(told[0])
+    kinds = {row["name"]: (row["joints"], row["kind"]) for row in told}
+    assert kinds["panda"] == (7, "7R")
+    assert kinds["stanford"] == (6, "RRPRRR")
+    assert kinds["rpr"] == (3, "RPR")
+
+
+REACH = {  # by hand: stretched arms
+    "planar3r": 0.6,
+    "elbow": 0.5 + 0.3 + 0.25,  # straight up
+    "elbow_offset": np.hypot(0.5 + np.hypot(0.55, 0.0), np.hypot(0.1, 0.15)),
+}
+
+
+def test_reach(arms):
+    for name, furthest in REACH.items():
+        reach = arms.json("robots", name)["reach"]
+        assert furthest * 0.995 <= reach["sampled"] <= reach["bound"] + 1e-9, name
+        assert reach["bound"] >= furthest - 1e-9, name
+    assert arms.json("robots", "rrp")["reach"] == {"sampled": None, "bound": None}
+
+
+@pytest.mark.parametrize("name", ["ur5e", "panda", "stanford", "cobra600", "scorbot", "irb120"])
+def test_no_configuration_reaches_further(arms, name):
+    robot, reach = load_robot(name), arms.json("robots", name)["reach"]
+    draws = np.random.default_rng(1)
+    bounds = np.clip(robot.limits.position, -np.pi, 2 * np.pi)
+    poses = forward(robot, draws.uniform(*bounds.T, (3000, len(robot.joints))))
+    distances = np.linalg.norm(poses[:, :3, 3] - robot.base[:3, 3], axis=1)
+    assert distances.max() <= reach["sampled"] * (1 + 1e-4)
+    assert reach["sampled"] <= reach["bound"]
+
+
+def test_one_robot_as_data(arms):
+    told = arms.json("robots", "ur5e")
+    assert told["convention"] == "standard"
+    assert told["joints"][1] == {
+        "name": "shoulder_lift_joint",
+        "type": "revolute",
+        "theta": 0,
+        "d": 0,
+        "a": -0.425,
+        "alpha": 0,
+        "sign": 1,
+        "position": [-360, 360],
+        "velocity": [-180, 180],
+        "acceleration": None,
+        "jerk": None,
+    }
+    assert told["units"] == {"angle": "deg", "length": "m"}
+    assert told["base"]["rpy"] == pytest.approx([0, 0, 180])
+    assert len(told["ik"]["branches"]) == 8
+    assert told["ik"]["reason"]
+    assert (told["mobility"], told["kind"]) == (6, "6R")
+    assert arms.json("robots", "panda")["ik"]["family"] == "numeric"
+
+
+@pytest.mark.parametrize("name", catalogue_names())
+def test_one_robot_in_words(arms, name):
+    code, out, err = arms.call("robots", name)
+    assert (code, err) == (0, "")
+    robot = load_robot(name)
+    assert out.startswith(f"{robot.name}: ")
+    for word in (
+        "source: ",
+        "licence: ",
+        "note: ",
+        "Denavit-Hartenberg table",
+        "limits (",
+        "reach",
+        "because ",
+    ):
+        assert word in out
+    assert all(out.count(joint) >= 2 for joint in robot.joint_names)
+    assert max(map(len, out.splitlines())) <= 110
+
+
+@pytest.mark.parametrize("name", catalogue_names())
+def test_the_file_to_start_from_is_the_same_robot(arms, name, tmp_path):
+    code, out, _ = arms.call("robots", name, "--yaml")
+    (tmp_path / "mine.yaml").write_text(out)
+    assert code == 0
+    assert out == (CATALOGUE / f"{name}.yaml").read_text("utf-8")
+    q = np.full(len(load_robot(name).joints), 0.3)
+    assert forward(load_robot(tmp_path / "mine.yaml"), q).tolist() == forward(load_robot(name), q).tolist()
+
+
+def test_a_file_of_the_user(arms, tmp_path):
+    (tmp_path / "bare.yaml").write_text("joints: [{position: [-1, 2], velocity: 3}, {}]\n")
+    code, out, err = arms.call("robots", tmp_path / "bare.yaml")
+    assert (code, err) == (0, "")
+    assert "bare joints without geometry" in out
+    assert "-1 .. 2" in out
+    told = arms.json("robots", tmp_path / "bare.yaml")
+    assert (told["reach"], told["ik"], told["convention"]) == (None, None, None)
+    assert "theta" not in told["joints"][0]
+
+
+BAD = [
+    (["ur5"], 2, "did you mean 'ur5e'?"),
+    (["no.yaml"], 4, "there is no file 'no.yaml'"),
+    (["--yaml"], 2, "--yaml prints the file of one robot"),
+    (["ur5e", "--yaml", "--json"], 2, "exclude each other"),
+]
+
+
+@pytest.mark.parametrize(("words", "code", "message"), BAD, ids=[row[2] for row in BAD])
+def test_wrong_calls(arms, words, code, message, tmp_path: Path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    outcome = arms.call("robots", *words)
+    assert (outcome.code, outcome.out) == (code, "")
+    assert message in outcome.err
