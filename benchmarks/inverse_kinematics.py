@@ -1,4 +1,4 @@
-"""Inverse kinematics: all eight branches of two kinds of arm, one answer each, and one call of the command."""
+"""Inverse kinematics: all branches of two kinds of arm, one answer each, and one call of the command."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ def fk(
 @guarded
 def ik(
     robot: RobotName,
-    rows: Annotated[list[str] | None, typer.Argument(metavar="[-]", help="- reads poses from a CSV.")] = None,
+    rows: Annotated[list[str] | None, typer.Argument(metavar="-", help="- reads poses from a CSV.")] = None,
     pose: Annotated[
         str | None,
         typer.Option(
@@ -74,7 +74,9 @@ def ik(
     ] = None,
     near: Annotated[
         str | None,
-        typer.Option("--near", metavar="Q...", help="Joint values to be near to, instead of zero."),
+        typer.Option(
+            "--near", metavar="Q...", help="Joint values to be near to, instead of zero; -- ends them."
+        ),
     ] = None,
     every: Annotated[bool, typer.Option("--all", help="Also answers outside the limits.")] = False,
     turns: Annotated[
@@ -106,7 +108,11 @@ def jacobian(
     ] = "world",
     rates: Annotated[
         str | None,
-        typer.Option("--qd", metavar="V...", help="A rate for each joint, for the acceleration they cause."),
+        typer.Option(
+            "--qd",
+            metavar="V...",
+            help="A rate for each joint, for the acceleration they cause; -- ends them.",
+        ),
     ] = None,
     si: Si = False,
     as_json: Json = False,
@@ -166,7 +172,7 @@ def pose(
 @guarded
 def robots(
     name: Annotated[
-        str | None, typer.Argument(metavar="[NAME|FILE]", help="One robot; without it all are listed.")
+        str | None, typer.Argument(metavar="NAME|FILE", help="One robot; without it all are listed.")
     ] = None,
     as_yaml: Annotated[
         bool, typer.Option("--yaml", help="Print the robot's file, to start a new one from.")

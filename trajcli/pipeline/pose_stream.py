@@ -13,10 +13,12 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Place, PlanningError, Problem
 from trajcli.geometry.quaternion import QUATERNION_DEFECT, matrix_from_quaternion
 from trajcli.geometry.rotation import Flags
+from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.choose import method_for
+from trajcli.kinematics.inverse.numeric import descend
 from trajcli.kinematics.inverse.solution import Solutions
 from trajcli.kinematics.inverse.solve import fits, solve
-from trajcli.kinematics.inverse.target import Target, partial_target
+from trajcli.kinematics.inverse.target import Target, closure_of, partial_target
 from trajcli.kinematics.inverse.turns import FULL, beyond, choose_turns, revolute
 from trajcli.kinematics.inverse.verdict import check_reachable
 from trajcli.pipeline.arm import Arm
@@ -24,6 +26,7 @@ from trajcli.pipeline.joint_stream import Stream
 from trajcli.streams.table import Rows
 
 _STRETCH = 256  # rows that are looked at together
+_CLOSE = 0.2  # rad or m: a larger step may have missed a nearer answer, so all are sought
 _AXES, _QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
 
 
@@ -40,7 +43,8 @@ def joints_of(arm: Arm, rows: Rows, near: Array | None, tolerance: float) -> Str
     """Return t, where there is one, and joint values for each row of poses (x y z, and qw qx qy qz or none).
 
     Of all answers within the limits the one nearest to the row before is taken, in the first row the one
-    nearest to `near`; the distance is the largest difference of any joint.
+    nearest to `near`; the distance is the largest difference of any joint. Where no closed form fits, the row
+    before is continued by the shortest steps instead, and all answers are sought only where that fails.
 
     Raises:
         InputError: When a column is missing; when taken, if a row is wrong.
@@ -96,7 +100,10 @@ class _Follower:
         Raises:
             PlanningError: When the row has none within the limits.
         """
-        if self._found is None or self._alone[row]:
+        if self._found is None:
+            continued = self._continued(row, last)
+            return self._solved_alone(row, last)[None] if continued is None else continued
+        if self._alone[row]:
             return self._solved_alone(row, last)[None]
         stretch = self._on_one_branch(self._found, row, last)
         return stretch if len(stretch) else self._nearest(self._found, row, last)[None]
@@ -125,6 +132,15 @@ class _Follower:
         choose_turns(self._arm.robot, turned, last[:, None])
         best = int(np.abs(turned[..., 0] - last[:, None]).max(axis=0).argmin())
         return np.array(turned[:, best, 0])
+
+    def _continued(self, row: int, last: Array) -> Array | None:
+        """Return the answer (1, n) that Newton's steps find near to the row before; None where they fail."""
+        robot, target = self._arm.robot, self._target.rows([row])
+        joints, found = descend(robot, target, last[None], robot.limits.position)
+        close = np.abs(joints - last).max() <= _CLOSE
+        inside = (beyond(joints, robot.limits.position) == 0.0).all()
+        met = found[0] and closure_of(target, forward(robot, joints)).max() <= self._tolerance
+        return joints if close and inside and met else None
 
     def _solved_alone(self, row: int, last: Array) -> Array:
         found = solve(self._arm.robot, self._target.rows([row]), last, self._tolerance)
