@@ -33,8 +33,8 @@ types: $(STAMP)
 test: $(STAMP)
 	$(BIN)/python -m pytest -n auto
 
-soak: $(STAMP)  ## long random campaigns
-	$(BIN)/python -m pytest -n auto -m soak
+soak: $(STAMP)  ## long random campaigns, and the random tests of `make test` with new examples
+	HYPOTHESIS_PROFILE=random $(BIN)/python -m pytest -n auto -m "soak or not soak"
 
 bench: $(STAMP) $(PEERS)/.installed  ## ratios against named peers, in one run
 	$(BIN)/python -m benchmarks --peers $(PEERS)/bin/python

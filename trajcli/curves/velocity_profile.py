@@ -9,6 +9,8 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, increasing
 
+_ROUNDING = 1e-14  # of the largest speed: speeds this close differ by rounding
+
 
 @dataclass(frozen=True)
 class Rates:
@@ -82,7 +84,7 @@ class Profile:
             end: Where it ends: `start` plus the distance, rounding apart.
             duration: When it ends: the duration, rounding apart.
         """
-        knots = [knot for knot in self.knots if knot[0] > 0]
+        knots = self._lasting_knots()
         if not knots:
             return PiecewisePolynomial(np.zeros(2), np.full((1, 1, 1), start))
         lengths = np.array([length for length, _ in knots])
@@ -95,3 +97,19 @@ class Profile:
         slope = np.diff(velocity) / np.diff(breaks)  # so that velocities meet where breaks are rounded
         coefficients: Array = np.stack([slope / 2, velocity[:-1], position[:-1]])[:, :, None]
         return PiecewisePolynomial(breaks, coefficients)
+
+    def _lasting_knots(self) -> list[tuple[float, float]]:
+        """Return the knots without stretches of no length, and ramps between speeds equal but for rounding.
+
+        Such a ramp is shorter than the times of its ends are exact: its acceleration would be anything.
+        """
+        fastest = max(abs(velocity) for velocity in (self.initial, *(v for _, v in self.knots)))
+        shortest = 8 * math.ulp(self.duration)
+        kept: list[tuple[float, float]] = []
+        before = self.initial
+        for length, velocity in self.knots:
+            same = abs(velocity - before) <= _ROUNDING * fastest
+            if length > (shortest if same else 0.0):
+                kept.append((length, before if same else velocity))
+                before = kept[-1][1]
+        return kept

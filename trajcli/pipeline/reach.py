@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,9 +12,6 @@ from trajcli.planners.fields import Target
 from trajcli.planners.planner import Event
 from trajcli.planners.pose_fields import Configuration
 from trajcli.trajectory import State
-
-if TYPE_CHECKING:
-    from trajcli.kinematics.inverse.target import Target as Goal
 
 _NOTED = 1e-12  # a smaller defect of a rotation matrix is rounding
 _CHOICES = ("shoulder", "elbow", "wrist")
@@ -62,8 +57,9 @@ def start_state(target: Target, robot: Robot) -> tuple[State, list[Event]]:
 def _nearest_branch(target: Target, robot: Robot, near: Array) -> Array:
     from trajcli.kinematics.inverse.solve import solve
     from trajcli.kinematics.inverse.verdict import check_reachable
+    from trajcli.pipeline.inverse_answers import goal_of
 
-    found = solve(robot, _wanted(target), near)
+    found = solve(robot, goal_of(target), near)
     check_reachable(robot, found)
     chosen = _of_configuration(
         target.configuration, [str(name) for name in found.names], robot, found.method.name
@@ -95,24 +91,6 @@ def _of_configuration(
 
 def _asked(wanted: Configuration | None) -> list[str]:
     return [word for choice in _CHOICES if (word := getattr(wanted, choice, None)) is not None]
-
-
-def _wanted(target: Target) -> Goal:
-    from trajcli.kinematics.inverse.target import partial_target, pose_target
-
-    pose = target.full_pose()
-    if target.gives_position and target.rotation_form is not None:
-        return pose_target(pose)
-    position = pose[:3, 3] if target.gives_position else None
-    if target.rotation_form is not None:
-        return partial_target(position, rotation=pose[:3, :3])
-    return partial_target(
-        position,
-        direction=target.direction,
-        yaw=target.yaw,
-        pitch=target.pitch,
-        tool_axis=target.tool_axis or "z",
-    )
 
 
 def _mended(target: Target) -> list[Event]:

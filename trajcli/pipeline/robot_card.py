@@ -15,7 +15,8 @@ from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.pipeline.pose_view import pose_view
 from trajcli.units import Quantity, factor, to_user
 
-_SEED, _ROUNDS, _DRAWN, _KEPT = 20, 8, 1024, 32  # measured: the largest of the catalogue's within 1e-4
+# Measured: within 2e-4 of what ten times as many draws find, for every robot of the catalogue.
+_SEED, _ROUNDS, _DRAWN, _KEPT = 20, 8, 1024, 32
 
 
 @dataclass(frozen=True)
