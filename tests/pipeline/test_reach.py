@@ -175,3 +175,10 @@ def test_a_resolved_job_with_poses_reads_as_the_same_job() -> None:
     again = job_from_text(dump_job(job))
     assert again.job.moves == job.job.moves
     assert dump_job(again) == dump_job(job)
+
+
+@pytest.mark.parametrize(("pitch", "up"), [(-90, -1), (90, 1)])
+def test_a_tool_may_point_straight_up_or_down(pitch: float, up: int) -> None:
+    plan = planned("{xyz: [400, 100, 300], pitch: " + str(pitch) + "}")
+    pose = tcp_of(plan.loaded.robot, ends(plan))
+    np.testing.assert_allclose(pose[:3, 2], [0, 0, up], atol=1e-8, rtol=0)

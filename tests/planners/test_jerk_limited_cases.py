@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from jerk_limited_moves import arm, excesses, misses, move_to, peaks, ruckigs_own, state, steps
 
+from trajcli.job.read import job_from_text
+from trajcli.pipeline.plan import plan_job
 from trajcli.planners.profile import Task
 from trajcli.planners.ruckig_solve import fastest, fastest_of
 
@@ -149,3 +151,23 @@ def test_solver_without_a_jerk_or_acceleration_limit(control, order):
     assert slower.duration == 4.0
     assert np.abs(slower.curve().piece_ends(1)).max() <= 2.0 * (1 + 1e-12)
     assert {phase.name for phase in profile.phases(0)} <= {"constant acceleration", "cruise", "rest"}
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(
+    ("speed", "a", "j"), [(20, 100, 1000), (1000, 200, 1000), (180, 800, 8000), (1000, 400, 2000)]
+)
+def test_a_displacement_that_just_reaches_the_acceleration_limit(
+    speed: float, a: float, j: float, sign: int
+) -> None:
+    # in degrees: converted to radians, these are where one case of ruckig's ends and the next begins
+    text = (
+        "version: 1\nunits: {angle: deg}\nrobot: {joints: 1}\nstart: {joints: [0]}\n"
+        f"limits: {{velocity: {speed}, acceleration: {a}, jerk: {j}}}\n"
+        f"moves:\n  - {{planner: jerk_limited, to: {{joints: [{sign * 2 * a**3 / j**2}]}}}}\n"
+    )
+    plan = plan_job(job_from_text(text))
+    assert plan.verdict.passed
+    assert plan.trajectory.duration == pytest.approx(
+        4 * a / j, rel=1e-9
+    )  # four ramps of the jerk, nothing between

@@ -50,10 +50,10 @@ def run_plan(job: str, overrides: Sequence[str], options: PlanOptions) -> int:
         raise verification_error(plan)
     if options.strict and plan.events:
         raise VerificationError(*(_problem(plan, event) for event in plan.events))
-    if not options.quiet:
-        _summarise(plan, grid.count, options)
     if not options.no_output:
         write_rows(plan, grid, options.output, options.digits)
+    if not options.quiet:
+        _summarise(plan, grid.count, options)
     return 0
 
 

@@ -123,7 +123,7 @@ def _problem(plan: Plan, finding: Finding) -> Problem:
         what, bound, hint = "jumps by", "", finding.hint
     else:
         what, bound = "reaches", ", its limit is {limit}"
-        hint = _remedy(plan.moves[index], finding)
+        hint = _remedy(plan, plan.moves[index], finding)
     text = f"{where}the {quantity} of {finding.joint} {what} {{value}} at t = {finding.time:.9g} s{bound}"
     return Problem(
         said(text, amounts, loaded.say),
@@ -137,8 +137,18 @@ def _problem(plan: Plan, finding: Finding) -> Problem:
     )
 
 
-def _remedy(move: PlannedMove, finding: Finding) -> str:
-    if finding.factor is None:
-        return "slowing down does not help: change the target, the start or the limit"
-    lasting = move.duration * finding.factor
-    return f"it must last {finding.factor:.6g} times longer ({lasting:.6g} s), or say `when_over_limit: slow`"
+def _remedy(plan: Plan, move: PlannedMove, finding: Finding) -> str:
+    useless = "slowing down does not help: change the target, the start or the limit"
+    if finding.factor is None or (move.planner.when_over_limit or plan.loaded.job.when_over_limit) == "slow":
+        return useless
+    if move.start.at_rest and move.planned.end.at_rest:
+        lasting = move.duration * finding.factor
+        longer = f"{finding.factor:.6g} times longer ({lasting:.6g} s)"
+        return f"it must last {longer}, or say `when_over_limit: slow`"
+    order, joint = QUANTITIES.index(finding.kind), move.robot.joint_names.index(finding.joint or "")
+    ends = [
+        (s.velocity, s.acceleration)[order - 1][joint] for s in (move.start, move.planned.end) if order < 3
+    ]
+    if any(abs(value) > abs(finding.limit) and value * finding.limit > 0 for value in ends):
+        return f"{useless.partition(':')[0]}: the move starts or ends over its limit"
+    return "say `when_over_limit: slow`: it finds the shortest duration between these moving states"

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ _LANDED = 1e-12  # relative to the joint's peaks: a larger miss means that other
 _ACCEPTABLE = 1e-9  # the same: a larger miss is a jump, and the phases are wrong
 _COARSE = 1e-11  # the same: what rounding times may do to the velocity
 _ROUNDING = 1e-12
+_SHAVED = (0.0, 1e-14, 1e-13, 5e-13)  # of the acceleration limits: tried in turn where ruckig finds nothing
 
 
 def fastest(task: Task) -> Profile:
@@ -100,8 +102,8 @@ def _slowed(task: Task, quickest: Profile, duration: float) -> Profile:
 
 def _found(task: Task, duration: float | None) -> Profile:
     best, least = None, _ACCEPTABLE
-    for time_unit, length_unit in _units(task, duration):
-        found = _ask_ruckig(task, duration, time_unit, length_unit)
+    for shave, (time_unit, length_unit) in product(_SHAVED, _units(task, duration)):
+        found = _ask_ruckig(_shaved(task, shave), duration, time_unit, length_unit)
         if found is None:
             continue
         profile, miss = _landed(found, duration)
@@ -116,6 +118,17 @@ def _found(task: Task, duration: float | None) -> Profile:
     hint = "change the end velocity or acceleration, or the duration, or raise the limits"
     amounts = {"duration": Amount(duration)} if duration else {}
     raise PlanningError(Problem(message, hint, joint=task.name, amounts=amounts))
+
+
+def _shaved(task: Task, part: float) -> Task:
+    """Return the task with a little less acceleration.
+
+    Where a limit is just reached, a case of ruckig's ends and the next begins, and rounding may leave it with
+    neither: a displacement of 2 a^3 / j^2 is such a place.
+    """
+    return (
+        replace(task, bounds=task.bounds * (1.0 - part * np.array([[0.0], [1.0], [0.0]]))) if part else task
+    )
 
 
 def _steady(task: Task, duration: float) -> Profile:
