@@ -93,7 +93,8 @@ def _report(plan: Plan, options: PlanOptions) -> None:
     report = report_of(plan, reference=options.reference)
     if options.report is not None:
         write_text(report.model_dump_json(indent=2) + "\n", options.report)
-    for move in report.moves if options.reference and not options.quiet else []:
+    compared = options.reference and plan.verdict.passed and not options.quiet
+    for move in report.moves if compared else []:
         bound = move.reference
         if bound is None:
             continue
