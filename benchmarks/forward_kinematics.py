@@ -28,7 +28,7 @@ def ours():
 
     joints = tuple(Joint(f"j{k}", d=d, a=a, alpha=alpha) for k, (d, a, alpha) in enumerate(ROWS, 1))
     robot = Robot("puma560", joints, unlimited(6), "standard", np.eye(4), np.eye(4))
-    q = _configurations()
+    q = configurations()
     return lambda: forward(robot, q), _some
 
 
@@ -37,7 +37,7 @@ def toolbox():
     import roboticstoolbox as rtb
 
     ets = rtb.DHRobot([rtb.RevoluteDH(d=d, a=a, alpha=alpha) for d, a, alpha in ROWS]).ets()
-    q = _configurations()
+    q = configurations()
     return lambda: ets.eval(q), _some
 
 
@@ -46,7 +46,7 @@ def compiled():
     import roboticstoolbox as rtb
 
     ets = rtb.DHRobot([rtb.RevoluteDH(d=d, a=a, alpha=alpha) for d, a, alpha in ROWS]).ets().compile()
-    q = _configurations()
+    q = configurations()
     return lambda: ets.eval(q), _some
 
 
@@ -68,12 +68,12 @@ def figures(peers: str | None, *, long: bool) -> list[Figure]:
     ]
 
 
-def _configurations():
-    """Return joint values, shape (CONFIGURATIONS, 6), rad, spread over the whole range."""
+def configurations(count=CONFIGURATIONS):
+    """Return joint values, shape (count, 6), rad, spread over the whole range."""
     import numpy as np
 
     steps = np.sqrt(np.array([2, 3, 5, 7, 11, 13]))
-    return (np.arange(CONFIGURATIONS)[:, None] * steps) % (2 * np.pi) - np.pi
+    return (np.arange(count)[:, None] * steps) % (2 * np.pi) - np.pi
 
 
 def _some(poses):

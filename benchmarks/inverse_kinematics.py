@@ -8,18 +8,12 @@ from math import pi
 
 from benchmarks.contest import Command, Function, compete
 from benchmarks.figures import Figure
+from benchmarks.forward_kinematics import ROWS as PUMA
+from benchmarks.forward_kinematics import configurations
 
 POSES = 10**5
 FEW = 2000  # poses that an iterating solver is asked for
-PUMA = (  # d, a, alpha of the standard rows; m and rad
-    (0.6718, 0.0, pi / 2),
-    (0.0, 0.4318, 0.0),
-    (0.15005, 0.0203, -pi / 2),
-    (0.4318, 0.0, pi / 2),
-    (0.0, 0.0, -pi / 2),
-    (0.0, 0.0, 0.0),
-)
-UR5E = (
+UR5E = (  # d, a, alpha of the standard rows; m and rad
     (0.1625, 0.0, pi / 2),
     (0.0, -0.425, 0.0),
     (0.0, -0.3922, 0.0),
@@ -40,7 +34,7 @@ def _ours(rows, count):
 
     joints = tuple(Joint(f"j{k}", d=d, a=a, alpha=alpha) for k, (d, a, alpha) in enumerate(rows, 1))
     robot = Robot("arm", joints, unlimited(6), "standard", np.eye(4), np.eye(4))
-    poses = forward(robot, _configurations(count))
+    poses = forward(robot, configurations(count))
     return lambda: solve(robot, poses), lambda found: found.count[count // 16 :: count // 8]
 
 
@@ -50,7 +44,7 @@ def _eaik(rows):
 
     d, a, alpha = (np.array(column) for column in zip(*rows, strict=True))
     robot = DhRobot(alpha, a, d)
-    poses = np.array([robot.fwdKin(q) for q in _configurations(POSES)])
+    poses = np.array([robot.fwdKin(q) for q in configurations(POSES)])
     return lambda: robot.IK_batched(poses), _exact
 
 
@@ -65,7 +59,7 @@ def toolbox():
     import roboticstoolbox as rtb
 
     ets = rtb.DHRobot([rtb.RevoluteDH(d=d, a=a, alpha=alpha) for d, a, alpha in PUMA]).ets()
-    poses = ets.eval(_configurations(FEW))
+    poses = ets.eval(configurations(FEW))
     return lambda: [ets.ik_LM(pose, tol=1e-12) for pose in poses], lambda found: [8.0] * 8
 
 
@@ -99,11 +93,3 @@ def figures(peers: str | None, *, long: bool) -> list[Figure]:
 
 def _figure(name, peer, runs, goal):
     return Figure(name, peer, runs["ours"].seconds, runs["peer"].seconds, goal, skipped=runs["peer"].skipped)
-
-
-def _configurations(count):
-    """Return joint values, shape (count, 6), rad, spread over the whole range."""
-    import numpy as np
-
-    steps = np.sqrt(np.array([2, 3, 5, 7, 11, 13]))
-    return (np.arange(count)[:, None] * steps) % (2 * np.pi) - np.pi
