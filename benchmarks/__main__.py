@@ -15,9 +15,17 @@ from pathlib import Path
 from benchmarks.contest import REPEATS, ContestError
 from benchmarks.figures import Figure, table
 
-BENCHMARKS = ("planning", "help", "writing", "evaluation", "forward_kinematics", "inverse_kinematics")
+BENCHMARKS = (
+    "planning",
+    "help",
+    "writing",
+    "evaluation",
+    "forward_kinematics",
+    "inverse_kinematics",
+    "time_optimal",
+)
 OURS = ("trajcli", "numpy", "pydantic", "pyyaml", "typer")
-THEIRS = ("roboticstoolbox-python", "eaik", "numpy", "scipy")
+THEIRS = ("roboticstoolbox-python", "eaik", "toppra", "numpy", "scipy")
 _VERSIONS = """
 import json, platform, sys
 from importlib.metadata import version

@@ -12,9 +12,11 @@ from trajcli.job.read import LoadedJob, job_from_text
 from trajcli.kinematics.robot import Robot
 from trajcli.planners import PLANNERS, Planner
 from trajcli.planners.planner import Planned
+from trajcli.planners.spline_rules import IMPOSES
 from trajcli.trajectory import State
 
 Fields = dict[str, Any]
+RULES = sorted(IMPOSES)
 RATES = ("velocity", "acceleration", "jerk")
 MOST_JOINTS = 12
 
@@ -138,6 +140,53 @@ def _hold(rng: np.random.Generator, start: Fields, joints: int, rest: bool) -> F
     return {"duration": random_duration(rng)}
 
 
+def _points_on_the_way(
+    rng: np.random.Generator, start: Fields, *, timed: bool
+) -> tuple[list[Fields], Fields]:
+    """Return waypoints and a target, each where joints have moved on from the one before."""
+    position, points = np.array(start["joints"]), []
+    times = np.cumsum(rng.uniform(0.3, 2.0, 5))
+    for time in times[: rng.integers(1, 5)].tolist():
+        position = position + np.where(
+            rng.random(position.size) < 0.2, 0.0, rng.uniform(-1, 1, position.size)
+        )
+        points.append({"joints": position.tolist(), **({"time": time} if timed else {})})
+    return points[:-1], points[-1]
+
+
+def _spline(rng: np.random.Generator, start: Fields, joints: int, rest: bool) -> Fields:
+    timed = bool(rng.random() < 0.7)
+    through, target = _points_on_the_way(rng, start, timed=timed)
+    rule = str(rng.choice(RULES))
+    orders = IMPOSES[rule]
+    for state in () if rest or orders == 0 else (start, target):
+        for quantity in RATES[:orders]:
+            state |= _maybe(rng, **{quantity: random_values(rng, joints, 0.1)})
+    if rule == "imposed":
+        for point in through:
+            point["velocity"] = random_values(rng, joints, 0.3)
+    return {"rule": rule, "through": through, "to": target}
+
+
+def _blends(rng: np.random.Generator, start: Fields, joints: int, rest: bool) -> Fields:
+    timed = bool(rng.random() < 0.7)
+    through, target = _points_on_the_way(rng, start, timed=timed)
+    fields = _maybe(rng, end_blends="inside", exactly=True)
+    if timed and rng.random() < 0.5:
+        fields["blend_durations"] = float(rng.uniform(0.05, 0.5))
+    return {"through": through, "to": target, **fields}
+
+
+def _time_optimal(rng: np.random.Generator, start: Fields, joints: int, rest: bool) -> Fields:
+    through, target = _points_on_the_way(rng, start, timed=False)
+    if rng.random() < 0.5:
+        return {"path": "polyline", "through": through, "to": target, **_maybe(rng, corner=0.05)}
+    if not rest and rng.random() < 0.3:
+        target["velocity"] = random_values(rng, joints, 0.05)
+    fields = _maybe(rng, rule=str(rng.choice(["not_a_knot", "natural", "shape_preserving", "quintic"])))
+    return {"through": through, "to": target, **fields, **_maybe(rng, parameter="centripetal")}
+
+
 _FIELDS = {
     "cubic": _cubic,
     "quintic": _quintic,
@@ -145,6 +194,9 @@ _FIELDS = {
     "cycloidal": _cycloidal,
     "trapezoid": _trapezoid,
     "jerk_limited": _jerk_limited,
+    "spline": _spline,
+    "blends": _blends,
+    "time_optimal": _time_optimal,
     "hold": _hold,
 }
 TAGS = sorted(_FIELDS)

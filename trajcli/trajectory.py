@@ -34,6 +34,29 @@ def resting(position: Array) -> State:
     return State(position, zero, zero)
 
 
+@dataclass(frozen=True, eq=False)
+class Passage:
+    """The points that a move passes, its start and its target among them.
+
+    Attributes:
+        times: When, s from the start of the move, shape (m,).
+        points: Shape (m, n), rad or m.
+        missed: By how much each joint passes beside each point, shape (m, n); zero where it goes through.
+    """
+
+    times: Array
+    points: Array
+    missed: Array
+
+    def __post_init__(self) -> None:
+        for name in ("times", "points", "missed"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    def scaled(self, factor: float) -> Passage:
+        """Return the passage of the same points in a motion that takes `factor` times as long."""
+        return Passage(self.times * factor, self.points, self.missed)
+
+
 @dataclass(frozen=True)
 class Span:
     """Where one move stands on the trajectory.

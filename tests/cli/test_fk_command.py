@@ -197,3 +197,55 @@ def test_a_robot_file_may_have_any_name(arms, tmp_path: Path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("myarm").write_text("convention: standard\njoints: [{a: 1}]\n")
     assert arms.json("fk", "--robot", "myarm", "0")["xyz"] == [1, 0, 0]
+
+
+def test_joint_values_outside_the_limits_are_remarked(arms):
+    turned = arms.call("fk", "--robot", "ur5e", "--", 0, -90, 190, 0, 90, 0)
+    same = arms.call("fk", "--robot", "ur5e", "--", 0, -90, -170, 0, 90, 0)  # a full turn away
+    assert (turned.code, turned.out) == (0, same.out)
+    assert turned.err == "outside the limits of UR5e: elbow_joint is at 190 deg, its limit is 180 deg\n"
+    assert same.err == ""
+    below = arms.call("fk", "--robot", "ur5e", "--si", "--", 0, -8, -4, 0, 0, 0)
+    lower = f"shoulder_lift_joint is at -8 rad, its limit is {-2 * np.pi:.9g} rad, and 1 more joint"
+    assert below.err == f"outside the limits of UR5e: {lower}\n"
+
+
+def test_a_remark_leaves_json_as_it_is(arms):
+    told = arms.json("fk", "--robot", "ur5e", "--", 0, -90, 190, 0, 90, 0)
+    assert set(told) == {"matrix", "xyz", "rpy", "quat_wxyz"}
+    assert "its limit is 180 deg" in arms.call("fk", "--robot", "ur5e", "--json", 0, -90, 190, 0, 90, 0).err
+
+
+def test_at_the_limit_is_not_outside(arms):
+    assert arms.call("fk", "--robot", "ur5e", "--", 360, -360, 180, 0, 90, 0).err == ""
+    assert "180.000001 deg" in arms.call("fk", "--robot", "ur5e", "--", 0, 0, "180.000001", 0, 90, 0).err
+    assert arms.call("fk", "--robot", "rrp", "--", 1e4, -1e4, 1e4).err == ""  # has no limits
+
+
+def test_rows_outside_the_limits_are_counted(arms):
+    head = "t,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n"
+    ramp = "".join(f"{k / 1000},0,-90,{k / 200},0,{k / 20000},{-k / 100}\n" for k in range(40000))
+    assert len(ramp) > 1 << 20  # more than is read at a time
+    code, out, err = arms.call("fk", "--robot", "ur5e", "-", stdin=head + ramp)
+    assert (code, len(out.splitlines())) == (0, 40001)
+    # after k = 36000 the elbow is over 180, and the last wrist over -360 by twice as much
+    where = "in 3999 of 40000 rows, first in row 36001 (from 0, t = 36.001 s)"
+    what = "wrist_3_joint is at -360.01 deg, its limit is -360 deg, and 1 more joint"
+    assert err == f"outside the limits of UR5e {where}: {what}\n"
+    short = head + ramp[: ramp.index("36.001,")]
+    assert arms.call("fk", "--robot", "ur5e", "-", stdin=short).err == ""
+
+
+def test_a_remark_speaks_the_units_of_the_columns(arms, tmp_path):
+    path = tmp_path / "slide.yaml"
+    path.write_text(
+        "convention: standard\n"
+        "joints: [{position: [-5 deg, 5 deg]}, {type: prismatic, position: [0.02, 0.1]}]\n"
+    )
+    rows = "q1,q2_mm\n0,50\n0,19\n0.2,10\n"
+    err = arms.call("fk", "--robot", path, "-", stdin=rows).err
+    where = "in 2 of 3 rows, first in row 1 (from 0)"
+    assert err == f"outside the limits of slide {where}: j2 is at 19 mm, its limit is 20 mm\n"
+    # 5 deg = 0.08726646259971647 rad: nine decimals round it up, beyond the limit
+    assert arms.call("fk", "--robot", path, "-", stdin="q1,q2\n0.087266463,0.05\n").err == ""
+    assert "in 1 of 1 rows" in arms.call("fk", "--robot", path, "-", stdin="q1,q2\n0.087266464,0.05\n").err

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from arm_calls import Arms
 
 from trajcli.job.robot_source import CATALOGUE, catalogue_names, load_robot
@@ -21,15 +22,28 @@ def test_the_list(arms):
     code, out, err = arms.call("robots")
     head, *lines = out.splitlines()
     assert (code, err) == (0, "")
-    assert head.split() == ["name", "joints", "kind", "reach", "(m)", "source"]
+    assert head.split() == ["name", "joints", "kind", "reach", "(m)", "units", "source"]
     assert [line.split()[0] for line in lines] == catalogue_names()
     told = arms.json("robots")
     assert [row["name"] for row in told] == catalogue_names()
-    assert {"name", "title", "joints", "kind", "reach", "source"} == set(told[0])
+    assert {"name", "title", "joints", "kind", "reach", "units", "source"} == set(told[0])
     kinds = {row["name"]: (row["joints"], row["kind"]) for row in told}
     assert kinds["panda"] == (7, "7R")
     assert kinds["stanford"] == (6, "RRPRRR")
     assert kinds["rpr"] == (3, "RPR")
+
+
+def test_the_list_says_the_units_of_each_file(arms):
+    out = arms.call("robots").out
+    head, *lines = out.splitlines()
+    start, end = head.index("units"), head.index("source")
+    for row, line in zip(arms.json("robots"), lines, strict=True):
+        units = yaml.safe_load((CATALOGUE / f"{row['name']}.yaml").read_text("utf-8"))["units"]
+        assert line[start:end].strip() == f"{units['angle']}, {units['length']}"
+        assert line[start - 2 : start] == line[end - 2 : end] == "  "
+        assert row["units"] == units
+    assert {line[start:end].strip() for line in lines} == {"deg, m", "rad, m"}
+    assert max(map(len, out.splitlines())) <= 100
 
 
 REACH = {  # by hand: stretched arms

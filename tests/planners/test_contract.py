@@ -55,7 +55,8 @@ def assert_keeps_contract(planner: Planner, start: State, robot: Robot, planned:
     if curve.duration == 0:  # nothing moves: the arm is there already
         assert np.array_equal(start.position, planned.end.position)
         return
-    for order, quantity in enumerate(ATTRIBUTES[: planner.continuity + 1]):
+    start = planned.begins or start
+    for order, quantity in enumerate(ATTRIBUTES[: planner.joins + 1]):
         scale = peaks_of(curve, order)
         first, last = curve.piece_ends(order)
         assert (np.abs(first[0] - getattr(start, quantity)) <= MET * scale).all(), (quantity, "start")
@@ -108,7 +109,8 @@ def test_contract(tag: str) -> None:
         if planned is not None:
             kept += 1
             assert_keeps_contract(planner, start, robot, planned)
-            assert_ends_at_target(planner, start, planned.end)
+            if planned.begins is None:  # else the method decides with what velocity it ends
+                assert_ends_at_target(planner, start, planned.end)
             assert_explains_itself(planned, start)
     assert kept >= ROUNDS / 4, "too few of the moves were possible for this to say something"
 

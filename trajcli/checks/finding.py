@@ -6,7 +6,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 Kind = Literal[
-    "position", "velocity", "acceleration", "jerk", "position_jump", "velocity_jump", "acceleration_jump"
+    "position",
+    "velocity",
+    "acceleration",
+    "jerk",
+    "position_jump",
+    "velocity_jump",
+    "acceleration_jump",
+    "waypoint",
 ]
 Method = Literal["exact", "bounded"]
 
@@ -18,9 +25,11 @@ class Finding:
     Attributes:
         move: Index of the move; None when it is about the whole trajectory.
         joint: Name of the joint; None when it is about the tool.
-        kind: The quantity that breaks its limit, or that jumps.
-        value: SI, signed as on the curve; for a jump the value after minus the value before.
-        limit: The bound it breaks, SI, signed as the value; for a jump the size that rounding explains.
+        kind: The quantity that breaks its limit, or that jumps; or a waypoint that is not where it should be.
+        value: SI, signed as on the curve; for a jump the value after minus the value before; for a waypoint
+            the distance from it.
+        limit: The bound it breaks, SI, signed as the value; for a jump the size that rounding explains; for a
+            waypoint the distance that was promised.
         time: Seconds from the start of the trajectory.
         method: "exact" from the roots of derivatives, or "bounded" between samples.
         factor: By what factor the move must last longer for the limit to hold; None where that does not help.

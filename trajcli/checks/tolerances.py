@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from trajcli.curves.piecewise import Array
+from trajcli.trajectory import Trajectory
 
 # A planner that runs at a limit reaches it by way of a dozen roundings, each 1e-16 of the value and each
 # magnified by what cancels; 1e-9 is a million times that, and a million times finer than any data sheet.
@@ -31,6 +32,12 @@ JUMP_BREAK_UNITS = 2.0
 BORDER_UNITS = 4.0
 
 
+# A curve through points is a sum of terms as large as the points and their distances; what it carries of
+# their rounding is a few hundred units in the last place, even at the end of a long piece.
+WAYPOINT_RELATIVE = 1e-12
+WAYPOINT_ABSOLUTE = 1e-12
+
+
 def exceeds(value: ArrayLike, bound: ArrayLike) -> NDArray[np.bool_]:
     """Return whether values are above an upper bound by more than rounding; for a lower bound negate both.
 
@@ -52,3 +59,17 @@ def allowed_jump(peak: Array, breaks: Array, next_derivative: Array) -> Array:
     """
     late = JUMP_BREAK_UNITS * np.spacing(np.abs(breaks))[:, None] * next_derivative
     return JUMP_ABSOLUTE + JUMP_RELATIVE * peak + late
+
+
+def waypoint_tolerance(trajectory: Trajectory, times: Array, points: Array) -> Array:
+    """Return the distance from waypoints that rounding explains, shape (m, n).
+
+    Args:
+        trajectory: The one that passes them.
+        times: When, s on the trajectory, shape (m,); rounded as breaks are.
+        points: Where, shape (m, n).
+    """
+    speed = np.abs(trajectory.curve.evaluate(times, 1))
+    late = JUMP_BREAK_UNITS * np.spacing(np.abs(times))[:, None] * speed
+    tolerance: Array = WAYPOINT_ABSOLUTE + WAYPOINT_RELATIVE * np.abs(points).max(axis=0) + late
+    return tolerance

@@ -10,9 +10,10 @@ import numpy as np
 from trajcli.checks.continuity import acceleration_steps, check_continuity
 from trajcli.checks.finding import Finding, Step
 from trajcli.checks.limits import check_limits, peaks_by_move
+from trajcli.checks.waypoints import check_waypoints
 from trajcli.curves.extrema import Peaks
 from trajcli.kinematics.robot import QUANTITIES, Limits
-from trajcli.trajectory import Trajectory
+from trajcli.trajectory import Passage, Trajectory
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,12 +38,17 @@ class Verdict:
         return not self.findings
 
 
-def verify(trajectory: Trajectory, limits_by_move: Sequence[Limits]) -> Verdict:
-    """Return the verdict on a trajectory: its joint limits for all t, and its continuity.
+def verify(
+    trajectory: Trajectory,
+    limits_by_move: Sequence[Limits],
+    passages: Sequence[Passage | None] | None = None,
+) -> Verdict:
+    """Return the verdict on a trajectory: its joint limits for all t, its continuity, the points it passes.
 
     Args:
         trajectory: What to judge.
         limits_by_move: The limits in force, one for each span.
+        passages: The points that each span promises to pass.
 
     Raises:
         ValueError: When there are more or fewer limits than spans.
@@ -50,6 +56,8 @@ def verify(trajectory: Trajectory, limits_by_move: Sequence[Limits]) -> Verdict:
     peaks = tuple(peaks_by_move(trajectory))
     findings = check_limits(trajectory, limits_by_move, peaks)
     findings += check_continuity(trajectory, limits_by_move, peaks)
+    if passages is not None:
+        findings += check_waypoints(trajectory, passages)
     place = {span.index: k for k, span in enumerate(trajectory.spans)}
     findings.sort(key=lambda finding: (place.get(finding.move or 0, 0), finding.time))
     return Verdict(

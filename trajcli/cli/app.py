@@ -80,7 +80,7 @@ def explain(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON for programs.")] = False,
     errors: Errors = "text",
 ) -> int:
-    """Say each move in words and formulas: polynomials, phases, peaks, and how fast it could be."""
+    """Say each move in words and formulas: polynomials, phases, peaks, branches, and how fast it could be."""
     from trajcli.cli.explain import run_explain
 
     return run_explain(job, override, as_json=as_json)

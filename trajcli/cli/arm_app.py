@@ -56,7 +56,10 @@ def fk(
     digits: Digits = "fixed",
     errors: Errors = "text",
 ) -> int:
-    """Say where the tool is: its pose for given joint values, or for each row of a CSV."""
+    """Say where the tool is: its pose for given joint values, or for each row of a CSV.
+
+    Joint values outside the robot's limits have a pose too; a line on stderr says which they are.
+    """
     from trajcli.cli.fk import FkOptions, run_fk
 
     return run_fk(robot, joints, FkOptions(tool, frame, links, si, as_json, digits))

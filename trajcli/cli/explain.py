@@ -6,13 +6,17 @@ import json
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from trajcli.cli.passing_text import passing_lines
+from trajcli.cli.reached_text import pose_reached_lines
 from trajcli.job.read import load_job
+from trajcli.pipeline.arm import Arm
 from trajcli.pipeline.explain import closed_form, explanation, stretches_of
 from trajcli.pipeline.plan import Plan, plan_job
 from trajcli.streams.whole_file import standard_output
 
 _SYMBOLS = {"position": "q", "velocity": "qd", "acceleration": "qdd", "jerk": "qddd"}
 _ROUNDING = 1e-12
+_MOST_PIECES = 100  # of a joint that are listed
 _TIME_DECIMALS = 12
 
 
@@ -47,6 +51,8 @@ def _lines(plan: Plan, told: dict[str, Any]) -> Iterator[str]:
     for index, move in enumerate(told["moves"]):
         yield ""
         yield f"move {index}: {move['planner']}, {move['duration']:.10g} s, from t = {move['start']:.10g} s"
+        yield from pose_reached_lines(move, Arm(plan.loaded.robot, plan.loaded.units))
+        yield from passing_lines(move)
         yield from _polynomials(plan, index)
         yield from _phases(move)
         yield from _peaks(move)
@@ -65,6 +71,9 @@ def _polynomials(plan: Plan, index: int) -> Iterator[str]:
         yield from (f"  q{i}(t) = {formula}" for i, formula in enumerate(formulas.values(), 1))
         return
     for number, rows in enumerate(stretches_of(move, units), 1):
+        if len(rows) > _MOST_PIECES:
+            yield f"  q{number}(t): {len(rows)} pieces, listed by --json"
+            continue
         for row in rows:
             when = f"{row.start:.10g} <= t <= {row.end:.10g}: " if len(rows) > 1 else ""
             yield f"  {when}q{number}(t) = {row.text}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -11,6 +12,7 @@ from trajcli.cli.printing import print_json, print_lines
 from trajcli.errors import InputError
 from trajcli.kinematics.forward import forward, link_poses
 from trajcli.pipeline.arm import Arm, open_arm
+from trajcli.pipeline.outside_limits import LimitWatch
 from trajcli.pipeline.pose_view import pose_view
 from trajcli.streams.csv import Digits, write_csv
 from trajcli.streams.whole_file import standard_output
@@ -50,6 +52,9 @@ def run_fk(robot: str, words: Sequence[str], options: FkOptions) -> int:
         print_json(told)
     else:
         print_lines(_lines(arm, told, options.frame))
+    watch = LimitWatch(arm.robot)
+    watch.see(q[None], arm.joint_factors, [arm.joint_unit(i) for i in range(len(q))])
+    _remark(arm, watch)
     return 0
 
 
@@ -67,7 +72,23 @@ def _stream(arm: Arm, options: FkOptions) -> int:
     for name, given in (("--json", options.as_json), ("--links", options.links)):
         if given:
             raise InputError(f"{name} is for one configuration, rows from standard input become a CSV")
-    names, blocks = poses_of(arm, open_rows("-"))
+    watch = LimitWatch(arm.robot)
+    names, blocks = poses_of(arm, open_rows("-"), watch)
     with standard_output() as out:
         write_csv(blocks, names, out, options.digits)
+    _remark(arm, watch, rows=True)
     return 0
+
+
+def _remark(arm: Arm, watch: LimitWatch, *, rows: bool = False) -> None:
+    """Say on standard error that joint values are outside the limits of the robot; their poses stand."""
+    first = watch.first
+    if first is None:
+        return
+    where = ""
+    if rows:
+        when = "" if first.time is None else f", t = {first.time:.9g} s"
+        where = f" in {watch.outside} of {watch.rows} rows, first in row {first.row} (from 0{when})"
+    what = f"{first.joint} is at {first.value:.9g} {first.unit}, its limit is {first.limit:.9g} {first.unit}"
+    more = f", and {first.others} more joint{'s' * (first.others > 1)}" if first.others else ""
+    print(f"outside the limits of {arm.robot.name}{where}: {what}{more}", file=sys.stderr)  # noqa: T201

@@ -81,8 +81,9 @@ def _lines(arm: Arm, found: Solutions, told: Sequence[dict[str, Any]]) -> Iterat
         names = " ".join(answer["branch"].values())
         notes = [names] if names else []
         notes += [] if answer["within_limits"] else ["outside the limits"]
-        if answer["singular"]:
-            notes.append(f"singular: free along {numbers(answer['free_direction'])}")
+        notes += ["singular"] if answer["singular"] else []
+        if "free_direction" in answer:
+            notes.append(f"free along {numbers(answer['free_direction'])}")
         joints = numbers(answer["joints"])
         yield f"  {joints}" + (f"   ({', '.join(notes)})" if notes else "")
     worst = max(answer["closure"] for answer in told)

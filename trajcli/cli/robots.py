@@ -13,7 +13,7 @@ from trajcli.job.robot_source import catalogue_names
 from trajcli.pipeline.arm import open_sheet
 from trajcli.pipeline.robot_card import robot_card, robot_row
 
-_WIDTH, _SOURCE = 100, 60  # columns of a paragraph, and of a source in the list
+_WIDTH, _SOURCE = 100, 48  # columns of a paragraph, and of a source in the list
 _DH = ("theta", "d", "a", "alpha")
 _LIMITS = ("position", "velocity", "acceleration", "jerk")
 
@@ -46,13 +46,14 @@ def run_robots(name: str | None, *, as_yaml: bool, as_json: bool) -> int:
 
 
 def _list_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    head = ["name", "joints", "kind", "reach (m)", "source"]
+    head = ["name", "joints", "kind", "reach (m)", "units", "source"]
     cells = [
         [
             row["name"],
             str(row["joints"]),
             row["kind"],
             "unlimited" if row["reach"] is None else f"{row['reach']:.3f}",
+            f"{row['units']['angle']}, {row['units']['length']}",
             textwrap.shorten(row["source"] or "-", _SOURCE, placeholder=" ..."),
         ]
         for row in rows

@@ -6,9 +6,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate, increasing, taylor_shift
+from trajcli.curves.critical import critical_points
+from trajcli.curves.extrema import piece_extremes
+from trajcli.curves.piecewise import (
+    Array,
+    PiecewisePolynomial,
+    concatenate,
+    horner,
+    increasing,
+    taylor_shift,
+)
 
 _ROUNDING = 4 * np.finfo(np.float64).eps  # of the largest time: what sums of phase durations may be apart
+_DEGREE = 10  # of a composition: beyond it rounding grows
+_NEAR = 1e6  # times rounding: a value of the law this near to a break may be one that it passes
 _REST = 1e-9  # of the peak velocity: less counts as standing still
 
 
@@ -94,6 +105,82 @@ def along_line(start: Array, displacement: Array, law: PiecewisePolynomial) -> P
     coefficients = law.coefficients * displacement
     coefficients[-1] += start
     return PiecewisePolynomial(law.breaks, coefficients)
+
+
+def compose(path: PiecewisePolynomial, law: PiecewisePolynomial) -> PiecewisePolynomial:
+    """Return q(s(t)), whose breaks are those of the law and the times at which s passes breaks of the path.
+
+    Args:
+        path: q(s) of degree d1.
+        law: s(t) of dimension 1 and degree d2, with d1 d2 at most 10.
+
+    Raises:
+        ValueError: When the degree would be above 10, or the law leaves the path.
+    """
+    if path.degree * law.degree > _DEGREE or law.dimension != 1:
+        raise ValueError(
+            f"a path of degree {path.degree} and a law of degree {law.degree} and dimension {law.dimension}: "
+            f"dimension 1 and a product of at most {_DEGREE} are what can be composed exactly"
+        )
+    law = _split(law, _crossings(path, law))
+    middle = horner(law.coefficients, 0.5 * law.lengths[:, None])[:, 0]
+    piece = np.clip(np.searchsorted(path.breaks, middle, "right") - 1, 0, path.pieces - 1)
+    outer = taylor_shift(
+        path.coefficients[:, piece], (law.coefficients[-1, :, 0] - path.breaks[piece])[:, None]
+    )
+    inner = law.coefficients.copy()
+    inner[-1] = 0.0
+    result = outer[:1]
+    for row in outer[1:]:
+        result = _product(result, inner)
+        result[-1] += row
+    return PiecewisePolynomial(law.breaks, result)
+
+
+def _crossings(path: PiecewisePolynomial, law: PiecewisePolynomial) -> Array:
+    """Return the times inside pieces of the law at which it passes a break of the path."""
+    low, high = (values[:, 0] for values in piece_extremes(law.coefficients, law.lengths, (0,))[0])
+    apart = _ROUNDING * max(abs(path.start), abs(path.end), float(np.abs(law.coefficients[-1]).max()))
+    if low.min() < path.start - _NEAR * apart or high.max() > path.end + _NEAR * apart:
+        raise ValueError(
+            f"the law runs from {float(low.min())!r} to {float(high.max())!r}, "
+            f"the path from {path.start!r} to {path.end!r}"
+        )
+    first = np.searchsorted(path.breaks, low + apart, "right")
+    count = np.maximum(np.searchsorted(path.breaks, high - apart, "left") - first, 0)
+    piece = np.repeat(np.arange(law.pieces), count)
+    passed = path.breaks[np.arange(piece.size) + np.repeat(first - (np.cumsum(count) - count), count)]
+    offset = law.coefficients[:, piece].copy()
+    offset[-1, :, 0] -= passed
+    powers = np.arange(law.degree + 1, 0, -1)[:, None, None]
+    integral = np.concatenate([offset / powers, np.zeros((1, piece.size, 1))])
+    local = critical_points(integral, law.lengths[piece], (0,))[0][:, :, 0]
+    inside = (local > 0) & (local < law.lengths[piece])
+    inside &= np.abs(horner(offset[:, :, 0], local)) <= _NEAR * apart  # the rest stands in for missing roots
+    return np.asarray((law.breaks[piece] + local)[inside])
+
+
+def _split(curve: PiecewisePolynomial, times: Array) -> PiecewisePolynomial:
+    """Return the same curve with further breaks, save those that only rounding sets apart from others."""
+    if not times.size:
+        return curve
+    apart = _ROUNDING * max(abs(curve.start), abs(curve.end))
+    times = np.sort(times)
+    after = np.clip(np.searchsorted(curve.breaks, times), 1, curve.pieces)
+    new = (times - curve.breaks[after - 1] > apart) & (curve.breaks[after] - times > apart)
+    new &= np.diff(times, prepend=-np.inf) > apart
+    breaks = np.union1d(curve.breaks, times[new])
+    piece = np.searchsorted(curve.breaks, breaks[:-1], "right") - 1
+    offset = breaks[:-1] - curve.breaks[piece]
+    return PiecewisePolynomial(breaks, taylor_shift(curve.coefficients[:, piece], offset[:, None]))
+
+
+def _product(a: Array, b: Array) -> Array:
+    """Return the products of polynomials (d + 1, ...), highest power first."""
+    result = np.zeros((a.shape[0] + b.shape[0] - 1, *np.broadcast_shapes(a.shape[1:], b.shape[1:])))
+    for k, row in enumerate(b):
+        result[k : k + a.shape[0]] += a * row
+    return result
 
 
 def hold_until(curve: PiecewisePolynomial, end: float) -> PiecewisePolynomial:

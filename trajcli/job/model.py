@@ -127,7 +127,7 @@ class Job(Model):
         if not self.start.is_place:
             raise refuse([(("start",), "the start needs `joints` or a pose", None)])
         first = self.moves[0]
-        if first.continuity == 1 and any(self.start.acceleration or ()):
+        if first.joins == 1 and any(self.start.acceleration or ()):
             hint = "use quintic or jerk_limited for the first move, or leave it out"
             raise refuse([(("start",), f"{first.tag} cannot start with an acceleration", hint)])
         return self

@@ -18,6 +18,7 @@ from trajcli.job.load import Document, parse_document, read_document
 from trajcli.job.messages import problems_of
 from trajcli.job.model import Job, UnitsSpec
 from trajcli.job.override import Setting, overridden, parse_setting
+from trajcli.job.recording import reader_of
 from trajcli.job.robot_source import find_robot
 from trajcli.kinematics.robot import Robot, unlimited
 from trajcli.planners.planner import Event
@@ -107,6 +108,7 @@ def _load(document: Document) -> LoadedJob:
     context = ReadingContext(units, points=_points(plain.get("points")))
     if robot is not None:
         context.joint_names, context.joint_types = robot.joint_names, robot.joint_types
+        context.read_points = reader_of(document, robot)
     try:
         job = Job.model_validate({**plain, **given}, context=context)
     except ValidationError as error:

@@ -46,6 +46,26 @@ class ReferenceReport(Model):
     reason: Annotated[str | None, Field(description="Why there is no bound.")] = None
 
 
+class WaypointReport(Model):
+    """A point that a move passes, its start and target among them."""
+
+    time: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
+    missed: Annotated[
+        list[float],
+        Field(description="By how much each joint passes beside it, SI; zero where it goes through."),
+    ]
+
+
+class OutsideReport(Model):
+    """How far a joint leaves the range that the waypoints of a move span."""
+
+    joint: str
+    beyond: Annotated[float, Field(description="Above (positive) or below (negative) that range, SI.")]
+    time: Annotated[
+        float, Field(description="Where it is furthest, seconds from the start of the trajectory.")
+    ]
+
+
 class MoveReport(Model):
     """One move."""
 
@@ -60,6 +80,15 @@ class MoveReport(Model):
     stretch: Annotated[float, Field(description="How many times longer it lasts than its planner said.")]
     peaks: list[PeakReport]
     binding: BindingReport | None
+    waypoints: Annotated[
+        list[WaypointReport] | None, Field(description="The points it passes; null for a move without any.")
+    ] = None
+    outside: Annotated[
+        list[OutsideReport] | None,
+        Field(
+            description="Joints that leave the range of the waypoints, and how far; null without waypoints."
+        ),
+    ] = None
     reference: ReferenceReport | None = None
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -45,6 +46,7 @@ class Axis:
     point: Column
 
 
+@lru_cache(maxsize=16)
 def links_of(robot: Robot) -> tuple[Link, ...]:
     """Return the robot's links, with exact cosines and sines where alpha is a whole number of right angles.
 
@@ -159,7 +161,9 @@ class MovingFrame:
 
     def _cos_sin(self) -> tuple[Entry, Entry]:
         if self._turned is None:
-            if isinstance(self._angle, float):
+            if isinstance(self._angle, float) and self._angle == 0.0:
+                self._turned = 1.0, 0.0
+            elif isinstance(self._angle, float):
                 cosine, sine = cos_sin(self._angle)
                 self._turned = float(cosine), float(sine)
             else:

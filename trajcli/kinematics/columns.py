@@ -55,16 +55,22 @@ def advance(p: Column, distance: Entry, axis: Column) -> Column:
 
 def plus(a: Column, b: Column) -> Column:
     """Return a + b."""
+    if a is ZERO or b is ZERO:
+        return b if a is ZERO else a
     return total(a[0], b[0]), total(a[1], b[1]), total(a[2], b[2])
 
 
 def minus(a: Column, b: Column) -> Column:
     """Return a - b."""
+    if b is ZERO:
+        return a
     return difference(a[0], b[0]), difference(a[1], b[1]), difference(a[2], b[2])
 
 
 def scaled(factor: Entry, a: Column) -> Column:
     """Return factor * a."""
+    if isinstance(factor, float) and factor in (0.0, 1.0):
+        return a if factor else ZERO
     return product(factor, a[0]), product(factor, a[1]), product(factor, a[2])
 
 

@@ -10,7 +10,10 @@ import numpy as np
 from trajcli.columns import joint_factors
 from trajcli.curves.piecewise import Array, taylor_shift
 from trajcli.job.report import PeakReport
+from trajcli.pipeline.arm import Arm
+from trajcli.pipeline.passing import passing_in_units
 from trajcli.pipeline.plan import Plan
+from trajcli.pipeline.reached_pose import reached_in_units
 from trajcli.pipeline.report import report_of
 from trajcli.pipeline.stretch import PlannedMove
 from trajcli.units import Dimension, Quantity, Units, to_user, unit_name
@@ -120,12 +123,15 @@ def _move(plan: Plan, index: int) -> dict[str, Any]:
     }
     return {
         "index": index,
+        "joints": list(names),
         "planner": span.planner,
         "start": span.start,
         "end": span.end,
         "duration": move.duration,
         "stretch": move.stretch,
         "continuity": span.continuity,
+        "from_pose": _reached(plan, None) if index == 0 else None,
+        "to_pose": _reached(plan, index),
         "breaks": move.planned.curve.breaks.tolist(),
         "polynomials": polynomials,
         "closed_form": closed_form(move, plan.loaded.units),
@@ -134,7 +140,14 @@ def _move(plan: Plan, index: int) -> dict[str, Any]:
             for phase in move.planned.phases
         ],
         "arrivals": None if arrivals is None else dict(zip(names, arrivals, strict=True)),
+        **passing_in_units(move, span, plan.verdict, plan.loaded.units),
     }
+
+
+def _reached(plan: Plan, index: int | None) -> dict[str, Any] | None:
+    """Return how the pose was reached that a move goes to, or the job starts at; None where there is none."""
+    reached = plan.reached[index]
+    return None if reached is None else reached_in_units(reached, Arm(plan.loaded.robot, plan.loaded.units))
 
 
 def closed_form(move: PlannedMove, units: Units) -> dict[str, str] | None:

@@ -8,6 +8,7 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, PlanningError
@@ -20,14 +21,13 @@ from trajcli.kinematics.inverse.target import Target, partial_target, residual_j
 from trajcli.kinematics.inverse.turns import all_turns
 from trajcli.kinematics.inverse.verdict import check_reachable
 from trajcli.kinematics.jacobian import jacobian
+from trajcli.kinematics.robot import Robot
 from trajcli.pipeline.arm import Arm
 from trajcli.pipeline.differential import simplest
 from trajcli.pipeline.pose_view import plain
 from trajcli.planners.pose_fields import Configuration, PoseFields
 
 _LOST = max(RANK_TOLERANCE, 1e-7)  # of the largest singular value: answers meet their target within rounding
-
-
 _UPRIGHT = 1e-9  # rad: a pitch this close to a quarter turn is one
 
 
@@ -72,8 +72,7 @@ def find_answers(
                 f"{arm.robot.name} has no choice of {choice} for this target: {found.method.reason}",
                 hint=f"leave {choice} out of `configuration`",
             )
-    fits = [all(getattr(name, key) == value for key, value in wanted.items()) for name in found.names]
-    return found, found.valid & np.array(fits)
+    return found, found.valid & found.named(**wanted)
 
 
 def _named(configuration: Configuration | None) -> dict[str, str]:
@@ -95,7 +94,7 @@ def answers(
     """Return [{joints, branch, within_limits, closure, singular, free_direction?}] of one target.
 
     `closure` is the larger of the miss in m and in rad. `free_direction` is a unit vector of joint values:
-    the arm can move along it while the tcp rests.
+    the arm can move along it while what is fixed of the pose rests; without it the answer stands alone.
 
     Args:
         arm: The arm.
@@ -148,18 +147,34 @@ def _answer(arm: Arm, found: Solutions, branch: int, joints: Array, target: Targ
         "closure": float(found.closure[branch].max()),
         "singular": bool(found.singular[branch]),
     }
-    if told["singular"]:
-        told["free_direction"] = plain(next(_free_directions(arm, joints, target)))
+    if found.free[branch].any():
+        told["free_direction"] = plain(next(free_directions(arm, joints, target)))
     return told
 
 
-def _free_directions(arm: Arm, joints: Array, target: Target) -> Iterator[Array]:
+def free_directions(arm: Arm, joints: Array, target: Target) -> Iterator[Array]:
     """Yield unit vectors (n,) of joint values, in the user's units, that leave what is fixed of the pose."""
-    flat = target.flat()
-    held = residual_jacobian(flat, forward(arm.robot, joints[None]), jacobian(arm.robot, joints[None]))[0]
-    held[: sum(target.position)] /= characteristic_length(arm.robot)
-    _, values, right = np.linalg.svd(held)
-    rank = min(int(np.count_nonzero(values > _LOST * values[0])), len(joints) - 1)
+    _, values, right = np.linalg.svd(_held(arm.robot, joints[None], target)[0])
+    rank = min(int(_rank(values)), len(joints) - 1)
     for direction in simplest(right[rank:]):
         shown = direction / arm.joint_factors
         yield shown / np.linalg.norm(shown)
+
+
+def rank_of_target(robot: Robot, joints: Array, target: Target) -> NDArray[np.intp]:
+    """Return in how many directions of what the target fixes the tcp can move, from joints (K, n): (K,)."""
+    values: Array = np.asarray(
+        np.linalg.svd(_held(robot, joints, target), compute_uv=False), dtype=np.float64
+    )
+    return _rank(values)
+
+
+def _held(robot: Robot, joints: Array, target: Target) -> Array:
+    """Return the Jacobians (K, m, n) of what the target fixes, lengths divided by the length of the arm."""
+    held = residual_jacobian(target.flat(), forward(robot, joints), jacobian(robot, joints))
+    held[:, : sum(target.position)] /= characteristic_length(robot)
+    return held
+
+
+def _rank(values: Array) -> NDArray[np.intp]:
+    return np.asarray(np.count_nonzero(values > _LOST * values[..., :1], axis=-1))

@@ -17,9 +17,12 @@ from trajcli.kinematics.forward import forward
 from trajcli.kinematics.jacobian import ReferenceFrame, jacobian
 from trajcli.kinematics.robot import Robot
 from trajcli.pipeline.arm import Arm
+from trajcli.pipeline.outside_limits import LimitWatch
+from trajcli.streams.decimals import DECIMALS
 from trajcli.streams.table import Rows
 
 _WHOSE = {"deg": "revolute", "mm": "prismatic"}
+_HALF = 0.5 * 10.0**-DECIMALS  # a joint that rests at its limit may be rounded beyond it
 
 
 class Stream(NamedTuple):
@@ -35,11 +38,12 @@ class Stream(NamedTuple):
 
 
 class _Wanted(NamedTuple):
-    """Which columns hold what: the time's index, and index and SI per unit of each joint's column."""
+    """Which columns hold what: the time's index, and index, SI per unit and unit of each joint's column."""
 
     time: int | None
     joints: NDArray[np.intp]
     factors: Array
+    units: list[str]
 
     def times(self, block: Array) -> Array:
         """Return the times (N, 1), or (N, 0) where there are none."""
@@ -50,11 +54,16 @@ class _Wanted(NamedTuple):
         return np.asarray(block[:, self.joints] * self.factors)
 
 
-def poses_of(arm: Arm, rows: Rows) -> Stream:
+def poses_of(arm: Arm, rows: Rows, watch: LimitWatch | None = None) -> Stream:
     """Return t, where there is one, and the tcp's pose (x y z qw qx qy qz) for each row of joint values.
 
     Lengths are in the arm's unit, which the names say. The sign of the quaternion is such that it never
     jumps from row to row, and that w >= 0 in the first.
+
+    Args:
+        arm: The arm.
+        rows: With a column for each joint.
+        watch: Sees the joint values as their rows are taken.
 
     Raises:
         InputError: When a joint has no column, or one of another unit; when taken, if a row is wrong.
@@ -62,13 +71,17 @@ def poses_of(arm: Arm, rows: Rows) -> Stream:
     wanted = _wanted(arm.robot, rows)
     unit = "mm" if arm.units.length == "mm" else None
     names = [*_time_name(wanted), *(Column(axis, None, unit).name for axis in "xyz"), "qw", "qx", "qy", "qz"]
-    return Stream(names, _poses(arm, rows, wanted))
+    return Stream(names, _poses(arm, rows, wanted, watch))
 
 
-def _poses(arm: Arm, rows: Rows, wanted: _Wanted) -> Iterator[Array]:
+def _poses(arm: Arm, rows: Rows, wanted: _Wanted, watch: LimitWatch | None) -> Iterator[Array]:
     last = None
     for block in rows.blocks:
-        poses = forward(arm.robot, wanted.values(block))
+        q = wanted.values(block)
+        if watch is not None:
+            times = None if wanted.time is None else block[:, wanted.time]
+            watch.see(q, wanted.factors, wanted.units, times, _HALF)
+        poses = forward(arm.robot, q)
         quaternions = without_jumps(quaternion_from_matrix(poses[:, :3, :3]), last)
         last = quaternions[-1]
         yield np.hstack([wanted.times(block), poses[:, :3, 3] / arm.length_factor, quaternions])
@@ -125,7 +138,9 @@ def _wanted(robot: Robot, rows: Rows) -> _Wanted:
         raise InputError(Problem(message, hint, place))
     columns = [found[i] for i in range(len(robot.joints))]
     indices = np.array([index for index, _ in columns])
-    return _Wanted(time, indices, np.array([column.factor for _, column in columns]))
+    si = ["m" if kind == "prismatic" else "rad" for kind in robot.joint_types]
+    units = [column.unit or plain for (_, column), plain in zip(columns, si, strict=True)]
+    return _Wanted(time, indices, np.array([column.factor for _, column in columns]), units)
 
 
 def _flaw(

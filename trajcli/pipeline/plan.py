@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
@@ -10,13 +10,15 @@ import numpy as np
 
 from trajcli.checks.verify import Verdict, verify
 from trajcli.curves.piecewise import concatenate
-from trajcli.errors import Place, TrajcliError
+from trajcli.errors import Amount, Place, TrajcliError
 from trajcli.job.limits import with_move_limits
 from trajcli.job.read import LoadedJob
-from trajcli.pipeline.reach import start_state, with_joints
+from trajcli.pipeline.reach import Reached, mended, start_state, with_joints
+from trajcli.pipeline.reach_through import through_joints
 from trajcli.pipeline.stretch import PlannedMove, aligned, slowed
 from trajcli.planners.planner import Event, Planner
 from trajcli.planners.point_to_point import PointToPoint
+from trajcli.planners.through_points import ThroughPoints
 from trajcli.trajectory import Span, State, Trajectory
 
 
@@ -30,6 +32,8 @@ class Plan:
         trajectory: All of them, joined.
         verdict: What the checks found.
         events: Concessions, in order of the moves; the job's own first.
+        reached: How poses are reached, by the index of the move that goes there, or None for the job's
+            start; None where joints were given.
     """
 
     loaded: LoadedJob
@@ -37,6 +41,7 @@ class Plan:
     trajectory: Trajectory
     verdict: Verdict
     events: tuple[Event, ...]
+    reached: Mapping[int | None, Reached | None]
 
 
 def plan_job(loaded: LoadedJob) -> Plan:
@@ -47,24 +52,25 @@ def plan_job(loaded: LoadedJob) -> Plan:
         PlanningError: When a move has no curve.
     """
     moves: list[PlannedMove] = []
-    events = list(loaded.events)
+    reached: dict[int | None, Reached | None] = {}
     with _errors_at(loaded, loaded.document.place(("start",))):
-        state, mended = start_state(loaded.job.start, loaded.robot)
-    events += mended
+        state, reached[None] = start_state(loaded.job.start, loaded.robot)
+    events = [*loaded.events, *mended(reached[None])]
     before: Planner | None = None
     for index, planner in enumerate(loaded.job.moves):
         start = _handed_over(state, before, planner)
         with _errors_of(loaded, index, planner):
-            reachable, mended = _with_joints(planner, loaded, state)
+            reachable, reached[index] = _with_joints(planner, loaded, state)
             move = _plan_move(loaded, index, reachable, start)
         moves.append(move)
-        events += [replace(event, move=index) for event in mended]
-        events += [replace(event, move=index) for event in move.planned.events]
+        events += [replace(event, move=index) for event in (*mended(reached[index]), *move.planned.events)]
         state, before = move.planned.end, planner
-    trajectory = _joined(moves, loaded)
-    verdict = verify(trajectory, [move.robot.limits for move in moves])
+    trajectory = _joined(moves, loaded, _first_state(loaded, moves[0], events))
+    verdict = verify(
+        trajectory, [move.robot.limits for move in moves], [move.planned.passage for move in moves]
+    )
     said = tuple(replace(event, message=event.text(loaded.say), amounts={}) for event in events)
-    return Plan(loaded, tuple(moves), trajectory, verdict, said)
+    return Plan(loaded, tuple(moves), trajectory, verdict, said, reached)
 
 
 def _plan_move(loaded: LoadedJob, index: int, planner: Planner, start: State) -> PlannedMove:
@@ -79,28 +85,45 @@ def _plan_move(loaded: LoadedJob, index: int, planner: Planner, start: State) ->
     return move
 
 
-def _with_joints(planner: Planner, loaded: LoadedJob, state: State) -> tuple[Planner, list[Event]]:
+def _with_joints(planner: Planner, loaded: LoadedJob, state: State) -> tuple[Planner, Reached | None]:
     """Return the planner with joints in the place of a pose to go to, on the branch nearest to `state`."""
+    if isinstance(planner, ThroughPoints):
+        return through_joints(planner, loaded.robot, state.position)
     if not isinstance(planner, PointToPoint):
-        return planner, []
-    target, mended = with_joints(planner.to, loaded.robot, state.position)
-    return planner.model_copy(update={"to": target}), mended
+        return planner, None
+    target, reached = with_joints(planner.to, loaded.robot, state.position)
+    return planner.model_copy(update={"to": target}), reached
 
 
 def _handed_over(state: State, before: Planner | None, after: Planner) -> State:
     """Return the state in which `after` starts: the acceleration is handed over between continuity 2 only."""
-    if before is None or (before.continuity == 2 and after.continuity == 2):
+    if before is None or (before.joins == 2 and after.joins == 2):
         return state
     return State(state.position, state.velocity, np.zeros_like(state.acceleration))
 
 
-def _joined(moves: list[PlannedMove], loaded: LoadedJob) -> Trajectory:
+def _first_state(loaded: LoadedJob, first: PlannedMove, events: list[Event]) -> State:
+    """Return the state in which the trajectory starts.
+
+    Where the job does not say how fast, and the first move's method leaves that open, it is the method's.
+    """
+    begins = first.planned.begins
+    if begins is None or loaded.job.start.velocity is not None or not begins.velocity.any():
+        return first.start
+    joint = int(np.abs(begins.velocity).argmax())
+    message = f"the trajectory begins in motion, {first.robot.joint_names[joint]} with {{velocity}}"
+    amounts = {"velocity": Amount(float(begins.velocity[joint]), 1, joint)}
+    events.append(Event("begins_moving", message, first.index, amounts))
+    return begins
+
+
+def _joined(moves: list[PlannedMove], loaded: LoadedJob, first: State) -> Trajectory:
     curve = concatenate([move.planned.curve for move in moves])
     spans, end = [], 0.0
     for move in moves:
         start, end = end, float(move.planned.curve.breaks[-1] + end)
-        spans.append(Span(move.index, move.planner.tag, start, end, move.planner.continuity))
-    robot, first, last = loaded.robot, moves[0].start, moves[-1].planned.end
+        spans.append(Span(move.index, move.planner.tag, start, end, move.planner.joins))
+    robot, last = loaded.robot, moves[-1].planned.end
     return Trajectory(curve, robot.joint_names, robot.joint_types, tuple(spans), first, last)
 
 

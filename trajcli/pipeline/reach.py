@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,12 +16,42 @@ from trajcli.planners.planner import Event
 from trajcli.planners.pose_fields import Configuration
 from trajcli.trajectory import State
 
+if TYPE_CHECKING:
+    from trajcli.kinematics.inverse.solution import Solutions
+    from trajcli.kinematics.inverse.target import Target as Goal
+
 _NOTED = 1e-12  # a smaller defect of a rotation matrix is rounding
 _CHOICES = ("shoulder", "elbow", "wrist")
 
 
-def with_joints(target: Target, robot: Robot, near: Array) -> tuple[Target, list[Event]]:
-    """Return the target with joints in the place of its pose, and an event where its rotation was mended.
+@dataclass(frozen=True, eq=False)
+class Reached:
+    """A pose that a job names, and the branch on which it is reached.
+
+    Attributes:
+        pose: What the job says.
+        goal: The coordinates that it fixes.
+        near: Joint values (n,) of where the arm comes from, rad or m.
+        found: All answers.
+        usable: Those within the limits that have the names the job asks for, shape (branches,).
+        branch: Index of the usable one that is nearest to `near`.
+    """
+
+    pose: Target
+    goal: Goal
+    near: Array
+    found: Solutions
+    usable: NDArray[np.bool_]
+    branch: int
+
+    @property
+    def joints(self) -> Array:
+        """Joint values (n,), rad or m."""
+        return np.asarray(self.found.joints[self.branch])
+
+
+def with_joints(target: Target, robot: Robot, near: Array) -> tuple[Target, Reached | None]:
+    """Return the target with joints in the place of its pose, and how that is reached; None without a pose.
 
     The branch is the one that the target's configuration names; without one, that nearest to `near`.
 
@@ -32,46 +65,45 @@ def with_joints(target: Target, robot: Robot, near: Array) -> tuple[Target, list
         PlanningError: When no branch reaches the pose within the limits.
     """
     if not target.gives_pose:
-        return target, []
+        return target, None
     if robot.convention is None:
         hint = "give its joints theta, d, a and alpha, or the target `joints`"
         raise InputError(f"{robot.name} has no geometry, so it reaches no pose", hint=hint)
-    joints = _nearest_branch(target, robot, near)
-    reached = Target(
-        joints=tuple(joints.tolist()), velocity=target.velocity, acceleration=target.acceleration
-    )
-    return reached, _mended(target)
+    reached = _on_nearest_branch(target, robot, near)
+    joints = tuple(reached.joints.tolist())
+    return Target(joints=joints, velocity=target.velocity, acceleration=target.acceleration), reached
 
 
-def start_state(target: Target, robot: Robot) -> tuple[State, list[Event]]:
+def start_state(target: Target, robot: Robot) -> tuple[State, Reached | None]:
     """Return the state in which a job starts; a pose is reached near to where all joints are zero.
 
     Raises:
         InputError: As `with_joints`.
         PlanningError: As `with_joints`.
     """
-    reached, events = with_joints(target, robot, np.zeros(len(robot.joints)))
-    return reached.as_state(), events
+    resolved, reached = with_joints(target, robot, np.zeros(len(robot.joints)))
+    return resolved.as_state(), reached
 
 
-def _nearest_branch(target: Target, robot: Robot, near: Array) -> Array:
+def _on_nearest_branch(target: Target, robot: Robot, near: Array) -> Reached:
     from trajcli.kinematics.inverse.solve import solve
     from trajcli.kinematics.inverse.verdict import check_reachable
     from trajcli.pipeline.inverse_answers import goal_of
 
-    found = solve(robot, goal_of(target), near)
+    goal = goal_of(target)
+    found = solve(robot, goal, near)
     check_reachable(robot, found)
     chosen = _of_configuration(
         target.configuration, [str(name) for name in found.names], robot, found.method.name
     )
     usable = found.within_limits & chosen
     if not usable.any():
-        words = " ".join(_asked(target.configuration))
+        words = " ".join(asked_names(target.configuration).values())
         others = sorted({str(found.names[k]) for k in np.flatnonzero(found.within_limits)})
         message = f"{robot.name} does not reach the pose within its limits in the configuration {words}"
         raise PlanningError(Problem(message, f"it does in: {', '.join(others)}"))
     distance = np.where(usable, np.abs(found.joints - near).max(axis=-1), np.inf)
-    return np.asarray(found.joints[int(distance.argmin())])
+    return Reached(target, goal, near, found, usable, int(distance.argmin()))
 
 
 def _of_configuration(
@@ -79,7 +111,7 @@ def _of_configuration(
 ) -> NDArray[np.bool_]:
     """Return which branches have the wanted names."""
     chosen = np.ones(len(names), dtype=bool)
-    for word in _asked(wanted):
+    for word in asked_names(wanted).values():
         has = np.array([word in name.split() for name in names])
         if not has.any():
             known = sorted({part for name in names for part in name.split()} - {"only"})
@@ -89,17 +121,18 @@ def _of_configuration(
     return chosen
 
 
-def _asked(wanted: Configuration | None) -> list[str]:
-    return [word for choice in _CHOICES if (word := getattr(wanted, choice, None)) is not None]
+def asked_names(wanted: Configuration | None) -> dict[str, str]:
+    """Return what a configuration names, such as {"elbow": "up"}."""
+    return {choice: word for choice in _CHOICES if (word := getattr(wanted, choice, None)) is not None}
 
 
-def _mended(target: Target) -> list[Event]:
+def mended(reached: Reached | None) -> list[Event]:
     """Return the event that a matrix was not quite a rotation and stands for the nearest one."""
-    if target.matrix is None:
+    if reached is None or reached.pose.matrix is None:
         return []
     from trajcli.geometry.rotation import rotation_defect
 
-    defect = float(rotation_defect(np.array([row[:3] for row in target.matrix[:3]])))
+    defect = float(rotation_defect(np.array([row[:3] for row in reached.pose.matrix[:3]])))
     if defect <= _NOTED:
         return []
     return [

@@ -21,6 +21,7 @@ from trajcli.job.report import (
     UncheckedReport,
 )
 from trajcli.kinematics.robot import QUANTITIES
+from trajcli.pipeline.passing import outside_reports, waypoint_reports
 from trajcli.pipeline.plan import Plan
 from trajcli.pipeline.reference import NoBound, fastest_duration
 from trajcli.pipeline.stretch import PlannedMove
@@ -71,6 +72,8 @@ def _move(plan: Plan, index: int, *, reference: bool) -> MoveReport:
         stretch=move.stretch,
         peaks=peaks,
         binding=binding,
+        waypoints=waypoint_reports(move, span),
+        outside=outside_reports(move, plan.verdict, index),
         reference=reference_of(move) if reference else None,
     )
 
@@ -119,8 +122,10 @@ def _problem(plan: Plan, finding: Finding) -> Problem:
     amounts = {"value": Amount(finding.value, order, joint), "limit": Amount(finding.limit, order, joint)}
     quantity = QUANTITIES[order]
     where = f"move {index} ({plan.moves[index].planner.tag}): "
-    if finding.kind in _JUMPS:
-        what, bound, hint = "jumps by", "", finding.hint
+    if finding.kind == "waypoint":
+        quantity, what, bound, hint = "path", "passes a waypoint at", ", it shall be {limit}", finding.hint
+    elif finding.kind in _JUMPS:
+        what, bound, hint = "jumps by", "", finding.hint or _jump_remedy(plan.moves[index])
     else:
         what, bound = "reaches", ", its limit is {limit}"
         hint = _remedy(plan, plan.moves[index], finding)
@@ -135,6 +140,12 @@ def _problem(plan: Plan, finding: Finding) -> Problem:
         value=finding.value,
         limit=finding.limit,
     )
+
+
+def _jump_remedy(move: PlannedMove) -> str | None:
+    if move.planned.begins is None:
+        return None
+    return "this rule leaves the velocities at its ends open: use clamped or continuous_acceleration"
 
 
 def _remedy(plan: Plan, move: PlannedMove, finding: Finding) -> str:

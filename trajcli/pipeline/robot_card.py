@@ -70,7 +70,10 @@ def _furthest(robot: Robot, ranges: Array) -> float:
 
 
 def robot_row(name: str, sheet: RobotSheet) -> dict[str, Any]:
-    """Return {name, title, joints, kind, reach, source} of a robot, reach in m; null where unlimited."""
+    """Return {name, title, joints, kind, reach, units, source} of a robot.
+
+    The reach is in m, null where unlimited; `units` are those of the robot's file.
+    """
     reach = reach_of(sheet.robot)
     return {
         "name": name,
@@ -78,6 +81,7 @@ def robot_row(name: str, sheet: RobotSheet) -> dict[str, Any]:
         "joints": len(sheet.robot.joints),
         "kind": kind_of(sheet.robot),
         "reach": None if reach is None else _finite(reach.sampled),
+        "units": asdict(sheet.units),
         "source": sheet.source,
     }
 

@@ -53,7 +53,7 @@ class PlannedMove:
 
     def alone(self) -> Trajectory:
         """Return the trajectory of this move alone."""
-        span = Span(self.index, self.planner.tag, 0.0, self.duration, self.planner.continuity)
+        span = Span(self.index, self.planner.tag, 0.0, self.duration, self.planner.joins)
         names, types = self.robot.joint_names, self.robot.joint_types
         return Trajectory(self.planned.curve, names, types, (span,), self.start, self.planned.end)
 
@@ -73,18 +73,9 @@ def lasting(move: PlannedMove, duration: float) -> PlannedMove:
     factor = duration / move.duration
     if move.start.at_rest and move.planned.end.at_rest:
         return replace(move, planned=_scaled(move.planned, factor), stretch=move.stretch * factor)
-    planned = _told_to_last(move.planner, duration).plan(move.start, move.robot)
+    planned = move.planner.told_to_last(duration).plan(move.start, move.robot)
     stretch = move.stretch * planned.curve.duration / move.duration
     return replace(move, planned=planned, stretch=stretch)
-
-
-def _told_to_last(planner: Planner, duration: float) -> Planner:
-    fields = type(planner).model_fields
-    names = [name for name in ("duration", "minimum_duration") if name in fields]
-    if not names:
-        raise PlanningError(f"{planner.tag} cannot last longer than it does")
-    given = [name for name in names if getattr(planner, name) is not None]
-    return planner.model_copy(update={(given or names[::-1])[0]: duration})
 
 
 def _scaled(planned: Planned, factor: float) -> Planned:
@@ -94,6 +85,8 @@ def _scaled(planned: Planned, factor: float) -> Planned:
         law=planned.law and scale_time(planned.law, factor),
         phases=tuple(replace(p, start=p.start * factor, end=p.end * factor) for p in planned.phases),
         arrivals=planned.arrivals and tuple(time * factor for time in planned.arrivals),
+        passage=planned.passage and planned.passage.scaled(factor),
+        origin=planned.origin * factor,
     )
 
 

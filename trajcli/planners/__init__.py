@@ -6,6 +6,7 @@ from typing import Annotated, Union, get_args
 
 from pydantic import Field
 
+from trajcli.planners.blends import Blends
 from trajcli.planners.cubic import Cubic
 from trajcli.planners.cycloidal import Cycloidal
 from trajcli.planners.hold import Hold
@@ -13,10 +14,12 @@ from trajcli.planners.jerk_limited import JerkLimited
 from trajcli.planners.planner import Planner
 from trajcli.planners.quintic import Quintic
 from trajcli.planners.septic import Septic
+from trajcli.planners.spline import Spline
+from trajcli.planners.time_optimal import TimeOptimal
 from trajcli.planners.trapezoid import Trapezoid
 
 Move = Annotated[
-    Union[Cubic, Quintic, Septic, Cycloidal, Trapezoid, JerkLimited, Hold],  # noqa: UP007
+    Union[Cubic, Quintic, Septic, Cycloidal, Trapezoid, JerkLimited, Spline, Blends, TimeOptimal, Hold],  # noqa: UP007
     Field(discriminator="planner"),
 ]
 

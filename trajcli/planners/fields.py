@@ -83,7 +83,7 @@ class Target(PoseFields):
         )
 
 
-class _Named:
+class Named:
     """Lets the name of a point stand for the point."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
@@ -134,4 +134,4 @@ def _known(name: str, points: Mapping[str, Any]) -> str:
     return did_you_mean(name, points) or valid_names(points, "points") or "the job has no `points`"
 
 
-NamedTarget = Annotated[Target, _Named()]
+NamedTarget = Annotated[Target, Named()]

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field
 
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.errors import Amount, said
+from trajcli.errors import Amount, PlanningError, said
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.bounds import LimitsSpec
 from trajcli.planners.model import Model
-from trajcli.trajectory import State
+from trajcli.trajectory import Passage, State
 
 WhenOverLimit = Literal["error", "slow"]
 
@@ -68,6 +68,10 @@ class Planned:
         events: Concessions.
         arrivals: Seconds after which each joint alone has arrived, shape (n,); None where all share one law.
         closed_form: "cycloid" where the curve is a fit of q0 + dq (t/T - sin(2 pi t/T) / (2 pi)).
+        passage: The points that it passes between start and target, where it has any.
+        origin: Where the zero of the planner's own time lies on the curve, s: above zero where the motion had
+            to begin before it.
+        begins: The state in which the curve begins where the method does not let its start be imposed.
     """
 
     curve: PiecewisePolynomial
@@ -77,6 +81,9 @@ class Planned:
     events: tuple[Event, ...] = ()
     arrivals: tuple[float, ...] | None = None
     closed_form: Literal["cycloid"] | None = None
+    passage: Passage | None = None
+    origin: float = 0.0
+    begins: State | None = None
 
 
 class Planner(Model):
@@ -102,6 +109,24 @@ class Planner(Model):
     def tag(self) -> str:
         """The planner's name in job files."""
         return str(type(self).model_fields["planner"].default)
+
+    @property
+    def joins(self) -> Literal[1, 2]:
+        """The continuity of this move: the planner's, unless its fields promise more."""
+        return self.continuity
+
+    def told_to_last(self, duration: float) -> Self:
+        """Return the planner of the same move over `duration` seconds.
+
+        Raises:
+            PlanningError: When it cannot be told.
+        """
+        fields = type(self).model_fields
+        names = [name for name in ("duration", "minimum_duration") if name in fields]
+        if not names:
+            raise PlanningError(f"{self.tag} cannot last longer than it does")
+        given = [name for name in names if getattr(self, name) is not None]
+        return self.model_copy(update={(given or names[::-1])[0]: duration})
 
     def plan(self, start: State, robot: Robot) -> Planned:
         """Return the move that begins in `start` at t = 0.

@@ -8,7 +8,7 @@ without one (a planner built in Python) values are SI.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,6 +16,7 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
+from trajcli.planners.recorded import Recorded
 from trajcli.units import Quantity, UnitError, Units, factor, parse_quantity, unit_name
 
 MAX_JOINTS = 12
@@ -36,12 +37,14 @@ class ReadingContext:
             values by joint are then checked for form only.
         joint_types: "revolute" or "prismatic" for each joint.
         points: The file's named points, as plain mappings.
+        read_points: Reads a file of recorded joint values, its path relative to the job; raises FlawError.
     """
 
     units: Units = field(default_factory=Units)
     joint_names: tuple[str, ...] | None = None
     joint_types: tuple[str, ...] = ()
     points: Mapping[str, Any] = field(default_factory=dict)
+    read_points: Callable[[str], Recorded] | None = None
 
     def joint_quantity(self, joint: int, order: int) -> Quantity:
         """Return the quantity of a joint's value or of its time derivative."""

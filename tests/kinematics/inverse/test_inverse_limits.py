@@ -118,7 +118,7 @@ def test_an_aligned_ur_wrist_frees_four_joints():
     robot = robot_of(next(robot for robot in robots() if robot["id"] == "C-ur5e"))
     joints = np.array([0.5, -1.2, 1.1, -0.4, 0.0, 2.0])
     found = solve(robot, forward(robot, joints), near=joints)
-    best = int(np.abs(found.joints - joints).max(axis=1).argmin())
+    best = int(found.nearest(joints))
     assert found.singular[best]
     assert found.joints[best] == pytest.approx(joints, abs=1e-6)
     assert found.free[best].tolist() == [False, True, True, True, False, True]

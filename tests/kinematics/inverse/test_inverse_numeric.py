@@ -96,7 +96,7 @@ def test_a_redundant_arm_answers_with_the_member_nearest_to_where_it_is():
     found = solve(robot, pose, near)
     best = int(found.nearest(near))
     joints = found.joints[best]
-    assert found.singular[best]
+    assert not found.singular[best]
     assert found.free[best].sum() >= 6
     slopes = np.array(
         [

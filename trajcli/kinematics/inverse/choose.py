@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from trajcli.kinematics.inverse import planar, positioning, spherical_wrist, three_parallel
 from trajcli.kinematics.inverse.lines import Arm, arm_of
 from trajcli.kinematics.inverse.method import Method
@@ -10,6 +12,7 @@ from trajcli.kinematics.robot import Robot
 FAMILIES = (planar.match, spherical_wrist.match, three_parallel.match, positioning.match)
 
 
+@lru_cache(maxsize=16)
 def method_for(robot: Robot) -> Method:
     """Return how the inverse kinematics of a robot is found: the first family that fits, else numerically.
 

@@ -1,28 +1,30 @@
 """Runs a closed form over blocks of poses and judges every answer by forward kinematics.
 
-Forward kinematics takes the cosines and sines of the closed form, which saves most of its time: the angles
-are their arc tangents to the last bit, and a pair that had not length 1 would show as a gap. Of two mirrored
-answers (joints 4 and 6 half a turn further, joint 5 bent the other way) it judges the first: the hand's
-rotation is the same product in both.
+Of two mirrored answers (joints 4 and 6 half a turn further, joint 5 bent the other way) the first is judged:
+the hand's rotation is the same product in both.
+
+Blocks do not know of each other, so that the answers are the same whatever the number of threads.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from trajcli.curves.piecewise import Array
-from trajcli.geometry.rotation import Flags, cos_sin
-from trajcli.kinematics.chain import Link, MovingFrame, links_of
-from trajcli.kinematics.columns import Column, Entry, advance
+from trajcli.geometry.rotation import Flags
+from trajcli.kinematics.columns import Entry
+from trajcli.kinematics.inverse.judge import Judge
 from trajcli.kinematics.inverse.lines import Arm, Goal
 from trajcli.kinematics.inverse.method import Choice, Method
-from trajcli.kinematics.inverse.subproblems import Mirrored, Opposed, Turn, Value, Watch, added, angle
+from trajcli.kinematics.inverse.subproblems import Mirrored, Opposed, Turn, Value, Watch, angle
 from trajcli.kinematics.robot import Robot
 
 _BLOCK = 4096  # poses at a time: eight branches of them stay in the processor's cache
+_EACH = 3  # blocks for each thread at least: with fewer, threads cost more than they gain
 _WORKSPACE = 1 << 21  # numbers: more than the temporary arrays of a block
 _ORDER: tuple[Choice, ...] = ("shoulder", "elbow", "wrist")
 
@@ -43,34 +45,69 @@ class Candidates:
 
 
 def candidates(robot: Robot, arm: Arm, method: Method, poses: Array) -> Candidates:
-    """Return all branches of poses (N, 4, 4) by a method that has a closed form."""
-    np.empty(
-        _WORKSPACE
-    )  # freed at once: the allocator then keeps blocks of this size instead of returning them
-    count, links, twos = len(poses), links_of(robot), (2,) * len(method.choices)
-    joints, gaps = np.empty((len(links), *twos, count)), np.empty((2, *twos, count))
+    """Return all branches of poses (N, 4, 4) by a method that has a closed form.
+
+    Raises:
+        ValueError: When the method has none.
+    """
+    if method.solve is None:
+        raise ValueError(f"the method {method.name} has no closed form")
+    # freed at once: the allocator then keeps blocks of this size instead of returning them
+    np.empty(_WORKSPACE)
+    count, twos = len(poses), (2,) * len(method.choices)
+    joints, gaps = np.empty((len(robot.joints), *twos, count)), np.empty((2, *twos, count))
     watched = np.zeros(count, dtype=bool)
-    present = [choice for choice in _ORDER if choice in method.choices]
-    axes = [*(len(twos) - 1 - method.choices.index(choice) for choice in present), len(twos)]
-    for low in range(0, count, _BLOCK):
-        block = slice(low, min(low + _BLOCK, count))
-        rows = np.ascontiguousarray(poses[block].reshape(-1, 16).T)
-        goal, watch = Goal(arm, rows[:12]), Watch(rows.shape[1], arm.length)
-        values = method.solve(goal, watch) if method.solve else ()
-        shape = (*twos, rows.shape[1])
-        for i, value in enumerate(values):
-            joints[i, ..., block] = np.broadcast_to(_plain(value), shape).transpose(axes)
-        for i, gap in enumerate(_gaps(robot, links, _judged(values, len(twos)), goal)):
-            gaps[i, ..., block] = np.broadcast_to(gap, shape).transpose(axes)
+    order, judge, solve = _order(method), Judge(robot), method.solve
+    places, misses = joints.transpose(order), gaps.transpose(order)
+
+    def fill(block: slice) -> None:
+        rows = np.ascontiguousarray(poses[block, :3].reshape(-1, 12).T)
+        goal, watch = Goal(arm, rows), Watch(rows.shape[1], arm.length)
+        values = solve(goal, watch)
+        for value, place in zip(values, places[..., block], strict=True):
+            _write(value, place)
+        misses[0, ..., block], misses[1, ..., block] = judge.gaps(_judged(values, len(twos)), goal)
         watched[block] = watch.rows
-    return Candidates(joints.reshape(len(links), -1, count), gaps.reshape(2, -1, count), watched)
+
+    _each(fill, [slice(low, low + _BLOCK) for low in range(0, count, _BLOCK)])
+    branches = (2 ** len(twos), count)
+    return Candidates(joints.reshape(len(robot.joints), *branches), gaps.reshape(2, *branches), watched)
 
 
-def _plain(value: Value) -> Entry:
-    """Return angles or slides."""
-    if isinstance(value, Mirrored | Opposed):
-        return value.angles()
-    return angle(value) if isinstance(value, tuple) else value
+def _each(work: Callable[[slice], None], blocks: Sequence[slice]) -> None:
+    """Work on all blocks, in threads where there are many: numpy computes without the interpreter's lock."""
+    threads = min(os.cpu_count() or 1, len(blocks) // _EACH)
+    if threads < 2:
+        for block in blocks:
+            work(block)
+        return
+    from concurrent.futures import ThreadPoolExecutor
+
+    with ThreadPoolExecutor(threads) as pool:
+        for _ in pool.map(work, blocks):
+            pass
+
+
+def _order(method: Method) -> list[int]:
+    """Return the axes of results (k, *branches, N) in the order of the solver's values, last choice first."""
+    present = [choice for choice in _ORDER if choice in method.choices]
+    return [0, *(1 + present.index(choice) for choice in reversed(method.choices)), 1 + len(present)]
+
+
+def _write(value: Value, out: Array) -> None:
+    """Write angles or slides into (2, ..., 2, B); what is the same for several branches is computed once."""
+    if not isinstance(value, tuple | Mirrored | Opposed):
+        out[...] = value
+        return
+    pair, answers = (value, ()) if isinstance(value, tuple) else (value.turn, (2,))
+    shape = (*answers, *np.broadcast_shapes(np.shape(pair[0]), np.shape(pair[1])))
+    place = out if shape == out.shape else np.empty(shape)
+    if isinstance(value, tuple):
+        angle(value, place)
+    else:
+        value.write(place)
+    if place is not out:
+        out[...] = place
 
 
 def _judged(values: Sequence[Value], choices: int) -> list[Turn | Entry]:
@@ -90,40 +127,3 @@ def _first_of(value: Value, choices: int) -> Turn | Entry:
 
 def _without_last_choice(entry: Entry, choices: int) -> Entry:
     return entry[0] if isinstance(entry, np.ndarray) and entry.ndim > choices else entry
-
-
-class _Frame(MovingFrame):
-    """A moving frame that turns by pairs of cosine and sine."""
-
-    def carry(self, link: Link, value: Turn | Entry) -> None:
-        """Move through a link with its joint's value."""
-        self.screw(*link.before)
-        if isinstance(value, tuple):
-            cosine, sine = cos_sin(link.theta)
-            turn = added((float(cosine), float(sine)), value, link.sign)
-            self._turned, self._x_now = added(self._cos_sin(), turn), None
-            self.p = advance(self.p, link.d, self.z)
-        else:
-            self.move(link, np.asarray(value))
-        self.screw(*link.after)
-
-
-def _gaps(
-    robot: Robot, links: Sequence[Link], values: Sequence[Turn | Entry], goal: Goal
-) -> tuple[Array, Array]:
-    """Return how far forward kinematics is from the goal, m and rad.
-
-    |dx|^2 + |dz|^2 of two axes is at least the square of a small angle, and at most twice that.
-    """
-    frame = _Frame(robot.base)
-    for link, value in zip(links, values, strict=True):
-        frame.carry(link, value)
-    frame.attach(robot.tool)
-    turned = np.sqrt(_square(frame.x, goal.x) + _square(frame.z, goal.z))
-    return np.sqrt(_square(frame.p, goal.p)), turned
-
-
-def _square(a: Column, b: Column) -> Array:
-    """Return |a - b|^2."""
-    first, second, third = (np.asarray(x - y) for x, y in zip(a, b, strict=True))
-    return np.asarray(first * first + second * second + third * third)

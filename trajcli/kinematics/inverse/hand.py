@@ -13,6 +13,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from trajcli.curves.piecewise import Array
 from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.columns import Column, cross, dot
 from trajcli.kinematics.inverse.lines import Floats, Goal, across_floats, aside
@@ -48,8 +49,7 @@ def hand(axes: Axes, back: Callable[[Column], Column], first_axis: Column, goal:
     aim = back(goal.direction(last))
     around, bend = two_turns(first, second, last, aim, watch)
     end = _last(axes, bend, first_axis, goal, watch)
-    away = across(aim, first)
-    aligned = np.asarray(np.asarray(dot(away, away)) < FREE**2)
+    aligned = np.asarray(_distance(aim, first, bend) < FREE)
     if not aligned.any():
         return around, bend, end
     marker = aside(last)
@@ -59,6 +59,14 @@ def hand(axes: Axes, back: Callable[[Column], Column], first_axis: Column, goal:
     seen = turned_back(back(goal.direction(marker)), second, pair)
     total = unit(onto(last, marker, seen), watch)
     return _replaced(around, aligned, (1.0, 0.0)), bend, _replaced(end, aligned, total)
+
+
+def _distance(aim: Column, axis: Floats, bend: Turn | Opposed) -> Array:
+    """Return how far the unit vector `aim` is from an axis: the sine of a square wrist's bend."""
+    if isinstance(bend, Opposed):
+        return bend.turn[1]
+    away = across(aim, axis)
+    return np.asarray(np.sqrt(dot(away, away)))
 
 
 def _replaced(value: Turn | Mirrored, where: Flags, turn: Turn) -> Turn | Mirrored:

@@ -11,6 +11,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from math import hypot
 from typing import cast
 
 import numpy as np
@@ -68,6 +70,7 @@ class Arm:
         return "".join("P" if line.prismatic else "R" for line in self.lines)
 
 
+@lru_cache(maxsize=16)
 def arm_of(robot: Robot) -> Arm:
     """Return the lines of a robot.
 
@@ -141,9 +144,8 @@ class InverseGoal(Goal):
 
 def parallel(*lines: Line) -> bool:
     """Return whether all lines have one direction, or the opposite one."""
-    first = np.array(lines[0].direction)
-    sines = [float(np.linalg.norm(np.cross(first, np.array(line.direction)))) for line in lines[1:]]
-    return max(sines, default=0.0) <= PARALLEL
+    crossed = (cross(lines[0].direction, line.direction) for line in lines[1:])
+    return all(hypot(*map(float, normal)) <= PARALLEL for normal in crossed)
 
 
 def perpendicular(a: Line, b: Line) -> bool:

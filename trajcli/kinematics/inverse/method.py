@@ -41,6 +41,7 @@ class Method:
         needs: Whether the closed form uses the whole pose or the position alone.
         idle: A direction in the base along which the position does not matter to the closed form; None
             where all of it does.
+        labels: Names of the answers where one name may have several.
     """
 
     name: str
@@ -50,12 +51,13 @@ class Method:
     solve: Solver | None = None
     needs: Literal["pose", "position"] = "pose"
     idle: Floats | None = None
+    labels: tuple[Branch, ...] = ()
 
     @property
     def branches(self) -> tuple[Branch, ...]:
-        """Names of the branches, in the order of the solutions; none for the numeric method."""
-        if self.solve is None:
-            return ()
+        """Names of the branches, in the order of the solutions; none where there is no closed form."""
+        if self.labels or self.solve is None:
+            return self.labels
         order: tuple[Choice, ...] = ("shoulder", "elbow", "wrist")
         present = [choice for choice in order if choice in self.choices]
         rows = product(*(NAMES[choice] for choice in present))

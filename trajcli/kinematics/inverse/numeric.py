@@ -164,13 +164,20 @@ def starting_points(robot: Robot, seeds: int, attempt: int) -> Array:
     return np.asarray(low + (high - low) * spread)
 
 
-def distinct(robot: Robot, joints: Array, usable: Flags) -> Flags:
-    """Return which rows (N, S) are usable and repeat no earlier one; full turns apart count as equal."""
+def distinct(robot: Robot, joints: Array, usable: Flags, within: float = SAME) -> Flags:
+    """Return which rows (N, S) are usable and repeat no earlier one; full turns apart count as equal.
+
+    Args:
+        robot: The arm.
+        joints: Shape (N, S, n).
+        usable: Shape (N, S).
+        within: How far two that are one may be apart, rad or m.
+    """
     turning = revolute(robot)
     keep = usable.copy()
     for i in range(1, joints.shape[1]):
         gap = joints[:, :i] - joints[:, i, None]
         gap = np.where(turning, gap - FULL * np.round(gap / FULL), gap)
-        same = (np.abs(gap).max(axis=-1) <= SAME) & keep[:, :i]
+        same = (np.abs(gap).max(axis=-1) <= within) & keep[:, :i]
         keep[:, i] &= ~same.any(axis=1)
     return keep

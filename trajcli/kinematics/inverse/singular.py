@@ -1,8 +1,10 @@
-"""Singular answers: which joints are free together, and the member of the family nearest to a configuration.
+"""Families of answers: which joints are free together, and where the arm is singular.
 
-An arm is singular where its Jacobian loses rank. A family of answers exists only if the arm can really move
-while the tcp rests: a small step along the lost direction is taken and corrected, and counts if the tcp is
-back while the joints are not. A stretched elbow fails that, an aligned wrist does not.
+A family exists where the arm can move while what the target fixes rests. That need not be singular: a target
+that fixes less than the arm can do leaves some freedom everywhere. An arm is singular where its Jacobian has
+less rank than elsewhere, and counts as that only if it really can move in more ways: a small step along a
+lost direction is taken and corrected, and counts if the tcp is back, the joints are not, and the rank is less
+there too. A stretched elbow fails that, an aligned wrist does not.
 """
 
 from __future__ import annotations
@@ -10,19 +12,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.geometry.rotation import Flags
-from trajcli.kinematics.inverse.numeric import SAME, linearised, refine
+from trajcli.kinematics.inverse.nearest_member import MET
+from trajcli.kinematics.inverse.numeric import SAME, linearised, refine, starting_points
 from trajcli.kinematics.inverse.target import Target
 from trajcli.kinematics.inverse.turns import FULL, revolute
 from trajcli.kinematics.robot import Robot
 
 RANK = 3e-9  # of the largest singular value
 _STEP = 0.05  # rad or m: large against what a correction may lose
-_MET = 1e-10  # scaled error with which a member still meets the target
 _PART = 1e-6  # of a unit direction: a joint with less takes no part
-_MOVES = 30
+_PLACES = 8  # configurations among which one is not singular
 _IN_LINE = 2  # joints that two axes in line leave free together
 
 
@@ -31,42 +34,43 @@ class Families:
     """What is known of K configurations.
 
     Attributes:
-        joints: Shape (K, n), the members nearest to the given configurations.
-        singular: Shape (K,).
+        singular: Shape (K,): the arm can move in more ways than the targets leave free elsewhere.
         free: Shape (K, n), the joints that are free together.
     """
 
-    joints: Array
     singular: Flags
     free: Flags
 
 
-def families(robot: Robot, target: Target, joints: Array, near: Array | None) -> Families:
+def families(robot: Robot, target: Target, joints: Array, freedom: int = 0) -> Families:
     """Return the families that configurations (K, n), which meet the flat target, belong to.
 
     Args:
         robot: The arm.
         target: A flat batch of K.
         joints: Shape (K, n).
-        near: Shape (K, n), whose nearest members are returned; None leaves the configurations as they are.
+        freedom: How many motions the targets leave free where the arm is not singular.
     """
-    result, free = joints.copy(), np.zeros(joints.shape, dtype=bool)
-    lost = _null_space(robot, target, joints)
-    candidates = np.flatnonzero(lost.any(axis=(1, 2)))
+    singular, lost = np.zeros(len(joints), dtype=bool), _null_space(robot, target, joints)
+    free = _joints_in(lost) if freedom else np.zeros(joints.shape, dtype=bool)
+    candidates = np.flatnonzero(_count(lost) > freedom)
     if len(candidates):
         some, start = target.rows(candidates), joints[candidates]
         direction = lost[candidates, -1]
         trial = refine(robot, some, start + _STEP * direction, 8)
         moved = np.abs(np.einsum("kn,kn->k", trial - start, direction)) > 0.4 * _STEP
-        real = moved & _met(robot, some, trial)
-        free[candidates[real]] = (np.abs(_null_space(robot, some.rows(real), trial[real])) > _PART).any(
-            axis=1
-        )
-    singular = np.asarray(free.any(axis=1))
-    rows = np.flatnonzero(singular)
-    if near is not None and len(rows):
-        result[rows] = _nearest_member(robot, target.rows(rows), joints[rows], near[rows])
-    return Families(result, singular, free)
+        there = _null_space(robot, some, trial)
+        real = moved & _met(robot, some, trial) & (_count(there) > freedom)
+        singular[candidates[real]] = True
+        free[candidates[real]] = _joints_in(there[real])
+    return Families(singular, free)
+
+
+def freedom_of(robot: Robot, target: Target) -> int:
+    """Return how many motions of its joints a flat target leaves to an arm that is not singular."""
+    somewhere = starting_points(robot, _PLACES, 0)
+    lost = _null_space(robot, target.rows(np.zeros(_PLACES, dtype=np.intp)), somewhere)
+    return int(_count(lost).min())
 
 
 def one_of_each(robot: Robot, joints: Array, valid: Flags, free: Flags, near: Array | None) -> Flags:
@@ -102,21 +106,16 @@ def _null_space(robot: Robot, target: Target, joints: Array) -> Array:
     return np.where(lost[..., None], right, 0.0)
 
 
+def _count(lost: Array) -> NDArray[np.intp]:
+    """Return how many independent motions the rows of a null space (K, n, n) span, shape (K,)."""
+    return np.asarray(np.count_nonzero(lost.any(axis=2), axis=1))
+
+
+def _joints_in(lost: Array) -> Flags:
+    """Return the joints that take part in the motions of a null space, shape (K, n)."""
+    return np.asarray((np.abs(lost) > _PART).any(axis=1))
+
+
 def _met(robot: Robot, target: Target, joints: Array) -> Flags:
     errors, _ = linearised(robot, target, joints)
-    return np.asarray(np.linalg.norm(errors, axis=1) <= _MET)
-
-
-def _nearest_member(robot: Robot, target: Target, joints: Array, near: Array) -> Array:
-    """Return members of the families with no way left, inside the family, towards `near`."""
-    turning, q = revolute(robot), joints
-    for _ in range(_MOVES):
-        gap = near - q
-        gap = np.where(turning, gap - FULL * np.round(gap / FULL), gap)
-        lost = _null_space(robot, target, q)
-        step = np.einsum("kij,ki->kj", lost, np.einsum("kij,kj->ki", lost, gap))
-        if np.abs(step).max(initial=0.0) < _MET:
-            break
-        moved = refine(robot, target, q + np.clip(step, -1.0, 1.0), 3)
-        q = np.where(_met(robot, target, moved)[:, None], moved, q)
-    return np.asarray(q)
+    return np.asarray(np.linalg.norm(errors, axis=1) <= MET)

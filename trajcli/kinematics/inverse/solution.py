@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
-from trajcli.geometry.rotation import Flags
+from trajcli.geometry.rotation import Axis, Flags
 from trajcli.kinematics.inverse.method import Branch, Method
 from trajcli.kinematics.inverse.turns import beyond
 
@@ -24,10 +24,12 @@ class Solutions:
         valid: Shape (*batch, branches): the tcp meets the target within the tolerance, and no earlier branch
             is the same configuration. Limits do not enter.
         closure: Shape (*batch, branches, 2): how far forward kinematics is from the target, m and rad.
-        singular: Shape (*batch, branches): the arm can move there while the tcp rests.
-        free: Shape (*batch, branches, n): the joints that are free together; one value of one of them fixes
-            the others. The member nearest to the given configuration is the one in `joints`.
+        singular: Shape (*batch, branches): the arm can move there in more ways than the target leaves free
+            elsewhere.
+        free: Shape (*batch, branches, n): the joints that are free together, because the arm is singular or
+            because the target leaves them free. The member nearest to the given configuration is in `joints`.
         bounds: Position limits, shape (n, 2).
+        fixed_axis: The axis of the tool that the targets mean, if no joint turns it.
     """
 
     method: Method
@@ -37,6 +39,7 @@ class Solutions:
     singular: Flags
     free: Flags
     bounds: Array
+    fixed_axis: Axis | None = None
 
     @property
     def names(self) -> tuple[Branch, ...]:
@@ -69,6 +72,17 @@ class Solutions:
         nearest = np.take_along_axis(self.closure, best, axis=-2)[..., 0, :]
         reached = np.asarray(self.valid.any(axis=-1))
         return np.where(reached[..., None], 0.0, nearest)
+
+    def named(self, **choices: str | None) -> Flags:
+        """Return which branches have the given names, shape (branches,); a choice of None does not matter.
+
+        Args:
+            choices: Of `shoulder`, `elbow` and `wrist`, in the words of a job's `configuration`.
+        """
+        wanted = {choice: name for choice, name in choices.items() if name is not None}
+        return np.array(
+            [all(getattr(own, key) == value for key, value in wanted.items()) for own in self.names]
+        )
 
     def nearest(self, near: Array, within_limits: bool = True) -> NDArray[np.intp]:
         """Return the index (*batch,) of the branch nearest to `near` (*batch, n), rad or m; -1 for none.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,45 +9,29 @@ from numpy.typing import ArrayLike, NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
-from trajcli.geometry.rotation import Flags
+from trajcli.geometry.rotation import AXES, Flags
 from trajcli.kinematics.chain import configurations
 from trajcli.kinematics.forward import forward
+from trajcli.kinematics.inverse.body import fixed_axis, never_heads
 from trajcli.kinematics.inverse.choose import method_for
 from trajcli.kinematics.inverse.closed_form import candidates
 from trajcli.kinematics.inverse.complete import complete
+from trajcli.kinematics.inverse.found import Found, by_name, closures, polish
 from trajcli.kinematics.inverse.lines import PARALLEL, Arm, arm_of
 from trajcli.kinematics.inverse.method import Method
-from trajcli.kinematics.inverse.numeric import distinct, refine, search
-from trajcli.kinematics.inverse.singular import families, one_of_each
+from trajcli.kinematics.inverse.nearest_member import nearest_members
+from trajcli.kinematics.inverse.numeric import SAME, distinct, search
+from trajcli.kinematics.inverse.postures import Postures, by_postures
+from trajcli.kinematics.inverse.singular import families, freedom_of, one_of_each
 from trajcli.kinematics.inverse.solution import Solutions
-from trajcli.kinematics.inverse.target import Target, closure_of, pose_target
+from trajcli.kinematics.inverse.target import Target, pose_target
 from trajcli.kinematics.inverse.turns import beyond, choose_turns
 from trajcli.kinematics.robot import Robot
 
 TOLERANCE = 1e-9  # m and rad: what a branch may miss its target by
-_ROUNDED = 1e-11  # m and rad: above, rounding has grown and one Newton step takes it away
-_NEAR = 1e-5  # m and rad: further off, a branch does not exist and is left where it is
 _LAST = 1e6  # rad or m: sorts answers outside the limits behind all others
 _KEPT = 16  # answers of a numeric search that are kept, the nearest
-
-
-@dataclass(eq=False)
-class _Found:
-    """Answers of a flat batch while they are worked on; joints come first, poses last.
-
-    Attributes:
-        joints: Shape (n, branches, N).
-        closure: Shape (2, branches, N), m and rad.
-        valid: Shape (branches, N).
-        suspect: Shape (N,): poses whose answers may be singular or repeat each other.
-        closed: Whether a closed form found them.
-    """
-
-    joints: Array
-    closure: Array
-    valid: Flags
-    suspect: Flags
-    closed: bool
+_SAME_MEMBER = 1e-3  # rad or m: nearest members of families that are no further apart are one
 
 
 def solve(
@@ -70,19 +53,44 @@ def solve(
     if not tolerance > 0.0:
         raise InputError(f"the tolerance must be positive, it is {tolerance:.6g}")
     wanted = target if isinstance(target, Target) else pose_target(target)
-    method, arm, flat = method_for(robot), arm_of(robot), wanted.flat()
+    arm, flat = arm_of(robot), wanted.flat()
     close_to = _near(robot, near, wanted.batch)
-    if method.solve is not None and fits(method, wanted, robot.base):
-        found = _closed(robot, arm, method, flat, tolerance)
-    else:
-        method = method if method.solve is None else numeric_instead(method, wanted)
-        found = _searched(robot, flat, close_to, tolerance)
+    stuck = flat.orientation in ("direction", "yaw", "pitch") and fixed_axis(arm, flat.tool_axis)
+    if stuck and flat.orientation == "yaw":
+        _check_heading(robot, arm, flat)
+    found = _find(robot, arm, flat, close_to, tolerance)
     singular, free = _resolve(robot, flat, found, close_to, tolerance)
-    _turn(robot, found, close_to)
+    choose_turns(robot, found.joints, None if close_to is None else close_to.T)
     arrays = (found.joints, found.closure, free, found.valid[None], singular[None])
     joints, closure, freed, valid, lost = (_batch_first(array, wanted.batch) for array in arrays)
-    bounds = robot.limits.position
-    return Solutions(method, joints, valid[..., 0], closure, lost[..., 0], freed, bounds)
+    bounds, fixed = robot.limits.position, flat.tool_axis if stuck else None
+    return Solutions(found.method, joints, valid[..., 0], closure, lost[..., 0], freed, bounds, fixed)
+
+
+def _find(robot: Robot, arm: Arm, target: Target, near: Array | None, tolerance: float) -> Found:
+    """Return the answers of the method that fits the arm and the targets."""
+    method = method_for(robot)
+    if method.solve is None:
+        return _searched(robot, method, target, near, tolerance)
+    if fits(method, target, robot.base):
+        return _closed(robot, arm, method, target, tolerance)
+    if method.needs == "pose":
+        start = np.zeros((len(target.poses), len(arm.lines))) if near is None else near
+        found = by_postures(robot, arm, method, target, start, tolerance)
+        if found is not None:
+            return found
+    found = _searched(robot, numeric_instead(method, target), target, near, tolerance)
+    return _named(found, Postures(robot, arm, method, 1, target.tool_axis))
+
+
+def _named(found: Found, postures: Postures) -> Found:
+    """Return the answers of a search by the branches that the closed form knows for their whole poses."""
+    columns, rows = np.nonzero(found.valid)
+    own = np.full(found.valid.shape, -1)
+    if len(rows):
+        answers = found.joints[:, columns, rows].T
+        own[columns, rows] = postures.branch(answers, forward(postures.robot, answers))[0]
+    return by_name(found, own, postures.method.branches)
 
 
 def _batch_first(array: NDArray[Any], batch: tuple[int, ...]) -> NDArray[Any]:
@@ -115,79 +123,89 @@ def _near(robot: Robot, near: ArrayLike | None, batch: tuple[int, ...]) -> Array
     return np.broadcast_to(values, (*batch, values.shape[-1])).reshape(-1, values.shape[-1])
 
 
-def _closed(robot: Robot, arm: Arm, method: Method, target: Target, tolerance: float) -> _Found:
+def _check_heading(robot: Robot, arm: Arm, target: Target) -> None:
+    """Do nothing when the tool axis, which no joint turns, has a heading.
+
+    Raises:
+        InputError: When it is vertical.
+    """
+    if never_heads(arm, target.tool_axis):
+        others = " or ".join(axis for axis in AXES if axis != target.tool_axis)
+        raise InputError(
+            f"the {target.tool_axis} axis of the tool of {robot.name} is always vertical and has no yaw",
+            hint=f"say which axis of the tool heads there, with `tool_axis: {others}`",
+        )
+
+
+def _closed(robot: Robot, arm: Arm, method: Method, target: Target, tolerance: float) -> Found:
     raw = candidates(robot, arm, method, target.poses)
     joints, closure = raw.joints, raw.gaps
     if not target.whole:
-        closure = _closures(robot, target, joints)
-    worst = np.maximum(closure[0], closure[1])
-    poor = (worst > _ROUNDED) & (worst < _NEAR)
-    if raw.watched.any():
-        poor |= raw.watched & (closure[0] < _NEAR)
-    branches, rows = np.nonzero(poor)
-    if len(rows):
-        some = target.rows(rows)
-        better = refine(robot, some, joints[:, branches, rows].T)
-        joints[:, branches, rows] = better.T
-        closure[:, branches, rows] = closure_of(some, forward(robot, better)).T
-        worst = np.maximum(closure[0], closure[1])
-    found = _Found(joints, closure, worst <= tolerance, raw.watched, closed=True)
+        closure = closures(robot, target, joints)
+    polish(robot, target, joints, closure, raw.watched)
+    worst, free = np.maximum(closure[0], closure[1]), np.zeros(len(joints), dtype=bool)
+    found = Found(method, joints, closure, worst <= tolerance, raw.watched, free, 0, closed=True)
     missed = np.flatnonzero(~found.valid.any(axis=0))
     if len(missed):
-        found.closure[..., missed] = _closures(robot, target.rows(missed), joints[..., missed])
+        found.closure[..., missed] = closures(robot, target.rows(missed), joints[..., missed])
     return found
 
 
-def _searched(robot: Robot, target: Target, near: Array | None, tolerance: float) -> _Found:
-    search_result = search(robot, target, near)
+def _searched(robot: Robot, method: Method, target: Target, near: Array | None, tolerance: float) -> Found:
+    """Return the nearest answers that a search finds; of families their nearest members."""
+    search_result, freedom = search(robot, target, near), freedom_of(robot, target)
     joints = np.ascontiguousarray(np.moveaxis(search_result.joints, 0, -1).swapaxes(0, 1))
-    found = _Found(
-        joints, _closures(robot, target, joints), search_result.found.T, np.ones(0, dtype=bool), closed=False
-    )
-    found.valid = found.valid & (found.closure.max(axis=0) <= tolerance)
-    _turn(robot, found, near)
-    found.valid = distinct(robot, joints.transpose(2, 1, 0), found.valid.T).T
-    aim = 0.0 if near is None else near.T[:, None]
+    valid = search_result.found.T & (closures(robot, target, joints).max(axis=0) <= tolerance)
+    choose_turns(robot, joints, None if near is None else near.T)
+    aim = np.zeros((len(target.poses), len(joints))) if near is None else near
+    within = SAME
+    if freedom:
+        seeds, rows = np.nonzero(valid)
+        members = nearest_members(robot, target.rows(rows), joints[:, seeds, rows].T, aim[rows])
+        joints[:, seeds, rows], within = members.T, _SAME_MEMBER
+    closure = closures(robot, target, joints)
+    valid &= closure.max(axis=0) <= tolerance
     outside = (beyond(joints.T, robot.limits.position) != 0.0).any(axis=-1).T
-    distance = np.abs(joints - aim).max(axis=0) + np.where(outside, _LAST, 0.0)
-    order = np.argsort(
-        np.where(found.valid, distance, 2 * _LAST + found.closure.sum(axis=0)), axis=0, kind="stable"
+    way = np.abs(joints - aim.T[:, None])
+    cost = (np.square(way).sum(axis=0) if freedom else way.max(axis=0)) + np.where(outside, _LAST, 0.0)
+    order = np.argsort(np.where(valid, cost, 2 * _LAST + closure.sum(axis=0)), axis=0, kind="stable")
+    joints, valid = _ordered(joints, order), _ordered(valid, order)
+    valid = distinct(robot, joints.transpose(2, 1, 0), valid.T, within).T
+    last = np.argsort(~valid, axis=0, kind="stable")
+    last = last[: max(1, min(_KEPT, int(valid.sum(axis=0).max(initial=0))))]
+    joints, closure, valid = (
+        _ordered(joints, last),
+        _ordered(_ordered(closure, order), last),
+        _ordered(valid, last),
     )
-    kept = order[: max(1, min(_KEPT, int(found.valid.sum(axis=0).max(initial=0))))]
-    columns = np.arange(kept.shape[1])
-    suspect = np.ones(kept.shape[1], dtype=bool)
-    return _Found(
-        joints[:, kept, columns],
-        found.closure[:, kept, columns],
-        found.valid[kept, columns],
-        suspect,
-        closed=False,
-    )
+    every, free = np.ones(valid.shape[1], dtype=bool), np.zeros(len(joints), dtype=bool)
+    return Found(method, joints, closure, valid, every, free, freedom, closed=False)
 
 
-def _closures(robot: Robot, target: Target, joints: Array) -> Array:
-    """Return how far joints (n, branches, N) are from flat targets, shape (2, branches, N)."""
-    count, branches, poses = joints.shape
-    repeated = target.rows(np.tile(np.arange(poses), branches))
-    closure = closure_of(repeated, forward(robot, joints.reshape(count, -1).T))
-    return closure.T.reshape(2, branches, poses).copy()
+def _ordered(array: NDArray[Any], order: NDArray[np.intp]) -> NDArray[Any]:
+    """Return (..., branches, N) with the branches of each pose in an order (kept, N)."""
+    return np.take_along_axis(array, order.reshape(*(1,) * (array.ndim - 2), *order.shape), axis=-2)
 
 
 def _resolve(
-    robot: Robot, target: Target, found: _Found, near: Array | None, tolerance: float
+    robot: Robot, target: Target, found: Found, near: Array | None, tolerance: float
 ) -> tuple[Flags, Flags]:
-    """Find the families of suspect poses, move to their nearest members, and drop repetitions."""
+    """Find the families of suspect poses, move to their nearest members, and drop repetitions.
+
+    Where the targets leave some freedom the members are the nearest ones already.
+    """
     singular, free = np.zeros(found.valid.shape, dtype=bool), np.zeros(found.joints.shape, dtype=bool)
+    free[:] = found.free[:, None, None] & found.valid
     suspects = np.flatnonzero(found.suspect)
     if not len(suspects):
         return singular, free
     some, close_to = target.rows(suspects), None if near is None else near[suspects]
     joints, valid = found.joints[:, :, suspects].transpose(2, 1, 0).copy(), found.valid[:, suspects].T.copy()
-    lost, freed = _to_nearest_members(robot, some, joints, valid, close_to)
+    lost, freed = _families(robot, some, joints, valid, found.freedom, close_to)
     valid = distinct(robot, joints, valid)
-    if found.closed and complete(robot, some, joints, valid, lost, close_to):
-        lost, freed = _to_nearest_members(robot, some, joints, valid, close_to)
-    closure = _closures(robot, some, joints.transpose(2, 1, 0))
+    if found.closed and not found.freedom and complete(robot, some, joints, valid, lost, close_to):
+        lost, freed = _families(robot, some, joints, valid, 0, close_to)
+    closure = closures(robot, some, joints.transpose(2, 1, 0))
     met = closure.max(axis=0) <= tolerance
     valid = distinct(robot, joints, valid & met.T)
     if found.closed:
@@ -198,23 +216,20 @@ def _resolve(
     return singular, free
 
 
-def _to_nearest_members(
-    robot: Robot, target: Target, joints: Array, valid: Flags, near: Array | None
+def _families(
+    robot: Robot, target: Target, joints: Array, valid: Flags, freedom: int, near: Array | None
 ) -> tuple[Flags, Flags]:
-    """Move valid joints (N, branches, n), in place; return what is singular (N, branches), and free."""
+    """Return what is singular (N, branches) of valid joints (N, branches, n), and what is free.
+
+    Singular ones of targets that leave no freedom elsewhere are moved, in place, to their nearest members.
+    """
     lost, freed = np.zeros(valid.shape, dtype=bool), np.zeros(joints.shape, dtype=bool)
     rows, places = np.nonzero(valid)
-    if len(rows):
-        answer = families(
-            robot, target.rows(rows), joints[rows, places], None if near is None else near[rows]
-        )
-        joints[rows, places], lost[rows, places], freed[rows, places] = (
-            answer.joints,
-            answer.singular,
-            answer.free,
-        )
+    if not len(rows):
+        return lost, freed
+    known = families(robot, target.rows(rows), joints[rows, places], freedom)
+    lost[rows, places], freed[rows, places] = known.singular, known.free
+    if near is not None and not freedom and known.singular.any():
+        rows, places = rows[known.singular], places[known.singular]
+        joints[rows, places] = nearest_members(robot, target.rows(rows), joints[rows, places], near[rows])
     return lost, freed
-
-
-def _turn(robot: Robot, found: _Found, near: Array | None) -> None:
-    choose_turns(robot, found.joints, None if near is None else near.T)

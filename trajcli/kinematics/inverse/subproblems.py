@@ -54,9 +54,19 @@ class Watch:
     def both(self, value: Entry) -> Array:
         """Return plus and minus a value (..., B) along the new first axis of one more choice."""
         self.choices += 1
-        values = np.asarray(value)
-        full = values.reshape((1,) * (self.choices - values.ndim) + values.shape)
-        return np.stack([full, -full])
+        return self._either(0.0, value)
+
+    def fork(self, middle: Turn, aside: Turn) -> Turn:
+        """Return middle + aside, and middle - aside, along the new first axis of one more choice."""
+        self.choices += 1
+        return self._either(middle[0], aside[0]), self._either(middle[1], aside[1])
+
+    def _either(self, middle: Entry, aside: Entry) -> Array:
+        shape = np.broadcast_shapes(np.shape(middle), np.shape(aside))
+        result = np.empty((2, *(1,) * (self.choices - len(shape)), *shape))
+        np.add(middle, aside, out=result[0])
+        np.subtract(middle, aside, out=result[1])
+        return result
 
     def mirrored(self, turn: Turn) -> Mirrored:
         """Return a turn (..., B) as the first answer of the last choice, with axes for the choices before."""
@@ -90,38 +100,47 @@ def along(vector: Column, axis: Floats) -> Column:
 
 def turned(vector: Column, axis: Floats, turn: Turn) -> Column:
     """Return a vector turned about a unit axis."""
-    swung = combine(turn[0], across(vector, axis), turn[1], cross(axis, vector))
-    return plus(along(vector, axis), swung)
+    plane = _plane(axis)
+    if plane is None:
+        swung = combine(turn[0], across(vector, axis), turn[1], cross(axis, vector))
+        return plus(along(vector, axis), swung)
+    i, j = plane
+    result = list(vector)
+    result[i], result[j] = added((vector[i], vector[j]), turn)
+    return result[0], result[1], result[2]
 
 
 def turned_back(vector: Column, axis: Floats, turn: Turn) -> Column:
     """Return a vector turned about a unit axis the other way."""
-    return turned(vector, axis, (turn[0], difference(0.0, turn[1])))
+    return turned(vector, (-axis[0], -axis[1], -axis[2]), turn)
+
+
+def _plane(axis: Floats) -> tuple[int, int] | None:
+    """Return the places of the two coordinates that a turn about a coordinate axis mixes, first to second."""
+    for i in range(3):
+        if abs(axis[i]) == 1.0:
+            j, k = (i + 1) % 3, (i + 2) % 3
+            return (j, k) if axis[i] > 0.0 else (k, j)
+    return None
 
 
 def added(first: Turn, second: Turn, sign: float = 1.0) -> Turn:
     """Return the turn by the first angle plus `sign` (1 or -1) times the second."""
-    (ca, sa), (cb, sb) = first, (second[0], product(sign, second[1]))
+    (ca, sa), (cb, sb) = first, second
+    if sign < 0.0:
+        return total(product(ca, cb), product(sa, sb)), difference(product(sa, cb), product(ca, sb))
     return difference(product(ca, cb), product(sa, sb)), total(product(sa, cb), product(ca, sb))
 
 
-def angle(turn: Turn) -> Array:
-    """Return angles in [-pi, pi] of turns of length 1.
-
-    tan(t / 2) = sin t / (1 + cos t), taken from the half turn where the cosine is negative, so that nothing
-    cancels: two roundings from the arc tangent of both, in half its time.
-    """
-    cosine, sine = np.asarray(turn[0]), np.asarray(turn[1]) + 0.0
-    half = np.arctan(sine / (1.0 + np.abs(cosine)))
-    result: Array = half + half
-    behind = cosine < 0.0
-    np.subtract(np.copysign(np.pi, sine), result, out=result, where=behind)
-    return result
+def angle(turn: Turn, out: Array) -> Array:
+    """Write the angles in [-pi, pi] of turns into `out` and return it; a sine of -0 counts as 0."""
+    np.arctan2(np.add(turn[1], 0.0), turn[0], out=out)
+    return out
 
 
-def half_turn_more(angles: Array) -> Array:
-    """Return angles in [-pi, pi] half a turn further, in the same range."""
-    return np.asarray(angles - np.copysign(np.pi, angles))
+def half_turn_more(angles: Array, out: Array) -> None:
+    """Write angles in [-pi, pi] half a turn further, in the same range, into `out`."""
+    np.subtract(angles, np.copysign(np.pi, angles), out=out)
 
 
 def onto(axis: Floats, vector: Column, aim: Column) -> Turn:
@@ -129,17 +148,30 @@ def onto(axis: Floats, vector: Column, aim: Column) -> Turn:
 
     One answer. Both vectors' parts along the axis do not matter; it is the nearest where they differ.
     """
-    return dot(across(vector, axis), aim), dot(cross(axis, vector), aim)
+    plane = _plane(axis)
+    if plane is None:
+        return dot(across(vector, axis), aim), dot(cross(axis, vector), aim)
+    i, j = plane
+    return added((aim[i], aim[j]), (vector[i], vector[j]), -1.0)
 
 
 def unit(turn: Turn, watch: Watch, scale: float = 1.0) -> Turn:
     """Return a turn of length 1; where it has none (1e-8 `scale`) the angle is free, zero is taken."""
-    size = np.sqrt(np.square(turn[0]) + np.square(turn[1]))
+    return _divided(turn, length(turn), watch, scale)
+
+
+def length(turn: Turn) -> Array:
+    """Return the root of cosine^2 + sine^2."""
+    square = np.asarray(np.square(turn[0]) + np.square(turn[1]))
+    return np.asarray(np.sqrt(square, out=square if square.ndim else None))
+
+
+def _divided(turn: Turn, size: Array, watch: Watch, scale: float = 1.0) -> Turn:
     free = np.asarray(size < FREE * scale)
     if free.any():
         watch.note(free)
-        cosine = np.where(free, 1.0, turn[0] / np.where(free, 1.0, size))
-        return cosine, np.where(free, 0.0, turn[1] / np.where(free, 1.0, size))
+        size = np.where(free, 1.0, size)
+        return np.where(free, 1.0, turn[0] / size), np.where(free, 0.0, turn[1] / size)
     return turn[0] / size, turn[1] / size
 
 
@@ -166,7 +198,7 @@ def levels(
         scale: The size that r is compared with.
         sign: Of y in the first answer, by pose if it is an array; then axis . (vector x normal) = -y there.
     """
-    a, b = dot(across(vector, axis), normal), dot(cross(axis, vector), normal)
+    a, b = onto(axis, vector, normal)
     x = difference(level, product(dot(axis, vector), dot(axis, normal)))
     square = np.square(a) + np.square(b)
     return _solved(a, b, x, np.asarray(square), np.asarray(square - np.square(x)), watch, (scale, sign))
@@ -181,16 +213,16 @@ def _solved(
     if out.any():
         x = np.where(out, np.copysign(np.sqrt(square), x), x)
         rest = np.where(out, 0.0, rest)
-    y = watch.both(
-        product(sign, np.sqrt(rest)) if isinstance(sign, float) else np.copysign(np.sqrt(rest), sign)
-    )
+    root = np.sqrt(rest)
+    y = product(sign, root) if isinstance(sign, float) else np.copysign(root, sign)
     free = square < (FREE * scale) ** 2
-    if free.any():
+    some = bool(free.any())
+    if some:
         square = np.where(free, 1.0, square)
         watch.note(np.asarray(free & np.ones_like(rest, dtype=bool)))
-    cosine = (product(a, x) - product(b, y)) / square
-    sine = (product(b, x) + product(a, y)) / square
-    return (np.where(free, 1.0, cosine), np.where(free, 0.0, sine)) if free.any() else (cosine, sine)
+    a, b = a / square, b / square
+    cosine, sine = watch.fork((product(a, x), product(b, x)), (product(difference(0.0, b), y), product(a, y)))
+    return (np.where(free, 1.0, cosine), np.where(free, 0.0, sine)) if some else (cosine, sine)
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,10 +235,9 @@ class Mirrored:
 
     turn: tuple[Array, Array]
 
-    def angles(self) -> Array:
-        """Return both answers' angles, shape (2, ..., B)."""
-        one = angle(self.turn)
-        return np.stack([one, half_turn_more(one)])
+    def write(self, out: Array) -> None:
+        """Write both answers' angles into (2, ..., B)."""
+        half_turn_more(angle(self.turn, out[0]), out[1])
 
     def both(self) -> Turn:
         """Return both answers as turns (2, ..., B)."""
@@ -224,10 +255,9 @@ class Opposed:
 
     turn: tuple[Array, Array]
 
-    def angles(self) -> Array:
-        """Return both answers' angles, shape (2, ..., B)."""
-        one = angle(self.turn)
-        return np.stack([one, -one])
+    def write(self, out: Array) -> None:
+        """Write both answers' angles into (2, ..., B)."""
+        np.negative(angle(self.turn, out[0]), out=out[1])
 
     def both(self) -> Turn:
         """Return both answers as turns (2, ..., B)."""
@@ -249,10 +279,10 @@ def two_turns(
         turn = levels(second, vector, first, dot(first, aim), watch)
         return unit(onto(first, turned(vector, second, turn), aim), watch), turn
     side = across_floats(second, first)
-    away = across(aim, first)
-    sine = np.sqrt(np.asarray(dot(away, away)))
+    turn = dot(side, aim), dot(second, aim)
+    sine = length(turn)
     watch.choices += 1
-    around = watch.mirrored(unit((dot(side, aim), dot(second, aim)), watch))
+    around = watch.mirrored(_divided(turn, sine, watch))
     bend = Opposed(watch.mirrored((dot(first, aim), sine)).turn)
     if dot(vector, side) == 0.0 and dot(vector, first) == 1.0:
         return around, bend

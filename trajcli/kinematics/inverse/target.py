@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
-from trajcli.geometry.axis_angle import log
+from trajcli.geometry.axis_angle import exp, log
 from trajcli.geometry.rotation import AXES, Axis
 
 Fixed = Literal["all", "direction", "yaw", "pitch", "none"]
@@ -173,6 +173,35 @@ def closure_of(target: Target, poses: Array) -> Array:
     split = sum(target.position)
     parts = differences[:, :split], differences[:, split:]
     return np.stack([np.linalg.norm(part, axis=1) for part in parts], axis=1)
+
+
+def meeting(target: Target, poses: Array) -> Array:
+    """Return poses (N, 4, 4), T_world_tcp, moved and turned the shortest way so that they meet flat targets.
+
+    Args:
+        target: A flat batch of N.
+        poses: Shape (N, 4, 4), or that of one pose.
+    """
+    result = np.broadcast_to(poses, target.poses.shape).copy()
+    fixed = np.flatnonzero(target.position)
+    result[:, fixed, 3] = target.poses[:, fixed, 3]
+    if target.orientation == "all":
+        result[:, :3, :3] = target.poses[:, :3, :3]
+    elif target.orientation != "none":
+        change = residuals(target, result)[:, len(fixed) :]
+        if target.orientation != "direction":
+            change = change * _turning_axis(target, result)
+        result[:, :3, :3] = exp(change) @ result[:, :3, :3]
+    return result
+
+
+def _turning_axis(target: Target, poses: Array) -> Array:
+    """Return the axes (N, 3) about which a turn changes the yaw alone, or the pitch alone."""
+    if target.orientation == "yaw":
+        return np.array([[0.0, 0.0, 1.0]])
+    axis = poses[:, :3, AXES.index(target.tool_axis)]
+    level = np.maximum(np.hypot(axis[:, 0], axis[:, 1]), _ALMOST_UPRIGHT)
+    return np.stack([axis[:, 1], -axis[:, 0], np.zeros(len(axis))], axis=1) / level[:, None]
 
 
 def _turn_between(axis: Array, aim: Array) -> Array:

@@ -45,11 +45,11 @@ def choose_turns(robot: Robot, joints: Array, near: Array | None) -> None:
         if near is not None:
             values[:] = _turned(values, near[i], low, high)
             continue
-        outside = np.abs(values) > np.pi
-        if low > -np.pi or high < np.pi:
-            outside |= (values < low) | (values > high)
-        if outside.any():
-            values[outside] = _turned(values[outside], 0.0, low, high)
+        low_first, high_last = max(low, -np.pi), min(high, np.pi)
+        if low_first <= values.min(initial=0.0) and values.max(initial=0.0) <= high_last:
+            continue
+        outside = (values < low_first) | (values > high_last)
+        values[outside] = _turned(values[outside], 0.0, low, high)
 
 
 def _turned(values: Array, aim: Array | float, low: float, high: float) -> Array:

@@ -67,9 +67,16 @@ def check_reachable(robot: Robot, found: Solutions) -> None:
         raise PlanningError(
             f"{robot.name} cannot reach the pose{which}: "
             f"it comes within {metres:.6g} m and {radians:.6g} rad",
-            hint="move the target, or leave coordinates of its orientation free",
+            hint=_way_out(found),
         )
     raise PlanningError(_problem(robot, found, index, which))
+
+
+def _way_out(found: Solutions) -> str:
+    """Return what would make a pose reachable."""
+    if found.fixed_axis is not None:
+        return f"no joint turns the {found.fixed_axis} axis of the tool: mean another one, with `tool_axis`"
+    return "move the target, or leave coordinates of its orientation free"
 
 
 def _problem(robot: Robot, found: Solutions, index: tuple[int, ...], which: str) -> Problem:

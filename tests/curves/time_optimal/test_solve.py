@@ -1,0 +1,137 @@
+"""The two scans against linear programmes solved by scipy, and a table of another library."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from scipy.optimize import linprog
+from topp_paths import random_bounds, spline, symmetric
+
+from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.curves.time_optimal.constraints import Intervals, Rows, constrained, joint_demand
+from trajcli.curves.time_optimal.solve import UnreachableSpeedError, controllable, solve
+
+CASES = yaml.safe_load((Path(__file__).parents[2] / "oracles" / "time_optimal.yaml").read_text())["cases"]
+NOWHERE = np.empty(0)
+
+
+def raw_rows(path, s, side, velocity, acceleration):
+    """Return (first, second derivative, largest x) at one place, from the definition."""
+    first, second = (path.evaluate(s, order, side=side) for order in (1, 2))
+    with np.errstate(divide="ignore"):
+        speeds = np.where(
+            first > 0, velocity[:, 1] / first, velocity[:, 0] / np.where(first == 0, -0.0, first)
+        )
+    return first, second, float(np.min(np.where(first == 0, np.inf, speeds) ** 2))
+
+
+def programme(path, near, far, velocity, acceleration):
+    """Return A, b of A (x, u) <= b for one interval: accelerations at both ends."""
+    double, rows, bounds = 2.0 * (far - near), [], []
+    for s, side, share in ((near, "right", 0.0), (far, "left", 1.0)):
+        first, second, _ = raw_rows(path, s, side, velocity, acceleration)
+        for j in range(path.dimension):
+            row = np.array([second[j], first[j] + share * double * second[j]])
+            rows += [row, -row]
+            bounds += [acceleration[j, 1], -acceleration[j, 0]]
+    return np.array(rows), np.array(bounds), double
+
+
+def best(direction, A, b, double, x_range, y_range):
+    """Return the extreme of direction . (x, y) with y = x + double u in its range, or None."""
+    rows = np.vstack([A, [1.0, double], [-1.0, -double]])
+    bounds = np.concatenate([b, [y_range[1], -y_range[0]]])
+    objective = [direction[0] + direction[1], direction[1] * double]
+    found = linprog(objective, rows, bounds, bounds=[x_range, (None, None)], method="highs")
+    return None if found.status == 2 else float(found.fun)
+
+
+def sets_by_programmes(path, grid, velocity, acceleration, end):
+    lower, upper = np.zeros(grid.size), np.zeros(grid.size)
+    lower[-1] = upper[-1] = end
+    for i in range(grid.size - 2, -1, -1):
+        interval = programme(path, grid[i], grid[i + 1], velocity, acceleration)
+        cap = min(raw_rows(path, grid[i], side, velocity, acceleration)[2] for side in ("left", "right"))
+        top = best((-1, 0), *interval, (0, cap), (lower[i + 1], upper[i + 1]))
+        if top is None:
+            return None
+        upper[i] = -top
+        lower[i] = best((1, 0), *interval, (0, cap), (lower[i + 1], upper[i + 1]))
+    return lower, upper
+
+
+def forward_by_programmes(path, grid, velocity, acceleration, upper, start):
+    x = [start]
+    for i in range(grid.size - 1):
+        A, b, double = programme(path, grid[i], grid[i + 1], velocity, acceleration)
+        x.append(-best((0, -1), A, b, double, (x[-1], x[-1]), (0.0, upper[i + 1])))
+    return np.array(x)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("moving", [False, True])
+def test_scans_solve_the_linear_programmes(seed, moving):
+    rng = np.random.default_rng(seed)
+    joints, count = int(rng.integers(1, 4)), 40
+    path = spline(rng.uniform(-1, 1, (5, joints)))
+    velocity, acceleration = random_bounds(rng, joints)
+    grid = np.union1d(np.linspace(0, 1, count), path.breaks)
+    intervals = constrained(grid, [joint_demand(path, velocity, acceleration)], NOWHERE)
+    top = controllable(intervals, np.inf).upper[-1]
+    end = 0.3 * top if moving else 0.0
+    lower, upper = sets_by_programmes(path, grid, velocity, acceleration, end)
+    found = controllable(intervals, np.sqrt(end))
+    np.testing.assert_allclose(found.upper, upper, rtol=1e-6, atol=1e-9 * upper.max())
+    np.testing.assert_allclose(found.lower, lower, rtol=1e-6, atol=1e-9 * upper.max())
+    start = max(0.5 * upper[0], lower[0]) if moving else 0.0
+    x, ceiling = solve(intervals, np.sqrt(start), np.sqrt(end))
+    expected = forward_by_programmes(path, grid, velocity, acceleration, found.upper, start)
+    np.testing.assert_allclose(x, expected, rtol=1e-5, atol=1e-7 * upper.max())
+    assert (x <= ceiling * (1 + 1e-12)).all()
+
+
+def test_an_end_that_is_too_fast_has_no_programme_either():
+    path = spline(np.array([[0.0], [0.3], [0.1], [0.5]]))
+    velocity, acceleration = symmetric(1.0), symmetric(1.0)
+    grid = np.union1d(np.linspace(0, 1, 31), path.breaks)
+    intervals = constrained(grid, [joint_demand(path, velocity, acceleration)], NOWHERE)
+    allowed = np.sqrt(solve(intervals, 0.0, np.inf)[0][-1])
+    assert solve(intervals, 0.0, allowed * (1 - 1e-9))[0][-1] == pytest.approx(allowed**2)
+    with pytest.raises(UnreachableSpeedError, match="at the end") as caught:
+        solve(intervals, 0.0, 1.01 * allowed)
+    assert caught.value.allowed == pytest.approx(allowed, rel=1e-9)
+    sets = sets_by_programmes(path, grid, velocity, acceleration, (1.01 * allowed) ** 2)
+    assert sets is None or sets[0][0] > 0
+    sets = sets_by_programmes(path, grid, velocity, acceleration, (0.99 * allowed) ** 2)
+    assert sets is not None
+    assert sets[0][0] == 0
+
+
+def test_controllable_sets_of_another_library():
+    case = next(case for case in CASES if case["kind"] == "topp_controllable")
+    given = case["inputs"]
+    coefficients = np.array(given["coefficients_highest_first"], dtype=float).transpose(2, 0, 1)
+    path = PiecewisePolynomial(given["breaks"], coefficients)
+    demand = joint_demand(path, symmetric(*given["vmax"]), symmetric(*given["amax"]))
+    grid = np.linspace(path.start, path.end, given["N"] + 1)
+    both = constrained(grid, [demand], NOWHERE)
+    half = both.rows // 2  # the table is of the collocation scheme: rows at the near ends only
+    near = Intervals(grid, both.P[:, :half], both.R[:, :half], both.C[:, :half], both.cap)
+    found = controllable(near).upper
+    np.testing.assert_allclose(found, case["expected"]["K_max"], rtol=0, atol=case["tolerance"])
+
+
+def test_rows_of_any_kind_join_in():
+    path = spline(np.array([[0.0], [1.0]]), bc_type="natural")
+    grid = np.linspace(0, 1, 11)
+
+    def braking(s, side):  # -u <= 1: brakes less than the joint could
+        ones = np.ones((s.size, 1))
+        return Rows(-ones, 0 * ones, ones, np.full(s.size, np.inf))
+
+    joints = joint_demand(path, symmetric(10.0), symmetric(2.0))
+    found = controllable(constrained(grid, [joints, braking], NOWHERE)).upper
+    np.testing.assert_allclose(found, 2.0 * (1.0 - grid), atol=1e-14)

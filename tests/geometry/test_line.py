@@ -1,0 +1,74 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from curve_laws import attitude_is_kept, keeps_the_laws_of_a_place
+
+from trajcli.errors import InputError, PlanningError
+from trajcli.geometry.line import Line
+from trajcli.geometry.place_curve import Pivot, Stretch
+
+
+def test_a_line_goes_straight_from_end_to_end():
+    line = Line([1, 2, 3], [1, 6, 6])
+    assert line.length == 5
+    place, first, second = line.evaluate(np.array([0, 2.5, 5]))
+    np.testing.assert_allclose(place, [[1, 2, 3], [1, 4, 4.5], [1, 6, 6]], rtol=0, atol=1e-15)
+    np.testing.assert_allclose(first, np.tile([0, 0.8, 0.6], (3, 1)), rtol=0, atol=1e-16)
+    np.testing.assert_array_equal(second, 0)
+    keeps_the_laws_of_a_place(line)
+    attitude_is_kept(line)
+    assert not line.breaks.size
+    assert not line.stops.size
+
+
+def test_both_ends_are_met_to_the_last_bit():
+    ends = np.random.default_rng(1).normal(size=(200, 2, 3))
+    for start, end in ends:
+        line = Line(start, end)
+        np.testing.assert_array_equal(line.evaluate(np.array([0, line.length]))[0], [start, end])
+
+
+@pytest.mark.parametrize("distance", [0.0, 1e-10])
+def test_a_line_without_length_is_refused(distance):
+    with pytest.raises(InputError, match=r"has no direction \(it needs more than 1e-09 m\)"):
+        Line([1, 0, 0], [1, 0, distance])
+
+
+def test_points_must_be_points():
+    with pytest.raises(InputError, match="the end must be three finite numbers"):
+        Line([1, 0, 0], [1, 0])
+    with pytest.raises(InputError, match="the start must be three finite numbers"):
+        Line([1, 0, np.nan], [1, 0, 0])
+
+
+def test_what_lies_outside_is_refused_and_rounding_is_not():
+    line = Line([0, 0, 0], [2, 0, 0])
+    np.testing.assert_array_equal(line.evaluate(np.array([-1e-12, 2 + 1e-12]))[0][:, 0], [0, 2])
+    for s in (-1e-8, 2 + 1e-8, np.nan):
+        with pytest.raises(ValueError, match=r"leaves the curve's \[0, 2"):
+            line.evaluate(np.array([0.0, s]))
+    assert line.evaluate(np.empty(0))[0].shape == (0, 3)
+
+
+def test_a_stretch_is_a_part_of_the_whole():
+    part = Stretch(Line([0, 0, 0], [2, 0, 0]), 0.5, 1.25)
+    assert part.length == 0.75
+    np.testing.assert_allclose(part.evaluate(np.array([0, 0.75]))[0][:, 0], [0.5, 1.25])
+    with pytest.raises(ValueError, match="leaves"):
+        part.evaluate(np.array([0.8]))
+
+
+def test_a_pivot_stays_where_it_is():
+    pivot = Pivot([1, 2, 3], [1, 2, 3 + 1e-10], 1.5)
+    place, first, second = pivot.evaluate(np.array([0, 1.5]))
+    np.testing.assert_array_equal(place, [[1, 2, 3], [1, 2, 3 + 1e-10]])
+    assert np.abs(first).max() < 1e-10
+    np.testing.assert_array_equal(second, 0)
+    np.testing.assert_array_equal(Pivot([1, 2, 3], [1, 2, 3], 0).evaluate(np.zeros(1))[0], [[1, 2, 3]])
+    with pytest.raises(InputError, match="1e-06 m apart: this is no rotation in place"):
+        Pivot([1, 2, 3], [1, 2, 3 + 1e-6], 1.5)
+    with pytest.raises(InputError, match="must be a finite angle"):
+        Pivot([1, 2, 3], [1, 2, 3], -1)
+    with pytest.raises(PlanningError, match="no direction of travel"):
+        pivot.transport(np.zeros(1))

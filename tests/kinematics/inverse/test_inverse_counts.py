@@ -1,0 +1,174 @@
+"""The closed forms give the same answers as two other ways, no more and no fewer: sampled polynomials, and EAIK.
+
+Turns are left out and limits ignored. An answer counts for itself from 1e-6 rad or m on. Poses of which two answers
+are less than 1e-4 apart are left out, two in a thousand at most: rounding decides there whether both exist.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+import os
+import subprocess
+import sys
+import zlib
+from dataclasses import replace
+from itertools import combinations
+from pathlib import Path
+from shutil import which
+
+import numpy as np
+import polynomial_answers as polynomials
+import pytest
+from inverse_arms import FAMILIES, arm, gap, random_joints
+
+from trajcli.kinematics.forward import forward
+from trajcli.kinematics.inverse.solve import solve
+from trajcli.kinematics.inverse.target import partial_target
+
+CLOSES = 1e-7  # m and rad: what an answer of the other ways may miss its target by
+SAME = 1e-6  # rad or m: nearer answers are one
+MERGING = 1e-4  # rad or m
+PLACING = ("positioning", "planar 2R", "planar RP")  # families that a place is enough for
+WAYS = {
+    "planar 3R": polynomials.by_last_turn,
+    "planar RPR": polynomials.by_last_turn,
+    "SCARA": polynomials.by_last_turn,
+    "elbow and pitch": polynomials.by_last_turn,
+    "elbow, pitch and roll": polynomials.by_parallel_axes,
+    "three parallel axes (UR)": polynomials.by_parallel_axes,
+    "spherical wrist": polynomials.by_wrist,
+}
+PLACES = [name for name in FAMILIES if FAMILIES[name][2] in PLACING]
+TURNING = [name for name in FAMILIES if all(row[0] == "R" for row in FAMILIES[name][0])]
+CASES = [*((name, "pose") for name in FAMILIES), *((name, "place") for name in PLACES)]
+PEER = """
+import io, sys
+import numpy as np
+from eaik.IK_HP import HPRobot
+data = np.load(io.BytesIO(sys.stdin.buffer.read()))
+found = HPRobot(data["directions"], data["steps"]).IK_batched(data["poses"], 1)
+answers = [np.reshape(each.Q, (-1, len(data["directions"]))) for each in found]
+result = io.BytesIO()
+np.savez(result, rows=np.repeat(np.arange(len(found)), [len(each) for each in answers]), q=np.concatenate(answers))
+sys.stdout.buffer.write(result.getvalue())
+"""
+
+
+def random_poses(name, count):
+    """Return an arm and poses, the last tenth those of an arm with longer links: some are out of reach."""
+    rng = np.random.default_rng(zlib.crc32(name.encode()))
+    robot = arm(name, rng)
+    links = [replace(joint, a=1.5 * joint.a) for joint in robot.joints[:3]]
+    longer = replace(robot, joints=(*links, *robot.joints[3:]))
+    own = forward(robot, random_joints(robot, rng, count))
+    return robot, np.concatenate([own, forward(longer, random_joints(robot, rng, count // 10))])
+
+
+def by_polynomials(robot, name, axes, home, goals):
+    family = FAMILIES[name][2]
+    if family in PLACING:
+        return polynomials.place(axes, home[:3, 3], (goals @ home)[:, :3, 3])
+    way = polynomials.by_shoulder if name == "spherical shoulder" else WAYS[family]
+    return way(axes, goals)
+
+
+def by_eaik(python, axes, home, goals):
+    directions = np.array([axis.h for axis in axes])
+    signs = np.ones(len(axes))
+    for i, j in combinations(range(len(axes)), 2):  # EAIK wants axes that are parallel to point the same way
+        if directions[i] @ directions[j] < 1e-12 - 1.0:
+            directions[j], signs[j] = -directions[j], -signs[j]
+    places = np.array([np.zeros(3), *(axis.o for axis in axes), home[:3, 3]])
+    poses = goals.copy()
+    poses[:, :3, 3] = (goals @ home)[:, :3, 3]
+    question = io.BytesIO()
+    np.savez(question, directions=directions, steps=np.diff(places, axis=0), poses=poses)
+    command = [python, "-c", PEER]
+    answer = subprocess.run(command, input=question.getvalue(), stdout=subprocess.PIPE, check=True).stdout
+    found = np.load(io.BytesIO(answer))
+    return found["rows"], found["q"] * signs
+
+
+def judged(robot, axes, home, goals, rows, q, kind):
+    """Return candidates that meet their goals as joints (N, most, n) and which of these are answers (N, most)."""
+    reached, wanted = polynomials.displacement(axes, q) @ home, (goals @ home)[rows]
+    miss = np.abs(reached - wanted)[:, :3, 3 if kind == "place" else slice(None)]
+    good = miss.max(axis=tuple(range(1, miss.ndim)), initial=0.0) < CLOSES
+    order = np.flatnonzero(good)[np.argsort(rows[good], kind="stable")]
+    rows, q = rows[order], q[order]
+    at = np.arange(len(rows)) - np.searchsorted(rows, rows)
+    joints = np.zeros((len(goals), at.max(initial=0) + 1, q.shape[1]))
+    valid = np.zeros(joints.shape[:2], dtype=bool)
+    joints[rows, at], valid[rows, at] = q, True
+    for i, j in combinations(range(valid.shape[1]), 2):
+        valid[:, j] &= ~(valid[:, i] & (gap(robot, joints[:, i], joints[:, j]) < SAME))
+    return joints, valid
+
+
+def nearest_pair(robot, joints, valid):
+    """Return the distance (N,) of the two answers that are closest."""
+    result = np.full(len(joints), np.inf)
+    for i, j in combinations(range(valid.shape[1]), 2):
+        both = valid[:, i] & valid[:, j]
+        result = np.where(both, np.minimum(result, gap(robot, joints[:, i], joints[:, j])), result)
+    return result
+
+
+def both(robot, name, kind, poses, way):
+    """Return joints (N, branches, n) and which of them are answers (N, branches), ours and another way's."""
+    ours = solve(robot, poses if kind == "pose" else partial_target(poses[:, :3, 3]))
+    axes, home = polynomials.arm_axes(robot)
+    goals = np.linalg.inv(robot.base) @ poses @ np.linalg.inv(home)
+    theirs = judged(robot, axes, home, goals, *way(robot, name, axes, home, goals), kind)
+    return (ours.joints, ours.valid), theirs
+
+
+def check(name, kind, count, way):
+    robot, poses = random_poses(name, count)
+    (ours, ours_valid), (theirs, theirs_valid) = both(robot, name, kind, poses, way)
+    pair = nearest_pair(robot, ours, ours_valid)
+    assert pair.min() > SAME
+    clear = np.minimum(pair, nearest_pair(robot, theirs, theirs_valid)) > MERGING
+    assert np.count_nonzero(~clear) <= 2 + len(poses) // 500
+    found, expected = ours_valid.sum(axis=1), theirs_valid.sum(axis=1)
+    different = np.flatnonzero(clear & (found != expected))
+    assert not len(different), [(poses[i].tolist(), found[i], expected[i]) for i in different[:3]]
+    gaps = np.where(ours_valid[:, None], gap(robot, theirs[:, :, None], ours[:, None]), np.inf)
+    assert np.where(theirs_valid & clear[:, None], gaps.min(axis=2), 0.0).max() < SAME
+    assert (expected[:count] > 0).all()
+
+
+@pytest.mark.parametrize(("name", "kind"), CASES)
+def test_sampled_polynomials_have_as_many_answers(name, kind):
+    check(name, kind, 150, by_polynomials)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize(("name", "kind"), CASES)
+def test_sampled_polynomials_have_as_many_answers_at_ten_thousand_poses(name, kind):
+    check(name, kind, 10_000, by_polynomials)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("name", TURNING)
+def test_eaik_has_as_many_answers_at_ten_thousand_poses(name):
+    python = python_with_eaik()
+    check(name, "pose", 10_000, lambda _robot, _name, *arguments: by_eaik(python, *arguments))
+
+
+def python_with_eaik():
+    """Return an interpreter that has EAIK: this one, the one TRAJCLI_PEERS names, or that of `make bench`."""
+    if importlib.util.find_spec("eaik"):
+        return sys.executable
+    usual = Path(__file__).parents[3] / ".venv-peers" / "bin" / "python"
+    for python in (os.environ.get("TRAJCLI_PEERS"), str(usual)):
+        if (
+            python
+            and which(python)
+            and not subprocess.run([python, "-c", "import eaik"], check=False).returncode
+        ):
+            return python
+    pytest.skip(
+        "EAIK is in no environment: `make bench` installs it, or TRAJCLI_PEERS names a python that has it"
+    )

@@ -1,0 +1,157 @@
+"""Any smooth function whose derivatives can be asked for, as quintic pieces within a stated tolerance.
+
+A piece takes value, first and second derivative from the function at its two ends; between them the error is
+of order 6 in its length (4 in the second derivative), so intervals are divided until the error is small
+enough where it is largest. All intervals of a round are asked for at once, and the curve so far tells it
+where to look.
+
+Source: Birkhoff and Priver, Hermite interpolation errors for derivatives, J. Math. Phys. 46 (1967).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+
+from trajcli.curves.hermite import hermite_coefficients
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, derivative_coefficients, horner
+
+MOST_PIECES = 4096
+Exact = Callable[[Array, Side, Array], Array]
+"""Value, first and second derivative (3, N, n) at places (N,) from one side of breaks, by guesses (N, n)."""
+Misfit = Callable[[Array, Array, Array], Array]
+"""By how many times its tolerance a fit (3, N, n) misses exact values (3, N, n) at places (N,): (N,)."""
+
+# where the error of a quintic piece is largest: of the value and its curvature, and of the slope
+_PROBES = np.array([0.5 - 0.1 * sqrt(5.0), 0.5, 0.5 + 0.1 * sqrt(5.0)])
+_ORDER = 4  # with which the error of the second derivative falls: the slowest
+_MOST_PARTS = 8
+_ROUNDS = 60
+
+
+class FitError(ValueError):
+    """The function cannot be fitted within its tolerance.
+
+    Attributes:
+        place: Where it is worst.
+        misfit: By how many times the tolerance it is missed there.
+    """
+
+    def __init__(self, place: float, misfit: float) -> None:
+        super().__init__(f"{misfit:.3g} times the tolerance is missed at {place!r}")
+        self.place = place
+        self.misfit = misfit
+
+
+@dataclass(frozen=True, eq=False)
+class _Pieces:
+    """Intervals with the derivatives at their own two ends.
+
+    Attributes:
+        start: Shape (k,).
+        end: Shape (k,).
+        left: Shape (3, k, n).
+        right: Shape (3, k, n).
+    """
+
+    start: Array
+    end: Array
+    left: Array
+    right: Array
+
+    def coefficients(self) -> Array:
+        """Return the quintics, shape (6, k, n)."""
+        return hermite_coefficients(self.left, self.right, (self.end - self.start)[:, None])
+
+    def at(self, kept: np.ndarray) -> _Pieces:
+        """Return some of the pieces."""
+        return _Pieces(self.start[kept], self.end[kept], self.left[:, kept], self.right[:, kept])
+
+
+def fit(
+    exact: Exact, misfit: Misfit, breaks: Array, guess: Callable[[Array], Array], *, most: int = MOST_PIECES
+) -> PiecewisePolynomial:
+    """Return quintic pieces through a function, each within tolerance where its error is largest.
+
+    Args:
+        exact: The function.
+        misfit: Its tolerance.
+        breaks: Shape (m,), increasing: where the second derivative may jump, and the ends.
+        guess: Values (N, n) near the function's at places (N,), to begin with.
+        most: Pieces.
+
+    Raises:
+        FitError: When more pieces would be needed.
+    """
+    pending = _Pieces(
+        breaks[:-1],
+        breaks[1:],
+        exact(breaks[:-1], "right", guess(breaks[:-1])),
+        exact(breaks[1:], "left", guess(breaks[1:])),
+    )
+    done: list[_Pieces] = []
+    count = 0
+    for _ in range(_ROUNDS):
+        error, probed = _errors(exact, misfit, pending)
+        fine = error <= 1.0
+        done.append(pending.at(fine))
+        count += int(np.count_nonzero(fine))
+        if fine.all():
+            return _joined(done)
+        rough = pending.at(~fine)
+        parts = np.clip(np.ceil(1.1 * error[~fine] ** (1 / _ORDER)), 2, _MOST_PARTS).astype(int)
+        if count + int(parts.sum()) > most:
+            worst = int(error.argmax())
+            raise FitError(float(probed[worst]), float(error[worst]))
+        pending = _divided(exact, rough, parts)
+    raise FitError(float(pending.start[0]), float(error.max()))
+
+
+def _errors(exact: Exact, misfit: Misfit, pieces: _Pieces) -> tuple[Array, Array]:
+    """Return for each piece the largest misfit and where it is, each of shape (k,)."""
+    lengths = pieces.end - pieces.start
+    local = lengths[:, None] * _PROBES
+    places = (pieces.start[:, None] + local).reshape(-1)
+    fitted = _at(pieces.coefficients(), local)
+    errors = misfit(places, exact(places, "right", fitted[0]), fitted).reshape(local.shape)
+    errors = np.where(np.isfinite(errors), errors, np.inf)
+    worst = errors.argmax(axis=1)
+    rows = np.arange(lengths.size)
+    return errors[rows, worst], places.reshape(local.shape)[rows, worst]
+
+
+def _at(coefficients: Array, local: Array) -> Array:
+    """Return value, first and second derivative (3, k * p, n) of pieces at local places (k, p)."""
+    spread = [
+        horner(derivative_coefficients(coefficients, order)[:, :, None, :], local[:, :, None])
+        for order in range(3)
+    ]
+    return np.stack(spread).reshape(3, local.size, -1)
+
+
+def _divided(exact: Exact, pieces: _Pieces, parts: np.ndarray) -> _Pieces:
+    """Return each piece divided into so many equal parts."""
+    owner = np.repeat(np.arange(parts.size), parts)
+    number = np.arange(owner.size) - np.repeat(np.cumsum(parts) - parts, parts)
+    lengths = (pieces.end - pieces.start)[owner]
+    local = lengths * number / parts[owner]
+    start = pieces.start[owner] + local
+    last = number == parts[owner] - 1
+    inner = np.flatnonzero(number > 0)
+    coefficients = pieces.coefficients()[:, owner[inner]]
+    values = exact(start[inner], "right", _at(coefficients, local[inner, None])[0])
+    left, right = pieces.left[:, owner].copy(), pieces.right[:, owner].copy()
+    left[:, inner] = values
+    right[:, np.flatnonzero(~last)] = values
+    return _Pieces(start, np.where(last, pieces.end[owner], np.append(start[1:], 0.0)), left, right)
+
+
+def _joined(pieces: list[_Pieces]) -> PiecewisePolynomial:
+    start = np.concatenate([some.start for some in pieces])
+    order = np.argsort(start)
+    coefficients = np.concatenate([some.coefficients() for some in pieces], axis=1)[:, order]
+    end = np.concatenate([some.end for some in pieces])[order]
+    return PiecewisePolynomial(np.append(start[order], end[-1]), coefficients)

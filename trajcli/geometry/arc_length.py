@@ -1,0 +1,92 @@
+"""Arc length of a polynomial curve: a table by Gauss quadrature, and its inverse by Newton's method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache, cached_property
+
+import numpy as np
+
+from trajcli.geometry.rotation import Array
+
+_NODES = 8  # of Gauss on each panel
+_PANELS = 8  # to begin with
+_EXACT = 1e-15  # of the length, to which a panel must agree with its halves
+_ROUNDS = 40  # halvings or Newton steps, far more than any curve with r' != 0 takes
+
+
+def derivative(coefficients: Array) -> Array:
+    """Return the coefficients (degree, 3) of the derivative, highest power first."""
+    degree = coefficients.shape[0] - 1
+    return coefficients[:-1] * np.arange(degree, 0, -1.0)[:, None]
+
+
+def values(coefficients: Array, u: Array) -> Array:
+    """Return the polynomial (*u.shape, 3) with the coefficients (degree + 1, 3), highest power first."""
+    result = np.broadcast_to(coefficients[0], (*u.shape, coefficients.shape[1]))
+    for row in coefficients[1:]:
+        result = result * u[..., None] + row
+    return np.asarray(result)
+
+
+@cache
+def _gauss() -> tuple[Array, Array]:
+    """Return nodes and weights on [0, 1]."""
+    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+    return (nodes + 1.0) / 2.0, weights / 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class ArcLength:
+    """Arc length of a polynomial curve r(u), u from 0 to 1, with r' nowhere zero.
+
+    Attributes:
+        coefficients: Of r, shape (degree + 1, 3), m, highest power first.
+    """
+
+    coefficients: Array
+
+    @cached_property
+    def _slope(self) -> Array:
+        return derivative(self.coefficients)
+
+    @cached_property
+    def knots(self) -> Array:
+        """Ends of panels (k + 1,) in u, each so short that the quadrature is exact to rounding."""
+        knots = np.linspace(0.0, 1.0, _PANELS + 1)
+        for _ in range(_ROUNDS):
+            low, high = knots[:-1], knots[1:]
+            middle = (low + high) / 2.0
+            whole = self._between(low, high)
+            rough = np.abs(whole - self._between(low, middle) - self._between(middle, high))
+            if not (rough > _EXACT * whole.sum()).any():
+                break
+            knots = np.sort(np.concatenate([knots, middle[rough > _EXACT * whole.sum()]]))
+        return knots
+
+    @cached_property
+    def lengths(self) -> Array:
+        """Arc length (k + 1,), m, from the start to each knot."""
+        return np.concatenate([[0.0], np.cumsum(self._between(self.knots[:-1], self.knots[1:]))])
+
+    def parameter(self, s: Array) -> Array:
+        """Return u (N,) at the arc lengths s (N,), m."""
+        panel = np.clip(np.searchsorted(self.lengths, s, "right") - 1, 0, self.knots.size - 2)
+        low, high = self.knots[panel], self.knots[panel + 1]
+        way = s - self.lengths[panel]
+        u = low + (high - low) * way / (self.lengths[panel + 1] - self.lengths[panel])
+        for _ in range(_ROUNDS):
+            step = (self._between(low, u) - way) / self._speed(u)
+            u = np.clip(u - step, low, high)
+            if not (np.abs(step) > _EXACT).any():
+                break
+        return u
+
+    def _speed(self, u: Array) -> Array:
+        slope = values(self._slope, u)
+        return np.asarray(np.sqrt(np.einsum("...i,...i", slope, slope)))
+
+    def _between(self, low: Array, high: Array) -> Array:
+        nodes, weights = _gauss()
+        width = (high - low)[..., None]
+        return np.asarray((self._speed(low[..., None] + width * nodes) * width) @ weights)

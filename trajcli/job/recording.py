@@ -1,0 +1,81 @@
+"""Joint values from a CSV file that a job names, in whatever units its columns say."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from trajcli.columns import Column, parse_column
+from trajcli.curves.piecewise import Array
+from trajcli.errors import FileError, InputError
+from trajcli.job.load import Document
+from trajcli.kinematics.robot import Robot
+from trajcli.planners.reading import FlawError
+from trajcli.planners.recorded import Recorded
+from trajcli.streams.table import Table, read_csv
+
+_WHOSE = {"deg": "revolute", "mm": "prismatic"}
+
+
+def reader_of(document: Document, robot: Robot) -> Callable[[str], Recorded]:
+    """Return what reads the recordings of a job: their paths are relative to its folder.
+
+    Args:
+        document: The job's.
+        robot: Its joints say which columns are needed.
+    """
+    folder = Path() if document.file.startswith(("<", "-")) else Path(document.file).parent
+
+    def read(path: str) -> Recorded:
+        try:
+            return _recorded(read_csv(folder / path), robot)
+        except (InputError, FileError) as error:
+            flaws = [problem.text() for problem in error.problems]
+            raise FlawError("; ".join(flaws), "csv", hint=error.problems[0].hint) from None
+
+    return read
+
+
+def _recorded(table: Table, robot: Robot) -> Recorded:
+    positions = np.stack([_joint(table, robot, joint) for joint in range(len(robot.joints))], axis=1)
+    if "t" not in table.names:
+        return Recorded(positions, file=table.file)
+    times = table.column("t")
+    late = np.flatnonzero(np.diff(times) <= 0)
+    if late.size:
+        row = int(late[0]) + 1
+        raise InputError(
+            f"{table.file}: times must increase, but row {row + 1} has t = {times[row]:.12g} s after "
+            f"{times[row - 1]:.12g} s",
+            hint="remove the rows that repeat a time, or the column t: times are then found from the limits",
+        )
+    return Recorded(positions, times, table.file)
+
+
+def _joint(table: Table, robot: Robot, joint: int) -> Array:
+    """Return the values of a joint, rad or m."""
+    name, kind = robot.joint_names[joint], robot.joint_types[joint]
+    found = [(n, c) for n in table.names if (c := _column(n, robot)) is not None and c.joint == joint]
+    if not found:
+        unit = "_deg" if kind == "revolute" else "_mm"
+        raise InputError(
+            f"{table.file}: no column for {name}", hint=f"call it q{joint + 1} (SI) or q{joint + 1}{unit}"
+        )
+    if len(found) > 1:
+        raise InputError(f"{table.file}: two columns for {name}: {found[0][0]} and {found[1][0]}")
+    header, column = found[0]
+    if column.unit is not None and _WHOSE[column.unit] != kind:
+        raise InputError(f"{table.file}: the column {header} has another unit than {name}, which is {kind}")
+    return np.asarray(table.column(header) * column.factor)
+
+
+def _column(name: str, robot: Robot) -> Column | None:
+    """Return the column of a joint's values: q1, or the joint's name, with or without a unit."""
+    column = parse_column(name)
+    if column.kind == "q":
+        return column
+    if column.kind in robot.joint_names:
+        return Column("q", robot.joint_names.index(column.kind), column.unit)
+    return None

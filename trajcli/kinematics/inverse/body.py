@@ -1,0 +1,128 @@
+"""How the tool of an arm with fewer than six joints turns, and what a target says of that.
+
+The tool turns by R1 R(h, s) R5(r) where h is the direction of the parallel axes: planar arms and SCARA have
+only s, the sum of their turns; elbow and pitch (4R) have joint 1 before it; roll (5R) comes after it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from trajcli.curves.piecewise import Array
+from trajcli.geometry.rotation import AXES, Axis, Flags
+from trajcli.kinematics.columns import dot
+from trajcli.kinematics.inverse.elbow import forward_sign, same_way
+from trajcli.kinematics.inverse.lines import PARALLEL, Arm, Floats, Line, contains, parallel
+from trajcli.kinematics.jacobian import jacobian
+from trajcli.kinematics.robot import Robot
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """The joints by what they do to one axis of the tool.
+
+    Attributes:
+        arm: Their lines.
+        together: The joints that turn about parallel axes.
+        shoulder: The joint before them that the position decides.
+        roll: The joint after them.
+        marker: The tool axis at zero, a line through the tcp.
+    """
+
+    arm: Arm
+    together: tuple[int, ...]
+    shoulder: Line | None
+    roll: Line | None
+    marker: Line
+
+    @property
+    def axis(self) -> Line:
+        """The first of the parallel axes."""
+        return self.arm.lines[self.together[0]]
+
+    @property
+    def up(self) -> Floats:
+        """World's z axis in the base."""
+        return cast("Floats", tuple(self.arm.base[2, :3].tolist()))
+
+    @property
+    def upright(self) -> bool:
+        """Whether the parallel axes are vertical in world wherever the arm is."""
+        return self.shoulder is None and _vertical(self.arm, self.axis.direction)
+
+    @property
+    def steady(self) -> bool:
+        """Whether the parallel axes leave the tool axis as it is."""
+        return self.roll is None and parallel(self.axis, self.marker)
+
+    @property
+    def rolls_in_place(self) -> bool:
+        """Whether no roll moves the tcp or the tool axis."""
+        return self.roll is None or (self.tip_on_roll and parallel(self.roll, self.marker))
+
+    @property
+    def tip_on_roll(self) -> bool:
+        """Whether no roll moves the tcp."""
+        return self.roll is None or contains(self.roll, self.marker.point, self.arm.length)
+
+    @property
+    def pitch_sign(self) -> float:
+        """The sign with which the first answer of `levels` has the tool axis on the side of link 1's x."""
+        if self.shoulder is None:
+            return -1.0
+        ahead = forward_sign(self.shoulder, self.axis, self.arm.forward)
+        return ahead * float(np.copysign(1.0, dot(self.up, self.shoulder.direction)))
+
+    def turned_together(self, joints: Array) -> Array:
+        """Return the sums s (K,) of joint values (K, n)."""
+        return np.asarray(sum(same_way(self.axis, self.arm.lines[i]) * joints[:, i] for i in self.together))
+
+    def leans_back(self, robot: Robot, joints: Array, poses: Array) -> Flags:
+        """Return which joints (K, n), at poses (K, 4, 4), have the tcp behind joint 1, shape (K,)."""
+        if self.shoulder is None:
+            raise ValueError("the arm has no shoulder")
+        one, two = np.moveaxis(jacobian(robot, joints)[:, 3:, :2], 2, 0)
+        way = (poses[:, :3, 3] - self.arm.base[:3, 3]) @ self.arm.base[:3, :3] - self.shoulder.point
+        ahead = np.einsum("ki,ki->k", way @ self.arm.base[:3, :3].T, np.cross(two, one))
+        return np.asarray(forward_sign(self.shoulder, self.axis, self.arm.forward) * ahead < 0.0)
+
+    def heads_back(self, robot: Robot, joints: Array, poses: Array, tool_axis: Axis) -> Flags:
+        """Return which joints (K, n), at poses (K, 4, 4), meet their pitch in the second way, shape (K,)."""
+        axis = jacobian(robot, joints)[:, 3:, self.together[0]]
+        tool = poses[:, :3, AXES.index(tool_axis)]
+        side = axis[:, 0] * tool[:, 1] - axis[:, 1] * tool[:, 0]
+        return np.asarray(self.pitch_sign * side > 0.0)
+
+
+def body_of(arm: Arm, tool_axis: Axis) -> Body:
+    """Return the body of an arm with parallel axes, for one axis of its tool."""
+    turns = tuple(i for i, line in enumerate(arm.lines) if not line.prismatic)
+    planar = parallel(*(arm.lines[i] for i in turns))
+    roll = arm.lines[4] if len(arm.lines) == 5 else None
+    marker = _marker(arm, tool_axis)
+    if planar:
+        return Body(arm, turns, None, None, marker)
+    return Body(arm, (1, 2, 3), arm.lines[0], roll, marker)
+
+
+def fixed_axis(arm: Arm, tool_axis: Axis) -> bool:
+    """Return whether no joint turns an axis of the tool."""
+    return all(line.prismatic or parallel(_marker(arm, tool_axis), line) for line in arm.lines)
+
+
+def never_heads(arm: Arm, tool_axis: Axis) -> bool:
+    """Return whether an axis of the tool that no joint turns is vertical in world."""
+    return _vertical(arm, _marker(arm, tool_axis).direction)
+
+
+def _marker(arm: Arm, tool_axis: Axis) -> Line:
+    axis, tip = (cast("Floats", tuple(arm.home[:3, i].tolist())) for i in (AXES.index(tool_axis), 3))
+    return Line(prismatic=False, direction=axis, point=tip)
+
+
+def _vertical(arm: Arm, direction: Floats) -> bool:
+    x, y, _ = arm.base[:3, :3] @ direction
+    return bool(np.hypot(x, y) <= PARALLEL)

@@ -1,0 +1,109 @@
+"""Answers of a flat batch while they are worked on, and how well they meet their targets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajcli.curves.piecewise import Array
+from trajcli.geometry.rotation import Flags
+from trajcli.kinematics.forward import forward
+from trajcli.kinematics.inverse.method import Branch, Method
+from trajcli.kinematics.inverse.numeric import refine
+from trajcli.kinematics.inverse.target import Target, closure_of
+from trajcli.kinematics.robot import Robot
+
+_ROUNDED = 1e-11  # m and rad: above, rounding has grown and one Newton step takes it away
+_NEAR = 1e-5  # m and rad: further off, a branch does not exist and is left where it is
+
+
+@dataclass(eq=False)
+class Found:
+    """Answers; joints come first, poses last.
+
+    Attributes:
+        method: How they were found.
+        joints: Shape (n, branches, N).
+        closure: Shape (2, branches, N), m and rad.
+        valid: Shape (branches, N).
+        suspect: Shape (N,): poses whose answers may be singular or repeat each other.
+        free: Shape (n,): joints that are free in every answer, whatever its family; the rest is to be found.
+        freedom: How many motions of the joints the targets leave free where the arm is not singular.
+        closed: Whether a closed form found them.
+    """
+
+    method: Method
+    joints: Array
+    closure: Array
+    valid: Flags
+    suspect: Flags
+    free: Flags
+    freedom: int
+    closed: bool
+
+
+def joined(parts: Sequence[Found]) -> Found:
+    """Return answers of several blocks, found in one way, as those of one batch."""
+    joints, closure, valid, suspect = (
+        np.concatenate([getattr(part, name) for part in parts], axis=-1)
+        for name in ("joints", "closure", "valid", "suspect")
+    )
+    return replace(parts[0], joints=joints, closure=closure, valid=valid, suspect=suspect)
+
+
+def by_name(found: Found, own: NDArray[np.intp], names: Sequence[Branch]) -> Found:
+    """Return answers in columns by name, at least one for each.
+
+    Args:
+        found: Answers in any order.
+        own: Shape (branches, N): which name each answer has; -1 for none.
+        names: What they are called.
+    """
+    worst = found.closure.max(axis=0)
+    columns, taken = [], []
+    for index in range(len(names)):
+        mine = own == index
+        most = max(1, int(np.count_nonzero(mine & found.valid, axis=0).max(initial=0)))
+        rank = np.where(mine & found.valid, -1.0, np.where(mine, worst, np.inf))
+        order = np.argsort(rank, axis=0, kind="stable")[:most]
+        taken.append((order, np.take_along_axis(mine & found.valid, order, axis=0)))
+        columns += [index] * len(order)
+    order = np.concatenate([some for some, _ in taken])
+    valid: Flags = np.concatenate([some for _, some in taken])
+    joints: Array = np.take_along_axis(found.joints, order[None], axis=1)
+    closure: Array = np.take_along_axis(found.closure, order[None], axis=1)
+    method = replace(found.method, labels=tuple(names[index] for index in columns))
+    return replace(found, method=method, joints=joints, closure=closure, valid=valid)
+
+
+def closures(robot: Robot, target: Target, joints: Array) -> Array:
+    """Return how far joints (n, branches, N) are from flat targets, shape (2, branches, N)."""
+    count, branches, poses = joints.shape
+    repeated = target.rows(np.tile(np.arange(poses), branches))
+    closure = closure_of(repeated, forward(robot, joints.reshape(count, -1).T))
+    return closure.T.reshape(2, branches, poses).copy()
+
+
+def polish(robot: Robot, target: Target, joints: Array, closure: Array, watched: Flags) -> None:
+    """Take rounding away from joints (n, branches, N) and closure (2, branches, N), in place.
+
+    Args:
+        robot: The arm.
+        target: A flat batch of N.
+        joints: What a closed form found.
+        closure: How far it is from the targets.
+        watched: Shape (N,): poses where two branches fall together, and are taken further.
+    """
+    worst = np.maximum(closure[0], closure[1])
+    poor = (worst > _ROUNDED) & (worst < _NEAR)
+    if watched.any():
+        poor |= watched & (closure[0] < _NEAR)
+    branches, rows = np.nonzero(poor)
+    if len(rows):
+        some = target.rows(rows)
+        better = refine(robot, some, joints[:, branches, rows].T)
+        joints[:, branches, rows] = better.T
+        closure[:, branches, rows] = closure_of(some, forward(robot, better)).T

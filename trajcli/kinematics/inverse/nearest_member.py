@@ -1,0 +1,169 @@
+"""The member of a family of answers that is nearest to a configuration, inside the limits.
+
+Gradient descent on the square of the distance, along the family: the step is what is left of the way once
+all that moves the tcp is taken out of it, times a length that the last two steps tell (Barzilai and Borwein);
+it is kept where it comes nearer. A joint at its limit that would pass it is held. The result is the nearest
+of all around it, not of all there are.
+
+Source: Nocedal and Wright, Numerical Optimization (2006), section 16.7; Barzilai and Borwein, Two-point step
+size gradient methods, IMA J. Numerical Analysis 8 (1988).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajcli.curves.piecewise import Array
+from trajcli.geometry.rotation import Flags
+from trajcli.kinematics.inverse.numeric import linearised
+from trajcli.kinematics.inverse.target import Target
+from trajcli.kinematics.inverse.turns import choose_turns
+from trajcli.kinematics.robot import Robot
+
+Allowed = Callable[[NDArray[np.intp], Array], Flags]
+MET = 1e-10  # scaled error with which a member still meets the target
+_NEARLY_MET = 1e-4  # the same on the way
+_MOVES = 60
+_LONGEST = 0.5  # rad or m, of one step
+_ARRIVED = 1e-11  # rad or m of the way that are left
+_STUCK = 1e-5  # of a whole step: no shorter one is tried
+_GROWS = 4.0  # times, at most, a step is longer than the one before
+_CORRECTIONS = 2
+_REFUSALS = 4  # then the next place is not allowed, and the one before is taken
+_AT_LIMIT = 1e-10  # rad or m
+_LOST = 1e-9  # of the largest singular value
+
+
+def nearest_members(
+    robot: Robot, target: Target, joints: Array, near: Array, allowed: Allowed | None = None
+) -> Array:
+    """Return the members (K, n) nearest to `near` of the families that configurations belong to.
+
+    Args:
+        robot: Its limits hold, except for joints that are outside from the start.
+        target: A flat batch of K, met by the joints.
+        joints: Shape (K, n).
+        near: Shape (K, n).
+        allowed: (rows, joints) -> whether a row may move there; None for anywhere.
+    """
+    turned = joints.T[:, None].copy()
+    choose_turns(robot, turned, near.T)
+    start = turned[:, 0].T.copy()
+    walk = _Walk(robot, target, start, near, allowed)
+    for _ in range(_MOVES):
+        if not walk.step():
+            break
+    return walk.end()
+
+
+class _Walk:
+    """The rows that are under way.
+
+    Attributes:
+        joints: Shape (K, n), where they are.
+    """
+
+    def __init__(
+        self, robot: Robot, target: Target, start: Array, near: Array, allowed: Allowed | None
+    ) -> None:
+        self._robot, self._target, self._near, self._allowed = robot, target, near, allowed
+        self._start, self.joints = start, start.copy()
+        self._low = np.minimum(robot.limits.position[:, 0], start)
+        self._high = np.maximum(robot.limits.position[:, 1], start)
+        self._running = np.arange(len(start))
+        self._length = np.ones(len(start))
+        self._refused = np.zeros(len(start), dtype=int)
+        self._last: Array = np.zeros_like(start)  # the way from the place before
+        self._moved: Array = np.zeros_like(start)
+
+    def step(self) -> bool:
+        """Move all running rows once; return whether any is left."""
+        way = self._way(self._running)
+        self._stretch(way)
+        going = np.abs(way).max(axis=1, initial=0.0) > _ARRIVED
+        going &= (self._length[self._running] > _STUCK) & (self._refused[self._running] <= _REFUSALS)
+        rows, way = self._running[going], way[going]
+        self._running = rows
+        if not len(rows):
+            return False
+        here = self.joints[rows]
+        trial, good = self._corrected(rows, here + self._shortened(rows, way), _NEARLY_MET)
+        gap, before = (np.square(self._near[rows] - values).sum(axis=1) for values in (trial, here))
+        good &= gap < before
+        if self._allowed is not None and good.any():
+            asked = np.flatnonzero(good)
+            good[asked] = self._allowed(rows[asked], trial[asked])
+            self._refused[rows[asked[~good[asked]]]] += 1
+        self._last[rows], self._moved[rows] = way, np.where(good[:, None], trial - here, 0.0)
+        self._length[rows] = np.where(good, self._length[rows], 0.25 * self._length[rows])
+        self.joints[rows[good]] = trial[good]
+        return True
+
+    def end(self) -> Array:
+        """Return where all rows have come to (K, n), or started from if they do not meet the target there."""
+        final, good = self._corrected(np.arange(len(self.joints)), self.joints, MET)
+        return np.where(good[:, None], final, self._start)
+
+    def _way(self, rows: NDArray[np.intp]) -> Array:
+        """Return what is left of the way (K, n) inside the families."""
+        q, target = self.joints[rows], self._target.rows(rows)
+        gap = self._near[rows] - q
+        _, slopes = linearised(self._robot, target, q)
+        way = _inside(slopes, gap)
+        held = np.zeros(q.shape, dtype=bool)
+        for _ in range(2):  # once held, a joint may press another one against its limit
+            at_limit = ((q >= self._high[rows] - _AT_LIMIT) & (way > 0.0)) | (
+                (q <= self._low[rows] + _AT_LIMIT) & (way < 0.0)
+            )
+            if not at_limit.any():
+                break
+            held |= at_limit
+            bars = held[:, :, None] * np.eye(q.shape[1])
+            way = np.where(held, 0.0, _inside(np.concatenate([slopes, bars], axis=1), gap))
+        return way
+
+    def _stretch(self, way: Array) -> None:
+        """Choose the lengths of the next steps from how the way changed in the last one."""
+        rows = self._running
+        moved = self._moved[rows]
+        change = np.einsum("kn,kn->k", moved, self._last[rows] - way)
+        square = np.square(moved).sum(axis=1)
+        told = change > square / _GROWS / self._length[rows]
+        longer = np.where(told, square / np.where(told, change, 1.0), _GROWS * self._length[rows])
+        self._length[rows] = np.where(square > 0.0, longer, self._length[rows])
+
+    def _corrected(self, rows: NDArray[np.intp], q: Array, tolerance: float) -> tuple[Array, Flags]:
+        """Return joint values (K, n) brought back to their targets, and which are there inside the limits.
+
+        Joints that stand at a limit stay.
+        """
+        target, low, high = self._target.rows(rows), self._low[rows], self._high[rows]
+        held = (q >= high - _AT_LIMIT) | (q <= low + _AT_LIMIT)
+        bars, nothing = held[:, :, None] * np.eye(q.shape[1]), np.zeros(q.shape)
+        for _ in range(_CORRECTIONS):
+            errors, slopes = linearised(self._robot, target, q)
+            inverse = np.linalg.pinv(np.concatenate([slopes, bars], axis=1), rcond=_LOST)
+            q = q + (inverse @ np.concatenate([errors, nothing], axis=1)[..., None])[..., 0]
+        q = np.where(held, np.clip(q, low, high), q)
+        errors, _ = linearised(self._robot, target, q)
+        inside = ((q >= low) & (q <= high)).all(axis=1)
+        return q, np.asarray((np.linalg.norm(errors, axis=1) <= tolerance) & inside)
+
+    def _shortened(self, rows: NDArray[np.intp], way: Array) -> Array:
+        """Return the steps (K, n): no longer than allowed, and none past a limit."""
+        step = way * self._length[rows, None]
+        longest = np.abs(step).max(axis=1, keepdims=True)
+        step *= np.minimum(1.0, _LONGEST / np.maximum(longest, _LONGEST))
+        room = np.where(step > 0.0, self._high[rows], self._low[rows]) - self.joints[rows]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            part = np.where(step != 0.0, room / step, np.inf)
+        return np.asarray(step * np.clip(part.min(axis=1), 0.0, 1.0)[:, None])
+
+
+def _inside(slopes: Array, gap: Array) -> Array:
+    """Return the part (K, n) of joint motions that moves nothing the slopes (K, m, n) tell of."""
+    outside = np.linalg.pinv(slopes, rcond=_LOST) @ (slopes @ gap[..., None])
+    return np.asarray(gap - outside[..., 0])

@@ -1,0 +1,232 @@
+"""Straight from point to point with rounded corners: linear segments with parabolic blends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+from pydantic.json_schema import JsonSchemaValue
+
+from trajcli.curves.blend_accelerations import BlendAccelerationError
+from trajcli.curves.blends import Blended, blended, blended_by_acceleration
+from trajcli.curves.piecewise import Array
+from trajcli.errors import Amount, PlanningError, Problem
+from trajcli.kinematics.robot import Robot
+from trajcli.planners.blend_times import blend_times
+from trajcli.planners.fields import JointAccelerationMagnitudes
+from trajcli.planners.planner import Event, Phase, Planned
+from trajcli.planners.point_to_point import missing_limit, require_rest, standstill
+from trajcli.planners.poses import read_numbers
+from trajcli.planners.reading import FieldType, Flaw, Number, ReadingContext, refuse
+from trajcli.planners.recorded import Recorded
+from trajcli.planners.through_points import PointTable, ThroughPoints
+from trajcli.trajectory import Passage, State
+from trajcli.units import Quantity
+
+_BLEND = Number(Quantity("time"), "Duration of a blend, s.", above=0.0)
+
+
+@dataclass(frozen=True)
+class _BlendDurations(FieldType):
+    """One duration for all blends, or one for each point."""
+
+    description: str
+
+    def read(self, value: Any, context: ReadingContext) -> float | tuple[float, ...]:  # noqa: ANN401
+        """Return seconds."""
+        if not isinstance(value, list | tuple):
+            return _BLEND.read(value, context)
+        read_numbers(value, len(value), _BLEND.quantity, context)
+        return tuple(_BLEND.read(item, context) for item in value)
+
+    def json_schema(self) -> JsonSchemaValue:
+        """Return the schema of a number or a list."""
+        one = _BLEND.json_schema()
+        return {"anyOf": [one, {"type": "array", "items": one, "minItems": 2}]}
+
+
+class Blends(ThroughPoints):
+    """Linear segments with parabolic blends: the points between the ends are passed at a stated distance.
+
+    Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.2.2; Craig,
+    Introduction to Robotics (2005), section 7.3.
+    """
+
+    continuity: ClassVar[Literal[1, 2]] = 1
+
+    planner: Literal["blends"] = "blends"
+    blend_durations: (
+        Annotated[
+            float | tuple[float, ...],
+            _BlendDurations("Duration of the blends, s: one for all, or one for each point, ends included."),
+        ]
+        | None
+    ) = None
+    acceleration: JointAccelerationMagnitudes | None = None
+    end_blends: Annotated[
+        Literal["centred", "inside"],
+        Field(
+            description="centred: the first and the last blend are centred on their times, as Siciliano has "
+            "it, so the motion lasts half a blend longer at either end; inside: they lie within the end "
+            "segments, as Craig has it."
+        ),
+    ] = "centred"
+    exactly: Annotated[
+        bool, Field(strict=True, description="Pass through the points, by way of pseudo-points beside them.")
+    ] = False
+
+    @model_validator(mode="after")
+    def _blends_fit(self) -> Blends:
+        flaws = [*self._flaws_of_blends(), *self._flaws_of_points()]
+        if flaws:
+            raise refuse(flaws)
+        return self
+
+    def _flaws_of_blends(self) -> Iterator[Flaw]:
+        own = [k for k, point in enumerate(self.listed) if point.blend is not None]
+        if self.acceleration is not None and (self.blend_durations is not None or own):
+            text = "acceleration and durations of blends exclude each other"
+            yield ("acceleration",), text, "leave one of them out"
+        count = 1 + len(self.listed)
+        if isinstance(self.blend_durations, tuple):
+            if own:
+                yield (
+                    ("blend_durations",),
+                    "the list already has the blends of all points",
+                    "leave `blend` out",
+                )
+            if not isinstance(self.through, Recorded) and len(self.blend_durations) != count:
+                text = (
+                    f"expected {count} durations, start and target included, got {len(self.blend_durations)}"
+                )
+                yield ("blend_durations",), text, None
+        if own and self.blend_durations is None and self.timed:
+            text = "give the blends of the other points too"
+            yield (
+                (),
+                text,
+                "a number under `blend_durations` is for all points without a `blend` of their own",
+            )
+        if self.timed is False and own:
+            yield (), "blends of points need points with times", "give every waypoint a `time`"
+
+    def _flaws_of_points(self) -> Iterator[Flaw]:
+        for k, point in enumerate(self.listed):
+            path = ("to",) if self.to is not None and k == len(self.listed) - 1 else ("through", k)
+            for name in ("velocity", "acceleration"):
+                if any(getattr(point, name) or ()):
+                    text = f"blends compute the {name} at the points, and end at rest"
+                    yield (*path, name), text, "leave it out, or use spline"
+
+    def plan(self, start: State, robot: Robot) -> Planned:
+        """Return the segments and blends.
+
+        Raises:
+            MissingLimitError: When a time or a blend follows neither from the fields nor from the limits.
+            PlanningError: When the arm moves at the start, or an acceleration is too small for the times.
+        """
+        require_rest(self.tag, start, robot)
+        points = self.waypoints(start)
+        if points.times is None and not np.ptp(points.positions, axis=0).any():
+            return standstill(points.target, self.duration or 0.0)
+        times, durations = self._asked(points, robot)
+        try:
+            made = self._made(points, times, durations, robot)
+        except BlendAccelerationError as error:
+            raise _too_slow(error, points, robot) from None
+        return Planned(
+            made.curve,
+            points.target,
+            phases=_phases(made),
+            passage=Passage(times + made.shift, points.positions, made.missed),
+            origin=made.shift,
+            events=(*points.events, *_shrunk(made, robot)),
+        )
+
+    def _asked(self, points: PointTable, robot: Robot) -> tuple[Array, Array | None]:
+        """Return when the points are passed, and the durations of the blends; None for accelerations."""
+        if points.times is not None:
+            return points.times, self._durations(points)
+        bounds = robot.limits.acceleration
+        if self.acceleration is not None:
+            own = np.array(self.acceleration)[:, None] * [-1.0, 1.0]
+            bounds = np.clip(bounds, own[:, :1], own[:, 1:])
+        times, durations = blend_times(
+            points, self._durations(points), robot, bounds, self.end_blends, exactly=self.exactly
+        )
+        if self.duration:
+            factor = self.duration / times[-1]
+            return times * factor, durations * factor
+        return times, durations
+
+    def _durations(self, points: PointTable) -> Array | None:
+        if self.blend_durations is None:
+            return None
+        if isinstance(self.blend_durations, tuple) and len(self.blend_durations) != points.count:
+            message = f"{len(self.blend_durations)} durations of blends for {points.count} points"
+            raise PlanningError(message, hint="give one for each point, or one number for all")
+        durations = np.broadcast_to(np.array(self.blend_durations), (points.count,))
+        return np.where(points.blends > 0, points.blends, durations)
+
+    def _made(self, points: PointTable, times: Array, durations: Array | None, robot: Robot) -> Blended:
+        if durations is not None:
+            return blended(times, points.positions, durations, ends=self.end_blends, exactly=self.exactly)
+        acceleration = self._magnitudes(points, robot)
+        return blended_by_acceleration(
+            times, points.positions, acceleration, ends=self.end_blends, exactly=self.exactly
+        )
+
+    def _magnitudes(self, points: PointTable, robot: Robot) -> Array:
+        if self.acceleration is not None:
+            return np.array(self.acceleration)
+        magnitudes = np.abs(robot.limits.acceleration).min(axis=1)
+        moving = np.ptp(points.positions, axis=0) > 0
+        lacking = np.flatnonzero(moving & ~np.isfinite(magnitudes))
+        if lacking.size:
+            also = "give the move `blend_durations` or an `acceleration`"
+            raise missing_limit(self.tag, "acceleration", lacking.tolist(), robot, "for its blends", also)
+        return np.where(np.isfinite(magnitudes), magnitudes, 1.0)
+
+
+def _phases(made: Blended) -> tuple[Phase, ...]:
+    """Return blends and straight segments in order of time, by joint where each has its own."""
+    shared = bool((made.blends == made.blends[:, :1]).all() and (made.times == made.times[:, :1]).all())
+    found: list[Phase] = []
+    for joint in range(1 if shared else made.times.shape[1]):
+        owner = None if shared else joint
+        starts = np.maximum(made.times[:, joint] - made.blends[:, joint] / 2, 0.0)
+        ends = np.minimum(made.times[:, joint] + made.blends[:, joint] / 2, made.curve.end)
+        last = 0.0
+        for point, start, end in zip(made.points.tolist(), starts.tolist(), ends.tolist(), strict=True):
+            if start > last:
+                found.append(Phase("straight", last, start, owner))
+            if end > start:
+                found.append(Phase(f"blend {point}", start, end, owner))
+            last = max(last, end)
+    return tuple(found)
+
+
+def _shrunk(made: Blended, robot: Robot) -> tuple[Event, ...]:
+    if not made.shrunk:
+        return ()
+    worst = min(made.shrunk, key=lambda one: one.used / one.asked)
+    whose = "" if worst.joint is None else f" of {robot.joint_names[worst.joint]}"
+    more = f"; so were {len(made.shrunk) - 1} others" if len(made.shrunk) > 1 else ""
+    room = "the segments beside it leave no room for more"
+    text = f"the blend{whose} at point {worst.point} was shortened from {{asked}} to {{used}}: {room}{more}"
+    return (Event("shrunk", text, amounts={"asked": Amount(worst.asked), "used": Amount(worst.used)}),)
+
+
+def _too_slow(error: BlendAccelerationError, points: PointTable, robot: Robot) -> PlanningError:
+    name, last = robot.joint_names[error.joint], error.point == points.count - 1
+    where = "last" if last else "first"
+    message = (
+        f"{{given}} of {name} is too little for the blend inside the {where} segment: it takes {{least}}"
+    )
+    given, least = (Amount(value, 2, error.joint) for value in (error.acceleration, error.least))
+    hint = "raise the acceleration, allow more time, or say `end_blends: centred`"
+    amounts = {"given": given, "least": least}
+    return PlanningError(Problem(message, hint, joint=name, amounts=amounts))

@@ -1,0 +1,130 @@
+"""The path in joint space that `time_optimal` follows: which way, not yet how fast."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from trajcli.curves.blends import blended
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.spline_shape import ShapeError
+from trajcli.errors import Amount, PlanningError, Problem
+from trajcli.kinematics.robot import Robot
+from trajcli.planners.planner import Event
+from trajcli.planners.spline_rules import Rule, curve_through
+from trajcli.planners.through_points import PointTable
+
+Parameter = Literal["chord", "centripetal", "uniform"] | tuple[float, ...]
+
+_OFF = 1e-9  # relative: a velocity this little off the path is on it
+_ROOM = 0.999  # of a segment that two blends may share: each keeps a straight piece between
+
+
+@dataclass(frozen=True, eq=False)
+class JointPath:
+    """A path through points.
+
+    Attributes:
+        curve: q(s).
+        places: s at each point, shape (m,).
+        missed: By how much each joint passes beside each point, shape (m, n).
+        speeds: sd at the start and at the end.
+        events: What was conceded.
+    """
+
+    curve: PiecewisePolynomial
+    places: Array
+    missed: Array
+    speeds: tuple[float, float]
+    events: tuple[Event, ...] = ()
+
+
+def spline_through(rule: Rule, parameter: Parameter, points: PointTable, robot: Robot) -> JointPath:
+    """Return the spline of a rule; where the arm moves at an end, the path has that direction there.
+
+    Raises:
+        PlanningError: When the parameter has another number of values than points, or shape_preserving does
+            not allow the direction.
+    """
+    places = _places(parameter, points)
+    q, ends = points.positions, points.rates[0, [0, -1]]
+    slopes, speeds = np.zeros_like(ends), [0.0, 0.0]
+    for k, (velocity, piece) in enumerate(zip(ends, (0, -1), strict=True)):
+        speed = float(np.linalg.norm(velocity))
+        if speed:
+            chord = np.diff(q, axis=0)[piece] / np.diff(places)[piece]
+            slopes[k] = velocity / speed * np.linalg.norm(chord)
+            speeds[k] = speed / float(np.linalg.norm(chord))
+    rates = np.zeros_like(points.rates)
+    rates[0, [0, -1]] = slopes
+    try:
+        curve = curve_through(rule, replace(points, rates=rates), places)
+    except ShapeError as error:
+        name = robot.joint_names[error.component]
+        message = f"the velocity of {name} at the {error.end} point does not let the path be monotone there"
+        raise PlanningError(Problem(message, "use rule not_a_knot", joint=name)) from None
+    return JointPath(curve, places, np.zeros_like(q), (speeds[0], speeds[1]))
+
+
+def _places(parameter: Parameter, points: PointTable) -> Array:
+    if isinstance(parameter, tuple):
+        if len(parameter) != points.count:
+            message = f"{len(parameter)} values of the parameter for {points.count} points"
+            raise PlanningError(message, hint="give one for each point, or use chord")
+        return np.array(parameter)
+    chords = np.linalg.norm(np.diff(points.positions, axis=0), axis=1)
+    steps = {"chord": chords, "centripetal": np.sqrt(chords), "uniform": np.ones_like(chords)}[parameter]
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def polyline_through(points: PointTable, corner: float, robot: Robot) -> JointPath:
+    """Return straight segments, corners rounded by parabolas that stay within `corner` of them.
+
+    Raises:
+        PlanningError: When the arm moves at an end in another direction than the segment there.
+    """
+    q, places = points.positions, _places("chord", points)
+    slopes = np.diff(q, axis=0) / np.diff(places)[:, None]
+    speeds = tuple(
+        _along(slope, velocity, robot)
+        for slope, velocity in zip(slopes[[0, -1]], points.rates[0, [0, -1]], strict=True)
+    )
+    turn = np.abs(np.diff(slopes, axis=0)).max(axis=1, initial=0.0)
+    if corner == 0 or not turn.any():
+        curve = PiecewisePolynomial(places, np.stack([slopes, q[:-1]]))
+        return JointPath(curve, places, np.zeros_like(q), (speeds[0], speeds[1]))
+    asked = np.zeros(points.count)
+    asked[1:-1] = 8 * corner / np.where(turn > 0, turn, np.inf)
+    room = np.diff(places)
+    limit = np.full(points.count, np.inf)
+    limit[1:-1] = _ROOM * np.minimum(room[:-1], room[1:])
+    used = np.minimum(asked, limit)
+    made = blended(places, q, used, ends="inside", start_velocity=slopes[0], end_velocity=slopes[-1])
+    return JointPath(made.curve, places, made.missed, (speeds[0], speeds[1]), _shrunk(asked, used))
+
+
+def _along(slope: Array, velocity: Array, robot: Robot) -> float:
+    """Return sd with which the path of a slope has the velocity."""
+    speed = float(velocity @ slope) / float(slope @ slope)
+    off = np.abs(velocity - speed * slope)
+    if off.max() > _OFF * np.abs(velocity).max() or speed < 0:
+        joint = int(off.argmax())
+        name = robot.joint_names[joint]
+        message = f"a polyline is straight at its ends, but {{velocity}} of {name} leaves it"
+        hint = "use `path: spline`, or let the move before end at rest"
+        amounts = {"velocity": Amount(float(velocity[joint]), 1, joint)}
+        raise PlanningError(Problem(message, hint, joint=name, amounts=amounts))
+    return speed
+
+
+def _shrunk(asked: Array, used: Array) -> tuple[Event, ...]:
+    less = np.flatnonzero(used[1:-1] < asked[1:-1])
+    if not less.size:
+        return ()
+    share = used[1:-1][less] / asked[1:-1][less]
+    worst = int(less[share.argmin()])
+    more = f"; so were {less.size - 1} others" if less.size > 1 else ""
+    text = f"the corner at point {worst + 1} had room for {share.min():.4g} of the deviation asked for{more}"
+    return (Event("shrunk", text),)

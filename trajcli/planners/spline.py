@@ -1,0 +1,178 @@
+"""One smooth curve through all points: the slides' 2.2, and the splines that numerical analysis knows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.spline_shape import ShapeError
+from trajcli.errors import Amount, PlanningError, Problem
+from trajcli.kinematics.robot import Robot
+from trajcli.planners.planner import Planned
+from trajcli.planners.point_to_point import standstill
+from trajcli.planners.pose_fields import Numbers
+from trajcli.planners.reading import Flaw, Path, refuse
+from trajcli.planners.recorded import Recorded
+from trajcli.planners.spline_rules import FREE_ENDS, IMPOSES, Rule, curve_through
+from trajcli.planners.spline_times import fastest_spline_times
+from trajcli.planners.through_points import PointTable, ThroughPoints, passage_through
+from trajcli.planners.waypoints import Waypoint
+from trajcli.trajectory import State
+from trajcli.units import Quantity
+
+_INNER = {"imposed": 1, "quintic": 2}
+
+
+class Spline(ThroughPoints):
+    """A smooth curve through all points, at times that are given or follow from the limits.
+
+    Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.2.2; Biagiotti and
+    Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), chapter 4.
+    """
+
+    continuity: ClassVar[Literal[1, 2]] = 1
+
+    planner: Literal["spline"] = "spline"
+    rule: Annotated[
+        Rule,
+        Field(
+            description="What fixes the curve between the points. imposed: velocities of the waypoints; "
+            "computed: velocities from the slopes, zero where their sign changes; continuous_acceleration: "
+            "two virtual points let the ends impose velocity and acceleration; natural, clamped, not_a_knot: "
+            "cubic splines of numerical analysis; quintic: continuous acceleration with given or computed "
+            "inner values; shape_preserving: monotone between points, no overshoot."
+        ),
+    ] = "continuous_acceleration"
+    virtual_times: (
+        Annotated[
+            tuple[float, ...],
+            Numbers(2, Quantity("time"), "Times of the two virtual points of continuous_acceleration, s."),
+        ]
+        | None
+    ) = None
+
+    @property
+    def joins(self) -> Literal[1, 2]:
+        """Acceleration joins where the rule imposes it at both ends."""
+        return 2 if IMPOSES[self.rule] == 2 else 1
+
+    @model_validator(mode="after")
+    def _says_what_the_rule_needs(self) -> Spline:
+        flaws = [*self._flaws_inside(), *self._flaws_of_target(), *self._flaws_of_virtual_times()]
+        if flaws:
+            raise refuse(flaws)
+        return self
+
+    def _flaws_inside(self) -> Iterator[Flaw]:
+        lacking = "rule imposed needs the velocity of every waypoint between start and target"
+        if isinstance(self.through, Recorded):
+            if self.rule == "imposed":
+                yield ("rule",), lacking, "recorded points have none: use computed"
+            return
+        between = self.through if self.to is not None else self.through[:-1]
+        for k, point in enumerate(between):
+            if self.rule == "imposed" and point.velocity is None:
+                yield ("through", k), lacking, "give it a `velocity`, or use computed"
+            for order, name in ((1, "velocity"), (2, "acceleration")):
+                if order > _INNER.get(self.rule, 0) and getattr(point, name) is not None:
+                    instead = "leave it out, or use quintic"
+                    yield (
+                        ("through", k, name),
+                        f"rule {self.rule} computes the {name} between the ends",
+                        instead,
+                    )
+        for k, point in enumerate(self.through):
+            if point.blend is not None:
+                yield (
+                    ("through", k, "blend"),
+                    "a spline goes through its points",
+                    "use blends, or leave it out",
+                )
+
+    def _flaws_of_target(self) -> Iterator[Flaw]:
+        path, target = self._target()
+        if target is None:
+            return
+        for order, name in ((1, "velocity"), (2, "acceleration")):
+            values = getattr(target, name)
+            if order > IMPOSES[self.rule] and any(values or ()):
+                text = f"rule {self.rule} does not impose the {name} at its end"
+                yield (*path, name), text, "use continuous_acceleration or quintic, or leave it out"
+
+    def _target(self) -> tuple[Path, Waypoint | None]:
+        if self.to is not None:
+            return ("to",), self.to
+        if isinstance(self.through, Recorded):
+            return (), None
+        return ("through", len(self.through) - 1), self.through[-1]
+
+    def _flaws_of_virtual_times(self) -> Iterator[Flaw]:
+        if self.virtual_times is None:
+            return
+        path: Path = ("virtual_times",)
+        if self.rule != "continuous_acceleration":
+            yield (
+                path,
+                f"rule {self.rule} has no virtual points",
+                "leave it out, or use continuous_acceleration",
+            )
+        elif not self.timed and not (self.duration and len(self.listed) == 1):
+            yield path, "virtual times need waypoints with times", "give each waypoint a `time`"
+
+    def plan(self, start: State, robot: Robot) -> Planned:
+        """Return the curve through all points.
+
+        Raises:
+            MissingLimitError: When times are left out and a moving joint has no limit.
+            PlanningError: When no times keep the limits, or the ends ask for what the rule cannot do.
+        """
+        points = self.waypoints(start)
+        if points.times is None and not np.ptp(points.positions, axis=0).any() and not points.rates.any():
+            return standstill(points.target, self.duration or 0.0)
+        times = self._times_of(points, robot)
+        curve = self._curve(points, times, robot)
+        return Planned(
+            curve,
+            self._end(points, curve),
+            passage=passage_through(points, times),
+            begins=_beginning(curve) if self.rule in FREE_ENDS else None,
+            events=points.events,
+        )
+
+    def _times_of(self, points: PointTable, robot: Robot) -> Array:
+        if points.times is not None:
+            return points.times
+        if self.duration and points.count == 2:
+            return np.array([0.0, self.duration])
+        times = fastest_spline_times(self.rule, points, robot)
+        return times * (self.duration / times[-1]) if self.duration else times
+
+    def _curve(self, points: PointTable, times: Array, robot: Robot) -> PiecewisePolynomial:
+        try:
+            return curve_through(self.rule, points, times, self.virtual_times)
+        except ShapeError as error:
+            name = robot.joint_names[error.component]
+            low, high = (Amount(value, 1, error.component) for value in (error.low, error.high))
+            message = (
+                f"{{velocity}} of {name} at the {error.end} point keeps the curve from being monotone, "
+                "{low} to {high} would not"
+            )
+            hint = "change that velocity, or use another rule than shape_preserving"
+            amounts = {"velocity": Amount(error.velocity, 1, error.component), "low": low, "high": high}
+            raise PlanningError(Problem(message, hint, joint=name, amounts=amounts)) from None
+        except ValueError as error:  # a virtual time outside its interval
+            raise PlanningError(str(error), hint="give other `virtual_times`, or leave them out") from None
+
+    def _end(self, points: PointTable, curve: PiecewisePolynomial) -> State:
+        if self.rule not in FREE_ENDS:
+            return points.target
+        return State(points.positions[-1], curve.piece_ends(1)[1][-1], np.zeros(curve.dimension))
+
+
+def _beginning(curve: PiecewisePolynomial) -> State:
+    position, velocity = (curve.piece_ends(order)[0][0] for order in (0, 1))
+    return State(position, velocity, np.zeros_like(position))

@@ -1,0 +1,219 @@
+"""Through points as fast as limits on velocity and acceleration allow."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+from pydantic.json_schema import JsonSchemaValue
+
+from trajcli.curves.compose import scale_time
+from trajcli.curves.invert import times_at
+from trajcli.curves.time_optimal.solve import UnreachableSpeedError
+from trajcli.curves.time_optimal.structure import structure
+from trajcli.curves.time_optimal.trajectory import TimeOptimal as Solved
+from trajcli.curves.time_optimal.trajectory import UnsettledSpeedError, time_optimal
+from trajcli.errors import Amount, PlanningError, Problem
+from trajcli.kinematics.robot import Robot
+from trajcli.planners.deviation import Deviation
+from trajcli.planners.joint_path import JointPath, polyline_through, spline_through
+from trajcli.planners.planner import Event, Phase, Planned
+from trajcli.planners.point_to_point import missing_limit, standstill
+from trajcli.planners.poses import read_numbers
+from trajcli.planners.reading import FieldType, Flaw, FlawError, ReadingContext, refuse, shown
+from trajcli.planners.recorded import Recorded
+from trajcli.planners.spline_rules import Rule
+from trajcli.planners.through_points import PointTable, ThroughPoints
+from trajcli.trajectory import Passage, State
+from trajcli.units import Quantity
+
+_NAMED = ("chord", "centripetal", "uniform")
+_MOST_STOPS = 10  # that an event lists
+_STRETCHED = 1e-9  # relative: a smaller stretch is rounding
+
+
+@dataclass(frozen=True)
+class _Parameter(FieldType):
+    """The name of a rule for the path parameter, or its value at each point."""
+
+    description: str
+
+    def read(self, value: Any, context: ReadingContext) -> str | tuple[float, ...]:  # noqa: ANN401
+        """Return the name, or the values."""
+        if isinstance(value, str) and value in _NAMED:
+            return value
+        if not isinstance(value, list | tuple):
+            raise FlawError(f"expected {', '.join(_NAMED)}, or a list of numbers from 0, got {shown(value)}")
+        values = read_numbers(value, len(value), Quantity("ratio"), context)
+        if values.size < 2 or values[0] != 0 or (np.diff(values) <= 0).any():
+            raise FlawError("the values of the parameter must begin with 0 and increase")
+        return tuple(values.tolist())
+
+    def json_schema(self) -> JsonSchemaValue:
+        """Return the schema of a name or a list."""
+        return {
+            "anyOf": [{"enum": list(_NAMED)}, {"type": "array", "items": {"type": "number"}, "minItems": 2}]
+        }
+
+
+class TimeOptimal(ThroughPoints):
+    """Through points as fast as velocity and acceleration limits allow, on a path that they fix.
+
+    Source: Pham and Pham, A New Approach to Time-Optimal Path Parameterization Based on Reachability
+    Analysis, IEEE Trans. Robotics 34 (2018).
+    """
+
+    continuity: ClassVar[Literal[1, 2]] = 1
+
+    planner: Literal["time_optimal"] = "time_optimal"
+    path: Annotated[
+        Literal["spline", "polyline"],
+        Field(description="A smooth curve through the points, or straight segments with rounded corners."),
+    ] = "spline"
+    rule: Annotated[
+        Rule | None, Field(description="Of the spline: as for `spline`; not_a_knot if left out.")
+    ] = None
+    parameter: (
+        Annotated[
+            Literal["chord", "centripetal", "uniform"] | tuple[float, ...],
+            _Parameter(
+                "Of the spline: its parameter grows with the distance of the points (chord, which is the "
+                "default), its root (centripetal), by one for each (uniform), or has the given values."
+            ),
+        ]
+        | None
+    ) = None
+    corner: (
+        Annotated[
+            float,
+            Deviation(
+                "Of the polyline: how far a joint may pass from a corner (angle unit, or length unit for "
+                "prismatic joints); 0 or left out: stop there."
+            ),
+        ]
+        | None
+    ) = None
+
+    @model_validator(mode="after")
+    def _path_fits(self) -> TimeOptimal:
+        flaws = [*self._flaws_of_path(), *self._flaws_of_points()]
+        if flaws:
+            raise refuse(flaws)
+        return self
+
+    def _flaws_of_path(self) -> Iterator[Flaw]:
+        foreign = ("corner",) if self.path == "spline" else ("rule", "parameter")
+        for name in foreign:
+            if getattr(self, name) is not None:
+                yield (name,), f"a {self.path} has no {name}", "leave it out, or choose the other `path`"
+        if self.rule in ("imposed", "continuous_acceleration"):
+            text = f"rule {self.rule} imposes derivatives in time, and the times are to be found"
+            yield ("rule",), text, "use not_a_knot, natural, shape_preserving, computed or quintic"
+        count = 1 + len(self.listed)
+        if not isinstance(self.parameter, tuple) or isinstance(self.through, Recorded):
+            return
+        if len(self.parameter) != count:
+            text = f"expected {count} values, one for each point from the start on, got {len(self.parameter)}"
+            yield ("parameter",), text, None
+
+    def _flaws_of_points(self) -> Iterator[Flaw]:
+        for k, point in enumerate(self.listed):
+            last = k == len(self.listed) - 1
+            path = ("to",) if self.to is not None and last else ("through", k)
+            if point.time is not None:
+                yield (*path, "time"), "time_optimal finds the times", "leave it out, or use spline"
+            if point.blend is not None:
+                yield (*path, "blend"), "time_optimal has no blends", "use `path: polyline` and `corner`"
+            for name in ("velocity", "acceleration"):
+                if any(getattr(point, name) or ()) and not (last and name == "velocity"):
+                    text = f"time_optimal does not impose the {name} here"
+                    yield (*path, name), text, "only the target may have a `velocity`"
+
+    def plan(self, start: State, robot: Robot) -> Planned:
+        """Return the fastest motion along the path.
+
+        Raises:
+            MissingLimitError: When a moving joint has no limit of acceleration.
+            PlanningError: When the velocities at the ends do not fit the path, or the duration is too short.
+        """
+        points = replace(self.waypoints(start), times=None)
+        moving = np.ptp(points.positions, axis=0) > 0
+        if not moving.any():
+            return standstill(points.target, self.duration or 0.0)
+        bounds = robot.limits.acceleration
+        lacking = np.flatnonzero(moving & ~np.isfinite(bounds).all(axis=1))
+        if lacking.size:
+            raise missing_limit(
+                self.tag, "acceleration", lacking.tolist(), robot, "to find the fastest motion"
+            )
+        path = self._path(points, robot)
+        made = _solved(path, robot)
+        duration = made.trajectory.duration
+        factor = 1.0 if self.duration is None else self.duration / duration
+        _check_duration(self.duration, duration, points)
+        passed = times_at(made.law, path.places)
+        binding = structure(made.trajectory, robot.limits.velocity, bounds)
+        return Planned(
+            scale_time(made.trajectory, factor) if factor != 1 else made.trajectory,
+            points.target,
+            phases=tuple(
+                Phase(f"{b.quantity} {'+' if b.sign > 0 else '-'}", b.start * factor, b.end * factor, b.joint)
+                for b in binding
+            ),
+            passage=Passage(passed * factor, points.positions, path.missed),
+            events=(*points.events, *path.events, *_events(made)),
+        )
+
+    def _path(self, points: PointTable, robot: Robot) -> JointPath:
+        if self.path == "polyline":
+            return polyline_through(points, self.corner or 0.0, robot)
+        return spline_through(self.rule or "not_a_knot", self.parameter or "chord", points, robot)
+
+
+def _solved(path: JointPath, robot: Robot) -> Solved:
+    limits = robot.limits
+    try:
+        return time_optimal(
+            path.curve,
+            limits.velocity,
+            limits.acceleration,
+            start_velocity=path.speeds[0],
+            end_velocity=path.speeds[1],
+        )
+    except UnreachableSpeedError as error:
+        share = error.allowed / error.speed
+        message = f"time_optimal cannot have so high a velocity at its ends: at most {share:.6g} of it"
+        raise PlanningError(message, hint="lower it, or let the move before end at rest") from None
+    except UnsettledSpeedError as error:
+        message = f"with these velocities at its ends time_optimal passes a limit by {error.over:.9g} times"
+        raise PlanningError(message, hint="lower them a little") from None
+
+
+def _check_duration(wanted: float | None, fastest: float, points: PointTable) -> None:
+    if wanted is None or wanted == fastest:
+        return
+    if points.rates[0, [0, -1]].any():
+        message = "time_optimal cannot last a given time when it starts or ends in motion"
+        raise PlanningError(message, hint="leave `duration` out, or use spline")
+    if wanted < fastest:
+        message = "time_optimal needs {fastest}, it shall last {wanted}"
+        amounts = {"fastest": Amount(fastest), "wanted": Amount(wanted)}
+        raise PlanningError(Problem(message, "leave `duration` out for the fastest", amounts=amounts))
+
+
+def _events(made: Solved) -> Iterator[Event]:
+    if made.refinements:
+        yield Event(
+            "refined",
+            f"the grid was refined {made.refinements} times, to {made.grid.size} places on the path",
+        )
+    if made.stretch > 1 + _STRETCHED:
+        yield Event("stretched", f"stretched {made.stretch:.9g} times to keep all limits between the places")
+    if made.stops.size:
+        times = ", ".join(f"{time:.6g}" for time in made.stop_times[:_MOST_STOPS].tolist())
+        more = ", ..." if made.stops.size > _MOST_STOPS else ""
+        text = f"stops at {made.stops.size} corners, at t = {times}{more} s of the move"
+        yield Event("stops", f"{text}: give `corner` to round them")

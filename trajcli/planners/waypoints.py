@@ -1,0 +1,172 @@
+"""The points that a move passes: listed one by one, or recorded in a file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, core_schema
+
+from trajcli.planners.deviation import Deviation
+from trajcli.planners.fields import Named, Target
+from trajcli.planners.per_joint import PerJoint
+from trajcli.planners.poses import read_numbers
+from trajcli.planners.reading import (
+    AT_KEY,
+    SI,
+    FlawError,
+    Number,
+    ReadingContext,
+    refuse,
+    shown,
+)
+from trajcli.planners.recorded import Recorded
+from trajcli.units import Quantity
+
+_TIME = Quantity("time")
+_MERGE = Deviation(
+    "Points no joint of which is further than this from the point before are left out (angle unit, or length "
+    "unit where all joints are prismatic)."
+)
+_KEYS = ("csv", "positions", "times", "merge")
+
+
+class Waypoint(Target):
+    """A point to pass: a state, and when."""
+
+    time: (
+        Annotated[float, Number(_TIME, "When it is passed, s from the start of the move.", above=0.0)] | None
+    ) = None
+    blend: Annotated[float, Number(_TIME, "Duration of the blend around it, s.", above=0.0)] | None = None
+
+    @model_validator(mode="after")
+    def _is_somewhere(self) -> Waypoint:
+        if not self.is_place:
+            raise refuse([((), "a waypoint needs `joints` or a pose", None)])
+        return self
+
+
+NamedWaypoint = Annotated[Waypoint, Named()]
+
+
+class _Through:
+    """Lets {csv: PATH} stand for the points of a file, and {positions: [...]} for a table of them."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
+        listed = handler.generate_schema(tuple[NamedWaypoint, ...])
+        return core_schema.with_info_wrap_validator_function(
+            self._read,
+            listed,
+            serialization=core_schema.wrap_serializer_function_ser_schema(
+                self._write, info_arg=True, schema=listed
+            ),
+        )
+
+    @staticmethod
+    def _read(
+        value: Any,  # noqa: ANN401
+        validate: core_schema.ValidatorFunctionWrapHandler,
+        info: core_schema.ValidationInfo,
+    ) -> Any:  # noqa: ANN401
+        if isinstance(value, Recorded):
+            return value
+        if not isinstance(value, Mapping):
+            return validate(value)
+        try:
+            return _recorded(value, info.context or SI)
+        except FlawError as error:
+            raise refuse(error.flaws) from None
+
+    @staticmethod
+    def _write(
+        value: Any,  # noqa: ANN401
+        serialize: core_schema.SerializerFunctionWrapHandler,
+        info: core_schema.SerializationInfo,
+    ) -> Any:  # noqa: ANN401
+        if not isinstance(value, Recorded):
+            return serialize(value)
+        return value if info.context is None else _written(value, info.context)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        keys = {
+            "csv": {"type": "string", "description": "A file of joint values, relative to the job's folder."},
+            "merge": {**_MERGE.json_schema(), "default": 0, "description": _MERGE.description},
+        }
+        file = {"type": "object", "properties": keys, "required": ["csv"], "additionalProperties": False}
+        rows = {"type": "array", "items": PerJoint(0, "").json_schema(), "minItems": 1}
+        table = {
+            "positions": {**rows, "description": "Joint values, one row for each point."},
+            "times": {"type": "array", "items": {"type": "number"}, "description": "When, s from the start."},
+            "merge": keys["merge"],
+        }
+        inline = {"type": "object", "properties": table, "required": ["positions"]}
+        return {"anyOf": [handler(schema), file, {**inline, "additionalProperties": False}]}
+
+
+Through = Annotated[tuple[NamedWaypoint, ...] | Recorded, _Through()]
+
+
+def _recorded(value: Mapping[str, Any], context: ReadingContext) -> Recorded:
+    unknown = [key for key in value if key not in _KEYS]
+    if unknown:
+        raise FlawError(
+            f"unknown key '{unknown[0]}'", unknown[0], AT_KEY, hint=f"the keys are {', '.join(_KEYS)}"
+        )
+    if ("csv" in value) == ("positions" in value):
+        raise FlawError("expected a list of waypoints, {csv: PATH} or {positions: [...]}")
+    points = _from_file(value, context) if "csv" in value else _inline(value, context)
+    merge = _merge(value["merge"], context) if "merge" in value else 0.0
+    return Recorded(points.positions, points.times, points.file, merge)
+
+
+def _from_file(value: Mapping[str, Any], context: ReadingContext) -> Recorded:
+    path = value["csv"]
+    if "times" in value:
+        raise FlawError("a file's times stand in its column t", "times", hint="leave `times` out")
+    if not isinstance(path, str):
+        raise FlawError(f"expected the path of a file, got {shown(path)}", "csv")
+    if context.read_points is None:
+        raise FlawError("only a job can read a file of points", "csv", hint="give `positions`")
+    return context.read_points(path)
+
+
+def _inline(value: Mapping[str, Any], context: ReadingContext) -> Recorded:
+    rows = value["positions"]
+    if not isinstance(rows, list | tuple) or not rows:
+        raise FlawError(f"expected a list of rows of joint values, got {shown(rows)}", "positions")
+    positions, one = [], PerJoint(0, "Position of each joint.")
+    for index, row in enumerate(rows):
+        try:
+            positions.append(one.read(row, context))
+        except FlawError as error:
+            error.flaws = [(("positions", index, *path), text, hint) for path, text, hint in error.flaws]
+            raise
+    if "times" not in value:
+        return Recorded(np.array(positions))
+    times = read_numbers(value["times"], len(positions), _TIME, context, "times")
+    if (np.diff(times) <= 0).any():
+        raise FlawError("times must increase", "times", int(np.flatnonzero(np.diff(times) <= 0)[0]) + 1)
+    return Recorded(np.array(positions), times)
+
+
+def _merge(value: Any, context: ReadingContext) -> float:  # noqa: ANN401
+    try:
+        return _MERGE.read(value, context)
+    except FlawError as error:
+        raise FlawError(str(error), "merge") from None
+
+
+def _written(recorded: Recorded, context: ReadingContext) -> dict[str, Any]:
+    """Return recorded points as a table with the SI unit of each joint."""
+    one = PerJoint(0, "")
+    table: dict[str, Any] = {"positions": [one.write(tuple(q), context) for q in recorded.positions.tolist()]}
+    if recorded.times is not None:
+        table["times"] = recorded.times.tolist()
+    if recorded.merge:
+        table["merge"] = _MERGE.write(recorded.merge, context)
+    return table
