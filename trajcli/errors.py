@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 
 @dataclass(frozen=True)
@@ -30,13 +31,15 @@ class Amount:
 
     Attributes:
         value: SI.
-        order: 0 for a joint's position, 1 to 3 for its time derivatives; without a joint it is a time.
+        order: 0 for a position, 1 to 3 for its time derivatives.
         joint: Index of the joint that says whether angle or length is meant.
+        dimension: "length" or "angle" of the tool; with neither this nor a joint the number is a time.
     """
 
     value: float
     order: int = 0
     joint: int | None = None
+    dimension: Literal["length", "angle"] | None = None
 
     def __str__(self) -> str:
         return f"{self.value:.9g}"

@@ -125,6 +125,35 @@ def test_one_segment_with_moving_ends_inside(distance, v0, v1, factor, h):
     np.testing.assert_allclose(ends[1][:, 0], [v0, v1], atol=1e-9)
 
 
+@settings(max_examples=60, deadline=None)
+@given(SEEDS, st.integers(3, 8))
+def test_moving_ends_inside_other_segments(seed, m):
+    t, q = polyline(seed, m, 2)
+    rng = np.random.default_rng(seed)
+    v = rng.normal(size=(2, 2))
+    a = strong(t, q, rng) + 20 * np.abs(v).max() / np.diff(t).min()
+    result = blended_by_acceleration(t, q, a, ends="inside", start_velocity=v[0], end_velocity=v[1])
+    assume(not result.shrunk)
+    scale = max(1, np.abs(q).max())
+    for at, point, velocity in ((0.0, q[0], v[0]), (result.curve.end, q[-1], v[1])):
+        np.testing.assert_allclose(result.curve.evaluate(at), point, rtol=0, atol=1e-11 * scale)
+        np.testing.assert_allclose(result.curve.evaluate(at, 1), velocity, rtol=0, atol=1e-11 * scale)
+        bend = np.abs(result.curve.evaluate(at, 2))
+        assert (np.minimum(bend, np.abs(bend - a)) <= 1e-7 * a).all()
+    touched = result.curve.evaluate(t[1:-1] + result.shift) - q[1:-1]
+    np.testing.assert_allclose(np.abs(touched), result.missed[1:-1], rtol=0, atol=1e-11 * scale)
+    steps = np.abs(np.diff(np.concatenate([v[:1], result.velocities, v[1:]]), axis=0))
+    np.testing.assert_allclose(result.blends * a, steps, rtol=0, atol=1e-11 * scale)
+
+
+def test_the_error_names_the_joint_that_lacks_most():
+    q = np.array([[0.0, 0.0, 0.0], [5.0, 1.0, 2.0]])
+    with pytest.raises(BlendAccelerationError) as caught:
+        blended_by_acceleration([0, 1], q, [100.0, 1.0, 4.0], ends="inside")
+    error = caught.value
+    assert (error.joint, error.point, error.acceleration, error.least) == (1, 0, 1.0, pytest.approx(4.0))
+
+
 def test_shrunk_blends_name_the_joint():
     # at the middle joint 1 turns by 4 within 1 s segments: at 1 rad/s^2 it asks for 4 s
     q = np.array([[0.0, 0.0], [1.0, 2.0], [2.0, 0.0]])
@@ -141,6 +170,7 @@ def test_rounding_is_not_a_corner():
     result = blended_by_acceleration(t, np.stack([3 * t + 7, 0 * t], axis=1), [50.0, 2.0])
     assert not result.shrunk
     assert not result.blends[1:-1].any()
+    assert result.curve.lengths.min() > 0.01
     assert not result.curve.evaluate(np.linspace(0.2, result.curve.end - 0.2, 200), 2).any()
 
 

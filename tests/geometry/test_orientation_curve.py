@@ -117,6 +117,14 @@ def test_the_rate_does_not_overshoot_in_a_rounded_corner():
     assert rate.max() < even.max() + 1e-12
 
 
+def test_blends_that_meet_have_one_break_between_them():
+    corners = [[0, 0, 0], [0.7, 0, 0], [0.7, 0.3, 0], [0.1, 0.3, 0.1]]
+    chain = join([Line(a, b) for a, b in itertools.pairwise(corners)], 0.25)
+    curve = AboutAxes(random_rotations(2, 4), chain.progress)
+    assert np.diff(curve.breaks).min() > 1e-3
+    assert curve.breaks.size == 5
+
+
 def test_equal_rates_need_no_stop():
     chain = join([Line([0, 0, 0], [1, 0, 0]), Line([1, 0, 0], [3, 0, 0])])
     turns = Rotation.from_rotvec([[0, 0, 0], [0.3, 0, 0], [0.9, 0, 0]]).as_matrix()

@@ -80,6 +80,13 @@ def _polynomials(plan: Plan, index: int) -> Iterator[str]:
 
 
 def _phases(move: dict[str, Any]) -> Iterator[str]:
+    if move["planner"] == "time_optimal" and move["phases"]:
+        yield "  which limit binds when (s):"
+        yield from (
+            f"    {phase['start']:.6g}..{phase['end']:.6g}: {phase['name']} of {phase['joint']}"
+            for phase in move["phases"]
+        )
+        return
     shown: dict[str | None, list[str]] = {}
     for phase in move["phases"]:
         shown.setdefault(phase["joint"], []).append(

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 _MOST = 20  # points that are listed one by one
+_ROUNDING = 1e-12  # in units of the job: what is missed by less is met
 
 
 def passing_lines(move: Mapping[str, Any]) -> Iterator[str]:
@@ -29,7 +30,7 @@ def _points(passed: list[dict[str, Any]], joints: list[str], origin: float) -> I
     if not any(any(point["missed"]) for point in passed):
         return
     for joint, name in enumerate(joints):
-        missed = [point["missed"][joint] for point in passed]
+        missed = [value if value > _ROUNDING else 0.0 for value in (p["missed"][joint] for p in passed)]
         if any(missed):
             listed = ", ".join(f"{value:.6g}" for value in missed[:_MOST])
             more = f", ... at most {max(missed):.6g}" if len(passed) > _MOST else ""

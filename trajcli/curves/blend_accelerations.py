@@ -22,7 +22,6 @@ _ROUNDING = 1e-12  # relative: what an acceleration may miss its least value by
 _STRAIGHT = 8 * np.finfo(np.float64).eps  # of positions over durations: a velocity step that is only rounding
 _ROUNDS = 60  # halves, or better, what the offsets are wrong by, until there is no room
 _SETTLED = 1e-12  # of the shorter segment beside the waypoint
-_CLOSEST = 1e-6  # of the same: two corners of one waypoint are at least this far from it
 
 
 class BlendAccelerationError(ValueError):
@@ -138,11 +137,11 @@ def _offsets(way: Way, a: Array) -> Array:
     segments = np.diff(way.times)[:, None]
     near = np.zeros_like(way.positions)
     near[1:-1] = np.minimum(segments[:-1], segments[1:])
-    offsets = _CLOSEST * near
+    offsets = np.zeros_like(near)
     for _ in range(_ROUNDS):
         asked = _asked(way, _sharp(way, offsets), a)
         wanted = np.concatenate([asked[:1], np.maximum(asked[1:-1:2], asked[2:-1:2]), asked[-1:]])
-        fitting = OFFSET * scaled_to_fit(np.maximum(wanted, _CLOSEST * near), segments, *way.room())
+        fitting = OFFSET * scaled_to_fit(wanted, segments, *way.room())
         fitting[[0, -1]] = 0.0
         settled = (np.abs(fitting - offsets) <= _SETTLED * near).all()
         offsets = fitting

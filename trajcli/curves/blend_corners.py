@@ -21,8 +21,6 @@ Ends = Literal["centred", "inside"]
 
 OFFSET = 0.625  # of a blend: two corners around a waypoint leave a quarter of it straight between them
 
-_ROUNDING = 1e-12  # relative: what blends that just touch may overlap by
-
 
 @dataclass(frozen=True, eq=False)
 class Way:
@@ -154,7 +152,7 @@ def scaled_to_fit(asked: Array, lengths: Array, after: Array, before: Array) -> 
         before: The same for the length before it.
     """
     needed = after[:-1] * asked[:-1] + before[1:] * asked[1:]
-    over = needed > lengths * (1 + _ROUNDING)
+    over = needed > lengths
     factor = np.where(over, lengths / np.where(over, needed, 1.0), 1.0)
     free = np.ones((1, factor.shape[1]))
     fitting: Array = asked * np.minimum(np.concatenate([free, factor]), np.concatenate([factor, free]))

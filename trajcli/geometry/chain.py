@@ -6,23 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from trajcli.errors import InputError, PlanningError
 from trajcli.geometry.axis_angle import exp
-from trajcli.geometry.corner import (
-    REVERSAL,
-    SAME_DIRECTION,
-    Blend,
-    corner_values,
-    curvature_jumps,
-    room_for_radius,
-    round_corner,
-    turn_between,
-)
+from trajcli.geometry.corner import REVERSAL, Blend, corner_values, round_corner, turn_between
+from trajcli.geometry.corner_radii import Kind, asked_radii, fitting_radii, sharp_kind
 from trajcli.geometry.place_curve import (
     SAME_PLACE,
     PlaceCurve,
@@ -36,7 +27,6 @@ from trajcli.geometry.place_curve import (
 from trajcli.geometry.progress import Progress
 from trajcli.geometry.rotation import Array
 
-Kind = Literal["smooth", "bend", "stop", "rounded"]
 _NOTHING = 1e-12  # of a segment, which is rounding where two blends meet
 
 
@@ -188,9 +178,9 @@ def join(segments: Sequence[PlaceCurve], radii: ArrayLike = 0.0) -> Chain:
     if not segments:
         raise InputError("a path needs at least one segment")
     _check_joints(segments)
-    asked = _radii(radii, len(segments) - 1)
-    kinds = [_sharp_kind(before, after) for before, after in pairwise(segments)]
-    cut, faded = _shrunk(segments, kinds, asked)
+    asked = asked_radii(radii, len(segments) - 1)
+    kinds = [sharp_kind(before, after) for before, after in pairwise(segments)]
+    cut, faded = fitting_radii(segments, kinds, asked)
     ends = [0.0, *cut, 0.0]
     parts: list[PlaceCurve] = []
     joints, blends = [], []
@@ -208,13 +198,10 @@ def join(segments: Sequence[PlaceCurve], radii: ArrayLike = 0.0) -> Chain:
     )
     offsets = _offsets(parts)
     places = offsets[joints] + np.where(np.array(cut) > 0.0, half, 0.0)
-    corners = []
-    for i, (blend, kind) in enumerate(zip(blends, kinds, strict=True)):
-        point = segments[i + 1].evaluate(np.zeros(1))[0][0]
-        turn = turn_between(segments[i], segments[i + 1])
-        away = blend.distance(point) if blend else 0.0
-        became: Kind = "rounded" if blend else kind
-        corners.append(Corner(became, float(places[i]), point, turn, asked[i], cut[i] + faded[i], away))
+    corners = [
+        _corner(pair, blends[i], kinds[i], float(places[i]), asked[i], cut[i] + faded[i])
+        for i, pair in enumerate(pairwise(segments))
+    ]
     borders = np.concatenate([[0.0], places, offsets[-1:]])
     return Chain(tuple(segments), tuple(corners), tuple(parts), borders, half)
 
@@ -223,11 +210,18 @@ def _offsets(parts: Sequence[PlaceCurve]) -> Array:
     return np.concatenate([[0.0], np.cumsum([part.length for part in parts])])
 
 
-def _sharp_kind(before: PlaceCurve, after: PlaceCurve) -> Kind:
-    """Return what a corner is as long as nothing is rounded."""
-    if turn_between(before, after) > SAME_DIRECTION:
-        return "stop"
-    return "bend" if curvature_jumps(before, after) else "smooth"
+def _corner(
+    pair: tuple[PlaceCurve, PlaceCurve],
+    blend: Blend | None,
+    kind: Kind,
+    place: float,
+    asked: float,
+    used: float,
+) -> Corner:
+    where, turn = pair[1].evaluate(np.zeros(1))[0][0], turn_between(*pair)
+    if blend is None:
+        return Corner(kind, place, where, turn, asked, used, 0.0)
+    return Corner("rounded", place, where, turn, asked, used, blend.distance(where))
 
 
 def _blend(index: int, before: PlaceCurve, after: PlaceCurve, radius: float) -> Blend | None:
@@ -253,42 +247,3 @@ def _check_joints(segments: Sequence[PlaceCurve]) -> None:
                 f"segment {i + 2} of the path starts at {shown(start)}, {gap:.6g} m from {shown(end)}, where "
                 f"segment {i + 1} ends (allowed is {SAME_PLACE:g} m)"
             )
-
-
-def _radii(radii: ArrayLike, corners: int) -> list[float]:
-    given = np.asarray(radii, dtype=np.float64)
-    if given.ndim and given.shape != (corners,):
-        raise InputError(f"the path has {corners} corners, there are {given.size} radii", hint="one for each")
-    wrong = given[~(np.isfinite(given) & ((given == 0.0) | (given > SAME_PLACE)))]
-    if wrong.size:
-        raise InputError(
-            f"a corner radius must be 0 (stop there) or more than {SAME_PLACE:g} m, it is {wrong[0]:.6g}"
-        )
-    return [float(radius) for radius in np.broadcast_to(given, (corners,))]
-
-
-def _shrunk(
-    segments: Sequence[PlaceCurve], kinds: Sequence[Kind], asked: Sequence[float]
-) -> tuple[list[float], list[float]]:
-    """Return the radii that fit where there is something to round, and those over which only rotations
-    fade."""
-    wanted = [
-        0.0 if kind == "smooth" or radius == 0.0 else min(radius, room_for_radius(*pair))
-        for radius, kind, pair in zip(asked, kinds, pairwise(segments), strict=True)
-    ]
-    cut = _fitting(segments, wanted, [0.0] * len(asked))
-    rest = [radius if kind == "smooth" else 0.0 for radius, kind in zip(asked, kinds, strict=True)]
-    return cut, _fitting(segments, rest, cut)
-
-
-def _fitting(segments: Sequence[PlaceCurve], wanted: Sequence[float], taken: Sequence[float]) -> list[float]:
-    """Return the radii that fit into what is left of the segments by radii that were taken before."""
-    around, gone = [0.0, *wanted, 0.0], [0.0, *taken, 0.0]
-    result = []
-    for i, radius in enumerate(wanted):
-        free = [
-            segment.length - gone[other] - min(around[other], segment.length / 2.0)
-            for segment, other in ((segments[i], i), (segments[i + 1], i + 2))
-        ]
-        result.append(max(0.0, min(radius, *free)))
-    return result

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from trajcli.geometry.place_curve import Side, inside
 from trajcli.geometry.rotation import Array
 
+_ROUNDING = 1e-12  # of the length, by which two blends that meet may be apart
+
 
 class Fractions(NamedTuple):
     """The two neighbouring segments that are under way at each place.
@@ -66,7 +68,8 @@ class Progress:
     def breaks(self) -> Array:
         """Inner places, increasing, where a derivative of a fraction jumps."""
         inner = self.borders[1:-1]
-        return np.unique(np.concatenate([inner - self.half_widths, inner, inner + self.half_widths]))
+        places = np.sort(np.concatenate([inner - self.half_widths, inner, inner + self.half_widths]))
+        return np.asarray(places[np.diff(places, prepend=-np.inf) > _ROUNDING * self.length])
 
     def at(self, s: Array, side: Side = "right") -> Fractions:
         """Return the fractions at s (N,).

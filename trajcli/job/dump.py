@@ -10,10 +10,14 @@ import json
 import re
 import unicodedata
 from collections.abc import Iterator, Mapping
+from dataclasses import asdict
+from math import isfinite
 from typing import Any
 
 from trajcli.job.read import LoadedJob
 from trajcli.job.robot_model import robot_as_mapping
+from trajcli.kinematics.robot import Robot
+from trajcli.planners.bounds import ToolLimitsSpec
 from trajcli.planners.reading import ReadingContext
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -35,6 +39,7 @@ def dump_job(loaded: LoadedJob) -> str:
         "name": loaded.name,
         "units": written["units"],
         "robot": robot_as_mapping(robot),
+        "limits": _tool_limits(robot, context),
         "points": written["points"],
         "start": written["start"],
         "moves": moves,
@@ -44,6 +49,13 @@ def dump_job(loaded: LoadedJob) -> str:
     if job.output.times is not None:
         ordered["output"].pop("rate")
     return "\n".join(_block(_without_empty(ordered))) + "\n"
+
+
+def _tool_limits(robot: Robot, context: ReadingContext) -> dict[str, Any]:
+    """Return the limits of the tool that are in force, which no robot file holds."""
+    given = {name: value for name, value in asdict(robot.limits.tcp).items() if isfinite(value)}
+    spec = ToolLimitsSpec(**given)
+    return {"tcp": spec.model_dump(context=context, exclude_none=True)} if given else {}
 
 
 def _without_empty(value: Any) -> Any:  # noqa: ANN401

@@ -10,7 +10,7 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount, InputError, Problem
-from trajcli.kinematics.robot import QUANTITIES, Limits, Robot
+from trajcli.kinematics.robot import QUANTITIES, Limits, Robot, ToolLimits
 from trajcli.planners.bounds import LimitsSpec
 from trajcli.planners.planner import Event
 
@@ -83,7 +83,27 @@ def _with_limits(robot: Robot, spec: LimitsSpec) -> Robot:
         name: _replaced(robot.limits.of_order(order), spec, order) * getattr(spec.scale, name, 1.0)
         for order, name in enumerate(QUANTITIES)
     }
-    return dataclasses.replace(robot, limits=Limits(**rows))
+    return dataclasses.replace(robot, limits=Limits(**rows, tcp=_tool_limits(robot.limits.tcp, spec)))
+
+
+def _tool_limits(before: ToolLimits, spec: LimitsSpec) -> ToolLimits:
+    """Return the limits of the tool, scaled as those of the joints are."""
+    given = {} if spec.tcp is None else spec.tcp.model_dump(exclude_none=True)
+    scales = {
+        "speed": spec.scale.velocity,
+        "angular_speed": spec.scale.velocity,
+        "acceleration": spec.scale.acceleration,
+        "angular_acceleration": spec.scale.acceleration,
+        "jerk": spec.scale.jerk,
+    }
+    return ToolLimits(**{name: given.get(name, getattr(before, name)) * k for name, k in scales.items()})
+
+
+def looser_tool_bounds(robot: Robot, spec: LimitsSpec) -> list[str]:
+    """Return the names of the tool's limits that a move loosens."""
+    given = {} if spec.tcp is None else spec.tcp.model_dump(exclude_none=True)
+    before = {name: getattr(robot.limits.tcp, name) for name in given}
+    return [name for name, value in given.items() if value > before[name] * (1 + _ROUNDING)]
 
 
 def _replaced(bounds: Array, spec: LimitsSpec, order: int) -> Array:

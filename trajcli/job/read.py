@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from trajcli.columns import TOOL_COLUMNS
 from trajcli.errors import Amount, InputError, Place, Problem
-from trajcli.job.limits import looser_bounds, looser_problem, with_job_limits
+from trajcli.job.limits import looser_bounds, looser_problem, looser_tool_bounds, with_job_limits
 from trajcli.job.load import Document, parse_document, read_document
 from trajcli.job.messages import problems_of
 from trajcli.job.model import Job, UnitsSpec
@@ -56,10 +56,12 @@ class LoadedJob:
         """Return a number of a message in the job's units."""
         if math.isinf(amount.value):
             return "unlimited"
-        if amount.joint is None:
+        dimension = amount.dimension
+        if amount.joint is not None:
+            dimension = "length" if self.robot.joint_types[amount.joint] == "prismatic" else "angle"
+        if dimension is None:
             return f"{amount.value:.9g} s"
-        prismatic = self.robot.joint_types[amount.joint] == "prismatic"
-        quantity = Quantity("length" if prismatic else "angle", amount.order)
+        quantity = Quantity(dimension, amount.order)
         return f"{to_user(amount.value, quantity, self.units):.9g} {unit_name(quantity, self.units)}"
 
     def place_of_move(self, index: int) -> Place:
@@ -119,7 +121,7 @@ def _load(document: Document) -> LoadedJob:
     effective, events = with_job_limits(tooled, job.limits)
     name = job.name or ("stdin" if document.file in ("-", "<stdin>") else Path(document.file).stem)
     loaded = LoadedJob(job, name, effective, document, tuple(events))
-    flaws = [*_loosened_by_moves(loaded), *_columns_without_geometry(loaded)]
+    flaws = [*_loosened_by_moves(loaded), *_loosened_tool_limits(loaded), *_columns_without_geometry(loaded)]
     if flaws:
         raise InputError(*sorted(flaws, key=_position))
     return loaded
@@ -134,6 +136,14 @@ def _loosened_by_moves(loaded: LoadedJob) -> Iterator[Problem]:
             one = next((p for p in _of_joint(path, looser.joint, robot) if loaded.document.node(p)), path)
             place = loaded.document.place(one)
             yield replace(problem, message=problem.text(loaded.say), amounts={}, place=place)
+
+
+def _loosened_tool_limits(loaded: LoadedJob) -> Iterator[Problem]:
+    for index, move in enumerate(loaded.job.moves):
+        for name in looser_tool_bounds(loaded.robot, move.limits) if move.limits is not None else ():
+            place = loaded.document.place(("moves", index, "limits", "tcp", name))
+            message = f"a move can only tighten limits: the {name} of the tool is lower in the job"
+            yield Problem(message, "raise it under the job's `limits`", place, move=index)
 
 
 def _columns_without_geometry(loaded: LoadedJob) -> Iterator[Problem]:

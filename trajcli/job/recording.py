@@ -9,7 +9,7 @@ import numpy as np
 
 from trajcli.columns import Column, parse_column
 from trajcli.curves.piecewise import Array
-from trajcli.errors import FileError, InputError
+from trajcli.errors import FileError, InputError, Problem
 from trajcli.job.load import Document
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.reading import FlawError
@@ -32,10 +32,15 @@ def reader_of(document: Document, robot: Robot) -> Callable[[str], Recorded]:
         try:
             return _recorded(read_csv(folder / path), robot)
         except (InputError, FileError) as error:
-            flaws = [problem.text() for problem in error.problems]
-            raise FlawError("; ".join(flaws), "csv", hint=error.problems[0].hint) from None
+            raise FlawError(
+                "; ".join(map(_placed, error.problems)), "csv", hint=error.problems[0].hint
+            ) from None
 
     return read
+
+
+def _placed(problem: Problem) -> str:
+    return f"{problem.place}: {problem.text()}" if problem.place else problem.text()
 
 
 def _recorded(table: Table, robot: Robot) -> Recorded:
@@ -67,7 +72,11 @@ def _joint(table: Table, robot: Robot, joint: int) -> Array:
         raise InputError(f"{table.file}: two columns for {name}: {found[0][0]} and {found[1][0]}")
     header, column = found[0]
     if column.unit is not None and _WHOSE[column.unit] != kind:
-        raise InputError(f"{table.file}: the column {header} has another unit than {name}, which is {kind}")
+        right = "mm" if kind == "prismatic" else "deg"
+        raise InputError(
+            f"{table.file}: the column {header} is in {column.unit}, but {name} is {kind}",
+            hint=f"call it {header.removesuffix(f'_{column.unit}')} (SI) or ..._{right}",
+        )
     return np.asarray(table.column(header) * column.factor)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import Literal
 
 import numpy as np
@@ -37,6 +38,25 @@ class Joint:
     sign: int = 1
 
 
+@dataclass(frozen=True)
+class ToolLimits:
+    """Bounds of the tool's motion along a path, magnitudes; infinite means unlimited, and is not checked.
+
+    Attributes:
+        speed: m/s.
+        acceleration: m/s^2.
+        jerk: m/s^3.
+        angular_speed: rad/s.
+        angular_acceleration: rad/s^2.
+    """
+
+    speed: float = inf
+    acceleration: float = inf
+    jerk: float = inf
+    angular_speed: float = inf
+    angular_acceleration: float = inf
+
+
 @dataclass(frozen=True, eq=False)
 class Limits:
     """Lower and upper bounds by joint; an infinite one means unlimited, and is not checked.
@@ -46,12 +66,14 @@ class Limits:
         velocity: Shape (n, 2), per second; lower < 0 < upper.
         acceleration: Shape (n, 2), per second squared; lower < 0 < upper.
         jerk: Shape (n, 2), per second cubed; lower < 0 < upper.
+        tcp: Of the tool, for moves along a path of the tool.
     """
 
     position: Array
     velocity: Array
     acceleration: Array
     jerk: Array
+    tcp: ToolLimits = ToolLimits()
 
     def __post_init__(self) -> None:
         for index, name in enumerate(QUANTITIES):

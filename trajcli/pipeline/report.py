@@ -26,6 +26,7 @@ from trajcli.pipeline.plan import Plan
 from trajcli.pipeline.reference import NoBound, fastest_duration
 from trajcli.pipeline.stretch import PlannedMove
 from trajcli.planners.point_to_point import PointToPoint
+from trajcli.planners.through_points import ThroughPoints
 
 _JUMPS = {"position_jump": 0, "velocity_jump": 1, "acceleration_jump": 2}
 
@@ -125,7 +126,7 @@ def _problem(plan: Plan, finding: Finding) -> Problem:
     if finding.kind == "waypoint":
         quantity, what, bound, hint = "path", "passes a waypoint at", ", it shall be {limit}", finding.hint
     elif finding.kind in _JUMPS:
-        what, bound, hint = "jumps by", "", finding.hint or _jump_remedy(plan.moves[index])
+        what, bound, hint = "jumps by", "", _jump_remedy(plan.moves[index], finding)
     else:
         what, bound = "reaches", ", its limit is {limit}"
         hint = _remedy(plan, plan.moves[index], finding)
@@ -142,9 +143,11 @@ def _problem(plan: Plan, finding: Finding) -> Problem:
     )
 
 
-def _jump_remedy(move: PlannedMove) -> str | None:
-    if move.planned.begins is None:
-        return None
+def _jump_remedy(move: PlannedMove, finding: Finding) -> str | None:
+    if finding.kind == "acceleration_jump" and isinstance(move.planner, ThroughPoints):
+        return "use spline with rule continuous_acceleration or quintic, or say limits: {jerk: null}"
+    if finding.hint is not None or move.planned.begins is None:
+        return finding.hint
     return "this rule leaves the velocities at its ends open: use clamped or continuous_acceleration"
 
 

@@ -87,6 +87,7 @@ def _scaled(planned: Planned, factor: float) -> Planned:
         arrivals=planned.arrivals and tuple(time * factor for time in planned.arrivals),
         passage=planned.passage and planned.passage.scaled(factor),
         origin=planned.origin * factor,
+        tool=planned.tool and planned.tool.scaled(factor),
     )
 
 

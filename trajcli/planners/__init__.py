@@ -6,20 +6,37 @@ from typing import Annotated, Union, get_args
 
 from pydantic import Field
 
+from trajcli.planners.arc import Arc
 from trajcli.planners.blends import Blends
 from trajcli.planners.cubic import Cubic
 from trajcli.planners.cycloidal import Cycloidal
 from trajcli.planners.hold import Hold
 from trajcli.planners.jerk_limited import JerkLimited
+from trajcli.planners.line import Line
 from trajcli.planners.planner import Planner
 from trajcli.planners.quintic import Quintic
+from trajcli.planners.screw import Screw
 from trajcli.planners.septic import Septic
 from trajcli.planners.spline import Spline
 from trajcli.planners.time_optimal import TimeOptimal
 from trajcli.planners.trapezoid import Trapezoid
 
 Move = Annotated[
-    Union[Cubic, Quintic, Septic, Cycloidal, Trapezoid, JerkLimited, Spline, Blends, TimeOptimal, Hold],  # noqa: UP007
+    Union[  # noqa: UP007
+        Cubic,
+        Quintic,
+        Septic,
+        Cycloidal,
+        Trapezoid,
+        JerkLimited,
+        Spline,
+        Blends,
+        TimeOptimal,
+        Line,
+        Arc,
+        Screw,
+        Hold,
+    ],
     Field(discriminator="planner"),
 ]
 

@@ -214,9 +214,11 @@ def _shrunk(made: Blended, robot: Robot) -> tuple[Event, ...]:
         return ()
     worst = min(made.shrunk, key=lambda one: one.used / one.asked)
     whose = "" if worst.joint is None else f" of {robot.joint_names[worst.joint]}"
-    more = f"; so were {len(made.shrunk) - 1} others" if len(made.shrunk) > 1 else ""
-    room = "the segments beside it leave no room for more"
-    text = f"the blend{whose} at point {worst.point} was shortened from {{asked}} to {{used}}: {room}{more}"
+    more = f"; {len(made.shrunk) - 1} more likewise" if len(made.shrunk) > 1 else ""
+    text = (
+        f"the blend{whose} at point {worst.point} was shortened from {{asked}} to {{used}}, "
+        f"for which the segments beside it have room{more}"
+    )
     return (Event("shrunk", text, amounts={"asked": Amount(worst.asked), "used": Amount(worst.used)}),)
 
 
@@ -224,7 +226,8 @@ def _too_slow(error: BlendAccelerationError, points: PointTable, robot: Robot) -
     name, last = robot.joint_names[error.joint], error.point == points.count - 1
     where = "last" if last else "first"
     message = (
-        f"{{given}} of {name} is too little for the blend inside the {where} segment: it takes {{least}}"
+        f"the acceleration of {name}, {{given}}, is too small for the blend inside the {where} segment: "
+        "it takes {least}"
     )
     given, least = (Amount(value, 2, error.joint) for value in (error.acceleration, error.least))
     hint = "raise the acceleration, allow more time, or say `end_blends: centred`"

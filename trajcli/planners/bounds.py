@@ -142,6 +142,27 @@ class Scale(Model):
     jerk: Factor = 1.0
 
 
+ToolSpeed = Annotated[float, Number(Quantity("length", 1), "Speed of the tool.", above=0.0)]
+ToolAcceleration = Annotated[
+    float, Number(Quantity("length", 2), "Magnitude of the tool's acceleration.", above=0.0)
+]
+ToolJerk = Annotated[float, Number(Quantity("length", 3), "Jerk of the tool along its path.", above=0.0)]
+AngularSpeed = Annotated[float, Number(Quantity("angle", 1), "Angular speed of the tool.", above=0.0)]
+AngularAcceleration = Annotated[
+    float, Number(Quantity("angle", 2), "Magnitude of the tool's angular acceleration.", above=0.0)
+]
+
+
+class ToolLimitsSpec(Model):
+    """Limits of the tool, for moves along a path of the tool; what is left out is unlimited."""
+
+    speed: ToolSpeed | None = None
+    acceleration: ToolAcceleration | None = None
+    jerk: ToolJerk | None = None
+    angular_speed: AngularSpeed | None = None
+    angular_acceleration: AngularAcceleration | None = None
+
+
 class LimitsSpec(Model):
     """Limits that replace or tighten others; what is left out stays as it is, null is unlimited."""
 
@@ -154,6 +175,7 @@ class LimitsSpec(Model):
     ] = ()
     jerk: Annotated[tuple[Bound | None, ...], Bounds(3, "Jerk limit of each joint, per s^3.")] = ()
     scale: Scale = Scale()
+    tcp: ToolLimitsSpec | None = None
 
     def of_order(self, order: int) -> tuple[Bound | None, ...]:
         """Return the bounds of a derivative, of order 0 (position) to 3 (jerk); empty where none is given."""

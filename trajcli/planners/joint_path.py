@@ -125,6 +125,7 @@ def _shrunk(asked: Array, used: Array) -> tuple[Event, ...]:
         return ()
     share = used[1:-1][less] / asked[1:-1][less]
     worst = int(less[share.argmin()])
-    more = f"; so were {less.size - 1} others" if less.size > 1 else ""
-    text = f"the corner at point {worst + 1} had room for {share.min():.4g} of the deviation asked for{more}"
+    more = f"; {less.size - 1} more likewise" if less.size > 1 else ""
+    part = f"{100 * share.min():.4g} % of the deviation asked for"
+    text = f"the corner at point {worst + 1} is rounded by {part}: its segments are too short for more{more}"
     return (Event("shrunk", text),)

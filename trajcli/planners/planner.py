@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
 from pydantic import Field
 
@@ -14,6 +14,9 @@ from trajcli.kinematics.robot import Robot
 from trajcli.planners.bounds import LimitsSpec
 from trajcli.planners.model import Model
 from trajcli.trajectory import Passage, State
+
+if TYPE_CHECKING:
+    from trajcli.kinematics.following.motion import ToolMotion
 
 WhenOverLimit = Literal["error", "slow"]
 
@@ -71,6 +74,7 @@ class Planned:
         passage: The points that it passes between start and target, where it has any.
         origin: Where the zero of the planner's own time lies on the curve, s: above zero where the motion had
             to begin before it.
+        tool: What the tool was told to do, where the move follows a path of it.
         begins: The state in which the curve begins where the method does not let its start be imposed.
     """
 
@@ -84,6 +88,7 @@ class Planned:
     passage: Passage | None = None
     origin: float = 0.0
     begins: State | None = None
+    tool: ToolMotion | None = None
 
 
 class Planner(Model):

@@ -30,31 +30,41 @@ class Recorded:
         if self.times is not None:
             object.__setattr__(self, "times", read_only(self.times))
 
-    def after(self, start: Array) -> Recorded:
-        """Return the points that come after `start` (n,), where the arm stands when the recording begins.
+    def begins_at(self, start: Array) -> bool:
+        """Return whether the first point is where the arm stands, `start` (n,): it is then no further point."""
+        return len(self.positions) > 1 and bool((np.abs(self.positions[0] - start) <= self.merge).all())
+
+    def after(self, start: Array, target: Array | None = None) -> Recorded:
+        """Return the points that come after `start`, and before `target` where the recording is not the end.
 
         A first point that is where the arm stands is the start itself, and times count from it. A point is
-        left out where no joint is further than `merge` from the last point that was kept; with times, only
-        if `merge` is above zero, because standing still may be meant.
+        left out where no joint is further than `merge` from the last point that was kept, the end apart; with
+        times, only if `merge` is above zero, because standing still may be meant.
+
+        Args:
+            start: Where the arm stands when the recording begins, shape (n,).
+            target: Where the move goes after the last point, shape (n,); None: the last point is its end.
         """
-        at_start = bool((np.abs(self.positions[0] - start) <= self.merge).all())
-        rows = np.arange(1 if at_start else 0, len(self.positions))
-        times = self.times
-        if times is not None and at_start:
-            times = times - times[0]
+        first = int(self.begins_at(start))
+        positions, times = self.positions[first:], self.times
+        if times is not None:
+            times = (times - times[0] if first else times)[first:]
         if times is None or self.merge > 0:
-            rows = _moved(self.positions, start, rows, self.merge)
-        return Recorded(self.positions[rows], None if times is None else times[rows], self.file, self.merge)
+            ends = positions if target is None else np.vstack([positions, target])
+            rows = _moved(start, ends, self.merge)
+            rows = rows if target is None else rows[:-1]
+            positions, times = positions[rows], None if times is None else times[rows]
+        return Recorded(positions, times, self.file, self.merge)
 
 
-def _moved(positions: Array, start: Array, rows: np.ndarray, merge: float) -> np.ndarray:
-    """Return those rows that are further than `merge` from the last one that was kept."""
-    step = np.diff(np.vstack([start, positions[rows]]), axis=0)
-    if (np.abs(step).max(axis=1) > merge).all():
-        return rows
-    kept, last = [], start
-    for row in rows.tolist():
-        if np.abs(positions[row] - last).max() > merge:
+def _moved(start: Array, positions: Array, merge: float) -> np.ndarray:
+    """Return those rows that are further than `merge` from the last one that was kept, and the last row."""
+    if (np.abs(np.diff(positions, axis=0, prepend=start[None])).max(axis=1) > merge).all():
+        return np.arange(len(positions))
+    kept, before = [], start
+    for row, position in enumerate(positions):
+        if np.abs(position - before).max() > merge:
             kept.append(row)
-            last = positions[row]
-    return np.array(kept, dtype=np.intp)
+            before = position
+    end = len(positions) - 1
+    return np.array(kept if kept[-1:] == [end] else [*kept[:-1], end], dtype=np.intp)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -120,8 +120,35 @@ class Spline(ThroughPoints):
                 f"rule {self.rule} has no virtual points",
                 "leave it out, or use continuous_acceleration",
             )
-        elif not self.timed and not (self.duration and len(self.listed) == 1):
+            return
+        between = isinstance(self.through, Recorded) or len(self.listed) > 1
+        if not self.timed and (between or not self.duration):
             yield path, "virtual times need waypoints with times", "give each waypoint a `time`"
+        elif not isinstance(self.through, Recorded):
+            yield from self._flaws_of_intervals(*self.virtual_times)
+
+    def _flaws_of_intervals(self, first: float, last: float) -> Iterator[Flaw]:
+        times = [0.0, *(point.time or self.duration or 0.0 for point in self.listed)]
+        if 0 < first < times[1] and times[-2] < last < times[-1] and first < last:
+            return
+        spans = " and ".join(f"{a:.12g} to {b:.12g} s" for a, b in (times[:2], times[-2:]))
+        text = f"the virtual points must lie inside the first interval and inside the last one, {spans}"
+        yield ("virtual_times",), text, "leave it out for their middles"
+
+    def told_to_last(self, duration: float) -> Self:
+        """Return the planner whose points, virtual ones too, are passed in the same proportion.
+
+        Raises:
+            PlanningError: When virtual times belong to a recording whose end nothing but its file says.
+        """
+        longer = super().told_to_last(duration)
+        if self.virtual_times is None:
+            return longer
+        last = self._last_time() or self.duration
+        if last is None:
+            raise PlanningError("virtual times cannot be stretched with a recording", hint="leave them out")
+        times = tuple(time * (duration / last) for time in self.virtual_times)
+        return longer.model_copy(update={"virtual_times": times})
 
     def plan(self, start: State, robot: Robot) -> Planned:
         """Return the curve through all points.

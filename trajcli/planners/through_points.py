@@ -136,13 +136,10 @@ class ThroughPoints(Planner):
         """Return the planner whose points are passed in the same proportion, the last after `duration` s."""
         last = self._last_time() or self.duration
         scaled: dict[str, object] = {"duration": duration}
-        if self.timed and not isinstance(self.through, Recorded) and last:
+        if self.timed and last:  # without: a recording is the end, and follows `duration`
             factor = duration / last
-            scaled["through"] = tuple(_at(point, factor) for point in self.through)
+            scaled["through"] = _at_times(self.through, factor)
             scaled["to"] = self.to and _at(self.to, factor)
-        elif isinstance(self.through, Recorded) and self.through.times is not None:
-            end = self.duration or float(self.through.times[-1] - self.through.times[0])
-            scaled["through"] = replace(self.through, times=self.through.times * (duration / end))
         return self.model_copy(update=scaled)
 
     def waypoints(self, start: State) -> PointTable:
@@ -151,12 +148,15 @@ class ThroughPoints(Planner):
         Args:
             start: Where the move begins.
         """
-        recorded = self.through if isinstance(self.through, Recorded) else None
-        points = self._stacked(start, recorded.after(start.position) if recorded else None)
-        if recorded is not None:
-            dropped = len(recorded.positions) + len(self.listed) + 1 - points.count
-            return replace(points, events=_merged(dropped, recorded)) if dropped > 1 else points
-        return points if points.times is not None else _without_repeats(points)
+        recorded = self.through
+        if not isinstance(recorded, Recorded):
+            points = self._stacked(start, None)
+            return points if points.times is not None else _without_repeats(points)
+        here = start.position
+        kept = recorded.after(here, None if self.to is None else self.to.as_state().position)
+        points = self._stacked(start, kept)
+        dropped = len(recorded.positions) - int(recorded.begins_at(here)) - len(kept.positions)
+        return replace(points, events=_merged(dropped, recorded)) if dropped else points
 
     def _stacked(self, start: State, recorded: Recorded | None) -> PointTable:
         listed = self.listed
@@ -179,15 +179,18 @@ class ThroughPoints(Planner):
         listed = [point.time or self.duration or 0.0 for point in self.listed]
         times = None if recorded is None else recorded.times
         before: list[float] = [] if times is None else times.tolist()
-        if before and self.to is None and self.duration:
+        if before and before[-1] > 0 and self.to is None and self.duration:
             before = [time * (self.duration / before[-1]) for time in before]
         times = np.array([0.0, *before, *listed])
         late = np.flatnonzero(np.diff(times) <= 0)
+        if late.size and late[0] == 0 and before:
+            raise PlanningError(
+                f"the recording begins at t = {before[0]:.12g} s, but not where the arm then stands",
+                hint="go to its first point in a move before, or give a larger `merge` or a later `t`",
+            )
         if late.size:
-            after, before = times[late[0] + 1], times[late[0]]
-            message = f"a point at {after:.12g} s comes after one at {before:.12g} s of the move"
-            hint = "the times of a recording count from its first row only if the arm stands there"
-            raise PlanningError(message, hint=hint)
+            message = f"the target is reached after {times[-1]:.12g} s, the last recorded point after {times[-2]:.12g} s"
+            raise PlanningError(message, hint="give the target a later `time`")
         return times
 
 
@@ -196,12 +199,20 @@ def passage_through(points: PointTable, times: Array) -> Passage:
     return Passage(times, points.positions, np.zeros_like(points.positions))
 
 
+def _at_times(points: tuple[Waypoint, ...] | Recorded, factor: float) -> tuple[Waypoint, ...] | Recorded:
+    if isinstance(points, Recorded):
+        return points if points.times is None else replace(points, times=points.times * factor)
+    return tuple(_at(point, factor) for point in points)
+
+
 def _at(point: Waypoint, factor: float) -> Waypoint:
     return point if point.time is None else point.model_copy(update={"time": point.time * factor})
 
 
 def _merged(count: int, recorded: Recorded) -> tuple[Event, ...]:
-    text = f"{count} of {len(recorded.positions)} points of {recorded.file} repeat the one before: left out"
+    text = (
+        f"left out {count} of {len(recorded.positions)} points of {recorded.file}: too near to the one before"
+    )
     return (Event("merged", text),)
 
 
@@ -214,7 +225,8 @@ def _without_repeats(points: PointTable) -> PointTable:
     if not keep[-1]:  # the target stays, because it may say how fast
         keep[-1], keep[np.flatnonzero(keep[:-1])[-1]] = True, keep[:-1].sum() == 1
     keep[0] = True
-    text = f"{points.count - int(keep.sum())} waypoints repeat the one before: left out"
+    count = points.count - int(keep.sum())
+    text = f"left out {count} waypoint{'s' * (count != 1)} that repeat{'s' * (count == 1)} the one before"
     return replace(
         points,
         positions=points.positions[keep],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -139,7 +139,7 @@ class TimeOptimal(ThroughPoints):
             MissingLimitError: When a moving joint has no limit of acceleration.
             PlanningError: When the velocities at the ends do not fit the path, or the duration is too short.
         """
-        points = replace(self.waypoints(start), times=None)
+        points = self._untimed().waypoints(start)
         moving = np.ptp(points.positions, axis=0) > 0
         if not moving.any():
             return standstill(points.target, self.duration or 0.0)
@@ -166,6 +166,12 @@ class TimeOptimal(ThroughPoints):
             passage=Passage(passed * factor, points.positions, path.missed),
             events=(*points.events, *path.events, *_events(made)),
         )
+
+    def _untimed(self) -> Self:
+        """Return the move without the times of a recording: it is to be passed faster."""
+        if not isinstance(self.through, Recorded):
+            return self
+        return self.model_copy(update={"through": replace(self.through, times=None)})
 
     def _path(self, points: PointTable, robot: Robot) -> JointPath:
         if self.path == "polyline":
@@ -197,7 +203,7 @@ def _check_duration(wanted: float | None, fastest: float, points: PointTable) ->
         return
     if points.rates[0, [0, -1]].any():
         message = "time_optimal cannot last a given time when it starts or ends in motion"
-        raise PlanningError(message, hint="leave `duration` out, or use spline")
+        raise PlanningError(message, hint="leave `duration` and `align` out, or use spline")
     if wanted < fastest:
         message = "time_optimal needs {fastest}, it shall last {wanted}"
         amounts = {"fastest": Amount(fastest), "wanted": Amount(wanted)}
@@ -215,5 +221,6 @@ def _events(made: Solved) -> Iterator[Event]:
     if made.stops.size:
         times = ", ".join(f"{time:.6g}" for time in made.stop_times[:_MOST_STOPS].tolist())
         more = ", ..." if made.stops.size > _MOST_STOPS else ""
-        text = f"stops at {made.stops.size} corners, at t = {times}{more} s of the move"
+        count = made.stops.size
+        text = f"stops at {count} corner{'s' * (count != 1)}, at t = {times}{more} s of the move"
         yield Event("stops", f"{text}: give `corner` to round them")

@@ -63,15 +63,15 @@ def test_unlimited_velocity_and_resting_joints():
 
 
 @pytest.mark.parametrize(
-    "turn", [[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 0], [0, 0]], [[0, 0], [1, 0], [2, 1e-8]]]
+    "turn", [[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 0], [0, 0]], [[0, 0], [1, 0], [2 + 1e-8, 0]]]
 )
 def test_corners_and_reversals_stop(turn):
     path = polyline(turn)
     velocity, acceleration = symmetric(5, 5), symmetric(1, 1)
     found = time_optimal(path, velocity, acceleration)
-    assert found.trajectory.duration == pytest.approx(4.0, rel=1e-9)
+    assert found.trajectory.duration == pytest.approx(4.0, rel=1e-8)
     assert found.stops.tolist() == [1.0]
-    assert found.stop_times == pytest.approx([2.0], rel=1e-9)
+    assert found.stop_times == pytest.approx([2.0], rel=1e-8)
     assert np.abs(found.trajectory.evaluate(found.stop_times, 1)).max() <= 1e-12
     assert_motion(found, path, velocity, acceleration)
 

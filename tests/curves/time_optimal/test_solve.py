@@ -10,6 +10,7 @@ import yaml
 from scipy.optimize import linprog
 from topp_paths import random_bounds, spline, symmetric
 
+from trajcli.curves.hermite import hermite_pieces
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.time_optimal.constraints import Intervals, Rows, constrained, joint_demand
 from trajcli.curves.time_optimal.solve import UnreachableSpeedError, controllable, solve
@@ -77,6 +78,8 @@ def test_scans_solve_the_linear_programmes(seed, moving):
     rng = np.random.default_rng(seed)
     joints, count = int(rng.integers(1, 4)), 40
     path = spline(rng.uniform(-1, 1, (5, joints)))
+    if seed % 2:  # q'' jumps at the breaks
+        path = hermite_pieces(path.breaks, rng.uniform(-2, 2, (2, 5, joints)))
     velocity, acceleration = random_bounds(rng, joints)
     grid = np.union1d(np.linspace(0, 1, count), path.breaks)
     intervals = constrained(grid, [joint_demand(path, velocity, acceleration)], NOWHERE)
@@ -135,3 +138,25 @@ def test_rows_of_any_kind_join_in():
     joints = joint_demand(path, symmetric(10.0), symmetric(2.0))
     found = controllable(constrained(grid, [joints, braking], NOWHERE)).upper
     np.testing.assert_allclose(found, 2.0 * (1.0 - grid), atol=1e-14)
+
+
+def test_of_two_caps_at_a_place_the_lower_one_counts():
+    def capped(s, side):
+        nothing = np.empty((s.size, 0))
+        return Rows(nothing, nothing, nothing, np.where(s == 0.5, {"left": 0.2, "right": 0.3}[side], 9.0))
+
+    joints = joint_demand(spline(np.array([[0.0], [1.0]])), symmetric(9.0), symmetric(9.0))
+    assert constrained(np.array([0.0, 0.5, 1.0]), [joints, capped], NOWHERE).cap[1] == 0.2
+
+
+def test_a_joint_that_turns_next_to_a_place_does_no_harm():
+    """At s = 1e-13 the first joint has all but turned: what its row says of sdd there is rounding."""
+    path = PiecewisePolynomial([-1.0, 1.0], np.array([[0.5, 0.0], [-1.0, 1.0], [0.5, 0.0]])[:, None, :])
+    demand = joint_demand(path, symmetric(9.0, 9.0), symmetric(1.0, 9.0))
+    found = []
+    for turn in (0.0, 1e-13, -1e-11):
+        grid = np.linspace(-1, 1, 41)
+        grid[20] = turn
+        found.append(solve(constrained(grid, [demand], NOWHERE), 0.0, 0.0)[0])
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-8, atol=1e-10)
+    np.testing.assert_allclose(found[2], found[0], rtol=1e-6, atol=1e-8)

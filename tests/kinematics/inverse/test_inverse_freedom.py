@@ -82,7 +82,7 @@ def test_each_posture_is_answered_once_and_as_near_as_can_be(name, kind, axis, f
 
 
 @pytest.mark.parametrize(
-    ("name", "kind", "axis"), [row[:3] for row in CASES if row[4] == 8 and row[0][0] in "Uw"]
+    ("name", "kind", "axis"), [row[:3] for row in CASES if row[0] in ("UR", "wrist over elbow")]
 )
 def test_answers_have_the_names_of_their_whole_poses(name, kind, axis):
     robot, joints, target, _ = case(name, kind, axis, 3)
@@ -114,7 +114,7 @@ def test_no_other_roll_of_the_tool_is_nearer(name, axis):
         assert (np.isfinite(there) <= np.isfinite(ours)).all()
         assert ours.min() <= there.min() + 1e-9
         further += np.count_nonzero(ours > there + 0.05)
-    assert further <= 1  # a posture may have two parts, and a narrow one be missed
+    assert further <= 3  # of 32: a posture may have two parts, and a narrow one be missed
 
 
 def test_singular_is_told_from_free():

@@ -82,8 +82,8 @@ def controllable(intervals: Intervals, end_velocity: float = 0.0) -> Controllabl
         end_velocity: sd at the end, not negative; infinite for any.
     """
     P, R, C, cap = intervals.P, intervals.R, intervals.C, intervals.cap
-    last = _ceiling(R[-1:], P[-1:], C[-1:], cap[-1:], cap[-2:-1])
-    ceiling = np.append(_ceiling(P, R, C, cap[:-1], cap[1:]), last)
+    last = _ceiling(R[-1:], P[-1:], C[-1:], cap[-1:])
+    ceiling = np.append(_ceiling(P, R, C, cap[:-1]), last)
     limits = ceiling.copy()
     limits[-1] = min(limits[-1], end_velocity**2)
     slopes, offsets = _affine(-R, P, C, (P > 0) & (R < 0))
@@ -168,8 +168,8 @@ def _lowest_lines(first: Array, last: Array) -> NDArray[np.bool_]:
 
 def _lower(intervals: Intervals, lower: Array, upper: Array) -> Array:
     """Return the lower ends of the controllable sets; infinite before the place where there is none left."""
-    P, R, C, cap = intervals.P, intervals.R, intervals.C, intervals.cap
-    fastest = np.minimum(_ceiling(R, P, C, cap[1:], cap[:-1]), upper[1:])
+    P, R, C = intervals.P, intervals.R, intervals.C
+    fastest = np.minimum(_ceiling(R, P, C, intervals.cap[1:]), upper[1:])
     slopes, offsets = _affine(R, -P, -C, (P < 0) & (R > 0))
     offsets[np.isinf(offsets)] = -np.inf
     y = float(lower[-1])
@@ -184,16 +184,16 @@ def _lower(intervals: Intervals, lower: Array, upper: Array) -> Array:
     return lower
 
 
-def _ceiling(P: Array, R: Array, C: Array, cap: Array, other_cap: Array) -> Array:
-    """Return the largest x <= cap of each interval for which some y in [0, other_cap] obeys all rows.
+def _ceiling(P: Array, R: Array, C: Array, cap: Array) -> Array:
+    """Return the largest x <= cap of each interval for which some y >= 0 obeys all rows.
 
     The room for y, the smallest upper bound less the largest lower one, is concave in x and positive at zero,
     so Newton's steps from the right end at the crossing of the two rows that decide, after a few of them.
     """
-    ones, zeros = np.ones((len(P), 1)), np.zeros((len(P), 1))
-    P = np.concatenate([P, zeros, zeros], axis=1)
-    R = np.concatenate([R, -ones, ones], axis=1)
-    C = np.concatenate([C, zeros, other_cap[:, None]], axis=1)
+    nothing = np.zeros((len(P), 1))
+    P = np.concatenate([P, nothing], axis=1)
+    R = np.concatenate([R, nothing - 1.0], axis=1)
+    C = np.concatenate([C, nothing], axis=1)
     alone = (R == 0) & (P > 0)
     x = np.minimum(np.minimum(cap, _HUGE), np.where(alone, C / np.where(alone, P, 1.0), np.inf).min(axis=1))
     live = np.arange(x.size)

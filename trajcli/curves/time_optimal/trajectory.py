@@ -32,7 +32,7 @@ _SWITCHING = (
 _OVER = 1e-4  # by which a limit may be passed between places before tightening sets it right
 _ROUNDS = 8  # of refinement
 _TRIES = 4  # of halving the grid before a speed at an end is called too high
-_TIGHTENINGS, _MOST_TIGHTENINGS = 3, 40  # where the rest is stretched away, and where it must not be
+_TIGHTENINGS, _MOST_TIGHTENINGS = 6, 40  # where the rest is stretched away, and where it must not be
 _EXACT = 1e-10  # a limit passed by less is kept
 
 

@@ -1,0 +1,102 @@
+"""The way of the tool, and what it demands of the joints at every place and at every time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trajcli.curves.invert import times_at
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side
+from trajcli.geometry.pose_curve import PosePath
+from trajcli.geometry.rotation import AXES, Axis
+from trajcli.kinematics.following.demand import Demand
+from trajcli.kinematics.inverse.target import Fixed
+
+_AT_BREAK = 1e-8  # of the length: a place this near to a break is at it
+_ONE_TIME = 1e-9  # of the duration: breaks this close to each other are one
+
+
+@dataclass(frozen=True, eq=False)
+class ToolPath:
+    """Poses along a path, and which of their coordinates count.
+
+    Attributes:
+        poses: X(s).
+        position: Which of x, y and z in world are fixed.
+        orientation: What is fixed of the orientation.
+        tool_axis: Which axis of the tcp is meant by direction, yaw and pitch.
+        turn: Change of yaw or pitch over the whole path, rad.
+    """
+
+    poses: PosePath
+    position: tuple[bool, bool, bool]
+    orientation: Fixed
+    tool_axis: Axis = "z"
+    turn: float = 0.0
+
+    @property
+    def length(self) -> float:
+        """How far s goes, m, or rad where the place rests."""
+        return self.poses.length
+
+    @property
+    def breaks(self) -> Array:
+        """Places where a second derivative may jump, the ends included."""
+        return np.concatenate([[0.0], self.poses.breaks, [self.length]])
+
+    def by_place(self, places: Array, side: Side) -> Demand:
+        """Return the demand at places (N,), derivatives by s."""
+        places = self._onto_breaks(np.asarray(places))
+        return self._demand(places, side, np.ones(places.size), np.zeros(places.size))
+
+    def by_time(self, law: PiecewisePolynomial, times: Array, side: Side) -> Demand:
+        """Return the demand at times (N,) of a law s(t), derivatives by t."""
+        rates = law.evaluate_orders(np.asarray(times), (0, 1, 2), side=side)[:, :, 0]
+        return self._demand(self._onto_breaks(rates[:, 0]), side, rates[:, 1], rates[:, 2])
+
+    def break_times(self, law: PiecewisePolynomial, breaks: Array) -> Array:
+        """Return the times at which a derivative may jump: those of the law, and those of the path.
+
+        Args:
+            law: s(t).
+            breaks: Its own, the ends included, increasing.
+        """
+        inner = self.poses.breaks
+        if not inner.size:
+            return breaks
+        times = times_at(law, inner)
+        apart = np.abs(times[:, None] - breaks).min(axis=1) > _ONE_TIME * law.duration
+        return np.unique(np.concatenate([breaks, times[apart]]))
+
+    def _onto_breaks(self, places: Array) -> Array:
+        places = np.clip(places, 0.0, self.length)
+        inner = self.poses.breaks
+        if not inner.size:
+            return places
+        nearest = inner[np.abs(places[:, None] - inner).argmin(axis=1)]
+        return np.where(np.abs(places - nearest) <= _AT_BREAK * self.length, nearest, places)
+
+    def _demand(self, places: Array, side: Side, speed: Array, acceleration: Array) -> Demand:
+        poses, first, second = self.poses.evaluate(places, side)
+        rate, change = speed[:, None], acceleration[:, None]
+        return Demand(
+            poses,
+            first * rate,
+            second * rate**2 + first * change,
+            self.position,
+            self.orientation,
+            self.tool_axis,
+            self._aims(places, speed, acceleration),
+        )
+
+    def _aims(self, places: Array, speed: Array, acceleration: Array) -> Array:
+        if self.orientation not in ("yaw", "pitch"):
+            return np.zeros((places.size, 0))
+        axis = self.poses.evaluate(np.zeros(1))[0][0, :3, AXES.index(self.tool_axis)]
+        if self.orientation == "yaw":
+            begins = np.arctan2(axis[1], axis[0])
+        else:
+            begins = np.arctan2(axis[2], np.hypot(axis[0], axis[1]))
+        slope = self.turn / self.length
+        return np.stack([begins + slope * places, slope * speed, slope * acceleration], axis=1)

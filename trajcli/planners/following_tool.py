@@ -1,0 +1,127 @@
+"""From the motion of the tool to the joints' curve."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from trajcli.curves.fit import FitError, fit
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.kinematics.following.follower import Follower, LostError, follower
+from trajcli.kinematics.following.motion import ToolMotion
+from trajcli.kinematics.following.tolerance import Tolerance, misfit_of, probes
+from trajcli.kinematics.following.tool_path import ToolPath
+from trajcli.kinematics.following.track import StuckError, track
+from trajcli.kinematics.robot import Robot
+from trajcli.planners.planner import Event, Phase
+from trajcli.planners.tool_trouble import Trouble
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """A motion of tool and joints.
+
+    Attributes:
+        curve: q(t).
+        motion: What the tool was told.
+        phases: Named stretches of time.
+        events: What was conceded.
+    """
+
+    curve: PiecewisePolynomial
+    motion: ToolMotion
+    phases: tuple[Phase, ...] = ()
+    events: tuple[Event, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """Joints along a path, as a function of its parameter.
+
+    Attributes:
+        robot: The arm.
+        path: Of the tool.
+        follower: Gives the exact joints at a place.
+        coarse: Joints near the exact ones, a curve over s.
+    """
+
+    robot: Robot
+    path: ToolPath
+    follower: Follower
+    coarse: PiecewisePolynomial
+
+    def by_place(self, tolerance: Tolerance) -> PiecewisePolynomial:
+        """Return q(s) within a tolerance.
+
+        Raises:
+            PlanningError: When no 4096 pieces are enough: names the singularity.
+        """
+        trouble = Trouble(self.robot, self.path.by_place, self.path.length, None, self.path.poses.in_place)
+        return _fitted(self.follower, self.path.breaks, self.coarse.evaluate, tolerance, trouble)
+
+    def by_time(self, motion: ToolMotion) -> PiecewisePolynomial:
+        """Return q(t) within the motion's tolerance.
+
+        Raises:
+            PlanningError: As `by_place`.
+        """
+        timed = replace(self.follower, demands=motion.timed)
+
+        def guess(times: Array) -> Array:
+            places = motion.law.evaluate(times)[:, 0]
+            return self.coarse.evaluate(places.clip(self.coarse.start, self.coarse.end))
+
+        return _fitted(timed, motion.breaks, guess, motion.tolerance, trouble_of(self.robot, motion))
+
+
+def trouble_of(robot: Robot, motion: ToolMotion) -> Trouble:
+    """Return who explains what goes wrong on a motion."""
+    return Trouble(robot, motion.timed, motion.law.end, motion.law, motion.in_place)
+
+
+def followed(robot: Robot, path: ToolPath, start: Array) -> Followed:
+    """Return the joints along a path from the joint values `start` (n,).
+
+    Raises:
+        PlanningError: Where the arm cannot follow, and why.
+    """
+    exact = follower(robot, path.by_place, start, 0.0)
+    try:
+        return Followed(robot, path, exact, track(exact, path.breaks))
+    except StuckError as error:
+        trouble = Trouble(robot, path.by_place, path.length, None, path.poses.in_place)
+        raise trouble.stuck(error) from None
+
+
+def followed_in_time(robot: Robot, motion: ToolMotion, start: Array) -> PiecewisePolynomial:
+    """Return q(t) of a motion that is known by its time alone.
+
+    Raises:
+        PlanningError: Where the arm cannot follow, and why.
+    """
+    middle = np.array([0.5 * motion.law.end])
+    held = follower(robot, lambda _, side: motion.timed(middle, side), start, 0.0).held
+    exact = Follower(robot, motion.timed, start, held)
+    trouble = trouble_of(robot, motion)
+    try:
+        coarse = track(exact, motion.breaks)
+    except StuckError as error:
+        raise trouble.stuck(error) from None
+    return _fitted(exact, motion.breaks, coarse.evaluate, motion.tolerance, trouble)
+
+
+def _fitted(
+    exact: Follower,
+    breaks: Array,
+    guess: Callable[[Array], Array],
+    tolerance: Tolerance,
+    trouble: Trouble,
+) -> PiecewisePolynomial:
+    try:
+        misfit = misfit_of(exact, tolerance, breaks, guess(probes(breaks)))
+        return fit(exact.exact, misfit, breaks, guess)
+    except (LostError, FitError) as error:
+        at = float(error.places[0]) if isinstance(error, LostError) else error.place
+        raise trouble.unfit(at, guess) from None

@@ -1,0 +1,148 @@
+"""Laws s(t) over a stretch of a path, from rest to rest."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from trajcli.curves.compose import scale_time
+from trajcli.curves.cycloid import cycloid_law
+from trajcli.curves.hermite import hermite_coefficients
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.trapezoid import (
+    InfeasibleProfileError,
+    fastest_profile,
+    profile_of_duration,
+    profile_of_speed,
+)
+from trajcli.curves.velocity_profile import Rates
+from trajcli.errors import Amount, PlanningError, Problem
+from trajcli.planners.path_law import LawSpec
+from trajcli.planners.planner import Phase
+
+_PEAKS = {"cubic": (1.5, 6.0, 12.0), "quintic": (1.875, 10 / math.sqrt(3), 60.0)}
+_PEAKS["cycloidal"] = (2.0, 2 * math.pi, 4 * math.pi**2)
+"""Largest speed, acceleration and jerk of a law over 1 in the time 1."""
+_CONDITIONS = {"cubic": 2, "quintic": 3}
+
+
+@dataclass(frozen=True)
+class PathBounds:
+    """What the parameter of a path may do, per s, s^2, s^3; infinite for anything.
+
+    Attributes:
+        speed: Largest sd.
+        acceleration: Largest sdd.
+        deceleration: Largest -sdd.
+        jerk: Largest magnitude of sddd.
+    """
+
+    speed: float
+    acceleration: float
+    deceleration: float
+    jerk: float
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """The law over a stretch.
+
+    Attributes:
+        law: s(t) from 0, of dimension 1, starting at s = 0.
+        breaks: Where a derivative of it jumps, s, ends included; pieces that only make up a smooth function
+            have none.
+        phases: Named stretches of time.
+    """
+
+    law: PiecewisePolynomial
+    breaks: Array
+    phases: tuple[Phase, ...] = ()
+
+    def scaled(self, factor: float) -> Stretch:
+        """Return the law that takes `factor` times as long."""
+        phases = tuple(Phase(p.name, p.start * factor, p.end * factor) for p in self.phases)
+        return Stretch(scale_time(self.law, factor), self.breaks * factor, phases)
+
+
+def stretch_of(spec: LawSpec, length: float, bounds: PathBounds, duration: float | None) -> Stretch:
+    """Return the law over `length`, in the given duration or as fast as the bounds let it.
+
+    Args:
+        spec: Says which shape; time_optimal is not among those made here.
+        length: Of the stretch, m or rad, above zero.
+        bounds: At least those that the shape needs are finite.
+        duration: s; None for the fastest.
+
+    Raises:
+        PlanningError: When no such law exists; names the interval of what does.
+    """
+    if spec.shape == "trapezoid":
+        return _trapezoid(spec, length, bounds, duration)
+    if spec.shape == "jerk_limited":
+        return _jerk_limited(length, bounds)
+    time = duration if duration is not None else _fastest(spec.shape, length, bounds)
+    if spec.shape == "cycloidal":
+        law = cycloid_law(time)
+        scaled = PiecewisePolynomial(law.breaks, law.coefficients * length)
+        return Stretch(scaled, np.array([0.0, time]))
+    start = np.zeros((_CONDITIONS[spec.shape], 1))
+    end = start.copy()
+    end[0] = length
+    coefficients = hermite_coefficients(start, end, np.array(time))[:, None, :]
+    law = PiecewisePolynomial(np.array([0.0, time]), coefficients)
+    return Stretch(law, law.breaks)
+
+
+def _fastest(shape: str, length: float, bounds: PathBounds) -> float:
+    limits = (bounds.speed, min(bounds.acceleration, bounds.deceleration), bounds.jerk)
+    pairs = zip(_PEAKS[shape], limits, strict=True)
+    times = [(peak * length / limit) ** (1 / order) for order, (peak, limit) in enumerate(pairs, 1)]
+    return float(max(times))
+
+
+def _jerk_limited(length: float, bounds: PathBounds) -> Stretch:
+    from trajcli.planners.profile import Task
+    from trajcli.planners.ruckig_solve import fastest
+
+    limits = [bounds.speed, min(bounds.acceleration, bounds.deceleration), bounds.jerk]
+    both = np.array(limits)[:, None] * [-1.0, 1.0]
+    profile = fastest(Task("the path", (0.0, 0.0, 0.0), (length, 0.0, 0.0), both))
+    law = profile.curve()
+    return Stretch(law, law.breaks, tuple(profile.phases(None)))
+
+
+def _trapezoid(spec: LawSpec, length: float, bounds: PathBounds, duration: float | None) -> Stretch:
+    rates = Rates(bounds.speed, bounds.acceleration, bounds.deceleration)
+    try:
+        if duration is None:
+            profile = fastest_profile(length, 0.0, 0.0, rates, rates)
+        elif spec.speed is not None or spec.angular_speed is not None:
+            slower = bounds.deceleration if spec.deceleration is not None else None
+            profile = profile_of_speed(length, 0.0, 0.0, duration, bounds.speed, slower)
+        else:
+            profile = profile_of_duration(length, 0.0, 0.0, duration, rates, rates)
+    except InfeasibleProfileError as error:
+        raise _infeasible(error, length, bounds, duration or 0.0) from None
+    phases = tuple(Phase(*phase) for phase in profile.phases())
+    law = profile.curve(0.0, length, duration)
+    return Stretch(law, law.breaks, phases)
+
+
+def _infeasible(
+    error: InfeasibleProfileError, length: float, bounds: PathBounds, duration: float
+) -> PlanningError:
+    order = {"speed": 1, "acceleration": 2}.get(error.reason)
+    amounts = {"length": Amount(length, 0, None, "length"), "duration": Amount(duration)}
+    if order is None:
+        message = "no trapezoid covers {length} in {duration}"
+        return PlanningError(Problem(message, "allow more time, or faster ramps", amounts=amounts))
+    given = bounds.speed if order == 1 else bounds.acceleration
+    amounts["given"] = Amount(given, order, None, "length")
+    amounts["low"] = Amount(error.low, order, None, "length")
+    amounts["high"] = Amount(error.high, order, None, "length")
+    allowed = "above {low} and at most {high}" if math.isfinite(error.high) else "at least {low}"
+    message = f"a trapezoid over {{length}} in {{duration}} cannot have {{given}}: it must be {allowed}"
+    hint = f"change the {error.reason}, or the duration"
+    return PlanningError(Problem(message, hint, amounts=amounts))

@@ -1,0 +1,175 @@
+"""The law of a whole path: bounds of its parameter from the limits of the tool, a stop at every corner."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
+from trajcli.errors import MissingLimitError, Problem
+from trajcli.kinematics.following.tool_path import ToolPath
+from trajcli.kinematics.robot import ToolLimits
+from trajcli.planners.law_shapes import PathBounds, Stretch, stretch_of
+from trajcli.planners.path_law import LawSpec
+from trajcli.planners.planner import Phase
+
+_SAMPLES = 257  # places at which the largest rates of the orientation are looked for
+_ALONG, _ACROSS = 0.6, 0.8  # of an acceleration, where the path is bent: 0.6^2 + 0.8^2 = 1
+
+
+@dataclass(frozen=True)
+class Rates:
+    """The largest derivatives of a path by its parameter.
+
+    Attributes:
+        way: Of the place: 1, or 0 where it rests.
+        bend: Curvature of the place, 1/m.
+        turn: Of the orientation, rad per unit.
+        twist: Second derivative of the orientation, rad per unit squared.
+    """
+
+    way: float
+    bend: float
+    turn: float
+    twist: float
+
+
+@dataclass(frozen=True, eq=False)
+class ToolLaw:
+    """s(t) over the whole path.
+
+    Attributes:
+        law: From t = 0, s from 0 to the length.
+        breaks: Where a derivative of it jumps, s, ends included.
+        phases: Named stretches of time.
+        ruled_by: "translation" or "rotation", whichever is slower; None where a duration rules.
+    """
+
+    law: PiecewisePolynomial
+    breaks: Array
+    phases: tuple[Phase, ...]
+    ruled_by: str | None
+
+
+def rates_of(path: ToolPath) -> Rates:
+    """Return the largest derivatives of a path, by sampling between its breaks."""
+    places = np.unique(np.concatenate([np.linspace(0.0, path.length, _SAMPLES), path.breaks]))
+    sides = [path.poses.evaluate(places, side) for side in ("left", "right")]
+    first, second = (np.stack([side[k] for side in sides]) for k in (1, 2))
+
+    def largest(rows: Array) -> float:
+        return float(np.linalg.norm(rows, axis=-1).max())
+
+    way = 0.0 if path.poses.in_place else 1.0
+    return Rates(way, largest(second[..., :3]), largest(first[..., 3:]), largest(second[..., 3:]))
+
+
+def bounds_of(spec: LawSpec, limits: ToolLimits, rates: Rates) -> tuple[PathBounds, str]:
+    """Return what the parameter may do, and whether translation or rotation says so.
+
+    An acceleration that a law names is along the path; one that comes from the limits is of the tool, which a
+    bent path also accelerates across: there 0.6 of it goes along and 0.8 across.
+    """
+    along, across = (1.0, math.inf) if rates.bend * rates.way == 0 else (_ALONG, _ACROSS)
+    speed = _or(spec.speed, limits.speed)
+    if spec.acceleration is None and rates.bend > 0 and rates.way:
+        speed = min(speed, math.sqrt(across * limits.acceleration / rates.bend))
+    acceleration = _or(spec.acceleration, along * limits.acceleration)
+    slowing = _or(spec.deceleration, _or(spec.acceleration, along * limits.acceleration))
+    place = PathBounds(speed, acceleration, slowing, _or(spec.jerk, limits.jerk))
+    angular = _rotation_bounds(spec, limits, rates)
+    if not rates.way:
+        return angular, "rotation"
+    both = PathBounds(*(min(pair) for pair in zip(_values(place), _values(angular), strict=True)))
+    return both, "rotation" if angular.speed < place.speed else "translation"
+
+
+def _rotation_bounds(spec: LawSpec, limits: ToolLimits, rates: Rates) -> PathBounds:
+    """Return what the rotation lets the parameter do."""
+    if rates.turn == 0:
+        return PathBounds(math.inf, math.inf, math.inf, math.inf)
+    speed = _or(spec.angular_speed, limits.angular_speed) / rates.turn
+    acceleration = _or(spec.angular_acceleration, limits.angular_acceleration)
+    if rates.twist > 0 and math.isfinite(acceleration):
+        speed = min(speed, math.sqrt(_ACROSS * acceleration / rates.twist))
+        acceleration *= _ALONG / 3  # w'' need not be perpendicular to w': sizes add up
+    return PathBounds(speed, acceleration / rates.turn, acceleration / rates.turn, math.inf)
+
+
+def _values(bounds: PathBounds) -> tuple[float, float, float, float]:
+    return bounds.speed, bounds.acceleration, bounds.deceleration, bounds.jerk
+
+
+def _or(value: float | None, other: float) -> float:
+    return other if value is None else value
+
+
+def law_over(path: ToolPath, spec: LawSpec, limits: ToolLimits, planner: str) -> ToolLaw:
+    """Return the law of a shape over the whole path, at rest at every place where the path must stop.
+
+    A duration is shared by the stretches between stops as their lengths are.
+
+    Raises:
+        MissingLimitError: When neither the law nor the limits say how fast.
+        PlanningError: When no such law exists.
+    """
+    rates = rates_of(path)
+    bounds, ruled_by = bounds_of(spec, limits, rates)
+    if spec.duration is None or spec.shape == "jerk_limited":
+        _require(spec, bounds, rates, planner)
+    elif spec.shape == "trapezoid" and spec.speed is None and spec.angular_speed is None:
+        bounds = replace(bounds, speed=math.inf)
+        _require_ramps(spec, bounds, rates, planner)
+    stops = np.concatenate([[0.0], path.poses.stops, [path.length]])
+    stretches = []
+    for low, high in pairwise(stops.tolist()):
+        length = high - low
+        share = None if spec.duration is None else spec.duration * length / path.length
+        stretches.append(stretch_of(spec, length, bounds, share))
+    total = sum(stretch.law.duration for stretch in stretches)
+    if spec.minimum_duration is not None and total < spec.minimum_duration:
+        stretches = [stretch.scaled(spec.minimum_duration / total) for stretch in stretches]
+    return _joined(stretches, stops, None if spec.duration else ruled_by)
+
+
+def _joined(stretches: list[Stretch], stops: Array, ruled_by: str | None) -> ToolLaw:
+    laws, breaks, phases, begins = [], [np.zeros(1)], [], 0.0
+    for stretch, place in zip(stretches, stops[:-1], strict=True):
+        coefficients = stretch.law.coefficients.copy()
+        coefficients[-1] += place
+        laws.append(PiecewisePolynomial(stretch.law.breaks, coefficients))
+        breaks.append(stretch.breaks[1:] + begins)
+        phases += [Phase(p.name, p.start + begins, p.end + begins) for p in stretch.phases]
+        begins += stretch.law.duration
+    return ToolLaw(concatenate(laws), np.concatenate(breaks), tuple(phases), ruled_by)
+
+
+def _require(spec: LawSpec, bounds: PathBounds, rates: Rates, planner: str) -> None:
+    ramps = math.isfinite(min(bounds.acceleration, bounds.deceleration))
+    needs = {
+        "speed": math.isfinite(bounds.speed) or spec.shape not in ("jerk_limited",),
+        "acceleration": ramps or spec.shape not in ("trapezoid", "jerk_limited"),
+        "jerk": math.isfinite(bounds.jerk) or spec.shape != "jerk_limited",
+    }
+    lacking = next((name for name, there in needs.items() if not there), None)
+    if lacking is None and all(map(math.isinf, _values(bounds))):
+        lacking = "speed"
+    if lacking is not None:
+        raise _missing(lacking, rates, planner, spec.shape)
+
+
+def _require_ramps(spec: LawSpec, bounds: PathBounds, rates: Rates, planner: str) -> None:
+    if math.isinf(min(bounds.acceleration, bounds.deceleration)):
+        raise _missing("speed", rates, planner, spec.shape)
+
+
+def _missing(name: str, rates: Rates, planner: str, shape: str) -> MissingLimitError:
+    key = name if rates.way or name == "jerk" else f"angular_{name}"
+    message = f"{planner} with a {shape} law needs the {key.replace('_', ' ')} of the tool"
+    hint = f"add `limits: {{tcp: {{{key}: ...}}}}` to the job, or `{key}` or a `duration` to the `law`"
+    if shape == "jerk_limited":
+        hint = f"add `limits: {{tcp: {{{key}: ...}}}}` to the job, or `{key}` to the `law`"
+    return MissingLimitError(Problem(message, hint))

@@ -1,0 +1,71 @@
+"""What a target on a path of the tool fixes, seen from where the tool starts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trajcli.curves.piecewise import Array
+from trajcli.geometry.rotation import Axis
+from trajcli.kinematics.forward import forward
+from trajcli.kinematics.inverse.target import Fixed, meeting, partial_target, residuals
+from trajcli.kinematics.robot import Robot
+from trajcli.planners.fields import Target
+from trajcli.planners.goal import goal_of
+
+_WHOLE = (True, True, True)
+_ALL_SIX = 6
+
+
+@dataclass(frozen=True, eq=False)
+class ToolTarget:
+    """A pose to go to, and what of it is fixed on the way there.
+
+    Attributes:
+        pose: T_world_tcp, shape (4, 4): what the target leaves free is as it was before.
+        position: Which of x, y and z are fixed.
+        orientation: What is fixed of the orientation.
+        tool_axis: Which axis of the tcp is meant by direction, yaw and pitch.
+        turn: Change of yaw or pitch on the way, rad; zero for other kinds.
+        joints: Joint values (n,) that the target imposes; None where it is a pose.
+        typed: The three angles (3,) that give the target, their sequence and frame; None if others do.
+    """
+
+    pose: Array
+    position: tuple[bool, bool, bool]
+    orientation: Fixed
+    tool_axis: Axis = "z"
+    turn: float = 0.0
+    joints: Array | None = None
+    typed: tuple[Array, str, str] | None = None
+
+
+def tool_target(target: Target, before: Array, robot: Robot) -> ToolTarget:
+    """Return what a target means for a tool that comes from the pose `before` (4, 4).
+
+    A target without orientation leaves it free on an arm with fewer than six joints, and keeps it on others;
+    one without a position keeps that.
+    """
+    if target.joints is not None:
+        joints = np.array(target.joints)
+        return ToolTarget(forward(robot, joints), _WHOLE, "all", joints=joints)
+    goal = goal_of(target)
+    position = goal.poses[:3, 3] if target.gives_position else before[:3, 3]
+    if goal.orientation == "none":
+        pose = before.copy()
+        pose[:3, 3] = position
+        return ToolTarget(pose, _WHOLE, "all" if len(robot.joints) >= _ALL_SIX else "none")
+    aims = None if goal.orientation == "all" else goal.aims
+    kind = {"all": "rotation", "direction": "direction"}.get(goal.orientation, goal.orientation)
+    given = goal.poses[:3, :3] if aims is None else aims if kind == "direction" else aims[0]
+    whole = partial_target(position, **{kind: given}, tool_axis=goal.tool_axis).flat()  # type: ignore[arg-type]
+    pose = meeting(whole, before[None])[0]
+    turn = float(residuals(whole, before[None])[0, 3]) if kind in ("yaw", "pitch") else 0.0
+    return ToolTarget(pose, _WHOLE, goal.orientation, goal.tool_axis, turn, typed=_typed(target))
+
+
+def _typed(target: Target) -> tuple[Array, str, str] | None:
+    if target.euler is not None:
+        return np.array(target.euler.angles), target.euler.sequence, target.euler.frame
+    return None if target.rpy is None else (np.array(target.rpy), "XYZ", "fixed")

@@ -1,0 +1,129 @@
+"""The fastest law along a path of the tool that joints and tool allow."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from trajcli.curves.compose import scale_time
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side
+from trajcli.curves.time_optimal.constraints import Demand as PathDemand
+from trajcli.curves.time_optimal.constraints import Rows
+from trajcli.curves.time_optimal.structure import structure
+from trajcli.curves.time_optimal.trajectory import time_optimal
+from trajcli.kinematics.following.motion import motion_along
+from trajcli.kinematics.following.tolerance import Tolerance
+from trajcli.kinematics.following.tool_path import ToolPath
+from trajcli.kinematics.robot import Robot, ToolLimits
+from trajcli.planners.following_tool import Followed, Made
+from trajcli.planners.path_law import LawSpec
+from trajcli.planners.planner import Event, Phase
+from trajcli.planners.point_to_point import missing_limit
+
+_FINER = 0.1  # of the tolerance, for q(s): what the law multiplies it with must still be within
+_CORNERS = 16  # of the polygon inside the circle of accelerations
+_STRETCHED = 1e-9
+
+
+def fastest_along(joints: Followed, spec: LawSpec, tolerance: Tolerance, planner: str) -> Made:
+    """Return the fastest motion along a path within the limits of joints and tool.
+
+    Args:
+        joints: Along the path.
+        spec: What it names replaces the limits of the tool.
+        tolerance: How near the joints' curve must be.
+        planner: Tag for messages.
+
+    Raises:
+        MissingLimitError: When a moving joint has no limit of acceleration.
+        PlanningError: When the joints cannot follow.
+    """
+    robot, path = joints.robot, joints.path
+    curve = joints.by_place(Tolerance(tolerance.position * _FINER, tolerance.angle * _FINER))
+    _require_acceleration(curve, robot, planner)
+    tcp = _limits(spec, robot.limits.tcp)
+    solved = time_optimal(
+        curve, robot.limits.velocity, robot.limits.acceleration, further=[tool_demand(path, tcp)]
+    )
+    least = spec.minimum_duration or 0.0
+    factor = max(1.0, least / solved.trajectory.duration)
+    law, trajectory = (
+        scale_time(each, factor) if factor > 1 else each for each in (solved.law, solved.trajectory)
+    )
+    motion = motion_along(path, law, law.breaks, tolerance, None)
+    binding = structure(solved.trajectory, robot.limits.velocity, robot.limits.acceleration)
+    phases = [
+        Phase(f"{b.quantity} {'+' if b.sign > 0 else '-'}", b.start * factor, b.end * factor, b.joint)
+        for b in binding
+    ]
+    text = f"the grid was refined {solved.refinements} times, to {solved.grid.size} places"
+    events = [Event("refined", text)]
+    if solved.stretch > 1 + _STRETCHED:
+        text = f"stretched {solved.stretch:.9g} times to keep all limits between the places"
+        events.append(Event("stretched", text))
+    return Made(trajectory, motion, tuple(phases), tuple(events if solved.refinements else events[1:]))
+
+
+def _limits(spec: LawSpec, limits: ToolLimits) -> ToolLimits:
+    given = spec.model_dump(include={"speed", "acceleration", "angular_speed", "angular_acceleration"})
+    return ToolLimits(**{**vars(limits), **{name: v for name, v in given.items() if v is not None}})
+
+
+def _require_acceleration(curve: PiecewisePolynomial, robot: Robot, planner: str) -> None:
+    moving = np.abs(curve.piece_ends(1)).max(axis=(0, 1)) > 0
+    lacking = np.flatnonzero(moving & ~np.isfinite(robot.limits.acceleration).all(axis=1))
+    if lacking.size:
+        why = "for the fastest law"
+        raise missing_limit(planner, "acceleration", lacking.tolist(), robot, why, "use another law `shape`")
+
+
+def tool_demand(path: ToolPath, limits: ToolLimits) -> PathDemand:
+    """Return what the limits of the tool demand of sd and sdd along a path.
+
+    An acceleration is the sum of one along the path and one across it: the circle of those that are allowed
+    is replaced by a polygon inside it, at most 2 % smaller. Across its axis a rotation gets 0.8, along 0.6.
+    """
+
+    def rows(places: Array, side: Side) -> Rows:
+        _, first, second = path.poses.evaluate(np.clip(places, 0.0, path.length), side)
+        way, turn = (np.linalg.norm(first[:, part], axis=1) for part in (slice(0, 3), slice(3, 6)))
+        bend = np.linalg.norm(second[:, :3], axis=1)
+        a, b, c = _translation_rows(way, bend, limits.acceleration)
+        more = _rotation_rows(first[:, 3:], second[:, 3:], turn, limits.angular_acceleration)
+        with np.errstate(divide="ignore"):
+            speed = np.minimum(limits.speed / way, limits.angular_speed / turn)
+        cap = np.minimum(speed**2, more[3])
+        joined = [np.concatenate(pair, axis=1) for pair in zip((a, b, c), more[:3], strict=True)]
+        return Rows(joined[0], joined[1], joined[2], cap)
+
+    return rows
+
+
+def _translation_rows(way: Array, bend: Array, limit: float) -> tuple[Array, Array, Array]:
+    count = way.size
+    if not bend.any():
+        ones = np.ones((count, 1)) * way[:, None]
+        return np.hstack([ones, -ones]), np.zeros((count, 2)), np.full((count, 2), limit)
+    angles = np.pi * (np.arange(_CORNERS // 2) + 0.5) / (_CORNERS // 2)
+    apothem = limit * math.cos(math.pi / _CORNERS)
+    return (
+        way[:, None] * np.cos(angles),
+        bend[:, None] * np.sin(angles),
+        np.full((count, angles.size), apothem),
+    )
+
+
+def _rotation_rows(
+    rate: Array, change: Array, turn: Array, limit: float
+) -> tuple[Array, Array, Array, Array]:
+    """Return rows (N, 2) and caps (N,) of the angular acceleration."""
+    axis = rate / np.where(turn > 0, turn, 1.0)[:, None]
+    along = (change * axis).sum(axis=1)
+    across = np.linalg.norm(change - axis * along[:, None], axis=1)
+    bent = bool(across.any())
+    a = np.stack([turn, -turn], axis=1)
+    b = np.stack([along, -along], axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        cap = np.where(across > 0, 0.8 * limit / across, np.inf)
+    return a, b, np.full((turn.size, 2), (0.6 if bent else 1.0) * limit), cap

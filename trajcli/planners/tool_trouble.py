@@ -1,0 +1,131 @@
+"""Why an arm cannot follow its tool: out of reach, outside its limits, or through a singularity."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajcli.curves.extrema import peaks
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.errors import Amount, PlanningError, Problem
+from trajcli.kinematics.dexterity import characteristic_length
+from trajcli.kinematics.following.follower import Demands
+from trajcli.kinematics.following.track import StuckError
+from trajcli.kinematics.forward import forward
+from trajcli.kinematics.inverse.solve import solve
+from trajcli.kinematics.inverse.target import residual_jacobian
+from trajcli.kinematics.jacobian import jacobian
+from trajcli.kinematics.robot import Robot
+
+_BISECTIONS = 40
+_LOOKS = 33  # places beyond the trouble at which the arm's reach is asked for
+_SLOPE = 1e-5  # of the whole: step of the difference that says how fast a joint would have to go
+
+
+@dataclass(frozen=True, eq=False)
+class Trouble:
+    """Explains what goes wrong along a path, or over the time of a motion.
+
+    Attributes:
+        robot: The arm.
+        demands: The tool, by place or by time.
+        end: Last place, or time.
+        law: From time to place; None where the tool is known by place.
+        in_place: Whether places are angles.
+    """
+
+    robot: Robot
+    demands: Demands
+    end: float
+    law: PiecewisePolynomial | None
+    in_place: bool
+
+    def stuck(self, error: StuckError) -> PlanningError:
+        """Return the error of an arm that could not be followed beyond a place."""
+        return self._unreachable(error.place) or self._singular(error.place, error.joints, error.rates)
+
+    def unfit(self, at: float, guess: Callable[[Array], Array]) -> PlanningError:
+        """Return the error of joints that no curve of the allowed pieces follows around a place."""
+        step = _SLOPE * self.end
+        around = np.clip(np.array([at - step, at, at + step]), 0.0, self.end)
+        before, here, after = guess(around)
+        return self._unreachable(at) or self._singular(at, here, (after - before) / (around[2] - around[0]))
+
+    def refuse_limits(self, curve: PiecewisePolynomial, room: float) -> None:
+        """Refuse a curve that leaves the range of a joint: the branch is fixed, and going slower is no help.
+
+        Raises:
+            PlanningError: Names the joint that is furthest beyond, where, and by how much.
+        """
+        (found,) = peaks(curve, (0,))
+        low, high = self.robot.limits.position.T
+        beyond = np.maximum(low - found.low, found.high - high)
+        if not (beyond > room).any():
+            return
+        joint = int(beyond.argmax())
+        below = low[joint] - found.low[joint] > found.high[joint] - high[joint]
+        value, time, limit = (
+            (found.low, found.low_time, low) if below else (found.high, found.high_time, high)
+        )
+        name = self.robot.joint_names[joint]
+        amounts = {
+            "value": Amount(float(value[joint]), 0, joint),
+            "limit": Amount(float(limit[joint]), 0, joint),
+            "place": self._place(float(time[joint])),
+        }
+        message = f"{name} would be at {{value}} at s = {{place}} of the path, its limit is {{limit}}"
+        hint = "start in another configuration, or move the path"
+        raise PlanningError(Problem(message, hint, joint=name, time=float(time[joint]), amounts=amounts))
+
+    def _place(self, at: float) -> Amount:
+        place = at if self.law is None else float(self.law.evaluate(min(at, self.law.end))[0])
+        return Amount(place, 0, None, "angle" if self.in_place else "length")
+
+    def _unreachable(self, at: float) -> PlanningError | None:
+        """Return the error that the path leaves the arm's reach, if it does so beyond a place."""
+        places = np.linspace(at, self.end, _LOOKS)[1:]
+        valid = self._reachable(places)
+        if valid.all():
+            return None
+        low, high = at, float(places[int(np.argmin(valid))])
+        for _ in range(_BISECTIONS):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self._reachable(np.array([middle]))[0] else (low, middle)
+        far = self.demands(places[~valid], "left").target()
+        missed = solve(self.robot, far, None).shortfall.max(axis=0)
+        kind = 0 if missed[0] > 0 else 1
+        amounts = {
+            "place": self._place(high),
+            "missed": Amount(float(missed[kind]), 0, None, ("length", "angle")[kind]),
+        }
+        message = (
+            f"{self.robot.name} does not reach the path beyond s = {{place}}: it stays up to {{missed}} away"
+        )
+        hint = "move the path nearer to the arm, or leave coordinates of the target free"
+        return PlanningError(Problem(message, hint, amounts=amounts))
+
+    def _reachable(self, places: Array) -> NDArray[np.bool_]:
+        found = solve(self.robot, self.demands(places, "left").target(), None)
+        return np.asarray(found.valid.any(axis=-1))
+
+    def _singular(self, at: float, joints: Array, rates: Array) -> PlanningError:
+        """Return the error that names the singularity at a place, and the joint that would race."""
+        demand = self.demands(np.array([at]), "right")
+        poses, slopes = forward(self.robot, joints[None]), jacobian(self.robot, joints[None])
+        rows = residual_jacobian(demand.target(), poses, slopes)[0]
+        rows[: sum(demand.position)] /= characteristic_length(self.robot)
+        values = np.linalg.svd(rows, compute_uv=False)
+        joint = int(np.abs(rates).argmax())
+        name = self.robot.joint_names[joint]
+        unit = "rad" if self.robot.joint_types[joint] == "revolute" else "m"
+        per = "s" if self.law is not None else "rad of the path" if self.in_place else "m of the path"
+        message = (
+            f"the path runs into a singularity at s = {{place}}: there {name} would have to go "
+            f"{abs(float(rates[joint])):.4g} {unit} for each {per} (smallest over largest singular value "
+            f"{float(values.min() / values[0]):.2g})"
+        )
+        hint = "move the path, start in another configuration, or use a move in joint space there"
+        return PlanningError(Problem(message, hint, joint=name, amounts={"place": self._place(at)}))
