@@ -7,8 +7,8 @@ duration d asks for, (v_after - v_before) / d within the limits. What remains is
     subject to  x_k <= X_k,    velocity steps / limits <= d_k,    (d_k + d_(k+1)) / 2 <= 1 / x_k.
 
 Newton's method with a logarithmic barrier follows its minimum. Each constraint couples neighbours only, so a
-step solves a system of 2 x 2 blocks on three diagonals. Of the last constraint, which is not convex, only so
-much curvature is kept as the objective outweighs: every step goes downhill, and the end is a local minimum.
+step solves a system of 2 x 2 blocks on three diagonals. The curvature of the last constraint,
+which is not convex, is left out: so every step goes downhill, and the end is a local minimum.
 
 Source: Boyd and Vandenberghe, Convex Optimization (2004), chapter 11, for the barrier method.
 """
@@ -30,7 +30,6 @@ _STEPS = 25  # of Newton in one round, at most
 _CENTRED = 0.5  # decrease of the barrier function that a step must still promise
 _ENOUGH = 1e-4  # of the promised decrease, that must come true
 _SHORTEST_STEP = 1e-9  # of Newton's: none helps
-_CONVEX = 0.05  # of the objective's curvature: what the constraint must leave of it
 _SHORTEST = 1e-6  # of the mean segment: duration of one between equal points that nothing else asks for
 _ROOM = 1e-9  # relative: what summing the segments up to times may cost of an acceleration
 _SOFT = 1e-3  # of the shorter segment beside it: a blend this long is taken where there is room
@@ -219,7 +218,7 @@ def _system(problem: _Problem, weight: float, d: Array, x: Array) -> tuple[Array
     diagonal[:, 1, 0] = diagonal[:, 0, 1]
     diagonal[:-1, 1, 1] = (after**2).sum(axis=1)[:-1] + (before**2).sum(axis=1)[1:]
     diagonal[:-1, 1, 1] += (by_room * inverse) ** 2 + by_speed**2
-    diagonal[:-1, 1, 1] += 2 * inverse / x * np.maximum(1 / weight - by_room, _CONVEX / weight)
+    diagonal[:-1, 1, 1] += 2 * inverse / x / weight
     diagonal[-1, 1, 1] = 1.0
 
     upper[:, 0, 0] = by_room**2 / 4

@@ -126,7 +126,9 @@ class RobotModel(Model):
         )
         position, *rates = (np.array([getattr(m, quantity) for m in self.joints]) for quantity in QUANTITIES)
         base, tool = (np.eye(4) if pose is None else pose for pose in (self.base, self.tool))
-        return Robot(self.name, joints, Limits(position, rates[0], rates[1], rates[2]), self.convention, base, tool)
+        return Robot(
+            self.name, joints, Limits(position, rates[0], rates[1], rates[2]), self.convention, base, tool
+        )
 
 
 def robot_as_mapping(robot: Robot) -> dict[str, Any]:

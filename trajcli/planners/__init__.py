@@ -13,6 +13,7 @@ from trajcli.planners.cycloidal import Cycloidal
 from trajcli.planners.hold import Hold
 from trajcli.planners.jerk_limited import JerkLimited
 from trajcli.planners.line import Line
+from trajcli.planners.path import PathMove
 from trajcli.planners.planner import Planner
 from trajcli.planners.quintic import Quintic
 from trajcli.planners.screw import Screw
@@ -34,6 +35,7 @@ Move = Annotated[
         TimeOptimal,
         Line,
         Arc,
+        PathMove,
         Screw,
         Hold,
     ],

@@ -10,6 +10,7 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
 from trajcli.errors import MissingLimitError, Problem
+from trajcli.geometry.place_curve import PlaceCurve
 from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.robot import ToolLimits
 from trajcli.planners.law_shapes import PathBounds, Stretch, stretch_of
@@ -59,12 +60,19 @@ def rates_of(path: ToolPath) -> Rates:
     places = np.unique(np.concatenate([np.linspace(0.0, path.length, _SAMPLES), path.breaks]))
     sides = [path.poses.evaluate(places, side) for side in ("left", "right")]
     first, second = (np.stack([side[k] for side in sides]) for k in (1, 2))
-
-    def largest(rows: Array) -> float:
-        return float(np.linalg.norm(rows, axis=-1).max())
-
     way = 0.0 if path.poses.in_place else 1.0
-    return Rates(way, largest(second[..., :3]), largest(first[..., 3:]), largest(second[..., 3:]))
+    turn, twist = (_largest(rows[..., 3:]) for rows in (first, second))
+    return Rates(way, _largest(second[..., :3]), turn, twist)
+
+
+def rates_of_segment(place: PlaceCurve, turn: float) -> Rates:
+    """Return the largest derivatives of a segment whose orientation turns evenly, by `turn` rad/m."""
+    places = np.linspace(0.0, place.length, _SAMPLES)
+    return Rates(1.0, _largest(place.evaluate(places)[2]), turn, 0.0)
+
+
+def _largest(rows: Array) -> float:
+    return float(np.linalg.norm(rows, axis=-1).max())
 
 
 def bounds_of(spec: LawSpec, limits: ToolLimits, rates: Rates) -> tuple[PathBounds, str]:
@@ -118,11 +126,7 @@ def law_over(path: ToolPath, spec: LawSpec, limits: ToolLimits, planner: str) ->
     """
     rates = rates_of(path)
     bounds, ruled_by = bounds_of(spec, limits, rates)
-    if spec.duration is None or spec.shape == "jerk_limited":
-        _require(spec, bounds, rates, planner)
-    elif spec.shape == "trapezoid" and spec.speed is None and spec.angular_speed is None:
-        bounds = replace(bounds, speed=math.inf)
-        _require_ramps(spec, bounds, rates, planner)
+    bounds = require_bounds(spec, bounds, rates, planner)
     stops = np.concatenate([[0.0], path.poses.stops, [path.length]])
     stretches = []
     for low, high in pairwise(stops.tolist()):
@@ -145,6 +149,20 @@ def _joined(stretches: list[Stretch], stops: Array, ruled_by: str | None) -> Too
         phases += [Phase(p.name, p.start + begins, p.end + begins) for p in stretch.phases]
         begins += stretch.law.duration
     return ToolLaw(concatenate(laws), np.concatenate(breaks), tuple(phases), ruled_by)
+
+
+def require_bounds(spec: LawSpec, bounds: PathBounds, rates: Rates, planner: str) -> PathBounds:
+    """Return the bounds that a law of this shape needs.
+
+    Raises:
+        MissingLimitError: When one is unlimited.
+    """
+    if spec.duration is None or spec.shape == "jerk_limited":
+        _require(spec, bounds, rates, planner)
+    elif spec.shape == "trapezoid" and spec.speed is None and spec.angular_speed is None:
+        _require_ramps(spec, bounds, rates, planner)
+        return replace(bounds, speed=math.inf)
+    return bounds
 
 
 def _require(spec: LawSpec, bounds: PathBounds, rates: Rates, planner: str) -> None:

@@ -102,7 +102,7 @@ def _tool_path(
 ) -> ToolPath:
     """Return the path with what its target fixes; one that follows from the path is fixed whole."""
     fixed = "all" if orientation == "tangent" else target.orientation
-    return ToolPath(poses, target.position, fixed, target.tool_axis, target.turn)
+    return ToolPath(poses, target.position, fixed, target.tool_axis, (target.turn,))
 
 
 def _with_note(way: Way, place: Arc) -> Way:

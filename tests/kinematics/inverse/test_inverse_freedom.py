@@ -11,6 +11,7 @@ from inverse_arms import arm, gap, random_joints
 from oracle_robots import robot_of, robots
 
 from trajcli.kinematics.forward import forward
+from trajcli.kinematics.inverse.nearest_member import nearest_members
 from trajcli.kinematics.inverse.solve import solve
 from trajcli.kinematics.inverse.target import partial_target, residuals
 
@@ -197,3 +198,36 @@ def test_what_only_a_narrow_range_of_the_tool_reaches_is_found():
     beyond = solve(robot, partial_target([0.95, 0.0, -0.1]))
     assert int(beyond.count) == 0
     assert beyond.shortfall[0] == pytest.approx(0.05, rel=0.02)
+
+
+def test_a_fold_inside_a_family_is_not_singular():
+    robot = arm("planar 3R")
+    theta = [joint.theta for joint in robot.joints]
+    near = np.array([0.4, np.pi, 0.0]) - theta  # all links in line, folded: the tcp could not move outwards
+    place = forward(robot, near)[:3, 3]
+    assert np.hypot(*place[:2]) == pytest.approx(0.1, abs=1e-12)
+    found = solve(robot, partial_target(place), near)
+    best = int(found.nearest(near))
+    assert found.joints[best] == pytest.approx(near, abs=1e-6)
+    assert found.free[best].all()
+    assert not found.singular[best]
+
+
+@pytest.mark.parametrize(("name", "kind", "axis"), [row[:3] for row in CASES if row[0] != "wrist over SCARA"])
+def test_members_come_nearer_by_whole_turns_and_along_the_family_and_stay_inside(name, kind, axis):
+    robot, joints, target, rng = case(name, kind, axis, 40)
+    turning = np.array([joint.type == "revolute" for joint in robot.joints])
+    span = np.where(turning, 3.0, 0.2)
+    low, high = joints.min(axis=0) - 0.1 * span, joints.max(axis=0) + 0.1 * span
+    robot = replace(robot, limits=replace(robot.limits, position=np.stack([low, high], axis=1)))
+    near = joints + rng.uniform(-1, 1, joints.shape) * span
+    members = nearest_members(robot, target, joints, near)
+    assert np.abs(residuals(target, forward(robot, members))).max() < 1e-9
+    assert (members >= low).all()
+    assert (members <= high).all()
+    far, came = np.linalg.norm(joints - near, axis=1), np.linalg.norm(members - near, axis=1)
+    assert (came <= far + 1e-9).all()
+    assert (came < far - 1e-3).mean() > 0.8
+    robot = replace(robot, limits=replace(robot.limits, position=np.tile([-np.inf, np.inf], (len(low), 1))))
+    turns = 2 * np.pi * rng.integers(-2, 3, joints.shape) * turning
+    assert nearest_members(robot, target, joints + turns, joints) == pytest.approx(joints, abs=1e-9)

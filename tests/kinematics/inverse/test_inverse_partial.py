@@ -209,3 +209,15 @@ def test_what_is_out_of_reach_says_how_far():
     aside = solve(robot, partial_target([0.3, 0.0, 0.3], direction=[np.cos(0.2), np.sin(0.2), 0.0]))
     assert int(aside.count) == 0
     assert aside.shortfall == pytest.approx([0.0, 0.2], abs=1e-9)
+
+
+def test_the_tool_of_no_flip_of_a_planar_arm_heads_along_up_times_axis():
+    base = np.eye(4)
+    base[:3, :3] = Rotation.from_euler("x", 90, degrees=True).as_matrix()  # the axes point along -y in world
+    robot = replace(arm("planar 3R"), base=base)
+    joints = random_joints(robot, np.random.default_rng(8), 20)
+    found = solve(robot, part_of(forward(robot, joints), "pitch", "x")[1])
+    rows, branches = np.nonzero(found.valid)
+    heads = forward(robot, found.joints[rows, branches])[:, 0, 0]
+    ahead = np.cross([0.0, 0.0, 1.0], [0.0, -1.0, 0.0])[0]
+    assert [found.names[i].wrist for i in branches] == ["no_flip" if x * ahead > 0 else "flip" for x in heads]

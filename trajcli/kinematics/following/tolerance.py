@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trajcli.curves.piecewise import Array, Side
+from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.following.follower import Follower
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.target import residuals
@@ -14,6 +15,8 @@ from trajcli.kinematics.inverse.turns import revolute
 from trajcli.kinematics.jacobian import jacobian
 
 _PROBES = 33  # places between neighbouring breaks, all together, at which the peaks are looked for
+
+_ASIDE = 0.1  # of the speed with which a point of the arm's length would go
 
 
 @dataclass(frozen=True)
@@ -95,6 +98,9 @@ def misfit_of(follower: Follower, tolerance: Tolerance, breaks: Array, guess: Ar
     rates = (rows @ exact[1][..., None])[..., 0].reshape(-1, 2, 3)
     seconds = demand.second.reshape(-1, 2, 3)
     tool_peaks = np.array([np.linalg.norm(part, axis=2).max(axis=0) for part in (rates, seconds)])
+    scale = characteristic_length(follower.robot)
+    for row in tool_peaks:  # what the tool does not do is measured by what it does
+        row[:] = max(row[0], _ASIDE * row[1] * scale), max(row[1], _ASIDE * row[0] / scale)
     return Misfit(follower, tolerance, _floored(joint_peaks, duration), _floored(tool_peaks, duration))
 
 

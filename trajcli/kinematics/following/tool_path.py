@@ -9,6 +9,7 @@ import numpy as np
 from trajcli.curves.invert import times_at
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side
 from trajcli.geometry.pose_curve import PosePath
+from trajcli.geometry.progress import Progress
 from trajcli.geometry.rotation import AXES, Axis
 from trajcli.kinematics.following.demand import Demand
 from trajcli.kinematics.inverse.target import Fixed
@@ -26,14 +27,16 @@ class ToolPath:
         position: Which of x, y and z in world are fixed.
         orientation: What is fixed of the orientation.
         tool_axis: Which axis of the tcp is meant by direction, yaw and pitch.
-        turn: Change of yaw or pitch over the whole path, rad.
+        turns: Changes of yaw or pitch over the segments of the path, rad; empty for other kinds.
+        progress: How far each of these segments is done; None for a single one.
     """
 
     poses: PosePath
     position: tuple[bool, bool, bool]
     orientation: Fixed
     tool_axis: Axis = "z"
-    turn: float = 0.0
+    turns: tuple[float, ...] = ()
+    progress: Progress | None = None
 
     @property
     def length(self) -> float:
@@ -87,16 +90,25 @@ class ToolPath:
             self.position,
             self.orientation,
             self.tool_axis,
-            self._aims(places, speed, acceleration),
+            self._aims(places, side, speed, acceleration),
         )
 
-    def _aims(self, places: Array, speed: Array, acceleration: Array) -> Array:
+    def _aims(self, places: Array, side: Side, speed: Array, acceleration: Array) -> Array:
         if self.orientation not in ("yaw", "pitch"):
             return np.zeros((places.size, 0))
-        axis = self.poses.evaluate(np.zeros(1))[0][0, :3, AXES.index(self.tool_axis)]
-        if self.orientation == "yaw":
-            begins = np.arctan2(axis[1], axis[0])
-        else:
-            begins = np.arctan2(axis[2], np.hypot(axis[0], axis[1]))
-        slope = self.turn / self.length
-        return np.stack([begins + slope * places, slope * speed, slope * acceleration], axis=1)
+        begins = self.begins(self.poses.evaluate(np.zeros(1))[0][0], self.orientation, self.tool_axis)
+        done = (self.progress or Progress.even(self.length)).at(places, side)
+        turns = np.append(self.turns, 0.0)
+        before = np.concatenate([[0.0], np.cumsum(self.turns)])[done.segment]
+        both = turns[np.stack([done.segment, done.segment + 1])]
+        value, slope, bend = ((rows * both).sum(axis=0) for rows in (done.value, done.slope, done.bend))
+        second = bend * speed**2 + slope * acceleration
+        return np.stack([begins + before + value, slope * speed, second], axis=1)
+
+    @staticmethod
+    def begins(pose: Array, orientation: Fixed, tool_axis: Axis) -> float:
+        """Return the yaw or the pitch of a pose (4, 4), rad."""
+        axis = pose[:3, AXES.index(tool_axis)]
+        if orientation == "yaw":
+            return float(np.arctan2(axis[1], axis[0]))
+        return float(np.arctan2(axis[2], np.hypot(axis[0], axis[1])))

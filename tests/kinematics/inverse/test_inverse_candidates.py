@@ -1,0 +1,109 @@
+"""The closed form as it runs: blocks and threads that no pose may learn of, and what judges its answers."""
+
+from __future__ import annotations
+
+import os
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from inverse_arms import FAMILIES, arm, gap, random_joints
+from scipy.spatial.transform import Rotation
+
+from trajcli.kinematics.dh import in_convention
+from trajcli.kinematics.forward import forward
+from trajcli.kinematics.inverse import closed_form
+from trajcli.kinematics.inverse.choose import method_for
+from trajcli.kinematics.inverse.closed_form import candidates
+from trajcli.kinematics.inverse.lines import arm_of
+from trajcli.kinematics.inverse.solve import solve
+from trajcli.kinematics.inverse.turns import choose_turns
+
+COUNT = 25_000  # six blocks and a part of one
+
+
+@pytest.mark.parametrize("name", ["wrist over elbow", "UR"])
+def test_a_large_batch_has_the_answers_of_its_parts_to_the_last_bit(name, monkeypatch):
+    monkeypatch.setattr(os, "cpu_count", lambda: 3)
+    started = []
+    start = threading.Thread.start
+    monkeypatch.setattr(threading.Thread, "start", lambda thread: (started.append(thread), start(thread)))
+    rng = np.random.default_rng(7)
+    robot = arm(name, rng)
+    joints = random_joints(robot, rng, COUNT)
+    poses = forward(robot, joints)
+    whole = solve(robot, poses)
+    count = len(started)
+    assert 1 <= count <= 2  # three would have less than three blocks each
+    there = np.where(whole.valid, gap(robot, whole.joints, joints[:, None]), np.inf).min(axis=1)
+    assert there.max() < 1e-6
+    off = np.abs(forward(robot, whole.joints) - poses[:, None]).max(axis=(-2, -1))
+    assert off[whole.valid].max() < 1e-10
+    monkeypatch.setattr(os, "cpu_count", lambda: 1)
+    for part in (slice(0, COUNT), slice(4090, 4103), slice(4096, 4097), slice(COUNT - 999, COUNT)):
+        some = solve(robot, poses[part])
+        for all_of_them, these in ((whole.joints, some.joints), (whole.closure, some.closure)):
+            assert all_of_them[part].tobytes() == these.tobytes()
+        assert (whole.valid[part] == some.valid).all()
+    assert len(started) == count
+
+
+def test_what_fails_in_a_thread_is_raised(monkeypatch):
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    robot = arm("UR")
+    poses = forward(robot, np.ones((COUNT, 6)))
+
+    def fail(*_):
+        raise ZeroDivisionError("in a block")
+
+    monkeypatch.setattr(closed_form, "_write", fail)
+    with pytest.raises(ZeroDivisionError, match="in a block"):
+        solve(robot, poses)
+
+
+def gaps_by_peer(robot, joints, poses):
+    """Return metres and radians between poses (N, 4, 4) and those of joints (n, branches, N)."""
+    reached = forward(robot, np.moveaxis(joints, 0, -1))
+    away = np.linalg.norm(reached[..., :3, 3] - poses[:, :3, 3], axis=-1)
+    rest = np.swapaxes(reached[..., :3, :3], -1, -2) @ poses[:, :3, :3]
+    return away, Rotation.from_matrix(rest.reshape(-1, 3, 3)).magnitude().reshape(away.shape)
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+def test_gaps_are_distances_and_bound_angles_also_where_a_pose_is_out_of_reach(name, convention):
+    rng = np.random.default_rng(11)
+    robot = in_convention(arm(name, rng), convention)
+    if convention == "modified":
+        first = replace(robot.joints[0], a=0.07, alpha=0.4)
+        robot = replace(robot, joints=(first, *robot.joints[1:]))
+    poses = forward(robot, random_joints(robot, rng, 40))
+    poses[20:, :3, 3] *= 1.5
+    found = candidates(robot, arm_of(robot), method_for(robot), poses)
+    metres, radians = gaps_by_peer(robot, found.joints, poses)
+    assert found.gaps[0] == pytest.approx(metres, abs=1e-11)
+    chord = 2.0 * np.sin(radians / 2.0)  # x and z are apart by between one and the root of two of these
+    assert (found.gaps[1] >= chord - 1e-7).all()
+    assert (found.gaps[1] <= np.sqrt(2.0) * chord + 1e-7).all()
+
+
+@pytest.mark.parametrize("name", ["wrist over elbow", "UR"])
+def test_an_aligned_wrist_is_met_by_the_closed_form_itself(name):
+    rng = np.random.default_rng(3)
+    robot = arm(name, rng)
+    joints = random_joints(robot, rng, 30)
+    joints[:, 4] = 0.0
+    poses = forward(robot, joints)
+    found = candidates(robot, arm_of(robot), method_for(robot), poses)
+    metres, radians = gaps_by_peer(robot, found.joints, poses)
+    assert found.watched.all()
+    assert np.maximum(metres, radians).min(axis=0).max() < 1e-6
+
+
+@pytest.mark.parametrize(("value", "bounds"), [(3.0, [-4.0, 2.0]), (-3.0, [-2.0, 4.0]), (4.0, [-9.0, 9.0])])
+def test_a_turn_is_taken_back_on_either_side(value, bounds):
+    robot = arm("planar 2R", limits=[bounds, bounds])
+    joints = np.full((2, 2, 3), value)
+    choose_turns(robot, joints, None)
+    assert joints == pytest.approx(value - np.copysign(2.0 * np.pi, value))
