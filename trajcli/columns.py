@@ -19,7 +19,7 @@ from trajcli.errors import InputError
 from trajcli.kinematics.robot import JointType
 from trajcli.units import Dimension, Quantity, Units, factor, unit_name
 
-Group = Literal["t", "q", "qd", "qdd", "qddd", "pose", "twist", "twistd", "move"]
+Group = Literal["t", "q", "qd", "qdd", "qddd", "pose", "twist", "twistd", "path", "move"]
 JOINT_ORDERS = {"q": 0, "qd": 1, "qdd": 2, "qddd": 3}
 TOOL_COLUMNS: dict[str, dict[str, Dimension]] = {
     "pose": {**dict.fromkeys(("x", "y", "z"), "length"), **dict.fromkeys(("qw", "qx", "qy", "qz"), "ratio")},
@@ -27,7 +27,9 @@ TOOL_COLUMNS: dict[str, dict[str, Dimension]] = {
     "twistd": {**dict.fromkeys(("ax", "ay", "az"), "length"), **dict.fromkeys(("ex", "ey", "ez"), "angle")},
 }
 """What the columns of a group about the tool are called, and of what dimension each is, times apart."""
-GROUPS: tuple[Group, ...] = ("t", "q", "qd", "qdd", "qddd", "pose", "twist", "twistd", "move")
+PATH_COLUMNS = ("s", "sd", "sdd")
+"""The way of the tool along its path in a move, and its derivatives; zero where there is none."""
+GROUPS: tuple[Group, ...] = ("t", "q", "qd", "qdd", "qddd", "pose", "twist", "twistd", "path", "move")
 
 _UNIT_FACTORS = {
     "deg": factor(Quantity("angle"), Units(angle="deg")),
@@ -98,6 +100,8 @@ def column_names(groups: Sequence[Group], joint_types: Sequence[JointType], unit
         elif group in TOOL_COLUMNS:
             measured = TOOL_COLUMNS[group].items()
             names += [Column(kind, None, _suffix(dimension, units)).name for kind, dimension in measured]
+        elif group == "path":
+            names += [Column(name, None, _suffix("length", units)).name for name in PATH_COLUMNS]
         else:
             names.append(group)
     return names

@@ -16,7 +16,7 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial, read_only
 from trajcli.errors import InputError
 from trajcli.kinematics.robot import Robot
 from trajcli.trajectory import Trajectory
-from trajcli.units import Units
+from trajcli.units import Quantity, Units, factor
 
 ROWS = 4096  # rows of a block: long enough to hide the cost of a call, short enough for the cache
 
@@ -167,6 +167,8 @@ def sample(
                 part = _of_tool(group, robot, motion * factors, last)
                 last = part[-1, 3:] if group == "pose" else last
                 parts.append(part / tool_factors(group, units))
+            elif group == "path":
+                parts.append(_ways(trajectory, local) / factor(Quantity("length"), units))
             else:
                 parts.append((times if group == "t" else _moves(trajectory, local))[:, None])
         yield np.concatenate(parts, axis=1)
@@ -223,6 +225,19 @@ def _window(curve: PiecewisePolynomial, local: Array) -> PiecewisePolynomial:
     ends = np.searchsorted(curve.breaks, local[[0, -1]], "right") - 1
     first, last = np.clip(ends, 0, curve.pieces - 1)
     return PiecewisePolynomial(curve.breaks[first : last + 2], curve.coefficients[:, first : last + 1])
+
+
+def _ways(trajectory: Trajectory, local: Array) -> Array:
+    """Return the way along the path and two derivatives, shape (N, 3), SI; zero where a move has no path."""
+    ways = np.zeros((local.size, 3))
+    starts = np.array([span.start for span in trajectory.spans])
+    owner = np.searchsorted(starts, local + _BREAK, "right") - 1
+    for place, (span, law) in enumerate(zip(trajectory.spans, trajectory.laws, strict=False)):
+        rows = np.flatnonzero(owner == place)
+        if law is not None and rows.size:
+            times = np.clip(local[rows] - span.start, law.start, law.end)
+            ways[rows] = law.evaluate_orders(_onto_breaks(times, law.breaks), (0, 1, 2))[:, :, 0]
+    return ways
 
 
 def _moves(trajectory: Trajectory, local: Array) -> Array:

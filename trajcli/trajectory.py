@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, read_only
-from trajcli.kinematics.robot import JointType
+from trajcli.kinematics.robot import JointType, Robot
+
+if TYPE_CHECKING:
+    from trajcli.kinematics.following.motion import ToolMotion
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +61,21 @@ class Passage:
         return Passage(self.times * factor, self.points, self.missed)
 
 
+@dataclass(frozen=True, eq=False)
+class Promise:
+    """What a move says of itself beyond its ends, for those who judge it.
+
+    Attributes:
+        passage: The points that it passes.
+        tool: What its tool was told to do along a path.
+        robot: The arm with the limits in force; given where there is a tool.
+    """
+
+    passage: Passage | None = None
+    tool: ToolMotion | None = None
+    robot: Robot | None = None
+
+
 @dataclass(frozen=True)
 class Span:
     """Where one move stands on the trajectory.
@@ -92,6 +111,7 @@ class Trajectory:
         spans: One for each move, in order, covering the whole curve.
         start: State in which the job says that the arm stands when t = 0.
         end: State in which the last move declares to end.
+        laws: For each span the way s(t) of the tool along its path, m, from t = 0; None where there is none.
     """
 
     curve: PiecewisePolynomial
@@ -100,6 +120,7 @@ class Trajectory:
     spans: tuple[Span, ...]
     start: State
     end: State
+    laws: tuple[PiecewisePolynomial | None, ...] = ()
 
     @property
     def duration(self) -> float:

@@ -131,7 +131,7 @@ def test_a_flat_arc_keeps_its_digits():
     assert arc.radius == pytest.approx(radius, rel=1e-10)
     np.testing.assert_allclose(arc.end, [1, 0, 0], rtol=0, atol=1e-12)
     middle = arc.evaluate(np.array([arc.length / 2]))[0][0]
-    np.testing.assert_allclose(middle, [0.5, 1e-5, 0], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(middle, [0.5, 1e-5, 0], rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize(

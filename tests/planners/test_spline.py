@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline, make_interp_spline
 from through_jobs import (
@@ -158,6 +158,7 @@ def drawn(seed, least=2):
 @pytest.mark.parametrize(
     ("rule", "ends"), [("natural", "natural"), ("clamped", "clamped"), ("not_a_knot", "not-a-knot")]
 )
+@settings(max_examples=40)
 @given(seed=waypoints)
 def test_as_scipy(rule, ends, seed):
     t, q = drawn(seed, least=4)
@@ -171,6 +172,7 @@ def test_as_scipy(rule, ends, seed):
 
 
 @pytest.mark.parametrize("rule", RULES)
+@settings(max_examples=25)
 @given(seed=waypoints)
 def test_laws(rule, seed):
     t, q = drawn(seed)
@@ -187,6 +189,7 @@ def test_laws(rule, seed):
     assert_joins(curve_of(made), JOINS.get(rule, 2))
 
 
+@settings(max_examples=50)
 @given(seed=waypoints)
 def test_shape_preserving_never_leaves_the_box(seed):
     t, q = drawn(seed)
@@ -260,7 +263,7 @@ def test_one_job_through_the_command_line(tmp_path, capfd):
         elif "--json" in command:
             move = json.loads(out)["moves"][0]
             bends = [2 * piece["local"][2] for piece in move["polynomials"]["j1"]]
-            np.testing.assert_allclose(bends, [0, 2.25, -1.5, -0.75], atol=1e-9)
+            np.testing.assert_allclose(bends, [0, 2.25, -1.5], atol=1e-9)  # the last two pieces are one cubic
             assert [point["time"] for point in move["waypoints"]] == [0, 2, 4]
         else:
             assert "3 points at (s): 0, 2, 4" in out

@@ -81,7 +81,7 @@ def assert_passes(made: Plan, times: Any, points: Any, tolerance: float = 1e-12)
         curve_of(made).evaluate(np.asarray(times, dtype=float)),
         points,
         rtol=0,
-        atol=tolerance * max(1.0, np.abs(points).max()),
+        atol=tolerance * max(1.0, np.abs(points).max(initial=0.0)),
     )
 
 

@@ -14,6 +14,15 @@ Kind = Literal[
     "velocity_jump",
     "acceleration_jump",
     "waypoint",
+    "tool_path",
+    "tool_orientation",
+    "tool_speed",
+    "tool_angular_speed",
+    "tool_acceleration",
+    "tool_angular_acceleration",
+    "tool_acceleration_jump",
+    "tool_jerk",
+    "branch",
 ]
 Method = Literal["exact", "bounded"]
 
@@ -25,7 +34,8 @@ class Finding:
     Attributes:
         move: Index of the move; None when it is about the whole trajectory.
         joint: Name of the joint; None when it is about the tool.
-        kind: The quantity that breaks its limit, or that jumps; or a waypoint that is not where it should be.
+        kind: The quantity that breaks its limit, or that jumps; a waypoint that is not where it should be; a
+            tool that leaves its path or its limits; an arm that changes its branch.
         value: SI, signed as on the curve; for a jump the value after minus the value before; for a waypoint
             the distance from it.
         limit: The bound it breaks, SI, signed as the value; for a jump the size that rounding explains; for a

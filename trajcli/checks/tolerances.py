@@ -37,6 +37,10 @@ BORDER_UNITS = 4.0
 WAYPOINT_RELATIVE = 1e-12
 WAYPOINT_ABSOLUTE = 1e-12
 
+# The tool's speed and acceleration are those of its law as far as the joints' curve follows it, which comes
+# on top; their peaks are looked for between rows until they change by less than this.
+TOOL_RELATIVE = 1e-6
+
 
 def exceeds(value: ArrayLike, bound: ArrayLike) -> NDArray[np.bool_]:
     """Return whether values are above an upper bound by more than rounding; for a lower bound negate both.

@@ -13,7 +13,7 @@ from trajcli.checks.limits import check_limits, peaks_by_move
 from trajcli.checks.waypoints import check_waypoints
 from trajcli.curves.extrema import Peaks
 from trajcli.kinematics.robot import QUANTITIES, Limits
-from trajcli.trajectory import Passage, Trajectory
+from trajcli.trajectory import Promise, Trajectory
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,14 +41,14 @@ class Verdict:
 def verify(
     trajectory: Trajectory,
     limits_by_move: Sequence[Limits],
-    passages: Sequence[Passage | None] | None = None,
+    promises: Sequence[Promise] | None = None,
 ) -> Verdict:
     """Return the verdict on a trajectory: its joint limits for all t, its continuity, the points it passes.
 
     Args:
         trajectory: What to judge.
         limits_by_move: The limits in force, one for each span.
-        passages: The points that each span promises to pass.
+        promises: What each span says of itself.
 
     Raises:
         ValueError: When there are more or fewer limits than spans.
@@ -56,8 +56,9 @@ def verify(
     peaks = tuple(peaks_by_move(trajectory))
     findings = check_limits(trajectory, limits_by_move, peaks)
     findings += check_continuity(trajectory, limits_by_move, peaks)
-    if passages is not None:
-        findings += check_waypoints(trajectory, passages)
+    if promises is not None:
+        findings += check_waypoints(trajectory, [promise.passage for promise in promises])
+        findings += _check_tools(trajectory, promises)
     place = {span.index: k for k, span in enumerate(trajectory.spans)}
     findings.sort(key=lambda finding: (place.get(finding.move or 0, 0), finding.time))
     return Verdict(
@@ -66,6 +67,16 @@ def verify(
         peaks=peaks,
         unchecked=_unchecked(trajectory, limits_by_move),
     )
+
+
+def _check_tools(trajectory: Trajectory, promises: Sequence[Promise]) -> list[Finding]:
+    found: list[Finding] = []
+    for span, promise in zip(trajectory.spans, promises, strict=True):
+        if promise.tool is not None and promise.robot is not None:
+            from trajcli.checks.tool import ToolRows, check_tool  # a plan without paths does not pay for it
+
+            found += check_tool(ToolRows(trajectory, span, promise.robot, promise.tool))
+    return found
 
 
 def _unchecked(trajectory: Trajectory, limits_by_move: Sequence[Limits]) -> tuple[tuple[str, str], ...]:

@@ -20,7 +20,7 @@ from trajcli.curves.piecewise import Array
 
 _ROUNDING = 1e-12  # relative: what an acceleration may miss its least value by
 _STRAIGHT = 8 * np.finfo(np.float64).eps  # of positions over durations: a velocity step that is only rounding
-_ROUNDS = 60  # halves, or better, what the offsets are wrong by, until there is no room
+_ROUNDS = 60  # at most; where there is room, a few settle the offsets
 _SETTLED = 1e-12  # of the shorter segment beside the waypoint
 
 

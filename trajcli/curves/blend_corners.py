@@ -105,7 +105,7 @@ class Way:
     def room(self) -> tuple[Array, Array]:
         """Return how many times its blend each waypoint takes after and before it, each of shape (m, 1).
 
-        A waypoint to be passed exactly takes one blend to its corner and the half of one beyond.
+        One to be passed exactly takes 5/8 of its blend up to its corner and half of it beyond.
         """
         return self._room(self.times.size, OFFSET + 0.5 if self.exactly else 0.5)
 

@@ -28,6 +28,7 @@ Misfit = Callable[[Array, Array, Array], Array]
 # where the error of a quintic piece is largest: of the value and its curvature, and of the slope
 _PROBES = np.array([0.5 - 0.1 * sqrt(5.0), 0.5, 0.5 + 0.1 * sqrt(5.0)])
 _ORDER = 4  # with which the error of the second derivative falls: the slowest
+_FILLED = 0.8  # of the tolerance: between the probes the error is a little larger
 _MOST_PARTS = 8
 _ROUNDS = 60
 
@@ -96,7 +97,7 @@ def fit(
     count = 0
     for _ in range(_ROUNDS):
         error, probed = _errors(exact, misfit, pending)
-        fine = error <= 1.0
+        fine = error <= _FILLED
         done.append(pending.at(fine))
         count += int(np.count_nonzero(fine))
         if fine.all():

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trajcli.checks.verify import Verdict, verify
-from trajcli.curves.piecewise import concatenate
+from trajcli.curves.piecewise import PiecewisePolynomial, concatenate
 from trajcli.errors import Amount, Place, TrajcliError
 from trajcli.job.limits import with_move_limits
 from trajcli.job.read import LoadedJob
@@ -66,9 +66,7 @@ def plan_job(loaded: LoadedJob) -> Plan:
         events += [replace(event, move=index) for event in (*mended(reached[index]), *move.planned.events)]
         state, before = move.planned.end, planner
     trajectory = _joined(moves, loaded, _first_state(loaded, moves[0], events))
-    verdict = verify(
-        trajectory, [move.robot.limits for move in moves], [move.planned.passage for move in moves]
-    )
+    verdict = verify(trajectory, [move.robot.limits for move in moves], [move.promise for move in moves])
     said = tuple(replace(event, message=event.text(loaded.say), amounts={}) for event in events)
     return Plan(loaded, tuple(moves), trajectory, verdict, said, reached)
 
@@ -124,7 +122,14 @@ def _joined(moves: list[PlannedMove], loaded: LoadedJob, first: State) -> Trajec
         start, end = end, float(move.planned.curve.breaks[-1] + end)
         spans.append(Span(move.index, move.planner.tag, start, end, move.planner.joins))
     robot, last = loaded.robot, moves[-1].planned.end
-    return Trajectory(curve, robot.joint_names, robot.joint_types, tuple(spans), first, last)
+    laws = tuple(_way_of(move) for move in moves)
+    return Trajectory(curve, robot.joint_names, robot.joint_types, tuple(spans), first, last, laws)
+
+
+def _way_of(move: PlannedMove) -> PiecewisePolynomial | None:
+    """Return the way s(t) of the tool; while it turns in its place it has none."""
+    tool = move.planned.tool
+    return None if tool is None or tool.in_place else tool.law
 
 
 @contextmanager

@@ -25,6 +25,7 @@ from trajcli.pipeline.passing import outside_reports, waypoint_reports
 from trajcli.pipeline.plan import Plan
 from trajcli.pipeline.reference import NoBound, fastest_duration
 from trajcli.pipeline.stretch import PlannedMove
+from trajcli.pipeline.tool_report import tool_finding
 from trajcli.planners.point_to_point import PointToPoint
 from trajcli.planners.through_points import ThroughPoints
 
@@ -117,22 +118,11 @@ def verification_error(plan: Plan) -> VerificationError:
 
 
 def _problem(plan: Plan, finding: Finding) -> Problem:
-    loaded, joint = plan.loaded, plan.trajectory.joint_names.index(finding.joint or "")
-    order = _JUMPS.get(finding.kind, QUANTITIES.index(finding.kind) if finding.kind in QUANTITIES else 0)
-    index = finding.move or 0
-    amounts = {"value": Amount(finding.value, order, joint), "limit": Amount(finding.limit, order, joint)}
-    quantity = QUANTITIES[order]
+    loaded, index = plan.loaded, finding.move or 0
+    text, amounts, hint = _said(plan, finding)
     where = f"move {index} ({plan.moves[index].planner.tag}): "
-    if finding.kind == "waypoint":
-        quantity, what, bound, hint = "path", "passes a waypoint at", ", it shall be {limit}", finding.hint
-    elif finding.kind in _JUMPS:
-        what, bound, hint = "jumps by", "", _jump_remedy(plan.moves[index], finding)
-    else:
-        what, bound = "reaches", ", its limit is {limit}"
-        hint = _remedy(plan, plan.moves[index], finding)
-    text = f"{where}the {quantity} of {finding.joint} {what} {{value}} at t = {finding.time:.9g} s{bound}"
     return Problem(
-        said(text, amounts, loaded.say),
+        said(f"{where}{text}", amounts, loaded.say),
         hint,
         place=loaded.place_of_move(index),
         move=index,
@@ -141,6 +131,24 @@ def _problem(plan: Plan, finding: Finding) -> Problem:
         value=finding.value,
         limit=finding.limit,
     )
+
+
+def _said(plan: Plan, finding: Finding) -> tuple[str, dict[str, Amount], str | None]:
+    """Return what a finding says, with the amounts in it, and what would fix it."""
+    if finding.joint is None:
+        return tool_finding(finding, _remedy(plan, plan.moves[finding.move or 0], finding))
+    joint = plan.trajectory.joint_names.index(finding.joint)
+    order = _JUMPS.get(finding.kind, QUANTITIES.index(finding.kind) if finding.kind in QUANTITIES else 0)
+    amounts = {"value": Amount(finding.value, order, joint), "limit": Amount(finding.limit, order, joint)}
+    quantity, move = QUANTITIES[order], plan.moves[finding.move or 0]
+    if finding.kind == "waypoint":
+        quantity, what, bound, hint = "path", "passes a waypoint at", ", it shall be {limit}", finding.hint
+    elif finding.kind in _JUMPS:
+        what, bound, hint = "jumps by", "", _jump_remedy(move, finding)
+    else:
+        what, bound, hint = "reaches", ", its limit is {limit}", _remedy(plan, move, finding)
+    text = f"the {quantity} of {finding.joint} {what} {{value}} at t = {finding.time:.9g} s{bound}"
+    return text, amounts, hint
 
 
 def _jump_remedy(move: PlannedMove, finding: Finding) -> str | None:
@@ -159,7 +167,9 @@ def _remedy(plan: Plan, move: PlannedMove, finding: Finding) -> str:
         lasting = move.duration * finding.factor
         longer = f"{finding.factor:.6g} times longer ({lasting:.6g} s)"
         return f"it must last {longer}, or say `when_over_limit: slow`"
-    order, joint = QUANTITIES.index(finding.kind), move.robot.joint_names.index(finding.joint or "")
+    if finding.joint is None:
+        return "say `when_over_limit: slow`"
+    order, joint = QUANTITIES.index(finding.kind), move.robot.joint_names.index(finding.joint)
     ends = [
         (s.velocity, s.acceleration)[order - 1][joint] for s in (move.start, move.planned.end) if order < 3
     ]

@@ -17,7 +17,7 @@ from trajcli.errors import Amount, PlanningError
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.planners.planner import Event, Planned, Planner
 from trajcli.planners.point_to_point import share_of_limits
-from trajcli.trajectory import Span, State, Trajectory
+from trajcli.trajectory import Promise, Span, State, Trajectory
 
 _LONGEST = 1e4  # times the planned duration: a move that needs more is not over its limit, it is wrong
 _ROOM = 1e-10  # relative; a tenth of the tolerance of limits, so that rounding does not tip the later verdict
@@ -57,9 +57,14 @@ class PlannedMove:
         names, types = self.robot.joint_names, self.robot.joint_types
         return Trajectory(self.planned.curve, names, types, (span,), self.start, self.planned.end)
 
+    @property
+    def promise(self) -> Promise:
+        """What the move says of itself."""
+        return Promise(self.planned.passage, self.planned.tool, self.robot)
+
     def verdict(self) -> Verdict:
         """Return the verdict on this move alone."""
-        return verify(self.alone(), [self.robot.limits])
+        return verify(self.alone(), [self.robot.limits], [self.promise])
 
 
 def lasting(move: PlannedMove, duration: float) -> PlannedMove:
@@ -111,7 +116,7 @@ def slowed(move: PlannedMove) -> PlannedMove:
     worst = max(over, key=lambda finding: finding.factor or 0.0)
     message = (
         f"stretched {slower.stretch:.6g} times, from {{before}} to {{after}}, "
-        f"to keep the {worst.kind} limit of {worst.joint}"
+        f"to keep the {worst.kind.removeprefix('tool_')} limit of {worst.joint or 'the tool'}"
     )
     amounts = {"before": Amount(move.duration), "after": Amount(slower.duration)}
     event = Event("slowed", message, move.index, amounts)
@@ -119,7 +124,7 @@ def slowed(move: PlannedMove) -> PlannedMove:
 
 
 def _over_limit(move: PlannedMove) -> list[Finding]:
-    return [finding for finding in move.verdict().findings if finding.kind in QUANTITIES]
+    return [f for f in move.verdict().findings if f.kind in QUANTITIES or f.factor is not None]
 
 
 def _excess(move: PlannedMove, factors: Array) -> Array:

@@ -10,7 +10,8 @@ Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), sect
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -123,14 +124,23 @@ def _stretches(
     whole = None
     if spec.duration is not None:
         whole = spec.duration + (len(places) - 1) * (move.overlap or 0.0)
-    stretches = []
+    stretches, crowd = [], _crowd(places) if spec.acceleration is None else 1.0
     for place, vector in zip(places, vectors, strict=True):
         rates = rates_of_segment(place, float(np.linalg.norm(vector)) / place.length)
-        bounds, _ = bounds_of(spec, limits, rates)
+        bounds, _ = bounds_of(spec, replace(limits, acceleration=limits.acceleration / crowd), rates)
         bounds = require_bounds(spec, bounds, rates, "path")
         share = None if whole is None else whole * place.length / total
         stretches.append(stretch_of(spec, place.length, bounds, share))
     return stretches
+
+
+def _crowd(places: Sequence[PlaceCurve]) -> float:
+    """Return how many accelerations along a segment add up to where one slows down and the next speeds up."""
+    turns = [
+        after.evaluate(np.zeros(1))[1][0] - before.evaluate(np.array([before.length]), "left")[1][0]
+        for before, after in pairwise(places)
+    ]
+    return max(1.0, *(float(np.linalg.norm(turn)) for turn in turns))
 
 
 def _check(stretches: Sequence[Stretch], overlap: float) -> None:

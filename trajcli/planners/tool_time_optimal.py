@@ -21,8 +21,9 @@ from trajcli.planners.path_law import LawSpec
 from trajcli.planners.planner import Event, Phase
 from trajcli.planners.point_to_point import missing_limit
 
-_FINER = 0.1  # of the tolerance, for q(s): what the law multiplies it with must still be within
+_FINER = 0.5  # of the tolerance, for q(s): what the law multiplies it with must still be within
 _CORNERS = 16  # of the polygon inside the circle of accelerations
+_BETWEEN = 6  # places of a piece at which the limits of the tool are looked at, its ends included
 _STRETCHED = 1e-9
 
 
@@ -46,8 +47,9 @@ def fastest_along(joints: Followed, spec: LawSpec, tolerance: Tolerance, planner
     solved = time_optimal(
         curve, robot.limits.velocity, robot.limits.acceleration, further=[tool_demand(path, tcp)]
     )
+    left = _left_over(path, solved.law, tcp)
     least = spec.minimum_duration or 0.0
-    factor = max(1.0, least / solved.trajectory.duration)
+    factor = max(left, least / solved.trajectory.duration)
     law, trajectory = (
         scale_time(each, factor) if factor > 1 else each for each in (solved.law, solved.trajectory)
     )
@@ -59,10 +61,25 @@ def fastest_along(joints: Followed, spec: LawSpec, tolerance: Tolerance, planner
     ]
     text = f"the grid was refined {solved.refinements} times, to {solved.grid.size} places"
     events = [Event("refined", text)]
-    if solved.stretch > 1 + _STRETCHED:
-        text = f"stretched {solved.stretch:.9g} times to keep all limits between the places"
+    stretch = solved.stretch * left
+    if stretch > 1 + _STRETCHED:
+        text = f"stretched {stretch:.9g} times to keep all limits between the places"
         events.append(Event("stretched", text))
     return Made(trajectory, motion, tuple(phases), tuple(events if solved.refinements else events[1:]))
+
+
+def _left_over(path: ToolPath, law: PiecewisePolynomial, limits: ToolLimits) -> float:
+    """Return how many times longer the law must last for the tool's limits to hold between the places, too."""
+    part = np.linspace(0.0, 1.0, _BETWEEN)
+    times = (law.breaks[:-1, None] + law.lengths[:, None] * part).reshape(-1)
+    demand = path.by_time(law, np.clip(times, law.start, law.end), "right")
+    shares = []
+    for order, rows in ((1, demand.first), (2, demand.second)):
+        for name, some in (("", rows[:, :3]), ("angular_", rows[:, 3:])):
+            limit = getattr(limits, name + ("speed", "acceleration")[order - 1])
+            shares.append((float(np.linalg.norm(some, axis=1).max()) / limit) ** (1 / order))
+    worst = max(shares)
+    return worst * (1 + _STRETCHED) if worst > 1 else 1.0
 
 
 def _limits(spec: LawSpec, limits: ToolLimits) -> ToolLimits:

@@ -22,6 +22,7 @@ from trajcli.kinematics.robot import Robot
 
 _BISECTIONS = 40
 _LOOKS = 33  # places beyond the trouble at which the arm's reach is asked for
+_REGULAR = 1e-3  # of the largest singular value: with more there is no singularity nearby
 _SLOPE = 1e-5  # of the whole: step of the difference that says how fast a joint would have to go
 
 
@@ -45,14 +46,16 @@ class Trouble:
 
     def stuck(self, error: StuckError) -> PlanningError:
         """Return the error of an arm that could not be followed beyond a place."""
-        return self._unreachable(error.place) or self._singular(error.place, error.joints, error.rates)
+        lost = self._unreachable(error.place)
+        return lost or self._singular(error.place, error.joints, error.rates, stuck=True)
 
     def unfit(self, at: float, guess: Callable[[Array], Array]) -> PlanningError:
         """Return the error of joints that no curve of the allowed pieces follows around a place."""
         step = _SLOPE * self.end
         around = np.clip(np.array([at - step, at, at + step]), 0.0, self.end)
         before, here, after = guess(around)
-        return self._unreachable(at) or self._singular(at, here, (after - before) / (around[2] - around[0]))
+        rates = (after - before) / (around[2] - around[0])
+        return self._unreachable(at) or self._singular(at, here, rates, stuck=False)
 
     def refuse_limits(self, curve: PiecewisePolynomial, room: float) -> None:
         """Refuse a curve that leaves the range of a joint: the branch is fixed, and going slower is no help.
@@ -111,13 +114,17 @@ class Trouble:
         found = solve(self.robot, self.demands(places, "left").target(), None)
         return np.asarray(found.valid.any(axis=-1))
 
-    def _singular(self, at: float, joints: Array, rates: Array) -> PlanningError:
+    def _singular(self, at: float, joints: Array, rates: Array, *, stuck: bool) -> PlanningError:
         """Return the error that names the singularity at a place, and the joint that would race."""
         demand = self.demands(np.array([at]), "right")
         poses, slopes = forward(self.robot, joints[None]), jacobian(self.robot, joints[None])
         rows = residual_jacobian(demand.target(), poses, slopes)[0]
         rows[: sum(demand.position)] /= characteristic_length(self.robot)
         values = np.linalg.svd(rows, compute_uv=False)
+        if not stuck and values.min() > _REGULAR * values[0]:
+            message = "around s = {place} of the path the tolerance is finer than rounding lets it be met"
+            hint = "choose a larger `tolerance`, or a smoother path"
+            return PlanningError(Problem(message, hint, amounts={"place": self._place(at)}))
         joint = int(np.abs(rates).argmax())
         name = self.robot.joint_names[joint]
         unit = "rad" if self.robot.joint_types[joint] == "revolute" else "m"

@@ -58,6 +58,7 @@ def contest(seed, points):
 @pytest.mark.parametrize(("seed", "points"), [(0, 5), (1, 5), (2, 20)])
 def test_as_fast_as_toppra(seed, points):
     found, path, velocity, acceleration, theirs = contest(seed, points)
+    assert found.stretch == 1.0
     assert found.trajectory.duration <= 1.01 * theirs
     assert found.trajectory.duration >= 0.99 * theirs  # on so fine a grid toppra is near the optimum too
     assert_motion(found, path, velocity, acceleration)

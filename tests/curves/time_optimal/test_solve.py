@@ -72,11 +72,11 @@ def forward_by_programmes(path, grid, velocity, acceleration, upper, start):
     return np.array(x)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("moving", [False, True])
 def test_scans_solve_the_linear_programmes(seed, moving):
     rng = np.random.default_rng(seed)
-    joints, count = int(rng.integers(1, 4)), 40
+    joints, count = int(rng.integers(1, 4)), 30
     path = spline(rng.uniform(-1, 1, (5, joints)))
     if seed % 2:  # q'' jumps at the breaks
         path = hermite_pieces(path.breaks, rng.uniform(-2, 2, (2, 5, joints)))
@@ -149,14 +149,17 @@ def test_of_two_caps_at_a_place_the_lower_one_counts():
     assert constrained(np.array([0.0, 0.5, 1.0]), [joints, capped], NOWHERE).cap[1] == 0.2
 
 
-def test_a_joint_that_turns_next_to_a_place_does_no_harm():
-    """At s = 1e-13 the first joint has all but turned: what its row says of sdd there is rounding."""
-    path = PiecewisePolynomial([-1.0, 1.0], np.array([[0.5, 0.0], [-1.0, 1.0], [0.5, 0.0]])[:, None, :])
-    demand = joint_demand(path, symmetric(9.0, 9.0), symmetric(1.0, 9.0))
+@pytest.mark.parametrize("seed", [1, 139])
+def test_a_joint_that_turns_next_to_a_place_does_no_harm(seed):
+    """At s = 1e-16 the first joint has all but turned: what its row says of sdd there is rounding."""
+    rng = np.random.default_rng(seed)
+    bend, limit = rng.uniform(0.3, 3), rng.uniform(0.5, 2)
+    path = PiecewisePolynomial([-1.0, 1.0], np.array([[bend, 0], [-2 * bend, 1], [bend, 0]])[:, None, :])
+    demand = joint_demand(path, symmetric(9.0, 9.0), symmetric(limit, 9.0))
     found = []
-    for turn in (0.0, 1e-13, -1e-11):
+    for turn in (0.0, 1.4e-16, -1.4e-16, 1e-13):
         grid = np.linspace(-1, 1, 41)
         grid[20] = turn
         found.append(solve(constrained(grid, [demand], NOWHERE), 0.0, 0.0)[0])
-    np.testing.assert_allclose(found[1], found[0], rtol=1e-8, atol=1e-10)
-    np.testing.assert_allclose(found[2], found[0], rtol=1e-6, atol=1e-8)
+    for other in found[1:]:
+        np.testing.assert_allclose(other, found[0], rtol=1e-9, atol=1e-12)

@@ -209,10 +209,10 @@ def _stretched(
     ):
         over = np.maximum(peak.high / bounds[:, 1], peak.low / bounds[:, 0])
         times = np.where(peak.high / bounds[:, 1] > peak.low / bounds[:, 0], peak.high_time, peak.low_time)
-        factors.append((float(over.max()) ** root, float(times[over.argmax()])))
-    stretch, time = max(factors)
+        factors.append((float(over.max()) ** root, float(over.max()), float(times[over.argmax()])))
+    stretch, worst, time = max(factors)
     if stretch <= 1.0 + _EXACT:
         return law, trajectory, 1.0
     if not problem.rests:
-        raise UnsettledSpeedError(float(law.evaluate(time)[0]), stretch)
+        raise UnsettledSpeedError(float(law.evaluate(time)[0]), worst)
     return scale_time(law, stretch), scale_time(trajectory, stretch), stretch

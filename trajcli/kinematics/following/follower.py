@@ -27,7 +27,7 @@ from trajcli.kinematics.robot import Robot
 Demands = Callable[[Array, Side], Demand]
 
 _ITERATIONS = 12
-_MET = 1e-13  # scaled residual at which Newton's method has done what rounding lets it
+_NEAR = 1e-8  # scaled residual after which one more step of Newton's reaches what rounding allows
 _GOOD = 1e-10  # scaled residual that still counts as met where rounding is larger
 _LONGEST = 0.5  # rad, or arm lengths: a longer correction leads elsewhere
 _RANK = 1e-6  # of the largest singular value: directions with less are free
@@ -88,15 +88,14 @@ class Follower:
 
     def _solved(self, demand: Demand, guess: Array, places: Array) -> Array:
         target = demand.target()
-        q, size = guess.copy(), np.full(len(guess), np.inf)
+        q = guess.copy()
         for _ in range(_ITERATIONS):
             errors = self._errors(demand, q)
-            size = np.abs(errors).max(axis=1)
-            if (size <= _MET).all():
-                return q
             _, slopes = self.linearised(demand, q)
             step = self._divided(slopes, errors)
             q = q + np.clip(step, -_LONGEST, _LONGEST)
+            if (np.abs(errors) <= _NEAR).all():
+                break
         errors = self._errors(demand, q)
         size = np.abs(errors).max(axis=1)
         lost = ~(size <= _GOOD) | (np.abs(q - guess).max(axis=1) > 2 * _LONGEST)
