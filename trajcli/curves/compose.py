@@ -165,10 +165,8 @@ def _split(curve: PiecewisePolynomial, times: Array) -> PiecewisePolynomial:
     if not times.size:
         return curve
     apart = _ROUNDING * max(abs(curve.start), abs(curve.end))
-    times = np.sort(times)
     after = np.clip(np.searchsorted(curve.breaks, times), 1, curve.pieces)
     new = (times - curve.breaks[after - 1] > apart) & (curve.breaks[after] - times > apart)
-    new &= np.diff(times, prepend=-np.inf) > apart
     breaks = np.union1d(curve.breaks, times[new])
     piece = np.searchsorted(curve.breaks, breaks[:-1], "right") - 1
     offset = breaks[:-1] - curve.breaks[piece]

@@ -32,6 +32,8 @@ from trajcli.planners.tool_law import bounds_of, rates_of_segment, require_bound
 from trajcli.planners.tool_orientation import orientation_along
 from trajcli.planners.tool_target import ToolTarget
 
+_ONE_TIME = 1e-9  # of the duration: times this close to each other are one
+
 
 @dataclass(frozen=True, eq=False)
 class Overlapped:
@@ -156,8 +158,8 @@ def _check(stretches: Sequence[Stretch], overlap: float) -> None:
 def _padded(law: PiecewisePolynomial, start: float, end: float) -> PiecewisePolynomial:
     """Return the law at rest before `start` and after it is done, over [0, end]."""
     before = constant(np.zeros(1), start)
-    rest = max(end - start - law.duration, 0.0)
-    after = constant(law.piece_ends()[1][-1], rest)
+    rest = end - start - law.duration
+    after = constant(law.piece_ends()[1][-1], rest if rest > _ONE_TIME * end else 0.0)
     joined = concatenate([before, law, after])
     breaks = joined.breaks.copy()
     breaks[-1] = end
@@ -167,7 +169,7 @@ def _padded(law: PiecewisePolynomial, start: float, end: float) -> PiecewisePoly
 def _distinct(times: Array, end: float) -> Array:
     """Return the distinct times within [0, end], those that rounding keeps apart made one."""
     ordered = np.sort(np.clip(times, 0.0, end))
-    keep = np.append(True, np.diff(ordered) > 1e-9 * end)
+    keep = np.append(True, np.diff(ordered) > _ONE_TIME * end)
     distinct = ordered[keep]
     distinct[-1] = end
     return np.asarray(distinct)

@@ -69,7 +69,7 @@ def fastest_along(joints: Followed, spec: LawSpec, tolerance: Tolerance, planner
 
 
 def _left_over(path: ToolPath, law: PiecewisePolynomial, limits: ToolLimits) -> float:
-    """Return how many times longer the law must last for the tool's limits to hold between the places, too."""
+    """Return how many times longer the law must last to keep the tool's limits between the places."""
     part = np.linspace(0.0, 1.0, _BETWEEN)
     times = (law.breaks[:-1, None] + law.lengths[:, None] * part).reshape(-1)
     demand = path.by_time(law, np.clip(times, law.start, law.end), "right")
