@@ -64,6 +64,12 @@ def test_breaks_that_meet_up_to_rounding_stay_one():
     assert compose(path, law).breaks.tolist() == times.tolist()
 
 
+def test_no_sliver_where_a_fast_law_passes_a_break_next_to_its_own():
+    path = PiecewisePolynomial([0.0, 1.0 + 1.2e-9, 2e6], np.ones((2, 2, 1)))
+    law = PiecewisePolynomial([0.0, 1.0, 2.0], np.array([[1.0, 1e6], [0.0, 1.0]])[:, :, None])
+    assert compose(path, law).breaks.tolist() == [0.0, 1.0, 2.0]
+
+
 def test_a_law_that_rests_or_has_no_length():
     path = PiecewisePolynomial([0.0, 1.0, 2.0], np.arange(8.0).reshape(2, 2, 2))
     rest = compose(path, constant([1.5], 2.0))

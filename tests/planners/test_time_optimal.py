@@ -73,7 +73,7 @@ def test_always_some_limit_is_used():
     used = np.maximum(
         np.abs(curve.evaluate(at, 1)).max(axis=1) / V, np.abs(curve.evaluate(at, 2)).max(axis=1) / A
     )
-    assert np.mean(used > 0.99) > 0.95
+    assert np.mean(used > 0.9) > 0.98  # the grid is as coarse as a duration within 1 % allows
 
 
 @pytest.mark.parametrize("scale", [1e-4, 1e4])

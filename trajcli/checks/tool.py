@@ -19,7 +19,7 @@ from trajcli.trajectory import Span, Trajectory
 
 _EACH = 8  # rows of a piece
 _ROUNDS, _INNER = 4, 17  # in which a peak is looked for more closely, and rows of each
-_SPEEDS: tuple[tuple[Kind, str, int, slice], ...] = (
+SPEEDS: tuple[tuple[Kind, str, int, slice], ...] = (
     ("tool_speed", "speed", 1, slice(0, 3)),
     ("tool_angular_speed", "angular_speed", 1, slice(3, 6)),
     ("tool_acceleration", "acceleration", 2, slice(0, 3)),
@@ -96,28 +96,34 @@ def check_tool(rows: ToolRows) -> list[Finding]:
     return [*_check_path(rows), *_check_limits(rows), *_check_jerk(rows), *_check_branch(rows)]
 
 
-def _check_path(rows: ToolRows) -> list[Finding]:
-    """Return by how much the tool is beside its path, or turned, where that is more than was promised."""
-    times, motion = rows.times(), rows.motion
+def beside_path(rows: ToolRows) -> tuple[Array, Array]:
+    """Return how far the tool is from its path, m, and from its orientation, rad, each (N,)."""
+    times = rows.times()
     q = rows.joints(times, (0,), "right")[:, 0]
-    target = motion.demand(times).target()
+    target = rows.motion.demand(times).target()
     off = residuals(target, forward(rows.robot, q))
     split = sum(target.position)
-    found = []
-    kinds: tuple[tuple[Kind, Array, float], ...] = (
-        ("tool_path", np.linalg.norm(off[:, :split], axis=1), motion.tolerance.position),
-        ("tool_orientation", np.linalg.norm(off[:, split:], axis=1), motion.tolerance.angle),
+    return np.linalg.norm(off[:, :split], axis=1), np.linalg.norm(off[:, split:], axis=1)
+
+
+def _check_path(rows: ToolRows) -> list[Finding]:
+    """Return by how much the tool is beside its path, or turned, where that is more than was promised."""
+    tolerance, found = rows.motion.tolerance, []
+    kinds: tuple[tuple[Kind, float], ...] = (
+        ("tool_path", tolerance.position),
+        ("tool_orientation", tolerance.angle),
     )
-    for kind, sizes, limit in kinds:
-        if sizes.size and exceeds(sizes.max(), limit):
+    for (kind, limit), sizes in zip(kinds, beside_path(rows), strict=True):
+        if exceeds(sizes.max(), limit):
             worst = int(sizes.argmax())
-            found.append(_finding(rows, kind, float(sizes[worst]), limit, float(times[worst]), None))
+            time = float(rows.times()[worst])
+            found.append(_finding(rows, kind, float(sizes[worst]), limit, time, None))
     return found
 
 
 def _check_limits(rows: ToolRows) -> list[Finding]:
     found = []
-    for kind, name, order, part in _SPEEDS:
+    for kind, name, order, part in SPEEDS:
         limit = float(getattr(rows.robot.limits.tcp, name))
         if np.isinf(limit):
             continue

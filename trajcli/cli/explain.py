@@ -8,6 +8,7 @@ from typing import Any
 
 from trajcli.cli.passing_text import passing_lines
 from trajcli.cli.reached_text import pose_reached_lines
+from trajcli.cli.tool_text import tool_lines
 from trajcli.job.read import load_job
 from trajcli.pipeline.arm import Arm
 from trajcli.pipeline.explain import closed_form, explanation, stretches_of
@@ -53,6 +54,7 @@ def _lines(plan: Plan, told: dict[str, Any]) -> Iterator[str]:
         yield f"move {index}: {move['planner']}, {move['duration']:.10g} s, from t = {move['start']:.10g} s"
         yield from pose_reached_lines(move, Arm(plan.loaded.robot, plan.loaded.units))
         yield from passing_lines(move)
+        yield from tool_lines(move, plan.loaded.units)
         yield from _polynomials(plan, index)
         yield from _phases(move)
         yield from _peaks(move)
@@ -69,6 +71,10 @@ def _polynomials(plan: Plan, index: int) -> Iterator[str]:
     formulas = closed_form(move, units)
     if formulas is not None:
         yield from (f"  q{i}(t) = {formula}" for i, formula in enumerate(formulas.values(), 1))
+        return
+    if move.planned.tool is not None:
+        count = move.planned.curve.pieces
+        yield f"  joints: {count} pieces of degree {move.planned.curve.degree}, listed by --json"
         return
     for number, rows in enumerate(stretches_of(move, units), 1):
         if len(rows) > _MOST_PIECES:
@@ -101,8 +107,13 @@ def _phases(move: dict[str, Any]) -> Iterator[str]:
 
 def _peaks(move: dict[str, Any]) -> Iterator[str]:
     yield "  peaks:"
+    largest: dict[str, float] = {}
     for peak in move["peaks"]:
-        if peak["low"] == peak["high"] == 0 and peak["quantity"] != "position":
+        size = max(abs(peak["low"]), abs(peak["high"]))
+        largest[peak["quantity"]] = max(largest.get(peak["quantity"], 0.0), size)
+    for peak in move["peaks"]:
+        size = max(abs(peak["low"]), abs(peak["high"]))
+        if size <= _ROUNDING * largest[peak["quantity"]] and peak["quantity"] != "position":
             continue
         symbol = _SYMBOLS[peak["quantity"]]
         yield f"    {peak['joint']} {symbol}: {_extent(peak, move['start'])} {peak['unit']}; {_limit(peak)}"

@@ -66,6 +66,44 @@ class OutsideReport(Model):
     ]
 
 
+class ToolPeakReport(Model):
+    """The largest magnitude of one quantity of the tool in one move."""
+
+    quantity: Literal["speed", "acceleration", "angular_speed", "angular_acceleration"]
+    value: Annotated[float, Field(description="SI, of the tool as forward kinematics has it.")]
+    time: Annotated[float, Field(description="Where it is, seconds from the start of the trajectory.")]
+    limit: Annotated[float | None, Field(description="SI; null is unlimited.")]
+
+
+class LowestSpeedReport(Model):
+    """Where the tool is slowest between the first and the last place at which its speed is the wanted one."""
+
+    speed: Annotated[float, Field(description="m/s, or rad/s where the tool turns in its place.")]
+    place: Annotated[float, Field(description="s on the path, m or rad.")]
+    joint: Annotated[str | None, Field(description="The joint that is the reason, where one is known.")]
+
+
+class ToolReport(Model):
+    """The tool on its path."""
+
+    length: Annotated[float, Field(description="Of the path, m, or rad where the tool turns in its place.")]
+    unit: Literal["m", "rad"]
+    ruled_by: Annotated[
+        Literal["translation", "rotation"] | None,
+        Field(description="Whose limits say how fast; null where a duration or the joints do."),
+    ]
+    wanted_speed: Annotated[
+        float | None, Field(description="Along the path, m/s or rad/s; null where no speed is named.")
+    ]
+    held: Annotated[
+        float | None, Field(description="Part of the path over which the wanted speed is held, 0 to 1.")
+    ]
+    lowest: LowestSpeedReport | None
+    peaks: list[ToolPeakReport]
+    deviation: Annotated[float, Field(description="Largest distance of the tool from its path, m.")]
+    turned: Annotated[float, Field(description="Largest angle between the tool and its orientation, rad.")]
+
+
 class MoveReport(Model):
     """One move."""
 
@@ -88,6 +126,9 @@ class MoveReport(Model):
         Field(
             description="Joints that leave the range of the waypoints, and how far; null without waypoints."
         ),
+    ] = None
+    tool: Annotated[
+        ToolReport | None, Field(description="The tool on its path; null for a move in joint space.")
     ] = None
     reference: ReferenceReport | None = None
 

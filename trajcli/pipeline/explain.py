@@ -2,52 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
-import numpy as np
-
 from trajcli.columns import joint_factors
-from trajcli.curves.piecewise import Array, taylor_shift
 from trajcli.job.report import PeakReport
 from trajcli.pipeline.arm import Arm
 from trajcli.pipeline.passing import passing_in_units
 from trajcli.pipeline.plan import Plan
+from trajcli.pipeline.polynomials import Stretch, stretches
 from trajcli.pipeline.reached_pose import reached_in_units
 from trajcli.pipeline.report import report_of
 from trajcli.pipeline.stretch import PlannedMove
+from trajcli.pipeline.tool_path import path_in_units
 from trajcli.units import Dimension, Quantity, Units, to_user, unit_name
-
-_NOTHING = 1e-12  # of the largest term over the move: what is smaller came from rounding
-_CANCELS = 1e4  # times larger than what they add up to: of ten digits, six are left
-_SAME = 1e-9  # of the largest term: neighbouring pieces this close are one polynomial
-
-
-@dataclass(frozen=True, eq=False)
-class Stretch:
-    """One polynomial of one joint, over one piece or several equal ones.
-
-    Attributes:
-        start: Seconds from the start of the move.
-        end: Seconds from the start of the move.
-        local: Coefficients in powers of (t - start), ascending, in the job's units.
-        absolute: Coefficients in powers of t from the start of the move, ascending, in the job's units.
-    """
-
-    start: float
-    end: float
-    local: Array
-    absolute: Array
-
-    @property
-    def text(self) -> str:
-        """The polynomial in powers of t, or of (t - start) where the former would lose its digits."""
-        powers = np.arange(self.local.size)
-        terms = np.abs(self.local) * (self.end - self.start) ** powers
-        cancelling = np.abs(self.absolute) * self.end**powers
-        if cancelling.max() <= _CANCELS * terms.max():
-            return polynomial_text(self.absolute)
-        return polynomial_text(self.local, f"(t - {self.start:.10g})")
 
 
 def stretches_of(move: PlannedMove, units: Units) -> list[list[Stretch]]:
@@ -55,34 +23,9 @@ def stretches_of(move: PlannedMove, units: Units) -> list[list[Stretch]]:
     factors = joint_factors(move.robot.joint_types, units)
     curve = move.planned.curve
     return [
-        _joint_stretches(curve.breaks, curve.coefficients[:, :, joint] / factors[joint])
+        stretches(curve.breaks, curve.coefficients[:, :, joint] / factors[joint])
         for joint in range(curve.dimension)
     ]
-
-
-def _joint_stretches(breaks: Array, coefficients: Array) -> list[Stretch]:
-    result: list[Stretch] = []
-    for piece in range(breaks.size - 1):
-        start, end = float(breaks[piece]), float(breaks[piece + 1])
-        local = _without_noise(coefficients[::-1, piece], end - start)
-        absolute = _without_noise(taylor_shift(coefficients[:, piece], np.array(-start))[::-1], end)
-        if result and _equal(result[-1].absolute, absolute, end):
-            result[-1] = Stretch(result[-1].start, end, result[-1].local, result[-1].absolute)
-        else:
-            result.append(Stretch(start, end, local, absolute))
-    return result
-
-
-def _without_noise(coefficients: Array, duration: float) -> Array:
-    """Return ascending coefficients without those whose term is mere rounding over the duration."""
-    terms = np.abs(coefficients) * duration ** np.arange(coefficients.size)
-    cleaned: Array = np.where(terms <= _NOTHING * terms.max(), 0.0, coefficients)
-    return cleaned
-
-
-def _equal(a: Array, b: Array, duration: float) -> bool:
-    powers = duration ** np.arange(a.size)
-    return bool((np.abs(a - b) * powers <= _SAME * (np.abs(a) * powers).max()).all())
 
 
 def explanation(plan: Plan) -> dict[str, Any]:
@@ -102,6 +45,7 @@ def explanation(plan: Plan) -> dict[str, Any]:
                 **_move(plan, index),
                 "peaks": [peak_in_units(peak, plan) for peak in entry.peaks],
                 "binding": entry.binding and entry.binding.model_dump(),
+                "tool": entry.tool and entry.tool.model_dump(),
                 "reference": entry.reference and entry.reference.model_dump(),
             }
             for index, entry in enumerate(report.moves)
@@ -141,6 +85,7 @@ def _move(plan: Plan, index: int) -> dict[str, Any]:
         ],
         "arrivals": None if arrivals is None else dict(zip(names, arrivals, strict=True)),
         **passing_in_units(move, span, plan.verdict, plan.loaded.units),
+        "path": None if move.planned.tool is None else path_in_units(move, plan.loaded.units),
     }
 
 
@@ -178,17 +123,3 @@ def peak_in_units(peak: PeakReport, plan: Plan) -> dict[str, Any]:
     said = {key: to_user(getattr(peak, key), quantity, units) for key in ("low", "high")}
     limit = [None if bound is None else to_user(bound, quantity, units) for bound in peak.limit]
     return {**peak.model_dump(), **said, "limit": limit, "unit": unit_name(quantity, units)}
-
-
-def polynomial_text(coefficients: Array, variable: str = "t") -> str:
-    """Return ascending coefficients as a textbook prints them: "20 + 90 t^2 - 60 t^3"."""
-    text = ""
-    for power, coefficient in enumerate(coefficients.tolist()):
-        size = f"{abs(coefficient):.10g}"
-        if size == "0":
-            continue
-        factor = ("", variable, f"{variable}^{power}")[min(power, 2)]
-        term = factor if size == "1" and power else f"{size} {factor}".strip()
-        sign = "-" if coefficient < 0 else "+"
-        text += f" {sign} {term}" if text else ("-" if sign == "-" else "") + term
-    return text or "0"

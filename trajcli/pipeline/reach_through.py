@@ -8,6 +8,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import TrajcliError
 from trajcli.kinematics.robot import Robot
 from trajcli.pipeline.reach import Reached, with_joints
+from trajcli.planners.fields import Target
 from trajcli.planners.recorded import Recorded
 from trajcli.planners.through_points import ThroughPoints
 from trajcli.planners.waypoints import Waypoint
@@ -27,6 +28,8 @@ def through_joints(planner: ThroughPoints, robot: Robot, near: Array) -> tuple[T
     """
     if not any(point.gives_pose for point in planner.listed):
         return planner, None
+    if isinstance(planner.through, Recorded):
+        near = planner.through.positions[-1]
     points, reached = [], None
     for index, point in enumerate(planner.listed):
         is_target = planner.to is not None and index == len(planner.listed) - 1
@@ -34,14 +37,20 @@ def through_joints(planner: ThroughPoints, robot: Robot, near: Array) -> tuple[T
             resolved, found = with_joints(point, robot, near)
         except TrajcliError as error:
             raise _of_point(error, "target" if is_target else f"waypoint {index}") from None
-        moved = Waypoint(**resolved.model_dump(), time=point.time, blend=point.blend)
         near = resolved.as_state().position
-        points.append(moved)
+        points.append(_waypoint(point, resolved))
         reached = found if index == len(planner.listed) - 1 else reached
     if planner.to is None:
         return planner.model_copy(update={"through": tuple(points)}), reached
     through = planner.through if isinstance(planner.through, Recorded) else tuple(points[:-1])
     return planner.model_copy(update={"through": through, "to": points[-1]}), reached
+
+
+def _waypoint(point: Waypoint, resolved: Target) -> Waypoint:
+    """Return the point with the joints that reach it."""
+    if not point.gives_pose:
+        return point
+    return Waypoint(**resolved.model_dump(), time=point.time, blend=point.blend)
 
 
 def _of_point(error: TrajcliError, name: str) -> TrajcliError:

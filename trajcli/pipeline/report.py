@@ -25,7 +25,8 @@ from trajcli.pipeline.passing import outside_reports, waypoint_reports
 from trajcli.pipeline.plan import Plan
 from trajcli.pipeline.reference import NoBound, fastest_duration
 from trajcli.pipeline.stretch import PlannedMove
-from trajcli.pipeline.tool_report import tool_finding
+from trajcli.pipeline.tool_finding import tool_finding
+from trajcli.pipeline.tool_report import tool_report
 from trajcli.planners.point_to_point import PointToPoint
 from trajcli.planners.through_points import ThroughPoints
 
@@ -76,6 +77,7 @@ def _move(plan: Plan, index: int, *, reference: bool) -> MoveReport:
         binding=binding,
         waypoints=waypoint_reports(move, span),
         outside=outside_reports(move, plan.verdict, index),
+        tool=None if move.planned.tool is None else tool_report(plan.trajectory, span, move),
         reference=reference_of(move) if reference else None,
     )
 

@@ -169,7 +169,7 @@ def test_a_new_place_is_where_speeding_up_meets_braking_or_the_middle():
     grid, every = np.array([0.0, 1.0, 2.0, 3.0]), np.ones(3, dtype=bool)
     x = np.array([0.0, 1.0, 1.5, 0.5])  # the lines x = s and x = 3.5 - s meet at s = 1.75
     np.testing.assert_allclose(refined(grid, x, every), [0, 0.5, 1, 1.75, 2, 2.5, 3], atol=1e-15)
-    even = np.array([0.0, 1.0, 2.0 + 1e-13, 3.0 - 1e-13])  # bent by rounding only
+    even = np.array([0.0, 1.0 + 1e-13, 2.0 + 1e-13, 3.0 - 1e-13])  # bent by rounding only
     np.testing.assert_allclose(refined(grid, even, every), [0, 0.5, 1, 1.5, 2, 2.5, 3], atol=1e-15)
     assert refined(grid, x, np.array([False, True, False])).size == 5
 

@@ -141,6 +141,15 @@ def test_the_limits_hold_while_the_nearest_is_sought():
         assert found.joints[best] == pytest.approx([*joints[:5], reached], abs=1e-9)
 
 
+def test_a_member_stops_at_the_limit_and_not_before():
+    robot = arm("SCARA", limits=[[-4, 4], [-4, 4], [0, 1], [-1.0, 2.0]])
+    start = np.array([[0.3, 0.7, 0.1, 1.4]])
+    target = partial_target(forward(robot, start)[:, :3, 3])
+    for wanted, reached in ((3.0, 2.0), (-1.5, -1.0), (0.6, 0.6)):
+        near = np.array([[0.3, 0.7, 0.1, wanted]])
+        assert nearest_members(robot, target, start, near)[0, 3] == pytest.approx(reached, abs=1e-12)
+
+
 def test_a_joint_at_its_limit_is_held_while_others_go_on():
     robot = arm("elbow, pitch and roll", limits=[[-7, 7], [-7, 7], [-7, 7], [-7, 7], [0.5, 2.0]])
     joints = np.array([0.4, 0.7, -1.2, 0.5, 0.9])

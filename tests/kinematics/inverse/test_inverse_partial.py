@@ -150,6 +150,17 @@ def test_names_choose_branches_over_a_batch():
     assert found.named().all()
 
 
+def test_a_long_batch_is_answered_row_by_row():
+    robot = arm("elbow and pitch")
+    joints = random_joints(robot, np.random.default_rng(5), 700)
+    _, target = part_of(forward(robot, joints), "pitch", "x")
+    found = solve(robot, target, joints)
+    for row in (0, 255, 256, 257, 699):
+        alone = solve(robot, target.rows([row]), joints[row : row + 1])
+        assert alone.valid[0].tolist() == found.valid[row].tolist()
+        assert alone.joints[0] == pytest.approx(found.joints[row], abs=1e-9)
+
+
 def test_along_a_path_a_branch_keeps_its_name():
     robot = arm("elbow and pitch")
     start, end = np.array([0.3, 0.9, -1.2, 0.5]), np.array([0.8, 1.2, -0.8, 0.1])

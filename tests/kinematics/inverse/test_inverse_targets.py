@@ -10,6 +10,7 @@ from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.solve import solve
 from trajcli.kinematics.inverse.target import (
     closure_of,
+    meeting,
     partial_target,
     pose_target,
     residual_jacobian,
@@ -47,6 +48,19 @@ def test_residuals_change_as_their_jacobian_says(target):
     before, after = (residuals(target, forward(robot, joints + sign * step * rate)) for sign in (-1.0, 1.0))
     expected = np.einsum("kmn,kn->km", slopes, rate)
     assert (before - after) / (2 * step) == pytest.approx(expected, abs=2e-8)
+
+
+@pytest.mark.parametrize("target", kinds(), ids=lambda target: f"{target.orientation}-{target.coordinates}")
+def test_poses_that_are_made_to_meet_a_target_turn_no_further_than_they_must(target):
+    poses = np.tile(np.eye(4), (4, 1, 1))
+    poses[:, :3, :3], poses[:, :3, 3] = Rotation.random(4, rng=RNG).as_matrix(), RNG.normal(size=(4, 3))
+    met = meeting(target, poses)
+    assert residuals(target, met) == pytest.approx(0.0, abs=1e-12)
+    turned = Rotation.from_matrix(met[:, :3, :3] @ poses[:, :3, :3].swapaxes(1, 2)).magnitude()
+    needed = np.linalg.norm(residuals(target, poses)[:, sum(target.position) :], axis=1)
+    assert turned == pytest.approx(needed, abs=1e-7)
+    free = ~np.array(target.position)
+    assert met[:, :3, 3][:, free] == pytest.approx(poses[:, :3, 3][:, free])
 
 
 def test_closure_counts_only_what_is_fixed():

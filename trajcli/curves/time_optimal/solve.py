@@ -126,7 +126,7 @@ def _forward(intervals: Intervals, first: float, upper: Array) -> Array:
     slopes, offsets = _affine(-P, R, C, R > 0)
     limits = upper.copy()
     limits[0] = first
-    return np.maximum(_scan(slopes, offsets, limits), 0.0)
+    return _scan(slopes, offsets, limits)
 
 
 def _affine(numerator: Array, divisor: Array, C: Array, chosen: NDArray[np.bool_]) -> tuple[Array, Array]:
@@ -147,7 +147,7 @@ def _scan(slopes: Array, offsets: Array, limits: Array) -> Array:
             value = slope * before + offset
             if value < z:
                 z = value
-        z = max(0.0, z)
+        z = max(0.0, z)  # zero is always allowed: what is below is rounding
         found.append(z)
     return np.array(found)
 

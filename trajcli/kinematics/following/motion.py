@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from trajcli.curves.compose import scale_time
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side
 from trajcli.kinematics.following.demand import Demand
@@ -35,8 +37,8 @@ class ToolMotion:
     ruled_by: str | None = None
 
     def demand(self, times: Array, side: Side = "right") -> Demand:
-        """Return what the tool is told at times (N,) from the start of the move."""
-        return self.timed(times, side)
+        """Return what the tool is told at times (N,) from the start of the move; rounding apart, within it."""
+        return self.timed(np.clip(times, self.law.start, self.law.end), side)
 
     def scaled(self, factor: float) -> ToolMotion:
         """Return the same way in `factor` times the time."""

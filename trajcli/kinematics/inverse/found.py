@@ -59,17 +59,15 @@ def by_name(found: Found, own: NDArray[np.intp], names: Sequence[Branch]) -> Fou
 
     Args:
         found: Answers in any order.
-        own: Shape (branches, N): which name each answer has; -1 for none.
+        own: Shape (branches, N): which name each valid answer has; -1 for the others.
         names: What they are called.
     """
-    worst = found.closure.max(axis=0)
     columns, taken = [], []
     for index in range(len(names)):
         mine = own == index
-        most = max(1, int(np.count_nonzero(mine & found.valid, axis=0).max(initial=0)))
-        rank = np.where(mine & found.valid, -1.0, np.where(mine, worst, np.inf))
-        order = np.argsort(rank, axis=0, kind="stable")[:most]
-        taken.append((order, np.take_along_axis(mine & found.valid, order, axis=0)))
+        most = max(1, int(np.count_nonzero(mine, axis=0).max(initial=0)))
+        order = np.argsort(~mine, axis=0, kind="stable")[:most]
+        taken.append((order, np.take_along_axis(mine, order, axis=0)))
         columns += [index] * len(order)
     order = np.concatenate([some for some, _ in taken])
     valid: Flags = np.concatenate([some for _, some in taken])

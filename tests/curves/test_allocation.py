@@ -1,0 +1,129 @@
+"""Durations of pieces against closed forms, and against scipy's search over the same family."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+from scipy.optimize import minimize
+
+from trajcli.curves.allocation import fastest_durations
+from trajcli.curves.piecewise import PiecewisePolynomial
+
+FREE = (-np.inf, np.inf)
+
+
+def bounds(velocity=FREE, acceleration=FREE, jerk=FREE, joints=1):
+    pairs = [(-one, one) if np.ndim(one) == 0 else one for one in (velocity, acceleration, jerk)]
+    return np.tile(np.array(pairs, dtype=float)[:, None], (1, joints, 1))
+
+
+def times_of(durations):
+    return np.concatenate([[0.0], np.cumsum(durations)])
+
+
+def straight(q):
+    """Return the family of straight pieces between points (m, n): each lasts as long as its slowest joint."""
+
+    def family(h):
+        return PiecewisePolynomial(times_of(h), np.stack([np.diff(q, axis=0) / h[:, None], q[:-1]]))
+
+    return family
+
+
+def resting(q):
+    """Return the family of cubics at rest at every point."""
+
+    def family(h):
+        way, h = np.diff(q, axis=0), h[:, None]
+        return PiecewisePolynomial(times_of(h[:, 0]), np.stack([-2 * way / h**3, 3 * way / h**2, 0 * way, q[:-1]]))
+
+    return family
+
+
+def smooth(q, ends="clamped"):
+    """Return scipy's cubic splines, as curves: what matters to a piece is also how long its neighbours last."""
+
+    def family(h):
+        spline = CubicSpline(times_of(h), q, bc_type=ends)
+        return PiecewisePolynomial(spline.x, spline.c)
+
+    return family
+
+
+def points(seed, count, joints=1):
+    return np.cumsum(np.random.default_rng(seed).uniform(-1, 1, (count, joints)), axis=0)
+
+
+@pytest.mark.parametrize("guess", [0.01, 1.0, 50.0])
+def test_each_straight_piece_takes_the_time_of_its_slowest_joint(guess):
+    q = points(1, 8, 2)
+    expected = np.abs(np.diff(q, axis=0)).max(axis=1) / 2
+    found = fastest_durations(straight(q), np.full(7, guess), bounds(velocity=2, joints=2))
+    assert found.sum() == pytest.approx(expected.sum(), rel=0.02)
+    assert (found >= expected * (1 - 1e-9)).all()
+
+
+def test_cubics_at_rest_have_a_closed_form():
+    """The way D takes max(3 D / 2 V, sqrt(6 D / A), cbrt(12 D / J))."""
+    q = points(2, 30)
+    way = np.abs(np.diff(q, axis=0))[:, 0]
+    expected = np.maximum.reduce([1.5 * way, np.sqrt(6 * way / 2), np.cbrt(12 * way / 9)])
+    found = fastest_durations(resting(q), np.full(29, 1.0), bounds(1, 2, 9))
+    assert found.sum() == pytest.approx(expected.sum(), rel=0.02)
+    assert (found >= expected * (1 - 1e-9)).all()
+
+
+def test_directions_have_their_own_bounds():
+    q = np.array([[0.0], [1.0], [0.0]])
+    found = fastest_durations(straight(q), np.ones(2), bounds(velocity=(-0.25, 1.0)))
+    np.testing.assert_allclose(found, [1, 4], rtol=0.02)
+
+
+@pytest.mark.parametrize(("seed", "count", "joints"), [(1, 3, 1), (2, 5, 1), (3, 5, 2), (4, 8, 2)])
+def test_no_slower_than_a_search_of_scipy(seed, count, joints):
+    q, family = points(seed, count, joints), smooth(points(seed, count, joints))
+    limits, guess = bounds(1, 3, joints=joints), np.full(count - 1, 1.0)
+
+    def room(y):
+        curve = family(np.exp(y))
+        at = (curve.breaks[:-1, None] + curve.lengths[:, None] * np.linspace(0.001, 0.999, 24)).ravel()
+        return np.concatenate([1 - np.abs(curve.evaluate(at, o)).ravel() / b for o, b in ((1, 1.0), (2, 3.0))])
+
+    best = np.inf
+    for k in range(5):
+        start = np.random.default_rng(k).normal(0, 0.3, count - 1) + np.log(2)
+        search = {"type": "ineq", "fun": room}
+        found = minimize(lambda y: np.exp(y).sum(), start, constraints=search, method="SLSQP")
+        if room(found.x).min() > -1e-6:
+            best = min(best, np.exp(found.x).sum())
+    found = fastest_durations(family, guess, limits)
+    assert found.sum() <= 1.02 * best
+    assert q.shape == (count, joints)
+
+
+def test_the_limits_are_kept_and_one_is_reached():
+    family = smooth(points(5, 40, 3), "natural")
+    found = fastest_durations(family, np.ones(39), bounds(1, 3, 40, joints=3))
+    curve = family(found)
+    at = np.linspace(0, curve.duration, 40_001)
+    used = [np.abs(curve.evaluate(at, order)).max() / bound for order, bound in ((1, 1), (2, 3))]
+    used.append(np.abs(curve.piece_ends(3)[0]).max() / 40)
+    assert max(used) <= 1 + 1e-9
+    assert max(used) > 1 - 1e-6
+
+
+def test_no_durations_at_all():
+    """A velocity that is given at an end and above its limit stays so however long the pieces last."""
+
+    def family(h):
+        spline = CubicSpline(times_of(h), [[0.0], [1.0], [2.0]], bc_type=((1, 5.0), (1, 0.0)))
+        return PiecewisePolynomial(spline.x, spline.c)
+
+    assert fastest_durations(family, np.ones(2), bounds(1, 3)) is None
+
+
+def test_it_says_the_same_every_time():
+    family = smooth(points(6, 12, 2))
+    first, second = (fastest_durations(family, np.ones(11), bounds(1, 3, joints=2)) for _ in range(2))
+    assert first.tobytes() == second.tobytes()

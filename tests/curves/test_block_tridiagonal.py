@@ -1,0 +1,55 @@
+"""Block tridiagonal systems against numpy's dense solution."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from trajcli.curves.block_tridiagonal import solve_block_tridiagonal
+
+
+def system(seed, blocks, size):
+    """Return blocks of a positive definite matrix, and the matrix."""
+    rng = np.random.default_rng(seed)
+    wide = np.zeros((blocks * size, (blocks + 1) * size))
+    for b in range(blocks):  # rows that reach into the next block: their product is block tridiagonal
+        wide[b * size : (b + 1) * size, b * size : (b + 2) * size] = rng.normal(size=(size, 2 * size))
+    dense = wide @ wide.T + 0.1 * np.eye(blocks * size)
+    cut = dense.reshape(blocks, size, blocks, size).swapaxes(1, 2)
+    at = np.arange(blocks)
+    return cut[at, at], cut[at[:-1], at[1:]], dense
+
+
+@pytest.mark.parametrize("blocks", [1, 2, 3, 4, 5, 7, 8, 9, 16, 33])
+@pytest.mark.parametrize("size", [1, 3, 8])
+def test_as_dense(blocks, size):
+    diagonal, right, dense = system(blocks, blocks, size)
+    values = np.random.default_rng(size).normal(size=blocks * size)
+    before = diagonal.copy(), right.copy()
+    found = solve_block_tridiagonal(diagonal, right, values)
+    np.testing.assert_allclose(found, np.linalg.solve(dense, values), rtol=1e-9, atol=1e-9)
+    for kept, given in zip(before, (diagonal, right), strict=True):
+        np.testing.assert_array_equal(kept, given)
+
+
+def test_missing_values_are_zero():
+    diagonal, right, dense = system(3, 4, 3)
+    values = np.arange(1.0, 11)
+    full = np.append(values, [0.0, 0.0])
+    found = solve_block_tridiagonal(diagonal, right, values)
+    assert found.shape == (10,)
+    np.testing.assert_allclose(found, np.linalg.solve(dense, full)[:10], rtol=1e-9)
+
+
+@pytest.mark.soak
+def test_the_work_is_linear():
+    from time import perf_counter
+
+    times = []
+    for blocks in (500, 5000):
+        diagonal, right, _ = (np.tile(part[1:2], (blocks, 1, 1)) for part in system(1, 3, 8))
+        diagonal += 20 * np.eye(8)
+        began = perf_counter()
+        solve_block_tridiagonal(diagonal, right[:-1], np.ones(blocks * 8))
+        times.append(perf_counter() - began)
+    assert times[1] < 30 * times[0]

@@ -1,0 +1,248 @@
+"""The points that moves pass: listed, named, as poses, from a file; and a job of them written out."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from through_jobs import assert_passes, curve_of, job_text, plan, refusal
+
+from trajcli.job.dump import dump_job
+from trajcli.job.read import job_from_text, load_job
+from trajcli.kinematics.forward import forward
+from trajcli.pipeline.plan import plan_job
+from trajcli.planners.recorded import Recorded
+
+LIMITS = {"velocity": 2, "acceleration": 8}
+PLANNERS = ["spline", "blends", "time_optimal"]
+
+
+def recorded(folder: Path, text: str, move=None, **rest):
+    """Plan a job whose points stand in a file beside it."""
+    (folder / "points.csv").write_text(text)
+    fields = {"planner": "spline", "through": {"csv": "points.csv"}, **(move or {})}
+    start = rest.pop("start", {"joints": [0, 0]})
+    job = folder / "job.json"
+    job.write_text(job_text(start, fields, **{"limits": LIMITS, **rest}))
+    return plan_job(load_job(job))
+
+
+def wrong_file(folder: Path, text: str | None, **rest) -> str:
+    from trajcli.errors import TrajcliError
+
+    with pytest.raises(TrajcliError) as caught:
+        recorded(folder, text or "", **rest)
+    (problem,) = caught.value.problems
+    assert problem.place is not None
+    assert caught.value.exit_code in (2, 3)
+    return f"{problem.text()} ({problem.hint})"
+
+
+def test_units_stand_in_the_columns_names(tmp_path):
+    robot = {"joints": [{"name": "turn"}, {"name": "lift", "type": "prismatic"}]}
+    text = "lift_mm,t,q1_deg\n0,0,0\n500,1,90\n100,3,-180\n"
+    made = recorded(tmp_path, text, robot=robot, limits={}, units={"length": "mm"})
+    assert_passes(made, [0, 1, 3], [[0, 0], [np.pi / 2, 0.5], [-np.pi, 0.1]])
+    si = recorded(tmp_path, "t,lift,turn\n0,0,0\n1,0.5,1\n3,0.1,2\n", robot=robot, limits={}, units={"angle": "deg"})
+    assert_passes(si, [0, 1, 3], [[0, 0], [1, 0.5], [2, 0.1]])  # a plain name is SI whatever the job's units are
+
+
+def test_times_count_from_the_first_row_where_the_arm_stands(tmp_path):
+    made = recorded(tmp_path, "t,q1,q2\n10,0,0\n11,1,0\n13,1,1\n")
+    assert made.moves[0].planned.passage.times.tolist() == [0, 1, 3]
+    elsewhere = recorded(tmp_path, "t,q1,q2\n1,1,0\n3,1,1\n", limits={"velocity": 5})
+    assert elsewhere.moves[0].planned.passage.times.tolist() == [0, 1, 3]
+    halved = recorded(tmp_path, "t,q1,q2\n10,0,0\n11,1,0\n13,1,1\n", {"duration": 1.5}, limits={})
+    assert halved.moves[0].planned.passage.times.tolist() == [0, 0.5, 1.5]
+
+
+def test_a_target_after_the_recording(tmp_path):
+    to = {"to": {"joints": [0, 0], "time": 4}}
+    made = recorded(tmp_path, "t,q1,q2\n0,0,0\n1,1,0\n3,1,1\n", to)
+    assert_passes(made, [0, 1, 3, 4], [[0, 0], [1, 0], [1, 1], [0, 0]])
+    free = recorded(tmp_path, "q1,q2\n0,0\n1,0\n1,1\n", {"to": {"joints": [1, 1]}})
+    assert len(free.moves[0].planned.passage.times) == 3, "the last row and the target are one point"
+
+
+@pytest.mark.parametrize("planner", PLANNERS)
+def test_repeated_rows_are_left_out_and_told(tmp_path, planner):
+    text = "q1,q2\n0,0\n0,0\n0.5,0\n0.5,0.0005\n1,1\n1,1\n"
+    made = recorded(tmp_path, text, {"planner": planner})
+    (told,) = [event.message for event in made.events if event.kind == "merged"]
+    assert told.startswith("left out 2 of 6 points of ")
+    assert told.endswith("points.csv: too near to the one before")
+    made = recorded(tmp_path, text, {"planner": planner, "through": {"csv": "points.csv", "merge": 0.001}})
+    assert "left out 3 of 6" in made.events[0].message
+    np.testing.assert_allclose(made.moves[0].planned.passage.points, [[0, 0], [0.5, 0], [1, 1]])
+
+
+def test_the_end_of_a_recording_is_kept_even_where_it_is_near(tmp_path):
+    text = "q1,q2\n0,0\n1,0\n2,0\n2.001,0\n"
+    made = recorded(tmp_path, text, {"through": {"csv": "points.csv", "merge": 0.01}})
+    np.testing.assert_array_equal(made.trajectory.end.position, [2.001, 0])
+    np.testing.assert_allclose(made.moves[0].planned.passage.points, [[0, 0], [1, 0], [2.001, 0]])
+
+
+def test_standing_still_may_be_meant_where_rows_have_times(tmp_path):
+    text = "t,q1,q2\n0,0,0\n1,0,0\n2,1,1\n3,1,1\n"
+    made = recorded(tmp_path, text, {"rule": "shape_preserving"}, limits={})
+    assert not made.events
+    np.testing.assert_allclose(curve_of(made).evaluate(np.linspace(0, 1, 9)), 0, atol=1e-15)
+    fast = recorded(tmp_path, text, {"planner": "time_optimal"})  # has no use for the times
+    assert "left out 2 of 4" in fast.events[0].message
+    assert fast.trajectory.duration < 1.5
+
+
+def test_one_row_is_a_target(tmp_path):
+    made = recorded(tmp_path, "q1,q2\n1,1\n")
+    np.testing.assert_array_equal(made.trajectory.end.position, [1, 1])
+    held = recorded(tmp_path, "q1,q2\n0,0\n", {"duration": 2})
+    assert held.trajectory.duration == 2
+    assert "comes" not in wrong_file(tmp_path, "t,q1,q2\n0,0,0\n")
+
+
+WRONG_FILES = {
+    "": "points.csv is empty (a CSV begins with",
+    "q1,q2\n": "points.csv:1:1: the file has no rows",
+    "q1\n0\n1\n": "points.csv: no column for j2 (call it q2 (SI) or q2_deg)",
+    "q1,q2\n0,0\n1\n": "points.csv:3:1: the line has 1 values, expected 2",
+    "q1,q2\n0,0\n1,x\n": "points.csv:3:3: q2 is 'x', expected a finite number",
+    "q1,q2\n0,0\n1,nan\n": "q2 is 'nan', expected a finite number",
+    "q1,q1_deg,q2\n0,0,0\n": "two columns for j1: q1 and q1_deg",
+    "q1,q2_mm\n0,0\n": "the column q2_mm is in mm, but j2 is revolute (call it q2 (SI) or ..._deg)",
+    "t,q1,q2\n0,0,0\n1,1,1\n1,2,2\n": "times must increase, but row 3 has t = 1 s after 1 s (remove the rows",
+    "t,q1,q2\n0,1,0\n1,1,1\n": "the recording begins at t = 0 s, but not where the arm then stands (go to",
+}
+
+
+@pytest.mark.parametrize(("text", "message"), WRONG_FILES.items(), ids=map(repr, WRONG_FILES))
+def test_a_wrong_file_is_one_clear_error(tmp_path, text, message):
+    told = wrong_file(tmp_path, text)
+    assert message in told
+    assert "\n" not in told
+
+
+def test_a_missing_file_names_the_path(tmp_path):
+    told = wrong_file(tmp_path, "", move={"through": {"csv": "lost/points.csv"}})
+    assert "lost/points.csv: No such file" in told
+
+
+def test_a_target_before_the_end_of_the_recording(tmp_path):
+    to = {"to": {"joints": [0, 0], "time": 2}}
+    told = wrong_file(tmp_path, "t,q1,q2\n0,0,0\n1,1,0\n3,1,1\n", move=to)
+    assert "the target is reached after 2 s, the last recorded point after 3 s" in told
+
+
+@pytest.mark.parametrize(
+    ("through", "message"),
+    [
+        ({}, "expected a list of waypoints, {csv: PATH} or {positions: [...]}"),
+        ({"csv": "a", "positions": [[0, 0]]}, "expected a list of waypoints, {csv: PATH}"),
+        ({"cvs": "a"}, "unknown key 'cvs'"),
+        ({"csv": 3}, "expected the path of a file, got 3"),
+        ({"csv": "a.csv", "times": [1]}, "a file's times stand in its column t"),
+        ({"positions": [[0, 1], [2]]}, "expected 2 values, one for each joint, got 1"),
+        ({"positions": []}, "expected a list of rows of joint values"),
+        ({"positions": [[0, 1], [2, 3]], "times": [1]}, "expected 2 numbers, got 1"),
+        ({"positions": [[0, 1], [2, 3]], "times": [2, 1]}, "times must increase"),
+        ({"positions": [[0, 1]], "merge": -1}, "expected a number at least 0 rad, got -1"),
+        ("points.csv", "expected"),
+    ],
+)
+def test_a_wrong_table(through, message):
+    error = refusal({"joints": [0, 0]}, {"planner": "spline", "through": through})
+    assert message in error.problems[0].text()
+    assert error.exit_code == 2
+
+
+@pytest.mark.parametrize("planner", PLANNERS)
+def test_a_table_is_the_list_of_its_rows(planner):
+    rows = np.random.default_rng(1).uniform(-1, 1, (4, 2)).tolist()
+    listed = plan({"joints": [0, 0]}, {"planner": planner, "through": [{"joints": q} for q in rows]}, limits=LIMITS)
+    table = plan({"joints": [0, 0]}, {"planner": planner, "through": {"positions": rows}}, limits=LIMITS)
+    assert curve_of(listed).coefficients.tobytes() == curve_of(table).coefficients.tobytes()
+
+
+def test_names_poses_and_joints_may_be_mixed():
+    home, via = [0, -1.5, 1.5, 0, 1.5, 0], [0.3, -1.2, 1.6, -0.4, 1.5, 0.2]
+    pose = {"xyz": [0.4, 0.1, 0.25], "rpy": ["180 deg", 0, 0]}
+    for end in ({"through": ["via", pose | {"time": 2}, {"joints": home, "time": 3}]}, {"through": ["via"], "to": "place"}):
+        job = {
+            "version": 1,
+            "robot": "ur5e",
+            "points": {"via": {"joints": via}, "place": pose},
+            "start": {"joints": home},
+            "moves": [{"planner": "spline", **end}],
+        }
+        if "to" not in end:
+            job["moves"][0]["through"][0] = {"joints": via, "time": 1}
+        else:
+            job["limits"] = {"acceleration": 8}
+        made = plan_job(job_from_text(json.dumps(job)))
+        assert made.verdict.passed
+        place = forward(made.loaded.robot, made.moves[0].planned.passage.points[2])
+        np.testing.assert_allclose(place[:3, 3], [0.4, 0.1, 0.25], atol=1e-9)
+        np.testing.assert_allclose(np.diag(place)[:3], [1, -1, -1], atol=1e-9)
+
+
+def test_a_pose_out_of_reach_names_the_waypoint():
+    job = {
+        "version": 1,
+        "robot": "ur5e",
+        "start": {"joints": [0, -1.5, 1.5, 0, 1.5, 0]},
+        "moves": [{"planner": "spline", "through": [{"xyz": [4, 0, 0], "time": 1}, {"joints": [0] * 6, "time": 2}]}],
+    }
+    from trajcli.errors import PlanningError
+
+    with pytest.raises(PlanningError, match="waypoint 0: "):
+        plan_job(job_from_text(json.dumps(job)))
+
+
+@pytest.mark.parametrize("planner", PLANNERS)
+@pytest.mark.parametrize("times", ["t,", ""])
+def test_a_job_written_out_is_the_same_plan(tmp_path, planner, times):
+    rows = [[0, 0], [20, 10], [30, 50], [31, 50], [0, 90]]
+    body = "".join((f"{k}," if times else "") + ",".join(map(str, row)) + "\n" for k, row in enumerate(rows))
+    move = {"planner": planner, "through": {"csv": "points.csv", "merge": "2 deg"}}
+    made = recorded(tmp_path, f"{times}q1_deg,q2_deg\n{body}", move, units={"angle": "deg"}, limits={"velocity": 100, "acceleration": 400})
+    text = dump_job(made.loaded)
+    again = plan_job(job_from_text(text))
+    assert curve_of(again).coefficients.tobytes() == curve_of(made).coefficients.tobytes()
+    assert dump_job(again.loaded) == text
+    assert "csv" not in yaml.safe_load(text)["moves"][0]["through"]
+
+
+def test_a_recording_that_follows_a_stretch(tmp_path):
+    """A start in motion is planned anew for each duration; a later target and the recording go along."""
+    text = "t,q1,q2\n0,0,0\n0.1,1,0\n0.3,1,1\n"
+    start = {"joints": [0, 0], "velocity": [1, 0]}
+    for move in ({}, {"to": {"joints": [0, 0], "time": 0.4}}, {"duration": 0.2}):
+        made = recorded(tmp_path, text, move, start=start, when_over_limit="slow")
+        assert made.verdict.passed
+        times = made.moves[0].planned.passage.times
+        assert made.moves[0].stretch > 1
+        np.testing.assert_allclose(times[1:3] / times[2], [1 / 3, 1], rtol=1e-9)
+
+
+def test_points_of_a_recording_are_frozen():
+    one = Recorded(np.zeros((2, 1)), np.arange(2.0))
+    assert not one.positions.flags.writeable
+    assert not one.times.flags.writeable
+
+
+def test_aligned_moves_end_on_whole_periods(tmp_path):
+    for planner in PLANNERS:
+        made = recorded(
+            tmp_path,
+            "q1,q2\n0,0\n1,0\n1,1\n",
+            {"planner": planner},
+            output={"rate": 125, "align": True},
+        )
+        periods = made.trajectory.duration * 125
+        assert periods == pytest.approx(round(periods), abs=1e-6)
+        passage = made.moves[0].planned.passage
+        missed = np.abs(curve_of(made).evaluate(np.clip(passage.times, 0, made.trajectory.duration)) - passage.points)
+        np.testing.assert_allclose(missed, passage.missed, atol=1e-9)
