@@ -25,6 +25,28 @@ EXAMPLES = {
         "  - {planner: jerk_limited, to: {velocity: 30}}        # a run-up: the position is left open\n"
         "  - {planner: jerk_limited, to: {joints: [20]}}\n"
     ),
+    "spline": (
+        f"{_HEAD}start: {{joints: [0]}}\nmoves:\n"
+        "  - planner: spline                                     # example 5 of the lecture\n"
+        "    rule: computed\n"
+        "    through: [{joints: [360], time: 2}, {joints: [90], time: 3}]\n"
+        "    to: {joints: [180], time: 5}\n"
+    ),
+    "blends": (
+        f"{_HEAD}start: {{joints: [0]}}\nmoves:\n"
+        "  - planner: blends                                     # exercise 7 of the lecture\n"
+        "    through: [{joints: [360], time: 2}, {joints: [90], time: 3}, {joints: [180], time: 5}]\n"
+        "    blend_durations: 0.2\n"
+    ),
+    "time_optimal": (
+        f"version: 1\nunits: {{angle: deg}}\nrobot: {{joints: 2}}\n"
+        "limits: {velocity: 60, acceleration: 200}\nstart: {joints: [0, 0]}\nmoves:\n"
+        "  - {planner: time_optimal, through: [{joints: [20, 30]}, {joints: [50, 25]}], to: {joints: [60, 0]}}\n"
+        "  - planner: time_optimal\n"
+        "    path: polyline\n"
+        "    corner: 3                                           # degrees\n"
+        "    through: {positions: [[50, 25], [20, 30], [0, 0]]}\n"
+    ),
     "hold": f"{_HEAD}{_FROM_20}  - {{planner: hold, duration: 0.5}}\n",
 }
 
@@ -56,5 +78,36 @@ is a run-up. Joints that move need limits on velocity, acceleration and jerk (a 
 velocity). With `synchronize: time` all joints arrive together, in the shortest time in which every one
 of them can; with `phase` they follow one law and the path is a straight line in joint space, which the
 velocities and accelerations of start and target must not leave; with `none` each arrives by itself.""",
+    "spline": """\
+`through` lists the points between the start and `to`; without `to` its last point is the target. A point
+is a state, the name of one, or a pose, and may have a `time` from the start of the move: all or none. For
+many points `{positions: [[...], ...], times: [...]}` is the shorter form, and `{csv: FILE}` takes them
+from a recording: a file beside the job with a column for each joint (`q1`, `q1_deg`, or the joint's name)
+and, if the points have times, `t`. A first row that is where the arm stands is the start itself; times
+then count from it. Points that are nearer than `merge` to the one before are left out.
+
+Without times the move is the fastest of its kind within the limits; a `duration` alone stretches that, and
+with a recording it stretches the recording. What the ends impose depends on the rule: velocity and
+acceleration with `continuous_acceleration` and `quintic`, velocity with `imposed`, `computed`, `clamped` and
+`shape_preserving`, nothing with `natural` and `not_a_knot`: they begin and end with the velocity that the
+rule has, which is an event at the start of a job that gives none, and a jump (an error) elsewhere.
+`quintic` takes velocities and accelerations of the points between where they are given.""",
+    "blends": """\
+Points stand as for `spline`. The motion is straight from point to point; around each point a parabola
+lasts for its `blend`, or for `blend_durations`, or is as short as an `acceleration` allows (each joint by
+itself). A point between the ends is missed by the change of velocity times the blend's duration / 8, and
+`explain` says by how much; `exactly` passes it by way of two points beside it.
+
+With `end_blends: centred` the first and the last blend are centred on their times, so that the motion
+begins half a blend before the start and lasts half a blend longer; `inside` keeps the times of both ends.
+Blends that would overlap are shortened, with an event. Without times they are found from the limits of
+velocity and acceleration, and so are the blends. It starts and ends at rest.""",
+    "time_optimal": """\
+Points stand as for `spline`, without times: it is as fast as the limits of velocity and acceleration
+allow along its path, which is a smooth curve through the points (`path: spline`; `rule` and `parameter`
+say which one) or straight from point to point (`path: polyline`). On a polyline it stops at each point,
+or, with `corner`, passes it at no more than that distance by a parabola. The times of a recording are not
+used. `explain` says which limit of which joint binds when. Its acceleration steps, so joints with a limit
+of jerk need another planner. A `duration` stretches the fastest motion.""",
     "hold": "It starts and ends at rest; a start that moves is refused (exit 3).",
 }

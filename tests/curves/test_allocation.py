@@ -117,7 +117,7 @@ def test_no_durations_at_all():
     """A velocity that is given at an end and above its limit stays so however long the pieces last."""
 
     def family(h):
-        spline = CubicSpline(times_of(h), [[0.0], [1.0], [2.0]], bc_type=((1, 5.0), (1, 0.0)))
+        spline = CubicSpline(times_of(h), [[0.0], [1.0], [2.0]], bc_type=((1, [5.0]), (1, [0.0])))
         return PiecewisePolynomial(spline.x, spline.c)
 
     assert fastest_durations(family, np.ones(2), bounds(1, 3)) is None

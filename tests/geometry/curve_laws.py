@@ -7,6 +7,8 @@ import itertools
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+_BESIDE = 1e-10  # m
+
 
 def pieces(curve):
     """Return the ends of the smooth pieces of a curve."""
@@ -92,8 +94,10 @@ def sides(evaluate, places):
 
 
 def continuous(evaluate, places, orders=3, tolerance=1e-9):
-    """Assert that the first `orders` of what `evaluate` returns do not jump."""
-    left, right = sides(evaluate, places)
-    for before, after in zip(left[:orders], right[:orders], strict=True):
-        size = max(1.0, np.abs(before).max(initial=0.0))
-        np.testing.assert_allclose(before, after, rtol=0, atol=tolerance * size)
+    """Assert that the first `orders` of what `evaluate` returns do not jump: on the sides, and beside."""
+    places = np.asarray(places)
+    near = evaluate(places - _BESIDE, "right"), evaluate(places + _BESIDE, "left")
+    for (left, right), allowed in ((sides(evaluate, places), tolerance), (near, 1e-5)):
+        for before, after in zip(left[:orders], right[:orders], strict=True):
+            size = max(1.0, np.abs(before).max(initial=0.0))
+            np.testing.assert_allclose(before, after, rtol=0, atol=allowed * size)

@@ -151,6 +151,11 @@ def test_radii_are_shrunk_to_what_fits(radii, used):
     assert all(part.length > 1e-3 for part in chain.parts)
 
 
+def test_of_an_arc_a_radius_takes_at_most_a_quarter():
+    segments = [Line([-9, 0, 0], [0, 0, 0]), Arc([0, 0, 0], [2, 0, 0], [0, 0, -1], 6.0)]
+    np.testing.assert_allclose(join(segments, 8).corners[0].used, np.pi)
+
+
 def test_a_corner_passes_its_point_at_the_middle_of_the_blend():
     chain = join(SQUARE, [0.2, 0])
     corner = chain.corners[0]

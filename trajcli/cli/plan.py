@@ -48,8 +48,9 @@ def run_plan(job: str, overrides: Sequence[str], options: PlanOptions) -> int:
         from trajcli.pipeline.report import verification_error
 
         raise verification_error(plan)
-    if options.strict and plan.events:
-        raise VerificationError(*(_problem(plan, event) for event in plan.events))
+    conceded = [event for event in plan.events if event.concedes]
+    if options.strict and conceded:
+        raise VerificationError(*(_problem(plan, event) for event in conceded))
     if not options.no_output:
         write_rows(plan, grid, options.output, options.digits)
     if not options.quiet:

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, cast
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, field_validator, model_validator
 from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, SchemaValidator, core_schema
 
 from trajcli.columns import Group
 from trajcli.kinematics.robot import Robot
-from trajcli.planners import Move
+from trajcli.planners import PLANNERS, Planner, moves_schema
 from trajcli.planners.bounds import LimitsSpec
 from trajcli.planners.fields import NamedTarget
 from trajcli.planners.model import Model
@@ -93,6 +96,37 @@ class Output(Model):
         return self
 
 
+class _Moves:
+    """Reads moves by the planners they name: only those are loaded."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
+        return core_schema.with_info_plain_validator_function(self._read)
+
+    @staticmethod
+    def _read(value: Any, info: core_schema.ValidationInfo) -> list[Planner]:  # noqa: ANN401
+        moves = _validator(_tags_of(value)).validate_python(value, context=info.context)
+        return cast("list[Planner]", moves)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        return handler(moves_schema(PLANNERS))
+
+
+def _tags_of(moves: Any) -> frozenset[str]:  # noqa: ANN401
+    """Return the planners that moves name; all of them where a name is wrong."""
+    if not isinstance(moves, list) or not moves:
+        return frozenset(PLANNERS)
+    tags = [m.get("planner") if isinstance(m, Mapping) else getattr(m, "planner", None) for m in moves]
+    known = [tag for tag in tags if isinstance(tag, str) and tag in PLANNERS]
+    return frozenset(known if len(known) == len(moves) else PLANNERS)
+
+
+@cache
+def _validator(tags: frozenset[str]) -> SchemaValidator:
+    return SchemaValidator(moves_schema(sorted(tags)))
+
+
 class Job(Model):
     """One robot, named points, and the moves to plan."""
 
@@ -106,7 +140,7 @@ class Job(Model):
     )
     points: dict[str, NamedTarget] = Field(default_factory=dict, description="Named states.")
     start: Annotated[NamedTarget, Field(description="Where the arm stands before the first move.")]
-    moves: Annotated[list[Move], Field(min_length=1, description="What to do, in order.")]
+    moves: Annotated[list[Planner], _Moves(), Field(description="What to do, in order.")]
     when_over_limit: Annotated[
         WhenOverLimit,
         Field(

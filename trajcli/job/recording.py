@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,7 +15,9 @@ from trajcli.job.load import Document
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.reading import FlawError
 from trajcli.planners.recorded import Recorded
-from trajcli.streams.table import Table, read_csv
+
+if TYPE_CHECKING:
+    from trajcli.streams.table import Table
 
 _WHOSE = {"deg": "revolute", "mm": "prismatic"}
 
@@ -29,6 +32,8 @@ def reader_of(document: Document, robot: Robot) -> Callable[[str], Recorded]:
     folder = Path() if document.file.startswith(("<", "-")) else Path(document.file).parent
 
     def read(path: str) -> Recorded:
+        from trajcli.streams.table import read_csv
+
         try:
             return _recorded(read_csv(folder / path), robot)
         except (InputError, FileError) as error:

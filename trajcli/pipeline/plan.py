@@ -9,16 +9,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trajcli.checks.verify import Verdict, verify
-from trajcli.curves.piecewise import PiecewisePolynomial, concatenate
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
 from trajcli.errors import Amount, Place, TrajcliError
 from trajcli.job.limits import with_move_limits
 from trajcli.job.read import LoadedJob
 from trajcli.pipeline.reach import Reached, mended, start_state, with_joints
-from trajcli.pipeline.reach_through import through_joints
 from trajcli.pipeline.stretch import PlannedMove, aligned, slowed
+from trajcli.planners.fields import Target
 from trajcli.planners.planner import Event, Planner
-from trajcli.planners.point_to_point import PointToPoint
-from trajcli.planners.through_points import ThroughPoints
 from trajcli.trajectory import Span, State, Trajectory
 
 
@@ -84,13 +82,15 @@ def _plan_move(loaded: LoadedJob, index: int, planner: Planner, start: State) ->
 
 
 def _with_joints(planner: Planner, loaded: LoadedJob, state: State) -> tuple[Planner, Reached | None]:
-    """Return the planner with joints in the place of a pose to go to, on the branch nearest to `state`."""
-    if isinstance(planner, ThroughPoints):
-        return through_joints(planner, loaded.robot, state.position)
-    if not isinstance(planner, PointToPoint):
-        return planner, None
-    target, reached = with_joints(planner.to, loaded.robot, state.position)
-    return planner.model_copy(update={"to": target}), reached
+    """Return the planner with joints in the place of poses, and how the last one is reached, if it is one."""
+    found: list[Reached | None] = [None]
+
+    def resolve(target: Target, near: Array) -> Target:
+        resolved, reached = with_joints(target, loaded.robot, near)
+        found[0] = reached
+        return resolved
+
+    return planner.with_places(resolve, state.position), found[0]
 
 
 def _handed_over(state: State, before: Planner | None, after: Planner) -> State:

@@ -1,49 +1,62 @@
-"""Planners: one file each. The union below is their registration; schema, messages, tests, docs read it."""
+"""Planners: one file each. The table below is their registration; schema, messages, tests, docs read it.
+
+A job loads the planners that it uses and no other: building all their models costs more than most plans.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated, Union, get_args
+from collections.abc import Iterable, Iterator, Mapping
+from importlib import import_module
 
-from pydantic import Field
+from pydantic_core import CoreSchema, core_schema
 
-from trajcli.planners.arc import Arc
-from trajcli.planners.blends import Blends
-from trajcli.planners.cubic import Cubic
-from trajcli.planners.cycloidal import Cycloidal
-from trajcli.planners.hold import Hold
-from trajcli.planners.jerk_limited import JerkLimited
-from trajcli.planners.line import Line
-from trajcli.planners.path import PathMove
 from trajcli.planners.planner import Planner
-from trajcli.planners.quintic import Quintic
-from trajcli.planners.screw import Screw
-from trajcli.planners.septic import Septic
-from trajcli.planners.spline import Spline
-from trajcli.planners.time_optimal import TimeOptimal
-from trajcli.planners.trapezoid import Trapezoid
 
-Move = Annotated[
-    Union[  # noqa: UP007
-        Cubic,
-        Quintic,
-        Septic,
-        Cycloidal,
-        Trapezoid,
-        JerkLimited,
-        Spline,
-        Blends,
-        TimeOptimal,
-        Line,
-        Arc,
-        PathMove,
-        Screw,
-        Hold,
-    ],
-    Field(discriminator="planner"),
-]
-
-PLANNERS: dict[str, type[Planner]] = {
-    str(planner.model_fields["planner"].default): planner for planner in get_args(get_args(Move)[0])
+_WHERE = {
+    "cubic": "cubic.Cubic",
+    "quintic": "quintic.Quintic",
+    "septic": "septic.Septic",
+    "cycloidal": "cycloidal.Cycloidal",
+    "trapezoid": "trapezoid.Trapezoid",
+    "jerk_limited": "jerk_limited.JerkLimited",
+    "spline": "spline.Spline",
+    "blends": "blends.Blends",
+    "time_optimal": "time_optimal.TimeOptimal",
+    "line": "line.Line",
+    "arc": "arc.Arc",
+    "path": "path.PathMove",
+    "screw": "screw.Screw",
+    "hold": "hold.Hold",
 }
+"""The module and class of each planner, by its name in job files."""
 
-__all__ = ["PLANNERS", "Move", "Planner"]
+
+class _Planners(Mapping[str, type[Planner]]):
+    """Every planner by its name; one that is asked for is loaded."""
+
+    def __getitem__(self, tag: str) -> type[Planner]:
+        module, _, name = _WHERE[tag].partition(".")
+        planner: type[Planner] = getattr(import_module(f"trajcli.planners.{module}"), name)
+        return planner
+
+    def __contains__(self, tag: object) -> bool:
+        return tag in _WHERE
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_WHERE)
+
+    def __len__(self) -> int:
+        return len(_WHERE)
+
+
+PLANNERS = _Planners()
+
+
+def moves_schema(tags: Iterable[str]) -> CoreSchema:
+    """Return the schema of a list of at least one move, each planned by one of the planners named."""
+    choices = {tag: PLANNERS[tag].__pydantic_core_schema__ for tag in tags}
+    move = core_schema.tagged_union_schema(choices, discriminator="planner")
+    return core_schema.list_schema(move, min_length=1)
+
+
+__all__ = ["PLANNERS", "Planner", "moves_schema"]

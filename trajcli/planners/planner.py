@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
 from pydantic import Field
 
-from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount, PlanningError, said
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.bounds import LimitsSpec
@@ -17,8 +17,11 @@ from trajcli.trajectory import Passage, State
 
 if TYPE_CHECKING:
     from trajcli.kinematics.following.motion import ToolMotion
+    from trajcli.planners.fields import Target
 
+Resolve = Callable[["Target", Array], "Target"]
 WhenOverLimit = Literal["error", "slow"]
+_REMARKS = ("refined",)  # kinds of events that concede nothing
 
 
 @dataclass(frozen=True)
@@ -40,7 +43,7 @@ class Phase:
 
 @dataclass(frozen=True)
 class Event:
-    """A concession that was made, and would otherwise go unnoticed.
+    """A concession that was made, and would otherwise go unnoticed; or a remark on how a curve was found.
 
     Attributes:
         kind: A stable word for programs, such as "slowed".
@@ -53,6 +56,11 @@ class Event:
     message: str
     move: int | None = None
     amounts: Mapping[str, Amount] = field(default_factory=dict)
+
+    @property
+    def concedes(self) -> bool:
+        """Whether anything was given up: a finer grid gives up nothing."""
+        return self.kind not in _REMARKS
 
     def text(self, say: Callable[[Amount], str] = str) -> str:
         """Return the message with its amounts said by `say`."""
@@ -119,6 +127,15 @@ class Planner(Model):
     def joins(self) -> Literal[1, 2]:
         """The continuity of this move: the planner's, unless its fields promise more."""
         return self.continuity
+
+    def with_places(self, resolve: Resolve, near: Array) -> Self:
+        """Return the planner with joints in the place of poses that it goes to in joint space.
+
+        Args:
+            resolve: From a target, and joint values (n,) to be near to, to the same target by its joints.
+            near: Joint values (n,) of where the arm comes from, rad or m.
+        """
+        return self
 
     def told_to_last(self, duration: float) -> Self:
         """Return the planner of the same move over `duration` seconds.

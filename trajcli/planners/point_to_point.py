@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -12,7 +12,7 @@ from trajcli.curves.piecewise import Array, constant
 from trajcli.errors import Amount, MissingLimitError, PlanningError, Problem
 from trajcli.kinematics.robot import QUANTITIES, Limits, Robot
 from trajcli.planners.fields import NamedTarget
-from trajcli.planners.planner import Planned, Planner
+from trajcli.planners.planner import Planned, Planner, Resolve
 from trajcli.planners.reading import refuse
 from trajcli.trajectory import State
 
@@ -32,6 +32,10 @@ class PointToPoint(Planner):
     stops_anywhere: ClassVar[bool] = False
 
     to: Annotated[NamedTarget, Field(description="The state in which the move ends, or the name of a point.")]
+
+    def with_places(self, resolve: Resolve, near: Array) -> Self:
+        """Return the planner with joints in the place of the target's pose."""
+        return self.model_copy(update={"to": resolve(self.to, near)})
 
     @model_validator(mode="after")
     def _can_impose_target(self) -> PointToPoint:

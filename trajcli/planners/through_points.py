@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from trajcli.curves.piecewise import Array
-from trajcli.errors import PlanningError
+from trajcli.errors import PlanningError, TrajcliError
 from trajcli.planners.fields import Duration
-from trajcli.planners.planner import Event, Planner
+from trajcli.planners.planner import Event, Planner, Resolve
 from trajcli.planners.reading import Flaw, refuse
 from trajcli.planners.recorded import Recorded
 from trajcli.planners.waypoints import NamedWaypoint, Through, Waypoint
@@ -132,6 +132,31 @@ class ThroughPoints(Planner):
             if time <= before
         ]
 
+    def with_places(self, resolve: Resolve, near: Array) -> Self:
+        """Return the planner with joints in the place of poses, each near to the point before it.
+
+        Raises:
+            TrajcliError: What `resolve` raises, with the name of the point.
+        """
+        if not any(point.gives_pose for point in self.listed):
+            return self
+        recorded = isinstance(self.through, Recorded)
+        near = self.through.positions[-1] if isinstance(self.through, Recorded) else near
+        points = []
+        for index, point in enumerate(self.listed):
+            try:
+                resolved = resolve(point, near)
+            except TrajcliError as error:
+                last = self.to is not None and index == len(self.listed) - 1
+                raise _of_point(error, "target" if last else f"waypoint {index}") from None
+            near = resolved.as_state().position
+            joined = Waypoint(**resolved.model_dump(), time=point.time, blend=point.blend)
+            points.append(joined if point.gives_pose else point)
+        if self.to is None:
+            return self.model_copy(update={"through": tuple(points)})
+        through = self.through if recorded else tuple(points[:-1])
+        return self.model_copy(update={"through": through, "to": points[-1]})
+
     def told_to_last(self, duration: float) -> Self:
         """Return the planner whose points are passed in the same proportion, the last after `duration` s."""
         last = self._last_time() or self.duration
@@ -203,6 +228,10 @@ def _at_times(points: tuple[Waypoint, ...] | Recorded, factor: float) -> tuple[W
     if isinstance(points, Recorded):
         return points if points.times is None else replace(points, times=points.times * factor)
     return tuple(_at(point, factor) for point in points)
+
+
+def _of_point(error: TrajcliError, name: str) -> TrajcliError:
+    return type(error)(*(replace(p, message=f"{name}: {p.message}") for p in error.problems))
 
 
 def _at(point: Waypoint, factor: float) -> Waypoint:

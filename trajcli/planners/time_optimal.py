@@ -214,7 +214,8 @@ def _events(made: Solved) -> Iterator[Event]:
     if made.refinements:
         yield Event(
             "refined",
-            f"the grid was refined {made.refinements} times, to {made.grid.size} places on the path",
+            f"the grid was refined {'once' if made.refinements == 1 else f'{made.refinements} times'}, "
+            f"to {made.grid.size} places on the path",
         )
     if made.stretch > 1 + _STRETCHED:
         yield Event("stretched", f"stretched {made.stretch:.9g} times to keep all limits between the places")

@@ -37,7 +37,7 @@ class ToolMotion:
     ruled_by: str | None = None
 
     def demand(self, times: Array, side: Side = "right") -> Demand:
-        """Return what the tool is told at times (N,) from the start of the move; rounding apart, within it."""
+        """Return what the tool is told at times (N,) from the start of the move."""
         return self.timed(np.clip(times, self.law.start, self.law.end), side)
 
     def scaled(self, factor: float) -> ToolMotion:

@@ -1,9 +1,9 @@
 """The member of a family of answers that is nearest to a configuration, inside the limits.
 
 Gradient descent on the square of the distance, along the family: the step is what is left of the way once
-all that moves the tcp is taken out of it, times a length that the last two steps tell (Barzilai and Borwein);
-it is kept where it comes nearer. A joint at its limit that would pass it is held. The result is the nearest
-of all around it, not of all there are.
+all that moves the tcp is taken out of it, times a length that the last two steps tell (Barzilai and Borwein).
+Their distances need not fall at every step, and arrive sooner than if they had to. A joint at its limit that
+would pass it is held. The result is the nearest of all around it, not of all there are.
 
 Source: Nocedal and Wright, Numerical Optimization (2006), section 16.7; Barzilai and Borwein, Two-point step
 size gradient methods, IMA J. Numerical Analysis 8 (1988).
@@ -91,8 +91,6 @@ class _Walk:
             return False
         here = self.joints[rows]
         trial, good = self._corrected(rows, here + self._shortened(rows, way), _NEARLY_MET)
-        gap, before = (np.square(self._near[rows] - values).sum(axis=1) for values in (trial, here))
-        good &= gap < before
         if self._allowed is not None and good.any():
             asked = np.flatnonzero(good)
             good[asked] = self._allowed(rows[asked], trial[asked])
