@@ -23,6 +23,7 @@ BENCHMARKS = (
     "forward_kinematics",
     "inverse_kinematics",
     "time_optimal",
+    "through_points",
 )
 OURS = ("trajcli", "numpy", "pydantic", "pyyaml", "typer")
 THEIRS = ("roboticstoolbox-python", "eaik", "toppra", "numpy", "scipy")

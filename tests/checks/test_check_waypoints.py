@@ -17,7 +17,9 @@ TIMES = np.array([0.0, 2.0, 4.0])
 
 
 def promise(times=TIMES, points=POINTS, missed=0.0):
-    return Passage(np.asarray(times), points, np.broadcast_to(np.asarray(missed, dtype=float), points.shape).copy())
+    return Passage(
+        np.asarray(times), points, np.broadcast_to(np.asarray(missed, dtype=float), points.shape).copy()
+    )
 
 
 def passing():

@@ -36,7 +36,9 @@ def resting(q):
 
     def family(h):
         way, h = np.diff(q, axis=0), h[:, None]
-        return PiecewisePolynomial(times_of(h[:, 0]), np.stack([-2 * way / h**3, 3 * way / h**2, 0 * way, q[:-1]]))
+        return PiecewisePolynomial(
+            times_of(h[:, 0]), np.stack([-2 * way / h**3, 3 * way / h**2, 0 * way, q[:-1]])
+        )
 
     return family
 
@@ -88,7 +90,9 @@ def test_no_slower_than_a_search_of_scipy(seed, count, joints):
     def room(y):
         curve = family(np.exp(y))
         at = (curve.breaks[:-1, None] + curve.lengths[:, None] * np.linspace(0.001, 0.999, 24)).ravel()
-        return np.concatenate([1 - np.abs(curve.evaluate(at, o)).ravel() / b for o, b in ((1, 1.0), (2, 3.0))])
+        return np.concatenate(
+            [1 - np.abs(curve.evaluate(at, o)).ravel() / b for o, b in ((1, 1.0), (2, 3.0))]
+        )
 
     best = np.inf
     for k in range(5):

@@ -33,7 +33,9 @@ def test_values_outside_are_taken_to_the_ends():
 def test_the_earliest_time_where_the_law_rests():
     """S rises to 1, rests for a second, rises to 2."""
     curve = law([0, 1, 2, 3], [1, 0], [0, 1], [1, 1])
-    np.testing.assert_allclose(times_at(curve, np.array([0.5, 1.0, 1.0 + 1e-9, 1.5])), [0.5, 1.0, 2 + 1e-9, 2.5])
+    np.testing.assert_allclose(
+        times_at(curve, np.array([0.5, 1.0, 1.0 + 1e-9, 1.5])), [0.5, 1.0, 2 + 1e-9, 2.5]
+    )
 
 
 def test_breaks_are_met_exactly():

@@ -93,11 +93,11 @@ def sides(evaluate, places):
     return evaluate(np.asarray(places), "left"), evaluate(np.asarray(places), "right")
 
 
-def continuous(evaluate, places, orders=3, tolerance=1e-9):
+def continuous(evaluate, places, orders=3, tolerance=1e-9, beside=1e-5):
     """Assert that the first `orders` of what `evaluate` returns do not jump: on the sides, and beside."""
     places = np.asarray(places)
     near = evaluate(places - _BESIDE, "right"), evaluate(places + _BESIDE, "left")
-    for (left, right), allowed in ((sides(evaluate, places), tolerance), (near, 1e-5)):
+    for (left, right), allowed in ((sides(evaluate, places), tolerance), (near, beside)):
         for before, after in zip(left[:orders], right[:orders], strict=True):
             size = max(1.0, np.abs(before).max(initial=0.0))
             np.testing.assert_allclose(before, after, rtol=0, atol=allowed * size)

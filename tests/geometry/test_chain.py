@@ -108,7 +108,7 @@ def test_a_smooth_corner_gets_what_the_others_leave():
 def test_a_rounded_chain_is_smooth_and_keeps_to_its_segments(segments, radius):
     chain = join(segments, radius)
     assert not chain.stops.size
-    continuous(chain.evaluate, chain.breaks, tolerance=1e-8)
+    continuous(chain.evaluate, chain.breaks, tolerance=1e-8, beside=1e-2)
     keeps_the_laws_of_a_place(chain, scale=1e-3, tolerance=1e-4)
     np.testing.assert_allclose(
         chain.evaluate(np.array([0, chain.length]))[0],
@@ -129,7 +129,7 @@ def test_a_rounded_chain_is_smooth_and_keeps_to_its_segments(segments, radius):
         assert corner.deviation == pytest.approx(distances.min(), rel=1e-3, abs=1e-9)
         np.testing.assert_allclose(distances[[0, -1]] <= corner.used * (1 + 1e-9), True)
     attitude_is_kept(chain, 1e-9)
-    continuous(chain.transport, chain.breaks, orders=2, tolerance=1e-8)
+    continuous(chain.transport, chain.breaks, orders=2, tolerance=1e-8, beside=1e-2)
 
 
 @pytest.mark.parametrize(

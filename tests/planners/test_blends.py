@@ -35,7 +35,9 @@ def test_the_slides(case):
     inputs, expected, within = case["inputs"], case["expected"], case["tolerance"]
     rests = not (inputs["v_start"] or inputs["v_end"])
     inner = slice(None) if rests else slice(1, -1)
-    low, high = (-np.inf, np.inf) if rests else (expected["blends"][0]["t_end"], expected["blends"][-1]["t_start"])
+    low, high = (
+        (-np.inf, np.inf) if rests else (expected["blends"][0]["t_end"], expected["blends"][-1]["t_start"])
+    )
     for made in jobs_of(case):
         told = explanation(made)["moves"][0]
         assert -told["origin"] == pytest.approx(expected["start_time"], abs=within)
@@ -260,11 +262,19 @@ WRONG = {
     "own only": ({"through": [TIMED[0] | {"blend": 0.1}, TIMED[1]]}, "the blends of the other points", 2),
     "own without times": ({"through": [FREE[0] | {"blend": 0.1}, FREE[1]]}, "need points with times", 2),
     "velocity": ({"through": [TIMED[0] | {"velocity": 1}, TIMED[1]]}, "blends compute the velocity", 2),
-    "end velocity": ({"through": TIMED[:1], "to": TIMED[1] | {"velocity": 1}}, "blends compute the velocity", 2),
+    "end velocity": (
+        {"through": TIMED[:1], "to": TIMED[1] | {"velocity": 1}},
+        "blends compute the velocity",
+        2,
+    ),
     "not a duration": ({"through": TIMED, "blend_durations": [0.1, -1, 0.1]}, "above 0 s, got -1", 2),
     "no limit": ({"through": FREE}, "blends needs a limit on the acceleration of j1, j2 to find when", 2),
     "no acceleration": ({"through": TIMED}, "blends needs a limit on the acceleration of j1, j2 for its", 2),
-    "too slow": ({"through": TIMED, "acceleration": 0.1, "end_blends": "inside"}, "is too small for the blend", 3),
+    "too slow": (
+        {"through": TIMED, "acceleration": 0.1, "end_blends": "inside"},
+        "is too small for the blend",
+        3,
+    ),
     "order": ({"through": TIMED[::-1], "blend_durations": 0.1}, "times must increase", 2),
 }
 
@@ -279,5 +289,7 @@ def test_wrong_input_is_one_clear_error(fields, message, code):
 
 
 def test_a_start_in_motion_is_refused():
-    error = refusal({**START, "velocity": [0, 1]}, {"planner": "blends", "through": TIMED, "blend_durations": 0.1})
+    error = refusal(
+        {**START, "velocity": [0, 1]}, {"planner": "blends", "through": TIMED, "blend_durations": 0.1}
+    )
     assert "the velocity of j2 is 1 rad/s at its start" in str(error)

@@ -300,7 +300,10 @@ WRONG = {
     ),
     "virtual times outside": ({"through": FIRST, "virtual_times": [0.5, 4]}, "0 to 1 s and 1 to 3 s"),
     "virtual times of free points": ({"through": FREE, "virtual_times": [0.5, 4]}, "waypoints with times"),
-    "no virtual points": ({"rule": "natural", "through": FIRST, "virtual_times": [0.5, 2]}, "no virtual points"),
+    "no virtual points": (
+        {"rule": "natural", "through": FIRST, "virtual_times": [0.5, 2]},
+        "no virtual points",
+    ),
     "joints": ({"through": [{"joints": [1], "time": 1}]}, "expected 2 values, one for each joint, got 1"),
     "an unknown rule": ({"rule": "monotone", "through": FIRST}, "expected imposed, computed"),
     "no limit": ({"through": FREE}, "spline needs a limit on the velocity of j1, j2"),

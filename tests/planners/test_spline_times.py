@@ -103,7 +103,9 @@ def test_limits_by_direction():
     limits = {"velocity": [[-0.2, VELOCITY]], "acceleration": ACCELERATION}
     made = plan({"joints": q[0].tolist()}, {"planner": "spline", "through": points}, limits=limits)
     times = made.moves[0].planned.passage.times
-    assert made.trajectory.duration <= WITHIN * fastest("continuous_acceleration", q, np.diff(times), down=0.2)
+    assert made.trajectory.duration <= WITHIN * fastest(
+        "continuous_acceleration", q, np.diff(times), down=0.2
+    )
     assert made.verdict.peaks[0][1].low[0] == pytest.approx(-0.2, rel=1e-6)
 
 
@@ -140,7 +142,9 @@ def test_a_duration_that_is_too_short_is_over_its_limits():
     made = plan(start, move, limits=limits, passes=False)
     assert {finding.kind for finding in made.verdict.findings} == {"velocity", "acceleration"}
     slowed = plan(start, {**move, "when_over_limit": "slow"}, limits=limits)
-    assert slowed.trajectory.duration == pytest.approx(free("continuous_acceleration", q).trajectory.duration, rel=1e-6)
+    assert slowed.trajectory.duration == pytest.approx(
+        free("continuous_acceleration", q).trajectory.duration, rel=1e-6
+    )
 
 
 def test_an_end_that_no_times_can_keep():
@@ -164,4 +168,6 @@ def test_many_points_take_no_longer_than_stopping_at_each():
     np.testing.assert_array_less(np.diff(made.moves[0].planned.passage.times), 10)
     assert_passes(made, made.moves[0].planned.passage.times, q)
     curve = curve_of(made)
-    assert np.abs(curve.evaluate(np.linspace(0, curve.duration, 50_001), 2)).max() <= ACCELERATION * (1 + 1e-9)
+    assert np.abs(curve.evaluate(np.linspace(0, curve.duration, 50_001), 2)).max() <= ACCELERATION * (
+        1 + 1e-9
+    )

@@ -46,8 +46,12 @@ def test_units_stand_in_the_columns_names(tmp_path):
     text = "lift_mm,t,q1_deg\n0,0,0\n500,1,90\n100,3,-180\n"
     made = recorded(tmp_path, text, robot=robot, limits={}, units={"length": "mm"})
     assert_passes(made, [0, 1, 3], [[0, 0], [np.pi / 2, 0.5], [-np.pi, 0.1]])
-    si = recorded(tmp_path, "t,lift,turn\n0,0,0\n1,0.5,1\n3,0.1,2\n", robot=robot, limits={}, units={"angle": "deg"})
-    assert_passes(si, [0, 1, 3], [[0, 0], [1, 0.5], [2, 0.1]])  # a plain name is SI whatever the job's units are
+    si = recorded(
+        tmp_path, "t,lift,turn\n0,0,0\n1,0.5,1\n3,0.1,2\n", robot=robot, limits={}, units={"angle": "deg"}
+    )
+    assert_passes(
+        si, [0, 1, 3], [[0, 0], [1, 0.5], [2, 0.1]]
+    )  # a plain name is SI whatever the job's units are
 
 
 def test_times_count_from_the_first_row_where_the_arm_stands(tmp_path):
@@ -161,7 +165,9 @@ def test_a_wrong_table(through, message):
 @pytest.mark.parametrize("planner", PLANNERS)
 def test_a_table_is_the_list_of_its_rows(planner):
     rows = np.random.default_rng(1).uniform(-1, 1, (4, 2)).tolist()
-    listed = plan({"joints": [0, 0]}, {"planner": planner, "through": [{"joints": q} for q in rows]}, limits=LIMITS)
+    listed = plan(
+        {"joints": [0, 0]}, {"planner": planner, "through": [{"joints": q} for q in rows]}, limits=LIMITS
+    )
     table = plan({"joints": [0, 0]}, {"planner": planner, "through": {"positions": rows}}, limits=LIMITS)
     assert curve_of(listed).coefficients.tobytes() == curve_of(table).coefficients.tobytes()
 
@@ -169,7 +175,10 @@ def test_a_table_is_the_list_of_its_rows(planner):
 def test_names_poses_and_joints_may_be_mixed():
     home, via = [0, -1.5, 1.5, 0, 1.5, 0], [0.3, -1.2, 1.6, -0.4, 1.5, 0.2]
     pose = {"xyz": [0.4, 0.1, 0.25], "rpy": ["180 deg", 0, 0]}
-    for end in ({"through": ["via", pose | {"time": 2}, {"joints": home, "time": 3}]}, {"through": ["via"], "to": "place"}):
+    for end in (
+        {"through": ["via", pose | {"time": 2}, {"joints": home, "time": 3}]},
+        {"through": ["via"], "to": "place"},
+    ):
         job = {
             "version": 1,
             "robot": "ur5e",
@@ -193,7 +202,9 @@ def test_a_pose_out_of_reach_names_the_waypoint():
         "version": 1,
         "robot": "ur5e",
         "start": {"joints": [0, -1.5, 1.5, 0, 1.5, 0]},
-        "moves": [{"planner": "spline", "through": [{"xyz": [4, 0, 0], "time": 1}, {"joints": [0] * 6, "time": 2}]}],
+        "moves": [
+            {"planner": "spline", "through": [{"xyz": [4, 0, 0], "time": 1}, {"joints": [0] * 6, "time": 2}]}
+        ],
     }
     from trajcli.errors import PlanningError
 
@@ -207,7 +218,13 @@ def test_a_job_written_out_is_the_same_plan(tmp_path, planner, times):
     rows = [[0, 0], [20, 10], [30, 50], [31, 50], [0, 90]]
     body = "".join((f"{k}," if times else "") + ",".join(map(str, row)) + "\n" for k, row in enumerate(rows))
     move = {"planner": planner, "through": {"csv": "points.csv", "merge": "2 deg"}}
-    made = recorded(tmp_path, f"{times}q1_deg,q2_deg\n{body}", move, units={"angle": "deg"}, limits={"velocity": 100, "acceleration": 400})
+    made = recorded(
+        tmp_path,
+        f"{times}q1_deg,q2_deg\n{body}",
+        move,
+        units={"angle": "deg"},
+        limits={"velocity": 100, "acceleration": 400},
+    )
     text = dump_job(made.loaded)
     again = plan_job(job_from_text(text))
     assert curve_of(again).coefficients.tobytes() == curve_of(made).coefficients.tobytes()
@@ -244,5 +261,7 @@ def test_aligned_moves_end_on_whole_periods(tmp_path):
         periods = made.trajectory.duration * 125
         assert periods == pytest.approx(round(periods), abs=1e-6)
         passage = made.moves[0].planned.passage
-        missed = np.abs(curve_of(made).evaluate(np.clip(passage.times, 0, made.trajectory.duration)) - passage.points)
+        missed = np.abs(
+            curve_of(made).evaluate(np.clip(passage.times, 0, made.trajectory.duration)) - passage.points
+        )
         np.testing.assert_allclose(missed, passage.missed, atol=1e-9)

@@ -51,7 +51,9 @@ def test_a_straight_way(path, distance):
     assert made.trajectory.duration == pytest.approx(along(distance), rel=1e-4)
 
 
-@pytest.mark.parametrize("fields", [{}, {"rule": "natural"}, {"parameter": "centripetal"}, {"path": "polyline"}])
+@pytest.mark.parametrize(
+    "fields", [{}, {"rule": "natural"}, {"parameter": "centripetal"}, {"path": "polyline"}]
+)
 def test_points_are_passed_in_order_within_the_limits(fields):
     q = points()
     made = fastest(q, **fields)
@@ -141,7 +143,11 @@ def test_velocities_at_the_ends():
     up, down = (V - 0.5) / A, V / A
     way = 1 - (V**2 - 0.5**2) / (2 * A) - V**2 / (2 * A)
     assert made.trajectory.duration == pytest.approx(up + down + way / V, rel=1e-4)
-    move = {"planner": "time_optimal", "through": [{"joints": [1, 1]}], "to": {"joints": [2, 1], "velocity": [1, 0.2]}}
+    move = {
+        "planner": "time_optimal",
+        "through": [{"joints": [1, 1]}],
+        "to": {"joints": [2, 1], "velocity": [1, 0.2]},
+    }
     ending = plan({"joints": [0, 0]}, move, limits=LIMITS)
     np.testing.assert_allclose(ending.trajectory.end.velocity, [1, 0.2])
     np.testing.assert_allclose(curve_of(ending).piece_ends(1)[1][-1], [1, 0.2], atol=1e-9)
@@ -200,8 +206,18 @@ FREE = [{"joints": [1, 2]}, {"joints": [2, 1]}]
 WRONG = {
     "time": ({"through": [FREE[0] | {"time": 1}, FREE[1] | {"time": 2}]}, "finds the times", 2, LIMITS),
     "blend": ({"through": [FREE[0] | {"blend": 1}, FREE[1]]}, "has no blends", 2, LIMITS),
-    "velocity": ({"through": [FREE[0] | {"velocity": 1}, FREE[1]]}, "does not impose the velocity", 2, LIMITS),
-    "acceleration": ({"through": [FREE[0], FREE[1] | {"acceleration": 1}]}, "not impose the accel", 2, LIMITS),
+    "velocity": (
+        {"through": [FREE[0] | {"velocity": 1}, FREE[1]]},
+        "does not impose the velocity",
+        2,
+        LIMITS,
+    ),
+    "acceleration": (
+        {"through": [FREE[0], FREE[1] | {"acceleration": 1}]},
+        "not impose the accel",
+        2,
+        LIMITS,
+    ),
     "corner": ({"through": FREE, "corner": 0.1}, "a spline has no corner", 2, LIMITS),
     "rule": ({"through": FREE, "path": "polyline", "rule": "natural"}, "a polyline has no rule", 2, LIMITS),
     "parameter": ({"through": FREE, "path": "polyline", "parameter": "chord"}, "has no parameter", 2, LIMITS),

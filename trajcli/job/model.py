@@ -6,16 +6,23 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, field_validator, model_validator
+from pydantic import (
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    TypeAdapter,
+    field_validator,
+    model_validator,
+)
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema, SchemaValidator, core_schema
+from pydantic_core import CoreSchema, core_schema
 
 from trajcli.columns import Group
 from trajcli.kinematics.robot import Robot
-from trajcli.planners import PLANNERS, Planner, moves_schema
+from trajcli.planners import PLANNERS, Planner, moves_adapter
 from trajcli.planners.bounds import LimitsSpec
 from trajcli.planners.fields import NamedTarget
 from trajcli.planners.model import Model
@@ -104,13 +111,13 @@ class _Moves:
 
     @staticmethod
     def _read(value: Any, info: core_schema.ValidationInfo) -> list[Planner]:  # noqa: ANN401
-        moves = _validator(_tags_of(value)).validate_python(value, context=info.context)
-        return cast("list[Planner]", moves)
+        moves: list[Planner] = _adapter(_tags_of(value)).validate_python(value, context=info.context)
+        return moves
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        return handler(moves_schema(PLANNERS))
+        return handler(moves_adapter(PLANNERS).core_schema)
 
 
 def _tags_of(moves: Any) -> frozenset[str]:  # noqa: ANN401
@@ -123,8 +130,8 @@ def _tags_of(moves: Any) -> frozenset[str]:  # noqa: ANN401
 
 
 @cache
-def _validator(tags: frozenset[str]) -> SchemaValidator:
-    return SchemaValidator(moves_schema(sorted(tags)))
+def _adapter(tags: frozenset[str]) -> TypeAdapter[list[Planner]]:
+    return moves_adapter(tags)
 
 
 class Job(Model):

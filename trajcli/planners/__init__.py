@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from importlib import import_module
+from typing import Annotated, Union
 
-from pydantic_core import CoreSchema, core_schema
+from pydantic import Field, TypeAdapter
 
 from trajcli.planners.planner import Planner
 
@@ -29,6 +30,7 @@ _WHERE = {
     "hold": "hold.Hold",
 }
 """The module and class of each planner, by its name in job files."""
+_ALWAYS = ("hold", "cubic")  # small ones
 
 
 class _Planners(Mapping[str, type[Planner]]):
@@ -52,11 +54,14 @@ class _Planners(Mapping[str, type[Planner]]):
 PLANNERS = _Planners()
 
 
-def moves_schema(tags: Iterable[str]) -> CoreSchema:
-    """Return the schema of a list of at least one move, each planned by one of the planners named."""
-    choices = {tag: PLANNERS[tag].__pydantic_core_schema__ for tag in tags}
-    move = core_schema.tagged_union_schema(choices, discriminator="planner")
-    return core_schema.list_schema(move, min_length=1)
+def moves_adapter(tags: Iterable[str]) -> TypeAdapter[list[Planner]]:
+    """Return what reads a list of at least one move, each planned by one of the planners named.
+
+    A union of one would not say in its errors which planner it is about: there are always two in it.
+    """
+    named = sorted({*tags, *_ALWAYS})
+    union = Annotated[Union[tuple(PLANNERS[tag] for tag in named)], Field(discriminator="planner")]  # type: ignore[valid-type]  # noqa: UP007
+    return TypeAdapter(Annotated[list[union], Field(min_length=1)])  # type: ignore[arg-type, valid-type]
 
 
-__all__ = ["PLANNERS", "Planner", "moves_schema"]
+__all__ = ["PLANNERS", "Planner", "moves_adapter"]

@@ -30,8 +30,20 @@ class Recorded:
         if self.times is not None:
             object.__setattr__(self, "times", read_only(self.times))
 
+    def __eq__(self, other: object) -> bool:
+        """Compare points, times and tolerance; the same points from another file are the same."""
+        return isinstance(other, Recorded) and self._content == other._content
+
+    def __hash__(self) -> int:
+        return hash(self._content)
+
+    @property
+    def _content(self) -> tuple[object, ...]:
+        times = b"" if self.times is None else self.times.tobytes()
+        return self.positions.shape, self.positions.tobytes(), times, self.merge
+
     def begins_at(self, start: Array) -> bool:
-        """Return whether the first point is where the arm stands, `start` (n,): it is then no further point."""
+        """Return whether the first point is where the arm stands, `start` (n,): then it is no further one."""
         return len(self.positions) > 1 and bool((np.abs(self.positions[0] - start) <= self.merge).all())
 
     def after(self, start: Array, target: Array | None = None) -> Recorded:

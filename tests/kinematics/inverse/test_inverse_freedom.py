@@ -227,7 +227,7 @@ def test_members_come_nearer_by_whole_turns_and_along_the_family_and_stay_inside
     robot, joints, target, rng = case(name, kind, axis, 40)
     turning = np.array([joint.type == "revolute" for joint in robot.joints])
     span = np.where(turning, 3.0, 0.2)
-    low, high = joints.min(axis=0) - 0.1 * span, joints.max(axis=0) + 0.1 * span
+    low, high = joints.min(axis=0) - 0.01 * span, joints.max(axis=0) + 0.01 * span
     robot = replace(robot, limits=replace(robot.limits, position=np.stack([low, high], axis=1)))
     near = joints + rng.uniform(-1, 1, joints.shape) * span
     members = nearest_members(robot, target, joints, near)

@@ -90,7 +90,9 @@ class _Walk:
         if not len(rows):
             return False
         here = self.joints[rows]
-        trial, good = self._corrected(rows, here + self._shortened(rows, way), _NEARLY_MET)
+        step = way * self._length[rows, None]
+        step *= np.minimum(1.0, _LONGEST / np.maximum(np.abs(step).max(axis=1, keepdims=True), _LONGEST))
+        trial, good = self._corrected(rows, here + step, _NEARLY_MET)
         if self._allowed is not None and good.any():
             asked = np.flatnonzero(good)
             good[asked] = self._allowed(rows[asked], trial[asked])
@@ -136,9 +138,10 @@ class _Walk:
     def _corrected(self, rows: NDArray[np.intp], q: Array, tolerance: float) -> tuple[Array, Flags]:
         """Return joint values (K, n) brought back to their targets, and which are there inside the limits.
 
-        Joints that stand at a limit stay.
+        Joints at a limit, or beyond it, are taken there and stay.
         """
         target, low, high = self._target.rows(rows), self._low[rows], self._high[rows]
+        q = np.clip(q, low, high)
         held = (q >= high - _AT_LIMIT) | (q <= low + _AT_LIMIT)
         bars, nothing = held[:, :, None] * np.eye(q.shape[1]), np.zeros(q.shape)
         for _ in range(_CORRECTIONS):
@@ -149,16 +152,6 @@ class _Walk:
         errors, _ = linearised(self._robot, target, q)
         inside = ((q >= low) & (q <= high)).all(axis=1)
         return q, np.asarray((np.linalg.norm(errors, axis=1) <= tolerance) & inside)
-
-    def _shortened(self, rows: NDArray[np.intp], way: Array) -> Array:
-        """Return the steps (K, n): no longer than allowed, and none past a limit."""
-        step = way * self._length[rows, None]
-        longest = np.abs(step).max(axis=1, keepdims=True)
-        step *= np.minimum(1.0, _LONGEST / np.maximum(longest, _LONGEST))
-        room = np.where(step > 0.0, self._high[rows], self._low[rows]) - self.joints[rows]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            part = np.where(step != 0.0, room / step, np.inf)
-        return np.asarray(step * np.clip(part.min(axis=1), 0.0, 1.0)[:, None])
 
 
 def _inside(slopes: Array, gap: Array) -> Array:
