@@ -24,6 +24,7 @@ BENCHMARKS = (
     "inverse_kinematics",
     "time_optimal",
     "through_points",
+    "operational",
 )
 OURS = ("trajcli", "numpy", "pydantic", "pyyaml", "typer")
 THEIRS = ("roboticstoolbox-python", "eaik", "toppra", "numpy", "scipy")

@@ -12,13 +12,17 @@ from pydantic.fields import FieldInfo
 from docs.markdown import first_sentence, table
 from trajcli.job.model import Output, RobotSource, UnitsSpec
 from trajcli.job.robot_model import JointModel
-from trajcli.planners import PLANNERS
+from trajcli.planners import PLANNERS, Planner
+from trajcli.planners.blends import BlendDurations
 from trajcli.planners.bounds import UNLIMITED, Bounds, JointBound, LimitsSpec, Scale
+from trajcli.planners.deviation import Deviation
 from trajcli.planners.fields import Target
 from trajcli.planners.per_joint import PerJoint
 from trajcli.planners.pose_fields import AxisAngle, Configuration, Direction, Euler, Matrix, Numbers
 from trajcli.planners.poses import Pose
 from trajcli.planners.reading import FieldType, Number
+from trajcli.planners.time_optimal import PathParameter
+from trajcli.planners.waypoints import PointsField, Waypoint
 from trajcli.units import Quantity, Units, unit_name
 
 SECTIONS: dict[type, str] = {
@@ -31,11 +35,13 @@ SECTIONS: dict[type, str] = {
     AxisAngle: "[axis and angle](#axis-and-angle)",
     Euler: "[Euler angles](#euler-angles)",
     Configuration: "[configuration](#configuration)",
+    Waypoint: "[waypoint](#waypoints)",
 }
 """Where a model that stands inside another one is described."""
 
 _BY_JOINT = "[for each joint](#values-by-joint)"
 _LEFT_OUT = "left out"
+_POINTS = "list of [waypoints](#waypoints), or `{positions, times, merge}`, or `{csv, merge}`"
 
 
 def field_table(model: type[BaseModel], left_out: Mapping[str, str] | None = None) -> str:
@@ -74,6 +80,8 @@ def _annotations(field: FieldInfo) -> list[Any]:
 
 
 def _form(field: FieldInfo) -> str:
+    if any(isinstance(item, PointsField) for item in field.metadata):
+        return _POINTS
     reader = field_type(field)
     return _type_form(field.annotation) if reader is None else _reader_form(reader)
 
@@ -94,6 +102,9 @@ def _reader_form(reader: FieldType) -> str:
         JointBound: "[bound](#bounds)",
         Pose: "[pose](#poses)",
         RobotSource: "[robot](#robot)",
+        Deviation: "number at least 0",
+        BlendDurations: "number above 0, or a list of them",
+        PathParameter: "`chord` or `centripetal` or `uniform` or a list of numbers",
     }
     return forms[type(reader)]
 
@@ -125,7 +136,7 @@ def _type_form(annotation: Any) -> str:  # noqa: ANN401
         return f"names, each with a {_type_form(arms[1])}"
     if origin in (Union, types.UnionType):
         return "[move](#moves)"
-    plain = {bool: "`true` or `false`", str: "text", float: "number"}
+    plain = {bool: "`true` or `false`", str: "text", float: "number", Planner: "[move](#moves)"}
     return plain[bare] if bare in plain else SECTIONS[bare]
 
 
@@ -135,6 +146,8 @@ def _unit(field: FieldInfo) -> str:
         return "joint" + ("", "/s", "/s^2", "/s^3")[reader.order]
     if isinstance(reader, Number | Numbers):
         return _quantity_unit(reader.quantity)
+    if isinstance(reader, Deviation | BlendDurations):
+        return "joint" if isinstance(reader, Deviation) else "s"
     listed = [item for item in get_args(_bare(field.annotation)) if get_origin(item) is Annotated]
     inner = [item for arm in listed for item in get_args(arm) if isinstance(item, Number)]
     return _quantity_unit(inner[0].quantity) if inner else ""

@@ -23,6 +23,7 @@ from trajcli.planners.point_to_point import PointToPoint
 from trajcli.planners.pose_fields import AxisAngle, Configuration, Euler
 from trajcli.planners.poses import SEQUENCES
 from trajcli.planners.reading import MAX_JOINTS
+from trajcli.planners.waypoints import Waypoint
 
 _INTRODUCTION = """\
 A job is one YAML document. Numbers follow YAML 1.2; anchors, tags, duplicate keys, unknown keys, NaN
@@ -89,6 +90,14 @@ Which branch is meant. `left` reaches along the x axis of the first link, `right
 `up` has the elbow higher along the first axis (for planar arms: left of the line to the tcp); `no_flip`
 bends joint 5 positively. `trajcli ik` lists the branches of a pose by these names."""
 
+_WAYPOINTS = """\
+A point that a move passes: the name of a point, or a state with a place and, if it is said when, a
+`time`. Poses are reached on the branch nearest to the point before. A table `{positions: [[...], ...],
+times: [...]}` is the shorter form for joint values without anything else; `{csv: FILE}` takes the table
+from a file beside the job, with a column for each joint (`q1`, `q1_deg`, or the joint's name) and, if its
+points have times, `t`. A first row of a table that is where the arm stands is the start itself; times
+then count from it. Rows of a table that are nearer than `merge` to the one before are left out."""
+
 _MOVES = """\
 Each move starts in the state in which the one before it ended: position and velocity, and the
 acceleration where both planners have continuity 2 (else it is zero). Where a `duration` may be left
@@ -130,6 +139,7 @@ def job_reference() -> str:
     parts += ["## States", _STATES, field_table(Target, {"joints": "see the planner"}), _POSE_TARGETS]
     parts += ["### Axis and angle", field_table(AxisAngle), "### Euler angles", field_table(Euler)]
     parts += ["### Configuration", _CONFIGURATION, field_table(Configuration)]
+    parts += ["### Waypoints", _WAYPOINTS, field_table(Waypoint, {"joints": "a pose instead"})]
     parts += ["## Values by joint", _VALUES]
     parts += ["## Limits", _LIMITS, field_table(LimitsSpec)]
     parts += ["### Scale", first_sentence(Scale.__doc__), field_table(Scale), "### Bounds", _BOUNDS]

@@ -39,9 +39,9 @@ EXAMPLES = {
         "    blend_durations: 0.2\n"
     ),
     "time_optimal": (
-        f"version: 1\nunits: {{angle: deg}}\nrobot: {{joints: 2}}\n"
+        "version: 1\nunits: {angle: deg}\nrobot: {joints: 2}\n"
         "limits: {velocity: 60, acceleration: 200}\nstart: {joints: [0, 0]}\nmoves:\n"
-        "  - {planner: time_optimal, through: [{joints: [20, 30]}, {joints: [50, 25]}], to: {joints: [60, 0]}}\n"
+        "  - {planner: time_optimal, through: {positions: [[20, 30], [50, 25]]}, to: {joints: [60, 0]}}\n"
         "  - planner: time_optimal\n"
         "    path: polyline\n"
         "    corner: 3                                           # degrees\n"
@@ -79,12 +79,8 @@ velocity). With `synchronize: time` all joints arrive together, in the shortest 
 of them can; with `phase` they follow one law and the path is a straight line in joint space, which the
 velocities and accelerations of start and target must not leave; with `none` each arrives by itself.""",
     "spline": """\
-`through` lists the points between the start and `to`; without `to` its last point is the target. A point
-is a state, the name of one, or a pose, and may have a `time` from the start of the move: all or none. For
-many points `{positions: [[...], ...], times: [...]}` is the shorter form, and `{csv: FILE}` takes them
-from a recording: a file beside the job with a column for each joint (`q1`, `q1_deg`, or the joint's name)
-and, if the points have times, `t`. A first row that is where the arm stands is the start itself; times
-then count from it. Points that are nearer than `merge` to the one before are left out.
+`through` lists the [waypoints](#waypoints) between the start and `to`; without `to` its last point is the
+target. Either all of them have a `time` or none.
 
 Without times the move is the fastest of its kind within the limits; a `duration` alone stretches that, and
 with a recording it stretches the recording. What the ends impose depends on the rule: velocity and

@@ -80,6 +80,7 @@ def test_every_planner_has_its_section_with_every_field(tag: str) -> None:
         ("## Job", None),
         ("## Units", "UnitsSpec"),
         ("## States", "Target"),
+        ("### Waypoints", "Waypoint"),
         ("## Limits", "LimitsSpec"),
         ("### Scale", "Scale"),
         ("## Robot", "RobotModel"),
@@ -94,7 +95,7 @@ def test_every_field_has_its_line(heading: str, definition: str | None) -> None:
 
 def test_every_definition_of_the_schema_is_looked_at() -> None:
     known = {"UnitsSpec", "Target", "LimitsSpec", "Scale", "RobotModel", "JointModel", "Output"}
-    known |= {"AxisAngle", "Euler", "Configuration"}
+    known |= {"AxisAngle", "Euler", "Configuration", "Waypoint"}
     others = {name for name, definition in SCHEMA["$defs"].items() if "properties" in definition} - known
     assert {SCHEMA["$defs"][name]["properties"]["planner"]["const"] for name in others} == set(MOVES)
 

@@ -121,9 +121,10 @@ def test_a_rounded_chain_is_smooth_and_keeps_to_its_segments(segments, radius):
         assert used[i] + used[i + 1] <= segment.length * (1 + 1e-12)
     for i, corner in enumerate(chain.corners):
         assert 0 < corner.used <= corner.asked == radius
-        assert corner.kind == ("rounded" if corner.turn > 1e-9 else "smooth")
         if corner.kind == "smooth":
+            assert corner.turn < 1e-9
             continue
+        assert corner.kind == "rounded"
         near = np.linspace(-1, 1, 2001) * chain.half_widths[i] + corner.place
         distances = np.linalg.norm(chain.evaluate(np.clip(near, 0, chain.length))[0] - corner.point, axis=-1)
         assert corner.deviation == pytest.approx(distances.min(), rel=1e-3, abs=1e-9)

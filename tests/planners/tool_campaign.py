@@ -81,7 +81,9 @@ class _Maker:
             said["direction"] = (turn.as_matrix() @ self.pose[:3, 2]).tolist()
         elif form == "pitch":
             z = self.pose[2, 2]
-            said["pitch"] = float(np.clip(np.arcsin(np.clip(z, -1, 1)) + self.rng.uniform(-0.5, 0.5), -1.5, 1.5))
+            said["pitch"] = float(
+                np.clip(np.arcsin(np.clip(z, -1, 1)) + self.rng.uniform(-0.5, 0.5), -1.5, 1.5)
+            )
         elif form == "yaw":
             x = self.pose[:3, 0]
             said |= {"yaw": float(np.arctan2(x[1], x[0]) + self.rng.uniform(-0.8, 0.8)), "tool_axis": "x"}
@@ -120,7 +122,9 @@ class _Maker:
                 segments.append({"arc": self.bent(form if form == "none" else None)})
             else:
                 segments.append({"line": self.target(form, self.pose[:3, 3] + self.aside(0.02, 0.2))})
-        corner: Fields = {"corner": "round", "radius": 0.02} if self.rng.random() < 0.5 else {"corner": "stop"}
+        corner: Fields = (
+            {"corner": "round", "radius": 0.02} if self.rng.random() < 0.5 else {"corner": "stop"}
+        )
         return {"planner": "path", "segments": segments, **corner}
 
     def law(self) -> Fields:
@@ -153,7 +157,10 @@ class Tracker:
     def __post_init__(self) -> None:
         n = len(self.robot.joints)
         rng = np.random.default_rng(1)
-        ranks = [np.linalg.matrix_rank(self.slopes(self.joints + rng.normal(size=n) * 0.2, 0.0), 1e-7) for _ in "abc"]
+        ranks = [
+            np.linalg.matrix_rank(self.slopes(self.joints + rng.normal(size=n) * 0.2, 0.0), 1e-7)
+            for _ in "abc"
+        ]
         right = np.linalg.svd(self.slopes(self.joints, 0.0))[2]
         self.held, self.kept = right[max(ranks) :], right[max(ranks) :] @ self.joints
 
@@ -183,7 +190,9 @@ class Tracker:
 
     def ratio(self) -> float:
         """Return the smallest over the largest singular value, of the directions that are held too."""
-        values = np.linalg.svd(np.concatenate([self.slopes(self.joints, self.place), self.held]), compute_uv=False)
+        values = np.linalg.svd(
+            np.concatenate([self.slopes(self.joints, self.place), self.held]), compute_uv=False
+        )
         return float(values[len(self.joints) - 1] / values[0])
 
     def bare_ratio(self) -> float:
@@ -200,7 +209,8 @@ class Tracker:
                 break
             slopes = np.concatenate([self.slopes(q, place), self.held])
             q = q - np.linalg.lstsq(slopes, missed, rcond=1e-10)[0]
-        good = np.abs(self.off(q[None], place)).max() < 1e-8 and np.abs(self.held @ q - self.kept).max() < 1e-8
+        missed = np.concatenate([self.off(q[None], place)[0], self.held @ q - self.kept])
+        good = np.abs(missed).max() < 1e-8
         return q if good else None
 
     def go(self, place: float, least: float = 1e-5) -> np.ndarray:

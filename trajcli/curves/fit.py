@@ -2,8 +2,8 @@
 
 A piece takes value, first and second derivative from the function at its two ends; between them the error is
 of order 6 in its length (4 in the second derivative), so intervals are divided until the error is small
-enough where it is largest. All intervals of a round are asked for at once, and the curve so far tells it
-where to look.
+enough where it is largest. All intervals of a round are asked for at once. Where the function is found by a
+search, a coarse curve says where to begin: the pieces of the first rounds are too far off for that.
 
 Source: Birkhoff and Priver, Hermite interpolation errors for derivatives, J. Math. Phys. 46 (1967).
 """
@@ -24,6 +24,9 @@ Exact = Callable[[Array, Side, Array], Array]
 """Value, first and second derivative (3, N, n) at places (N,) from one side of breaks, by guesses (N, n)."""
 Misfit = Callable[[Array, Array, Array], Array]
 """By how many times its tolerance a fit (3, N, n) misses exact values (3, N, n) at places (N,): (N,)."""
+
+Guess = Callable[[Array], Array]
+"""Values (N, n) near the function's at places (N,)."""
 
 # where the error of a quintic piece is largest: of the value and its curvature, and of the slope
 _PROBES = np.array([0.5 - 0.1 * sqrt(5.0), 0.5, 0.5 + 0.1 * sqrt(5.0)])
@@ -73,7 +76,7 @@ class _Pieces:
 
 
 def fit(
-    exact: Exact, misfit: Misfit, breaks: Array, guess: Callable[[Array], Array], *, most: int = MOST_PIECES
+    exact: Exact, misfit: Misfit, breaks: Array, guess: Guess, *, most: int = MOST_PIECES
 ) -> PiecewisePolynomial:
     """Return quintic pieces through a function, each within tolerance where its error is largest.
 
@@ -96,7 +99,7 @@ def fit(
     done: list[_Pieces] = []
     count = 0
     for _ in range(_ROUNDS):
-        error, probed = _errors(exact, misfit, pending)
+        error, probed = _errors(exact, misfit, pending, guess)
         fine = error <= _FILLED
         done.append(pending.at(fine))
         count += int(np.count_nonzero(fine))
@@ -107,17 +110,17 @@ def fit(
         if count + int(parts.sum()) > most:
             worst = int(error.argmax())
             raise FitError(float(probed[worst]), float(error[worst]))
-        pending = _divided(exact, rough, parts)
+        pending = _divided(exact, rough, parts, guess)
     raise FitError(float(pending.start[0]), float(error.max()))
 
 
-def _errors(exact: Exact, misfit: Misfit, pieces: _Pieces) -> tuple[Array, Array]:
+def _errors(exact: Exact, misfit: Misfit, pieces: _Pieces, guess: Guess) -> tuple[Array, Array]:
     """Return for each piece the largest misfit and where it is, each of shape (k,)."""
     lengths = pieces.end - pieces.start
     local = lengths[:, None] * _PROBES
     places = (pieces.start[:, None] + local).reshape(-1)
     fitted = _at(pieces.coefficients(), local)
-    errors = misfit(places, exact(places, "right", fitted[0]), fitted).reshape(local.shape)
+    errors = misfit(places, exact(places, "right", guess(places)), fitted).reshape(local.shape)
     errors = np.where(np.isfinite(errors), errors, np.inf)
     worst = errors.argmax(axis=1)
     rows = np.arange(lengths.size)
@@ -133,7 +136,7 @@ def _at(coefficients: Array, local: Array) -> Array:
     return np.stack(spread).reshape(3, local.size, -1)
 
 
-def _divided(exact: Exact, pieces: _Pieces, parts: np.ndarray) -> _Pieces:
+def _divided(exact: Exact, pieces: _Pieces, parts: np.ndarray, guess: Guess) -> _Pieces:
     """Return each piece divided into so many equal parts."""
     owner = np.repeat(np.arange(parts.size), parts)
     number = np.arange(owner.size) - np.repeat(np.cumsum(parts) - parts, parts)
@@ -142,8 +145,7 @@ def _divided(exact: Exact, pieces: _Pieces, parts: np.ndarray) -> _Pieces:
     start = pieces.start[owner] + local
     last = number == parts[owner] - 1
     inner = np.flatnonzero(number > 0)
-    coefficients = pieces.coefficients()[:, owner[inner]]
-    values = exact(start[inner], "right", _at(coefficients, local[inner, None])[0])
+    values = exact(start[inner], "right", guess(start[inner]))
     left, right = pieces.left[:, owner].copy(), pieces.right[:, owner].copy()
     left[:, inner] = values
     right[:, np.flatnonzero(~last)] = values

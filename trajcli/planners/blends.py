@@ -30,7 +30,7 @@ _BLEND = Number(Quantity("time"), "Duration of a blend, s.", above=0.0)
 
 
 @dataclass(frozen=True)
-class _BlendDurations(FieldType):
+class BlendDurations(FieldType):
     """One duration for all blends, or one for each point."""
 
     description: str
@@ -61,7 +61,7 @@ class Blends(ThroughPoints):
     blend_durations: (
         Annotated[
             float | tuple[float, ...],
-            _BlendDurations("Duration of the blends, s: one for all, or one for each point, ends included."),
+            BlendDurations("Duration of the blends, s: one for all, or one for each point, ends included."),
         ]
         | None
     ) = None

@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import PlanningError, TrajcliError
-from trajcli.planners.fields import Duration
+from trajcli.planners.fields import Duration, Target
 from trajcli.planners.planner import Event, Planner, Resolve
 from trajcli.planners.reading import Flaw, refuse
 from trajcli.planners.recorded import Recorded
@@ -150,8 +150,7 @@ class ThroughPoints(Planner):
                 last = self.to is not None and index == len(self.listed) - 1
                 raise _of_point(error, "target" if last else f"waypoint {index}") from None
             near = resolved.as_state().position
-            joined = Waypoint(**resolved.model_dump(), time=point.time, blend=point.blend)
-            points.append(joined if point.gives_pose else point)
+            points.append(_placed(point, resolved))
         if self.to is None:
             return self.model_copy(update={"through": tuple(points)})
         through = self.through if recorded else tuple(points[:-1])
@@ -214,9 +213,19 @@ class ThroughPoints(Planner):
                 hint="go to its first point in a move before, or give a larger `merge` or a later `t`",
             )
         if late.size:
-            message = f"the target is reached after {times[-1]:.12g} s, the last recorded point after {times[-2]:.12g} s"
+            message = (
+                f"the target is reached after {times[-1]:.12g} s, "
+                f"the last recorded point after {times[-2]:.12g} s"
+            )
             raise PlanningError(message, hint="give the target a later `time`")
         return times
+
+
+def _placed(point: Waypoint, resolved: Target) -> Waypoint:
+    """Return the point with the joints that reach it."""
+    if not point.gives_pose:
+        return point
+    return Waypoint(**resolved.model_dump(), time=point.time, blend=point.blend)
 
 
 def passage_through(points: PointTable, times: Array) -> Passage:

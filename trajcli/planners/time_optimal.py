@@ -36,7 +36,7 @@ _STRETCHED = 1e-9  # relative: a smaller stretch is rounding
 
 
 @dataclass(frozen=True)
-class _Parameter(FieldType):
+class PathParameter(FieldType):
     """The name of a rule for the path parameter, or its value at each point."""
 
     description: str
@@ -79,7 +79,7 @@ class TimeOptimal(ThroughPoints):
     parameter: (
         Annotated[
             Literal["chord", "centripetal", "uniform"] | tuple[float, ...],
-            _Parameter(
+            PathParameter(
                 "Of the spline: its parameter grows with the distance of the points (chord, which is the "
                 "default), its root (centripetal), by one for each (uniform), or has the given values."
             ),

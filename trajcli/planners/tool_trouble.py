@@ -20,8 +20,9 @@ from trajcli.kinematics.inverse.target import residual_jacobian
 from trajcli.kinematics.jacobian import jacobian
 from trajcli.kinematics.robot import Robot
 
-_BISECTIONS = 40
-_LOOKS = 33  # places beyond the trouble at which the arm's reach is asked for
+_BISECTIONS = 12  # each asks for all configurations of an arm, which may take a search
+_LOOKS = 17  # places beyond the trouble at which the arm's reach is asked for
+_NEXT = 4e-6  # of the whole: how far beyond the trouble the first of them is
 _REGULAR = 1e-3  # of the largest singular value: with more there is no singularity nearby
 _SLOPE = 1e-5  # of the whole: step of the difference that says how fast a joint would have to go
 
@@ -89,12 +90,14 @@ class Trouble:
 
     def _unreachable(self, at: float) -> PlanningError | None:
         """Return the error that the path leaves the arm's reach, if it does so beyond a place."""
-        places = np.linspace(at, self.end, _LOOKS)[1:]
+        places = np.linspace(at, self.end, _LOOKS)
+        places[0] = min(at + _NEXT * self.end, self.end)
         valid = self._reachable(places)
         if valid.all():
             return None
-        low, high = at, float(places[int(np.argmin(valid))])
-        for _ in range(_BISECTIONS):
+        first = int(np.argmin(valid))
+        low, high = (float(places[first - 1]), float(places[first])) if first else (at, at)
+        for _ in range(_BISECTIONS if first else 0):
             middle = 0.5 * (low + high)
             low, high = (middle, high) if self._reachable(np.array([middle]))[0] else (low, middle)
         far = self.demands(places[~valid], "left").target()

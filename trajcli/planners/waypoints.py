@@ -52,7 +52,7 @@ class Waypoint(Target):
 NamedWaypoint = Annotated[Waypoint, Named()]
 
 
-class _Through:
+class PointsField:
     """Lets {csv: PATH} stand for the points of a file, and {positions: [...]} for a table of them."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
@@ -108,7 +108,7 @@ class _Through:
         return {"anyOf": [handler(schema), file, {**inline, "additionalProperties": False}]}
 
 
-Through = Annotated[tuple[NamedWaypoint, ...] | Recorded, _Through()]
+Through = Annotated[tuple[NamedWaypoint, ...] | Recorded, PointsField()]
 
 
 def _recorded(value: Mapping[str, Any], context: ReadingContext) -> Recorded:

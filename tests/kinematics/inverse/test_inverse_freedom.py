@@ -222,8 +222,10 @@ def test_a_fold_inside_a_family_is_not_singular():
     assert not found.singular[best]
 
 
-@pytest.mark.parametrize(("name", "kind", "axis"), [row[:3] for row in CASES if row[0] != "wrist over SCARA"])
-def test_members_come_nearer_by_whole_turns_and_along_the_family_and_stay_inside(name, kind, axis):
+@pytest.mark.parametrize(
+    ("name", "kind", "axis", "free"), [row[:4] for row in CASES if row[0] != "wrist over SCARA"]
+)
+def test_members_come_nearer_by_whole_turns_and_along_the_family_and_stay_inside(name, kind, axis, free):
     robot, joints, target, rng = case(name, kind, axis, 40)
     turning = np.array([joint.type == "revolute" for joint in robot.joints])
     span = np.where(turning, 3.0, 0.2)
@@ -237,6 +239,14 @@ def test_members_come_nearer_by_whole_turns_and_along_the_family_and_stay_inside
     far, came = np.linalg.norm(joints - near, axis=1), np.linalg.norm(members - near, axis=1)
     assert (came <= far + 1e-9).all()
     assert (came < far - 1e-3).mean() > 0.8
+    if free == 1:
+        for row, member in enumerate(members):
+            (idle,) = idle_motions(robot, target.rows(np.full(len(low), row)), member, 1)
+            left = idle @ (near[row] - member)
+            blocked = np.where(idle * left > 0, high - member < 1e-8, member - low < 1e-8) & (
+                np.abs(idle) > 1e-6
+            )
+            assert abs(left) < 1e-5 or blocked.any()
     robot = replace(robot, limits=replace(robot.limits, position=np.tile([-np.inf, np.inf], (len(low), 1))))
     turns = 2 * np.pi * rng.integers(-2, 3, joints.shape) * turning
     assert nearest_members(robot, target, joints + turns, joints) == pytest.approx(joints, abs=1e-9)

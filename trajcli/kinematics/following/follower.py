@@ -12,11 +12,12 @@ Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from trajcli.curves.piecewise import Array, Side
+from trajcli.geometry.rotation import AXES
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.following.demand import Demand
 from trajcli.kinematics.forward import forward
@@ -31,6 +32,7 @@ _NEAR = 1e-8  # scaled residual after which one more step of Newton's reaches wh
 _GOOD = 1e-10  # scaled residual that still counts as met where rounding is larger
 _LONGEST = 0.5  # rad, or arm lengths: a longer correction leads elsewhere
 _RANK = 1e-6  # of the largest singular value: directions with less are free
+_FLAT = 1e-12  # a determinant of scaled rows, which are of the size 1, that is none
 _AROUND, _SPREAD = 4, 0.1  # configurations, rad or m: an arm is regular almost everywhere
 
 
@@ -59,12 +61,15 @@ class Follower:
         demands: The tool at places (N,) of the path, from one side of breaks.
         start: Joint values at the beginning of the path, shape (n,).
         held: Unit directions of joint values that are kept, shape (f, n).
+        hand: Sign of the determinant of the rows at the start, which it keeps: where it changes the arm
+            passes from one branch to another. Zero where the start is singular.
     """
 
     robot: Robot
     demands: Demands
     start: Array
     held: Array
+    hand: float = 0.0
 
     def exact(self, places: Array, side: Side, guess: Array) -> Array:
         """Return joint values and their first and second derivative, shape (3, N, n).
@@ -80,6 +85,10 @@ class Follower:
         demand = self.demands(places, side)
         q = self._solved(demand, guess, places)
         poses, slopes = self.linearised(demand, q)
+        other = self.hand * handedness(demand, slopes) < 0
+        if other.any():
+            first_other = int(np.flatnonzero(other)[np.argmin(places[other])])
+            raise LostError(np.sort(places[other]), q[first_other], (0.0, 0.0))
         first = self._divided(slopes, self._scaled(demand.rates(), demand))
         bias = jacobian_dot_qd(self.robot, q, first)
         twist = (jacobian(self.robot, q) @ first[..., None])[..., 0]
@@ -140,6 +149,22 @@ class Follower:
         return np.asarray((np.linalg.pinv(slopes, rcond=1e-12) @ rates[..., None])[..., 0])
 
 
+def handedness(demand: Demand, rows: Array) -> Array:
+    """Return the sign of the determinant of scaled rows (N, m + f, n), (N,): zero where it nearly vanishes.
+
+    The three rows of a direction count for two: a column of the axis itself makes up for the third.
+    """
+    if demand.orientation == "direction":
+        column = np.zeros((*rows.shape[:2], 1))
+        split = sum(demand.position)
+        column[:, split : split + 3, 0] = demand.poses[:, :3, AXES.index(demand.tool_axis)]
+        rows = np.concatenate([rows, column], axis=2)
+    if rows.shape[1] != rows.shape[2]:
+        return np.zeros(len(rows))
+    values = np.linalg.det(rows)
+    return np.asarray(np.where(np.abs(values) > _FLAT, np.sign(values), 0.0))
+
+
 def follower(robot: Robot, demands: Demands, start: Array, place: float) -> Follower:
     """Return the follower that begins in joint values `start` (n,) at a place of the path.
 
@@ -158,4 +183,6 @@ def follower(robot: Robot, demands: Demands, start: Array, place: float) -> Foll
     values = np.linalg.svd(nearby, compute_uv=False)
     rank = int((values > _RANK * values[:, :1]).sum(axis=1).max())
     _, _, right = np.linalg.svd(here[0])
-    return Follower(robot, demands, start, right[rank:])
+    held = Follower(robot, demands, start, right[rank:])
+    hand = handedness(demand, held.linearised(demand, start[None])[1])
+    return replace(held, hand=float(hand[0]))

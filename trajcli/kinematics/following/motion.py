@@ -45,7 +45,7 @@ class ToolMotion:
         timed = self.timed
 
         def slower(times: Array, side: Side) -> Demand:
-            demand = timed(times / factor, side)
+            demand = timed(np.clip(times / factor, self.law.start, self.law.end), side)
             aims = demand.aims.copy()
             if aims.shape[1]:
                 aims[:, 1] /= factor
@@ -72,9 +72,10 @@ def motion_along(
         tolerance: How near the joints' curve promises to be.
         ruled_by: Which limits say how fast.
     """
+    passed = path.passed(law, law_breaks)
 
     def timed(times: Array, side: Side) -> Demand:
-        return path.by_time(law, times, side)
+        return path.by_time(law, times, side, passed)
 
-    breaks = path.break_times(law, law_breaks)
+    breaks = np.unique(np.concatenate([law_breaks, passed]))
     return ToolMotion(path, law, timed, breaks, tolerance, path.poses.in_place, ruled_by)

@@ -14,7 +14,9 @@ from trajcli.geometry.rotation import AXES, Axis
 from trajcli.kinematics.following.demand import Demand
 from trajcli.kinematics.inverse.target import Fixed
 
-_AT_BREAK = 1e-8  # of the length: a place this near to a break is at it
+_AT_BREAK = 1e-12  # of the length: a place this near to a break is at it
+_BESIDE = 1e-13  # of the length: how far before or after a break the tool is that is not at it
+_THEN = 1e-12  # of the duration: a time this close to a break's is that time
 _ONE_TIME = 1e-9  # of the duration: breaks this close to each other are one
 
 
@@ -53,13 +55,21 @@ class ToolPath:
         places = self._onto_breaks(np.asarray(places))
         return self._demand(places, side, np.ones(places.size), np.zeros(places.size))
 
-    def by_time(self, law: PiecewisePolynomial, times: Array, side: Side) -> Demand:
-        """Return the demand at times (N,) of a law s(t), derivatives by t."""
-        rates = law.evaluate_orders(np.asarray(times), (0, 1, 2), side=side)[:, :, 0]
-        return self._demand(self._onto_breaks(rates[:, 0]), side, rates[:, 1], rates[:, 2])
+    def by_time(self, law: PiecewisePolynomial, times: Array, side: Side, passed: Array) -> Demand:
+        """Return the demand at times (N,) of a law s(t), derivatives by t.
 
-    def break_times(self, law: PiecewisePolynomial, breaks: Array) -> Array:
-        """Return the times at which a derivative may jump: those of the law, and those of the path.
+        Args:
+            law: s(t).
+            times: Within the law's.
+            side: Which side of a break is meant.
+            passed: Shape (k,): when the law passes the inner breaks of the path.
+        """
+        rates = law.evaluate_orders(np.asarray(times), (0, 1, 2), side=side)[:, :, 0]
+        places = self._passing(rates[:, 0], times, passed, _THEN * law.duration)
+        return self._demand(places, side, rates[:, 1], rates[:, 2])
+
+    def passed(self, law: PiecewisePolynomial, breaks: Array) -> Array:
+        """Return when a law s(t) passes the inner breaks of the path, (k,): at a break of its own if it can.
 
         Args:
             law: s(t).
@@ -67,10 +77,13 @@ class ToolPath:
         """
         inner = self.poses.breaks
         if not inner.size:
-            return breaks
-        times = times_at(law, inner)
-        apart = np.abs(times[:, None] - breaks).min(axis=1) > _ONE_TIME * law.duration
-        return np.unique(np.concatenate([breaks, times[apart]]))
+            return inner
+        places, times = law.evaluate(breaks)[:, 0], times_at(law, inner)
+        away = np.abs(inner[:, None] - places)
+        own = breaks[away.argmin(axis=1)]
+        late = np.abs(times - own)
+        same = (late <= _ONE_TIME * law.duration) | (away.min(axis=1) <= _AT_BREAK * self.length)
+        return np.where(same, own, times)
 
     def _onto_breaks(self, places: Array) -> Array:
         places = np.clip(places, 0.0, self.length)
@@ -79,6 +92,18 @@ class ToolPath:
             return places
         nearest = inner[np.abs(places[:, None] - inner).argmin(axis=1)]
         return np.where(np.abs(places - nearest) <= _AT_BREAK * self.length, nearest, places)
+
+    def _passing(self, places: Array, times: Array, passed: Array, same: float) -> Array:
+        """Return places (N,) on the side of each break on which their times are.
+
+        A law that stops at a break is so near to it for some time that rounding would mix up the sides.
+        """
+        edges = np.concatenate([[-np.inf], self.poses.breaks, [np.inf]])
+        gap = _BESIDE * self.length
+        before, after = (np.searchsorted(passed + shift, times, "right") for shift in (same, -same))
+        low = np.where(before < after, edges[after], edges[before] + gap)
+        high = np.where(before < after, edges[after], edges[before + 1] - gap)
+        return np.clip(np.clip(places, low, high), 0.0, self.length)
 
     def _demand(self, places: Array, side: Side, speed: Array, acceleration: Array) -> Demand:
         poses, first, second = self.poses.evaluate(places, side)

@@ -148,7 +148,7 @@ class _Walk:
             errors, slopes = linearised(self._robot, target, q)
             inverse = np.linalg.pinv(np.concatenate([slopes, bars], axis=1), rcond=_LOST)
             q = q + (inverse @ np.concatenate([errors, nothing], axis=1)[..., None])[..., 0]
-        q = np.where(held, np.clip(q, low, high), q)
+        q = np.where(held, np.clip(q, low, high), q)  # rounding
         errors, _ = linearised(self._robot, target, q)
         inside = ((q >= low) & (q <= high)).all(axis=1)
         return q, np.asarray((np.linalg.norm(errors, axis=1) <= tolerance) & inside)

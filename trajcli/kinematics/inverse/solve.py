@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +12,6 @@ from trajcli.errors import InputError
 from trajcli.geometry.rotation import AXES, Flags
 from trajcli.kinematics.chain import configurations
 from trajcli.kinematics.forward import forward
-from trajcli.kinematics.inverse.body import fixed_axis, never_heads
 from trajcli.kinematics.inverse.choose import method_for
 from trajcli.kinematics.inverse.closed_form import candidates
 from trajcli.kinematics.inverse.complete import complete
@@ -21,12 +20,14 @@ from trajcli.kinematics.inverse.lines import PARALLEL, Arm, arm_of
 from trajcli.kinematics.inverse.method import Method
 from trajcli.kinematics.inverse.nearest_member import nearest_members
 from trajcli.kinematics.inverse.numeric import SAME, distinct, search
-from trajcli.kinematics.inverse.postures import Postures, by_postures
 from trajcli.kinematics.inverse.singular import families, freedom_of, one_of_each
 from trajcli.kinematics.inverse.solution import Solutions
 from trajcli.kinematics.inverse.target import Target, pose_target
 from trajcli.kinematics.inverse.turns import beyond, choose_turns
 from trajcli.kinematics.robot import Robot
+
+if TYPE_CHECKING:
+    from trajcli.kinematics.inverse.postures import Postures
 
 TOLERANCE = 1e-9  # m and rad: what a branch may miss its target by
 _LAST = 1e6  # rad or m: sorts answers outside the limits behind all others
@@ -48,16 +49,14 @@ def solve(
 
     Raises:
         InputError: When the robot has no geometry, a target or near is malformed, or the tolerance is not
-            positive.
+            positive; or when a target gives the yaw of a tool axis that is always vertical.
     """
     if not tolerance > 0.0:
         raise InputError(f"the tolerance must be positive, it is {tolerance:.6g}")
     wanted = target if isinstance(target, Target) else pose_target(target)
     arm, flat = arm_of(robot), wanted.flat()
     close_to = _near(robot, near, wanted.batch)
-    stuck = flat.orientation in ("direction", "yaw", "pitch") and fixed_axis(arm, flat.tool_axis)
-    if stuck and flat.orientation == "yaw":
-        _check_heading(robot, arm, flat)
+    stuck = flat.orientation in ("direction", "yaw", "pitch") and _is_stuck(robot, arm, flat)
     found = _find(robot, arm, flat, close_to, tolerance)
     singular, free = _resolve(robot, flat, found, close_to, tolerance)
     choose_turns(robot, found.joints, None if close_to is None else close_to.T)
@@ -74,6 +73,8 @@ def _find(robot: Robot, arm: Arm, target: Target, near: Array | None, tolerance:
         return _searched(robot, method, target, near, tolerance)
     if fits(method, target, robot.base):
         return _closed(robot, arm, method, target, tolerance)
+    from trajcli.kinematics.inverse.postures import Postures, by_postures
+
     if method.needs == "pose":
         start = np.zeros((len(target.poses), len(arm.lines))) if near is None else near
         found = by_postures(robot, arm, method, target, start, tolerance)
@@ -123,18 +124,22 @@ def _near(robot: Robot, near: ArrayLike | None, batch: tuple[int, ...]) -> Array
     return np.broadcast_to(values, (*batch, values.shape[-1])).reshape(-1, values.shape[-1])
 
 
-def _check_heading(robot: Robot, arm: Arm, target: Target) -> None:
-    """Do nothing when the tool axis, which no joint turns, has a heading.
+def _is_stuck(robot: Robot, arm: Arm, target: Target) -> bool:
+    """Return whether no joint turns the tool axis that a target means.
 
     Raises:
-        InputError: When it is vertical.
+        InputError: When its yaw is asked for, and it is always vertical.
     """
-    if never_heads(arm, target.tool_axis):
+    from trajcli.kinematics.inverse.body import fixed_axis, never_heads
+
+    stuck = fixed_axis(arm, target.tool_axis)
+    if stuck and target.orientation == "yaw" and never_heads(arm, target.tool_axis):
         others = " or ".join(axis for axis in AXES if axis != target.tool_axis)
         raise InputError(
             f"the {target.tool_axis} axis of the tool of {robot.name} is always vertical and has no yaw",
             hint=f"say which axis of the tool heads there, with `tool_axis: {others}`",
         )
+    return stuck
 
 
 def _closed(robot: Robot, arm: Arm, method: Method, target: Target, tolerance: float) -> Found:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -161,7 +162,7 @@ def test_blends_that_would_overlap_are_shrunk():
     assert event.message.startswith("the blend at point 1 was shortened from 1.9 s to ")
     phases = explanation(made)["moves"][0]["phases"]
     ends = [(p["start"], p["end"]) for p in phases if p["name"].startswith("blend")]
-    assert all(b[0] >= a[1] - 1e-12 for a, b in zip(ends[:-1], ends[1:], strict=True))
+    assert all(b[0] >= a[1] - 1e-12 for a, b in pairwise(ends))
 
 
 VELOCITY, ACCELERATION = 1.0, 4.0
