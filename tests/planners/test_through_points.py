@@ -197,6 +197,35 @@ def test_names_poses_and_joints_may_be_mixed():
         np.testing.assert_allclose(np.diag(place)[:3], [1, -1, -1], atol=1e-9)
 
 
+@pytest.mark.parametrize("table", [False, True])
+def test_a_pose_is_reached_near_the_point_before_it(table):
+    """The elbow is down at the start, and up at the point before the pose."""
+    down, up = [0, -0.3, -1.6, 0.4, 1.5, 0], [0, -1.5, 1.5, 0, 1.5, 0]
+    job = {
+        "version": 1,
+        "robot": "ur5e",
+        "start": {"joints": down},
+        "moves": [
+            {
+                "planner": "spline",
+                "through": {"positions": [up], "times": [2]} if table else [{"joints": up, "time": 2}],
+                "to": {"xyz": [0.4, 0.1, 0.25], "rpy": ["180 deg", 0, 0], "time": 4},
+            }
+        ],
+    }
+    joints = plan_job(job_from_text(json.dumps(job))).trajectory.end.position
+    answers = []
+    for elbow in ("up", "down"):
+        job["moves"] = [
+            {"planner": "cubic", "duration": 1, "to": {"xyz": [0.4, 0.1, 0.25], "rpy": ["180 deg", 0, 0]}}
+        ]
+        job["moves"][0]["to"]["configuration"] = {"elbow": elbow}
+        job["start"] = {"joints": up}
+        answers.append(plan_job(job_from_text(json.dumps(job))).trajectory.end.position)
+    assert np.linalg.norm(joints - answers[0]) < 1e-9
+    assert np.linalg.norm(joints - answers[1]) > 1
+
+
 def test_a_pose_out_of_reach_names_the_waypoint():
     job = {
         "version": 1,

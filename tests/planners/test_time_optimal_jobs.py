@@ -9,7 +9,7 @@ import json
 
 import numpy as np
 import pytest
-from through_jobs import assert_joins, cases, curve_of, plan, refusal
+from through_jobs import assert_joins, cases, curve_of, job_text, plan, refusal
 
 from trajcli.pipeline.explain import explanation
 from trajcli.pipeline.report import report_of
@@ -153,6 +153,12 @@ def test_velocities_at_the_ends():
     np.testing.assert_allclose(curve_of(ending).piece_ends(1)[1][-1], [1, 0.2], atol=1e-9)
 
 
+def test_a_velocity_at_an_end_is_in_time_whatever_the_parameter():
+    for parameter in ("chord", [0, 10, 30], [0, 1e-3, 2e-3]):
+        made = fastest([[0.0, 0], [1, 0.5], [2, 0]], start={"velocity": [0.5, 0.25]}, parameter=parameter)
+        np.testing.assert_allclose(curve_of(made).evaluate(0.0, 1), [0.5, 0.25], rtol=1e-9)
+
+
 def test_a_longer_duration_is_kept():
     q = points(6)
     shortest = fastest(q).trajectory.duration
@@ -200,6 +206,26 @@ def test_one_job_through_the_command_line(tmp_path, capfd):
             assert json.loads(out)["duration"] == pytest.approx(1.5, rel=1e-4)
         else:
             assert "  which limit binds when (s):\n    0..0.5: acceleration + of j1\n" in out
+
+
+@pytest.mark.parametrize(("middle", "code"), [([[60, 30]], 0), ([[60, 30], [60, 30]], 1)])
+def test_a_finer_grid_is_no_concession_and_a_point_left_out_is(tmp_path, capfd, middle, code):
+    from trajcli.cli.app import app
+
+    job = tmp_path / "fast.json"
+    through = [{"joints": q} for q in [*middle, [20, 80], [90, 10], [0, 0]]]
+    fields = {"planner": "time_optimal", "through": through}
+    limits = {"velocity": 90, "acceleration": 180}
+    job.write_text(job_text({"joints": [0, 0]}, fields, limits=limits, units={"angle": "deg"}))
+    with pytest.raises(SystemExit) as left:
+        app(["plan", str(job), "--strict", "--no-output"])
+    assert (left.value.code or 0) == code
+    told = capfd.readouterr().err
+    assert ("refined: " in told) is not bool(code)
+    assert ("merged: left out 1 waypoint that repeats the one before" in told) is bool(code)
+    with pytest.raises(SystemExit):
+        app(["explain", str(job)])
+    assert "  q1(t) .. q2(t): " in capfd.readouterr().out
 
 
 FREE = [{"joints": [1, 2]}, {"joints": [2, 1]}]

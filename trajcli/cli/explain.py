@@ -17,6 +17,7 @@ from trajcli.streams.whole_file import standard_output
 
 _SYMBOLS = {"position": "q", "velocity": "qd", "acceleration": "qdd", "jerk": "qddd"}
 _ROUNDING = 1e-12
+_FITTED = 1e-9  # of the largest: rates of a joint that rests, where the arm follows its tool
 _MOST_PIECES = 100  # of a joint that are listed
 _TIME_DECIMALS = 12
 
@@ -76,7 +77,12 @@ def _polynomials(plan: Plan, index: int) -> Iterator[str]:
         count = move.planned.curve.pieces
         yield f"  joints: {count} pieces of degree {move.planned.curve.degree}, listed by --json"
         return
-    for number, rows in enumerate(stretches_of(move, units), 1):
+    stretches = stretches_of(move, units)
+    counts = {len(rows) for rows in stretches}
+    if len(stretches) > 1 and len(counts) == 1 and min(counts) > _MOST_PIECES:
+        yield f"  q1(t) .. q{len(stretches)}(t): {min(counts)} pieces each, listed by --json"
+        return
+    for number, rows in enumerate(stretches, 1):
         if len(rows) > _MOST_PIECES:
             yield f"  q{number}(t): {len(rows)} pieces, listed by --json"
             continue
@@ -112,19 +118,20 @@ def _peaks(move: dict[str, Any]) -> Iterator[str]:
         size = max(abs(peak["low"]), abs(peak["high"]))
         largest[peak["quantity"]] = max(largest.get(peak["quantity"], 0.0), size)
     for peak in move["peaks"]:
-        size = max(abs(peak["low"]), abs(peak["high"]))
-        if size <= _ROUNDING * largest[peak["quantity"]] and peak["quantity"] != "position":
+        size, most = max(abs(peak["low"]), abs(peak["high"])), largest[peak["quantity"]]
+        nothing = (_ROUNDING if move["tool"] is None else _FITTED) * most
+        if size <= nothing and peak["quantity"] != "position":
             continue
-        symbol = _SYMBOLS[peak["quantity"]]
-        yield f"    {peak['joint']} {symbol}: {_extent(peak, move['start'])} {peak['unit']}; {_limit(peak)}"
+        nothing = max(_ROUNDING * size, nothing if move["tool"] else 0.0)
+        extent = f"{_extent(peak, move['start'], nothing)} {peak['unit']}; {_limit(peak)}"
+        yield f"    {peak['joint']} {_SYMBOLS[peak['quantity']]}: {extent}"
 
 
-def _extent(peak: dict[str, Any], start: float) -> str:
-    """Return the extremes with their times in the move; what is nothing beside the other one is rounding."""
-    size = max(abs(peak["low"]), abs(peak["high"]))
+def _extent(peak: dict[str, Any], start: float, nothing: float) -> str:
+    """Return the extremes with their times in the move; what is not above `nothing` is rounding."""
     said = []
     for end in ("low", "high"):
-        value = peak[end] if abs(peak[end]) > _ROUNDING * size else 0.0
+        value = peak[end] if abs(peak[end]) > nothing else 0.0
         said.append(f"{value:.9g} (t = {round(peak[f'{end}_time'] - start, _TIME_DECIMALS):.6g})")
     return said[0] if peak["low"] == peak["high"] else " .. ".join(said)
 
@@ -152,4 +159,5 @@ def _speed(move: dict[str, Any]) -> Iterator[str]:
         yield f"  no bound for the duration: {reference['joint']}, {reference['reason']}"
     elif reference["ratio"] is not None:
         fastest = f"{reference['duration']:.6g} s, {reference['joint']}"
-        yield f"  duration: {reference['ratio']:.4g} x the fastest under the same limits ({fastest})"
+        how = "the fastest" if move["path"] is None else "the fastest off the path"
+        yield f"  duration: {reference['ratio']:.4g} x {how} under the same limits ({fastest})"

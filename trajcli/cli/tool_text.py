@@ -12,6 +12,9 @@ from trajcli.units import Quantity, Units, to_user, unit_name
 
 _MOST = 40  # pieces of a law that are listed
 _NOISE = 1e-6  # SI: a tool that turns, or goes, less than that does not
+_ZERO = 1e-9  # user units: a coordinate or an angle below that is rounding
+_REACHED = 0.999  # of the wanted speed
+_SPEED_OF = {"length": "speed", "angle": "angular_speed"}
 
 
 def tool_lines(move: Mapping[str, Any], units: Units) -> Iterator[str]:
@@ -43,7 +46,7 @@ def _segment(segment: Mapping[str, Any], units: Units) -> str:
 
 
 def _corner(corner: Mapping[str, Any], units: Units) -> str:
-    where = f"at s = {corner['place']:.9g} {units.length}, turn {corner['turn']:.6g} {units.angle}"
+    where = f"at s = {corner['place']:.9g} {units.length}, turn {_clean(corner['turn']):.6g} {units.angle}"
     if corner["kind"] != "rounded":
         told = {"stop": "stops there", "smooth": "goes on smoothly", "bend": "the curvature jumps"}
         return f"{where}: {told[corner['kind']]}"
@@ -89,6 +92,11 @@ def _held(tool: Mapping[str, Any], units: Units) -> Iterator[str]:
     dimension = "length" if tool["unit"] == "m" else "angle"
     speed, place = Quantity(dimension, 1), Quantity(dimension)  # type: ignore[arg-type]
     wanted = f"{to_user(tool['wanted_speed'], speed, units):.6g} {unit_name(speed, units)}"
+    if tool["held"] == 0:
+        top = next(p["value"] for p in tool["peaks"] if p["quantity"] == _SPEED_OF[dimension])
+        reached = "reached, but not held" if top >= _REACHED * tool["wanted_speed"] else "not reached"
+        yield f"    tool speed of {wanted} {reached}"
+        return
     text = f"    tool speed of {wanted} held on {100 * tool['held']:.4g} % of the path"
     lowest = tool["lowest"]
     if lowest is not None:
@@ -104,4 +112,8 @@ def _quantity(name: str) -> tuple[str, int]:
 
 
 def _point(values: list[float]) -> str:
-    return "[" + ", ".join(f"{value:.9g}" for value in values) + "]"
+    return "[" + ", ".join(f"{_clean(value):.9g}" for value in values) + "]"
+
+
+def _clean(value: float) -> float:
+    return value if abs(value) > _ZERO else 0.0

@@ -45,6 +45,26 @@ def jacobian(robot: Robot, q: ArrayLike, frame: ReferenceFrame = "world") -> Arr
     return result.reshape(*values.shape[:-1], 6, len(links))
 
 
+def linearisation(robot: Robot, q: ArrayLike) -> tuple[Array, Array]:
+    """Return T_world_tcp (*batch, 4, 4) and J in world (*batch, 6, n) on one way along the chain.
+
+    Raises:
+        InputError: When the robot has no geometry, or q has not n finite values.
+    """
+    links, values = links_of(robot), configurations(robot, q)
+    count = values.size // values.shape[-1]
+    poses, slopes = np.empty((count, 4, 4)), np.empty((count, 6, len(links)))
+    for rows, (block,) in blocks(values):
+        axes, tcp = travel(links, robot.base, robot.tool, block)
+        tcp.write(poses[rows])
+        for i, axis in enumerate(axes):
+            linear, angular = _columns(axis, tcp.p)
+            _write(slopes[rows, :3, i], linear)
+            _write(slopes[rows, 3:, i], angular)
+    batch = values.shape[:-1]
+    return poses.reshape(*batch, 4, 4), slopes.reshape(*batch, 6, len(links))
+
+
 def jacobian_dot_qd(robot: Robot, q: ArrayLike, qd: ArrayLike, frame: ReferenceFrame = "world") -> Array:
     """Return the part of the tcp's acceleration that does not come from qdd, shape (*batch, 6).
 

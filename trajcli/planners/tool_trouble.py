@@ -15,12 +15,13 @@ from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.following.follower import Demands
 from trajcli.kinematics.following.track import StuckError
 from trajcli.kinematics.forward import forward
+from trajcli.kinematics.inverse.numeric import descend
 from trajcli.kinematics.inverse.solve import solve
 from trajcli.kinematics.inverse.target import residual_jacobian
 from trajcli.kinematics.jacobian import jacobian
 from trajcli.kinematics.robot import Robot
 
-_BISECTIONS = 12  # each asks for all configurations of an arm, which may take a search
+_BISECTIONS = 20
 _LOOKS = 17  # places beyond the trouble at which the arm's reach is asked for
 _NEXT = 4e-6  # of the whole: how far beyond the trouble the first of them is
 _REGULAR = 1e-3  # of the largest singular value: with more there is no singularity nearby
@@ -92,19 +93,18 @@ class Trouble:
         """Return the error that the path leaves the arm's reach, if it does so beyond a place."""
         places = np.linspace(at, self.end, _LOOKS)
         places[0] = min(at + _NEXT * self.end, self.end)
-        valid = self._reachable(places)
+        found = solve(self.robot, self.demands(places, "left").target(), None)
+        valid = found.valid.any(axis=-1)
         if valid.all():
             return None
-        first = int(np.argmin(valid))
-        low, high = (float(places[first - 1]), float(places[first])) if first else (at, at)
-        for _ in range(_BISECTIONS if first else 0):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if self._reachable(np.array([middle]))[0] else (low, middle)
-        far = self.demands(places[~valid], "left").target()
-        missed = solve(self.robot, far, None).shortfall.max(axis=0)
+        first, last = int(np.argmin(valid)), at
+        if first:
+            known = found.joints[first - 1][found.valid[first - 1]]
+            last = self._last_reached(float(places[first - 1]), float(places[first]), known)
+        missed = found.shortfall.max(axis=0)
         kind = 0 if missed[0] > 0 else 1
         amounts = {
-            "place": self._place(high),
+            "place": self._place(last),
             "missed": Amount(float(missed[kind]), 0, None, ("length", "angle")[kind]),
         }
         message = (
@@ -113,9 +113,17 @@ class Trouble:
         hint = "move the path nearer to the arm, or leave coordinates of the target free"
         return PlanningError(Problem(message, hint, amounts=amounts))
 
-    def _reachable(self, places: Array) -> NDArray[np.bool_]:
-        found = solve(self.robot, self.demands(places, "left").target(), None)
-        return np.asarray(found.valid.any(axis=-1))
+    def _last_reached(self, low: float, high: float, known: Array) -> float:
+        """Return how far beyond `low`, where joint values (k, n) are known, some meet the target."""
+        for _ in range(_BISECTIONS):
+            middle = 0.5 * (low + high)
+            target = self.demands(np.full(len(known), middle), "left").target()
+            joints, met = descend(self.robot, target, known, None)
+            if met.any():
+                low, known = middle, joints[met]
+            else:
+                high = middle
+        return low
 
     def _singular(self, at: float, joints: Array, rates: Array, *, stuck: bool) -> PlanningError:
         """Return the error that names the singularity at a place, and the joint that would race."""

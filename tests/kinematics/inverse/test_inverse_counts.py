@@ -172,3 +172,42 @@ def python_with_eaik():
     pytest.skip(
         "EAIK is in no environment: `make bench` installs it, or TRAJCLI_PEERS names a python that has it"
     )
+
+
+UR_SLANTED = ["R 0 .16 0 1", "R 0 0 -.42 0", "R 0 0 -.39 0", "R 0 .13 0 .8", "R 0 .1 0 -.8", "R 0 .1 0 0"]
+SLANTED = ["R 0 .4 .1 -1", "R 0 .05 .4 0", "R 0 .02 .05 1", "R 0 .4 0 -.8", "R 0 0 0 .8", "R 0 .1 .02 0"]
+STANFORD = FAMILIES["wrist over Stanford"][0]
+CLOSE = {  # rows, family, kind, joints, index of the one that brings a place or a direction to the axis of another
+    "folded 2R": (["R 0 0 .3 0", "R 0 0 .3 0"], "planar 2R", "place", [0.3, np.pi], 1),
+    "folded elbow": (
+        ["R 0 .5 0 1", "R 0 0 .3 0", "R 0 0 .3 0"],
+        "positioning",
+        "place",
+        [0.3, 0.5, np.pi],
+        2,
+    ),
+    "short slide": (FAMILIES["planar RPR"][0], "planar RPR", "pose", [0.3, 0.0, 0.4], 1),
+    "short slide below a wrist": (STANFORD, "spherical wrist", "pose", [0.3, 0.4, -0.2, 0.3, 0.4, 0.5], 2),
+    "slanted wrist in line": (SLANTED, "spherical wrist", "pose", [0.3, 0.4, 0.1, 0.3, 0.0, 0.5], 4),
+    "slanted UR in line": (UR_SLANTED, "three parallel axes (UR)", "pose", [0.3, 0.4, 0.9, 0.3, 0.0, 0.5], 4),
+    "point above the shoulder": (
+        ["R 0 .3 0 1", "R 0 .2 0 -.7", "R 0 .1 .4 0"],
+        "positioning",
+        "place",
+        [0.3, 4.076477399, 0.759480056],
+        1,
+    ),
+}
+
+
+@pytest.mark.parametrize("close", [1e-4, 3e-5, 1e-5])
+@pytest.mark.parametrize("name", CLOSE)
+def test_what_is_close_to_an_axis_still_tells_its_angle(monkeypatch, name, close):
+    rows, family, kind, joints, moved = CLOSE[name]
+    monkeypatch.setitem(FAMILIES, name, (rows, 0, family))
+    robot, joints = arm(name), np.array(joints)
+    joints[moved] += close
+    poses = forward(robot, joints)[None]
+    (ours, ours_valid), (_, theirs_valid) = both(robot, name, kind, poses, by_polynomials)
+    assert ours_valid.sum() == theirs_valid.sum()
+    assert gap(robot, ours[0][ours_valid[0]], joints).min() < SAME

@@ -24,6 +24,7 @@ import numpy as np
 from trajcli.kinematics.columns import Column, difference, dot, minus, plus, product
 from trajcli.kinematics.inverse.lines import Floats, Line, across_floats, parallel
 from trajcli.kinematics.inverse.subproblems import (
+    FREE,
     Turn,
     Watch,
     across,
@@ -57,7 +58,7 @@ def parallel_pair(
     sign = turning if up is None else product(turning, dot(way, up))
     third = levels(three.direction, hand, link, level, watch, watch.length**2, sign)
     reached = plus(link, turned(hand, three.direction, third))
-    return unit(onto(axis, reached, way), watch, watch.length**2), third
+    return unit(onto(axis, reached, way), watch, FREE * watch.length**2), third
 
 
 def shoulder_turn(

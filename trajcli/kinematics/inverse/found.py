@@ -104,4 +104,5 @@ def polish(robot: Robot, target: Target, joints: Array, closure: Array, watched:
         some = target.rows(rows)
         better = refine(robot, some, joints[:, branches, rows].T)
         joints[:, branches, rows] = better.T
+        watched[rows] = True  # it may have moved onto its neighbour
         closure[:, branches, rows] = closure_of(some, forward(robot, better)).T

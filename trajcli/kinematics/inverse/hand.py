@@ -95,4 +95,4 @@ def _last(
         return watch.mirrored(unit(seen, watch))
     view = goal.view(first_axis)
     bent = turned_back(first, second, bend.both() if isinstance(bend, Opposed) else bend)
-    return unit((dot(across(bent, last), view), dot(cross(bent, last), view)), watch)
+    return unit((dot(across(bent, last), view), dot(cross(bent, last), view)), watch, FREE)

@@ -23,10 +23,9 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.dexterity import characteristic_length
-from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.target import Target, residual_jacobian, residuals
 from trajcli.kinematics.inverse.turns import FULL, revolute
-from trajcli.kinematics.jacobian import jacobian
+from trajcli.kinematics.jacobian import linearisation
 from trajcli.kinematics.robot import Robot
 
 SEEDS = 64  # where any answer of a family will do
@@ -55,8 +54,8 @@ class Search:
 
 def linearised(robot: Robot, target: Target, q: Array) -> tuple[Array, Array]:
     """Return scaled residuals (K, m) and their Jacobian (K, m, n) at joint values (K, n)."""
-    poses = forward(robot, q)
-    errors, slopes = residuals(target, poses), residual_jacobian(target, poses, jacobian(robot, q))
+    poses, whole = linearisation(robot, q)
+    errors, slopes = residuals(target, poses), residual_jacobian(target, poses, whole)
     scale = np.ones(errors.shape[1])
     scale[: sum(target.position)] = 1.0 / characteristic_length(robot)
     return errors * scale, slopes * scale[:, None]
@@ -77,6 +76,8 @@ def refine(robot: Robot, target: Target, q: Array, iterations: int = 4) -> Array
     """Return joint values (K, n) moved by undamped least-squares steps, each kept only where it gains."""
     errors, slopes = linearised(robot, target, q)
     for _ in range(iterations):
+        if (np.abs(errors) <= DONE).all():
+            break
         inverse = np.linalg.pinv(slopes, rcond=1e-9)
         candidate = q + np.clip((inverse @ errors[..., None])[..., 0], -_LONGEST, _LONGEST)
         new_errors, new_slopes = linearised(robot, target, candidate)

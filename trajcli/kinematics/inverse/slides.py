@@ -27,6 +27,7 @@ from trajcli.kinematics.columns import Column, Entry, advance, cross, difference
 from trajcli.kinematics.inverse.elbow import before, forward_sign, parallel_pair, shoulder_turn
 from trajcli.kinematics.inverse.lines import Floats, Line, across_floats
 from trajcli.kinematics.inverse.subproblems import (
+    FREE,
     TANGENT,
     Turn,
     Watch,
@@ -83,7 +84,7 @@ def turn_and_slide(turn: Line, slide: Line, point: Column, aim: Column, watch: W
     rest = plus_square(difference(dot(way, way), dot(hand, hand)), ahead)
     distance = difference(_lengths(rest, watch), ahead)
     reached = advance(hand, distance, slide.direction)
-    return unit(onto(turn.direction, reached, way), watch, watch.length**2), np.asarray(distance)
+    return unit(onto(turn.direction, reached, way), watch, FREE * watch.length**2), np.asarray(distance)
 
 
 def scara(lines: Sequence[Line], point: Column, target: Column, watch: Watch) -> tuple[Turn, Turn, Entry]:
@@ -115,7 +116,7 @@ def ball(
         hand = plus(link, turned(hand, three.direction, third))
     second = levels(two.direction, hand, one.direction, dot(one.direction, way), watch, watch.length)
     first = onto(one.direction, turned(hand, two.direction, second), way)
-    return unit(first, watch, watch.length**2), second, third
+    return unit(first, watch, FREE * watch.length**2), second, third
 
 
 def plus_square(value: Entry, root: Entry) -> Array:

@@ -277,7 +277,7 @@ def two_turns(
     """
     if not square_wrist(first, second, vector):
         turn = levels(second, vector, first, dot(first, aim), watch)
-        return unit(onto(first, turned(vector, second, turn), aim), watch), turn
+        return unit(onto(first, turned(vector, second, turn), aim), watch, FREE), turn
     side = across_floats(second, first)
     turn = dot(side, aim), dot(second, aim)
     sine = length(turn)
