@@ -14,7 +14,8 @@ from trajcli.errors import InputError
 from trajcli.job.inline import inline_target
 from trajcli.kinematics.inverse.solution import Solutions
 from trajcli.pipeline.arm import Arm, open_arm
-from trajcli.pipeline.inverse_answers import answers, find_answers, goal_of, require_answer
+from trajcli.pipeline.inverse_answers import answers, find_answers, require_answer
+from trajcli.planners.goal import goal_of
 from trajcli.streams.csv import Digits
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any
@@ -17,7 +16,7 @@ from trajcli.kinematics.dexterity import RANK_TOLERANCE, characteristic_length
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.solution import Solutions
 from trajcli.kinematics.inverse.solve import solve
-from trajcli.kinematics.inverse.target import Target, partial_target, residual_jacobian
+from trajcli.kinematics.inverse.target import Target, residual_jacobian
 from trajcli.kinematics.inverse.turns import all_turns
 from trajcli.kinematics.inverse.verdict import check_reachable
 from trajcli.kinematics.jacobian import jacobian
@@ -25,28 +24,9 @@ from trajcli.kinematics.robot import Robot
 from trajcli.pipeline.arm import Arm
 from trajcli.pipeline.differential import simplest
 from trajcli.pipeline.pose_view import plain
-from trajcli.planners.pose_fields import Configuration, PoseFields
+from trajcli.planners.pose_fields import Configuration
 
 _LOST = max(RANK_TOLERANCE, 1e-7)  # of the largest singular value: answers meet their target within rounding
-_UPRIGHT = 1e-9  # rad: a pitch this close to a quarter turn is one
-
-
-def goal_of(fields: PoseFields) -> Target:
-    """Return the coordinates of the tcp's pose that a target fixes."""
-    pose = fields.full_pose()
-    position = pose[:3, 3] if fields.gives_position else None
-    if fields.rotation_form is not None:
-        return partial_target(position, rotation=pose[:3, :3])
-    if fields.pitch is not None and math.pi / 2 - abs(fields.pitch) <= _UPRIGHT:
-        upright = (0.0, 0.0, math.copysign(1.0, fields.pitch))  # there the elevation has no slope to follow
-        return partial_target(position, direction=upright, tool_axis=fields.tool_axis or "z")
-    return partial_target(
-        position,
-        direction=fields.direction,
-        yaw=fields.yaw,
-        pitch=fields.pitch,
-        tool_axis=fields.tool_axis or "z",
-    )
 
 
 def find_answers(

@@ -88,7 +88,7 @@ def start_state(target: Target, robot: Robot) -> tuple[State, Reached | None]:
 def _on_nearest_branch(target: Target, robot: Robot, near: Array) -> Reached:
     from trajcli.kinematics.inverse.solve import solve
     from trajcli.kinematics.inverse.verdict import check_reachable
-    from trajcli.pipeline.inverse_answers import goal_of
+    from trajcli.planners.goal import goal_of
 
     goal = goal_of(target)
     found = solve(robot, goal, near)

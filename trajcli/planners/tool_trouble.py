@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trajcli.curves.extrema import peaks
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
