@@ -129,6 +129,8 @@ def _peaks(move: dict[str, Any]) -> Iterator[str]:
 
 def _extent(peak: dict[str, Any], start: float, nothing: float) -> str:
     """Return the extremes with their times in the move; what is not above `nothing` is rounding."""
+    if max(abs(peak["low"]), abs(peak["high"])) <= nothing:
+        return "0"
     said = []
     for end in ("low", "high"):
         value = peak[end] if abs(peak[end]) > nothing else 0.0

@@ -58,7 +58,7 @@ class Followed:
         Raises:
             PlanningError: When no 4096 pieces are enough: names the singularity.
         """
-        trouble = Trouble(self.robot, self.path.by_place, self.path.length, None, self.path.poses.in_place)
+        trouble = trouble_on(self.robot, self.path, self.follower)
         return _fitted(self.follower, self.path.breaks, self.coarse.evaluate, tolerance, trouble)
 
     def by_time(self, motion: ToolMotion) -> PiecewisePolynomial:
@@ -73,12 +73,18 @@ class Followed:
             places = motion.law.evaluate(times)[:, 0]
             return self.coarse.evaluate(places.clip(self.coarse.start, self.coarse.end))
 
-        return _fitted(timed, motion.breaks, guess, motion.tolerance, trouble_of(self.robot, motion))
+        return _fitted(timed, motion.breaks, guess, motion.tolerance, trouble_of(self.robot, motion, timed))
 
 
-def trouble_of(robot: Robot, motion: ToolMotion) -> Trouble:
+def trouble_on(robot: Robot, path: ToolPath, exact: Follower) -> Trouble:
+    """Return who explains what goes wrong along a path."""
+    return Trouble(robot, path.by_place, path.length, None, path.poses.in_place, len(exact.held))
+
+
+def trouble_of(robot: Robot, motion: ToolMotion, exact: Follower | None = None) -> Trouble:
     """Return who explains what goes wrong on a motion."""
-    return Trouble(robot, motion.timed, motion.law.end, motion.law, motion.in_place)
+    free = 0 if exact is None else len(exact.held)
+    return Trouble(robot, motion.timed, motion.law.end, motion.law, motion.in_place, free)
 
 
 def followed(robot: Robot, path: ToolPath, start: Array) -> Followed:
@@ -91,8 +97,7 @@ def followed(robot: Robot, path: ToolPath, start: Array) -> Followed:
     try:
         return Followed(robot, path, exact, track(exact, path.breaks))
     except StuckError as error:
-        trouble = Trouble(robot, path.by_place, path.length, None, path.poses.in_place)
-        raise trouble.stuck(error) from None
+        raise trouble_on(robot, path, exact).stuck(error) from None
 
 
 def followed_in_time(robot: Robot, motion: ToolMotion, start: Array) -> PiecewisePolynomial:
@@ -102,9 +107,9 @@ def followed_in_time(robot: Robot, motion: ToolMotion, start: Array) -> Piecewis
         PlanningError: Where the arm cannot follow, and why.
     """
     middle = np.array([0.5 * motion.law.end])
-    held = follower(robot, lambda _, side: motion.timed(middle, side), start, 0.0).held
-    exact = Follower(robot, motion.timed, start, held)
-    trouble = trouble_of(robot, motion)
+    known = follower(robot, lambda _, side: motion.timed(middle, side), start, 0.0)
+    exact = replace(known, demands=motion.timed)
+    trouble = trouble_of(robot, motion, exact)
     try:
         coarse = track(exact, motion.breaks)
     except StuckError as error:

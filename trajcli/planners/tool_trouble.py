@@ -37,6 +37,7 @@ class Trouble:
         end: Last place, or time.
         law: From time to place; None where the tool is known by place.
         in_place: Whether places are angles.
+        free: How many directions of the joint values the targets leave free.
     """
 
     robot: Robot
@@ -44,6 +45,7 @@ class Trouble:
     end: float
     law: PiecewisePolynomial | None
     in_place: bool
+    free: int = 0
 
     def stuck(self, error: StuckError) -> PlanningError:
         """Return the error of an arm that could not be followed beyond a place."""
@@ -131,10 +133,9 @@ class Trouble:
         rows = residual_jacobian(demand.target(), poses, slopes)[0]
         rows[: sum(demand.position)] /= characteristic_length(self.robot)
         values = np.linalg.svd(rows, compute_uv=False)
-        if not stuck and values.min() > _REGULAR * values[0]:
-            message = "around s = {place} of the path the tolerance is finer than rounding lets it be met"
-            hint = "choose a larger `tolerance`, or a smoother path"
-            return PlanningError(Problem(message, hint, amounts={"place": self._place(at)}))
+        ratio = float(values[len(joints) - self.free - 1] / values[0])
+        if ratio > _REGULAR and (self.free or not stuck):
+            return self._regular(at, stuck=stuck)
         joint = int(np.abs(rates).argmax())
         name = self.robot.joint_names[joint]
         unit = "rad" if self.robot.joint_types[joint] == "revolute" else "m"
@@ -142,7 +143,19 @@ class Trouble:
         message = (
             f"the path runs into a singularity at s = {{place}}: there {name} would have to go "
             f"{abs(float(rates[joint])):.4g} {unit} for each {per} (smallest over largest singular value "
-            f"{float(values.min() / values[0]):.2g})"
+            f"{ratio:.2g})"
         )
         hint = "move the path, start in another configuration, or use a move in joint space there"
         return PlanningError(Problem(message, hint, joint=name, amounts={"place": self._place(at)}))
+
+    def _regular(self, at: float, *, stuck: bool) -> PlanningError:
+        """Return the error of a place where the tool could go on."""
+        message = "around s = {place} of the path the tolerance is finer than rounding lets it be met"
+        hint = "choose a larger `tolerance`, or a smoother path"
+        if stuck:
+            message = (
+                f"what the target leaves free cannot be held beyond s = {{place}} of the path: "
+                f"{self.robot.name} would have to turn round in its place"
+            )
+            hint = "start in another configuration, fix more of the target's orientation, or split the move"
+        return PlanningError(Problem(message, hint, amounts={"place": self._place(at)}))

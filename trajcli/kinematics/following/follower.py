@@ -22,7 +22,7 @@ from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.following.demand import Demand
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.target import residual_jacobian, residuals
-from trajcli.kinematics.jacobian import jacobian, jacobian_dot_qd
+from trajcli.kinematics.jacobian import jacobian_dot_qd, linearisation
 from trajcli.kinematics.robot import Robot
 
 Demands = Callable[[Array, Side], Demand]
@@ -84,14 +84,15 @@ class Follower:
         """
         demand = self.demands(places, side)
         q = self._solved(demand, guess, places)
-        poses, slopes = self.linearised(demand, q)
+        poses, columns = linearisation(self.robot, q)
+        slopes = self.rows(demand, poses, columns)
         other = self.hand * handedness(demand, slopes) < 0
         if other.any():
             first_other = int(np.flatnonzero(other)[np.argmin(places[other])])
             raise LostError(np.sort(places[other]), q[first_other], (0.0, 0.0))
         first = self._divided(slopes, self._scaled(demand.rates(), demand))
         bias = jacobian_dot_qd(self.robot, q, first)
-        twist = (jacobian(self.robot, q) @ first[..., None])[..., 0]
+        twist = (columns @ first[..., None])[..., 0]
         second = self._divided(slopes, self._scaled(demand.accelerations(poses, bias, twist), demand))
         return np.stack([q, first, second])
 
@@ -99,35 +100,34 @@ class Follower:
         target = demand.target()
         q = guess.copy()
         for _ in range(_ITERATIONS):
-            errors = self._errors(demand, q)
-            _, slopes = self.linearised(demand, q)
-            step = self._divided(slopes, errors)
+            poses, columns = linearisation(self.robot, q)
+            errors = self._errors(demand, poses, q)
+            step = self._divided(self.rows(demand, poses, columns), errors)
             q = q + np.clip(step, -_LONGEST, _LONGEST)
             if (np.abs(errors) <= _NEAR).all():
                 break
-        errors = self._errors(demand, q)
-        size = np.abs(errors).max(axis=1)
+        poses = forward(self.robot, q)
+        size = np.abs(self._errors(demand, poses, q)).max(axis=1)
         lost = ~(size <= _GOOD) | (np.abs(q - guess).max(axis=1) > 2 * _LONGEST)
         if lost.any():
             first = int(np.flatnonzero(lost)[np.argmin(places[lost])])
-            difference = residuals(target.rows([first]), forward(self.robot, q[[first]]))[0]
+            difference = residuals(target.rows([first]), poses[[first]])[0]
             split = sum(demand.position)
             missed = float(np.linalg.norm(difference[:split])), float(np.linalg.norm(difference[split:]))
             raise LostError(np.sort(places[lost]), q[first], missed)
         return q
 
-    def _errors(self, demand: Demand, q: Array) -> Array:
-        differences = residuals(demand.target(), forward(self.robot, q))
+    def _errors(self, demand: Demand, poses: Array, q: Array) -> Array:
+        differences = residuals(demand.target(), poses)
         kept = (self.start - q) @ self.held.T
         return np.concatenate([self._by_length(differences, demand), kept], axis=1)
 
-    def linearised(self, demand: Demand, q: Array) -> tuple[Array, Array]:
-        """Return the tcp's poses (N, 4, 4) and the scaled rows (N, m + f, n)."""
-        poses = forward(self.robot, q)
-        rows = residual_jacobian(demand.target(), poses, jacobian(self.robot, q))
+    def rows(self, demand: Demand, poses: Array, columns: Array) -> Array:
+        """Return the scaled rows (N, m + f, n) of tcp poses (N, 4, 4) and Jacobians (N, 6, n) in world."""
+        rows = residual_jacobian(demand.target(), poses, columns)
         rows[:, : sum(demand.position)] /= characteristic_length(self.robot)
-        kept = np.broadcast_to(self.held, (len(q), *self.held.shape))
-        return poses, np.concatenate([rows, kept], axis=1)
+        kept = np.broadcast_to(self.held, (len(poses), *self.held.shape))
+        return np.concatenate([rows, kept], axis=1)
 
     def _scaled(self, rates: Array, demand: Demand) -> Array:
         still = np.zeros((len(rates), len(self.held)))
@@ -176,13 +176,11 @@ def follower(robot: Robot, demands: Demands, start: Array, place: float) -> Foll
     """
     bare = Follower(robot, demands, start, np.empty((0, start.size)))
     demand = demands(np.array([place]), "right")
-    _, here = bare.linearised(demand, start[None])
+    here = linearisation(robot, start[None])
     around = start + np.random.default_rng(0).normal(scale=_SPREAD, size=(_AROUND, start.size))
-    repeated = demands(np.full(_AROUND, place), "right")
-    _, nearby = bare.linearised(repeated, around)
+    nearby = bare.rows(demands(np.full(_AROUND, place), "right"), *linearisation(robot, around))
     values = np.linalg.svd(nearby, compute_uv=False)
     rank = int((values > _RANK * values[:, :1]).sum(axis=1).max())
-    _, _, right = np.linalg.svd(here[0])
+    _, _, right = np.linalg.svd(bare.rows(demand, *here)[0])
     held = Follower(robot, demands, start, right[rank:])
-    hand = handedness(demand, held.linearised(demand, start[None])[1])
-    return replace(held, hand=float(hand[0]))
+    return replace(held, hand=float(handedness(demand, held.rows(demand, *here))[0]))
