@@ -14,14 +14,18 @@ from trajcli.job.model import Output, RobotSource, UnitsSpec
 from trajcli.job.robot_model import JointModel
 from trajcli.planners import PLANNERS, Planner
 from trajcli.planners.blends import BlendDurations
-from trajcli.planners.bounds import UNLIMITED, Bounds, JointBound, LimitsSpec, Scale
+from trajcli.planners.bounds import UNLIMITED, Bounds, JointBound, LimitsSpec, Scale, ToolLimitsSpec
 from trajcli.planners.deviation import Deviation
 from trajcli.planners.fields import Target
+from trajcli.planners.operational import ToleranceSpec
+from trajcli.planners.path import Segment
+from trajcli.planners.path_law import LawSpec
 from trajcli.planners.per_joint import PerJoint
 from trajcli.planners.pose_fields import AxisAngle, Configuration, Direction, Euler, Matrix, Numbers
 from trajcli.planners.poses import Pose
 from trajcli.planners.reading import FieldType, Number
 from trajcli.planners.time_optimal import PathParameter
+from trajcli.planners.tool_fields import ArcFields
 from trajcli.planners.waypoints import PointsField, Waypoint
 from trajcli.units import Quantity, Units, unit_name
 
@@ -36,6 +40,11 @@ SECTIONS: dict[type, str] = {
     Euler: "[Euler angles](#euler-angles)",
     Configuration: "[configuration](#configuration)",
     Waypoint: "[waypoint](#waypoints)",
+    ToolLimitsSpec: "[limits of the tool](#limits-of-the-tool)",
+    LawSpec: "[law](#law)",
+    ToleranceSpec: "[tolerance](#tolerance)",
+    Segment: "[segments](#segments)",
+    ArcFields: "[arc](#arcs)",
 }
 """Where a model that stands inside another one is described."""
 
@@ -155,7 +164,7 @@ def _unit(field: FieldInfo) -> str:
 
 def _quantity_unit(quantity: Quantity) -> str:
     if quantity.dimension in ("angle", "length"):
-        return quantity.dimension
+        return quantity.dimension + ("", "/s", "/s^2", "/s^3")[quantity.order]
     return unit_name(quantity, Units())
 
 

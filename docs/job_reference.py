@@ -10,13 +10,14 @@ import trajcli.units
 from docs.fields import field_table
 from docs.markdown import ROOT, first_sentence, table
 from docs.planner_examples import EXAMPLES, LEFT_OUT, NOTES
+from docs.tool_path_reference import tool_path_sections
 from trajcli.columns import GROUPS, Group
 from trajcli.job.load import read_document
 from trajcli.job.model import Job, Output, UnitsSpec
 from trajcli.job.robot_model import JointModel, RobotModel
 from trajcli.job.robot_source import CATALOGUE, catalogue_names
 from trajcli.planners import PLANNERS
-from trajcli.planners.bounds import LimitsSpec, Scale
+from trajcli.planners.bounds import LimitsSpec, Scale, ToolLimitsSpec
 from trajcli.planners.fields import Target
 from trajcli.planners.planner import Planner
 from trajcli.planners.point_to_point import PointToPoint
@@ -51,6 +52,11 @@ _LIMITS = """\
 A job's `limits` replace the robot's, then `scale` multiplies them. A limit that is looser than the
 robot's is allowed, and reported as an event. A move's `limits` apply to that move only, and can only
 tighten."""
+
+_TOOL_LIMITS = """\
+Speeds and accelerations of the tcp, in world, of [moves along a path](#along-a-path-of-the-tool): their
+laws take them from here, and they are verified there. Moves in joint space are not judged by them. `jerk`
+is the one along the path."""
 
 _ROBOT = f"""\
 Under `robot` stands the name of a robot of the [catalogue](#catalogue), `{{file: PATH}}` (relative to
@@ -116,6 +122,7 @@ _MEANINGS: dict[Group, str] = {
     "pose": "`x y z qw qx qy qz`: position and unit quaternion of the tcp in world",
     "twist": "`vx vy vz wx wy wz`: velocity at the tcp and angular velocity, in world",
     "twistd": "`ax ay az ex ey ez`: time derivative of the twist",
+    "path": "`s sd sdd`: way of the tcp along the path of its move and two derivatives; 0 without a path",
     "move": "index of the move, from 0; at the border of two moves, that of the later one",
 }
 
@@ -127,6 +134,9 @@ are in the units of the job; quaternions have none.
 The tcp is that of the robot with its base and tool: `pose`, `twist` and `twistd` need a robot with
 geometry. The quaternion begins with w >= 0 (where w is zero but for rounding, with the first other
 component above zero) and never jumps to the other sign from one row to the next.
+
+`path` is in the unit of length; s begins at 0 in each move along a path, and all three are 0 in other
+moves, also where the tool only turns in its place.
 
 Rows stand at `start_time + k / rate`; the last row is exactly the end."""
 
@@ -143,10 +153,13 @@ def job_reference() -> str:
     parts += ["## Values by joint", _VALUES]
     parts += ["## Limits", _LIMITS, field_table(LimitsSpec)]
     parts += ["### Scale", first_sentence(Scale.__doc__), field_table(Scale), "### Bounds", _BOUNDS]
+    parts += ["### Limits of the tool", _TOOL_LIMITS, field_table(ToolLimitsSpec)]
     parts += ["## Robot", _ROBOT, field_table(RobotModel)]
     parts += ["### Joints", _JOINTS, field_table(JointModel), "### Poses", _POSES]
     parts += ["### Catalogue", _catalogue()]
     parts += ["## Moves", _MOVES.rstrip(), _common_fields()]
+    parts += tool_path_sections()
+    parts += ["## Planners"]
     for tag, planner in PLANNERS.items():
         parts += [f"### {tag}", *_planner(tag, planner)]
     parts += ["## Output", field_table(Output), "### Columns", _columns(), _COLUMNS]

@@ -4,6 +4,12 @@ from __future__ import annotations
 
 _HEAD = "version: 1\nunits: {angle: deg}\nrobot: {joints: 1}\n"
 _FROM_20 = "start: {joints: [20]}\nmoves:\n"
+_UR5E = (
+    "version: 1\nunits: {angle: deg, length: mm}\nrobot: ur5e\n"
+    "limits: {acceleration: 800, tcp: {speed: 250, acceleration: 1500, angular_speed: 90,"
+    " angular_acceleration: 500}}\n"
+    "start: {xyz: [400, 100, 300], rpy: [180, 0, 0], configuration: {elbow: up}}\nmoves:\n"
+)
 
 EXAMPLES = {
     "cubic": f"{_HEAD}{_FROM_20}  - {{planner: cubic, to: {{joints: [50]}}, duration: 1}}\n",
@@ -47,6 +53,29 @@ EXAMPLES = {
         "    corner: 3                                           # degrees\n"
         "    through: {positions: [[50, 25], [20, 30], [0, 0]]}\n"
     ),
+    "line": (
+        f"{_UR5E}  - {{planner: line, to: {{xyz: [400, 300, 250]}}}}   # keeps its orientation\n"
+        "  - {planner: line, to: {rpy: [180, 0, 60]}}                 # turns in its place\n"
+        "  - {planner: line, to: {xyz: [400, 100, 300], rpy: [180, 0, 0]},"
+        " law: {shape: quintic, duration: 2}}\n"
+    ),
+    "arc": (
+        f"{_UR5E}  - {{planner: arc, via: {{xyz: [450, 150, 300]}}, to: {{xyz: [400, 200, 300]}}}}\n"
+        "  - {planner: arc, center: [400, 150, 300], axis: z, to: {xyz: [400, 100, 300]}}\n"
+        "  - {planner: arc, center: [400, 150, 300], axis: z, angle: 2 rev, pitch: 15,"
+        " law: {speed: 80}}   # a helix\n"
+    ),
+    "path": (
+        f"{_UR5E}  - planner: path\n"
+        "    corner: round\n"
+        "    radius: 15\n"
+        "    segments:\n"
+        "      - {line: {xyz: [400, 200, 300]}}\n"
+        "      - {line: {xyz: [450, 250, 300]}}\n"
+        "      - {arc: {via: {xyz: [500, 200, 300]}, to: {xyz: [450, 150, 300]}}}\n"
+        "    law: {shape: time_optimal, speed: 150}\n"
+    ),
+    "screw": f"{_UR5E}  - {{planner: screw, to: {{xyz: [450, 200, 250], rpy: [180, 0, 90]}}}}\n",
     "hold": f"{_HEAD}{_FROM_20}  - {{planner: hold, duration: 0.5}}\n",
 }
 
@@ -58,6 +87,10 @@ LEFT_OUT = {
     "deceleration": "as `acceleration`",
 }
 """What it means that a field of a planner is left out."""
+
+_JOINS = """\
+What it has in common with the other moves along a path stands [above](#along-a-path-of-the-tool). With a
+law of shape `quintic`, `cycloidal` or `jerk_limited` it begins and ends without acceleration."""
 
 NOTES = {
     "cycloidal": "It starts and ends at rest; a start that moves is refused (exit 3).",
@@ -105,5 +138,23 @@ say which one) or straight from point to point (`path: polyline`). On a polyline
 or, with `corner`, passes it at no more than that distance by a parabola. The times of a recording are not
 used. `explain` says which limit of which joint binds when. Its acceleration steps, so joints with a limit
 of jerk need another planner. A `duration` stretches the fastest motion.""",
+    "line": _JOINS,
+    "arc": f"""\
+Which arc is meant is said in one of [three ways](#arcs). An arc by its angle ends with the orientation with
+which it begins, unless `orientation: tangent` turns the tool along. {_JOINS}""",
+    "path": f"""\
+One law leads over all [segments](#segments); each of them may turn the tool to the orientation of its
+target. At a corner the path stops, or (`round`) is rounded by a curve whose curvature joins: its `radius`
+is measured along both segments, and shrinks to what they leave room for, with an event. `explain` says at
+what distance a rounded corner is passed. Where the direction goes on there is nothing to stop at; `round`
+then makes the curvatures of line and arc join, so that no acceleration steps.
+
+With `overlap` each segment has a law of its own and begins before the last one has ended, by that time:
+the tool cuts the corners without stopping. An acceleration from `limits.tcp` is divided where two add up.
+
+{_JOINS}""",
+    "screw": f"""\
+The axis follows from the two poses: the tool turns about it and moves along it evenly, as on a hinge or a
+thread. The target gives its whole orientation, or none, which keeps it. {_JOINS}""",
     "hold": "It starts and ends at rest; a start that moves is refused (exit 3).",
 }

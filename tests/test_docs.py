@@ -83,6 +83,11 @@ def test_every_planner_has_its_section_with_every_field(tag: str) -> None:
         ("### Waypoints", "Waypoint"),
         ("## Limits", "LimitsSpec"),
         ("### Scale", "Scale"),
+        ("### Limits of the tool", "ToolLimitsSpec"),
+        ("### Law", "LawSpec"),
+        ("### Tolerance", "ToleranceSpec"),
+        ("### Segments", "Segment"),
+        ("### Arcs", "ArcFields"),
         ("## Robot", "RobotModel"),
         ("### Joints", "JointModel"),
         ("## Output", "Output"),
@@ -96,6 +101,7 @@ def test_every_field_has_its_line(heading: str, definition: str | None) -> None:
 def test_every_definition_of_the_schema_is_looked_at() -> None:
     known = {"UnitsSpec", "Target", "LimitsSpec", "Scale", "RobotModel", "JointModel", "Output"}
     known |= {"AxisAngle", "Euler", "Configuration", "Waypoint"}
+    known |= {"ToolLimitsSpec", "LawSpec", "ToleranceSpec", "Segment", "ArcFields"}
     others = {name for name, definition in SCHEMA["$defs"].items() if "properties" in definition} - known
     assert {SCHEMA["$defs"][name]["properties"]["planner"]["const"] for name in others} == set(MOVES)
 

@@ -215,6 +215,12 @@ def test_a_velocity_that_forbids_to_be_monotone():
     error = refusal(start, move)
     assert error.exit_code == 3
     assert "-0.5 rad/s of j2 at the last point keeps the curve from being monotone" in str(error)
+    # a + b <= 3 or a^2 + ab + b^2 - 6a - 6b + 9 <= 0 (Fritsch and Carlson) with b = 1 inside: a <= 4
+    assert "0 rad/s to 4 rad/s would not" in str(error)
+    for point in points:
+        del point["time"]
+    error = refusal(start, move, limits={"velocity": 1, "acceleration": 4})
+    assert str(error).endswith("-0.5 rad/s of j2 at the last point keeps the curve from being monotone")
 
 
 def test_virtual_times_follow_a_stretch():

@@ -106,7 +106,8 @@ def reference_of(move: PlannedMove) -> ReferenceReport:
         # to where a velocity is reached fastest, another way may lead a little faster
         reason = "the move leaves its end position open"
         return ReferenceReport(duration=None, ratio=None, joint=move.robot.joint_names[0], reason=reason)
-    bound = fastest_duration(move.start, move.planned.end, move.robot.limits)
+    begins = move.planned.begins or move.start
+    bound = fastest_duration(begins, move.planned.end, move.robot.limits)
     name = None if bound.joint is None else move.robot.joint_names[bound.joint]
     if isinstance(bound, NoBound):
         return ReferenceReport(duration=None, ratio=None, joint=name, reason=bound.reason)

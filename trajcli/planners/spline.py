@@ -175,22 +175,17 @@ class Spline(ThroughPoints):
             return points.times
         if self.duration and points.count == 2:
             return np.array([0.0, self.duration])
-        times = fastest_spline_times(self.rule, points, robot)
+        try:
+            times = fastest_spline_times(self.rule, points, robot)
+        except ShapeError as error:
+            raise _not_monotone(error, robot, given=False) from None
         return times * (self.duration / times[-1]) if self.duration else times
 
     def _curve(self, points: PointTable, times: Array, robot: Robot) -> PiecewisePolynomial:
         try:
             return curve_through(self.rule, points, times, self.virtual_times)
         except ShapeError as error:
-            name = robot.joint_names[error.component]
-            low, high = (Amount(value, 1, error.component) for value in (error.low, error.high))
-            message = (
-                f"{{velocity}} of {name} at the {error.end} point keeps the curve from being monotone, "
-                "{low} to {high} would not"
-            )
-            hint = "change that velocity, or use another rule than shape_preserving"
-            amounts = {"velocity": Amount(error.velocity, 1, error.component), "low": low, "high": high}
-            raise PlanningError(Problem(message, hint, joint=name, amounts=amounts)) from None
+            raise _not_monotone(error, robot, given=points.times is not None) from None
         except ValueError as error:  # a virtual time outside its interval
             raise PlanningError(str(error), hint="give other `virtual_times`, or leave them out") from None
 
@@ -198,6 +193,18 @@ class Spline(ThroughPoints):
         if self.rule not in FREE_ENDS:
             return points.target
         return State(points.positions[-1], curve.piece_ends(1)[1][-1], np.zeros(curve.dimension))
+
+
+def _not_monotone(error: ShapeError, robot: Robot, *, given: bool) -> PlanningError:
+    name, joint = robot.joint_names[error.component], error.component
+    message = f"{{velocity}} of {name} at the {error.end} point keeps the curve from being monotone"
+    amounts = {"velocity": Amount(error.velocity, 1, joint)}
+    if given:
+        message += ", {low} to {high} would not"
+        amounts |= {"low": Amount(error.low, 1, joint), "high": Amount(error.high, 1, joint)}
+    hint = "change that velocity, or use another rule than shape_preserving"
+    hint += "" if given else ", or give every waypoint a `time`"
+    return PlanningError(Problem(message, hint, joint=name, amounts=amounts))
 
 
 def _beginning(curve: PiecewisePolynomial) -> State:

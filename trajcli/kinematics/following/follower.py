@@ -30,7 +30,8 @@ Demands = Callable[[Array, Side], Demand]
 _ITERATIONS = 12
 _NEAR = 1e-8  # scaled residual after which one more step of Newton's reaches what rounding allows
 _GOOD = 1e-10  # scaled residual that still counts as met where rounding is larger
-_LONGEST = 0.5  # rad, or arm lengths: a longer correction leads elsewhere
+_LONGEST = 0.5  # rad, or arm lengths, in one step
+_ELSEWHERE = 0.25  # rad or m: joint values this far from the guess are on another branch
 _RANK = 1e-6  # of the largest singular value: directions with less are free
 _FLAT = 1e-12  # a determinant of scaled rows, which are of the size 1, that is none
 _AROUND, _SPREAD = 4, 0.1  # configurations, rad or m: an arm is regular almost everywhere
@@ -86,7 +87,7 @@ class Follower:
         q = self._solved(demand, guess, places)
         poses, columns = linearisation(self.robot, q)
         slopes = self.rows(demand, poses, columns)
-        other = self.hand * handedness(demand, slopes) < 0
+        other = self.hand * handedness(demand, poses, slopes) < 0
         if other.any():
             first_other = int(np.flatnonzero(other)[np.argmin(places[other])])
             raise LostError(np.sort(places[other]), q[first_other], (0.0, 0.0))
@@ -108,7 +109,7 @@ class Follower:
                 break
         poses = forward(self.robot, q)
         size = np.abs(self._errors(demand, poses, q)).max(axis=1)
-        lost = ~(size <= _GOOD) | (np.abs(q - guess).max(axis=1) > 2 * _LONGEST)
+        lost = ~(size <= _GOOD) | (np.abs(q - guess).max(axis=1) > _ELSEWHERE)
         if lost.any():
             first = int(np.flatnonzero(lost)[np.argmin(places[lost])])
             difference = residuals(target.rows([first]), poses[[first]])[0]
@@ -149,15 +150,15 @@ class Follower:
         return np.asarray((np.linalg.pinv(slopes, rcond=1e-12) @ rates[..., None])[..., 0])
 
 
-def handedness(demand: Demand, rows: Array) -> Array:
-    """Return the sign of the determinant of scaled rows (N, m + f, n), (N,): zero where it nearly vanishes.
+def handedness(demand: Demand, poses: Array, rows: Array) -> Array:
+    """Return the sign (N,) of the determinant of scaled rows (N, m + f, n); zero where it nearly vanishes.
 
     The three rows of a direction count for two: a column of the axis itself makes up for the third.
     """
     if demand.orientation == "direction":
         column = np.zeros((*rows.shape[:2], 1))
         split = sum(demand.position)
-        column[:, split : split + 3, 0] = demand.poses[:, :3, AXES.index(demand.tool_axis)]
+        column[:, split : split + 3, 0] = poses[:, :3, AXES.index(demand.tool_axis)]
         rows = np.concatenate([rows, column], axis=2)
     if rows.shape[1] != rows.shape[2]:
         return np.zeros(len(rows))
@@ -183,4 +184,4 @@ def follower(robot: Robot, demands: Demands, start: Array, place: float) -> Foll
     rank = int((values > _RANK * values[:, :1]).sum(axis=1).max())
     _, _, right = np.linalg.svd(bare.rows(demand, *here)[0])
     held = Follower(robot, demands, start, right[rank:])
-    return replace(held, hand=float(handedness(demand, held.rows(demand, *here))[0]))
+    return replace(held, hand=float(handedness(demand, here[0], held.rows(demand, *here))[0]))

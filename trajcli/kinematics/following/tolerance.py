@@ -15,7 +15,7 @@ from trajcli.kinematics.inverse.turns import revolute
 from trajcli.kinematics.jacobian import jacobian
 
 _PROBES = 33  # places between neighbouring breaks, all together, at which the peaks are looked for
-
+_RACING = 1e-8  # of what the fastest joint does: near a singularity rounding leaves no less at the tool
 _ASIDE = 0.1  # of the speed with which a point of the arm's length would go
 
 
@@ -56,12 +56,14 @@ class Misfit:
         worst = (off[0] / joint).max(axis=1)
         rows = jacobian(self.follower.robot, exact[0])
         tool = np.array([self.tolerance.position, self.tolerance.angle])
+        scale = characteristic_length(self.follower.robot)
         worst = np.maximum(worst, (self._beside(places, fitted[0]) / tool).max(axis=1))
         for order in (1, 2):
             worst = np.maximum(worst, (off[order] / (joint * self.joint_peaks[order - 1])).max(axis=1))
             moved = (rows @ (fitted - exact)[order][..., None])[..., 0]
             sizes = np.linalg.norm(moved.reshape(-1, 2, 3), axis=2)
-            worst = np.maximum(worst, (sizes / (tool * self.tool_peaks[order - 1])).max(axis=1))
+            racing = np.abs(exact[order]).max(axis=1, keepdims=True) * [_RACING * scale, _RACING]
+            worst = np.maximum(worst, (sizes / (tool * self.tool_peaks[order - 1] + racing)).max(axis=1))
         return np.asarray(worst)
 
     def _beside(self, places: Array, joints: Array) -> Array:

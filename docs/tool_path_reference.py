@@ -1,0 +1,69 @@
+"""The part of the job reference that all moves along a path of the tool share."""
+
+from __future__ import annotations
+
+from docs.fields import field_table
+from trajcli.planners.operational import ToleranceSpec
+from trajcli.planners.path import Segment
+from trajcli.planners.path_law import LawSpec
+from trajcli.planners.tool_fields import ArcFields
+
+_PATHS = """\
+`line`, `arc`, `path` and `screw` lead the tcp along a path in space; the joints follow. They start and end
+at rest. A target is a pose or the name of a point; without `xyz` the tool stays where it is and turns, and
+without an orientation it keeps the one it has (an arm with fewer than six joints leaves it free). Joint
+values may be a target too: the pose that belongs to them. What a target fixes holds all the way: a target
+with `yaw` alone fixes nothing but the yaw along the path.
+
+The arm stays on the branch on which it starts, and arrives there: another `configuration` in the target is
+refused, and so is a path through a singularity, out of reach, or out of the range of a joint (exit 3, with
+the place s on the path and the joint). Joints that a target leaves free are held: see
+[concepts](concepts.md#what-a-target-leaves-free).
+
+`orientation` says how the tool turns on the way: `axis_angle` about one fixed axis by the shortest angle,
+evenly in s; `euler` evenly in the three angles in which the target is given (`euler` or `rpy`); `fixed`
+not at all; `tangent` with the path, so that the tool keeps its attitude to it, as along a seam."""
+
+_LAW = """\
+How s grows with time. Speeds, accelerations and the jerk that the law does not name are those of
+[`limits.tcp`](#limits-of-the-tool). With a `duration` no limit is needed for a polynomial; a trapezoid with
+a `duration` needs the law's `speed`, or an acceleration. A path has one law from
+end to end, and the largest bend of it bounds the speed everywhere; only `time_optimal` goes place by place.
+
+Limits of joints are not looked at when a law is made, only when the move is verified, except by
+`time_optimal`, which needs and keeps those of velocity and acceleration. Another move that is too fast
+for a joint is refused with the factor, or stretched by it: `when_over_limit: slow`.
+
+Along a bent path the tool also accelerates across. Of an acceleration in `limits.tcp`, 0.6 goes along the
+path and 0.8 across where a path is bent anywhere. `acceleration` of the law is the one along the path
+alone; what comes across is then only verified."""
+
+_TOLERANCE = """\
+How near the joints' curve comes to the exact one; velocities and accelerations likewise, as a part of their
+peaks. Finer means more pieces: at most 4096 for a move."""
+
+_SEGMENTS = """\
+A segment begins where the one before it ends. `radius` is the way before and after the corner at its end
+over which the path is rounded; it stands here for one corner or in the move for all."""
+
+_ARCS = """\
+Three ways to say which one: through `via` to `to`; about `center` to `to`, the shorter way round, or
+right-handed about `axis`; about `center` and `axis` by a signed `angle`, also several turns, with `pitch` a
+helix. A center may be off by 0.001 of the radius: it is moved, with an event. Half a turn to a target needs
+`axis`."""
+
+_SI = {"position": "`1e-6` m", "angle": "`1e-6` rad"}
+_TAKEN = ("speed", "acceleration", "jerk", "angular_speed", "angular_acceleration")
+_FROM_LIMITS = dict.fromkeys(_TAKEN, "from `limits.tcp`") | {
+    "duration": "from the limits",
+    "deceleration": "as `acceleration`",
+}
+
+
+def tool_path_sections() -> list[str]:
+    """Return the sections on what moves along a path of the tool have in common."""
+    parts = ["## Along a path of the tool", _PATHS, "### Law", _LAW, field_table(LawSpec, _FROM_LIMITS)]
+    parts += ["### Tolerance", _TOLERANCE, field_table(ToleranceSpec, _SI)]
+    parts += ["### Segments", _SEGMENTS, field_table(Segment)]
+    parts += ["### Arcs", _ARCS, field_table(ArcFields)]
+    return parts

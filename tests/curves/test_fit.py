@@ -1,0 +1,164 @@
+"""Quintic pieces through smooth functions, against the functions themselves, and times of increasing laws."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from trajcli.curves.fit import FitError, fit
+from trajcli.curves.hermite import hermite_pieces
+from trajcli.curves.invert import times_at
+from trajcli.curves.piecewise import PiecewisePolynomial
+
+ENDS = np.array([0.0, 3.0])
+
+
+def waves(t):
+    """Return sin(2t) and exp(-t), with two derivatives, (3, N, 2)."""
+    return np.stack(
+        [
+            np.stack([np.sin(2 * t), np.exp(-t)], axis=-1),
+            np.stack([2 * np.cos(2 * t), -np.exp(-t)], axis=-1),
+            np.stack([-4 * np.sin(2 * t), np.exp(-t)], axis=-1),
+        ]
+    )
+
+
+def known(function):
+    return lambda places, side, guess: function(places)
+
+
+def within(tolerance):
+    """Return the misfit of value, slope and curvature alike."""
+    return lambda places, exact, fitted: np.abs(fitted - exact).max(axis=(0, 2)) / tolerance
+
+
+def nothing(places):
+    return np.zeros((places.size, 2))
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9])
+def test_value_slope_and_curvature_are_met_everywhere(tolerance):
+    curve = fit(known(waves), within(tolerance), ENDS, nothing)
+    t = np.linspace(*ENDS, 7001)
+    off = np.abs(curve.evaluate_orders(t, (0, 1, 2)).swapaxes(0, 1) - waves(t))
+    assert off.max() <= tolerance * 1.05
+    assert off[2].max() > tolerance * 1e-3  # no finer than asked for
+    assert (curve.start, curve.end) == tuple(ENDS)
+
+
+@pytest.mark.parametrize(("order", "rate"), [(0, 6), (1, 5), (2, 4)])
+def test_the_error_falls_with_the_order_of_quintic_pieces(order, rate):
+    def misfit(places, exact, fitted):
+        return np.abs(fitted - exact)[order].max(axis=1)
+
+    few, many = (fit(known(waves), misfit, np.linspace(*ENDS, n + 1), nothing) for n in (60, 120))
+    assert (few.pieces, many.pieces) == (60, 120)  # tolerances are met at once: the errors are those of the grid
+    t = np.linspace(*ENDS, 4001)
+    errors = [np.abs(c.evaluate(t, order) - waves(t)[order]).max() for c in (few, many)]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(rate, abs=0.35)
+
+
+def test_breaks_are_kept_with_both_their_sides():
+    def kinked(places, side, guess):
+        late = places >= 1.0 if side == "right" else places > 1.0
+        bend = np.where(late, -3.0, 2.0)
+        x = places - 1.0
+        return np.stack([bend * x**2 / 2, bend * x, bend])[..., None]
+
+    curve = fit(kinked, within(1e-9), np.array([0.0, 1.0, 2.0]), lambda t: np.zeros((t.size, 1)))
+    assert curve.pieces == 2
+    sides = [curve.evaluate(1.0, 2, side=side)[0] for side in ("left", "right")]
+    np.testing.assert_allclose(sides, [2.0, -3.0], atol=1e-12)
+    np.testing.assert_allclose(curve.evaluate([0.0, 2.0])[:, 0], [1.0, -1.5], atol=1e-12)
+
+
+def test_pieces_are_short_only_where_they_must_be():
+    def peak(t):
+        x = (t - 2.0) / 0.02
+        return np.stack([np.exp(-(x**2)), -2 * x * np.exp(-(x**2)) / 0.02, (4 * x**2 - 2) * np.exp(-(x**2)) / 4e-4])[
+            ..., None
+        ]
+
+    curve = fit(known(peak), within(1e-3), ENDS + [0.0, 1.0], lambda t: np.zeros((t.size, 1)))
+    near = np.abs(curve.breaks - 2.0) < 0.1
+    assert near.mean() > 0.8
+    t = np.linspace(0, 4, 9001)
+    assert np.abs(curve.evaluate(t) - peak(t)[0]).max() < 1e-3
+
+
+def test_searches_begin_where_the_guess_says():
+    """cos q = c(t) has two answers; the pieces of the first rounds are so far off that they lead to the other one."""
+
+    def answers(t):
+        return 0.6 + 0.55 * np.cos(9 * t), -4.95 * np.sin(9 * t), -44.55 * np.cos(9 * t)
+
+    def searched(places, side, guess):
+        q, slope, bend = answers(places)
+        found = guess[:, 0].copy()
+        for _ in range(60):  # Newton's method on cos q = cos(answer)
+            found -= np.clip((np.cos(q) - np.cos(found)) / np.sin(found), -0.2, 0.2)
+        sign = np.where(found > 0, 1.0, -1.0)
+        assert (sign > 0).all(), "the other answer"
+        return np.stack([found, slope, bend])[..., None]
+
+    curve = fit(searched, within(1e-6), ENDS, lambda t: answers(t)[0][:, None])
+    t = np.linspace(*ENDS, 999)
+    np.testing.assert_allclose(curve.evaluate(t)[:, 0], answers(t)[0], atol=1e-6)
+
+
+def test_a_function_that_no_quintics_follow_is_named_with_its_place():
+    def root(t):
+        x = np.abs(t - np.sqrt(2)) + 1e-300
+        return np.stack([np.sqrt(x), 0.5 / np.sqrt(x), -0.25 / x**1.5])[..., None]
+
+    with pytest.raises(FitError) as caught:
+        fit(known(root), within(1e-6), ENDS, lambda t: np.zeros((t.size, 1)))
+    assert caught.value.place == pytest.approx(np.sqrt(2), abs=1e-3)
+    assert caught.value.misfit > 1
+    assert "times the tolerance" in str(caught.value)
+
+
+def test_the_number_of_pieces_is_bounded():
+    with pytest.raises(FitError):
+        fit(known(waves), within(1e-9), ENDS, nothing, most=20)
+    assert fit(known(waves), within(1e-9), ENDS, nothing, most=400).pieces <= 400
+
+
+def test_not_a_number_is_no_fit():
+    def broken(t):
+        return np.where(t[:, None] > 1.5, np.nan, waves(t))
+
+    with pytest.raises(FitError):
+        fit(known(broken), within(1e-3), ENDS, nothing)
+
+
+def law(*states):
+    """Return a quintic law through (t, s, sd, sdd)."""
+    rows = np.array(states, dtype=float)
+    return hermite_pieces(rows[:, 0], rows[:, 1:].T[:, :, None])
+
+
+RISING = law((0, 0, 0, 0), (1, 1, 1, 0), (2.5, 2, 0, 0), (4, 5, 0, 0))
+
+
+def test_times_are_those_of_a_root_finder():
+    wanted = np.array([1e-9, 0.2, 0.999, 1.0, 1.7, 2.0 - 1e-6, 3.3, 4.999])
+    got = times_at(RISING, wanted)
+    for value, time in zip(wanted, got, strict=True):
+        peer = brentq(lambda t, v=value: RISING.evaluate(t)[0] - v, 0, 4, xtol=1e-15, rtol=1e-14)
+        assert RISING.evaluate(time)[0] == pytest.approx(value, abs=2e-15)
+        if abs(RISING.evaluate(peer, 1)[0]) > 1e-3:
+            assert time == pytest.approx(peer, abs=1e-12)
+
+
+def test_ends_stops_and_what_lies_outside():
+    assert times_at(RISING, np.array([0.0, -1.0, 9.0])).tolist() == [0.0, 0.0, 4.0]
+    assert RISING.evaluate(times_at(RISING, np.array([5.0])))[0, 0] == pytest.approx(5.0, abs=1e-14)
+    assert times_at(RISING, np.array([2.0]))[0] == 2.5  # the law stops there, where a search finds no sharp time
+
+
+def test_the_earliest_time_of_a_pause():
+    still = PiecewisePolynomial(np.array([0.0, 1.0, 3.0, 4.0]), np.array([[1.0, 0, 1], [0, 1, 1]])[:, :, None])
+    assert times_at(still, np.array([1.0, 0.5, 1.5])).tolist() == pytest.approx([1.0, 0.5, 3.5], abs=1e-12)

@@ -1,0 +1,116 @@
+"""Paths of every kind of target, and joints on them from a root finder that knows forward kinematics alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import root
+from scipy.spatial.transform import Rotation
+
+from trajcli.geometry.arc import Arc
+from trajcli.geometry.line import Line
+from trajcli.geometry.orientation_curve import AboutAxes
+from trajcli.geometry.pose_curve import PoseCurve
+from trajcli.geometry.progress import Progress
+from trajcli.job.robot_source import load_robot
+from trajcli.kinematics.following.tool_path import ToolPath
+from trajcli.kinematics.forward import forward
+from trajcli.kinematics.robot import Robot
+
+XYZ = "xyz"
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """An arm at the beginning of a path, and how many directions of its joints the path leaves free."""
+
+    robot: Robot
+    start: np.ndarray
+    path: ToolPath
+    free: int = 0
+
+
+def case(name, start, orientation="all", tool_axis="z", *, free=0, bent=False, turn=(0.2, -0.3, 0.4), move=None) -> Case:
+    """Return a line or an arc from where the arm stands, with a rotation that its targets see or not."""
+    robot, q = load_robot(name), np.array(start, dtype=float)
+    pose = forward(robot, q)
+    if name == "planar3r":
+        move, turn = (-0.05, 0.04, 0.0), (0, 0, 0.3)
+    end = pose[:3, 3] + np.array(move or (0.06, 0.05, -0.04))
+    place = Line(pose[:3, 3], end)
+    if bent:
+        place = Arc.through(pose[:3, 3], (pose[:3, 3] + end) / 2 + [0.01, 0.0, 0.02], end)
+    last = Rotation.from_rotvec(turn).as_matrix() @ pose[:3, :3]
+    turning = AboutAxes(np.stack([pose[:3, :3], last]), Progress.even(place.length))
+    poses = PoseCurve(place, turning)
+    fixed = (True, True, True)
+    turns = (0.35,) if orientation in ("yaw", "pitch") else ()
+    return Case(robot, q, ToolPath(poses, fixed, orientation, tool_axis, turns), free)
+
+
+CASES = {
+    "ur5e, pose": case("ur5e", [0.3, -1.2, 1.4, -0.9, -1.3, 0.4]),
+    "ur5e, pose on an arc": case("ur5e", [0.3, -1.2, 1.4, -0.9, -1.3, 0.4], bent=True),
+    "puma560, pose": case("puma560", [0.2, 0.7, -0.8, 0.4, 0.9, -0.3]),
+    "puma560, direction": case("puma560", [0.2, 0.7, -0.8, 0.4, 0.9, -0.3], "direction", free=1),
+    "ur5e, direction of x": case("ur5e", [0.3, -1.2, 1.4, -0.9, -1.3, 0.4], "direction", "x", free=1),
+    "ur5e, yaw of x": case("ur5e", [0.3, -1.2, 1.4, -0.9, -1.3, 0.4], "yaw", "x", free=2),
+    "ur5e, pitch of y": case("ur5e", [0.3, -1.2, 1.4, -0.9, -1.3, 0.4], "pitch", "y", free=2),
+    "panda, pose": case("panda", [0.1, -0.5, 0.2, -2.0, 0.1, 1.6, 0.7], free=1),
+    "panda, direction": case("panda", [0.1, -0.5, 0.2, -2.0, 0.1, 1.6, 0.7], "direction", free=2),
+    "panda, position on an arc": case("panda", [0.1, -0.5, 0.2, -2.0, 0.1, 1.6, 0.7], "none", free=4, bent=True),
+    "scorbot, pitch": case("scorbot", [0.1, 0.4, -0.9, 1.2, 0.3], "pitch", free=1),
+    "scorbot, position": case("scorbot", [0.1, 0.4, -0.9, 1.2, 0.3], "none", free=2),
+    "cobra600, yaw of x": case("cobra600", [0.2, 0.9, 0.1, 0.5], "yaw", "x"),
+    "cobra600, position": case("cobra600", [0.2, 0.9, 0.1, 0.5], "none", free=1, bent=True),
+    "planar3r, yaw of x": case("planar3r", [0.3, 0.8, 0.4], "yaw", "x"),
+    "rrp, position": case("rrp", [0.3, 0.5, 0.3], "none"),
+    "cartesian_wrist, pose": case("cartesian_wrist", [0.3, 0.2, 0.4, 0.3, 0.8, -0.5], bent=True),
+}
+
+
+def off(case_, place, q):
+    """Return what is between the tcp of joints (n,) and its path; angles of it, not rates of them."""
+    path = case_.path
+    wanted, poses = path.poses.evaluate(np.array([place]))[0][0], forward(case_.robot, q)
+    parts = [poses[:3, 3] - wanted[:3, 3]]
+    k = XYZ.index(path.tool_axis)
+    axis, aim = poses[:3, k], wanted[:3, k]
+    begins = path.poses.evaluate(np.zeros(1))[0][0][:3, k]
+    part = place / path.length
+    match path.orientation:
+        case "all":
+            parts.append(Rotation.from_matrix(poses[:3, :3] @ wanted[:3, :3].T).as_rotvec())
+        case "direction":
+            parts.append(axis - aim)
+        case "yaw":
+            angle = np.arctan2(begins[1], begins[0]) + part * path.turns[0]
+            parts.append([np.cos(angle) * axis[1] - np.sin(angle) * axis[0]])
+        case "pitch":
+            parts.append([axis[2] - np.sin(np.arcsin(begins[2]) + part * path.turns[0])])
+    return np.concatenate(parts)
+
+
+def numeric_slopes(case_, place, q, step=1e-6):
+    columns = [off(case_, place, q + step * e) - off(case_, place, q - step * e) for e in np.eye(q.size)]
+    return np.stack(columns, axis=1) / (2 * step)
+
+
+def solved(case_, place, held, near):
+    """Return joint values (n,) on the path, components along `held` (f, n) as at the start, by a root finder."""
+
+    def equations(q):
+        missed = off(case_, place, q)
+        return np.concatenate([missed, held @ (q - case_.start)])
+
+    q = root(equations, near, method="lm", options={"xtol": 1e-15, "ftol": 1e-15}).x
+    for _ in range(3):  # to the last digits
+        rows = np.concatenate([numeric_slopes(case_, place, q), held])
+        q = q - np.linalg.lstsq(rows, equations(q), rcond=1e-8)[0]
+    assert np.abs(equations(q)).max() < 1e-13
+    return q
+
+
+def mirrored(case_, **fields) -> Case:
+    return replace(case_, **fields)

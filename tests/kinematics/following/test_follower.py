@@ -1,0 +1,150 @@
+"""Joint values on a path and their derivatives, against a root finder and its finite differences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from followed_paths import CASES, case, numeric_slopes, off, solved
+from scipy.linalg import null_space
+
+from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.kinematics.following.follower import LostError, follower
+from trajcli.kinematics.following.motion import motion_along
+from trajcli.kinematics.following.tolerance import Tolerance
+
+STEP = 0.012  # of the path, between the places of the differences
+STENCILS = {  # central, of order 6
+    1: np.array([-1, 9, -45, 0, 45, -9, 1]) / 60,
+    2: np.array([2, -27, 270, -490, 270, -27, 2]) / 180,
+}
+NAMES = list(CASES)
+
+
+def followed(case_):
+    return follower(case_.robot, case_.path.by_place, case_.start, 0.0)
+
+
+def around(case_, held, middle, step):
+    """Return joints at seven places around a place, (7, n), each from the last."""
+    places = middle + step * np.arange(-3, 4)
+    rows, near = [], case_.start
+    for place in np.concatenate([np.linspace(0, places[0], 6)[1:-1], places]):
+        near = solved(case_, place, held, near)
+        rows.append(near)
+    return places, np.array(rows[-7:])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_values_and_derivatives_by_place(name):
+    made = CASES[name]
+    arm, length = followed(made), made.path.length
+    places, peers = around(made, arm.held, 0.4 * length, STEP * length)
+    exact = arm.exact(places, "right", peers + 0.01 * np.random.default_rng(0).normal(size=peers.shape))
+    np.testing.assert_allclose(exact[0], peers, rtol=0, atol=1e-11)
+    for order, stencil in STENCILS.items():
+        difference = stencil @ peers / (STEP * length) ** order
+        scale = np.abs(exact[order]).max() + 1
+        np.testing.assert_allclose(exact[order][3], difference, rtol=0, atol=3e-6 * scale)
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if "arc" in name or "yaw" in name or "pitch" in name])
+def test_derivatives_by_time(name):
+    made = CASES[name]
+    arm, length = followed(made), made.path.length
+    law = PiecewisePolynomial(np.array([0.0, 2.0]), np.array([0.05, 0.1, 0.1, 0.0])[:, None, None] * length)
+    motion = motion_along(made.path, law, law.breaks, Tolerance())
+    step, middle = 0.02, 0.9
+    times = middle + step * np.arange(-3, 4)
+    rows, near = [], made.start
+    for time in times:
+        near = solved(made, law.evaluate(time)[0], arm.held, near)
+        rows.append(near)
+    timed = type(arm)(arm.robot, motion.timed, arm.start, arm.held)
+    exact = timed.exact(np.array([middle]), "right", np.array([rows[3]]))[:, 0]
+    for order, stencil in STENCILS.items():
+        difference = stencil @ np.array(rows) / step**order
+        np.testing.assert_allclose(exact[order], difference, rtol=0, atol=3e-6 * (np.abs(exact[order]).max() + 1))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_what_is_held_is_what_the_target_leaves_free(name):
+    made = CASES[name]
+    arm = followed(made)
+    free = null_space(numeric_slopes(made, 0.0, made.start), rcond=1e-6).T
+    assert len(arm.held) == made.free == len(free)
+    np.testing.assert_allclose(arm.held @ arm.held.T, np.eye(made.free), atol=1e-12)
+    np.testing.assert_allclose(arm.held.T @ arm.held, free.T @ free, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if CASES[name].free])
+def test_what_is_free_comes_back_with_the_tool(name):
+    """Held directions make joints a function of the place: to the end and back leads to the start."""
+    made = CASES[name]
+    arm = followed(made)
+    there = np.linspace(0, made.path.length, 30)
+    q = made.start
+    for place in np.concatenate([there, there[::-1]]):
+        q = arm.exact(np.array([place]), "right", q[None])[0, 0]
+        assert np.abs(off(made, place, q)).max() < 1e-9
+        assert np.abs(arm.held @ (q - made.start)).max(initial=0) < 1e-10
+    np.testing.assert_allclose(q, made.start, rtol=0, atol=1e-9)
+
+
+def test_a_guess_on_no_branch_is_lost_with_its_place():
+    made = CASES["ur5e, pose"]
+    arm = followed(made)
+    places = np.array([0.03, 0.01, 0.02])
+    guess = np.tile(made.start, (3, 1))
+    guess[0] += 2.0
+    guess[2] -= 2.0
+    with pytest.raises(LostError) as caught:
+        arm.exact(places, "right", guess)
+    np.testing.assert_array_equal(caught.value.places, [0.02, 0.03])
+    assert caught.value.joints.shape == (6,)
+
+
+def test_out_of_reach_is_lost_with_the_distance():
+    made = case("rrp", [0.3, 0.5, 0.3], "none", move=(0.05, 0.0, 0.0))
+    far = case("planar3r", [0.3, 0.05, 0.02], "yaw", "x")
+    assert made.path.length == pytest.approx(0.05)
+    arm = followed(far)
+    beyond = arm.demands
+
+    def stretched(places, side):
+        demand = beyond(places, side)
+        demand.poses[:, :3, 3] *= 3.0
+        return demand
+
+    with pytest.raises(LostError) as caught:
+        type(arm)(arm.robot, stretched, arm.start, arm.held).exact(np.array([0.01]), "right", far.start[None])
+    assert caught.value.missed[0] > 0.1
+
+
+def test_the_other_branch_is_no_answer():
+    """An elbow arm's mirror image has the same tool: the sign of the determinant tells them apart."""
+    made = CASES["cobra600, yaw of x"]
+    arm = followed(made)
+    mirror = made.start.copy()
+    k = np.arctan2(0.275 * np.sin(0.9), 0.325 + 0.275 * np.cos(0.9))
+    mirror[0] += 2 * k
+    mirror[1] *= -1
+    mirror[3] += 2 * k - 2 * 0.9  # the heading is q1 + q2 - q4
+    assert np.abs(off(made, 0.0, mirror)).max() < 1e-12
+    assert arm.exact(np.zeros(1), "right", made.start[None])[0, 0] == pytest.approx(made.start)
+    with pytest.raises(LostError):
+        arm.exact(np.zeros(1), "right", mirror[None])
+
+
+@pytest.mark.parametrize("name", ["puma560, direction", "ur5e, direction of x", "panda, direction"])
+def test_a_direction_has_a_hand_too(name):
+    made = CASES[name]
+    arm = followed(made)
+    assert abs(arm.hand) == 1.0
+    other = type(arm)(arm.robot, arm.demands, arm.start, arm.held, -arm.hand)
+    with pytest.raises(LostError):
+        other.exact(np.zeros(1), "right", made.start[None])
+
+
+def test_a_singular_start_has_no_hand():
+    made = case("puma560", [0.2, 0.7, -0.8, 0.4, 0.0, -0.3])
+    assert followed(made).hand == 0.0
