@@ -27,16 +27,16 @@ not at all; `tangent` with the path, so that the tool keeps its attitude to it, 
 _LAW = """\
 How s grows with time. Speeds, accelerations and the jerk that the law does not name are those of
 [`limits.tcp`](#limits-of-the-tool). With a `duration` no limit is needed for a polynomial; a trapezoid with
-a `duration` needs the law's `speed`, or an acceleration. A path has one law from
-end to end, and the largest bend of it bounds the speed everywhere; only `time_optimal` goes place by place.
+a `duration` needs the law's `speed`, or an acceleration. A path has one law from end to end, and its
+largest bend bounds the speed everywhere; only `time_optimal` goes place by place.
 
 Limits of joints are not looked at when a law is made, only when the move is verified, except by
 `time_optimal`, which needs and keeps those of velocity and acceleration. Another move that is too fast
 for a joint is refused with the factor, or stretched by it: `when_over_limit: slow`.
 
 Along a bent path the tool also accelerates across. Of an acceleration in `limits.tcp`, 0.6 goes along the
-path and 0.8 across where a path is bent anywhere. `acceleration` of the law is the one along the path
-alone; what comes across is then only verified."""
+path and 0.8 across where a path is bent anywhere (`time_optimal` divides it place by place). The
+`acceleration` of the law is the one along the path alone; what comes across is then only verified."""
 
 _TOLERANCE = """\
 How near the joints' curve comes to the exact one; velocities and accelerations likewise, as a part of their

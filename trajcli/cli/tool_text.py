@@ -77,13 +77,14 @@ def _speeds(tool: Mapping[str, Any], start: float, units: Units) -> Iterator[str
             used = 100 * peak["value"] / peak["limit"]
             limit = f"limit {to_user(peak['limit'], quantity, units):.9g}, {used:.4g} % used"
         name = peak["quantity"].replace("_", " ")
-        yield f"    {name}: at most {value:.9g} {unit} (t = {peak['time'] - start:.6g}); {limit}"
+        yield f"    {name}: at most {value:.6g} {unit} (t = {peak['time'] - start:.6g}); {limit}"
     yield from _held(tool, units)
     if tool["ruled_by"]:
         yield f"    the limits of {tool['ruled_by']} say how fast"
     off = to_user(tool["deviation"], Quantity("length"), units)
     turned = to_user(tool["turned"], Quantity("angle"), units)
-    yield f"    off the path by at most {off:.3g} {units.length}, turned by {turned:.3g} {units.angle}"
+    told = f"{_clean(off):.3g} {units.length}, turned by {_clean(turned):.3g} {units.angle}"
+    yield f"    off the path by at most {told}"
 
 
 def _held(tool: Mapping[str, Any], units: Units) -> Iterator[str]:

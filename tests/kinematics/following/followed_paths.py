@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import root
@@ -60,10 +60,10 @@ CASES = {
     "panda, pose": case("panda", [0.1, -0.5, 0.2, -2.0, 0.1, 1.6, 0.7], free=1),
     "panda, direction": case("panda", [0.1, -0.5, 0.2, -2.0, 0.1, 1.6, 0.7], "direction", free=2),
     "panda, position on an arc": case("panda", [0.1, -0.5, 0.2, -2.0, 0.1, 1.6, 0.7], "none", free=4, bent=True),
-    "scorbot, pitch": case("scorbot", [0.1, 0.4, -0.9, 1.2, 0.3], "pitch", free=1),
+    "scorbot, pitch": case("scorbot", [0.1, 0.4, -1.3, 1.2, 0.3], "pitch", free=1),
     "scorbot, position": case("scorbot", [0.1, 0.4, -0.9, 1.2, 0.3], "none", free=2),
     "cobra600, yaw of x": case("cobra600", [0.2, 0.9, 0.1, 0.5], "yaw", "x"),
-    "cobra600, position": case("cobra600", [0.2, 0.9, 0.1, 0.5], "none", free=1, bent=True),
+    "cobra600, position": case("cobra600", [0.2, 1.5, 0.1, 0.5], "none", free=1, bent=True),
     "planar3r, yaw of x": case("planar3r", [0.3, 0.8, 0.4], "yaw", "x"),
     "rrp, position": case("rrp", [0.3, 0.5, 0.3], "none"),
     "cartesian_wrist, pose": case("cartesian_wrist", [0.3, 0.2, 0.4, 0.3, 0.8, -0.5], bent=True),
@@ -112,5 +112,3 @@ def solved(case_, place, held, near):
     return q
 
 
-def mirrored(case_, **fields) -> Case:
-    return replace(case_, **fields)

@@ -20,7 +20,6 @@ from trajcli.curves.piecewise import Array, Side
 from trajcli.geometry.rotation import AXES
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.following.demand import Demand
-from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.target import residual_jacobian, residuals
 from trajcli.kinematics.jacobian import jacobian_dot_qd, linearisation
 from trajcli.kinematics.robot import Robot
@@ -84,8 +83,7 @@ class Follower:
             LostError: When no joint values near the guess meet the target.
         """
         demand = self.demands(places, side)
-        q = self._solved(demand, guess, places)
-        poses, columns = linearisation(self.robot, q)
+        q, poses, columns = self._solved(demand, guess, places)
         slopes = self.rows(demand, poses, columns)
         other = self.hand * handedness(demand, poses, slopes) < 0
         if other.any():
@@ -97,17 +95,18 @@ class Follower:
         second = self._divided(slopes, self._scaled(demand.accelerations(poses, bias, twist), demand))
         return np.stack([q, first, second])
 
-    def _solved(self, demand: Demand, guess: Array, places: Array) -> Array:
+    def _solved(self, demand: Demand, guess: Array, places: Array) -> tuple[Array, Array, Array]:
+        """Return joint values (N, n), poses of the tcp and Jacobians there."""
         target = demand.target()
         q = guess.copy()
+        poses, columns = linearisation(self.robot, q)
         for _ in range(_ITERATIONS):
-            poses, columns = linearisation(self.robot, q)
             errors = self._errors(demand, poses, q)
             step = self._divided(self.rows(demand, poses, columns), errors)
             q = q + np.clip(step, -_LONGEST, _LONGEST)
+            poses, columns = linearisation(self.robot, q)
             if (np.abs(errors) <= _NEAR).all():
                 break
-        poses = forward(self.robot, q)
         size = np.abs(self._errors(demand, poses, q)).max(axis=1)
         lost = ~(size <= _GOOD) | (np.abs(q - guess).max(axis=1) > _ELSEWHERE)
         if lost.any():
@@ -116,7 +115,7 @@ class Follower:
             split = sum(demand.position)
             missed = float(np.linalg.norm(difference[:split])), float(np.linalg.norm(difference[split:]))
             raise LostError(np.sort(places[lost]), q[first], missed)
-        return q
+        return q, poses, columns
 
     def _errors(self, demand: Demand, poses: Array, q: Array) -> Array:
         differences = residuals(demand.target(), poses)

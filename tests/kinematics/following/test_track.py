@@ -1,0 +1,116 @@
+"""The coarse curve along a path: on the branch of the start to the end, or stuck where a root finder is too."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from followed_paths import CASES, solved
+
+from trajcli.curves.fit import FitError, fit
+from trajcli.geometry.arc import Arc
+from trajcli.geometry.line import Line
+from trajcli.geometry.orientation_curve import Fixed
+from trajcli.geometry.pose_curve import PoseCurve
+from trajcli.kinematics.following.follower import follower
+from trajcli.kinematics.following.tolerance import Tolerance, misfit_of, probes
+from trajcli.kinematics.following.tool_path import ToolPath
+from trajcli.kinematics.following.track import StuckError, track
+from trajcli.kinematics.forward import forward
+
+NAMES = ["ur5e, pose on an arc", "panda, direction", "scorbot, position", "cobra600, yaw of x", "planar3r, yaw of x"]
+
+
+def tracked(made):
+    arm = follower(made.robot, made.path.by_place, made.start, 0.0)
+    return arm, track(arm, made.path.breaks)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_is_near_a_root_finders_joints_everywhere(name):
+    made = CASES[name]
+    arm, curve = tracked(made)
+    assert (curve.start, curve.end) == (0.0, made.path.length)
+    near = made.start
+    for place in np.linspace(0, made.path.length, 41):
+        near = solved(made, place, arm.held, near)
+        assert np.abs(curve.evaluate(place) - near).max() < 0.01
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-8])
+def test_the_fit_keeps_its_promise_of_joints_and_tool(name, tolerance):
+    made = CASES[name]
+    arm, coarse = tracked(made)
+    breaks = made.path.breaks
+    misfit = misfit_of(arm, Tolerance(tolerance, tolerance), breaks, coarse.evaluate(probes(breaks)))
+    curve = fit(arm.exact, misfit, breaks, coarse.evaluate)
+    places = np.linspace(0, made.path.length, 77)
+    exact = arm.exact(places, "right", coarse.evaluate(places))
+    fitted = curve.evaluate_orders(places, (0, 1, 2)).swapaxes(0, 1)
+    assert np.abs(fitted[0] - exact[0]).max() <= tolerance
+    aside = forward(made.robot, fitted[0])[:, :3, 3] - arm.demands(places, "right").poses[:, :3, 3]
+    assert np.linalg.norm(aside, axis=1).max() <= tolerance
+    for order in (1, 2):
+        peak = np.abs(exact[order]).max()
+        print(name, order, np.abs(fitted[order] - exact[order]).max() / tolerance / peak)
+    finer = fit(arm.exact, lambda *given: 1e3 * misfit(*given), breaks, coarse.evaluate)
+    assert finer.pieces > 1.8 * curve.pieces
+
+
+L1, L2, HAND = 0.3, 0.2, 0.1  # the links of the planar arm, m
+PLANAR = CASES["planar3r, yaw of x"].robot
+
+
+def wrist_path(place):
+    """Return the path of a tool that heads along x, on a curve of its place."""
+    poses = PoseCurve(place, Fixed(np.eye(3), place.length))
+    return ToolPath(poses, (True, True, True), "yaw", "x", (0.0,))
+
+
+def elbow_of(radius):
+    """Return the elbow's angle with the wrist at a radius, by the law of cosines."""
+    return np.arccos((radius**2 - L1**2 - L2**2) / (2 * L1 * L2))
+
+
+def standing(wrist):
+    """Return joint values, elbow positive, with the wrist there (2,) and the hand along x."""
+    q2 = elbow_of(np.hypot(*wrist))
+    q1 = np.arctan2(wrist[1], wrist[0]) - np.arctan2(L2 * np.sin(q2), L1 + L2 * np.cos(q2))
+    return np.array([q1, q2, -q1 - q2])
+
+
+def test_it_is_stuck_where_the_reach_ends():
+    """The wrist on x = 0.35 reaches up to y = sqrt(0.5^2 - 0.35^2), and there the arm is straight."""
+    wrist = np.array([0.35, 0.05])
+    begin = np.array([*wrist, 0.0]) + [HAND, 0, 0]
+    path = wrist_path(Line(begin, begin + [0.0, 0.4, 0.0]))
+    with pytest.raises(StuckError) as caught:
+        track(follower(PLANAR, path.by_place, standing(wrist), 0.0), path.breaks)
+    edge = np.sqrt((L1 + L2) ** 2 - 0.35**2) - 0.05
+    assert edge - 1e-5 < caught.value.place < edge
+    assert 0 < caught.value.joints[1] < 0.02
+    assert np.abs(caught.value.rates).max() > 100
+
+
+@pytest.mark.parametrize("gap", [1e-3, 1e-5, 1e-7])
+def test_it_does_not_pass_from_one_elbow_to_the_other(gap):
+    """The wrist comes to within a gap of the reach, where the mirror image is as near, and goes back."""
+    edge, near = L1 + L2, L1 + L2 - 0.02
+    turn = np.array([np.cos(0.3), np.sin(0.3), 0.0])
+    points = near * turn * [1, -1, 1], np.array([edge - gap, 0, 0]), near * turn
+    path = wrist_path(Arc.through(*(point + [HAND, 0, 0] for point in points)))
+    curve = track(follower(PLANAR, path.by_place, standing(points[0][:2]), 0.0), path.breaks)
+    elbow = curve.evaluate(np.linspace(0, path.length, 2001))[:, 1]
+    assert (elbow > 0).all()
+    assert curve.evaluate(path.length / 2)[1] == pytest.approx(elbow_of(edge - gap), abs=0.02)
+    assert elbow[-1] == pytest.approx(elbow_of(near), abs=1e-9)
+
+
+def test_pieces_too_many_are_named():
+    made = CASES["ur5e, pose on an arc"]
+    arm, coarse = tracked(made)
+    breaks = made.path.breaks
+    misfit = misfit_of(arm, Tolerance(1e-13, 1e-13), breaks, coarse.evaluate(probes(breaks)))
+    with pytest.raises(FitError) as caught:
+        fit(arm.exact, misfit, breaks, coarse.evaluate)
+    assert 0 <= caught.value.place <= made.path.length
