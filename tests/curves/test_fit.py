@@ -54,7 +54,10 @@ def test_the_error_falls_with_the_order_of_quintic_pieces(order, rate):
         return np.abs(fitted - exact)[order].max(axis=1)
 
     few, many = (fit(known(waves), misfit, np.linspace(*ENDS, n + 1), nothing) for n in (60, 120))
-    assert (few.pieces, many.pieces) == (60, 120)  # tolerances are met at once: the errors are those of the grid
+    assert (few.pieces, many.pieces) == (
+        60,
+        120,
+    )  # tolerances are met at once: the errors are those of the grid
     t = np.linspace(*ENDS, 4001)
     errors = [np.abs(c.evaluate(t, order) - waves(t)[order]).max() for c in (few, many)]
     assert np.log2(errors[0] / errors[1]) == pytest.approx(rate, abs=0.35)
@@ -77,11 +80,11 @@ def test_breaks_are_kept_with_both_their_sides():
 def test_pieces_are_short_only_where_they_must_be():
     def peak(t):
         x = (t - 2.0) / 0.02
-        return np.stack([np.exp(-(x**2)), -2 * x * np.exp(-(x**2)) / 0.02, (4 * x**2 - 2) * np.exp(-(x**2)) / 4e-4])[
-            ..., None
-        ]
+        return np.stack(
+            [np.exp(-(x**2)), -2 * x * np.exp(-(x**2)) / 0.02, (4 * x**2 - 2) * np.exp(-(x**2)) / 4e-4]
+        )[..., None]
 
-    curve = fit(known(peak), within(1e-3), ENDS + [0.0, 1.0], lambda t: np.zeros((t.size, 1)))
+    curve = fit(known(peak), within(1e-3), np.array([0.0, 4.0]), lambda t: np.zeros((t.size, 1)))
     near = np.abs(curve.breaks - 2.0) < 0.1
     assert near.mean() > 0.8
     t = np.linspace(0, 4, 9001)
@@ -156,9 +159,13 @@ def test_times_are_those_of_a_root_finder():
 def test_ends_stops_and_what_lies_outside():
     assert times_at(RISING, np.array([0.0, -1.0, 9.0])).tolist() == [0.0, 0.0, 4.0]
     assert RISING.evaluate(times_at(RISING, np.array([5.0])))[0, 0] == pytest.approx(5.0, abs=1e-14)
-    assert times_at(RISING, np.array([2.0]))[0] == 2.5  # the law stops there, where a search finds no sharp time
+    assert (
+        times_at(RISING, np.array([2.0]))[0] == 2.5
+    )  # the law stops there, where a search finds no sharp time
 
 
 def test_the_earliest_time_of_a_pause():
-    still = PiecewisePolynomial(np.array([0.0, 1.0, 3.0, 4.0]), np.array([[1.0, 0, 1], [0, 1, 1]])[:, :, None])
+    still = PiecewisePolynomial(
+        np.array([0.0, 1.0, 3.0, 4.0]), np.array([[1.0, 0, 1], [0, 1, 1]])[:, :, None]
+    )
     assert times_at(still, np.array([1.0, 0.5, 1.5])).tolist() == pytest.approx([1.0, 0.5, 3.5], abs=1e-12)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from trajcli.checks.finding import Finding, Kind
-from trajcli.checks.tolerances import TOOL_RELATIVE, exceeds
+from trajcli.checks.tolerances import JUMP_RELATIVE, TOOL_RELATIVE, exceeds
+from trajcli.curves.extrema import peaks
 from trajcli.curves.piecewise import Array, Side
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.following.motion import ToolMotion
@@ -141,9 +142,9 @@ def _check_jerk(rows: ToolRows) -> list[Finding]:
         return []
     before, after = law.piece_ends(2)[1][:, 0], law.piece_ends(2)[0][:, 0]
     steps = np.abs(np.append(after, 0.0) - np.append(0.0, before))
-    peak = max(float(np.abs(before).max()), float(np.abs(after).max()))
+    accelerations, jerks = peaks(law, (2, 3))
     hint = "use shape jerk_limited or quintic, or leave the limit of the tool's jerk out"
-    if steps.max() > 1e-9 * peak:
+    if steps.max() > JUMP_RELATIVE * float(accelerations.magnitude[0]):
         return [
             Finding(
                 rows.span.index,
@@ -155,10 +156,11 @@ def _check_jerk(rows: ToolRows) -> list[Finding]:
                 hint=hint,
             )
         ]
-    value = float(np.abs(np.concatenate(law.piece_ends(3))).max())
-    if value > limit * (1 + TOOL_RELATIVE):
-        return [_finding(rows, "tool_jerk", value, limit, 0.0, (value / limit) ** (1 / 3))]
-    return []
+    value = float(jerks.magnitude[0])
+    if value <= limit * (1 + TOOL_RELATIVE):
+        return []
+    time = float(jerks.high_time[0] if jerks.high[0] >= value else jerks.low_time[0])
+    return [_finding(rows, "tool_jerk", value, limit, time, (value / limit) ** (1 / 3))]
 
 
 def _check_branch(rows: ToolRows) -> list[Finding]:

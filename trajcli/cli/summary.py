@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from trajcli.curves.extrema import peaks
 from trajcli.kinematics.robot import QUANTITIES
 from trajcli.pipeline.plan import Plan
+from trajcli.pipeline.stretch import PlannedMove
 
 
 def summary(plan: Plan, rows: int) -> str:
@@ -33,16 +35,28 @@ def _where(move: int | None) -> str:
 
 def _tightest(plan: Plan) -> str:
     best, text = 0.0, ""
-    for move, peaks in zip(plan.moves, plan.verdict.peaks, strict=True):
+    for move, extremes in zip(plan.moves, plan.verdict.peaks, strict=True):
         for order in (1, 2, 3):
             bounds = move.robot.limits.of_order(order)
-            used = np.maximum(peaks[order].low / bounds[:, 0], peaks[order].high / bounds[:, 1])
+            used = np.maximum(extremes[order].low / bounds[:, 0], extremes[order].high / bounds[:, 1])
             joint = int(used.argmax())
             if used[joint] > best * (1 + 1e-9):
                 best = float(used[joint])
                 name = move.robot.joint_names[joint]
                 text = f"{QUANTITIES[order]} of {name} in move {move.index}, {100 * best:.4g} % used"
+        speed = _tool_speed(move)
+        if speed > best * (1 + 1e-6):
+            best, text = speed, f"speed of the tool in move {move.index}, {100 * speed:.4g} % used"
     return text
+
+
+def _tool_speed(move: PlannedMove) -> float:
+    """Return which part of the limit of the tool's speed along its path is used."""
+    tool, limits = move.planned.tool, move.robot.limits.tcp
+    if tool is None:
+        return 0.0
+    limit = limits.angular_speed if tool.in_place else limits.speed
+    return float(peaks(tool.law, (1,))[0].magnitude[0]) / limit
 
 
 def _unchecked(plan: Plan) -> str:

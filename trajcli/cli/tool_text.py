@@ -32,8 +32,10 @@ def tool_lines(move: Mapping[str, Any], units: Units) -> Iterator[str]:
 def _segment(segment: Mapping[str, Any], units: Units) -> str:
     kind, length = segment["kind"], units.length
     if kind == "screw":
-        moved, turned = _point(segment["translation"]), _point(segment["rotation"])
-        return f"screw in the axes of the tool: {moved} {length}, {turned} {units.angle}"
+        where = f" through {_point(segment['point'])} {length}" if "point" in segment else ""
+        turned = f"{segment['angle']:.9g} {units.angle} about it"
+        along = f"{_clean(segment['advance']):.9g} {length} along it"
+        return f"screw about the axis {_point(segment['axis'])}{where}: {turned}, {along}"
     if kind == "rotation":
         return f"rotation by {segment['angle']:.9g} {units.angle} at {_point(segment['place'])} {length}"
     ends = f"{_point(segment['start'])} to {_point(segment['end'])} {length}, length {segment['length']:.9g}"
@@ -48,7 +50,17 @@ def _segment(segment: Mapping[str, Any], units: Units) -> str:
 def _corner(corner: Mapping[str, Any], units: Units) -> str:
     where = f"at s = {corner['place']:.9g} {units.length}, turn {_clean(corner['turn']):.6g} {units.angle}"
     if corner["kind"] != "rounded":
-        told = {"stop": "stops there", "smooth": "goes on smoothly", "bend": "the curvature jumps"}
+        told = {
+            "stop": "stops there",
+            "overlap": "cut by overlapping in time",
+            "smooth": "goes on smoothly",
+            "bend": "the curvature jumps",
+        }
+            "stop": "stops there",
+            "overlap": "cut by overlapping in time",
+            "smooth": "goes on smoothly",
+            "bend": "the curvature jumps",
+        }
         return f"{where}: {told[corner['kind']]}"
     size = f"radius {corner['radius']:.6g}, passes at {corner['deviation']:.6g} {units.length}"
     return f"{where}: rounded, {size}"

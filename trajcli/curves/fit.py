@@ -31,7 +31,7 @@ Guess = Callable[[Array], Array]
 # where the error of a quintic piece is largest: of the value and its curvature, and of the slope
 _PROBES = np.array([0.5 - 0.1 * sqrt(5.0), 0.5, 0.5 + 0.1 * sqrt(5.0)])
 _ORDER = 4  # with which the error of the second derivative falls: the slowest
-_FILLED = 0.8  # of the tolerance: between the probes the error is a little larger
+_FILLED = 0.5  # of the tolerance: between the probes the error may be twice as large
 _MOST_PARTS = 8
 _ROUNDS = 60
 

@@ -152,7 +152,7 @@ def round_corner(before: PlaceCurve, after: PlaceCurve, radius: float) -> Blend:
         raise PlanningError(
             f"the path turns back by {np.degrees(turn):.6g} deg: such a corner cannot be rounded (the "
             f"largest is {np.degrees(np.pi - REVERSAL):.6g} deg)",
-            hint="radius 0 stops there",
+            hint="stop there instead: `corner: stop`",
         )
     first = before.evaluate(np.array([before.length - radius]), "right")
     last = after.evaluate(np.array([radius]), "left")

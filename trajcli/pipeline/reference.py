@@ -13,6 +13,7 @@ from trajcli.planners.ruckig_solve import fastest
 from trajcli.trajectory import State
 
 _ROUNDING = 1e-12
+_NOWHERE = 1e-9  # rad or m: a joint that comes back so near to where it was has no way to go
 
 
 @dataclass(frozen=True)
@@ -80,6 +81,8 @@ def _task(start: State, end: State, limits: Limits, joint: int) -> Task:
     for state in (start, end):
         rates = float(state.velocity[joint]), counts * float(state.acceleration[joint])
         ends.append((float(state.position[joint]), *rates))
+    if abs(ends[1][0] - ends[0][0]) <= _NOWHERE:
+        ends[1] = (ends[0][0], *ends[1][1:])
     return Task(f"joint {joint + 1}", ends[0], ends[1], bounds)
 
 

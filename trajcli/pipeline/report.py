@@ -27,6 +27,7 @@ from trajcli.pipeline.reference import NoBound, fastest_duration
 from trajcli.pipeline.stretch import PlannedMove
 from trajcli.pipeline.tool_finding import tool_finding
 from trajcli.pipeline.tool_report import tool_report
+from trajcli.planners.operational import OperationalMove
 from trajcli.planners.point_to_point import PointToPoint
 from trajcli.planners.through_points import ThroughPoints
 
@@ -157,6 +158,8 @@ def _said(plan: Plan, finding: Finding) -> tuple[str, dict[str, Amount], str | N
 def _jump_remedy(move: PlannedMove, finding: Finding) -> str | None:
     if finding.kind == "acceleration_jump" and isinstance(move.planner, ThroughPoints):
         return "use spline with rule continuous_acceleration or quintic, or say limits: {jerk: null}"
+    if finding.kind == "acceleration_jump" and isinstance(move.planner, OperationalMove):
+        return "use `law: {shape: quintic}` or jerk_limited, or say limits: {jerk: null}"
     if finding.hint is not None or move.planned.begins is None:
         return finding.hint
     return "this rule leaves the velocities at its ends open: use clamped or continuous_acceleration"

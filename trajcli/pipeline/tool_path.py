@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.pipeline.polynomials import stretches
 from trajcli.pipeline.stretch import PlannedMove
+from trajcli.planners.path import PathMove
 from trajcli.units import Quantity, Units, factor
+
+if TYPE_CHECKING:
+    from trajcli.geometry.screw import Screw
+    from trajcli.kinematics.following.tool_path import ToolPath
 
 
 def path_in_units(move: PlannedMove, units: Units) -> dict[str, Any] | None:
@@ -23,7 +28,8 @@ def path_in_units(move: PlannedMove, units: Units) -> dict[str, Any] | None:
         {"start": s.start, "end": s.end, "local": s.local.tolist(), "absolute": s.absolute.tolist()}
         for s in stretches(tool.law.breaks, tool.law.coefficients[:, :, 0] / scale)
     ]
-    segments, corners = _drawing(tool.path, units)
+    overlaps = isinstance(move.planner, PathMove) and move.planner.corner == "overlap"
+    segments, corners = _drawing(tool.path, units, overlaps=overlaps)
     return {
         "length": float(tool.law.piece_ends()[1][-1, 0]) / scale,
         "unit": units.angle if tool.in_place else units.length,
@@ -33,37 +39,56 @@ def path_in_units(move: PlannedMove, units: Units) -> dict[str, Any] | None:
     }
 
 
-def _drawing(path: Any, units: Units) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:  # noqa: ANN401
+def _drawing(
+    path: ToolPath | None, units: Units, *, overlaps: bool
+) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Return the segments of a path and the corners between them."""
     from trajcli.geometry.chain import Chain
+    from trajcli.geometry.pose_curve import PoseCurve
     from trajcli.geometry.screw import Screw
 
-    poses = None if path is None else path.poses
-    if poses is None:
+    if path is None:
         return [], []
-    if isinstance(poses, Screw):
-        twist = poses.twist
-        lengths, angles = (factor(Quantity(kind), units) for kind in ("length", "angle"))
-        screw = {
-            "kind": "screw",
-            "translation": _plain(twist[:3] / lengths),
-            "rotation": _plain(twist[3:] / angles),
-        }
-        return [screw], []
-    if not isinstance(poses.place, Chain):
-        return [_segment(poses.place, units)], []
+    if isinstance(path.poses, Screw):
+        return [_screw(path.poses, units)], []
+    place = path.poses.place if isinstance(path.poses, PoseCurve) else None
+    if not isinstance(place, Chain):
+        return ([] if place is None else [_segment(place, units)]), []
     length, angle = (factor(Quantity(kind), units) for kind in ("length", "angle"))
     corners = [
         {
-            "kind": corner.kind,
+            "kind": "overlap" if overlaps else corner.kind,
             "place": corner.place / length,
             "point": _plain(corner.point / length),
             "turn": corner.turn / angle,
             "radius": corner.used / length,
             "deviation": corner.deviation / length,
         }
-        for corner in poses.place.corners
+        for corner in place.corners
     ]
-    return [_segment(segment, units) for segment in poses.place.segments], corners
+    return [_segment(segment, units) for segment in place.segments], corners
+
+
+def _screw(screw: Screw, units: Units) -> dict[str, Any]:
+    """Return the axis of a screw in world, a point of it, and angle and way along it.
+
+    Source: Lynch and Park, Modern Robotics (2017), section 3.3.2.
+    """
+    length, angle = (factor(Quantity(kind), units) for kind in ("length", "angle"))
+    rotation, origin = screw.start[:3, :3], screw.start[:3, 3]
+    moved, turned = rotation @ screw.twist[:3], rotation @ screw.twist[3:]
+    size = float(np.linalg.norm(turned))
+    if size == 0:
+        way = float(np.linalg.norm(moved))
+        return {"kind": "screw", "axis": _plain(moved / way), "angle": 0.0, "advance": way / length}
+    axis = turned / size
+    return {
+        "kind": "screw",
+        "axis": _plain(axis),
+        "point": _plain((origin + np.cross(axis, moved) / size) / length),
+        "angle": size / angle,
+        "advance": float(axis @ moved) / length,
+    }
 
 
 def _segment(place: Any, units: Units) -> dict[str, Any]:  # noqa: ANN401

@@ -142,14 +142,24 @@ class Scale(Model):
     jerk: Factor = 1.0
 
 
-ToolSpeed = Annotated[float, Number(Quantity("length", 1), "Speed of the tool.", above=0.0)]
-ToolAcceleration = Annotated[
-    float, Number(Quantity("length", 2), "Magnitude of the tool's acceleration.", above=0.0)
+ToolSpeed = Annotated[
+    float, Number(Quantity("length", 1), "Speed of the tool (length unit per s).", above=0.0)
 ]
-ToolJerk = Annotated[float, Number(Quantity("length", 3), "Jerk of the tool along its path.", above=0.0)]
-AngularSpeed = Annotated[float, Number(Quantity("angle", 1), "Angular speed of the tool.", above=0.0)]
+ToolAcceleration = Annotated[
+    float,
+    Number(Quantity("length", 2), "Magnitude of the tool's acceleration (length unit per s^2).", above=0.0),
+]
+ToolJerk = Annotated[
+    float, Number(Quantity("length", 3), "Jerk of the tool along its path (length unit per s^3).", above=0.0)
+]
+AngularSpeed = Annotated[
+    float, Number(Quantity("angle", 1), "Angular speed of the tool (angle unit per s).", above=0.0)
+]
 AngularAcceleration = Annotated[
-    float, Number(Quantity("angle", 2), "Magnitude of the tool's angular acceleration.", above=0.0)
+    float,
+    Number(
+        Quantity("angle", 2), "Magnitude of the tool's angular acceleration (angle unit per s^2).", above=0.0
+    ),
 ]
 
 

@@ -48,7 +48,7 @@ class PathMove(OperationalMove):
     """
 
     planner: Literal["path"] = "path"
-    segments: Annotated[tuple[Segment, ...], Field(min_length=1, description="Lines and arcs, in order.")]
+    segments: Annotated[list[Segment], Field(min_length=1, description="Lines and arcs, in order.")]
     corner: Annotated[
         Literal["stop", "round", "overlap"],
         Field(

@@ -50,7 +50,7 @@ def chain_way(before: Array, move: PathMove, robot: Robot) -> Way:
         return way
     tolerance = Tolerance(move.tolerance.position, move.tolerance.angle)
     motion = overlapped(before, places, targets, move, robot.limits.tcp, tolerance)
-    return replace(way, overlap=motion, events=())
+    return replace(way, overlap=replace(motion, path=path), events=())
 
 
 def _segments(before: Array, move: PathMove, robot: Robot) -> tuple[list[PlaceCurve], list[ToolTarget]]:

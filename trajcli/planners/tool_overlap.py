@@ -126,10 +126,13 @@ def _stretches(
     whole = None
     if spec.duration is not None:
         whole = spec.duration + (len(places) - 1) * (move.overlap or 0.0)
-    stretches, crowd = [], _crowd(places) if spec.acceleration is None else 1.0
+    stretches, crowd = [], _crowd(places)
+    lower = replace(
+        limits, acceleration=limits.acceleration / crowd, jerk=limits.jerk / 2
+    )  # two at once add up
     for place, vector in zip(places, vectors, strict=True):
         rates = rates_of_segment(place, float(np.linalg.norm(vector)) / place.length)
-        bounds, _ = bounds_of(spec, replace(limits, acceleration=limits.acceleration / crowd), rates)
+        bounds, _ = bounds_of(spec, lower, rates)
         bounds = require_bounds(spec, bounds, rates, "path")
         share = None if whole is None else whole * place.length / total
         stretches.append(stretch_of(spec, place.length, bounds, share))

@@ -7,15 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from trajcli.curves.piecewise import Array
-from trajcli.geometry.rotation import Axis
+from trajcli.errors import PlanningError
+from trajcli.geometry.rotation import AXES, Axis
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.target import Fixed, meeting, partial_target, residuals
+from trajcli.kinematics.inverse.target import Target as Goal
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.fields import Target
 from trajcli.planners.goal import goal_of
 
 _WHOLE = (True, True, True)
 _ALL_SIX = 6
+_UPRIGHT = 1e-6  # rad from upright
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +59,7 @@ def tool_target(target: Target, before: Array, robot: Robot) -> ToolTarget:
         pose = before.copy()
         pose[:3, 3] = position
         return ToolTarget(pose, _WHOLE, "all" if len(robot.joints) >= _ALL_SIX else "none")
+    _refuse_upright(goal, before)
     aims = None if goal.orientation == "all" else goal.aims
     kind = {"all": "rotation", "direction": "direction"}.get(goal.orientation, goal.orientation)
     given = goal.poses[:3, :3] if aims is None else aims if kind == "direction" else aims[0]
@@ -63,6 +67,23 @@ def tool_target(target: Target, before: Array, robot: Robot) -> ToolTarget:
     pose = meeting(whole, before[None])[0]
     turn = float(residuals(whole, before[None])[0, 3]) if kind in ("yaw", "pitch") else 0.0
     return ToolTarget(pose, _WHOLE, goal.orientation, goal.tool_axis, turn, typed=_typed(target))
+
+
+def _refuse_upright(goal: Goal, before: Array) -> None:
+    """Refuse a yaw or pitch from where the tool axis is upright: it has no heading to turn from.
+
+    Raises:
+        PlanningError: Names the axis.
+    """
+    if goal.orientation not in ("yaw", "pitch"):
+        return
+    axis = before[:3, AXES.index(goal.tool_axis)]
+    if np.hypot(axis[0], axis[1]) <= _UPRIGHT:
+        message = f"the {goal.tool_axis} axis of the tool is upright where the move starts: it has no heading"
+        raise PlanningError(
+            message,
+            hint=f"say another `tool_axis`, or give the target's orientation without {goal.orientation}",
+        )
 
 
 def _typed(target: Target) -> tuple[Array, str, str] | None:

@@ -25,6 +25,7 @@ _FINER = 0.5  # of the tolerance, for q(s): what the law multiplies it with must
 _CORNERS = 16  # of the polygon inside the circle of accelerations
 _BETWEEN = 6  # places of a piece at which the limits of the tool are looked at, its ends included
 _STRETCHED = 1e-9
+_NOTED = 1e-6  # relative: a smaller stretch is not worth an event
 
 
 def fastest_along(joints: Followed, spec: LawSpec, tolerance: Tolerance, planner: str) -> Made:
@@ -62,7 +63,7 @@ def fastest_along(joints: Followed, spec: LawSpec, tolerance: Tolerance, planner
     text = f"the grid was refined {solved.refinements} times, to {solved.grid.size} places"
     events = [Event("refined", text)]
     stretch = solved.stretch * left
-    if stretch > 1 + _STRETCHED:
+    if stretch > 1 + _NOTED:
         text = f"stretched {stretch:.9g} times to keep all limits between the places"
         events.append(Event("stretched", text))
     return Made(trajectory, motion, tuple(phases), tuple(events if solved.refinements else events[1:]))

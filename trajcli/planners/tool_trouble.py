@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trajcli.curves.extrema import peaks
+from trajcli.curves.fit import MOST_PIECES
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount, PlanningError, Problem
 from trajcli.kinematics.dexterity import characteristic_length
@@ -23,6 +24,7 @@ from trajcli.kinematics.robot import Robot
 _BISECTIONS = 20
 _LOOKS = 17  # places beyond the trouble at which the arm's reach is asked for
 _NEXT = 4e-6  # of the whole: how far beyond the trouble the first of them is
+_SLOW = 20.0  # rad for each length of the arm: a joint that goes less does not race
 _REGULAR = 1e-3  # of the largest singular value: with more there is no singularity nearby
 _SLOPE = 1e-5  # of the whole: step of the difference that says how fast a joint would have to go
 
@@ -103,7 +105,7 @@ class Trouble:
             known = found.joints[first - 1][found.valid[first - 1]]
             last = self._last_reached(float(places[first - 1]), float(places[first]), known)
         missed = found.shortfall.max(axis=0)
-        kind = 0 if missed[0] > 0 else 1
+        kind = int(missed[1] * characteristic_length(self.robot) > missed[0])
         amounts = {
             "place": self._place(last),
             "missed": Amount(float(missed[kind]), 0, None, ("length", "angle")[kind]),
@@ -140,18 +142,20 @@ class Trouble:
         name = self.robot.joint_names[joint]
         unit = "rad" if self.robot.joint_types[joint] == "revolute" else "m"
         per = "s" if self.law is not None else "rad of the path" if self.in_place else "m of the path"
+        race = f"{name} would have to go {abs(float(rates[joint])):.4g} {unit} for each {per}"
+        if self.law is None and abs(float(rates[joint])) < _SLOW / characteristic_length(self.robot):
+            race = "branches of the arm meet, and it would pass from one to another"
         message = (
-            f"the path runs into a singularity at s = {{place}}: there {name} would have to go "
-            f"{abs(float(rates[joint])):.4g} {unit} for each {per} (smallest over largest singular value "
-            f"{ratio:.2g})"
+            f"the path runs into a singularity at s = {{place}}: there {race} (smallest over largest "
+            f"singular value {ratio:.2g})"
         )
         hint = "move the path, start in another configuration, or use a move in joint space there"
         return PlanningError(Problem(message, hint, joint=name, amounts={"place": self._place(at)}))
 
     def _regular(self, at: float, *, stuck: bool) -> PlanningError:
         """Return the error of a place where the tool could go on."""
-        message = "around s = {place} of the path the tolerance is finer than rounding lets it be met"
-        hint = "choose a larger `tolerance`, or a smoother path"
+        message = f"{MOST_PIECES} pieces do not meet the tolerance on this path, worst around s = {{place}}"
+        hint = "choose a larger `tolerance`, or split the path"
         if stuck:
             message = (
                 f"what the target leaves free cannot be held beyond s = {{place}} of the path: "

@@ -31,7 +31,9 @@ class Case:
     free: int = 0
 
 
-def case(name, start, orientation="all", tool_axis="z", *, free=0, bent=False, turn=(0.2, -0.3, 0.4), move=None) -> Case:
+def case(
+    name, start, orientation="all", tool_axis="z", *, free=0, bent=False, turn=(0.2, -0.3, 0.4), move=None
+) -> Case:
     """Return a line or an arc from where the arm stands, with a rotation that its targets see or not."""
     robot, q = load_robot(name), np.array(start, dtype=float)
     pose = forward(robot, q)
@@ -59,10 +61,12 @@ CASES = {
     "ur5e, pitch of y": case("ur5e", [0.3, -1.2, 1.4, -0.9, -1.3, 0.4], "pitch", "y", free=2),
     "panda, pose": case("panda", [0.1, -0.5, 0.2, -2.0, 0.1, 1.6, 0.7], free=1),
     "panda, direction": case("panda", [0.1, -0.5, 0.2, -2.0, 0.1, 1.6, 0.7], "direction", free=2),
-    "panda, position on an arc": case("panda", [0.1, -0.5, 0.2, -2.0, 0.1, 1.6, 0.7], "none", free=4, bent=True),
+    "panda, position on an arc": case(
+        "panda", [0.1, -0.5, 0.2, -2.0, 0.1, 1.6, 0.7], "none", free=4, bent=True
+    ),
     "scorbot, pitch": case("scorbot", [0.1, 0.4, -1.3, 1.2, 0.3], "pitch", free=1),
     "scorbot, position": case("scorbot", [0.1, 0.4, -0.9, 1.2, 0.3], "none", free=2),
-    "cobra600, yaw of x": case("cobra600", [0.2, 0.9, 0.1, 0.5], "yaw", "x"),
+    "cobra600, yaw of x": case("cobra600", [0.2, 1.5, 0.1, 0.5], "yaw", "x"),
     "cobra600, position": case("cobra600", [0.2, 1.5, 0.1, 0.5], "none", free=1, bent=True),
     "planar3r, yaw of x": case("planar3r", [0.3, 0.8, 0.4], "yaw", "x"),
     "rrp, position": case("rrp", [0.3, 0.5, 0.3], "none"),
@@ -110,5 +114,3 @@ def solved(case_, place, held, near):
         q = q - np.linalg.lstsq(rows, equations(q), rcond=1e-8)[0]
     assert np.abs(equations(q)).max() < 1e-13
     return q
-
-

@@ -17,9 +17,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trajcli.curves.piecewise import Array, Side
-from trajcli.geometry.rotation import AXES
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.following.demand import Demand
+from trajcli.kinematics.following.hand import NO_HAND, Hand, hand_of
 from trajcli.kinematics.inverse.target import residual_jacobian, residuals
 from trajcli.kinematics.jacobian import jacobian_dot_qd, linearisation
 from trajcli.kinematics.robot import Robot
@@ -27,12 +27,11 @@ from trajcli.kinematics.robot import Robot
 Demands = Callable[[Array, Side], Demand]
 
 _ITERATIONS = 12
-_NEAR = 1e-8  # scaled residual after which one more step of Newton's reaches what rounding allows
+_NEAR = 1e-8  # rad or m: after a step as short as this Newton's method is at what rounding allows
 _GOOD = 1e-10  # scaled residual that still counts as met where rounding is larger
 _LONGEST = 0.5  # rad, or arm lengths, in one step
 _ELSEWHERE = 0.25  # rad or m: joint values this far from the guess are on another branch
 _RANK = 1e-6  # of the largest singular value: directions with less are free
-_FLAT = 1e-12  # a determinant of scaled rows, which are of the size 1, that is none
 _AROUND, _SPREAD = 4, 0.1  # configurations, rad or m: an arm is regular almost everywhere
 
 
@@ -61,15 +60,14 @@ class Follower:
         demands: The tool at places (N,) of the path, from one side of breaks.
         start: Joint values at the beginning of the path, shape (n,).
         held: Unit directions of joint values that are kept, shape (f, n).
-        hand: Sign of the determinant of the rows at the start, which it keeps: where it changes the arm
-            passes from one branch to another. Zero where the start is singular.
+        hand: On which side of singular configurations the arm starts, and stays.
     """
 
     robot: Robot
     demands: Demands
     start: Array
     held: Array
-    hand: float = 0.0
+    hand: Hand = NO_HAND
 
     def exact(self, places: Array, side: Side, guess: Array) -> Array:
         """Return joint values and their first and second derivative, shape (3, N, n).
@@ -85,7 +83,7 @@ class Follower:
         demand = self.demands(places, side)
         q, poses, columns = self._solved(demand, guess, places)
         slopes = self.rows(demand, poses, columns)
-        other = self.hand * handedness(demand, poses, slopes) < 0
+        other = self.hand.changed(demand, poses, slopes)
         if other.any():
             first_other = int(np.flatnonzero(other)[np.argmin(places[other])])
             raise LostError(np.sort(places[other]), q[first_other], (0.0, 0.0))
@@ -105,7 +103,7 @@ class Follower:
             step = self._divided(self.rows(demand, poses, columns), errors)
             q = q + np.clip(step, -_LONGEST, _LONGEST)
             poses, columns = linearisation(self.robot, q)
-            if (np.abs(errors) <= _NEAR).all():
+            if (np.abs(step) <= _NEAR).all():
                 break
         size = np.abs(self._errors(demand, poses, q)).max(axis=1)
         lost = ~(size <= _GOOD) | (np.abs(q - guess).max(axis=1) > _ELSEWHERE)
@@ -149,22 +147,6 @@ class Follower:
         return np.asarray((np.linalg.pinv(slopes, rcond=1e-12) @ rates[..., None])[..., 0])
 
 
-def handedness(demand: Demand, poses: Array, rows: Array) -> Array:
-    """Return the sign (N,) of the determinant of scaled rows (N, m + f, n); zero where it nearly vanishes.
-
-    The three rows of a direction count for two: a column of the axis itself makes up for the third.
-    """
-    if demand.orientation == "direction":
-        column = np.zeros((*rows.shape[:2], 1))
-        split = sum(demand.position)
-        column[:, split : split + 3, 0] = poses[:, :3, AXES.index(demand.tool_axis)]
-        rows = np.concatenate([rows, column], axis=2)
-    if rows.shape[1] != rows.shape[2]:
-        return np.zeros(len(rows))
-    values = np.linalg.det(rows)
-    return np.asarray(np.where(np.abs(values) > _FLAT, np.sign(values), 0.0))
-
-
 def follower(robot: Robot, demands: Demands, start: Array, place: float) -> Follower:
     """Return the follower that begins in joint values `start` (n,) at a place of the path.
 
@@ -183,4 +165,4 @@ def follower(robot: Robot, demands: Demands, start: Array, place: float) -> Foll
     rank = int((values > _RANK * values[:, :1]).sum(axis=1).max())
     _, _, right = np.linalg.svd(bare.rows(demand, *here)[0])
     held = Follower(robot, demands, start, right[rank:])
-    return replace(held, hand=float(handedness(demand, here[0], held.rows(demand, *here))[0]))
+    return replace(held, hand=hand_of(demand, here[0], held.rows(demand, *here)))

@@ -19,7 +19,7 @@ class ToolMotion:
     """The tool over the time of a move.
 
     Attributes:
-        path: Where it goes; None where segments overlap, and only time says where it is.
+        path: Where it goes; where segments overlap it is only near, and time alone says where it is.
         law: s(t) from t = 0, m, or rad where the tool turns in its place.
         timed: The demand at times (N,), derivatives by t; from one side of breaks.
         breaks: Times at which a second derivative may jump, the ends included.

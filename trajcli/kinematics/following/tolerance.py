@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array, Side
 from trajcli.kinematics.dexterity import characteristic_length
@@ -40,7 +41,8 @@ class Misfit:
     Attributes:
         follower: Knows what is exact.
         tolerance: What is allowed.
-        joint_peaks: Largest first and second derivative of any joint of the same kind, shape (2, n).
+        joint_peaks: Largest first and second derivative of any joint of the same kind, shape (2, n), as far
+            as they are known; where joints race there may be larger ones.
         tool_peaks: Largest first and second derivative of the tool's place and orientation, shape (2, 2).
     """
 
@@ -52,14 +54,16 @@ class Misfit:
     def __call__(self, places: Array, exact: Array, fitted: Array) -> Array:
         """Return the misfit (N,) of fitted (3, N, n) from exact (3, N, n) values at places (N,)."""
         off = np.abs(fitted - exact)
-        joint = np.where(revolute(self.follower.robot), self.tolerance.angle, self.tolerance.position)
+        turning = revolute(self.follower.robot)
+        joint = np.where(turning, self.tolerance.angle, self.tolerance.position)
         worst = (off[0] / joint).max(axis=1)
         rows = jacobian(self.follower.robot, exact[0])
         tool = np.array([self.tolerance.position, self.tolerance.angle])
         scale = characteristic_length(self.follower.robot)
         worst = np.maximum(worst, (self._beside(places, fitted[0]) / tool).max(axis=1))
         for order in (1, 2):
-            worst = np.maximum(worst, (off[order] / (joint * self.joint_peaks[order - 1])).max(axis=1))
+            peaks = np.maximum(self.joint_peaks[order - 1], _by_kind(exact[order], turning))
+            worst = np.maximum(worst, (off[order] / (joint * peaks)).max(axis=1))
             moved = (rows @ (fitted - exact)[order][..., None])[..., 0]
             sizes = np.linalg.norm(moved.reshape(-1, 2, 3), axis=2)
             racing = np.abs(exact[order]).max(axis=1, keepdims=True) * [_RACING * scale, _RACING]
@@ -89,12 +93,7 @@ def misfit_of(follower: Follower, tolerance: Tolerance, breaks: Array, guess: Ar
     exact = follower.exact(places, side, guess)
     turning = revolute(follower.robot)
     duration = float(breaks[-1] - breaks[0])
-    joint_peaks = np.empty((2, len(turning)))
-    for order in (1, 2):
-        largest = np.abs(exact[order]).max(axis=0)
-        for kind in (turning, ~turning):
-            if kind.any():
-                joint_peaks[order - 1, kind] = largest[kind].max()
+    joint_peaks = np.stack([_by_kind(exact[order], turning) for order in (1, 2)])
     demand = follower.demands(places, side)
     rows = jacobian(follower.robot, exact[0])
     rates = (rows @ exact[1][..., None])[..., 0].reshape(-1, 2, 3)
@@ -104,6 +103,13 @@ def misfit_of(follower: Follower, tolerance: Tolerance, breaks: Array, guess: Ar
     for row in tool_peaks:  # what the tool does not do is measured by what it does
         row[:] = max(row[0], _ASIDE * row[1] * scale), max(row[1], _ASIDE * row[0] / scale)
     return Misfit(follower, tolerance, _floored(joint_peaks, duration), _floored(tool_peaks, duration))
+
+
+def _by_kind(rates: Array, turning: NDArray[np.bool_]) -> Array:
+    """Return the largest rate (N, n) of any joint that turns, and of any that slides, for each joint (n,)."""
+    largest = np.abs(rates).max(axis=0)
+    kinds = (largest * turning).max(), (largest * ~turning).max()
+    return np.asarray(np.where(turning, *kinds))
 
 
 def probes(breaks: Array) -> Array:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from trajcli.curves.hermite import hermite_coefficients
-from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, horner
 from trajcli.kinematics.following.follower import Follower, LostError
 
 _FIRST = 1 / 8  # of a stretch between breaks
 _SURE = 0.15  # rad or m: a prediction that is off by more may have led to another branch
+_BULGE = 10.0  # times that a curve through both ends of a step is to be nearer than a prediction from one
 _AIM = 0.05  # rad or m by which predictions may be off
 _SHORTEST = 1e-6  # of the path: where so little a step is not sure, the joints race
 _ORDER = 3  # of the error of the prediction, in the step
@@ -47,15 +48,13 @@ def track(follower: Follower, breaks: Array) -> PiecewisePolynomial:
     nodes, pieces, q = [float(breaks[0])], [], follower.start
     for end in breaks[1:].tolist():
         place, step = nodes[-1], (end - nodes[-1]) * _FIRST
-        state = _exact(follower, place, "right", q, q)
+        state = _exact(follower, np.array([place]), "right", q[None])[:, 0]
         while place < end:
             step = min(step, end - place)
             if step > 0.7 * (end - place):
                 step = end - place
-            predicted = state[0] + step * (state[1] + 0.5 * step * state[2])
             try:
-                reached = _exact(follower, place + step, "left", predicted, state[0])
-                off = float(np.abs(reached[0] - predicted).max())
+                reached, off = _tried(follower, place, step, state)
                 lost = None
             except LostError as error:
                 off, lost = np.inf, error
@@ -64,18 +63,37 @@ def track(follower: Follower, breaks: Array) -> PiecewisePolynomial:
                 if step < shortest:
                     raise StuckError(place, state[0], state[1], lost)
                 continue
-            pieces.append(hermite_coefficients(state, reached, np.array(step)))
+            middle, last = reached[:, 0], reached[:, 1]
+            pieces += [
+                hermite_coefficients(*ends, np.array(0.5 * step))
+                for ends in ((state, middle), (middle, last))
+            ]
+            half = place + 0.5 * step
             place = end if step == end - place else place + step
-            nodes.append(place)
-            state = reached
+            nodes += [half, place]
+            state = last
             step *= float(np.clip((_AIM / max(off, 1e-12)) ** (1 / _ORDER), 0.5, 3.0))
         q = state[0]
     return PiecewisePolynomial(np.array(nodes), np.stack(pieces, axis=1))
 
 
-def _exact(follower: Follower, place: float, side: str, guess: Array, last: Array) -> Array:
-    """Return joint values and two derivatives (3, n) at one place."""
-    values = follower.exact(np.array([place]), side, guess[None])[:, 0]  # type: ignore[arg-type]
-    if not np.isfinite(values).all():
-        raise LostError(np.array([place]), last, (0.0, 0.0))
+def _tried(follower: Follower, place: float, step: float, state: Array) -> tuple[Array, float]:
+    """Return what is exact half a step and a step further, (3, 2, n), and how far off the guesses of it were.
+
+    Half a step further the curve between the ends of the step is a guess too: the joints may race there.
+    """
+    further = step * np.array([[0.5], [1.0]])
+    predicted = state[0] + further * (state[1] + 0.5 * further * state[2])
+    reached = _exact(follower, place + further[:, 0], "left", predicted)
+    between = horner(hermite_coefficients(state, reached[:, 1], np.array(step)), np.array(0.5 * step))
+    off = float(np.abs(reached[0] - predicted).max())
+    return reached, max(off, _BULGE * float(np.abs(between - reached[0, 0]).max()))
+
+
+def _exact(follower: Follower, places: Array, side: Side, guess: Array) -> Array:
+    """Return joint values and two derivatives (3, N, n)."""
+    values = follower.exact(places, side, guess)
+    broken = ~np.isfinite(values).all(axis=(0, 2))
+    if broken.any():
+        raise LostError(places[broken], guess[broken][0], (0.0, 0.0))
     return values
