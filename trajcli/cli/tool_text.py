@@ -56,11 +56,6 @@ def _corner(corner: Mapping[str, Any], units: Units) -> str:
             "smooth": "goes on smoothly",
             "bend": "the curvature jumps",
         }
-            "stop": "stops there",
-            "overlap": "cut by overlapping in time",
-            "smooth": "goes on smoothly",
-            "bend": "the curvature jumps",
-        }
         return f"{where}: {told[corner['kind']]}"
     size = f"radius {corner['radius']:.6g}, passes at {corner['deviation']:.6g} {units.length}"
     return f"{where}: rounded, {size}"
