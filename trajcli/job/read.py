@@ -142,7 +142,11 @@ def _loosened_tool_limits(loaded: LoadedJob) -> Iterator[Problem]:
     for index, move in enumerate(loaded.job.moves):
         for name in looser_tool_bounds(loaded.robot, move.limits) if move.limits is not None else ():
             place = loaded.document.place(("moves", index, "limits", "tcp", name))
-            message = f"a move can only tighten limits: the {name} of the tool is lower in the job"
+            quantity, order = name.replace("_", " "), TOOL_ORDERS[name.removeprefix("angular_")]
+            kind: Literal["angle", "length"] = "angle" if name.startswith("angular_") else "length"
+            tool = loaded.robot.limits.tcp, loaded.job.moves[index].limits.tcp
+            before, after = (loaded.say(Amount(getattr(each, name), order, None, kind)) for each in tool)
+            message = f"a move can only tighten limits: the {quantity} of the tool is {before}, got {after}"
             yield Problem(message, "raise it under the job's `limits`", place, move=index)
 
 
