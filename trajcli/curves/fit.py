@@ -31,7 +31,7 @@ Guess = Callable[[Array], Array]
 # where the error of a quintic piece is largest: of the value and its curvature, and of the slope
 _PROBES = np.array([0.5 - 0.1 * sqrt(5.0), 0.5, 0.5 + 0.1 * sqrt(5.0)])
 _ORDER = 4  # with which the error of the second derivative falls: the slowest
-_FILLED = 0.5  # of the tolerance: between the probes the error may be twice as large
+_FILLED = 0.8  # of the tolerance: a finer aim would drown in rounding at tolerances of 1e-9
 _MOST_PARTS = 8
 _ROUNDS = 60
 

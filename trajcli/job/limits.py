@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from trajcli.planners.bounds import LimitsSpec
 from trajcli.planners.planner import Event
 
 _ROUNDING = 1e-12  # relative: a limit that differs by less was meant to be the same, in another unit
+_TOOL_ORDERS = {"speed": 1, "acceleration": 2, "jerk": 3}
 
 
 class Looser(NamedTuple):
@@ -99,11 +100,14 @@ def _tool_limits(before: ToolLimits, spec: LimitsSpec) -> ToolLimits:
     return ToolLimits(**{name: given.get(name, getattr(before, name)) * k for name, k in scales.items()})
 
 
-def looser_tool_bounds(robot: Robot, spec: LimitsSpec) -> list[str]:
-    """Return the names of the tool's limits that a move loosens."""
-    given = {} if spec.tcp is None else spec.tcp.model_dump(exclude_none=True)
-    before = {name: getattr(robot.limits.tcp, name) for name in given}
-    return [name for name, value in given.items() if value > before[name] * (1 + _ROUNDING)]
+def looser_tool_bounds(robot: Robot, spec: LimitsSpec) -> Iterator[tuple[str, tuple[Amount, Amount]]]:
+    """Yield the names of the limits of the tool that a move loosens, with what they were and would be."""
+    for name, value in ({} if spec.tcp is None else spec.tcp.model_dump(exclude_none=True)).items():
+        before = getattr(robot.limits.tcp, name)
+        if value > before * (1 + _ROUNDING):
+            order = _TOOL_ORDERS[name.removeprefix("angular_")]
+            kind: Literal["angle", "length"] = "angle" if name.startswith("angular_") else "length"
+            yield name, (Amount(before, order, None, kind), Amount(value, order, None, kind))
 
 
 def _replaced(bounds: Array, spec: LimitsSpec, order: int) -> Array:

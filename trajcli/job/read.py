@@ -140,14 +140,12 @@ def _loosened_by_moves(loaded: LoadedJob) -> Iterator[Problem]:
 
 def _loosened_tool_limits(loaded: LoadedJob) -> Iterator[Problem]:
     for index, move in enumerate(loaded.job.moves):
-        for name in looser_tool_bounds(loaded.robot, move.limits) if move.limits is not None else ():
+        for name, amounts in looser_tool_bounds(loaded.robot, move.limits) if move.limits is not None else ():
             place = loaded.document.place(("moves", index, "limits", "tcp", name))
-            quantity, order = name.replace("_", " "), TOOL_ORDERS[name.removeprefix("angular_")]
-            kind: Literal["angle", "length"] = "angle" if name.startswith("angular_") else "length"
-            tool = loaded.robot.limits.tcp, loaded.job.moves[index].limits.tcp
-            before, after = (loaded.say(Amount(getattr(each, name), order, None, kind)) for each in tool)
-            message = f"a move can only tighten limits: the {quantity} of the tool is {before}, got {after}"
-            yield Problem(message, "raise it under the job's `limits`", place, move=index)
+            before, after = (loaded.say(amount) for amount in amounts)
+            what = f"the {name.replace('_', ' ')} of the tool is {before}, got {after}"
+            hint = "raise it under the job's `limits`"
+            yield Problem(f"a move can only tighten limits: {what}", hint, place, move=index)
 
 
 def _columns_without_geometry(loaded: LoadedJob) -> Iterator[Problem]:
