@@ -58,7 +58,9 @@ def test_the_fit_keeps_its_promise_of_joints_and_tool(name, tolerance):
     assert np.linalg.norm(aside, axis=1).max() <= tolerance
     for order in (1, 2):
         peak = np.abs(exact[order]).max()
-        assert np.abs(fitted[order] - exact[order]).max() <= 2 * tolerance * peak  # between its probes the error may be larger
+        assert (
+            np.abs(fitted[order] - exact[order]).max() <= 2 * tolerance * peak
+        )  # between its probes the error may be larger
 
 
 L1, L2, HAND = 0.3, 0.2, 0.1  # the links of the planar arm, m

@@ -1,0 +1,278 @@
+"""Checks of the tool: right motions pass; a mutant for each kind of finding fails it, and says what a peer finds."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from trajcli.checks.tool import ToolRows, check_tool
+from trajcli.curves.compose import scale_time
+from trajcli.curves.hermite import hermite_pieces
+from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.geometry.line import Line
+from trajcli.geometry.orientation_curve import AboutAxes
+from trajcli.geometry.pose_curve import PoseCurve
+from trajcli.geometry.progress import Progress
+from trajcli.job.robot_source import load_robot
+from trajcli.kinematics.following.motion import motion_along
+from trajcli.kinematics.following.tolerance import Tolerance
+from trajcli.kinematics.following.tool_path import ToolPath
+from trajcli.kinematics.forward import forward
+from trajcli.kinematics.jacobian import tcp_acceleration, tcp_twist
+from trajcli.kinematics.robot import Limits, Robot, ToolLimits, unlimited
+from trajcli.planners.following_tool import followed
+from trajcli.trajectory import Span, Trajectory, resting
+
+WHOLE = (True, True, True)
+DURATION, LENGTH, TURN = 2.0, 0.2, 0.6
+# peaks of a quintic law over length and duration: 15/8, 10/sqrt(3), 60
+SPEED, ACCELERATION, JERK = (
+    15 / 8 * LENGTH / DURATION,
+    10 / np.sqrt(3) * LENGTH / DURATION**2,
+    60 * LENGTH / DURATION**3,
+)
+
+
+def law(length=LENGTH, duration=DURATION, conditions=3):
+    states = np.zeros((conditions, 2, 1))
+    states[0, 1] = length
+    return hermite_pieces(np.array([0.0, duration]), states)
+
+
+def trajectory_of(robot: Robot, curve: PiecewisePolynomial) -> Trajectory:
+    ends = [resting(end) for end in (curve.evaluate(curve.start), curve.evaluate(curve.end))]
+    names, types = robot.joint_names, robot.joint_types
+    return Trajectory(curve, names, types, (Span(0, "line", 0.0, curve.duration, 2),), *ends)
+
+
+def limited(robot: Robot, **tcp: float) -> Robot:
+    limits = unlimited(len(robot.joints))
+    return dataclasses.replace(
+        robot, limits=Limits(*(limits.of_order(k) for k in range(4)), ToolLimits(**tcp))
+    )
+
+
+def moving(tcp=None, *, the_law=None, turn=(0.0, 0.0, TURN), tolerance=1e-6) -> ToolRows:
+    """Return a line of a UR5e with a rotation, followed within a tolerance."""
+    robot, q = load_robot("ur5e"), np.array([0.3, -1.2, 1.4, -0.9, -1.3, 0.4])
+    pose = forward(robot, q)
+    place = Line(pose[:3, 3], pose[:3, 3] + [0.0, LENGTH * 0.6, LENGTH * 0.8])
+    from scipy.spatial.transform import Rotation
+
+    last = Rotation.from_rotvec(turn).as_matrix() @ pose[:3, :3]
+    turning = AboutAxes(np.stack([pose[:3, :3], last]), Progress.even(place.length))
+    path = ToolPath(PoseCurve(place, turning), WHOLE, "all")
+    s = the_law or law(place.length)
+    motion = motion_along(path, s, s.breaks, Tolerance(tolerance, tolerance))
+    curve = followed(robot, path, q).by_time(motion)
+    return ToolRows(
+        trajectory_of(robot, curve),
+        Span(0, "line", 0.0, curve.duration, 2),
+        limited(robot, **(tcp or {})),
+        motion,
+    )
+
+
+RIGHT = moving()
+ROOMY = {
+    "speed": SPEED * (1 + 1e-4),
+    "angular_speed": SPEED * TURN / LENGTH * (1 + 1e-4),
+    "acceleration": ACCELERATION * (1 + 1e-4),
+    "angular_acceleration": ACCELERATION * TURN / LENGTH * (1 + 1e-4),
+    "jerk": JERK * (1 + 1e-4),
+}
+
+
+def judged(rows: ToolRows, **fields) -> list:
+    return check_tool(dataclasses.replace(rows, **fields))
+
+
+def kinds(findings) -> list[str]:
+    return [finding.kind for finding in findings]
+
+
+def with_limits(rows: ToolRows, **tcp) -> ToolRows:
+    return dataclasses.replace(rows, robot=limited(rows.robot, **tcp))
+
+
+def shifted(rows: ToolRows, offset) -> ToolRows:
+    """Return rows whose joints are moved by a bump in the middle of the motion."""
+    curve = rows.trajectory.curve
+    coefficients = curve.coefficients.copy()
+    coefficients[-1] += np.asarray(offset)
+    return dataclasses.replace(
+        rows, trajectory=trajectory_of(rows.robot, PiecewisePolynomial(curve.breaks, coefficients))
+    )
+
+
+def test_a_right_motion_passes_with_and_without_limits():
+    assert judged(RIGHT) == []
+    assert judged(with_limits(RIGHT, **ROOMY)) == []
+
+
+@pytest.mark.parametrize("size", [1e-2, 2e-6])
+def test_a_tool_beside_its_path(size):
+    """All joints stand as they should but one, which moves the tool by lever times angle."""
+    found = judged(shifted(RIGHT, [size, 0, 0, 0, 0, 0]))
+    assert set(kinds(found)) >= {"tool_path"}
+    (beside,) = [finding for finding in found if finding.kind == "tool_path"]
+    times = np.linspace(0, DURATION, 2001)
+    places = forward(RIGHT.robot, RIGHT.trajectory.curve.evaluate(times))[:, :3, 3]
+    lever = np.linalg.norm(places[:, :2], axis=1).max()
+    assert beside.value == pytest.approx(size * lever, rel=2e-2)
+    assert beside.limit == 1e-6
+    assert beside.factor is None
+
+
+def test_less_than_the_tolerance_beside_its_path_passes():
+    assert judged(shifted(RIGHT, [3e-7, 0, 0, 0, 0, 0])) == []
+
+
+def test_a_tool_that_is_turned():
+    """The last joint turns the tool about itself and leaves its place."""
+    found = judged(shifted(RIGHT, [0, 0, 0, 0, 0, 5e-6]))
+    assert kinds(found) == ["tool_orientation"]
+    assert found[0].value == pytest.approx(5e-6, rel=0.3)
+
+
+def test_a_tool_turned_about_what_is_free_passes():
+    """The path fixes the place and the direction of z, which the last joint of this arm leaves."""
+    path = dataclasses.replace(RIGHT.motion.path, orientation="direction")
+    motion = motion_along(path, RIGHT.motion.law, RIGHT.motion.breaks, RIGHT.motion.tolerance)
+    rows = dataclasses.replace(RIGHT, motion=motion)
+    assert judged(rows) == []
+    assert judged(shifted(rows, [0, 0, 0, 0, 0, 1e-3])) == []
+    assert "tool_orientation" in kinds(judged(shifted(rows, [0, 0, 0, 0, 1e-3, 0])))
+
+
+LAWS = {
+    "tool_speed": ("speed", SPEED, 1),
+    "tool_angular_speed": ("angular_speed", SPEED * TURN / LENGTH, 1),
+    "tool_acceleration": ("acceleration", ACCELERATION, 2),
+    "tool_angular_acceleration": ("angular_acceleration", ACCELERATION * TURN / LENGTH, 2),
+    "tool_jerk": ("jerk", JERK, 3),
+}
+
+
+@pytest.mark.parametrize("kind", LAWS)
+def test_a_limit_below_the_laws_own_peak_is_broken(kind):
+    name, peak, order = LAWS[kind]
+    (found,) = judged(with_limits(RIGHT, **{name: peak * 0.99}))
+    assert found.kind == kind
+    assert found.value == pytest.approx(peak, rel=1e-4)
+    assert found.limit == pytest.approx(peak * 0.99)
+    assert found.factor == pytest.approx((1 / 0.99) ** (1 / order), rel=1e-4)
+    assert judged(with_limits(RIGHT, **{name: peak * (1 + 1e-4)})) == []
+
+
+@pytest.mark.parametrize(("kind", "part"), [("tool_speed", 1), ("tool_acceleration", 2)])
+def test_peaks_are_those_of_a_dense_sampling(kind, part):
+    (found,) = judged(with_limits(RIGHT, **{LAWS[kind][0]: 0.01}))
+    t = np.linspace(0, DURATION, 20_001)
+    curve = RIGHT.trajectory.curve
+    q = [curve.evaluate(t, order) for order in range(3)]
+    rows = tcp_twist(RIGHT.robot, *q[:2]) if part == 1 else tcp_acceleration(RIGHT.robot, *q)
+    sizes = np.linalg.norm(rows[:, :3], axis=1)
+    assert found.value == pytest.approx(sizes.max(), rel=1e-6)
+    assert found.time == pytest.approx(t[sizes.argmax()], abs=2e-3) or sizes[
+        np.abs(t - found.time).argmin()
+    ] == pytest.approx(sizes.max(), rel=1e-6)
+
+
+def test_joints_that_race_make_the_tool_faster_than_its_law():
+    """The law is slow enough; the curve that is judged goes the same way in half the time."""
+    fast = trajectory_of(RIGHT.robot, scale_time(RIGHT.trajectory.curve, 0.5))
+    motion = RIGHT.motion.scaled(0.5)
+    rows = ToolRows(fast, Span(0, "line", 0.0, fast.duration, 2), RIGHT.robot, motion)
+    assert judged(rows) == []
+    found = judged(with_limits(rows, **{name: ROOMY[name] for name in ("speed", "acceleration")}))
+    assert kinds(found) == ["tool_speed", "tool_acceleration"]
+    assert [finding.factor for finding in found] == pytest.approx([2, 2], rel=1e-3)
+
+
+def test_a_tool_that_does_not_move_with_its_law():
+    """The same way in twice the time is not what the law says."""
+    slow = trajectory_of(RIGHT.robot, scale_time(RIGHT.trajectory.curve, 2.0))
+    half = dataclasses.replace(RIGHT, trajectory=slow, span=Span(0, "line", 0.0, DURATION, 2))
+    assert "tool_path" in kinds(judged(half))
+
+
+def test_a_step_of_acceleration_although_jerk_is_limited():
+    cubic = moving(the_law=law(conditions=2))
+    assert judged(cubic) == []
+    (found,) = judged(with_limits(cubic, jerk=1e6))
+    assert found.kind == "tool_acceleration_jump"
+    assert found.value == pytest.approx(6 * LENGTH / DURATION**2)
+    assert found.time in (0.0, DURATION)
+    assert "jerk_limited" in (found.hint or "")
+
+
+def planar(elbow) -> ToolRows:
+    """Return a planar arm that goes along the tool's way for which its elbow has the given angles over time."""
+    robot = load_robot("planar3r")
+    t = np.linspace(0, DURATION, 65)
+    rows = np.stack([0.4 + 0.1 * t, elbow(t), -0.3 + 0.05 * t], axis=1)
+    from scipy.interpolate import make_interp_spline
+
+    spline = make_interp_spline(t, rows, k=5)
+    derivatives = np.stack([spline(t, order) for order in range(3)])
+    curve = hermite_pieces(t, derivatives)
+    whole = trajectory_of(robot, curve)
+
+    class Told:
+        """The tool is told exactly where the joints bring it."""
+
+    def timed(times, side):
+        from trajcli.kinematics.following.demand import Demand
+
+        poses = forward(robot, curve.evaluate(np.clip(times, 0, DURATION)))
+        zero = np.zeros((len(poses), 6))
+        return Demand(
+            poses,
+            zero,
+            zero,
+            (True, True, False),
+            "yaw",
+            "x",
+            np.stack([np.arctan2(poses[:, 1, 0], poses[:, 0, 0])] * 3, axis=1),
+        )
+
+    motion = dataclasses.replace(
+        RIGHT.motion, path=None, timed=timed, breaks=np.array([0.0, DURATION]), law=law()
+    )
+    return ToolRows(whole, Span(0, "line", 0.0, DURATION, 2), limited(robot), motion)
+
+
+def test_an_elbow_that_straightens_through_changes_the_branch():
+    assert judged(planar(lambda t: 0.5 + 0.1 * t)) == []
+    (found,) = judged(planar(lambda t: 0.55 - 0.5 * t))
+    assert found.kind == "branch"
+    assert found.time == pytest.approx(1.1, abs=0.02)
+    assert found.factor is None
+
+
+def test_a_wrist_that_passes_its_middle_changes_the_branch():
+    """A pose that is told as the joints go, with the fifth joint through zero: flip to no flip."""
+    robot = load_robot("puma560")
+    first, last = np.array([0.2, 0.7, -0.8, 0.4, 0.5, -0.3]), np.array([0.2, 0.7, -0.8, 0.4, -0.3, -0.3])
+    states = np.zeros((3, 2, 6))
+    states[0] = first, last
+    curve = hermite_pieces(np.array([0.0, DURATION]), states)
+
+    def timed(times, side):
+        from trajcli.kinematics.following.demand import Demand
+
+        poses = forward(robot, curve.evaluate(np.clip(times, 0, DURATION)))
+        zero = np.zeros((len(poses), 6))
+        return Demand(poses, zero, zero, WHOLE, "all", "z", zero[:, :0])
+
+    motion = dataclasses.replace(
+        RIGHT.motion, path=None, timed=timed, breaks=np.array([0.0, DURATION]), law=law()
+    )
+    whole = trajectory_of(robot, curve)
+    (found,) = judged(ToolRows(whole, whole.spans[0], limited(robot), motion))
+    assert found.kind == "branch"
+    crossing = curve.evaluate(found.time)[4]
+    assert abs(crossing) < 0.11  # the first of eight rows of a piece behind it
