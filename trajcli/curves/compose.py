@@ -167,7 +167,7 @@ def _split(curve: PiecewisePolynomial, times: Array) -> PiecewisePolynomial:
     apart = _ROUNDING * max(abs(curve.start), abs(curve.end))
     after = np.clip(np.searchsorted(curve.breaks, times), 1, curve.pieces)
     new = (times - curve.breaks[after - 1] > apart) & (curve.breaks[after] - times > apart)
-    breaks = np.unique(np.append(curve.breaks, times[new]))
+    breaks = distinct(np.append(curve.breaks, times[new]))
     piece = np.searchsorted(curve.breaks, breaks[:-1], "right") - 1
     offset = breaks[:-1] - curve.breaks[piece]
     return PiecewisePolynomial(breaks, taylor_shift(curve.coefficients[:, piece], offset[:, None]))

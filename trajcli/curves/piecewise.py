@@ -175,6 +175,12 @@ def taylor_shift(coefficients: Array, x: Array) -> Array:
     return shifted
 
 
+def distinct(values: Array) -> Array:
+    """Return numbers (k,) in order and without repeats; `np.unique` would load masked arrays for that."""
+    ordered = np.sort(values)
+    return np.asarray(ordered[np.append(True, ordered[1:] > ordered[:-1])[: ordered.size]])
+
+
 def increasing(breaks: Array) -> Array:
     """Return `breaks` with those that rounding made equal moved apart by the smallest possible step."""
     if (np.diff(breaks) > 0).all():

@@ -145,7 +145,7 @@ class Chain:
     def _by_part(self, s: Array, side: Side, values: Callable[[int, Array], Triple]) -> Triple:
         places = inside(s, self.length)
         part = np.searchsorted(self.breaks, places, side)
-        here = np.unique(part)
+        here = np.flatnonzero(np.bincount(part)) if part.size else part
         if here.size <= 1:
             only = int(here[0]) if here.size else 0
             return values(only, self._local(only, places))

@@ -205,7 +205,7 @@ class AlongPath:
         if not places.size:
             return places
         left, right = self.place.transport(places, "left")[1], self.place.transport(places, "right")[1]
-        return np.unique(np.append(places[_differ(left, right)], self.jumps))
+        return np.array(sorted({*places[_differ(left, right)].tolist(), *self.jumps.tolist()}))
 
     @property
     def jumps(self) -> Array:

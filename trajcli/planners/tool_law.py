@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate, distinct
 from trajcli.errors import MissingLimitError, Problem
 from trajcli.geometry.place_curve import PlaceCurve
 from trajcli.kinematics.following.tool_path import ToolPath
@@ -57,7 +57,7 @@ class ToolLaw:
 
 def rates_of(path: ToolPath) -> Rates:
     """Return the largest derivatives of a path, by sampling between its breaks."""
-    places = np.unique(np.concatenate([np.linspace(0.0, path.length, _SAMPLES), path.breaks]))
+    places = distinct(np.concatenate([np.linspace(0.0, path.length, _SAMPLES), path.breaks]))
     sides = [path.poses.evaluate(places, side) for side in ("left", "right")]
     first, second = (np.stack([side[k] for side in sides]) for k in (1, 2))
     way = 0.0 if path.poses.in_place else 1.0

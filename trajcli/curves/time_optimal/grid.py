@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, distinct
 
 _FEWEST, _FIRST = 6, 96  # intervals: of a piece, and of the whole path, to begin with
 _MOST, _MORE = 20, 4000  # intervals: of a piece on average, and of the whole path on top, in the end
@@ -17,7 +17,7 @@ def first_grid(path: PiecewisePolynomial) -> Array:
     """Return the breaks of the path and equally many equal parts between each two, shape (N + 1,)."""
     parts = max(_FEWEST, -(-_FIRST // path.pieces))
     inner = path.breaks[:-1, None] + path.lengths[:, None] * (np.arange(parts) / parts)
-    return np.unique(np.append(inner, path.end))
+    return distinct(np.append(inner, path.end))
 
 
 def most_intervals(path: PiecewisePolynomial) -> int:
@@ -27,7 +27,7 @@ def most_intervals(path: PiecewisePolynomial) -> int:
 
 def halved(grid: Array) -> Array:
     """Return the grid with the middle of each interval added."""
-    return np.unique(np.append(grid, 0.5 * (grid[:-1] + grid[1:])))
+    return distinct(np.append(grid, 0.5 * (grid[:-1] + grid[1:])))
 
 
 def refined(grid: Array, x: Array, chosen: NDArray[np.bool_]) -> Array:
@@ -49,4 +49,4 @@ def refined(grid: Array, x: Array, chosen: NDArray[np.bool_]) -> Array:
     bent = before - after > _BENT * np.maximum(np.abs(before), np.abs(after))
     meeting = bent & (share > _EDGE) & (share < 1.0 - _EDGE)
     places = grid[:-1] + lengths * np.where(meeting, share, 0.5)
-    return np.unique(np.append(grid, places[chosen]))
+    return distinct(np.append(grid, places[chosen]))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trajcli.curves.compose import scale_time
-from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, distinct
 from trajcli.kinematics.following.demand import Demand
 from trajcli.kinematics.following.follower import Demands
 from trajcli.kinematics.following.tolerance import Tolerance
@@ -77,5 +77,5 @@ def motion_along(
     def timed(times: Array, side: Side) -> Demand:
         return path.by_time(law, times, side, passed)
 
-    breaks = np.unique(np.concatenate([law_breaks, passed]))
+    breaks = distinct(np.concatenate([law_breaks, passed]))
     return ToolMotion(path, law, timed, breaks, tolerance, path.poses.in_place, ruled_by)
