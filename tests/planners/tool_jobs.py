@@ -25,6 +25,7 @@ LEFT = {"shoulder": "left", "elbow": "up", "wrist": "no_flip"}
 START = {"xyz": [0.4, 0.1, 0.05], "rpy": DOWN, "configuration": LEFT}
 TO = {"xyz": [0.4, 0.3, 0.25], "rpy": [np.pi, 0, 0.8]}
 LENGTH = np.hypot(0.2, 0.2)
+FINE = {"tolerance": {"position": 1e-9, "angle": 1e-9}}
 SHAPES = ["trapezoid", "cubic", "quintic", "cycloidal", "jerk_limited", "time_optimal"]
 ROUND = {"center": [0.4, 0.15, 0.05], "axis": "z", "angle": 2.0}
 

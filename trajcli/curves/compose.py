@@ -12,6 +12,7 @@ from trajcli.curves.piecewise import (
     Array,
     PiecewisePolynomial,
     concatenate,
+    distinct,
     horner,
     increasing,
     taylor_shift,
