@@ -23,7 +23,36 @@ ROWS = 31  # of a planned move that are compared
 LOOKS = 40  # places on the way to where a refused move ends
 NEAR_SINGULAR = 2e-3
 CLOSED = ("puma560", "ur5e")
-FIXED = [3, 4, 5, 7, 22, 23, 24, 26, 28, 36, 47, 48, 51, 53, 55, 57, 59, 64, 72, 74, 75, 79, 82, 84, 86]
+FIXED = [
+    1,
+    2,
+    4,
+    5,
+    6,
+    11,
+    13,
+    23,
+    24,
+    26,
+    28,
+    36,
+    47,
+    48,
+    57,
+    59,
+    60,
+    63,
+    64,
+    79,
+    81,
+    82,
+    86,
+    97,
+    98,
+    104,
+    109,
+    118,
+]
 REASONS = {
     "reach": "does not reach",
     "limit": "its limit is",
@@ -71,7 +100,7 @@ def refused(text: str, tracker: Tracker) -> str:
     reason = next(name for name, words in REASONS.items() if words in text)
     said = float(re.search(r"s = ([-0-9.e]+)", text).group(1))
     length, limits = tracker.path.length, tracker.robot.limits.position
-    stopped, beyond, ratios = None, None, [(0.0, 1.0)]
+    stopped, beyond, ratios = None, None, [(0.0, tracker.ratio())]
     try:
         for place in np.linspace(0, length, LOOKS + 1)[1:]:
             q = tracker.go(place)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
 from trajcli.geometry.arc import Arc
@@ -74,43 +73,46 @@ CASES = {
 }
 
 
-def off(case_, place, q):
-    """Return what is between the tcp of joints (n,) and its path; angles of it, not rates of them."""
+def off(case_, place, joints):
+    """Return what is between the tcp of joints (N, n) and its path, (N, m); angles of it, not rates of them."""
     path = case_.path
-    wanted, poses = path.poses.evaluate(np.array([place]))[0][0], forward(case_.robot, q)
-    parts = [poses[:3, 3] - wanted[:3, 3]]
+    wanted, poses = path.poses.evaluate(np.array([place]))[0][0], forward(case_.robot, joints)
+    parts = [poses[:, :3, 3] - wanted[:3, 3]]
     k = XYZ.index(path.tool_axis)
-    axis, aim = poses[:3, k], wanted[:3, k]
+    axis, aim = poses[:, :3, k], wanted[:3, k]
     begins = path.poses.evaluate(np.zeros(1))[0][0][:3, k]
     part = place / path.length
     match path.orientation:
         case "all":
-            parts.append(Rotation.from_matrix(poses[:3, :3] @ wanted[:3, :3].T).as_rotvec())
+            parts.append(Rotation.from_matrix(poses[:, :3, :3] @ wanted[:3, :3].T).as_rotvec())
         case "direction":
             parts.append(axis - aim)
         case "yaw":
             angle = np.arctan2(begins[1], begins[0]) + part * path.turns[0]
-            parts.append([np.cos(angle) * axis[1] - np.sin(angle) * axis[0]])
+            parts.append((np.cos(angle) * axis[:, 1] - np.sin(angle) * axis[:, 0])[:, None])
         case "pitch":
-            parts.append([axis[2] - np.sin(np.arcsin(begins[2]) + part * path.turns[0])])
-    return np.concatenate(parts)
+            parts.append((axis[:, 2] - np.sin(np.arcsin(begins[2]) + part * path.turns[0]))[:, None])
+    return np.concatenate(parts, axis=1)
 
 
 def numeric_slopes(case_, place, q, step=1e-6):
-    columns = [off(case_, place, q + step * e) - off(case_, place, q - step * e) for e in np.eye(q.size)]
-    return np.stack(columns, axis=1) / (2 * step)
+    """Return how joints (n,) change that, (m, n), by central differences."""
+    both = off(case_, place, q + step * np.concatenate([np.eye(q.size), -np.eye(q.size)]))
+    return (both[: q.size] - both[q.size :]).T / (2 * step)
 
 
 def solved(case_, place, held, near):
-    """Return joint values (n,) on the path, components along `held` (f, n) as at the start, by a root finder."""
+    """Return joint values (n,) on the path near others, components along `held` (f, n) as at the start."""
 
     def equations(q):
-        missed = off(case_, place, q)
-        return np.concatenate([missed, held @ (q - case_.start)])
+        return np.concatenate([off(case_, place, q[None])[0], held @ (q - case_.start)])
 
-    q = root(equations, near, method="lm", options={"xtol": 1e-15, "ftol": 1e-15}).x
-    for _ in range(3):  # to the last digits
+    q, missed = near, equations(near)
+    for _ in range(12):
         rows = np.concatenate([numeric_slopes(case_, place, q), held])
-        q = q - np.linalg.lstsq(rows, equations(q), rcond=1e-8)[0]
-    assert np.abs(equations(q)).max() < 1e-13
+        q = q - np.linalg.lstsq(rows, missed, rcond=1e-8)[0]
+        before, missed = np.abs(missed).max(), equations(q)
+        if before < 1e-9:
+            break
+    assert np.abs(missed).max() < 1e-13
     return q
