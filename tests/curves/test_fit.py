@@ -129,6 +129,17 @@ def test_the_number_of_pieces_is_bounded():
     assert fit(known(waves), within(1e-9), ENDS, nothing, most=400).pieces <= 400
 
 
+@pytest.mark.parametrize("width", [1e-5, 1e-7])
+def test_a_short_way_between_breaks_is_no_place_for_a_search(width):
+    """The second derivative of a piece so short holds the rounding of its ends, many times the tolerance."""
+    breaks = np.array([0.0, 1.0, 1.0 + width, 3.0])
+    lift = np.array([3.0, 0.0, 0.0])[:, None, None]
+    curve = fit(known(lambda t: waves(t) + lift), within(1e-8), breaks, nothing)
+    assert curve.pieces < 400
+    t = np.linspace(*ENDS, 3001)
+    np.testing.assert_allclose(curve.evaluate(t), waves(t)[0] + 3.0, rtol=0, atol=1e-8)
+
+
 def test_not_a_number_is_no_fit():
     def broken(t):
         return np.where(t[:, None] > 1.5, np.nan, waves(t))

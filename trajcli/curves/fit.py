@@ -31,7 +31,8 @@ Guess = Callable[[Array], Array]
 # where the error of a quintic piece is largest: of the value and its curvature, and of the slope
 _PROBES = np.array([0.5 - 0.1 * sqrt(5.0), 0.5, 0.5 + 0.1 * sqrt(5.0)])
 _ORDER = 4  # with which the error of the second derivative falls: the slowest
-_FILLED = 0.8  # of the tolerance: a finer aim would drown in rounding at tolerances of 1e-9
+_FILLED = 0.8  # of the tolerance: between the probes the error is a little larger
+_NOISE = 4.0  # units in the last place by which values that are exact may be off
 _MOST_PARTS = 8
 _ROUNDS = 60
 
@@ -80,6 +81,8 @@ def fit(
 ) -> PiecewisePolynomial:
     """Return quintic pieces through a function, each within tolerance where its error is largest.
 
+    What rounding explains is no error: pieces that are short for that reason would only make it larger.
+
     Args:
         exact: The function.
         misfit: Its tolerance.
@@ -120,11 +123,26 @@ def _errors(exact: Exact, misfit: Misfit, pieces: _Pieces, guess: Guess) -> tupl
     local = lengths[:, None] * _PROBES
     places = (pieces.start[:, None] + local).reshape(-1)
     fitted = _at(pieces.coefficients(), local)
-    errors = misfit(places, exact(places, "right", guess(places)), fitted).reshape(local.shape)
+    values = exact(places, "right", guess(places))
+    errors = misfit(places, values, fitted).reshape(local.shape)
     errors = np.where(np.isfinite(errors), errors, np.inf)
-    worst = errors.argmax(axis=1)
-    rows = np.arange(lengths.size)
-    return errors[rows, worst], places.reshape(local.shape)[rows, worst]
+    worst = np.arange(lengths.size) * _PROBES.size + errors.argmax(axis=1)
+    error, probed = errors.reshape(-1)[worst], places[worst]
+    rough = np.flatnonzero(error > _FILLED)
+    if rough.size:
+        known = values[:, worst[rough]]
+        explained = misfit(probed[rough], known, known + _rounding(known, lengths[rough]))
+        error[rough[error[rough] <= explained]] = 0.0
+    return error, probed
+
+
+def _rounding(values: Array, lengths: Array) -> Array:
+    """Return by how much rounding of what is exact (3, k, n) puts off a fit and its derivatives, (3, k, n).
+
+    The derivatives of a piece hold differences of its ends, over its length and over the square of it.
+    """
+    noise = _NOISE * np.spacing(np.maximum(np.abs(values[0]), 1.0))
+    return np.stack([noise, 2 * noise / lengths[:, None], 60 * noise / lengths[:, None] ** 2])
 
 
 def _at(coefficients: Array, local: Array) -> Array:

@@ -208,12 +208,14 @@ def _turn_between(axis: Array, aim: Array) -> Array:
     """Return the rotation vectors (K, 3) that turn unit vectors to their aims the shorter way."""
     normal = np.cross(axis, aim)
     sine = np.linalg.norm(normal, axis=1, keepdims=True)
-    angle = np.arctan2(sine, np.einsum("ki,ki->k", axis, aim)[:, None])
+    cosine = np.einsum("ki,ki->k", axis, aim)[:, None]
+    angle = np.arctan2(sine, cosine)
     smallest = np.eye(3)[np.argmin(np.abs(axis), axis=1)]
     aside = np.cross(axis, smallest)
     aside /= np.linalg.norm(aside, axis=1, keepdims=True)
-    clear = sine > _ALMOST_UPRIGHT
-    return np.asarray(np.where(clear, normal / np.where(clear, sine, 1.0), aside) * angle)
+    opposite = (sine <= _ALMOST_UPRIGHT) & (cosine < 0)
+    longer = np.where(sine > 0, angle, 1.0) / np.where(sine > 0, sine, 1.0)
+    return np.asarray(np.where(opposite, aside * angle, normal * longer))
 
 
 def _wrapped(angles: Array) -> Array:
