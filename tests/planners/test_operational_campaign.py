@@ -144,4 +144,4 @@ def test_a_thousand_tasks():
     for (robot, outcome), count in sorted(outcomes.items()):
         print(f"{robot:10s} {outcome:10s} {count}")
     for robot in ROBOTS:
-        assert outcomes[robot, "planned"] > 50
+        assert outcomes[robot, "planned"] > 40
