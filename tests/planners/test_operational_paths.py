@@ -26,7 +26,7 @@ def path(*, turning=False, **fields):
     segments = []
     for point, turn in zip(POINTS[1:].tolist(), TURNS[1:], strict=True):
         segments.append({"line": {"xyz": point, **({"rpy": turn} if turning else {})}})
-    return {"planner": "path", "segments": segments, **fields}
+    return {"planner": "path", "corner": "stop", "segments": segments, **fields}
 
 
 def rates(made, times):

@@ -67,7 +67,8 @@ def test_the_fastest_law_needs_the_joints_limits():
 
 
 def segment(**fields):
-    return {"planner": "path", "segments": [{"line": {"xyz": [0.4, 0.3, 0.05]}}, {"line": TO}], **fields}
+    ends = [{"line": {"xyz": [0.4, 0.3, 0.05]}}, {"line": TO}]
+    return {"planner": "path", "corner": "stop", "segments": ends, **fields}
 
 
 TWO = [{"line": {"xyz": [0.4, 0.3, 0.05]}}, {"line": {"xyz": [0.5, 0.3, 0.05]}}]

@@ -55,7 +55,7 @@ class PathMove(OperationalMove):
             description="stop: at rest in each corner; round: with a smooth curve of the given `radius`; "
             "overlap: each segment begins before the last one ends, by the time `overlap`."
         ),
-    ] = "stop"
+    ] = "round"
     radius: Radius | None = None
     overlap: (
         Annotated[
