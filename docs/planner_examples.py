@@ -144,10 +144,11 @@ Which arc is meant is said in one of [three ways](#arcs). An arc by its angle en
 which it begins, unless `orientation: tangent` turns the tool along. {_JOINS}""",
     "path": f"""\
 One law leads over all [segments](#segments); each of them may turn the tool to the orientation of its
-target. At a corner the path stops (`stop`), or is rounded (`round`, the default) by a curve whose curvature joins: its `radius`
-is measured along both segments, and shrinks to what they leave room for, with an event. `explain` says at
-what distance a rounded corner is passed. Where the direction goes on there is nothing to stop at; `round`
-then makes the curvatures of line and arc join, so that no acceleration steps.
+target. At a corner the path stops (`stop`), or is rounded (`round`, the default) by a curve whose
+curvature joins: its `radius` is measured along both segments, and shrinks to what they leave room for,
+with an event. `explain` says at what distance a rounded corner is passed. Where the direction goes on
+there is nothing to stop at; `round` then makes the curvatures of line and arc join, so that no
+acceleration steps.
 
 With `overlap` each segment has a law of its own and begins before the last one has ended, by that time:
 the tool cuts the corners without stopping. An acceleration from `limits.tcp` is divided where two add up.
