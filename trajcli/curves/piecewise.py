@@ -127,14 +127,14 @@ class PiecewisePolynomial:
         Raises:
             ValueError: When a time lies outside the curve.
         """
-        if t.size and (np.isnan(t).any() or t.min() < self.start or t.max() > self.end):
+        if t.size and not (t.min() >= self.start and t.max() <= self.end):  # so written, NaN is outside too
             raise ValueError(f"time outside the curve's domain [{self.start!r}, {self.end!r}]")
         table = np.concatenate(
             [_padded(derivative_coefficients(self.coefficients, order), self.degree) for order in orders],
             axis=2,
         )
         rows = np.empty((t.size, table.shape[2]))
-        piece = np.clip(np.searchsorted(self.breaks, t, side) - 1, 0, self.pieces - 1)
+        piece = _piece_of(self.breaks, t, side)
         for low in range(0, t.size, _BLOCK):
             block = slice(low, min(low + _BLOCK, t.size))
             _evaluate_block(self.breaks, table, t[block], piece[block], rows[block])
@@ -222,10 +222,20 @@ def _padded(coefficients: Array, degree: int) -> Array:
     )
 
 
+def _piece_of(breaks: Array, t: Array, side: Side) -> NDArray[np.intp]:
+    """Return the piece (N,) that speaks at each time; in ordered times only the breaks are looked for."""
+    inner = breaks[1:-1]
+    if t.size < breaks.size or (t[1:] < t[:-1]).any():
+        return np.searchsorted(inner, t, side)
+    rows = np.searchsorted(t, inner, "left" if side == "right" else "right")
+    return np.repeat(np.arange(breaks.size - 1), np.diff(rows, prepend=0, append=t.size))
+
+
 def _evaluate_block(breaks: Array, table: Array, t: Array, piece: NDArray[np.intp], out: Array) -> None:
     first, last = int(piece[0]), int(piece[-1])
-    local = t - breaks[piece]
-    if (piece[1:] < piece[:-1]).any() or (last - first + 1) * _FEW > t.size:
+    ordered = not (piece[1:] < piece[:-1]).any()
+    local = t - (breaks[first] if ordered and first == last else breaks[piece])
+    if not ordered or (last - first + 1) * _FEW > t.size:
         out[:] = horner(table[:, piece, :], local[:, None])
         return
     monomials = np.empty((table.shape[0], t.size))
