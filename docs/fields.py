@@ -13,6 +13,7 @@ from docs.markdown import first_sentence, table
 from trajcli.job.model import Output, RobotSource, UnitsSpec
 from trajcli.job.robot_model import JointModel
 from trajcli.planners import PLANNERS, Planner
+from trajcli.planners.arc_fields import ArcFields
 from trajcli.planners.blends import BlendDurations
 from trajcli.planners.bounds import UNLIMITED, Bounds, JointBound, LimitsSpec, Scale, ToolLimitsSpec
 from trajcli.planners.deviation import Deviation
@@ -25,7 +26,6 @@ from trajcli.planners.pose_fields import AxisAngle, Configuration, Direction, Eu
 from trajcli.planners.poses import Pose
 from trajcli.planners.reading import FieldType, Number
 from trajcli.planners.time_optimal import PathParameter
-from trajcli.planners.tool_fields import ArcFields
 from trajcli.planners.waypoints import PointsField, Waypoint
 from trajcli.units import Quantity, Units, unit_name
 
@@ -111,7 +111,7 @@ def _reader_form(reader: FieldType) -> str:
         JointBound: "[bound](#bounds)",
         Pose: "[pose](#poses)",
         RobotSource: "[robot](#robot)",
-        Deviation: "number at least 0",
+        Deviation: f"number at least 0, {_BY_JOINT}",
         BlendDurations: "number above 0, or a list of them",
         PathParameter: "`chord` or `centripetal` or `uniform` or a list of numbers",
     }

@@ -130,7 +130,9 @@ itself). A point between the ends is missed by the change of velocity times the 
 With `end_blends: centred` the first and the last blend are centred on their times, so that the motion
 begins half a blend before the start and lasts half a blend longer; `inside` keeps the times of both ends.
 Blends that would overlap are shortened, with an event. Without times they are found from the limits of
-velocity and acceleration, and so are the blends. It starts and ends at rest.""",
+velocity and acceleration, and so are the blends; a `duration` stretches all of that. It then starts and ends
+at rest. With times the start and the target may have a velocity: a centred blend then begins before the
+first point, which only the start of a job can do (an event, `begins_before`), and ends beyond the last.""",
     "time_optimal": """\
 Points stand as for `spline`, without times: it is as fast as the limits of velocity and acceleration
 allow along its path, which is a smooth curve through the points (`path: spline`; `rule` and `parameter`

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from docs.fields import field_table
+from trajcli.planners.arc_fields import ArcFields
 from trajcli.planners.operational import ToleranceSpec
 from trajcli.planners.path import Segment
 from trajcli.planners.path_law import LawSpec
-from trajcli.planners.tool_fields import ArcFields
 
 _PATHS = """\
 `line`, `arc`, `path` and `screw` lead the tcp along a path in space; the joints follow. They start and end
@@ -21,18 +21,22 @@ the place s on the path and the joint). Joints that a target leaves free are hel
 [concepts](concepts.md#what-a-target-leaves-free).
 
 `orientation` says how the tool turns on the way: `axis_angle` about one fixed axis by the shortest angle,
-evenly in s; `euler` evenly in the three angles in which the target is given (`euler` or `rpy`); `fixed`
-not at all; `tangent` with the path, so that the tool keeps its attitude to it, as along a seam."""
+evenly in s; `euler` evenly in the three angles in which the target is given (`euler` or `rpy`), from
+those of the start that are nearest to them; `fixed` not at all; `tangent` with the path, so that the tool
+keeps its attitude to it, as along a seam."""
 
 _LAW = """\
 How s grows with time. Speeds, accelerations and the jerk that the law does not name are those of
-[`limits.tcp`](#limits-of-the-tool). With a `duration` no limit is needed for a polynomial; a trapezoid with
-a `duration` needs the law's `speed`, or an acceleration. A path has one law from end to end, and its
-largest bend bounds the speed everywhere; only `time_optimal` goes place by place.
+[`limits.tcp`](#limits-of-the-tool). With a `duration` no limit makes a law slower: it does what it names, and
+the limits are verified. A polynomial then needs none, and a trapezoid the law's `speed`, or an acceleration;
+a polynomial that would exceed a speed, an acceleration or a jerk that the law names beside is refused. A
+path has one law from end to end, and its largest bend bounds the speed everywhere; only `time_optimal`
+goes place by place.
 
 Limits of joints are not looked at when a law is made, only when the move is verified, except by
-`time_optimal`, which needs and keeps those of velocity and acceleration. Another move that is too fast
-for a joint is refused with the factor, or stretched by it: `when_over_limit: slow`.
+`time_optimal`, which needs and keeps those of velocity and acceleration; nor is a turn that the target
+leaves free. Another move that is too fast is refused with the factor, or stretched by it:
+`when_over_limit: slow`. A turn in place has no limit of jerk.
 
 Along a bent path the tool also accelerates across. Of an acceleration in `limits.tcp`, 0.6 goes along the
 path and 0.8 across where a path is bent anywhere (`time_optimal` divides it place by place). The

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
+from trajcli.frozen import comparable
 from trajcli.kinematics.robot import JointType
 from trajcli.units import Dimension, Quantity, Units, factor, unit_name
 
@@ -39,7 +39,7 @@ _NAME = re.compile(r"(?P<stem>.+?)(?:_(?P<unit>deg|mm))?", re.DOTALL)
 _JOINT = re.compile(r"(?P<kind>qd{0,3})(?P<number>[1-9][0-9]*)")
 
 
-@dataclass(frozen=True)
+@comparable
 class Column:
     """What one column holds.
 

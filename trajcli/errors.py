@@ -7,11 +7,13 @@ the numbers in it, the place it stands in (if it stands in a file), and what wou
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Literal
 
+from trajcli.frozen import comparable
 
-@dataclass(frozen=True)
+
+@comparable
 class Place:
     """A stretch of one line of a file. Lines and columns count from 1."""
 
@@ -25,33 +27,40 @@ class Place:
         return f"{self.file}:{self.line}:{self.column}"
 
 
-@dataclass(frozen=True)
+@comparable
 class Amount:
     """A number inside a message, in SI, so that it can be said in the user's units.
 
     Attributes:
-        value: SI.
+        value: SI; several are the coordinates of a place.
         order: 0 for a position, 1 to 3 for its time derivatives.
         joint: Index of the joint that says whether angle or length is meant.
         dimension: "length" or "angle" of the tool; with neither this nor a joint the number is a time.
     """
 
-    value: float
+    value: float | tuple[float, ...]
     order: int = 0
     joint: int | None = None
     dimension: Literal["length", "angle"] | None = None
 
     def __str__(self) -> str:
-        return f"{self.value:.9g}"
+        unit = {"length": " m", "angle": " rad", None: ""}[self.dimension]
+        return self.numbers() + (unit + ("", "/s", "/s^2", "/s^3")[self.order] if unit else "")
+
+    def numbers(self, scale: Callable[[float], float] = float) -> str:
+        """Return the number, or the coordinates in brackets, each after `scale`."""
+        if isinstance(self.value, tuple):
+            return "[" + ", ".join(f"{scale(value) + 0.0:.9g}" for value in self.value) + "]"
+        return f"{scale(self.value):.9g}"
 
 
-@dataclass(frozen=True)
+@comparable
 class Problem:
     """One thing that is wrong.
 
     Attributes:
         message: What is wrong, with the number and the bound, in the user's units.
-        hint: What would fix it.
+        hint: What would fix it; its amounts are held as those of the message are.
         place: Where it stands in the user's file.
         move: Index of the move, from 0.
         joint: Name of the joint.
@@ -74,6 +83,10 @@ class Problem:
     def text(self, say: Callable[[Amount], str] = str) -> str:
         """Return the message with its amounts said by `say`."""
         return said(self.message, self.amounts, say)
+
+    def advice(self, say: Callable[[Amount], str] = str) -> str | None:
+        """Return the hint with its amounts said by `say`."""
+        return None if self.hint is None else said(self.hint, self.amounts, say)
 
 
 def said(message: str, amounts: Mapping[str, Amount], say: Callable[[Amount], str] = str) -> str:
@@ -110,7 +123,8 @@ class TrajcliError(Exception):
 
     def said_by(self, say: Callable[[Amount], str]) -> TrajcliError:
         """Return the same error with the amounts of its messages said by `say`."""
-        return type(self)(*(replace(p, message=p.text(say), amounts={}) for p in self.problems))
+        told = (replace(p, message=p.text(say), hint=p.advice(say), amounts={}) for p in self.problems)
+        return type(self)(*told)
 
 
 class VerificationError(TrajcliError):

@@ -6,7 +6,6 @@ Rows are made in blocks of bounded size, so that memory does not grow with their
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from math import ceil, isfinite
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy as np
 from trajcli.columns import JOINT_ORDERS, TOOL_COLUMNS, Group, check_groups, joint_factors, tool_factors
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, read_only
 from trajcli.errors import InputError
+from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Robot
 from trajcli.trajectory import Trajectory
 from trajcli.units import Quantity, Units, factor
@@ -27,7 +27,7 @@ _BREAK = 1e-12  # s: a row this close before a break is at it; rounding decides 
 _TOOL_ORDERS = {"pose": 0, "twist": 1, "twistd": 2}  # the highest derivative of q that each group is made of
 
 
-@dataclass(frozen=True)
+@comparable
 class UniformGrid:
     """Rows at `start_time` + k / rate, and one exactly at the end.
 
@@ -75,7 +75,7 @@ class UniformGrid:
             yield self.start_time + local, local
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class ListedGrid:
     """Rows at given times.
 

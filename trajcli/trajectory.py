@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, read_only
+from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import JointType, Robot
 
 if TYPE_CHECKING:
     from trajcli.kinematics.following.motion import ToolMotion
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class State:
     """Position, velocity and acceleration of all joints, each of shape (n,), SI."""
 
@@ -38,7 +38,7 @@ def resting(position: Array) -> State:
     return State(position, zero, zero)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Passage:
     """The points that a move passes, its start and its target among them.
 
@@ -61,7 +61,7 @@ class Passage:
         return Passage(self.times * factor, self.points, self.missed)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Promise:
     """What a move says of itself beyond its ends, for those who judge it.
 
@@ -76,7 +76,7 @@ class Promise:
     robot: Robot | None = None
 
 
-@dataclass(frozen=True)
+@comparable
 class Span:
     """Where one move stands on the trajectory.
 
@@ -100,7 +100,7 @@ class Span:
         return self.end - self.start
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Trajectory:
     """The motion of all joints over time.
 

@@ -17,8 +17,9 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
 from typing import Literal
+
+from trajcli.frozen import comparable
 
 Dimension = Literal["angle", "length", "time", "frequency", "ratio"]
 AngleUnit = Literal["rad", "deg"]
@@ -45,7 +46,7 @@ class UnitError(ValueError):
     """A string is not a quantity of the wanted kind; the message says what was expected."""
 
 
-@dataclass(frozen=True)
+@comparable
 class Units:
     """The units of a file's plain numbers; time is always in seconds, frequency in hertz."""
 
@@ -59,7 +60,7 @@ class Units:
             )
 
 
-@dataclass(frozen=True)
+@comparable
 class Quantity:
     """What a number measures.
 

@@ -7,7 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from trajcli.checks.tool import ToolRows, check_tool
+from trajcli.checks.tool import check_tool
+from trajcli.checks.tool_rows import ToolRows
 from trajcli.curves.compose import scale_time
 from trajcli.curves.hermite import hermite_pieces
 from trajcli.curves.piecewise import PiecewisePolynomial

@@ -16,6 +16,9 @@ JOINED = [
     ("--near --json", "--near --json"),
     ("--near 10deg -5mm --json", "--near=10deg,-5mm --json"),
     ("-- --qd 1", "-- --qd 1"),
+    ("--near nan -inf 3 -", "--near=nan,-inf,3 -"),
+    ("{a} --point -2 1 1 {b}", "{a} --point=-2,1,1 {b}"),
+    ("{a} --s 0 0.5 1 --json", "{a} --s=0,0.5,1 --json"),
 ]
 
 
@@ -30,7 +33,9 @@ SORTED = [
     ("{a} --point -2 1 1 {b}", "--point -2 1 1 -- {a} {b}"),
     ("- --robot=ur5e", "--robot=ur5e -- -"),
     ("--jsn 1", "--jsn -- 1"),
-    ("--robot", "--robot --"),
+    ("3 --robot", "--robot"),
+    ("3 --robot -- 4", "--robot"),
+    ("0 -inf --json", "--json -- 0 -inf"),
 ]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -25,13 +27,20 @@ def waves(t):
     )
 
 
+@dataclass
+class Known:
+    """Value, slope and curvature (3, N, n)."""
+
+    values: np.ndarray
+
+
 def known(function):
-    return lambda places, side, guess: function(places)
+    return lambda places, side, guess: Known(function(places))
 
 
 def within(tolerance):
     """Return the misfit of value, slope and curvature alike."""
-    return lambda places, exact, fitted: np.abs(fitted - exact).max(axis=(0, 2)) / tolerance
+    return lambda known, rows, fitted: np.abs(fitted - known.values[:, rows]).max(axis=(0, 2)) / tolerance
 
 
 def nothing(places):
@@ -50,8 +59,8 @@ def test_value_slope_and_curvature_are_met_everywhere(tolerance):
 
 @pytest.mark.parametrize(("order", "rate"), [(0, 6), (1, 5), (2, 4)])
 def test_the_error_falls_with_the_order_of_quintic_pieces(order, rate):
-    def misfit(places, exact, fitted):
-        return np.abs(fitted - exact)[order].max(axis=1)
+    def misfit(known, rows, fitted):
+        return np.abs(fitted - known.values[:, rows])[order].max(axis=1)
 
     few, many = (fit(known(waves), misfit, np.linspace(*ENDS, n + 1), nothing) for n in (60, 120))
     assert (few.pieces, many.pieces) == (
@@ -68,7 +77,7 @@ def test_breaks_are_kept_with_both_their_sides():
         late = places >= 1.0 if side == "right" else places > 1.0
         bend = np.where(late, -3.0, 2.0)
         x = places - 1.0
-        return np.stack([bend * x**2 / 2, bend * x, bend])[..., None]
+        return Known(np.stack([bend * x**2 / 2, bend * x, bend])[..., None])
 
     curve = fit(kinked, within(1e-9), np.array([0.0, 1.0, 2.0]), lambda t: np.zeros((t.size, 1)))
     assert curve.pieces == 2
@@ -104,7 +113,7 @@ def test_searches_begin_where_the_guess_says():
             found -= np.clip((np.cos(q) - np.cos(found)) / np.sin(found), -0.2, 0.2)
         sign = np.where(found > 0, 1.0, -1.0)
         assert (sign > 0).all(), "the other answer"
-        return np.stack([found, slope, bend])[..., None]
+        return Known(np.stack([found, slope, bend])[..., None])
 
     curve = fit(searched, within(1e-6), ENDS, lambda t: answers(t)[0][:, None])
     t = np.linspace(*ENDS, 999)

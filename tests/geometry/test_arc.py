@@ -180,12 +180,12 @@ def test_a_flat_arc_keeps_its_digits():
         (
             lambda: Arc.around([1, 0, 0], [0, 0, 0], [0, 1, 0.25], [0, 0, 1]),
             PlanningError,
-            "is 1 m from the start and 1.03078 m from the target",
+            r"is 1 m from the start and 1.03077\d* m from the target",
         ),
         (
             lambda: Arc.around([1, 0, 0], [0, 0, 0], [0, 0.6, 0.8], [0, 0, 1]),
             PlanningError,
-            r"the target lies 0.8 m off the plane of the arc.*allowed is 0.00141 m",
+            r"the target lies 0.8 m off the plane of the arc.*allowed is 0.00141\d* m",
         ),
         (
             lambda: Arc.around([1, 0, 0.5], [0, 0, 0], [0, 1, 0.5], [0, 0, 1]),
@@ -213,14 +213,14 @@ def test_what_is_no_arc_is_named(make, error, message):
 def test_the_message_names_the_center_that_would_do():
     with pytest.raises(PlanningError) as caught:
         Arc.around([1, 0, 0], [0, 0, 0], [0, 1.2, 0])
-    hint = caught.value.problems[0].hint
-    right = np.array([float(word) for word in hint.split("[")[1].rstrip("]").split(",")])
+    hint = caught.value.problems[0].advice()
+    right = np.array([float(word) for word in hint.split("[")[1].split("]")[0].split(",")])
     near, far = np.linalg.norm(right - [1, 0, 0]), np.linalg.norm(right - [0, 1.2, 0])
     assert near == pytest.approx(far, rel=1e-5)
     Arc.around([1, 0, 0], right, [0, 1.2, 0])
     with pytest.raises(PlanningError) as caught:
         Arc([1, 0, 0.2], [0, 0, 0], [0, 0, 1], 1.0)
-    assert "[0, 0, 0.2]" in caught.value.problems[0].hint
+    assert "[0, 0, 0.2] m" in caught.value.problems[0].advice()
 
 
 def test_half_a_turn_goes_right_handed_about_its_axis():

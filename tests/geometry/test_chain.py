@@ -171,7 +171,7 @@ def test_a_corner_passes_its_point_at_the_middle_of_the_blend():
 def test_a_path_that_turns_back_is_named_and_may_be_stopped_at():
     segments = polyline([0, 0, 0], [1, 0, 0], [1, 1, 0], [1, 0.5, 0])
     with pytest.raises(
-        PlanningError, match=r"corner 2 of the path, at \[1, 1, 0\]: the path turns back by 180 d"
+        PlanningError, match=r"corner 2 of the path, at \[1, 1, 0\] m: the path turns back by 180 d"
     ):
         join(segments, 0.1)
     chain = join(segments, [0.1, 0])
@@ -221,7 +221,7 @@ def test_what_cannot_be_joined_is_refused():
     with pytest.raises(InputError, match="at least one segment"):
         join([])
     with pytest.raises(
-        InputError, match=r"segment 2 of the path starts at \[0, 0, 1e-06\], 1e-06 m from \[0, 0, 0\]"
+        InputError, match=r"segment 2 of the path starts at \[0, 0, 1e-06\] m, 1e-06 m from \[0, 0, 0\] m"
     ):
         join([Line([1, 0, 0], [0, 0, 0]), Line([0, 0, 1e-6], [0, 1, 0])])
     with pytest.raises(InputError, match="the path has 2 corners, there are 3 radii"):

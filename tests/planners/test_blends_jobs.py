@@ -12,7 +12,10 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 from through_jobs import assert_joins, assert_passes, cases, curve_of, plan, printed, refusal, timed
 
+from trajcli.job.read import job_from_text
 from trajcli.pipeline.explain import explanation
+from trajcli.pipeline.plan import plan_job
+from trajcli.pipeline.report import verification_error
 
 
 def blends(start, points, **fields):
@@ -23,7 +26,8 @@ def blends(start, points, **fields):
 def jobs_of(case):
     """Return the slides' case said in both ways: a list of durations, and a blend at each point."""
     inputs = case["inputs"]
-    start, points = timed(inputs["t"], inputs["q"])
+    start, points = timed(inputs["t"], inputs["q"], velocity=inputs["v_end"])
+    start |= {"velocity": inputs["v_start"]} if inputs["v_start"] else {}
     durations = inputs["blend_durations"]
     yield blends(start, points, blend_durations=durations)
     each = [point | {"blend": blend} for point, blend in zip(points, durations[1:], strict=True)]
@@ -32,31 +36,64 @@ def jobs_of(case):
 
 @cases("blends", "lspb_via")
 def test_the_slides(case):
-    """A job's blends begin and end at rest: of a case that does not, what is not beside its ends is compared."""
     inputs, expected, within = case["inputs"], case["expected"], case["tolerance"]
-    rests = not (inputs["v_start"] or inputs["v_end"])
-    inner = slice(None) if rests else slice(1, -1)
-    low, high = (
-        (-np.inf, np.inf) if rests else (expected["blends"][0]["t_end"], expected["blends"][-1]["t_start"])
-    )
     for made in jobs_of(case):
         told = explanation(made)["moves"][0]
         assert -told["origin"] == pytest.approx(expected["start_time"], abs=within)
         assert told["duration"] - told["origin"] == pytest.approx(expected["end_time"], abs=within)
         missed = [point["missed"][0] for point in told["waypoints"]]
         wanted = np.abs(np.array(expected["position_at_via_times"]) - inputs["q"])
-        np.testing.assert_allclose(missed[inner], wanted[inner], atol=within)
+        np.testing.assert_allclose(missed, wanted, atol=within)
         curve = curve_of(made)
-        for t, q, v in (row for row in expected["samples_t_q_v"] if low <= row[0] <= high):
+        for t, q, v in expected["samples_t_q_v"]:
             at = np.clip(t + told["origin"], 0, curve.duration)
             assert curve.evaluate(at)[0] == pytest.approx(q, abs=within)
             assert curve.evaluate(at, 1)[0] == pytest.approx(v, abs=within)
-        for blend in expected["blends"][inner]:
+        for blend in expected["blends"]:
             at = (blend["t_start"] + blend["t_end"]) / 2 + told["origin"]
             assert 2 * printed(made, at)[2] == pytest.approx(blend["acceleration"], abs=1e-7)
         phases = [p for p in told["phases"] if p["name"].startswith("blend")]
         got = [[p["start"] - told["origin"], p["end"] - told["origin"]] for p in phases]
         np.testing.assert_allclose(got, [[b["t_start"], b["t_end"]] for b in expected["blends"]], atol=within)
+        begins = abs(expected["samples_t_q_v"][0][1] - inputs["q"][0])
+        assert [e.kind for e in made.events] == (["begins_before"] if begins > within else [])
+
+
+def test_ends_in_motion():
+    """Inside, the points at the ends are kept; a centred blend begins where the motion before it would be."""
+    q, v, tau, t = np.array([[0.0, 1], [2, 0], [1, 3]]), np.array([[0.5, 0], [-1, 0.25]]), 0.3, [0, 1, 3]
+    start, points = timed(t, q, velocity=v[1].tolist())
+    start |= {"velocity": v[0].tolist()}
+    for ends, shift in (("inside", 0.0), ("centred", tau / 2)):
+        made = blends(start, points, blend_durations=tau, end_blends=ends)
+        curve = curve_of(made)
+        assert curve.duration == pytest.approx(3 + 2 * shift)
+        for k, at in ((0, 0.0), (-1, curve.duration)):
+            np.testing.assert_allclose(curve.evaluate(at), q[k] + [-1, 1][k] * shift * v[k], atol=1e-12)
+            np.testing.assert_allclose(curve.evaluate(at, 1), v[k], atol=1e-12)
+        assert_joins(curve, 1)
+        np.testing.assert_array_equal(made.trajectory.end.velocity, v[1])
+        slow = blends(
+            start, points, blend_durations=tau, end_blends=ends, limits={"acceleration": 6},
+            when_over_limit="slow",
+        )  # fmt: skip
+        assert slow.moves[0].stretch > 1
+        np.testing.assert_allclose(curve_of(slow).evaluate(0.0, 1), v[0], atol=1e-12)
+
+
+def test_a_blend_centred_on_a_point_passed_in_motion_cannot_follow_a_move():
+    job = {
+        "version": 1, "robot": {"joints": 1}, "start": {"joints": [0]},
+        "moves": [
+            {"planner": "quintic", "to": {"joints": [1], "velocity": [1]}, "duration": 2},
+            {"planner": "blends", "blend_durations": 0.2, "through": [{"joints": [2], "time": 1}]},
+        ],
+    }  # fmt: skip
+    made = plan_job(job_from_text(json.dumps(job)))
+    assert not made.verdict.passed
+    assert "use `end_blends: inside`" in str([p.hint for p in verification_error(made).problems])
+    job["moves"][1]["end_blends"] = "inside"
+    assert plan_job(job_from_text(json.dumps(job))).verdict.passed
 
 
 @cases("blends", "lspb_craig")
@@ -218,6 +255,8 @@ def test_a_duration_stretches_the_fastest():
     fastest = blends(start, points, end_blends="inside", limits=limits)
     slower = blends(start, points, end_blends="inside", limits=limits, duration=20)
     assert slower.trajectory.duration == pytest.approx(20, rel=1e-12)
+    centred = blends(start, points, limits=limits, duration=20)
+    assert centred.trajectory.duration == pytest.approx(20, rel=1e-12)  # the blends at the ends included
     ratio = 20 / fastest.trajectory.duration
     np.testing.assert_allclose(
         slower.moves[0].planned.passage.times, fastest.moves[0].planned.passage.times * ratio, rtol=1e-9
@@ -264,8 +303,13 @@ WRONG = {
     "own without times": ({"through": [FREE[0] | {"blend": 0.1}, FREE[1]]}, "need points with times", 2),
     "velocity": ({"through": [TIMED[0] | {"velocity": 1}, TIMED[1]]}, "blends compute the velocity", 2),
     "end velocity": (
-        {"through": TIMED[:1], "to": TIMED[1] | {"velocity": 1}},
-        "blends compute the velocity",
+        {"through": FREE[:1], "to": FREE[1] | {"velocity": 1}},
+        "blends end at rest where their times are found",
+        2,
+    ),
+    "end acceleration": (
+        {"through": TIMED[:1], "to": TIMED[1] | {"acceleration": 1}},
+        "blends compute the acceleration",
         2,
     ),
     "not a duration": ({"through": TIMED, "blend_durations": [0.1, -1, 0.1]}, "above 0 s, got -1", 2),
@@ -289,8 +333,13 @@ def test_wrong_input_is_one_clear_error(fields, message, code):
     assert error.exit_code == code
 
 
-def test_a_start_in_motion_is_refused():
-    error = refusal(
-        {**START, "velocity": [0, 1]}, {"planner": "blends", "through": TIMED, "blend_durations": 0.1}
-    )
+def test_each_wrong_duration_of_a_list_is_underlined():
+    error = refusal(START, {"planner": "blends", "through": TIMED, "blend_durations": [0.1, -1, 0]})
+    places = [problem.place for problem in error.problems]
+    assert [p.source[p.column - 1 : p.column - 1 + p.length] for p in places] == ["-1", "0"]
+
+
+def test_a_start_in_motion_needs_times():
+    limits = {"velocity": 1, "acceleration": 1}
+    error = refusal({**START, "velocity": [0, 1]}, {"planner": "blends", "through": FREE}, limits=limits)
     assert "the velocity of j2 is 1 rad/s at its start" in str(error)

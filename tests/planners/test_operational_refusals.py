@@ -47,7 +47,12 @@ MISSING = [
         ("angular_speed", "angular_acceleration"),
         "angular_speed",
     ),
-    (line(law={"duration": 3}), ("acceleration", "angular_acceleration"), "speed"),
+    (line(law={"duration": 3}), ("acceleration", "angular_acceleration"), "acceleration"),
+    (
+        line({"rpy": [np.pi, 0, 0.8]}, law={"duration": 3, "speed": 0.1}),
+        ("angular_acceleration",),
+        "angular_acceleration",
+    ),
 ]
 
 

@@ -153,7 +153,7 @@ def test_one_job_through_the_command_line(tmp_path, capfd):
         elif "--json" in command:
             move = json.loads(out)["moves"][0]
             bends = [2 * piece["local"][2] for piece in move["polynomials"]["j1"]]
-            np.testing.assert_allclose(bends, [0, 2.25, -1.5], atol=1e-9)  # the last two pieces are one cubic
+            np.testing.assert_allclose(bends, [0, 2.25, -1.5, -0.75], atol=1e-9)
             assert [point["time"] for point in move["waypoints"]] == [0, 2, 4]
         else:
             assert "3 points at (s): 0, 2, 4" in out
@@ -168,6 +168,20 @@ def test_explain_agrees_with_itself():
             np.testing.assert_allclose(in_time(piece["local"], piece["start"]), piece["absolute"], atol=1e-9)
 
 
+@pytest.mark.parametrize(("rule", "ends"), [("not_a_knot", 0), ("clamped", 1)])
+def test_there_is_a_polynomial_for_each_interval_also_where_two_are_one_cubic(rule, ends):
+    """A PPoly of scipy has as many, in the same order; not_a_knot joins its first two, and its last two."""
+    t, q = np.array([0, 1, 2.5, 3, 5]), np.array([[0, 7], [2, 7], [1, 7], [3, 7], [4, 7]])
+    start, through = timed(t, q)
+    made = plan(start, {"planner": "spline", "rule": rule, "through": through})
+    told = explanation(made)["moves"][0]
+    assert told["breaks"] == t.tolist()
+    spline = CubicSpline(t, q, bc_type="clamped" if ends else "not-a-knot")
+    for joint, pieces in enumerate(told["polynomials"].values()):
+        got = [piece["local"] for piece in pieces]
+        np.testing.assert_allclose(got, spline.c[::-1, :, joint].T, atol=1e-12)
+
+
 FIRST = [{"joints": [1, 2], "time": 1}, {"joints": [2, 1], "time": 3}]
 FREE = [{"joints": [1, 2]}, {"joints": [2, 1]}]
 WRONG = {
@@ -177,6 +191,10 @@ WRONG = {
     "the target has no time": ({"through": FIRST, "to": FREE[0]}, "the target has no time"),
     "two durations": ({"through": FIRST, "duration": 4}, "reached after 3 s"),
     "a blend": ({"through": [FIRST[0] | {"blend": 0.1}, FIRST[1]]}, "a spline goes through its points"),
+    "a blend at the target": (
+        {"through": [FIRST[0]], "to": FIRST[1] | {"blend": 0.1}},
+        "a spline goes through its points",
+    ),
     "not somewhere": ({"through": [{"velocity": 1, "time": 1}]}, "a waypoint needs `joints` or a pose"),
     "no velocity": ({"rule": "imposed", "through": FIRST}, "needs the velocity of every waypoint"),
     "inner velocity": ({"through": [FIRST[0] | {"velocity": 1}, FIRST[1]]}, "computes the velocity between"),

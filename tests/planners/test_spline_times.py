@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.interpolate import CubicHermiteSpline, CubicSpline, make_interp_spline
+from scipy.interpolate import BPoly, CubicHermiteSpline, CubicSpline, PchipInterpolator, make_interp_spline
 from scipy.optimize import minimize
 from through_jobs import assert_passes, curve_of, plan, refusal
 
@@ -32,12 +32,34 @@ def computed(t, q):
     return CubicHermiteSpline(t, q, np.vstack([0 * q[:1], inner, 0 * q[:1]]))
 
 
+def monotone(t, q):
+    """Return the cubics with the inner velocities of scipy's PCHIP, at rest at both ends."""
+    inner = PchipInterpolator(t, q).derivative()(t[1:-1])
+    return CubicHermiteSpline(t, q, np.vstack([0 * q[:1], inner, 0 * q[:1]]))
+
+
+def parabolic(t, values):
+    """Return the slopes of parabolas through three neighbours: none at a turn, at most thrice the smaller chord."""
+    chords = np.diff(values, axis=0) / np.diff(t)[:, None]
+    most = 3 * np.minimum(np.abs(chords[:-1]), np.abs(chords[1:]))
+    inner = np.clip(np.gradient(values, t, axis=0)[1:-1], -most, most)
+    return np.vstack([0 * values[:1], np.where(chords[1:] * chords[:-1] > 0, inner, 0), 0 * values[:1]])
+
+
+def quintic(t, q):
+    velocities = parabolic(t, q)
+    pieces = BPoly.from_derivatives(t, np.stack([q, velocities, parabolic(t, velocities)], axis=1))
+    return lambda at, order: pieces(at, nu=order)
+
+
 RULES = {
     "natural": cubic("natural"),
     "clamped": cubic("clamped"),
     "not_a_knot": cubic("not-a-knot"),
     "continuous_acceleration": virtual,
     "computed": computed,
+    "quintic": quintic,
+    "shape_preserving": monotone,
 }
 
 

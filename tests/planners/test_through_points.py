@@ -10,6 +10,7 @@ import pytest
 import yaml
 from through_jobs import assert_passes, curve_of, job_text, plan, refusal
 
+from trajcli.errors import FileError, TrajcliError
 from trajcli.job.dump import dump_job
 from trajcli.job.read import job_from_text, load_job
 from trajcli.kinematics.forward import forward
@@ -31,8 +32,6 @@ def recorded(folder: Path, text: str, move=None, **rest):
 
 
 def wrong_file(folder: Path, text: str | None, **rest) -> str:
-    from trajcli.errors import TrajcliError
-
     with pytest.raises(TrajcliError) as caught:
         recorded(folder, text or "", **rest)
     (problem,) = caught.value.problems
@@ -83,6 +82,15 @@ def test_repeated_rows_are_left_out_and_told(tmp_path, planner):
     np.testing.assert_allclose(made.moves[0].planned.passage.points, [[0, 0], [0.5, 0], [1, 1]])
 
 
+def test_near_is_an_angle_or_a_length_as_the_joint_is(tmp_path):
+    robot = {"joints": [{"name": "turn"}, {"name": "lift", "type": "prismatic"}]}
+    text = "turn_deg,lift_mm\n10,0\n10.4,0.4\n11,0\n11,0.6\n20,5\n"
+    move = {"through": {"csv": "points.csv", "merge": 0.5}}
+    made = recorded(tmp_path, text, move, robot=robot, units={"angle": "deg", "length": "mm"})
+    left = made.moves[0].planned.passage.points / [np.pi / 180, 1e-3]
+    np.testing.assert_allclose(left, [[0, 0], [10, 0], [11, 0], [11, 0.6], [20, 5]], atol=1e-9)
+
+
 def test_the_end_of_a_recording_is_kept_even_where_it_is_near(tmp_path):
     text = "q1,q2\n0,0\n1,0\n2,0\n2.001,0\n"
     made = recorded(tmp_path, text, {"through": {"csv": "points.csv", "merge": 0.01}})
@@ -118,6 +126,8 @@ WRONG_FILES = {
     "q1,q1_deg,q2\n0,0,0\n": "two columns for j1: q1 and q1_deg",
     "q1,q2_mm\n0,0\n": "the column q2_mm is in mm, but j2 is revolute (call it q2 (SI) or ..._deg)",
     "t,q1,q2\n0,0,0\n1,1,1\n1,2,2\n": "times must increase, but row 3 has t = 1 s after 1 s (remove the rows",
+    "time,q1,q2\n1,1,0\n2,1,1\n": "times stand in the column t, in s; this file has 'time' (call it t",
+    "T_ms,q1,q2\n1,1,0\n2,1,1\n": "this file has 'T_ms'",
     "t,q1,q2\n0,1,0\n1,1,1\n": "the recording begins at t = 0 s, but not where the arm then stands (go to",
 }
 
@@ -130,8 +140,24 @@ def test_a_wrong_file_is_one_clear_error(tmp_path, text, message):
 
 
 def test_a_missing_file_names_the_path(tmp_path):
-    told = wrong_file(tmp_path, "", move={"through": {"csv": "lost/points.csv"}})
-    assert "lost/points.csv: No such file" in told
+    with pytest.raises(FileError) as caught:
+        recorded(tmp_path, "", move={"through": {"csv": "lost/points.csv"}})
+    (problem,) = caught.value.problems
+    assert "lost/points.csv: No such file" in problem.text()
+    assert problem.place.source[problem.place.column - 1 :].startswith('"lost/points.csv"')
+    assert caught.value.exit_code == 4
+
+
+def test_a_target_with_a_time_after_points_without(tmp_path):
+    text = wrong_file(tmp_path, "q1,q2\n1,0\n", move={"to": {"joints": [0, 0], "time": 2}})
+    assert "the target has a time, but the recorded points have none" in text
+
+
+def test_the_times_of_a_recording_do_not_bind_the_fastest_motion(tmp_path):
+    """With and without its times, a recording before a target is the same path."""
+    move = {"planner": "time_optimal", "to": {"joints": [0, 0]}}
+    timed = recorded(tmp_path, "t,q1,q2\n1,1,0\n9,1,1\n", move)
+    assert timed.trajectory.duration == recorded(tmp_path, "q1,q2\n1,0\n1,1\n", move).trajectory.duration
 
 
 def test_a_target_before_the_end_of_the_recording(tmp_path):

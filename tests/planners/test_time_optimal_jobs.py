@@ -68,9 +68,10 @@ def test_points_are_passed_in_order_within_the_limits(fields):
     assert curve.evaluate(0.0, 1) == pytest.approx(0)
 
 
-def test_always_some_limit_is_used():
+@pytest.mark.parametrize("rule", ["not_a_knot", "quintic", "computed"])
+def test_always_some_limit_is_used(rule):
     """Bang-bang: at almost every time one joint moves or accelerates as fast as it may."""
-    curve = curve_of(fastest(points(2)))
+    curve = curve_of(fastest(points(2), rule=rule))
     at = np.linspace(0, curve.duration, 2001)[1:-1]
     used = np.maximum(
         np.abs(curve.evaluate(at, 1)).max(axis=1) / V, np.abs(curve.evaluate(at, 2)).max(axis=1) / A
@@ -119,6 +120,22 @@ def test_a_corner_is_stopped_at_or_rounded_by_no_more_than_asked_for():
         np.testing.assert_allclose(made.moves[0].planned.passage.missed[1], corner, rtol=1e-9)
         durations.append(made.trajectory.duration)
     assert durations == sorted(durations, reverse=True)
+
+
+def test_a_corner_is_an_angle_or_a_length_as_the_joint_is():
+    robot = {"joints": [{"type": "prismatic"}, {"type": "revolute"}]}
+    start, move = {"joints": [0, 0]}, {"planner": "time_optimal", "path": "polyline"}
+    move["through"] = [{"joints": [300, 10]}, {"joints": [-350, 60]}, {"joints": [0, 0]}]
+    rest = {"robot": robot, "units": {"angle": "deg", "length": "mm"}, "limits": {"acceleration": 300}}
+
+    def missed(corner):
+        made = plan(start, move | {"corner": corner}, **rest)
+        return made.moves[0].planned.passage.missed[1:-1] / [1e-3, np.pi / 180]
+
+    alike = missed(1)
+    assert alike.max(axis=1) == pytest.approx([1, 1], rel=1e-9)  # mm, degrees
+    np.testing.assert_allclose(missed([1, "1 deg"]), alike, rtol=1e-9)
+    np.testing.assert_allclose(missed([0.5, 2]), alike / 2, rtol=1e-9)  # the slide is what turns
 
 
 def test_a_corner_that_has_no_room_is_shrunk():
@@ -231,6 +248,7 @@ def test_a_finer_grid_is_no_concession_and_a_point_left_out_is(tmp_path, capfd, 
 FREE = [{"joints": [1, 2]}, {"joints": [2, 1]}]
 WRONG = {
     "time": ({"through": [FREE[0] | {"time": 1}, FREE[1] | {"time": 2}]}, "finds the times", 2, LIMITS),
+    "one time": ({"through": [FREE[0] | {"time": 1}, FREE[1]]}, "finds the times", 2, LIMITS),
     "blend": ({"through": [FREE[0] | {"blend": 1}, FREE[1]]}, "has no blends", 2, LIMITS),
     "velocity": (
         {"through": [FREE[0] | {"velocity": 1}, FREE[1]]},
@@ -245,6 +263,12 @@ WRONG = {
         LIMITS,
     ),
     "corner": ({"through": FREE, "corner": 0.1}, "a spline has no corner", 2, LIMITS),
+    "some corner": (
+        {"through": FREE, "path": "polyline", "corner": [0, 1]},
+        "rounded for all joints or for none",
+        2,
+        LIMITS,
+    ),
     "rule": ({"through": FREE, "path": "polyline", "rule": "natural"}, "a polyline has no rule", 2, LIMITS),
     "parameter": ({"through": FREE, "path": "polyline", "parameter": "chord"}, "has no parameter", 2, LIMITS),
     "imposed": ({"through": FREE, "rule": "imposed"}, "imposes derivatives in time", 2, LIMITS),

@@ -52,6 +52,7 @@ def test_what_is_written_is_read(tmp_path, digits):
         "\ufefft,q1\n0,1.5\n1,-2\n",
         "t,q1\n\n0,1.5\n\n1,-2\n\n\n",
         't , "q1"\n0 , 1.5\n 1,\t-2 \n',
+        "# t,q1\n0,1.5\n1,-2\n",
         "t,q1\n0.,+1.5e0\n.1E1,-200e-2\n",
         "t,q1\n0.000000000,1.500000000\n1.000000000,-2.000000000\n",
     ],

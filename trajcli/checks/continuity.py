@@ -7,7 +7,6 @@ and after the last one in its declared end.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from trajcli.checks.limits import peaks_by_move
 from trajcli.checks.tolerances import allowed_jump
 from trajcli.curves.extrema import Peaks
 from trajcli.curves.piecewise import Array
+from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Limits
 from trajcli.trajectory import Trajectory
 
@@ -86,7 +86,7 @@ def acceleration_steps(
     ]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class _Jumps:
     """The two sides of every break, first and last included, each of shape (pieces + 1, n).
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
+
+from trajcli.frozen import comparable
 
 Kind = Literal[
     "position",
@@ -24,10 +25,10 @@ Kind = Literal[
     "tool_jerk",
     "branch",
 ]
-Method = Literal["exact", "bounded"]
+Method = Literal["exact", "bounded", "sampled"]
 
 
-@dataclass(frozen=True)
+@comparable
 class Finding:
     """Something that is wrong with a trajectory.
 
@@ -41,7 +42,8 @@ class Finding:
         limit: The bound it breaks, SI, signed as the value; for a jump the size that rounding explains; for a
             waypoint the distance that was promised.
         time: Seconds from the start of the trajectory.
-        method: "exact" from the roots of derivatives, or "bounded" between samples.
+        method: "exact": from the roots of derivatives; "bounded": at most that for all t, proven between rows
+            within 1e-6; "sampled": on rows, without a proof of what is between them.
         factor: By what factor the move must last longer for the limit to hold; None where that does not help.
         hint: What would fix it.
     """
@@ -57,7 +59,7 @@ class Finding:
     hint: str | None = None
 
 
-@dataclass(frozen=True)
+@comparable
 class Step:
     """A step in a joint's acceleration, which is legal where the joint has no jerk limit.
 

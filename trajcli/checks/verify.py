@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,11 +11,12 @@ from trajcli.checks.finding import Finding, Step
 from trajcli.checks.limits import check_limits, peaks_by_move
 from trajcli.checks.waypoints import check_waypoints
 from trajcli.curves.extrema import Peaks
+from trajcli.frozen import frozen
 from trajcli.kinematics.robot import QUANTITIES, Limits
 from trajcli.trajectory import Promise, Trajectory
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Verdict:
     """What the checks found.
 
@@ -73,7 +73,8 @@ def _check_tools(trajectory: Trajectory, promises: Sequence[Promise]) -> list[Fi
     found: list[Finding] = []
     for span, promise in zip(trajectory.spans, promises, strict=True):
         if promise.tool is not None and promise.robot is not None:
-            from trajcli.checks.tool import ToolRows, check_tool  # a plan without paths does not pay for it
+            from trajcli.checks.tool import check_tool  # a plan without paths does not pay for it
+            from trajcli.checks.tool_rows import ToolRows
 
             found += check_tool(ToolRows(trajectory, span, promise.robot, promise.tool))
     return found

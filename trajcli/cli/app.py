@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+import sys
+from typing import Annotated, Literal, get_type_hints
 
 import typer
 
@@ -31,6 +32,11 @@ Overrides = Annotated[
         "--set", metavar="PATH=VALUE", help="Override a value of the job, such as moves.0.duration=3."
     ),
 ]
+
+
+@app.callback()
+def commands() -> None:
+    """Let typer ask for a command's name also where `run` leaves only one."""
 
 
 @app.command()
@@ -142,3 +148,15 @@ def init(
 
 
 register(app)
+
+
+def run() -> None:
+    """Run the command that the command line names; where it names none, print help."""
+    # Typer makes every command it knows, and evaluates each annotation four times: more work than a plan.
+    known = {info.callback.__name__: info for info in app.registered_commands if info.callback}
+    wanted = [known[word] for word in sys.argv[1:2] if word in known] or [*known.values()]
+    for info in wanted:
+        if info.callback:
+            info.callback.__annotations__.update(get_type_hints(info.callback, include_extras=True))
+    app.registered_commands = wanted
+    app()

@@ -94,7 +94,11 @@ def ik(
     digits: Digits = "fixed",
     errors: Errors = "text",
 ) -> int:
-    """Find all joint values that bring the tool to a pose; of a CSV of poses, the way that stays nearest."""
+    """Find all joint values that bring the tool to a pose; of a CSV of poses, the way that stays nearest.
+
+    An answer is singular where the tool can move in fewer directions, of those that the pose fixes, than it
+    can nearby. What is free is a direction in which the joints can move while the pose is kept.
+    """
     from trajcli.cli.ik import IkOptions, run_ik
 
     options = IkOptions(pose, near, every, turns, tolerance, tool, si, as_json, digits)
@@ -139,7 +143,7 @@ def pose(
     ] = "",
     inverse: Annotated[bool, typer.Option("--inverse", help="Take the inverse of the result.")] = False,
     point: Annotated[
-        tuple[str, str, str] | None,
+        str | None,
         typer.Option(
             "--point", metavar="X Y Z", help="A point in the pose's frame, to be said in the first."
         ),

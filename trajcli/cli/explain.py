@@ -86,8 +86,9 @@ def _polynomials(plan: Plan, index: int) -> Iterator[str]:
         if len(rows) > _MOST_PIECES:
             yield f"  q{number}(t): {len(rows)} pieces, listed by --json"
             continue
-        for row in rows:
-            when = f"{row.start:.10g} <= t <= {row.end:.10g}: " if len(rows) > 1 else ""
+        one = len({row.text for row in rows}) == 1
+        for row in rows[:1] if one else rows:
+            when = "" if one else f"{row.start:.10g} <= t <= {row.end:.10g}: "
             yield f"  {when}q{number}(t) = {row.text}"
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, Literal
 
 from trajcli.cli.matrix_text import pose_lines
 from trajcli.cli.printing import print_json, print_lines
 from trajcli.errors import InputError
+from trajcli.frozen import comparable
 from trajcli.kinematics.forward import forward, link_poses
 from trajcli.pipeline.arm import Arm, open_arm
 from trajcli.pipeline.outside_limits import LimitWatch
@@ -18,7 +18,7 @@ from trajcli.streams.csv import Digits, write_csv
 from trajcli.streams.whole_file import standard_output
 
 
-@dataclass(frozen=True)
+@comparable
 class FkOptions:
     """What the command line says beside robot and joints; see `trajcli fk --help`."""
 

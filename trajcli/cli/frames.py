@@ -43,7 +43,7 @@ def render_problem(problem: Problem, *, color: bool) -> str:
         color: Whether to use the terminal's colors.
     """
     paint = _painted if color else _plain
-    place, hint = problem.place, _shown(problem.hint) if problem.hint else ""
+    place, hint = problem.place, _shown(problem.advice() or "")
     where = f"{_shown(place.file)}:{place.line}:{place.column}: " if place is not None else ""
     rows = [f"{paint(where, _BOLD) if where else ''}{paint('error:', _RED)} {_shown(problem.text())}"]
     if place is None or not place.source.strip():
@@ -70,7 +70,7 @@ def problem_as_json(problem: Problem) -> dict[str, Any]:
     place = problem.place
     return {
         "message": problem.text(),
-        "hint": problem.hint,
+        "hint": problem.advice(),
         "file": place.file if place is not None else None,
         "line": place.line if place is not None else None,
         "column": place.column if place is not None else None,

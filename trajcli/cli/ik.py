@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from trajcli.cli.matrix_text import number, numbers
 from trajcli.cli.printing import print_json, print_lines
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
+from trajcli.frozen import comparable
 from trajcli.job.inline import inline_target
 from trajcli.kinematics.inverse.solution import Solutions
 from trajcli.pipeline.arm import Arm, open_arm
@@ -19,7 +19,7 @@ from trajcli.planners.goal import goal_of
 from trajcli.streams.csv import Digits
 
 
-@dataclass(frozen=True)
+@comparable
 class IkOptions:
     """What the command line says beside the robot; see `trajcli ik --help`."""
 

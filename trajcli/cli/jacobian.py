@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from trajcli.cli.matrix_text import matrix_lines, number, numbers
 from trajcli.cli.printing import print_json, print_lines
 from trajcli.errors import InputError
+from trajcli.frozen import comparable
 from trajcli.kinematics.jacobian import ReferenceFrame
 from trajcli.pipeline.arm import Arm, open_arm
 from trajcli.pipeline.differential import differential
@@ -17,7 +17,7 @@ from trajcli.streams.whole_file import standard_output
 _COMPONENTS = ("vx", "vy", "vz", "wx", "wy", "wz")
 
 
-@dataclass(frozen=True)
+@comparable
 class JacobianOptions:
     """What the command line says beside robot and joints; see `trajcli jacobian --help`."""
 

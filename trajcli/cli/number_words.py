@@ -8,8 +8,8 @@ from collections.abc import Mapping
 import typer
 import typer.core
 
-_NUMBER_LIKE = re.compile(r"[-+]?\.?[0-9][^=]*")
-JOINED = ("--qd", "--near")
+_NUMBER_LIKE = re.compile(r"[-+]?(?:\.?[0-9][^=]*|\.?nan|\.?inf(?:inity)?)", re.IGNORECASE)
+JOINED = ("--qd", "--near", "--point", "--s")
 """Options that take all the numbers behind them."""
 
 
@@ -49,6 +49,8 @@ def joined(args: list[str]) -> list[str]:
 def sorted_words(args: list[str], takes: Mapping[str, int]) -> list[str]:
     """Return the words with options first, then `--`, then everything else in its order.
 
+    An option whose value is missing comes last and alone, so that `--` is not taken for it.
+
     Args:
         args: The words as they were typed.
         takes: How many words each option takes.
@@ -62,6 +64,8 @@ def sorted_words(args: list[str], takes: Mapping[str, int]) -> list[str]:
             others.append(word)
             continue
         count = takes.get(word, 0)
+        if len(rest) < count or "--" in rest[:count]:
+            return [*options, word]
         options += [word, *rest[:count]]
         rest = rest[count:]
     return [*options, "--", *others, *rest[1:]]

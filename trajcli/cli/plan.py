@@ -5,17 +5,22 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from trajcli.errors import InputError, Problem, VerificationError
+from trajcli.frozen import comparable
 from trajcli.job.read import LoadedJob, load_job
 from trajcli.pipeline.plan import Plan, plan_job
 from trajcli.pipeline.write import check_output_name, grid_of, write_rows, write_text
 from trajcli.planners.planner import Event
 
+if TYPE_CHECKING:
+    from trajcli.job.report import MoveReport, ReferenceReport
 
-@dataclass(frozen=True)
+_STILL = 1e-9  # rad/s or m/s, below which a joint only rounds
+
+
+@comparable
 class PlanOptions:
     """What the command line says beside the job; see `trajcli plan --help`."""
 
@@ -96,17 +101,19 @@ def _report(plan: Plan, options: PlanOptions) -> None:
         write_text(report.model_dump_json(indent=2) + "\n", options.report)
     compared = options.reference and plan.verdict.passed and not options.quiet
     for move in report.moves if compared else []:
-        bound = move.reference
-        if bound is None:
-            continue
-        if bound.duration is None:
-            text = f"no bound for {bound.joint}: {bound.reason}"
-        elif bound.ratio is None:
-            text = "nothing to move"
-        else:
-            text = f"{move.duration:.6g} s, {bound.ratio:.4g} x the fastest under the same limits"
-            text += f" ({bound.duration:.6g} s)"
-        print(f"move {move.index} ({move.planner}): {text}", file=sys.stderr)  # noqa: T201
+        if move.reference is not None:
+            text = _compared(move, move.reference)
+            print(f"move {move.index} ({move.planner}): {text}", file=sys.stderr)  # noqa: T201
+
+
+def _compared(move: MoveReport, bound: ReferenceReport) -> str:
+    if bound.duration is None:
+        return f"no bound for {bound.joint}: {bound.reason}"
+    if bound.ratio is None:
+        speeds = [max(-peak.low, peak.high) for peak in move.peaks if peak.quantity == "velocity"]
+        return "no bound: it ends where it starts" if max(speeds) > _STILL else "nothing to move"
+    how = "the fastest" if move.tool is None else "the fastest off the path"
+    return f"{move.duration:.6g} s, {bound.ratio:.4g} x {how} under the same limits ({bound.duration:.6g} s)"
 
 
 def _summarise(plan: Plan, rows: int, options: PlanOptions) -> None:

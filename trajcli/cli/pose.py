@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any, Literal
 
 from trajcli.cli.matrix_text import number, numbers, pose_lines
 from trajcli.cli.printing import print_json, print_lines
 from trajcli.errors import InputError
+from trajcli.frozen import comparable
 from trajcli.geometry.pose import invert
 from trajcli.geometry.rotation import rotation_defect
 from trajcli.job.inline import inline_number
@@ -20,13 +20,13 @@ from trajcli.units import Quantity, Units
 _ROUNDING = 1e-9  # of R^T R: above it is told, since it comes from rounded entries
 
 
-@dataclass(frozen=True)
+@comparable
 class PoseOptions:
     """What the command line says beside the steps; see `trajcli pose --help`."""
 
     units: str = ""
     inverse: bool = False
-    point: tuple[str, str, str] | None = None
+    point: str | None = None
     euler: str | None = None
     to: str | None = None
     s: str | None = None
@@ -83,8 +83,14 @@ def _start(words: Sequence[str], options: PoseOptions, units: Units) -> End:
     return End(pose, steps[0].typed if len(steps) == 1 else None)
 
 
-def _point(words: Sequence[str], units: Units) -> list[float]:
-    return [inline_number(word, "--point", Quantity("length"), units) for word in words]
+def _point(text: str, units: Units) -> list[float]:
+    words = [word.strip() for word in text.split(",")]
+    if len(words) != len("xyz"):
+        count = f"{len(words)} value{'s' * (len(words) != 1)}"
+        raise InputError(f"--point has {count}, a point has x, y, z", hint="such as --point 0.1 0 -0.2")
+    names = [f"--point, {axis}" for axis in "xyz"]
+    length = Quantity("length")
+    return [inline_number(word, name, length, units) for word, name in zip(words, names, strict=True)]
 
 
 def _require_target(options: PoseOptions) -> None:

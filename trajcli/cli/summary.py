@@ -44,19 +44,19 @@ def _tightest(plan: Plan) -> str:
                 best = float(used[joint])
                 name = move.robot.joint_names[joint]
                 text = f"{QUANTITIES[order]} of {name} in move {move.index}, {100 * best:.4g} % used"
-        speed = _tool_speed(move)
+        speed, name = _tool_speed(move)
         if speed > best * (1 + 1e-6):
-            best, text = speed, f"speed of the tool in move {move.index}, {100 * speed:.4g} % used"
+            best, text = speed, f"{name} of the tool in move {move.index}, {100 * speed:.4g} % used"
     return text
 
 
-def _tool_speed(move: PlannedMove) -> float:
-    """Return which part of the limit of the tool's speed along its path is used."""
+def _tool_speed(move: PlannedMove) -> tuple[float, str]:
+    """Return which part of the limit of the tool's speed along its path is used, and its name."""
     tool, limits = move.planned.tool, move.robot.limits.tcp
     if tool is None:
-        return 0.0
-    limit = limits.angular_speed if tool.in_place else limits.speed
-    return float(peaks(tool.law, (1,))[0].magnitude[0]) / limit
+        return 0.0, "speed"
+    limit, name = (limits.angular_speed, "angular speed") if tool.in_place else (limits.speed, "speed")
+    return float(peaks(tool.law, (1,))[0].magnitude[0]) / limit, name
 
 
 def _unchecked(plan: Plan) -> str:

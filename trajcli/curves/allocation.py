@@ -17,7 +17,6 @@ the estimation of sparse Jacobian matrices, J. Inst. Math. Appl. 13 (1974).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,6 +24,7 @@ from trajcli.curves.block_tridiagonal import solve_block_tridiagonal
 from trajcli.curves.extrema import piece_extremes
 from trajcli.curves.feasible import smallest_feasible
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.frozen import frozen
 
 Family = Callable[[Array], PiecewisePolynomial]
 
@@ -43,7 +43,7 @@ _CALM = 1e-3  # of log h: a step this short ends a round
 _AMPLE = 1e4
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class _Barrier:
     """The problem of one barrier.
 

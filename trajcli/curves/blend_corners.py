@@ -7,7 +7,6 @@ through it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
@@ -16,13 +15,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from trajcli.curves.blend_pieces import Knots
 from trajcli.curves.piecewise import Array
+from trajcli.frozen import frozen
 
 Ends = Literal["centred", "inside"]
 
 OFFSET = 0.625  # of a blend: two corners around a waypoint leave a quarter of it straight between them
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Way:
     """What the corners are made from: m waypoints of n joints.
 

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.compose import merge_breaks
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.frozen import frozen
 
 _ROUNDING = 8 * np.finfo(np.float64).eps  # of the end: a straight piece this short is none
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Knots:
     """The corners of a polyline in time, each rounded by a parabola centred on it.
 

@@ -15,14 +15,13 @@ Source: Boyd and Vandenberghe, Convex Optimization (2004), chapter 11, for the b
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from trajcli.curves.blend_corners import Ends
 from trajcli.curves.block_tridiagonal import solve_block_tridiagonal
 from trajcli.curves.piecewise import Array
+from trajcli.frozen import frozen
 
 _GAP = 1e-7  # of the total time: what the barrier may still cost at the end
 _SHARPER = 0.15  # factor of the barrier's weight from round to round
@@ -93,7 +92,7 @@ def _shorter(segments: Array) -> Array:
     return np.minimum(padded[:-1], padded[1:])
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class _Problem:
     """The constraints, for m points and n joints.
 

@@ -12,7 +12,7 @@ ends; Craig, Introduction to Robotics (2005), section 7.3, for "inside" ends and
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,12 +21,13 @@ from trajcli.curves.blend_accelerations import offsets_and_blends
 from trajcli.curves.blend_corners import OFFSET, Ends, Way, corners, scaled_to_fit
 from trajcli.curves.blend_pieces import Knots
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, read_only
+from trajcli.frozen import comparable, frozen
 
 _SHRUNK = 1e-12  # relative: less is rounding
 _JUMP = 1e-9  # of a joint's fastest segment: a velocity step that needs a blend
 
 
-@dataclass(frozen=True)
+@comparable
 class Shrunk:
     """A blend that had to be shortened.
 
@@ -43,7 +44,7 @@ class Shrunk:
     used: float
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Blended:
     """Linear segments with parabolic blends through m waypoints of n joints.
 

@@ -7,18 +7,18 @@ always a point on the curve: one too many does no harm.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from trajcli.curves.critical import critical_points
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, derivative_coefficients, horner
+from trajcli.frozen import frozen
 
 _SAME = 1e-12  # of the largest value: peaks closer than this are one peak, and the earliest is named
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Peaks:
     """Smallest and largest value of one derivative of a curve, each of shape (n,).
 
@@ -112,7 +112,7 @@ def piece_extremes(
     return found
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class _Windows:
     """The stretches of pieces that make up the intervals; w of them in all, m intervals.
 

@@ -11,19 +11,38 @@ Source: Birkhoff and Priver, Hermite interpolation errors for derivatives, J. Ma
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import sqrt
+from typing import Protocol, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajcli.curves.hermite import hermite_coefficients
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, derivative_coefficients, horner
+from trajcli.frozen import frozen
 
 MOST_PIECES = 4096
-Exact = Callable[[Array, Side, Array], Array]
-"""Value, first and second derivative (3, N, n) at places (N,) from one side of breaks, by guesses (N, n)."""
-Misfit = Callable[[Array, Array, Array], Array]
-"""By how many times its tolerance a fit (3, N, n) misses exact values (3, N, n) at places (N,): (N,)."""
+Rows = NDArray[np.intp]
+
+
+class Known(Protocol):
+    """What is known of a function at N places; what else a misfit needs may come with it.
+
+    Attributes:
+        values: Value, first and second derivative, shape (3, N, n).
+    """
+
+    @property
+    def values(self) -> Array:
+        """Value and derivatives."""
+        ...
+
+
+K = TypeVar("K", bound=Known)
+Exact = Callable[[Array, Side, Array], K]
+"""What is known at places (N,) from one side of breaks, by guesses (N, n)."""
+Misfit = Callable[[K, Rows, Array], Array]
+"""By how many times its tolerance a fit (3, k, n) misses what is known at rows (k,) of the places: (k,)."""
 
 Guess = Callable[[Array], Array]
 """Values (N, n) near the function's at places (N,)."""
@@ -34,6 +53,8 @@ _ORDER = 4  # with which the error of the second derivative falls: the slowest
 _FILLED = 0.8  # of the tolerance: between the probes the error is a little larger
 _NOISE = 4.0  # units in the last place by which values that are exact may be off
 _MOST_PARTS = 8
+_AT_ONCE = 64  # of a few pieces that are off everywhere, together; others may only have a narrow peak
+_EXPLAINED = 100.0  # times its rounding by which a derivative may be off that rounding explains
 _ROUNDS = 60
 
 
@@ -51,7 +72,7 @@ class FitError(ValueError):
         self.misfit = misfit
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class _Pieces:
     """Intervals with the derivatives at their own two ends.
 
@@ -75,9 +96,49 @@ class _Pieces:
         """Return some of the pieces."""
         return _Pieces(self.start[kept], self.end[kept], self.left[:, kept], self.right[:, kept])
 
+    def probes(self) -> Array:
+        """Return the places (k * p,) between the ends at which a fit is judged."""
+        return np.asarray(self.start[:, None] + (self.end - self.start)[:, None] * _PROBES).reshape(-1)
+
+
+@frozen
+class _Pending:
+    """Pieces of which not all ends are known.
+
+    Attributes:
+        pieces: With anything at the ends that are not known.
+        lefts: Pieces (u,) whose starts are to be asked for.
+        rights: Pieces that end there; none where the right sides of breaks are asked for, and the left known.
+        guess: Values near those at these starts and at all probes of the pieces, shape (u + k * p, n).
+    """
+
+    pieces: _Pieces
+    lefts: Rows
+    rights: Rows
+    guess: Array
+
+
+@frozen
+class _Judged:
+    """Pieces and how good they are.
+
+    Attributes:
+        pieces: All ends known.
+        error: Largest misfit of each, shape (k,).
+        least: Smallest, shape (k,).
+        place: Where the largest is, shape (k,).
+        nearer: Whether the piece is nearer to the function than the guess was, shape (k,).
+    """
+
+    pieces: _Pieces
+    error: Array
+    least: Array
+    place: Array
+    nearer: NDArray[np.bool_]
+
 
 def fit(
-    exact: Exact, misfit: Misfit, breaks: Array, guess: Guess, *, most: int = MOST_PIECES
+    exact: Exact[K], misfit: Misfit[K], breaks: Array, guess: Guess, *, most: int = MOST_PIECES
 ) -> PiecewisePolynomial:
     """Return quintic pieces through a function, each within tolerance where its error is largest.
 
@@ -93,47 +154,65 @@ def fit(
     Raises:
         FitError: When more pieces would be needed.
     """
-    pending = _Pieces(
-        breaks[:-1],
-        breaks[1:],
-        exact(breaks[:-1], "right", guess(breaks[:-1])),
-        exact(breaks[1:], "left", guess(breaks[1:])),
-    )
+    pending = _whole(exact, breaks, guess)
     done: list[_Pieces] = []
     count = 0
     for _ in range(_ROUNDS):
-        error, probed = _errors(exact, misfit, pending, guess)
-        fine = error <= _FILLED
-        done.append(pending.at(fine))
+        judged = _judged(exact, misfit, pending)
+        fine = judged.error <= _FILLED
+        done.append(judged.pieces.at(fine))
         count += int(np.count_nonzero(fine))
         if fine.all():
             return _joined(done)
-        rough = pending.at(~fine)
-        parts = np.clip(np.ceil(1.1 * error[~fine] ** (1 / _ORDER)), 2, _MOST_PARTS).astype(int)
+        pieces = count + int(np.count_nonzero(~fine))
+        parts = _parts(judged.error[~fine], judged.least[~fine], _AT_ONCE // pieces)
         if count + int(parts.sum()) > most:
-            worst = int(error.argmax())
-            raise FitError(float(probed[worst]), float(error[worst]))
-        pending = _divided(exact, rough, parts, guess)
-    raise FitError(float(pending.start[0]), float(error.max()))
+            break
+        pending = _divided(judged.pieces.at(~fine), parts, judged.nearer[~fine], guess)
+    worst = int(judged.error.argmax())
+    raise FitError(float(judged.place[worst]), float(judged.error[worst]))
 
 
-def _errors(exact: Exact, misfit: Misfit, pieces: _Pieces, guess: Guess) -> tuple[Array, Array]:
-    """Return for each piece the largest misfit and where it is, each of shape (k,)."""
+def _whole(exact: Exact[K], breaks: Array, guess: Guess) -> _Pending:
+    """Return one piece between any two neighbouring breaks, its end known."""
+    ends = exact(breaks[1:], "left", guess(breaks[1:])).values
+    pieces = _Pieces(breaks[:-1], breaks[1:], ends.copy(), ends)
+    near = guess(np.append(pieces.start, pieces.probes()))
+    return _Pending(pieces, np.arange(breaks.size - 1), np.arange(0), near)
+
+
+def _judged(exact: Exact[K], misfit: Misfit[K], pending: _Pending) -> _Judged:
+    """Return the pieces with their misfits; ends and probes are asked for at once: a question costs more."""
+    pieces, inner = pending.pieces, pending.lefts.size
+    probes = pieces.probes()
+    known = exact(np.append(pieces.start[pending.lefts], probes), "right", pending.guess)
+    pieces.left[:, pending.lefts] = known.values[:, :inner]
+    pieces.right[:, pending.rights] = known.values[:, : pending.rights.size]
     lengths = pieces.end - pieces.start
-    local = lengths[:, None] * _PROBES
-    places = (pieces.start[:, None] + local).reshape(-1)
-    fitted = _at(pieces.coefficients(), local)
-    values = exact(places, "right", guess(places))
-    errors = misfit(places, values, fitted).reshape(local.shape)
+    fitted, values = _at(pieces.coefficients(), lengths[:, None] * _PROBES), known.values[:, inner:]
+    errors = misfit(known, inner + np.arange(probes.size), fitted).reshape(-1, _PROBES.size)
     errors = np.where(np.isfinite(errors), errors, np.inf)
     worst = np.arange(lengths.size) * _PROBES.size + errors.argmax(axis=1)
-    error, probed = errors.reshape(-1)[worst], places[worst]
-    rough = np.flatnonzero(error > _FILLED)
-    if rough.size:
-        known = values[:, worst[rough]]
-        explained = misfit(probed[rough], known, known + _rounding(known, lengths[rough]))
-        error[rough[error[rough] <= explained]] = 0.0
-    return error, probed
+    error = errors.reshape(-1)[worst]
+    rounding = _rounding(values[:, worst], lengths)
+    near = np.abs(fitted - values)[:, worst].max(axis=2) <= _EXPLAINED * rounding.max(axis=2)
+    rows = np.flatnonzero((error > _FILLED) & near.any(axis=0))
+    if rows.size:
+        there = worst[rows]
+        explained = misfit(known, inner + there, values[:, there] + rounding[:, rows])
+        error[rows[error[rows] <= explained]] = 0.0
+    off = [
+        np.abs(near - values[0]).max(axis=1).reshape(errors.shape).max(axis=1)
+        for near in (fitted[0], pending.guess[inner:])
+    ]
+    return _Judged(pieces, error, errors.min(axis=1), probes[worst], off[0] < off[1])
+
+
+def _parts(error: Array, least: Array, at_once: int) -> Rows:
+    """Return into how many parts pieces of a largest and a smallest misfit (k,) are divided."""
+    wanted, everywhere = (np.ceil(1.1 * size ** (1 / _ORDER)) for size in (error, least))
+    most = np.maximum(_MOST_PARTS, np.minimum(everywhere, at_once))
+    return np.clip(wanted, 2, most).astype(int)
 
 
 def _rounding(values: Array, lengths: Array) -> Array:
@@ -154,20 +233,21 @@ def _at(coefficients: Array, local: Array) -> Array:
     return np.stack(spread).reshape(3, local.size, -1)
 
 
-def _divided(exact: Exact, pieces: _Pieces, parts: np.ndarray, guess: Guess) -> _Pieces:
-    """Return each piece divided into so many equal parts."""
+def _divided(pieces: _Pieces, parts: Rows, nearer: NDArray[np.bool_], guess: Guess) -> _Pending:
+    """Return each piece divided into so many equal parts; pieces that are nearer are the better guess."""
     owner = np.repeat(np.arange(parts.size), parts)
     number = np.arange(owner.size) - np.repeat(np.cumsum(parts) - parts, parts)
-    lengths = (pieces.end - pieces.start)[owner]
-    local = lengths * number / parts[owner]
-    start = pieces.start[owner] + local
+    start = pieces.start[owner] + (pieces.end - pieces.start)[owner] * number / parts[owner]
     last = number == parts[owner] - 1
-    inner = np.flatnonzero(number > 0)
-    values = exact(start[inner], "right", guess(start[inner]))
-    left, right = pieces.left[:, owner].copy(), pieces.right[:, owner].copy()
-    left[:, inner] = values
-    right[:, np.flatnonzero(~last)] = values
-    return _Pieces(start, np.where(last, pieces.end[owner], np.append(start[1:], 0.0)), left, right)
+    end = np.where(last, pieces.end[owner], np.append(start[1:], 0.0))
+    divided = _Pieces(start, end, pieces.left[:, owner], pieces.right[:, owner])
+    lefts = np.flatnonzero(number > 0)
+    places = np.append(start[lefts], divided.probes())
+    near, whose = guess(places), np.append(owner[lefts], np.repeat(owner, _PROBES.size))
+    own = nearer[whose]
+    local = (places - pieces.start[whose])[own]
+    near[own] = horner(pieces.coefficients()[:, whose[own]], local[:, None])
+    return _Pending(divided, lefts, lefts - 1, near)
 
 
 def _joined(pieces: list[_Pieces]) -> PiecewisePolynomial:

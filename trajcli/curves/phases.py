@@ -9,13 +9,14 @@ given duration with few phases), the constants change too, a thousand times less
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from math import factorial
 
 import numpy as np
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.frozen import frozen
 
 _GOAL = 4e-15  # relative: what summing a few phases leaves
 _ROUNDS = 12
@@ -25,7 +26,7 @@ _LARGEST_STEP = 0.5
 _LEVEL = 1e-9  # of the peak: an acceleration below this in a phase without jerk means a cruise
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class PhaseChain:
     """A motion from a given state, relative to its first position.
 

@@ -6,12 +6,13 @@ A joint path q(s), a time law s(t) and a trajectory q(t) are this type in three 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import perm
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from trajcli.frozen import frozen
 
 Array = NDArray[np.float64]
 Side = Literal["left", "right"]
@@ -27,7 +28,7 @@ def read_only(values: ArrayLike) -> Array:
     return array
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class PiecewisePolynomial:
     """A function of one variable with values in R^n, a polynomial between neighbouring breaks.
 

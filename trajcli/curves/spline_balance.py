@@ -17,16 +17,15 @@ Source: de Boor, A Practical Guide to Splines, revised edition (2001), chapter I
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from trajcli.curves.banded import solve_tridiagonal
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.curves.waypoints import Waypoints
+from trajcli.frozen import frozen
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Side:
     """How every knot is reached from one side: at velocity + stiffness M + coupling M' (writable arrays).
 

@@ -13,8 +13,6 @@ Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -28,6 +26,7 @@ from trajcli.curves.spline_balance import (
     without_acceleration,
 )
 from trajcli.curves.waypoints import Waypoints
+from trajcli.frozen import frozen
 
 
 def continuous_acceleration(
@@ -94,7 +93,7 @@ def _virtual_times(times: Array, given: ArrayLike | None) -> Array:
     return virtual
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class _EndState:
     """Position, velocity and acceleration of one end, each of shape (n,)."""
 
@@ -113,7 +112,7 @@ class _EndState:
         return _EndState(self.position + way, self.velocity + time * mean, acceleration)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class _EndInterval:
     """From the first waypoint over a virtual one, `to_virtual` later, to the next, `to_real` after that.
 

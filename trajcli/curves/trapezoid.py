@@ -12,9 +12,10 @@ and 3.2.7; Siciliano et al., Robotics: Modelling, Planning and Control (2009), s
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from trajcli.curves.velocity_profile import Profile, Rates
+from trajcli.frozen import comparable
 
 _ROUNDING = 1e-12  # relative: what a speed, a distance or a duration may miss its bound by
 _DOUBLE = 1e-15  # relative: a discriminant this small is zero, and both roots are one
@@ -134,7 +135,7 @@ def _speeds_of_duration(
     return roots[0] if roots else math.inf, high
 
 
-@dataclass(frozen=True)
+@comparable
 class _Way:
     """A motion in three parts, of which the middle goes straight to its end and is still to be found.
 

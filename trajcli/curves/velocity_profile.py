@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, increasing
+from trajcli.frozen import comparable
 
 _ROUNDING = 1e-14  # of the largest speed: speeds this close differ by rounding
 
 
-@dataclass(frozen=True)
+@comparable
 class Rates:
     """What a motion in one direction may do: all positive; speed may be infinite.
 
@@ -27,7 +27,7 @@ class Rates:
     deceleration: float
 
 
-@dataclass(frozen=True)
+@comparable
 class Profile:
     """A velocity that is linear between knots.
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from trajcli.curves.piecewise import Array, read_only
+from trajcli.frozen import frozen
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Waypoints:
     """Values to pass at given times; m >= 2 of them, n components.
 

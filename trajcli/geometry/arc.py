@@ -9,15 +9,25 @@ Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajcli.errors import InputError, PlanningError
+from trajcli.errors import Amount, InputError, PlanningError, Problem
+from trajcli.frozen import frozen
 from trajcli.geometry.axis_angle import exp
-from trajcli.geometry.place_curve import SAME_PLACE, Side, Smooth, Triple, inside, point, shown
+from trajcli.geometry.place_curve import (
+    SAME_PLACE,
+    Side,
+    Smooth,
+    Triple,
+    inside,
+    metres,
+    point,
+    shown,
+    spot,
+)
 from trajcli.geometry.rotation import Array
 
 LOOSE = 1e-3  # of radius or chord: numbers typed with three digits fit, a wrong one does not
@@ -26,7 +36,7 @@ HALF_TURN = 1e-3  # rad from half a turn, within which typed digits decide the p
 _TURN = 2.0 * np.pi
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Arc(Smooth):
     """A circular arc, or a helix: several turns are possible.
 
@@ -59,15 +69,15 @@ class Arc(Smooth):
         along = float((start - center) @ axis)
         radius = float(np.linalg.norm(start - center - along * axis))
         if radius <= SAME_PLACE:
-            raise InputError(
-                f"an arc needs a radius: the start lies {radius:.3g} m from the axis through {shown(center)}"
-            )
+            text = "an arc needs a radius: the start lies {radius} from the axis through {center}"
+            raise InputError(Problem(text, amounts={"radius": metres(radius), "center": spot(center)}))
         if abs(along) > LOOSE * radius:
             raise _oblique_axis(start, center, axis, along)
         if not (np.isfinite(self.angle) and np.isfinite(self.pitch)):
             raise InputError(f"angle and pitch of an arc must be finite: {self.angle}, {self.pitch}")
         if abs(self.angle) * radius <= SAME_PLACE:
-            raise InputError(f"an arc by an angle of {self.angle:.6g} rad has no length")
+            amounts = {"angle": Amount(float(self.angle), 0, None, "angle")}
+            raise InputError(Problem("an arc by an angle of {angle} has no length", amounts=amounts))
         for name, value in {
             "start": start,
             "center": point(center + along * axis, "center"),
@@ -220,43 +230,49 @@ def _across(axis: ArrayLike, chord: Array, distance: float) -> Array:
     given = direction(axis)
     slope = float(given @ chord)
     if abs(slope) > LOOSE:
-        raise PlanningError(
-            f"the target lies {abs(slope) * distance:.6g} m off the plane of the arc, which goes through the "
-            f"start perpendicular to the axis {shown(given)} (allowed is {LOOSE * distance:.3g} m)",
-            hint="leave `axis` out, or give `center`, `axis`, `angle` and `pitch` for a helix",
+        text = (
+            "the target lies {off} off the plane of the arc, which goes through the start perpendicular to "
+            f"the axis {shown(given)} (allowed is {{most}})"
         )
+        hint = "leave `axis` out, or give `center`, `axis`, `angle` and `pitch` for a helix"
+        amounts = {"off": metres(abs(slope) * distance), "most": metres(LOOSE * distance)}
+        raise PlanningError(Problem(text, hint, amounts=amounts))
     return direction(given - slope * chord)
 
 
 def _oblique_axis(start: Array, center: Array, axis: Array, along: float) -> PlanningError:
-    return PlanningError(
-        f"the axis {shown(axis)} is not perpendicular to the line from the center {shown(center)} to the "
-        f"start {shown(start)}: along the axis they are {abs(along):.6g} m apart",
-        hint=f"the center of a circle about this axis through the start is {shown(center + along * axis)}",
+    text = (
+        f"the axis {shown(axis)} is not perpendicular to the line from the center {{center}} to the "
+        "start {start}: along the axis they are {along} apart"
     )
+    amounts = {"center": spot(center), "start": spot(start), "along": metres(abs(along))}
+    amounts["right"] = spot(center + along * axis)
+    hint = "the center of a circle about this axis through the start is {right}"
+    return PlanningError(Problem(text, hint, amounts=amounts))
 
 
 def _coincident(names: str, where: Array) -> InputError:
     hint = "give `center`, `axis` and `angle` for whole turns" if "center" not in names else None
-    return InputError(
-        f"{names} of the arc coincide at {shown(where)}: no circle follows from them", hint=hint
-    )
+    text = f"{names} of the arc coincide at {{where}}: no circle follows from them"
+    return InputError(Problem(text, hint, amounts={"where": spot(where)}))
 
 
 def _collinear(start: Array, via: Array, target: Array) -> PlanningError:
-    line = f"start {shown(start)}, via {shown(via)} and target {shown(target)} are collinear"
+    text = "start {start}, via {via} and target {target} are collinear"
+    amounts = {"start": spot(start), "via": spot(via), "target": spot(target)}
     if (via - start) @ (target - via) > 0.0:
-        return PlanningError(f"{line}: use line, this arc is straight", hint="line: {to: ...}")
-    return PlanningError(
-        f"{line} and via is not between the others: no arc goes through them", hint="move the via point"
-    )
+        text, hint = f"{text}: use line, this arc is straight", "line: {to: ...}"
+    else:
+        text, hint = f"{text} and via is not between the others: no arc goes through them", "move via"
+    return PlanningError(Problem(text, hint, amounts=amounts))
 
 
 def _not_equidistant(start: Array, center: Array, target: Array, right: Array) -> PlanningError:
-    near, far = np.linalg.norm(start - center), np.linalg.norm(target - center)
-    return PlanningError(
-        f"the center {shown(center)} is {near:.6g} m from the start and {far:.6g} m from the target: they do "
-        f"not lie on one circle about it (it may be {LOOSE:g} of the radius out of place, it is "
-        f"{np.linalg.norm(center - right):.6g} m)",
-        hint=f"the nearest center that fits is {shown(right)}",
+    text = (
+        "the center {center} is {near} from the start and {far} from the target: they do not lie on one "
+        f"circle about it (it may be {LOOSE:g} of the radius out of place, it is {{off}})"
     )
+    ends = {"near": start, "far": target, "off": right}
+    amounts = {name: metres(float(np.linalg.norm(place - center))) for name, place in ends.items()}
+    amounts |= {"center": spot(center), "right": spot(right)}
+    return PlanningError(Problem(text, "the nearest center that fits is {right}", amounts=amounts))

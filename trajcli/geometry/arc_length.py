@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache, cached_property
 
 import numpy as np
 
+from trajcli.frozen import frozen
 from trajcli.geometry.rotation import Array
 
 _NODES = 8  # of Gauss on each panel
 _PANELS = 8  # to begin with
 _EXACT = 1e-15  # of the length, to which a panel must agree with its halves
+_NEAR = 1e-8  # a Newton step as short as this leaves its square, which is rounding
 _ROUNDS = 40  # halvings or Newton steps, far more than any curve with r' != 0 takes
 
 
@@ -23,10 +24,19 @@ def derivative(coefficients: Array) -> Array:
 
 def values(coefficients: Array, u: Array) -> Array:
     """Return the polynomial (*u.shape, 3) with the coefficients (degree + 1, 3), highest power first."""
-    result = np.broadcast_to(coefficients[0], (*u.shape, coefficients.shape[1]))
-    for row in coefficients[1:]:
-        result = result * u[..., None] + row
-    return np.asarray(result)
+    result = np.empty((*u.shape, coefficients.shape[1]))
+    for i, column in enumerate(coefficients.T):
+        result[..., i] = _value(column, u)
+    return result
+
+
+def _value(coefficients: Array, u: Array) -> Array:
+    """Return the polynomial (*u.shape,) with the coefficients (degree + 1,), highest power first."""
+    result = np.full(u.shape, coefficients[0])
+    for value in coefficients[1:]:
+        result *= u
+        result += value
+    return result
 
 
 @cache
@@ -36,7 +46,7 @@ def _gauss() -> tuple[Array, Array]:
     return (nodes + 1.0) / 2.0, weights / 2.0
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class ArcLength:
     """Arc length of a polynomial curve r(u), u from 0 to 1, with r' nowhere zero.
 
@@ -73,18 +83,26 @@ class ArcLength:
         """Return u (N,) at the arc lengths s (N,), m."""
         panel = np.clip(np.searchsorted(self.lengths, s, "right") - 1, 0, self.knots.size - 2)
         low, high = self.knots[panel], self.knots[panel + 1]
-        way = s - self.lengths[panel]
-        u = low + (high - low) * way / (self.lengths[panel + 1] - self.lengths[panel])
+        way, whole = s - self.lengths[panel], self.lengths[panel + 1] - self.lengths[panel]
+        # begin with the cubic that has the slopes du/ds of both ends of the panel
+        part = way / whole
+        first, last = (whole / self._speeds[k] for k in (panel, panel + 1))
+        u = low + part * first
+        u += part**2 * (3.0 * (high - low) - 2.0 * first - last + part * (first + last - 2.0 * (high - low)))
         for _ in range(_ROUNDS):
             step = (self._between(low, u) - way) / self._speed(u)
             u = np.clip(u - step, low, high)
-            if not (np.abs(step) > _EXACT).any():
+            if not (np.abs(step) > _NEAR).any():
                 break
         return u
 
+    @cached_property
+    def _speeds(self) -> Array:
+        return self._speed(self.knots)
+
     def _speed(self, u: Array) -> Array:
-        slope = values(self._slope, u)
-        return np.asarray(np.sqrt(np.einsum("...i,...i", slope, slope)))
+        square = sum(_value(column, u) ** 2 for column in self._slope.T)
+        return np.asarray(np.sqrt(square))
 
     def _between(self, low: Array, high: Array) -> Array:
         nodes, weights = _gauss()

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from trajcli.errors import InputError
+from trajcli.frozen import frozen
 from trajcli.geometry.quaternion import quaternion_from_matrix
 from trajcli.geometry.rotation import Array, Flags
 
 NO_ANGLE = 1e-12  # rad, below which rounding decides the axis
+_FAR = -1.0  # twice the cosine of the angle, 120 deg, from which on the quaternion is used
 HALF_TURN = 1e-9  # rad from pi, within which either sign of the axis describes the same rotation
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class AxisAngle:
     """Rotations by an angle from 0 to pi about an axis.
 
@@ -60,9 +60,27 @@ def exp(vector: ArrayLike) -> Array:
 def log(matrix: Array) -> Array:
     """Return the rotation vectors (*batch, 3), of length 0 to pi, of rotation matrices (*batch, 3, 3).
 
-    It is accurate at every angle: the quaternion takes the axis from the antisymmetric part of R near 0 and
-    from the symmetric part near pi. At pi the sign of the axis is free; `axis_angle_from_matrix` says so.
+    It is accurate at every angle: the axis is taken from the antisymmetric part of R, and near pi, where that
+    vanishes, by way of the quaternion from the symmetric part. At pi the sign of the axis is free;
+    `axis_angle_from_matrix` says so.
     """
+    r = np.asarray(matrix, dtype=np.float64)
+    double = np.stack(
+        [r[..., 2, 1] - r[..., 1, 2], r[..., 0, 2] - r[..., 2, 0], r[..., 1, 0] - r[..., 0, 1]], axis=-1
+    )
+    sine = np.sqrt(np.einsum("...i,...i", double, double))  # both doubled
+    cosine = np.einsum("...ii", r) - 1.0
+    angle = np.arctan2(sine, cosine)
+    ratio = np.full_like(sine, 0.5)  # limit of angle / (2 sin(angle))
+    np.divide(angle, sine, out=ratio, where=sine > 0.0)
+    result: Array = double * ratio[..., None]
+    far = np.asarray(cosine < _FAR)
+    if far.any():
+        result[far] = _log_by_quaternion(r[far])
+    return result
+
+
+def _log_by_quaternion(matrix: Array) -> Array:
     quaternion = quaternion_from_matrix(matrix)
     sine = np.linalg.norm(quaternion[..., 1:], axis=-1)
     ratio = np.full_like(sine, 2.0)  # limit of angle / sin(angle / 2)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajcli.errors import InputError, PlanningError
+from trajcli.errors import InputError, PlanningError, Problem
+from trajcli.frozen import frozen
 from trajcli.geometry.axis_angle import exp
 from trajcli.geometry.corner import REVERSAL, Blend, corner_values, round_corner, turn_between
 from trajcli.geometry.corner_radii import Kind, asked_radii, fitting_radii, sharp_kind
@@ -22,7 +23,8 @@ from trajcli.geometry.place_curve import (
     Triple,
     angle_between,
     inside,
-    shown,
+    metres,
+    spot,
 )
 from trajcli.geometry.progress import Progress
 from trajcli.geometry.rotation import Array
@@ -30,7 +32,7 @@ from trajcli.geometry.rotation import Array
 _NOTHING = 1e-12  # of a segment, which is rounding where two blends meet
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Corner:
     """What became of the corner between two segments.
 
@@ -55,7 +57,7 @@ class Corner:
     deviation: float
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Chain:
     """Curves joined end to start.
 
@@ -133,11 +135,12 @@ class Chain:
     def _shortest(self, k: int, first: Array, last: Array) -> Array:
         angle = angle_between(first, last)
         if angle > np.pi - REVERSAL:
-            raise PlanningError(
-                f"at s = {self.offsets[k + 1]:.6g} m the path turns back by {np.degrees(angle):.6g} deg: "
-                "about which axis a tool that keeps its attitude to the path should follow is not determined",
-                hint="orientation: axis_angle or fixed; or a path without a reversal",
+            text = (
+                f"at s = {{place}} the path turns back by {np.degrees(angle):.6g} deg: "
+                "about which axis a tool that keeps its attitude to the path should follow is not determined"
             )
+            hint = "orientation: axis_angle or fixed; or a path without a reversal"
+            raise PlanningError(Problem(text, hint, amounts={"place": metres(self.offsets[k + 1])}))
         axis = np.cross(first, last)
         sine = float(np.linalg.norm(axis))
         return exp(axis * (angle / sine)) if sine > 0.0 else np.eye(3)
@@ -149,7 +152,11 @@ class Chain:
         if here.size <= 1:
             only = int(here[0]) if here.size else 0
             return values(only, self._local(only, places))
-        found = [(part == k, values(int(k), self._local(int(k), places[part == k]))) for k in here]
+        order = np.argsort(part, kind="stable")
+        ends = np.cumsum(np.bincount(part))[here]
+        found = []
+        for k, rows in zip(here.tolist(), np.split(order, ends[:-1]), strict=True):
+            found.append((rows, values(k, self._local(k, places[rows]))))
         result = tuple(np.empty((places.size, *row.shape[1:])) for row in found[0][1])
         for rows, triple in found:
             for column, row in zip(result, triple, strict=True):
@@ -230,11 +237,10 @@ def _blend(index: int, before: PlaceCurve, after: PlaceCurve, radius: float) -> 
     try:
         return round_corner(before, after, radius)
     except PlanningError as error:
-        where = shown(after.evaluate(np.zeros(1))[0][0])
-        raise PlanningError(
-            f"corner {index + 1} of the path, at {where}: {error.problems[0].message}",
-            hint=error.problems[0].hint,
-        ) from error
+        (why,) = error.problems
+        text = f"corner {index + 1} of the path, at {{where}}: {why.message}"
+        amounts = {**why.amounts, "where": spot(after.evaluate(np.zeros(1))[0][0])}
+        raise PlanningError(replace(why, message=text, amounts=amounts)) from error
 
 
 def _check_joints(segments: Sequence[PlaceCurve]) -> None:
@@ -243,7 +249,14 @@ def _check_joints(segments: Sequence[PlaceCurve]) -> None:
         start = after.evaluate(np.zeros(1))[0][0]
         gap = float(np.linalg.norm(start - end))
         if gap > SAME_PLACE:
-            raise InputError(
-                f"segment {i + 2} of the path starts at {shown(start)}, {gap:.6g} m from {shown(end)}, where "
-                f"segment {i + 1} ends (allowed is {SAME_PLACE:g} m)"
+            text = (
+                f"segment {i + 2} of the path starts at {{start}}, {{gap}} from {{end}}, "
+                f"where segment {i + 1} ends (allowed is {{most}})"
             )
+            amounts = {
+                "start": spot(start),
+                "gap": metres(gap),
+                "end": spot(end),
+                "most": metres(SAME_PLACE),
+            }
+            raise InputError(Problem(text, amounts=amounts))

@@ -10,12 +10,12 @@ Source: Farin, Curves and Surfaces for CAGD (2002), chapter 11 (geometric contin
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from trajcli.errors import InputError, PlanningError
+from trajcli.frozen import frozen
 from trajcli.geometry.arc_length import ArcLength, derivative, values
 from trajcli.geometry.place_curve import PlaceCurve, Side, Smooth, Triple, angle_between, inside
 from trajcli.geometry.rotation import Array
@@ -32,7 +32,7 @@ _TIE = 1e-9  # relative, so that rounding does not choose between two speeds
 _FINER = 16  # steps of the parallel transport on each panel of the arc length: exact to 1e-13 rad
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Blend(Smooth):
     """A quintic by arc length.
 

@@ -9,9 +9,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajcli.errors import InputError
+from trajcli.errors import InputError, Problem
 from trajcli.geometry.corner import SAME_DIRECTION, curvature_jumps, room_for_radius, turn_between
-from trajcli.geometry.place_curve import SAME_PLACE, PlaceCurve
+from trajcli.geometry.place_curve import SAME_PLACE, PlaceCurve, metres
 
 Kind = Literal["smooth", "bend", "stop", "rounded"]
 
@@ -34,9 +34,9 @@ def asked_radii(radii: ArrayLike, corners: int) -> list[float]:
         raise InputError(f"the path has {corners} corners, there are {given.size} radii", hint="one for each")
     wrong = given[~(np.isfinite(given) & ((given == 0.0) | (given > SAME_PLACE)))]
     if wrong.size:
-        raise InputError(
-            f"a corner radius must be 0 (stop there) or more than {SAME_PLACE:g} m, it is {wrong[0]:.6g}"
-        )
+        text = "a corner radius must be 0 (stop there) or more than {least}, it is {given}"
+        amounts = {"least": metres(SAME_PLACE), "given": metres(wrong[0])}
+        raise InputError(Problem(text, amounts=amounts))
     return [float(radius) for radius in np.broadcast_to(given, (corners,))]
 
 

@@ -11,19 +11,18 @@ Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from trajcli.errors import InputError
+from trajcli.frozen import frozen
 from trajcli.geometry.rotation import AXES, Array, Flags, Frame, rotation_about
 
 GIMBAL_LOCK = 1e-7  # rad from the lock, within which first and third angle are said to be undetermined
 _NOISE = 1e-12  # rad from the lock, within which rounding alone would split the sum
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class EulerAngles:
     """The two triples of angles that describe a rotation, each angle in [-pi, pi].
 
@@ -98,7 +97,7 @@ def check_sequence(sequence: str) -> tuple[int, int, int]:
     if len(axes) != 3 or any(axis not in AXES for axis in axes) or axes[0] == axes[1] or axes[1] == axes[2]:
         raise InputError(
             f"{sequence!r} is no sequence of Euler angles",
-            hint="three letters of x, y and z, no two alike in a row, such as zyz or xyz",
+            hint="three letters of X, Y and Z, no two alike in a row, such as ZYZ or XYZ",
         )
     i, j, k = (AXES.index(axis) for axis in axes)
     return i, j, k

@@ -7,12 +7,12 @@ Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from trajcli.errors import InputError
+from trajcli.frozen import frozen
 from trajcli.geometry.euler import check_sequence, euler_from_matrix, matrix_from_euler
 from trajcli.geometry.orientation_curve import check_targets, rate_jumps
 from trajcli.geometry.place_curve import Side, Triple
@@ -24,7 +24,7 @@ _DIGITS = 9  # to which two triples must differ before one is nearer
 _MET = 1e-10  # of an entry of a matrix, by which a rotation is still met
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class EvenAngles:
     """Three angles about the axes of a sequence, each going evenly along each segment.
 

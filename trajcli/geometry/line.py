@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from trajcli.errors import InputError
-from trajcli.geometry.place_curve import SAME_PLACE, Side, Smooth, Triple, inside, point
+from trajcli.errors import InputError, Problem
+from trajcli.frozen import frozen
+from trajcli.geometry.place_curve import SAME_PLACE, Side, Smooth, Triple, inside, metres, point, spot
 from trajcli.geometry.rotation import Array
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Line(Smooth):
     """A straight line.
 
@@ -30,11 +29,10 @@ class Line(Smooth):
         object.__setattr__(self, "start", point(self.start, "start"))
         object.__setattr__(self, "end", point(self.end, "end"))
         if self.length <= SAME_PLACE:
-            raise InputError(
-                f"a line from {self.start.tolist()} that is {self.length:.3g} m long has no direction "
-                f"(it needs more than {SAME_PLACE:g} m)",
-                hint="leave it out; to turn in place, use one `line` for the rotation alone",
-            )
+            text = "a line from {start} that is {length} long has no direction (it needs more than {least})"
+            hint = "leave it out; to turn in place, use one `line` for the rotation alone"
+            amounts = {"start": spot(self.start), "length": metres(self.length), "least": metres(SAME_PLACE)}
+            raise InputError(Problem(text, hint, amounts=amounts))
 
     @property
     def length(self) -> float:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
 from trajcli.errors import InputError
+from trajcli.frozen import frozen
 from trajcli.geometry.axis_angle import axis_angle_from_matrix, exp
 from trajcli.geometry.place_curve import PlaceCurve, Side, Smooth, Triple, inside
 from trajcli.geometry.progress import Progress
@@ -62,7 +62,7 @@ class OrientationCurve(Protocol):
         ...
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Fixed(Smooth):
     """An orientation that stays.
 
@@ -83,7 +83,7 @@ class Fixed(Smooth):
         return np.tile(self.rotation, (count, 1, 1)), np.zeros((count, 3)), np.zeros((count, 3))
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class AboutAxes:
     """From each orientation to the next one about the fixed axis of the shortest rotation.
 
@@ -159,6 +159,8 @@ class AboutAxes:
 
     def evaluate(self, s: Array, side: Side = "right") -> Triple:
         """Return R, w', w'' as `OrientationCurve` says."""
+        if self.progress.segments == 1:
+            return self._evenly(s)
         done = self.progress.at(s, side)
         vectors = np.concatenate([self.vectors, np.zeros((1, 3))])
         v, w = vectors[done.segment], vectors[done.segment + 1]
@@ -169,8 +171,16 @@ class AboutAxes:
         change = first * done.bend[0][:, None] + second * done.bend[1][:, None] + np.cross(one, other)
         return middle @ exp(w * done.value[1][:, None]), one + other, change
 
+    def _evenly(self, s: Array) -> Triple:
+        """Return what `evaluate` does for the one rotation of a single segment."""
+        done = inside(s, self.length) / (self.length or 1.0)
+        vector, start = self.vectors[0], self.rotations[0]
+        rate = np.tile(start @ vector / (self.length or 1.0), (done.size, 1))
+        turned = exp(vector * done[:, None]) if vector.any() else np.eye(3)[None]
+        return np.broadcast_to(start @ turned, (done.size, 3, 3)), rate, np.zeros((done.size, 3))
 
-@dataclass(frozen=True, eq=False)
+
+@frozen
 class AlongPath:
     """The tool keeps its attitude to the path: R = Q(s) R(0), Q how the path has turned.
 

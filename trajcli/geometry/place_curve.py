@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajcli.errors import InputError, PlanningError
+from trajcli.errors import Amount, InputError, PlanningError
+from trajcli.frozen import frozen
 from trajcli.geometry.rotation import Array
 
 Side = Literal["left", "right"]
@@ -86,6 +86,16 @@ def shown(vector: Array) -> str:
     return "[" + ", ".join(f"{value:.6g}" for value in (vector + 0.0).tolist()) + "]"
 
 
+def spot(vector: Array) -> Amount:
+    """Return a place (3,), m, as a message says it."""
+    return Amount(tuple(vector.tolist()), 0, None, "length")
+
+
+def metres(length: float) -> Amount:
+    """Return a length, m, as a message says it."""
+    return Amount(float(length), 0, None, "length")
+
+
 def inside(s: Array, length: float) -> Array:
     """Return arc lengths (N,) within [0, length], those beside it by no more than rounding moved inside.
 
@@ -123,7 +133,7 @@ class Smooth:
         return np.empty(0)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Stretch:
     """A part of a curve.
 
@@ -166,7 +176,7 @@ class Stretch:
         return places[(places > self.first) & (places < self.last)] - self.first
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Pivot(Smooth):
     """No motion of the place, for a rotation alone: s is then an angle, and p' is zero, not a unit vector.
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
+from trajcli.frozen import frozen
 from trajcli.geometry.orientation_curve import OrientationCurve
 from trajcli.geometry.place_curve import Pivot, PlaceCurve, Side, Triple
 from trajcli.geometry.pose import build
@@ -64,7 +64,7 @@ class PosePath(Protocol):
         ...
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class PoseCurve:
     """Place and orientation side by side.
 

@@ -8,12 +8,12 @@ differentiable there.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trajcli.frozen import frozen
 from trajcli.geometry.place_curve import Side, inside
 from trajcli.geometry.rotation import Array
 
@@ -36,7 +36,7 @@ class Fractions(NamedTuple):
     bend: Array
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Progress:
     """The fractions done of the k segments of a path.
 
@@ -67,9 +67,10 @@ class Progress:
     @property
     def breaks(self) -> Array:
         """Inner places, increasing, where a derivative of a fraction jumps."""
-        inner = self.borders[1:-1]
+        inner, room = self.borders[1:-1], _ROUNDING * self.length
         places = np.sort(np.concatenate([inner - self.half_widths, inner, inner + self.half_widths]))
-        return np.asarray(places[np.diff(places, prepend=-np.inf) > _ROUNDING * self.length])
+        places = places[(places > room) & (places < self.length - room)]  # a blend may begin at an end
+        return np.asarray(places[np.diff(places, prepend=-np.inf) > room])
 
     def at(self, s: Array, side: Side = "right") -> Fractions:
         """Return the fractions at s (N,).

@@ -5,18 +5,18 @@ Source: Murray, Li and Sastry, A Mathematical Introduction to Robotic Manipulati
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from trajcli.frozen import frozen
 from trajcli.geometry.orientation_curve import turn_vectors
 from trajcli.geometry.place_curve import SAME_PLACE, Side, Smooth, Triple, inside
 from trajcli.geometry.pose import check_pose, exp_pose, invert
 from trajcli.geometry.rotation import Array
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Screw(Smooth):
     """Poses X(s) = start exp(s twist), the twist constant in the tool's axes.
 

@@ -8,18 +8,18 @@ products.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from trajcli.frozen import frozen
 from trajcli.geometry.axis_angle import exp
 from trajcli.geometry.rotation import Array
 
 _OFFSET = np.sqrt(15.0) / 10.0  # of the outer Gauss nodes from the middle
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Transport:
     """The rotation Q(u) from Q = I at the first knot.
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from trajcli.errors import Place
+from trajcli.frozen import frozen
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -49,7 +50,7 @@ class Node(NamedTuple):
         return value
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Document:
     """One YAML document.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 from typing import Annotated, Any, Literal
@@ -21,6 +20,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
 from trajcli.columns import Group
+from trajcli.frozen import comparable
 from trajcli.kinematics.robot import Robot
 from trajcli.planners import PLANNERS, Planner, moves_adapter
 from trajcli.planners.bounds import LimitsSpec
@@ -46,7 +46,7 @@ class UnitsSpec(Model):
         return Units(self.angle, self.length)
 
 
-@dataclass(frozen=True)
+@comparable
 class RobotSource(FieldType):
     """A robot, which the loader has put in the place of what names it."""
 

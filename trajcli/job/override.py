@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import NamedTuple
 
 from trajcli.errors import InputError, Place
+from trajcli.frozen import frozen
 from trajcli.job.document import Document, Node
 from trajcli.job.load import parse_document
 
@@ -40,7 +41,7 @@ def parse_setting(text: str) -> Setting:
     return Setting(f"--set {text}", steps, value or "null")
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class PatchedDocument(Document):
     """A document in which parts stand for what an option said.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from trajcli.columns import TOOL_COLUMNS
 from trajcli.errors import Amount, InputError, Place, Problem
+from trajcli.frozen import frozen
 from trajcli.job.limits import looser_bounds, looser_problem, looser_tool_bounds, with_job_limits
 from trajcli.job.load import Document, parse_document, read_document
 from trajcli.job.messages import problems_of
@@ -29,7 +30,7 @@ _UNREAD = Robot("unread", (), unlimited(0), None, np.eye(4), np.eye(4))
 """Stands for a robot whose own flaws are known, while the rest of the job is read."""
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class LoadedJob:
     """A job that was read.
 
@@ -54,15 +55,16 @@ class LoadedJob:
 
     def say(self, amount: Amount) -> str:
         """Return a number of a message in the job's units."""
-        if math.isinf(amount.value):
+        if amount.value in (math.inf, -math.inf):
             return "unlimited"
         dimension = amount.dimension
         if amount.joint is not None:
             dimension = "length" if self.robot.joint_types[amount.joint] == "prismatic" else "angle"
         if dimension is None:
-            return f"{amount.value:.9g} s"
+            return f"{amount.numbers()} s"
         quantity = Quantity(dimension, amount.order)
-        return f"{to_user(amount.value, quantity, self.units):.9g} {unit_name(quantity, self.units)}"
+        numbers = amount.numbers(lambda value: to_user(value, quantity, self.units))
+        return f"{numbers} {unit_name(quantity, self.units)}"
 
     def place_of_move(self, index: int) -> Place:
         """Return where a move stands in the file."""

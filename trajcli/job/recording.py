@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,6 +20,7 @@ from trajcli.planners.recorded import Recorded
 if TYPE_CHECKING:
     from trajcli.streams.table import Table
 
+_OF_TIME = re.compile(r"(t|time|timestamp|secs?|seconds)([ _\[(].*)?")
 _WHOSE = {"deg": "revolute", "mm": "prismatic"}
 
 
@@ -36,12 +38,26 @@ def reader_of(document: Document, robot: Robot) -> Callable[[str], Recorded]:
 
         try:
             return _recorded(read_csv(folder / path), robot)
-        except (InputError, FileError) as error:
+        except FileError as error:
+            raise error.located(place=document.place(_named_at(document, path))) from None
+        except InputError as error:
             raise FlawError(
                 "; ".join(map(_placed, error.problems)), "csv", hint=error.problems[0].hint
             ) from None
 
     return read
+
+
+def _named_at(document: Document, path: str) -> tuple[str | int, ...]:
+    """Return where the job names a recording."""
+    moves = document.node(("moves",))
+    listed = moves.value if moves is not None and isinstance(moves.value, list) else []
+    for index, move in enumerate(listed):
+        through = move.child("through")
+        node = through and through.child("csv")
+        if node is not None and node.value == path:
+            return ("moves", index, "through", "csv")
+    return ("moves",)
 
 
 def _placed(problem: Problem) -> str:
@@ -51,6 +67,7 @@ def _placed(problem: Problem) -> str:
 def _recorded(table: Table, robot: Robot) -> Recorded:
     positions = np.stack([_joint(table, robot, joint) for joint in range(len(robot.joints))], axis=1)
     if "t" not in table.names:
+        _refuse_other_times(table)
         return Recorded(positions, file=table.file)
     times = table.column("t")
     late = np.flatnonzero(np.diff(times) <= 0)
@@ -62,6 +79,16 @@ def _recorded(table: Table, robot: Robot) -> Recorded:
             hint="remove the rows that repeat a time, or the column t: times are then found from the limits",
         )
     return Recorded(positions, times, table.file)
+
+
+def _refuse_other_times(table: Table) -> None:
+    """Refuse times under another name: the points would be passed at other times, and nobody would notice."""
+    other = next((name for name in table.names if _OF_TIME.fullmatch(name.lower())), None)
+    if other is not None:
+        raise InputError(
+            f"{table.file}: times stand in the column t, in s; this file has '{other}'",
+            hint="call it t, with its values in s; or remove it: times are then found from the limits",
+        )
 
 
 def _joint(table: Table, robot: Robot, joint: int) -> Array:

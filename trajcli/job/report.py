@@ -71,6 +71,7 @@ class ToolPeakReport(Model):
 
     quantity: Literal["speed", "acceleration", "angular_speed", "angular_acceleration"]
     value: Annotated[float, Field(description="SI, of the tool as forward kinematics has it.")]
+    bound: Annotated[float, Field(description="It is proven to be at most this at every time, SI.")]
     time: Annotated[float, Field(description="Where it is, seconds from the start of the trajectory.")]
     limit: Annotated[float | None, Field(description="SI; null is unlimited.")]
 
@@ -142,7 +143,10 @@ class FindingReport(Model):
     value: Annotated[float, Field(description="SI.")]
     limit: Annotated[float, Field(description="SI.")]
     time: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
-    method: Annotated[Literal["exact", "bounded"], Field(description="How the value was found.")]
+    method: Annotated[
+        Literal["exact", "bounded", "sampled"],
+        Field(description="exact: a root; bounded: proven between rows; sampled: the largest on rows."),
+    ]
     factor: Annotated[
         float | None, Field(description="The move must last this many times longer; null: no help.")
     ]

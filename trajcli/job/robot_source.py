@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
 from trajcli.errors import FileError, InputError, Problem
+from trajcli.frozen import frozen
 from trajcli.job.load import Document, read_document
 from trajcli.job.messages import problems_of
 from trajcli.job.robot_model import RobotModel
@@ -21,7 +21,7 @@ from trajcli.units import Units
 CATALOGUE = Path(__file__).parent.parent / "catalogue"
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class RobotSheet:
     """A robot file: the robot, and what the file says beside it.
 

@@ -7,7 +7,6 @@ instead of multiplying matrices.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -15,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
+from trajcli.frozen import comparable, frozen
 from trajcli.geometry.rotation import cos_sin
 from trajcli.kinematics.columns import Column, Entry, advance, combine, dot, minus, product, scaled, total
 from trajcli.kinematics.robot import Robot
@@ -22,7 +22,7 @@ from trajcli.kinematics.robot import Robot
 _BLOCK = 4096  # configurations at a time: the arrays in use stay in the processor's cache
 
 
-@dataclass(frozen=True)
+@comparable
 class Link:
     """A joint and the fixed screws about x before and after it, each (a, cos alpha, sin alpha).
 
@@ -37,7 +37,7 @@ class Link:
     after: tuple[float, float, float]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Axis:
     """The axis of one joint: its direction, pointing as the joint counts, and a point on it."""
 

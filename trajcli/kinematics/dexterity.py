@@ -7,19 +7,18 @@ turn at full stretch counts as much in position as in orientation.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from trajcli.curves.piecewise import Array
+from trajcli.frozen import frozen
 from trajcli.kinematics.jacobian import jacobian
 from trajcli.kinematics.robot import Robot
 
 RANK_TOLERANCE = 1e-9  # of the largest singular value: far above rounding, far below what a joint resolves
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Dexterity:
     """Measures of one Jacobian or of a batch of them.
 
@@ -40,7 +39,7 @@ class Dexterity:
     length: float
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class SingularDirections:
     """What an arm cannot do, or does in vain, in one configuration.
 

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import inf
 from typing import Literal
 
 import numpy as np
 
 from trajcli.curves.piecewise import Array, read_only
+from trajcli.frozen import comparable, frozen
 
 JointType = Literal["revolute", "prismatic"]
 Convention = Literal["standard", "modified"]
 QUANTITIES = ("position", "velocity", "acceleration", "jerk")
 
 
-@dataclass(frozen=True)
+@comparable
 class Joint:
     """One joint and its DH row: theta_i = theta + sign q (revolute), d_i = d + sign q (prismatic).
 
@@ -38,7 +38,7 @@ class Joint:
     sign: int = 1
 
 
-@dataclass(frozen=True)
+@comparable
 class ToolLimits:
     """Bounds of the tool's motion along a path, magnitudes; infinite means unlimited, and is not checked.
 
@@ -57,7 +57,7 @@ class ToolLimits:
     angular_acceleration: float = inf
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Limits:
     """Lower and upper bounds by joint; an infinite one means unlimited, and is not checked.
 
@@ -98,7 +98,7 @@ def unlimited(joints: int) -> Limits:
     return Limits(none, none, none, none)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Robot:
     """A serial robot.
 

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from trajcli.columns import Column, parse_column
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
+from trajcli.frozen import comparable, frozen
 from trajcli.streams.table import Table
 
 _SAME_ROW = 1e-6  # of a period: times this close are those of one row
 
 
-@dataclass(frozen=True)
+@comparable
 class Pair:
     """A column that both tables have.
 
@@ -35,7 +34,7 @@ class Pair:
         return values if self.a.unit == self.b.unit else values * (self.b.factor / self.a.factor)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Alignment:
     """Rows of the first table with what belongs to them of the second.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -12,6 +12,7 @@ import numpy as np
 from trajcli.columns import joint_factors
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount, InputError
+from trajcli.frozen import frozen
 from trajcli.job.inline import inline_number, inline_pose
 from trajcli.job.robot_source import RobotSheet, catalogue_names, load_sheet
 from trajcli.kinematics.chain import links_of
@@ -19,7 +20,7 @@ from trajcli.kinematics.robot import Robot
 from trajcli.units import Quantity, Units, factor, to_user, unit_name
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Arm:
     """A robot that has geometry.
 
@@ -87,10 +88,14 @@ class Arm:
 
     def say(self, amount: Amount) -> str:
         """Return a number of a message in the arm's units."""
-        if amount.joint is None:
+        if amount.joint is not None:
+            quantity = self._quantity(amount.joint, amount.order)
+        elif amount.dimension is not None:
+            quantity = Quantity(amount.dimension, amount.order)
+        else:
             return str(amount)
-        quantity = self._quantity(amount.joint, amount.order)
-        return f"{to_user(amount.value, quantity, self.units):.9g} {unit_name(quantity, self.units)}"
+        numbers = amount.numbers(lambda value: to_user(value, quantity, self.units))
+        return f"{numbers} {unit_name(quantity, self.units)}"
 
     def _quantity(self, joint: int, order: int) -> Quantity:
         prismatic = self.robot.joint_types[joint] == "prismatic"

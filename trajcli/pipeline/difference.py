@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from trajcli.frozen import comparable
 
 _SHOWN = 20  # columns told about by name
 
 
-@dataclass(frozen=True)
+@comparable
 class Deviation:
     """The difference of one pair of values.
 
@@ -37,7 +37,7 @@ class Deviation:
         return (float("inf") if self.difference > 0 else 0.0), self.difference
 
 
-@dataclass(frozen=True)
+@comparable
 class ColumnDifference:
     """How one column compares.
 
@@ -52,7 +52,7 @@ class ColumnDifference:
     count: int
 
 
-@dataclass(frozen=True)
+@comparable
 class Difference:
     """How two files compare.
 

@@ -19,11 +19,15 @@ from trajcli.units import Dimension, Quantity, Units, to_user, unit_name
 
 
 def stretches_of(move: PlannedMove, units: Units) -> list[list[Stretch]]:
-    """Return the polynomials of each joint of a move, in order of time."""
+    """Return the polynomials of each joint of a move, in order of time.
+
+    Equal neighbours are joined, but not those of a spline: the slides have one between any two points.
+    """
+    join = move.planner.tag != "spline"
     factors = joint_factors(move.robot.joint_types, units)
     curve = move.planned.curve
     return [
-        stretches(curve.breaks, curve.coefficients[:, :, joint] / factors[joint])
+        stretches(curve.breaks, curve.coefficients[:, :, joint] / factors[joint], join=join)
         for joint in range(curve.dimension)
     ]
 

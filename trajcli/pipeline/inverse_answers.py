@@ -27,6 +27,7 @@ from trajcli.pipeline.pose_view import plain
 from trajcli.planners.pose_fields import Configuration
 
 _LOST = max(RANK_TOLERANCE, 1e-7)  # of the largest singular value: answers meet their target within rounding
+_AROUND, _SPREAD = 4, 0.1  # configurations, rad or m: an arm is regular almost everywhere around
 
 
 def find_answers(
@@ -73,8 +74,10 @@ def answers(
 ) -> list[dict[str, Any]]:
     """Return [{joints, branch, within_limits, closure, singular, free_direction?}] of one target.
 
-    `closure` is the larger of the miss in m and in rad. `free_direction` is a unit vector of joint values:
-    the arm can move along it while what is fixed of the pose rests; without it the answer stands alone.
+    `closure` is the larger of the miss in m and in rad. `singular`: of the directions that the target fixes,
+    the tcp can move in fewer than it can nearby, as `ranks` finds. `free_direction` is a unit vector of joint
+    values: the arm can move along it while what is fixed of the pose rests; without it the answer stands
+    alone, as that of a stretched arm does although it is singular.
 
     Args:
         arm: The arm.
@@ -85,10 +88,13 @@ def answers(
         every: Whether answers outside the limits count too.
         turns: Whether every full turn that the limits allow is an answer of its own.
     """
-    usable = chosen if every else chosen & found.within_limits
+    usable = np.flatnonzero(chosen if every else chosen & found.within_limits)
+    if not len(usable):
+        return []
+    here, nearby = ranks(arm.robot, found.joints[usable], target)
     told = [
-        (joints, _answer(arm, found, branch, joints, target))
-        for branch in np.flatnonzero(usable).tolist()
+        (joints, _answer(arm, found, branch, joints, target, lost))
+        for branch, lost in zip(usable.tolist(), (here < nearby).tolist(), strict=True)
         for joints in (all_turns(arm.robot, found.joints[branch]) if turns else [found.joints[branch]])
     ]
     if near is not None:
@@ -118,14 +124,16 @@ def require_answer(arm: Arm, found: Solutions, chosen: Flags, configuration: Con
         raise error.said_by(arm.say) from None
 
 
-def _answer(arm: Arm, found: Solutions, branch: int, joints: Array, target: Target) -> dict[str, Any]:
+def _answer(
+    arm: Arm, found: Solutions, branch: int, joints: Array, target: Target, singular: bool
+) -> dict[str, Any]:
     names = {choice: name for choice, name in asdict(found.names[branch]).items() if name is not None}
     told = {
         "joints": plain(joints / arm.joint_factors),
         "branch": names,
         "within_limits": bool(found.within_limits[branch]),
         "closure": float(found.closure[branch].max()),
-        "singular": bool(found.singular[branch]),
+        "singular": singular,
     }
     if found.free[branch].any():
         told["free_direction"] = plain(next(free_directions(arm, joints, target)))
@@ -141,12 +149,20 @@ def free_directions(arm: Arm, joints: Array, target: Target) -> Iterator[Array]:
         yield shown / np.linalg.norm(shown)
 
 
-def rank_of_target(robot: Robot, joints: Array, target: Target) -> NDArray[np.intp]:
-    """Return in how many directions of what the target fixes the tcp can move, from joints (K, n): (K,)."""
-    values: Array = np.asarray(
-        np.linalg.svd(_held(robot, joints, target), compute_uv=False), dtype=np.float64
-    )
-    return _rank(values)
+def ranks(robot: Robot, joints: Array, target: Target) -> tuple[NDArray[np.intp], int]:
+    """Return in how many directions of what the target fixes the tcp can move: (K,) here, and nearby.
+
+    Args:
+        robot: The arm.
+        joints: Shape (K, n), rad or m, K >= 1.
+        target: One target.
+    """
+    count = joints.shape[1]
+    steps = _SPREAD * np.cos(np.square(np.arange(1.0, _AROUND * count + 1.0))).reshape(_AROUND, count)
+    held = _held(robot, np.vstack([joints, joints[:1] + steps]), target)
+    values = np.asarray(np.linalg.svd(held, compute_uv=False), dtype=np.float64)
+    found = _rank(values)
+    return found[: len(joints)], int(found.max())
 
 
 def _held(robot: Robot, joints: Array, target: Target) -> Array:

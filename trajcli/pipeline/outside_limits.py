@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from trajcli.curves.piecewise import Array
+from trajcli.frozen import comparable
 from trajcli.kinematics.inverse.turns import beyond
 from trajcli.kinematics.robot import Robot
 
 
-@dataclass(frozen=True)
+@comparable
 class Outside:
     """A joint value outside its limits, in the unit that it was given in.
 

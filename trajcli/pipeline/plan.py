@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from trajcli.checks.verify import Verdict, verify
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
 from trajcli.errors import Amount, Place, TrajcliError
+from trajcli.frozen import frozen
 from trajcli.job.limits import with_move_limits
 from trajcli.job.read import LoadedJob
 from trajcli.pipeline.reach import Reached, mended, start_state, with_joints
@@ -20,7 +21,7 @@ from trajcli.planners.planner import Event, Planner
 from trajcli.trajectory import Span, State, Trajectory
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Plan:
     """A planned and judged job.
 
@@ -103,15 +104,24 @@ def _handed_over(state: State, before: Planner | None, after: Planner) -> State:
 def _first_state(loaded: LoadedJob, first: PlannedMove, events: list[Event]) -> State:
     """Return the state in which the trajectory starts.
 
-    Where the job does not say how fast, and the first move's method leaves that open, it is the method's.
+    Where the job does not say how fast, and the first move's method leaves that open, it is the method's. So
+    is the place where a first blend begins that is centred on a point passed in motion.
     """
-    begins = first.planned.begins
-    if begins is None or loaded.job.start.velocity is not None or not begins.velocity.any():
+    begins, given = first.planned.begins, loaded.job.start.velocity
+    if begins is None or (given is not None and not np.array_equal(begins.velocity, first.start.velocity)):
         return first.start
-    joint = int(np.abs(begins.velocity).argmax())
-    message = f"the trajectory begins in motion, {first.robot.joint_names[joint]} with {{velocity}}"
-    amounts = {"velocity": Amount(float(begins.velocity[joint]), 1, joint)}
-    events.append(Event("begins_moving", message, first.index, amounts))
+    name = first.robot.joint_names
+    if given is None and begins.velocity.any():
+        joint = int(np.abs(begins.velocity).argmax())
+        message = f"the trajectory begins in motion, {name[joint]} with {{velocity}}"
+        amounts = {"velocity": Amount(float(begins.velocity[joint]), 1, joint)}
+        events.append(Event("begins_moving", message, first.index, amounts))
+    apart = begins.position - first.start.position
+    if apart.any():
+        joint = int(np.abs(apart).argmax())
+        message = f"the trajectory begins before its first point, {name[joint]} by {{distance}}"
+        amounts = {"distance": Amount(float(abs(apart[joint])), 0, joint)}
+        events.append(Event("begins_before", message, first.index, amounts))
     return begins
 
 

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from trajcli.curves.piecewise import Array, taylor_shift
+from trajcli.frozen import frozen
 
 _NOTHING = 1e-12  # of the largest term over the move: what is smaller came from rounding
 _CANCELS = 1e4  # times larger than what they add up to: of ten digits, six are left
 _SAME = 1e-9  # of the largest term: neighbouring pieces this close are one polynomial
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Stretch:
     """One polynomial of one joint, over one piece or several equal ones.
 
@@ -40,19 +39,20 @@ class Stretch:
         return polynomial_text(self.local, f"(t - {self.start:.10g})")
 
 
-def stretches(breaks: Array, coefficients: Array) -> list[Stretch]:
-    """Return the polynomials of one component, equal neighbours joined.
+def stretches(breaks: Array, coefficients: Array, *, join: bool = True) -> list[Stretch]:
+    """Return the polynomials of one component.
 
     Args:
         breaks: Shape (pieces + 1,).
         coefficients: Shape (degree + 1, pieces), highest power first, local to each break.
+        join: Whether equal neighbours become one.
     """
     result: list[Stretch] = []
     for piece in range(breaks.size - 1):
         start, end = float(breaks[piece]), float(breaks[piece + 1])
         local = _without_noise(coefficients[::-1, piece], end - start)
         absolute = _without_noise(taylor_shift(coefficients[:, piece], np.array(-start))[::-1], end)
-        if result and _equal(result[-1].absolute, absolute, end):
+        if join and result and _equal(result[-1].absolute, absolute, end):
             result[-1] = Stretch(result[-1].start, end, result[-1].local, result[-1].absolute)
         else:
             result.append(Stretch(start, end, local, absolute))

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
+from trajcli.frozen import frozen
 from trajcli.geometry.euler import euler_from_matrix, matrix_from_euler
 from trajcli.geometry.pose import Way, build, interpolate
 from trajcli.geometry.rotation import Frame, nearest_rotation
@@ -19,7 +19,7 @@ Orientation = Literal["axis_angle", "euler"]
 _RPY: tuple[str, Frame] = ("XYZ", "fixed")
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class End:
     """One end of the way.
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
 
 from trajcli.curves.piecewise import Array
+from trajcli.frozen import comparable, frozen
 from trajcli.geometry.pose import invert
 from trajcli.geometry.rotation import Frame, compose_turns
 from trajcli.job.inline import inline_document, read_at
@@ -19,7 +19,7 @@ from trajcli.units import Quantity, Units
 _OWN_KEYS = ("frame", "invert")
 
 
-@dataclass(frozen=True)
+@comparable
 class TypedAngles:
     """Three angles as the user wrote them.
 
@@ -34,7 +34,7 @@ class TypedAngles:
     angles: tuple[float, float, float]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Step:
     """One pose of the chain.
 

@@ -143,9 +143,9 @@ class _Follower:
         return joints if close and inside and met else None
 
     def _solved_alone(self, row: int, last: Array) -> Array:
-        found = solve(self._arm.robot, self._target.rows([row]), last, self._tolerance)
+        found = solve(self._arm.robot, self._target.rows(row), last, self._tolerance)
         check_reachable(self._arm.robot, found)
-        return np.array(found.joints[0, int(found.nearest(last)[0])])
+        return np.array(found.joints[int(found.nearest(last))])
 
 
 def _of_row(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, PlanningError, Problem
+from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.fields import Target
 from trajcli.planners.planner import Event
@@ -24,7 +24,7 @@ _NOTED = 1e-12  # a smaller defect of a rotation matrix is rounding
 _CHOICES = ("shoulder", "elbow", "wrist")
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Reached:
     """A pose that a job names, and the branch on which it is reached.
 

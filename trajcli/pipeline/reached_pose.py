@@ -7,13 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from trajcli.kinematics.robot import Robot
 from trajcli.pipeline.arm import Arm
-from trajcli.pipeline.inverse_answers import free_directions, rank_of_target
+from trajcli.pipeline.inverse_answers import free_directions, ranks
 from trajcli.pipeline.pose_view import plain
 from trajcli.pipeline.reach import Reached, asked_names
-
-_AROUND, _SPREAD, _SEED = 4, 0.1, 7  # configurations, rad or m: an arm is regular almost everywhere around
 
 
 def reached_in_units(reached: Reached, arm: Arm) -> dict[str, Any]:
@@ -26,7 +23,7 @@ def reached_in_units(reached: Reached, arm: Arm) -> dict[str, Any]:
     """
     found, joints = reached.found, reached.joints
     asked = asked_names(reached.pose.configuration)
-    here, nearby = _ranks(reached, arm.robot)
+    here, nearby = ranks(arm.robot, joints[None], reached.goal)
     told = {
         "joints": plain(joints / arm.joint_factors),
         "branch": {key: name for key, name in asdict(found.names[reached.branch]).items() if name},
@@ -38,18 +35,9 @@ def reached_in_units(reached: Reached, arm: Arm) -> dict[str, Any]:
             "candidates": int(np.count_nonzero(reached.usable)),
             "within_limits": int(np.count_nonzero(found.within_limits)),
         },
-        "singular": here < nearby,
-        "rank": {"here": here, "nearby": nearby},
+        "singular": bool(here[0] < nearby),
+        "rank": {"here": int(here[0]), "nearby": nearby},
     }
     if found.free[reached.branch].any():
         told["free_direction"] = plain(next(free_directions(arm, joints, reached.goal)))
     return told
-
-
-def _ranks(reached: Reached, robot: Robot) -> tuple[int, int]:
-    """Return in how many directions of the pose the tcp can move, here and nearby."""
-    steps = np.random.default_rng(_SEED).normal(scale=_SPREAD, size=(_AROUND, len(reached.joints)))
-    ranks = rank_of_target(
-        robot, reached.joints + np.vstack([np.zeros(len(reached.joints)), steps]), reached.goal
-    )
-    return int(ranks[0]), int(ranks.max())

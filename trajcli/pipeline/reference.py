@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from trajcli.errors import PlanningError
+from trajcli.frozen import comparable
 from trajcli.kinematics.robot import QUANTITIES, Limits
 from trajcli.planners.profile import Task
 from trajcli.planners.ruckig_solve import fastest
@@ -16,7 +15,7 @@ _ROUNDING = 1e-12
 _NOWHERE = 1e-9  # rad or m: a joint that comes back so near to where it was has no way to go
 
 
-@dataclass(frozen=True)
+@comparable
 class Bound:
     """No motion between the two states within the limits is faster.
 
@@ -29,7 +28,7 @@ class Bound:
     joint: int | None
 
 
-@dataclass(frozen=True)
+@comparable
 class NoBound:
     """Nothing can be said about the fastest motion.
 

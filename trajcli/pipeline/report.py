@@ -162,6 +162,8 @@ def _jump_remedy(move: PlannedMove, finding: Finding) -> str | None:
         return "use `law: {shape: quintic}` or jerk_limited, or say limits: {jerk: null}"
     if finding.hint is not None or move.planned.begins is None:
         return finding.hint
+    if finding.kind == "position_jump":
+        return "a blend centred on a point passed in motion begins before it: use `end_blends: inside`"
     return "this rule leaves the velocities at its ends open: use clamped or continuous_acceleration"
 
 

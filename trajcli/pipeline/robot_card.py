@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from trajcli.curves.piecewise import Array
+from trajcli.frozen import comparable
 from trajcli.job.robot_source import RobotSheet
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.choose import method_for
@@ -19,7 +20,7 @@ from trajcli.units import Quantity, factor, to_user
 _SEED, _ROUNDS, _DRAWN, _KEPT = 20, 8, 1024, 32
 
 
-@dataclass(frozen=True)
+@comparable
 class Reach:
     """How far the tcp gets from the origin of the base, m.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import ceil
 
 import numpy as np
@@ -14,6 +14,7 @@ from trajcli.curves.compose import scale_time
 from trajcli.curves.feasible import smallest_feasible
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount, PlanningError
+from trajcli.frozen import frozen
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.planners.planner import Event, Planned, Planner
 from trajcli.planners.point_to_point import share_of_limits
@@ -26,7 +27,7 @@ _WHOLE = 1e-9  # of a period: what is this close to whole is whole
 _TRIES = 50
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class PlannedMove:
     """A move with all that it was planned from.
 

@@ -28,19 +28,20 @@ def tool_report(trajectory: Trajectory, span: Span, move: PlannedMove) -> ToolRe
     Raises:
         ValueError: When the move has no path.
     """
-    from trajcli.checks.tool import SPEEDS, ToolRows, beside_path
+    from trajcli.checks.tool_rows import SPEEDS, ToolRows
 
     tool = move.planned.tool
     if tool is None:
         raise ValueError(f"move {move.index} has no path")
     rows = ToolRows(trajectory, span, move.robot, tool)
     peaks = []
-    for _, name, order, part in SPEEDS:
-        value, time = rows.peak(order, part)
+    for _, name, _, _ in SPEEDS:
+        peak = rows.peaks[name]
         limit = float(getattr(move.robot.limits.tcp, name))
         shown = None if math.isinf(limit) else limit
-        peaks.append(ToolPeakReport(quantity=name, value=value, time=span.start + time, limit=shown))
-    deviation, turned = (float(sizes.max(initial=0.0)) for sizes in beside_path(rows))
+        at = span.start + peak.time
+        peaks.append(ToolPeakReport(quantity=name, value=peak.value, bound=peak.most, time=at, limit=shown))
+    deviation, turned = (float(sizes.max(initial=0.0)) for sizes in rows.beside)
     wanted = wanted_speed(move)
     held, lowest = _held(move, tool.law, wanted)
     return ToolReport(

@@ -30,7 +30,6 @@ _WHERE = {
     "hold": "hold.Hold",
 }
 """The module and class of each planner, by its name in job files."""
-_ALWAYS = ("hold", "cubic")  # small ones
 
 
 class _Planners(Mapping[str, type[Planner]]):
@@ -59,7 +58,7 @@ def moves_adapter(tags: Iterable[str]) -> TypeAdapter[list[Planner]]:
 
     A union of one would not say in its errors which planner it is about: there are always two in it.
     """
-    named = sorted({*tags, *_ALWAYS})
+    named = sorted({"hold", *({*tags} - {"hold"} or {"cubic"})})  # small ones
     union = Annotated[Union[tuple(PLANNERS[tag] for tag in named)], Field(discriminator="planner")]  # type: ignore[valid-type]  # noqa: UP007
     return TypeAdapter(Annotated[list[union], Field(min_length=1)])  # type: ignore[arg-type, valid-type]
 

@@ -6,8 +6,8 @@ from typing import Literal
 
 from trajcli.curves.piecewise import Array
 from trajcli.kinematics.robot import Robot
+from trajcli.planners.arc_fields import ArcFields
 from trajcli.planners.operational import OperationalMove, Way
-from trajcli.planners.tool_fields import ArcFields
 
 
 class Arc(OperationalMove, ArcFields):
@@ -20,6 +20,6 @@ class Arc(OperationalMove, ArcFields):
 
     def way(self, before: Array, robot: Robot) -> Way:
         """Return the arc from the pose `before` (4, 4)."""
-        from trajcli.planners.tool_ways import arc_way
+        from trajcli.planners.tool_arcs import arc_way
 
         return arc_way(before, self, self.orientation, robot)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -12,6 +11,7 @@ from trajcli.curves.blend_times import fastest_blends
 from trajcli.curves.blends import blended
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import PlanningError
+from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.point_to_point import missing_limit
 from trajcli.planners.through_points import PointTable
@@ -62,7 +62,7 @@ def blend_times(
     return best
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class _Family:
     """The curves that differ in the durations of their segments alone.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -14,13 +13,14 @@ from trajcli.curves.blend_accelerations import BlendAccelerationError
 from trajcli.curves.blends import Blended, blended, blended_by_acceleration
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount, PlanningError, Problem
+from trajcli.frozen import comparable
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.blend_times import blend_times
 from trajcli.planners.fields import JointAccelerationMagnitudes
+from trajcli.planners.per_joint import flawed
 from trajcli.planners.planner import Event, Phase, Planned
 from trajcli.planners.point_to_point import missing_limit, require_rest, standstill
-from trajcli.planners.poses import read_numbers
-from trajcli.planners.reading import FieldType, Flaw, Number, ReadingContext, refuse
+from trajcli.planners.reading import FieldType, Flaw, FlawError, Number, ReadingContext, refuse
 from trajcli.planners.recorded import Recorded
 from trajcli.planners.through_points import PointTable, ThroughPoints
 from trajcli.trajectory import Passage, State
@@ -29,7 +29,7 @@ from trajcli.units import Quantity
 _BLEND = Number(Quantity("time"), "Duration of a blend, s.", above=0.0)
 
 
-@dataclass(frozen=True)
+@comparable
 class BlendDurations(FieldType):
     """One duration for all blends, or one for each point."""
 
@@ -39,8 +39,15 @@ class BlendDurations(FieldType):
         """Return seconds."""
         if not isinstance(value, list | tuple):
             return _BLEND.read(value, context)
-        read_numbers(value, len(value), _BLEND.quantity, context)
-        return tuple(_BLEND.read(item, context) for item in value)
+        durations, flaws = [], list[Flaw]()
+        for index, item in enumerate(value):
+            try:
+                durations.append(_BLEND.read(item, context))
+            except FlawError as error:
+                flaws += [((index, *path), text, hint) for path, text, hint in error.flaws]
+        if flaws:
+            raise flawed(flaws)
+        return tuple(durations)
 
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of a number or a list."""
@@ -115,11 +122,14 @@ class Blends(ThroughPoints):
 
     def _flaws_of_points(self) -> Iterator[Flaw]:
         for k, point in enumerate(self.listed):
-            path = ("to",) if self.to is not None and k == len(self.listed) - 1 else ("through", k)
-            for name in ("velocity", "acceleration"):
-                if any(getattr(point, name) or ()):
-                    text = f"blends compute the {name} at the points, and end at rest"
-                    yield (*path, name), text, "leave it out, or use spline"
+            last = k == len(self.listed) - 1
+            path = ("to",) if self.to is not None and last else ("through", k)
+            if any(point.acceleration or ()) or (any(point.velocity or ()) and not last):
+                name = "velocity" if any(point.velocity or ()) and not last else "acceleration"
+                yield (*path, name), f"blends compute the {name} at the points", "leave it out, or use spline"
+            elif any(point.velocity or ()) and not self.timed:
+                text = "blends end at rest where their times are found from the limits"
+                yield (*path, "velocity"), text, "leave it out, or give every waypoint a `time`"
 
     def plan(self, start: State, robot: Robot) -> Planned:
         """Return the segments and blends.
@@ -128,8 +138,9 @@ class Blends(ThroughPoints):
             MissingLimitError: When a time or a blend follows neither from the fields nor from the limits.
             PlanningError: When the arm moves at the start, or an acceleration is too small for the times.
         """
-        require_rest(self.tag, start, robot)
         points = self.waypoints(start)
+        if points.times is None or start.acceleration.any():
+            require_rest(self.tag, start, robot)
         if points.times is None and not np.ptp(points.positions, axis=0).any():
             return standstill(points.target, self.duration or 0.0)
         times, durations = self._asked(points, robot)
@@ -137,12 +148,14 @@ class Blends(ThroughPoints):
             made = self._made(points, times, durations, robot)
         except BlendAccelerationError as error:
             raise _too_slow(error, points, robot) from None
+        first, last = _ends(made, points)
         return Planned(
             made.curve,
-            points.target,
+            last,
             phases=_phases(made),
             passage=Passage(times + made.shift, points.positions, made.missed),
             origin=made.shift,
+            begins=first if start.velocity.any() else None,
             events=(*points.events, *_shrunk(made, robot)),
         )
 
@@ -158,7 +171,8 @@ class Blends(ThroughPoints):
             points, self._durations(points), robot, bounds, self.end_blends, exactly=self.exactly
         )
         if self.duration:
-            factor = self.duration / times[-1]
+            outside = durations[[0, -1]].sum() / 2 if self.end_blends == "centred" else 0.0
+            factor = self.duration / (times[-1] + outside)
             return times * factor, durations * factor
         return times, durations
 
@@ -172,12 +186,15 @@ class Blends(ThroughPoints):
         return np.where(points.blends > 0, points.blends, durations)
 
     def _made(self, points: PointTable, times: Array, durations: Array | None, robot: Robot) -> Blended:
+        asked = {
+            "ends": self.end_blends,
+            "exactly": self.exactly,
+            "start_velocity": points.rates[0, 0],
+            "end_velocity": points.rates[0, -1],
+        }
         if durations is not None:
-            return blended(times, points.positions, durations, ends=self.end_blends, exactly=self.exactly)
-        acceleration = self._magnitudes(points, robot)
-        return blended_by_acceleration(
-            times, points.positions, acceleration, ends=self.end_blends, exactly=self.exactly
-        )
+            return blended(times, points.positions, durations, **asked)
+        return blended_by_acceleration(times, points.positions, self._magnitudes(points, robot), **asked)
 
     def _magnitudes(self, points: PointTable, robot: Robot) -> Array:
         if self.acceleration is not None:
@@ -189,6 +206,19 @@ class Blends(ThroughPoints):
             also = "give the move `blend_durations` or an `acceleration`"
             raise missing_limit(self.tag, "acceleration", lacking.tolist(), robot, "for its blends", also)
         return np.where(np.isfinite(magnitudes), magnitudes, 1.0)
+
+
+def _ends(made: Blended, points: PointTable) -> tuple[State, State]:
+    """Return the states in which the curve begins and ends: beyond a point that a centred blend passes."""
+    nothing = np.zeros(made.curve.dimension)
+    reached = made.curve.piece_ends(0)
+    states = [
+        State(np.where(made.shift * velocity != 0, place, position), velocity, nothing)
+        for place, position, velocity in zip(
+            (reached[0][0], reached[1][-1]), points.positions[[0, -1]], points.rates[0, [0, -1]], strict=True
+        )
+    ]
+    return states[0], states[1]
 
 
 def _phases(made: Blended) -> tuple[Phase, ...]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic.json_schema import JsonSchemaValue
 
+from trajcli.frozen import comparable
 from trajcli.kinematics.robot import QUANTITIES
 from trajcli.planners.model import Model
 from trajcli.planners.per_joint import per_joint_schema, read_per_joint
@@ -72,7 +72,7 @@ def _bound_schema(order: int) -> JsonSchemaValue:
     return {"anyOf": [number, pair, {"type": "null"}]}
 
 
-@dataclass(frozen=True)
+@comparable
 class JointBound(FieldType):
     """The bound of one joint, whose type is the first of the context."""
 
@@ -88,7 +88,7 @@ class JointBound(FieldType):
         return _bound_schema(self.order)
 
 
-@dataclass(frozen=True)
+@comparable
 class Bounds(FieldType):
     """One bound for all joints, a list, or a mapping by joint name; None where a joint is left out."""
 
@@ -173,7 +173,7 @@ class ToolLimitsSpec(Model):
     angular_acceleration: AngularAcceleration | None = None
 
 
-class LimitsSpec(Model):
+class LimitsSpec(Model, defer_build=False):  # made once, not for each planner that has it
     """Limits that replace or tighten others; what is left out stays as it is, null is unlimited."""
 
     position: Annotated[

@@ -47,7 +47,7 @@ JointAccelerationMagnitudes = Annotated[
 ]
 
 
-class Target(PoseFields):
+class Target(PoseFields, defer_build=False):  # made once, not for each planner that has it
     """The state that a point names, or that a move starts from or ends in: by its joints, or by a pose."""
 
     joints: JointPositions | None = None

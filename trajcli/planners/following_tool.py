@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from trajcli.curves.fit import FitError, fit
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.frozen import frozen
 from trajcli.kinematics.following.follower import Follower, LostError, follower
 from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.kinematics.following.tolerance import Tolerance, misfit_of, probes
@@ -19,7 +20,7 @@ from trajcli.planners.planner import Event, Phase
 from trajcli.planners.tool_trouble import Trouble
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Made:
     """A motion of tool and joints.
 
@@ -36,7 +37,7 @@ class Made:
     events: tuple[Event, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Followed:
     """Joints along a path, as a function of its parameter.
 
@@ -126,7 +127,7 @@ def _fitted(
 ) -> PiecewisePolynomial:
     try:
         misfit = misfit_of(exact, tolerance, breaks, guess(probes(breaks)))
-        return fit(exact.exact, misfit, breaks, guess)
+        return fit(exact.solved, misfit, breaks, guess)
     except (LostError, FitError) as error:
         at = float(error.places[0]) if isinstance(error, LostError) else error.place
         raise trouble.unfit(at, guess) from None

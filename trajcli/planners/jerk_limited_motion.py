@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from trajcli.curves.compose import along_line, coast_until, hold_until, merge_breaks
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount
+from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Limits, Robot
 from trajcli.planners.jerk_limited_errors import (
     cannot_wait,
@@ -26,7 +26,7 @@ from trajcli.trajectory import State
 _PARALLEL = 1e-12  # relative; what leaves the line by more is no rounding error
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Request:
     """What is asked of the joints.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -11,6 +11,7 @@ from trajcli.curves.blends import blended
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.curves.spline_shape import ShapeError
 from trajcli.errors import Amount, PlanningError, Problem
+from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.planner import Event
 from trajcli.planners.spline_rules import Rule, curve_through
@@ -22,7 +23,7 @@ _OFF = 1e-9  # relative: a velocity this little off the path is on it
 _ROOM = 0.999  # of a segment that two blends may share: each keeps a straight piece between
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class JointPath:
     """A path through points.
 
@@ -44,6 +45,8 @@ class JointPath:
 def spline_through(rule: Rule, parameter: Parameter, points: PointTable, robot: Robot) -> JointPath:
     """Return the spline of a rule; where the arm moves at an end, the path has that direction there.
 
+    A quintic that ends at rest leaves its end towards the next point.
+
     Raises:
         PlanningError: When the parameter has another number of values than points, or shape_preserving does
             not allow the direction.
@@ -53,10 +56,12 @@ def spline_through(rule: Rule, parameter: Parameter, points: PointTable, robot: 
     slopes, speeds = np.zeros_like(ends), [0.0, 0.0]
     for k, (velocity, piece) in enumerate(zip(ends, (0, -1), strict=True)):
         speed = float(np.linalg.norm(velocity))
+        chord = np.diff(q, axis=0)[piece] / np.diff(places)[piece]
         if speed:
-            chord = np.diff(q, axis=0)[piece] / np.diff(places)[piece]
             slopes[k] = velocity / speed * np.linalg.norm(chord)
             speeds[k] = speed / float(np.linalg.norm(chord))
+        elif rule == "quintic":  # without slope and curvature it would take infinite sd to leave the end
+            slopes[k] = chord
     rates = np.zeros_like(points.rates)
     rates[0, [0, -1]] = slopes
     try:
@@ -79,8 +84,14 @@ def _places(parameter: Parameter, points: PointTable) -> Array:
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def polyline_through(points: PointTable, corner: float, robot: Robot) -> JointPath:
+def polyline_through(points: PointTable, corner: Array, robot: Robot) -> JointPath:
     """Return straight segments, corners rounded by parabolas that stay within `corner` of them.
+
+    Args:
+        points: What to pass.
+        corner: How far each joint may pass from a corner, rad or m, shape (n,): all above zero, or all zero
+            for sharp corners.
+        robot: For the names of joints.
 
     Raises:
         PlanningError: When the arm moves at an end in another direction than the segment there.
@@ -91,12 +102,13 @@ def polyline_through(points: PointTable, corner: float, robot: Robot) -> JointPa
         _along(slope, velocity, robot)
         for slope, velocity in zip(slopes[[0, -1]], points.rates[0, [0, -1]], strict=True)
     )
-    turn = np.abs(np.diff(slopes, axis=0)).max(axis=1, initial=0.0)
-    if corner == 0 or not turn.any():
+    turn = np.abs(np.diff(slopes, axis=0))
+    if not corner.any() or not turn.any():
         curve = PiecewisePolynomial(places, np.stack([slopes, q[:-1]]))
         return JointPath(curve, places, np.zeros_like(q), (speeds[0], speeds[1]))
     asked = np.zeros(points.count)
-    asked[1:-1] = 8 * corner / np.where(turn > 0, turn, np.inf)
+    sharpest = (turn / corner).max(axis=1)
+    asked[1:-1] = 8 / np.where(sharpest > 0, sharpest, np.inf)
     room = np.diff(places)
     limit = np.full(points.count, np.inf)
     limit[1:-1] = _ROOM * np.minimum(room[:-1], room[1:])

@@ -3,32 +3,30 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from trajcli.curves.compose import scale_time
-from trajcli.curves.cycloid import cycloid_law
 from trajcli.curves.hermite import hermite_coefficients
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.curves.trapezoid import (
-    InfeasibleProfileError,
-    fastest_profile,
-    profile_of_duration,
-    profile_of_speed,
-)
-from trajcli.curves.velocity_profile import Rates
 from trajcli.errors import Amount, PlanningError, Problem
+from trajcli.frozen import comparable, frozen
 from trajcli.planners.path_law import LawSpec
 from trajcli.planners.planner import Phase
+
+if TYPE_CHECKING:
+    from trajcli.curves.trapezoid import InfeasibleProfileError
 
 _PEAKS = {"cubic": (1.5, 6.0, 12.0), "quintic": (1.875, 10 / math.sqrt(3), 60.0)}
 _PEAKS["cycloidal"] = (2.0, 2 * math.pi, 4 * math.pi**2)
 """Largest speed, acceleration and jerk of a law over 1 in the time 1."""
 _CONDITIONS = {"cubic": 2, "quintic": 3}
+_ROUNDING = 1e-9  # relative
 
 
-@dataclass(frozen=True)
+@comparable
 class PathBounds:
     """What the parameter of a path may do, per s, s^2, s^3; infinite for anything.
 
@@ -37,15 +35,26 @@ class PathBounds:
         acceleration: Largest sdd.
         deceleration: Largest -sdd.
         jerk: Largest magnitude of sddd.
+        unit: Whether the parameter is a length or an angle.
     """
 
     speed: float
     acceleration: float
     deceleration: float
     jerk: float
+    unit: Literal["length", "angle"] = "length"
+
+    def values(self) -> tuple[float, float, float, float]:
+        """Return the four numbers."""
+        return self.speed, self.acceleration, self.deceleration, self.jerk
+
+    def with_each(self, other: PathBounds, pick: Callable[[float, float], float]) -> PathBounds:
+        """Return what `pick` makes of each number and the other one."""
+        speed, acceleration, deceleration, jerk = map(pick, self.values(), other.values())
+        return PathBounds(speed, acceleration, deceleration, jerk, self.unit)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Stretch:
     """The law over a stretch.
 
@@ -82,8 +91,13 @@ def stretch_of(spec: LawSpec, length: float, bounds: PathBounds, duration: float
         return _trapezoid(spec, length, bounds, duration)
     if spec.shape == "jerk_limited":
         return _jerk_limited(length, bounds)
-    time = duration if duration is not None else _fastest(spec.shape, length, bounds)
+    fastest = _fastest(spec.shape, length, bounds)
+    time = fastest if duration is None else duration
+    if time < fastest * (1 - _ROUNDING):
+        raise _too_short(spec, length, bounds, time, fastest)
     if spec.shape == "cycloidal":
+        from trajcli.curves.cycloid import cycloid_law
+
         law = cycloid_law(time)
         scaled = PiecewisePolynomial(law.breaks, law.coefficients * length)
         return Stretch(scaled, np.array([0.0, time]))
@@ -114,11 +128,19 @@ def _jerk_limited(length: float, bounds: PathBounds) -> Stretch:
 
 
 def _trapezoid(spec: LawSpec, length: float, bounds: PathBounds, duration: float | None) -> Stretch:
+    from trajcli.curves.trapezoid import (
+        InfeasibleProfileError,
+        fastest_profile,
+        profile_of_duration,
+        profile_of_speed,
+    )
+    from trajcli.curves.velocity_profile import Rates
+
     rates = Rates(bounds.speed, bounds.acceleration, bounds.deceleration)
     try:
         if duration is None:
             profile = fastest_profile(length, 0.0, 0.0, rates, rates)
-        elif spec.speed is not None or spec.angular_speed is not None:
+        elif math.isfinite(bounds.speed):
             slower = bounds.deceleration if spec.deceleration is not None else None
             profile = profile_of_speed(length, 0.0, 0.0, duration, bounds.speed, slower)
         else:
@@ -134,15 +156,38 @@ def _infeasible(
     error: InfeasibleProfileError, length: float, bounds: PathBounds, duration: float
 ) -> PlanningError:
     order = {"speed": 1, "acceleration": 2}.get(error.reason)
-    amounts = {"length": Amount(length, 0, None, "length"), "duration": Amount(duration)}
+    amounts = {"length": Amount(length, 0, None, bounds.unit), "duration": Amount(duration)}
     if order is None:
         message = "no trapezoid covers {length} in {duration}"
         return PlanningError(Problem(message, "allow more time, or faster ramps", amounts=amounts))
     given = bounds.speed if order == 1 else bounds.acceleration
-    amounts["given"] = Amount(given, order, None, "length")
-    amounts["low"] = Amount(error.low, order, None, "length")
-    amounts["high"] = Amount(error.high, order, None, "length")
+    amounts["given"] = Amount(given, order, None, bounds.unit)
+    amounts["low"] = Amount(error.low, order, None, bounds.unit)
+    amounts["high"] = Amount(error.high, order, None, bounds.unit)
     allowed = "above {low} and at most {high}" if math.isfinite(error.high) else "at least {low}"
     message = f"a trapezoid over {{length}} in {{duration}} cannot have {{given}}: it must be {allowed}"
     hint = f"change the {error.reason}, or the duration"
     return PlanningError(Problem(message, hint, amounts=amounts))
+
+
+def _too_short(
+    spec: LawSpec, length: float, bounds: PathBounds, duration: float, fastest: float
+) -> PlanningError:
+    """Return the error of a duration in which a polynomial exceeds what the law itself names."""
+    limits = (bounds.speed, min(bounds.acceleration, bounds.deceleration), bounds.jerk)
+    order, peak, limit = max(
+        ((n, k, limit) for n, (k, limit) in enumerate(zip(_PEAKS[spec.shape], limits, strict=True), 1)),
+        key=lambda row: float((row[1] * length / row[2]) ** (1 / row[0])),
+    )
+    amounts = {
+        "length": Amount(length, 0, None, bounds.unit),
+        "duration": Amount(duration),
+        "reached": Amount(peak * length / duration**order, order, None, bounds.unit),
+        "limit": Amount(limit, order, None, bounds.unit),
+        "fastest": Amount(fastest),
+    }
+    message = (
+        f"a {spec.shape} law over {{length}} in {{duration}} reaches {{reached}}, but the law says at most "
+        "{limit}: that takes {fastest}"
+    )
+    return PlanningError(Problem(message, "allow more time, or leave one of the two out", amounts=amounts))

@@ -12,7 +12,8 @@ from trajcli.planners.reading import NULL
 class Model(BaseModel):
     """Base of everything that a job file may hold: frozen, and strict about unknown keys."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    # Most models stand only in others, and never need the reader that would be made with each class.
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     @model_validator(mode="before")
     @classmethod

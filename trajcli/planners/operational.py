@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
+from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.model import Model
 from trajcli.planners.path_law import LawSpec
@@ -39,7 +39,7 @@ class ToleranceSpec(Model):
     ] = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Way:
     """Where the tool shall go.
 
@@ -99,10 +99,11 @@ class OperationalMove(Planner):
             hint = "give its joints theta, d, a and alpha"
             raise InputError(f"{robot.name} has no geometry, so its tool has no path", hint=hint)
         from trajcli.kinematics.forward import forward
-        from trajcli.planners.tool_moves import moved_along
+        from trajcli.planners.tool_moves import check_arrival, moved_along
 
         require_rest(self.tag, start, robot)
         way = self.way(forward(robot, start.position), robot)
         if way.path.length == 0:
+            check_arrival(way, start.position, robot)
             return standstill(start, self.law.duration or self.law.minimum_duration or 0.0)
         return moved_along(way, self.law, self.tolerance, self.tag, start.position, robot)

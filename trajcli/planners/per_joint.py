@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from pydantic.json_schema import JsonSchemaValue
 
+from trajcli.frozen import comparable
 from trajcli.planners.reading import (
     AT_KEY,
     MAX_JOINTS,
@@ -71,7 +71,7 @@ def _named_items(
         ((n, AT_KEY), f"the robot has no joint '{n}'", _listed(names)) for n in value if n not in names
     ]
     if unknown:
-        raise _flawed(unknown)
+        raise flawed(unknown)
     return {names.index(name): (name, item) for name, item in value.items()}
 
 
@@ -97,17 +97,18 @@ def _read_items(
             if key is None:
                 break
     if flaws:
-        raise _flawed(flaws)
+        raise flawed(flaws)
     return tuple(values)
 
 
-def _flawed(flaws: list[Flaw]) -> FlawError:
+def flawed(flaws: list[Flaw]) -> FlawError:
+    """Return the error that holds several flaws of one value."""
     error = FlawError("; ".join(flaw[1] for flaw in flaws))
     error.flaws = flaws
     return error
 
 
-@dataclass(frozen=True)
+@comparable
 class PerJoint(FieldType):
     """A joint value or one of its time derivatives, for each joint.
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
 from pydantic import Field
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount, PlanningError, said
+from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.bounds import LimitsSpec
 from trajcli.planners.model import Model
@@ -24,7 +25,7 @@ WhenOverLimit = Literal["error", "slow"]
 _REMARKS = ("refined",)  # kinds of events that concede nothing
 
 
-@dataclass(frozen=True)
+@comparable
 class Phase:
     """A named stretch of a move.
 
@@ -41,7 +42,7 @@ class Phase:
     joint: int | None = None
 
 
-@dataclass(frozen=True)
+@comparable
 class Event:
     """A concession that was made, and would otherwise go unnoticed; or a remark on how a curve was found.
 
@@ -67,7 +68,7 @@ class Event:
         return said(self.message, self.amounts, say)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Planned:
     """What a planner returns.
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 from pydantic.json_schema import JsonSchemaValue
 
 from trajcli.curves.piecewise import Array
+from trajcli.frozen import comparable
 from trajcli.planners.model import Model
 from trajcli.planners.poses import Pose, read_numbers
 from trajcli.planners.reading import (
@@ -33,7 +33,7 @@ Axis = Literal["x", "y", "z"]
 Row = tuple[float, ...]
 
 
-@dataclass(frozen=True)
+@comparable
 class Numbers(FieldType):
     """A given count of numbers of one quantity.
 
@@ -60,7 +60,7 @@ class Numbers(FieldType):
         return {"type": "array", "items": _NUMBER, "minItems": self.count, "maxItems": self.count}
 
 
-@dataclass(frozen=True)
+@comparable
 class Direction(FieldType):
     """The name of an axis, or three numbers."""
 
@@ -89,7 +89,7 @@ class Direction(FieldType):
         }
 
 
-@dataclass(frozen=True)
+@comparable
 class Matrix(FieldType):
     """A rotation matrix, or a homogeneous one whose last column is a position."""
 
@@ -98,7 +98,8 @@ class Matrix(FieldType):
     def read(self, value: Any, context: ReadingContext) -> tuple[Row, ...]:  # noqa: ANN401
         """Return its rows, the position in m."""
         if not isinstance(value, Sequence) or isinstance(value, str) or len(value) not in (3, 4):
-            raise FlawError(f"expected a 3x3 or 4x4 matrix, row by row, got {shown(value)}")
+            got = f"{len(value)} rows" if isinstance(value, list) else shown(value)
+            raise FlawError(f"expected a 3x3 or 4x4 matrix, row by row, got {got}")
         size = len(value)
         rows = []
         for index, row in enumerate(value):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from pydantic.json_schema import JsonSchemaValue
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
+from trajcli.frozen import comparable
 from trajcli.planners.reading import (
     AT_KEY,
     FieldType,
@@ -28,7 +28,7 @@ _ROUNDING = 1e-14  # a rotation written with all its digits stays as it stands, 
 _ANGLE, _LENGTH, _RATIO = Quantity("angle"), Quantity("length"), Quantity("ratio")
 
 
-@dataclass(frozen=True)
+@comparable
 class Pose(FieldType):
     """A full pose; what it leaves out is zero. It is read into a (4, 4) matrix, lengths in m."""
 
@@ -150,24 +150,26 @@ def _homogeneous(rows: list[Any], context: ReadingContext) -> Array:
         pose[index, 3] = read_numbers(row[3:], 1, _LENGTH, context, "matrix", index)[0]
     last = read_numbers(rows[3], 4, _RATIO, context, "matrix", 3)
     if (last != [0, 0, 0, 1]).any():
-        raise FlawError("the last row of a 4x4 matrix must be [0, 0, 0, 1]", "matrix", 3)
-    pose[:3, :3] = _projected(pose[:3, :3])
+        row = ", ".join(f"{number:.9g}" for number in last.tolist())
+        raise FlawError(f"the last row of a 4x4 matrix must be [0, 0, 0, 1], it is [{row}]", "matrix", 3)
+    pose[:3, :3] = _projected(pose[:3, :3], "matrix")
     return pose
 
 
 def _matrix(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401
     if not isinstance(value, list) or len(value) != 3:
-        raise FlawError("expected a 3x3 or 4x4 matrix, row by row")
+        got = f"{len(value)} rows" if isinstance(value, list) else shown(value)
+        raise FlawError(f"expected a 3x3 or 4x4 matrix, row by row, got {got}")
     return _projected(np.stack([read_numbers(row, 3, _RATIO, context, i) for i, row in enumerate(value)]))
 
 
-def _projected(matrix: Array) -> Array:
+def _projected(matrix: Array, *path: str) -> Array:
     from trajcli.geometry.rotation import check_rotation, nearest_rotation
 
     try:
         check_rotation(matrix)
     except InputError as error:
-        raise FlawError(str(error), hint=error.problems[0].hint) from None
+        raise FlawError(str(error), *path, hint=error.problems[0].hint) from None
     off = np.abs(matrix @ matrix.T - np.eye(3)).max()
     return matrix if off <= _ROUNDING else nearest_rotation(matrix)
 
@@ -216,9 +218,9 @@ def _euler(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401
     fields = _exactly(value, ("sequence", "angles"), ("frame",))
     sequence, frame = fields["sequence"], fields.get("frame", "current")
     if sequence not in SEQUENCES:
-        raise FlawError(
-            f"unknown sequence {shown(sequence)}", "sequence", hint=f"one of {', '.join(SEQUENCES)}"
-        )
+        known = isinstance(sequence, str) and sequence.upper() in SEQUENCES
+        hint = f"did you mean '{sequence.upper()}'?" if known else f"one of {', '.join(SEQUENCES)}"
+        raise FlawError(f"unknown sequence {shown(sequence)}", "sequence", hint=hint)
     if frame not in ("current", "fixed"):
         raise FlawError(f"expected current or fixed, got {shown(frame)}", "frame")
     return matrix_from_euler(sequence, read_numbers(fields["angles"], 3, _ANGLE, context, "angles"), frame)

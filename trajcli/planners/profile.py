@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from trajcli.curves.phases import PhaseChain
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.frozen import frozen
 from trajcli.planners.planner import Phase
 
 Control = Literal["position", "velocity"]
@@ -16,7 +16,7 @@ Control = Literal["position", "velocity"]
 _STILL = 1e-9  # of the peak velocity: less counts as rest
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Task:
     """What one variable shall do.
 
@@ -63,7 +63,7 @@ class Task:
         return self.displacement == 0 and self.initial[1:] == self.final[1:]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Profile:
     """The motion of one variable.
 

@@ -16,6 +16,7 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
+from trajcli.frozen import comparable
 from trajcli.planners.recorded import Recorded
 from trajcli.units import Quantity, UnitError, Units, factor, parse_quantity, unit_name
 
@@ -159,7 +160,7 @@ class FieldType:
         return {**self.json_schema(), "description": self.description}
 
 
-@dataclass(frozen=True)
+@comparable
 class Number(FieldType):
     """A number with its unit, such as a duration.
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from trajcli.curves.piecewise import Array, read_only
+from trajcli.frozen import frozen
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Recorded:
     """Joint values that were recorded.
 
@@ -17,13 +16,14 @@ class Recorded:
         positions: Shape (m, n), rad or m, m >= 1.
         times: Shape (m,), s, increasing; None where the file has none.
         file: Its name, for messages.
-        merge: Points that are no further than this from the one before, rad and m, are left out.
+        merge: Points no joint of which is further than this from the one before are left out: rad or m, one
+            for each joint, or none for zero.
     """
 
     positions: Array
     times: Array | None = None
     file: str = "recorded points"
-    merge: float = 0.0
+    merge: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "positions", read_only(self.positions))
@@ -42,9 +42,13 @@ class Recorded:
         times = b"" if self.times is None else self.times.tobytes()
         return self.positions.shape, self.positions.tobytes(), times, self.merge
 
+    @property
+    def _reach(self) -> Array:
+        return np.array(self.merge or (0.0,))
+
     def begins_at(self, start: Array) -> bool:
         """Return whether the first point is where the arm stands, `start` (n,): then it is no further one."""
-        return len(self.positions) > 1 and bool((np.abs(self.positions[0] - start) <= self.merge).all())
+        return len(self.positions) > 1 and bool((np.abs(self.positions[0] - start) <= self._reach).all())
 
     def after(self, start: Array, target: Array | None = None) -> Recorded:
         """Return the points that come after `start`, and before `target` where the recording is not the end.
@@ -61,21 +65,21 @@ class Recorded:
         positions, times = self.positions[first:], self.times
         if times is not None:
             times = (times - times[0] if first else times)[first:]
-        if times is None or self.merge > 0:
+        if times is None or any(self.merge):
             ends = positions if target is None else np.vstack([positions, target])
-            rows = _moved(start, ends, self.merge)
+            rows = _moved(start, ends, self._reach)
             rows = rows if target is None else rows[:-1]
             positions, times = positions[rows], None if times is None else times[rows]
         return Recorded(positions, times, self.file, self.merge)
 
 
-def _moved(start: Array, positions: Array, merge: float) -> np.ndarray:
+def _moved(start: Array, positions: Array, merge: Array) -> np.ndarray:
     """Return those rows that are further than `merge` from the last one that was kept, and the last row."""
-    if (np.abs(np.diff(positions, axis=0, prepend=start[None])).max(axis=1) > merge).all():
+    if (np.abs(np.diff(positions, axis=0, prepend=start[None])) > merge).any(axis=1).all():
         return np.arange(len(positions))
     kept, before = [], start
     for row, position in enumerate(positions):
-        if np.abs(position - before).max() > merge:
+        if (np.abs(position - before) > merge).any():
             kept.append(row)
             before = position
     end = len(positions) - 1

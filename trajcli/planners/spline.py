@@ -62,7 +62,12 @@ class Spline(ThroughPoints):
 
     @model_validator(mode="after")
     def _says_what_the_rule_needs(self) -> Spline:
-        flaws = [*self._flaws_inside(), *self._flaws_of_target(), *self._flaws_of_virtual_times()]
+        flaws = [
+            *self._flaws_inside(),
+            *self._flaws_of_blends(),
+            *self._flaws_of_target(),
+            *self._flaws_of_virtual_times(),
+        ]
         if flaws:
             raise refuse(flaws)
         return self
@@ -85,13 +90,13 @@ class Spline(ThroughPoints):
                         f"rule {self.rule} computes the {name} between the ends",
                         instead,
                     )
-        for k, point in enumerate(self.through):
+
+    def _flaws_of_blends(self) -> Iterator[Flaw]:
+        for k, point in enumerate(self.listed):
             if point.blend is not None:
-                yield (
-                    ("through", k, "blend"),
-                    "a spline goes through its points",
-                    "use blends, or leave it out",
-                )
+                last = self.to is not None and k == len(self.listed) - 1
+                path: Path = ("to",) if last else ("through", k)
+                yield (*path, "blend"), "a spline goes through its points", "use blends, or leave it out"
 
     def _flaws_of_target(self) -> Iterator[Flaw]:
         path, target = self._target()

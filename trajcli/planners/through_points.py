@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
-from typing import Annotated, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from pydantic import Field, model_validator
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import PlanningError, TrajcliError
+from trajcli.frozen import frozen
 from trajcli.planners.fields import Duration, Target
 from trajcli.planners.planner import Event, Planner, Resolve
 from trajcli.planners.reading import Flaw, refuse
@@ -22,7 +24,7 @@ from trajcli.trajectory import Passage, State
 _SAME_TIME = 1e-9  # relative: a duration and the time of the last point that agree
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class PointTable:
     """The points of a move as numbers, its start first and its target last.
 
@@ -54,7 +56,13 @@ class PointTable:
 
 
 class ThroughPoints(Planner):
-    """A planner that passes points on the way to its target."""
+    """A planner that passes points on the way to its target.
+
+    Attributes:
+        finds_times: Whether it always finds itself when it passes them, whatever a recording says.
+    """
+
+    finds_times: ClassVar[bool] = False
 
     to: Annotated[
         NamedWaypoint | None,
@@ -88,11 +96,19 @@ class ThroughPoints(Planner):
 
     @model_validator(mode="after")
     def _times_fit(self) -> Self:
+        if self.finds_times:
+            return self
+        flaws = [*self._lone_time()]
         if self.timed:
-            flaws = [*self._lacking_times(), *self._disordered_times()]
-            if flaws:
-                raise refuse(flaws)
+            flaws += [*self._lacking_times(), *self._disordered_times()]
+        if flaws:
+            raise refuse(flaws)
         return self
+
+    def _lone_time(self) -> Iterator[Flaw]:
+        if isinstance(self.through, Recorded) and not self.timed and self.to is not None and self.to.time:
+            text = "the target has a time, but the recorded points have none: all or none"
+            yield ("to", "time"), text, "leave it out, or give the points their times"
 
     def _lacking_times(self) -> list[Flaw]:
         flaws: list[Flaw] = []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -17,6 +17,7 @@ from trajcli.curves.time_optimal.structure import structure
 from trajcli.curves.time_optimal.trajectory import TimeOptimal as Solved
 from trajcli.curves.time_optimal.trajectory import UnsettledSpeedError, time_optimal
 from trajcli.errors import Amount, PlanningError, Problem
+from trajcli.frozen import comparable
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.deviation import Deviation
 from trajcli.planners.joint_path import JointPath, polyline_through, spline_through
@@ -35,7 +36,7 @@ _MOST_STOPS = 10  # that an event lists
 _STRETCHED = 1e-9  # relative: a smaller stretch is rounding
 
 
-@dataclass(frozen=True)
+@comparable
 class PathParameter(FieldType):
     """The name of a rule for the path parameter, or its value at each point."""
 
@@ -67,6 +68,7 @@ class TimeOptimal(ThroughPoints):
     """
 
     continuity: ClassVar[Literal[1, 2]] = 1
+    finds_times: ClassVar[bool] = True
 
     planner: Literal["time_optimal"] = "time_optimal"
     path: Annotated[
@@ -88,7 +90,7 @@ class TimeOptimal(ThroughPoints):
     ) = None
     corner: (
         Annotated[
-            float,
+            tuple[float, ...],
             Deviation(
                 "Of the polyline: how far a joint may pass from a corner (angle unit, or length unit for "
                 "prismatic joints); 0 or left out: stop there."
@@ -112,6 +114,9 @@ class TimeOptimal(ThroughPoints):
         if self.rule in ("imposed", "continuous_acceleration"):
             text = f"rule {self.rule} imposes derivatives in time, and the times are to be found"
             yield ("rule",), text, "use not_a_knot, natural, shape_preserving, computed or quintic"
+        if self.corner is not None and any(self.corner) and not all(self.corner):
+            text = "a corner is rounded for all joints or for none, but only some have 0"
+            yield ("corner",), text, "give each joint a number above 0"
         count = 1 + len(self.listed)
         if not isinstance(self.parameter, tuple) or isinstance(self.through, Recorded):
             return
@@ -175,7 +180,7 @@ class TimeOptimal(ThroughPoints):
 
     def _path(self, points: PointTable, robot: Robot) -> JointPath:
         if self.path == "polyline":
-            return polyline_through(points, self.corner or 0.0, robot)
+            return polyline_through(points, np.array(self.corner or (0.0,)), robot)
         return spline_through(self.rule or "not_a_knot", self.parameter or "chord", points, robot)
 
 

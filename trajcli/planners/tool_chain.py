@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from trajcli.curves.piecewise import Array
-from trajcli.errors import Amount, InputError, PlanningError, TrajcliError
+from trajcli.errors import Amount, InputError, PlanningError, Problem, TrajcliError
 from trajcli.geometry.chain import Chain, Corner, join
 from trajcli.geometry.line import Line
 from trajcli.geometry.place_curve import PlaceCurve
@@ -18,10 +18,10 @@ from trajcli.kinematics.robot import Robot
 from trajcli.planners.operational import Way
 from trajcli.planners.path import PathMove, Segment
 from trajcli.planners.planner import Event
+from trajcli.planners.tool_arcs import arc_of, arc_target, notes_of
 from trajcli.planners.tool_orientation import orientation_along
 from trajcli.planners.tool_overlap import overlapped
 from trajcli.planners.tool_target import ToolTarget, tool_target
-from trajcli.planners.tool_ways import arc_of, arc_target
 
 _SHRUNK = 1e-9  # relative
 
@@ -37,20 +37,21 @@ def chain_way(before: Array, move: PathMove, robot: Robot) -> Way:
     turning = orientation_along(move.orientation, before[:3, :3], targets, chain, chain.progress)
     poses = PoseCurve(chain, turning)
     if poses.jumps.size and not overlap:
-        place = float(poses.jumps[0])
-        message = f"at the corner at s = {place:.6g} m a tool that keeps its attitude to the path would jump"
-        raise PlanningError(message, hint="say `corner: round`, or orientation: axis_angle")
+        amounts = {"place": Amount(float(poses.jumps[0]), 0, None, "length")}
+        message = "at the corner at s = {place} a tool that keeps its attitude to the path would jump"
+        hint = "say `corner: round`, or orientation: axis_angle"
+        raise PlanningError(Problem(message, hint, amounts=amounts))
     last = targets[-1]
     fixed = "all" if move.orientation == "tangent" else last.orientation
     turns = tuple(target.turn for target in targets)
     path = ToolPath(poses, last.position, fixed, last.tool_axis, turns, chain.progress)
     end = move.segments[-1].line or (move.segments[-1].arc and move.segments[-1].arc.to)
-    way = Way(path, last.joints, end.configuration if end else None, _events(chain))
+    way = Way(path, last.joints, end.configuration if end else None, (*notes_of(places), *_events(chain)))
     if not overlap:
         return way
     tolerance = Tolerance(move.tolerance.position, move.tolerance.angle)
     motion = overlapped(before, places, targets, move, robot.limits.tcp, tolerance)
-    return replace(way, overlap=replace(motion, path=path), events=())
+    return replace(way, overlap=replace(motion, path=path), events=notes_of(places))
 
 
 def _segments(before: Array, move: PathMove, robot: Robot) -> tuple[list[PlaceCurve], list[ToolTarget]]:
@@ -88,7 +89,7 @@ def _segment(segment: Segment, pose: Array, robot: Robot) -> tuple[PlaceCurve, T
 def _events(chain: Chain) -> tuple[Event, ...]:
     events = []
     for number, corner in enumerate(chain.corners, 1):
-        if corner.kind == "rounded" and corner.used < corner.asked * (1 - _SHRUNK):
+        if corner.kind != "smooth" and corner.used < corner.asked * (1 - _SHRUNK):
             events.append(_shrunk(number, corner))
     return tuple(events)
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate, distinct
 from trajcli.errors import MissingLimitError, Problem
+from trajcli.frozen import comparable, frozen
 from trajcli.geometry.place_curve import PlaceCurve
 from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.robot import ToolLimits
@@ -21,7 +22,7 @@ _SAMPLES = 257  # places at which the largest rates of the orientation are looke
 _ALONG, _ACROSS = 0.6, 0.8  # of an acceleration, where the path is bent: 0.6^2 + 0.8^2 = 1
 
 
-@dataclass(frozen=True)
+@comparable
 class Rates:
     """The largest derivatives of a path by its parameter.
 
@@ -38,7 +39,7 @@ class Rates:
     twist: float
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class ToolLaw:
     """s(t) over the whole path.
 
@@ -90,9 +91,33 @@ def bounds_of(spec: LawSpec, limits: ToolLimits, rates: Rates) -> tuple[PathBoun
     place = PathBounds(speed, acceleration, slowing, _or(spec.jerk, limits.jerk))
     angular = _rotation_bounds(spec, limits, rates)
     if not rates.way:
-        return angular, "rotation"
-    both = PathBounds(*(min(pair) for pair in zip(_values(place), _values(angular), strict=True)))
+        return replace(angular, unit="angle"), "rotation"
+    both = place.with_each(angular, min)
     return both, "rotation" if angular.speed < place.speed else "translation"
+
+
+def bounds_for(
+    spec: LawSpec, limits: ToolLimits, rates: Rates, planner: str
+) -> tuple[PathBounds, str | None]:
+    """Return what a law of this shape may do, and whether translation or rotation says so.
+
+    With a duration nothing is lowered by the limits, which the move is verified by: a law does what it names.
+
+    Raises:
+        MissingLimitError: When one that the shape needs is unlimited.
+    """
+    bounds, ruled_by = bounds_of(spec, limits, rates)
+    if spec.duration is None:
+        return require_bounds(spec, bounds, rates, planner), ruled_by
+    named, _ = bounds_of(spec, ToolLimits(), rates)
+    if spec.shape != "trapezoid":
+        return named, None
+    if math.isinf(named.speed):
+        either = named.with_each(bounds, lambda own, other: own if math.isfinite(own) else other)
+        named = replace(either, speed=math.inf)
+        if math.isinf(min(named.acceleration, named.deceleration)):
+            raise _missing("acceleration", rates, planner, spec)
+    return named, None
 
 
 def _rotation_bounds(spec: LawSpec, limits: ToolLimits, rates: Rates) -> PathBounds:
@@ -105,10 +130,6 @@ def _rotation_bounds(spec: LawSpec, limits: ToolLimits, rates: Rates) -> PathBou
         speed = min(speed, math.sqrt(_ACROSS * acceleration / rates.twist))
         acceleration *= _ALONG / 3  # w'' need not be perpendicular to w': sizes add up
     return PathBounds(speed, acceleration / rates.turn, acceleration / rates.turn, math.inf)
-
-
-def _values(bounds: PathBounds) -> tuple[float, float, float, float]:
-    return bounds.speed, bounds.acceleration, bounds.deceleration, bounds.jerk
 
 
 def _or(value: float | None, other: float) -> float:
@@ -125,8 +146,7 @@ def law_over(path: ToolPath, spec: LawSpec, limits: ToolLimits, planner: str) ->
         PlanningError: When no such law exists.
     """
     rates = rates_of(path)
-    bounds, ruled_by = bounds_of(spec, limits, rates)
-    bounds = require_bounds(spec, bounds, rates, planner)
+    bounds, ruled_by = bounds_for(spec, limits, rates, planner)
     stops = np.concatenate([[0.0], path.poses.stops, [path.length]])
     stretches = []
     for low, high in pairwise(stops.tolist()):
@@ -136,7 +156,7 @@ def law_over(path: ToolPath, spec: LawSpec, limits: ToolLimits, planner: str) ->
     total = sum(stretch.law.duration for stretch in stretches)
     if spec.minimum_duration is not None and total < spec.minimum_duration:
         stretches = [stretch.scaled(spec.minimum_duration / total) for stretch in stretches]
-    return _joined(stretches, stops, None if spec.duration else ruled_by)
+    return _joined(stretches, stops, ruled_by)
 
 
 def _joined(stretches: list[Stretch], stops: Array, ruled_by: str | None) -> ToolLaw:
@@ -152,20 +172,11 @@ def _joined(stretches: list[Stretch], stops: Array, ruled_by: str | None) -> Too
 
 
 def require_bounds(spec: LawSpec, bounds: PathBounds, rates: Rates, planner: str) -> PathBounds:
-    """Return the bounds that a law of this shape needs.
+    """Return the bounds that the fastest law of this shape needs.
 
     Raises:
         MissingLimitError: When one is unlimited.
     """
-    if spec.duration is None or spec.shape == "jerk_limited":
-        _require(spec, bounds, rates, planner)
-    elif spec.shape == "trapezoid" and spec.speed is None and spec.angular_speed is None:
-        _require_ramps(spec, bounds, rates, planner)
-        return replace(bounds, speed=math.inf)
-    return bounds
-
-
-def _require(spec: LawSpec, bounds: PathBounds, rates: Rates, planner: str) -> None:
     ramps = math.isfinite(min(bounds.acceleration, bounds.deceleration))
     needs = {
         "speed": math.isfinite(bounds.speed) or spec.shape not in ("jerk_limited",),
@@ -173,21 +184,22 @@ def _require(spec: LawSpec, bounds: PathBounds, rates: Rates, planner: str) -> N
         "jerk": math.isfinite(bounds.jerk) or spec.shape != "jerk_limited",
     }
     lacking = next((name for name, there in needs.items() if not there), None)
-    if lacking is None and all(map(math.isinf, _values(bounds))):
+    if lacking is None and all(map(math.isinf, bounds.values())):
         lacking = "speed"
     if lacking is not None:
-        raise _missing(lacking, rates, planner, spec.shape)
+        raise _missing(lacking, rates, planner, spec)
+    return bounds
 
 
-def _require_ramps(spec: LawSpec, bounds: PathBounds, rates: Rates, planner: str) -> None:
-    if math.isinf(min(bounds.acceleration, bounds.deceleration)):
-        raise _missing("speed", rates, planner, spec.shape)
-
-
-def _missing(name: str, rates: Rates, planner: str, shape: str) -> MissingLimitError:
-    key = name if rates.way or name == "jerk" else f"angular_{name}"
-    message = f"{planner} with a {shape} law needs the {key.replace('_', ' ')} of the tool"
-    hint = f"add `limits: {{tcp: {{{key}: ...}}}}` to the job, or `{key}` or a `duration` to the `law`"
-    if shape == "jerk_limited":
-        hint = f"add `limits: {{tcp: {{{key}: ...}}}}` to the job, or `{key}` to the `law`"
+def _missing(name: str, rates: Rates, planner: str, spec: LawSpec) -> MissingLimitError:
+    if name == "jerk" and not rates.way:
+        message = f"a {spec.shape} law needs a jerk, and a rotation in place has no limit of it"
+        return MissingLimitError(Problem(message, "use shape quintic or cycloidal"))
+    key = name if rates.way else f"angular_{name}"
+    message = f"{planner} with a {spec.shape} law needs the {key.replace('_', ' ')} of the tool"
+    more = "" if spec.shape == "jerk_limited" else " or a `duration`"
+    if spec.duration is not None:
+        speed = "speed" if rates.way else "angular_speed"
+        message, more = f"{message}, or its {speed.replace('_', ' ')}", f" or `{speed}`"
+    hint = f"add `limits: {{tcp: {{{key}: ...}}}}` to the job, or `{key}`{more} to the `law`"
     return MissingLimitError(Problem(message, hint))

@@ -8,14 +8,12 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount, PlanningError, Problem
 from trajcli.kinematics.following.motion import motion_along
 from trajcli.kinematics.following.tolerance import Tolerance
-from trajcli.kinematics.inverse.solve import solve
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.following_tool import Made, followed, followed_in_time, trouble_of
 from trajcli.planners.operational import ToleranceSpec, Way
 from trajcli.planners.path_law import LawSpec
 from trajcli.planners.planner import Planned
 from trajcli.planners.tool_law import law_over
-from trajcli.planners.tool_time_optimal import fastest_along
 from trajcli.trajectory import resting
 
 _ARRIVED = 1e-5  # rad or m: joint values that are given, and reached on the way
@@ -43,7 +41,7 @@ def moved_along(
     room = max(tolerance.position, tolerance.angle)
     trouble_of(robot, made.motion).refuse_limits(made.curve, room)
     end = made.curve.piece_ends()[1][-1]
-    _check_arrival(way, end, robot)
+    check_arrival(way, end, robot)
     return Planned(
         made.curve,
         resting(end),
@@ -57,13 +55,15 @@ def _made(way: Way, spec: LawSpec, tolerance: Tolerance, planner: str, start: Ar
     if way.overlap is not None:
         return Made(followed_in_time(robot, way.overlap, start), way.overlap)
     if spec.shape == "time_optimal":
+        from trajcli.planners.tool_time_optimal import fastest_along
+
         return fastest_along(followed(robot, way.path, start), spec, tolerance, planner)
     law = law_over(way.path, spec, robot.limits.tcp, planner)
     motion = motion_along(way.path, law.law, law.breaks, tolerance, law.ruled_by)
     return Made(followed(robot, way.path, start).by_time(motion), motion, law.phases)
 
 
-def _check_arrival(way: Way, end: Array, robot: Robot) -> None:
+def check_arrival(way: Way, end: Array, robot: Robot) -> None:
     """Refuse to arrive in other joint values than the target names, or on another branch.
 
     Raises:
@@ -84,6 +84,8 @@ def _check_arrival(way: Way, end: Array, robot: Robot) -> None:
     wanted = {} if way.configuration is None else way.configuration.model_dump(exclude_none=True)
     if not wanted:
         return
+    from trajcli.kinematics.inverse.solve import solve
+
     target = way.path.by_place(np.array([way.path.length]), "left").target()
     found = solve(robot, target, end[None])
     apart = np.where(found.valid[0], np.abs(found.joints[0] - end).max(axis=-1), np.inf)

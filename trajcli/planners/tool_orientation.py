@@ -8,7 +8,6 @@ from typing import Literal
 import numpy as np
 
 from trajcli.errors import InputError, PlanningError
-from trajcli.geometry.even_angles import even_angles
 from trajcli.geometry.orientation_curve import AboutAxes, AlongPath, Fixed, OrientationCurve
 from trajcli.geometry.place_curve import PlaceCurve
 from trajcli.geometry.progress import Progress
@@ -61,6 +60,8 @@ def orientation_along(
 
 
 def _even(rotations: Array, targets: Sequence[ToolTarget], progress: Progress | None) -> OrientationCurve:
+    from trajcli.geometry.even_angles import even_angles
+
     forms = {(typed[1], typed[2]) for target in targets if (typed := target.typed) is not None}
     if len(forms) != 1:
         what = "different angles" if forms else "no angles"

@@ -10,7 +10,7 @@ Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), sect
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -18,6 +18,7 @@ import numpy as np
 from trajcli.curves.compose import merge_breaks
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, concatenate, constant
 from trajcli.errors import Amount, PlanningError, Problem
+from trajcli.frozen import frozen
 from trajcli.geometry.axis_angle import exp
 from trajcli.geometry.orientation_curve import turn_vectors
 from trajcli.geometry.place_curve import PlaceCurve
@@ -28,14 +29,14 @@ from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.robot import ToolLimits
 from trajcli.planners.law_shapes import Stretch, stretch_of
 from trajcli.planners.path import PathMove
-from trajcli.planners.tool_law import bounds_of, rates_of_segment, require_bounds
+from trajcli.planners.tool_law import bounds_for, rates_of_segment
 from trajcli.planners.tool_orientation import orientation_along
 from trajcli.planners.tool_target import ToolTarget
 
 _ONE_TIME = 1e-9  # of the duration: times this close to each other are one
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Overlapped:
     """Segments under way, some at once.
 
@@ -132,11 +133,14 @@ def _stretches(
     )  # two at once add up
     for place, vector in zip(places, vectors, strict=True):
         rates = rates_of_segment(place, float(np.linalg.norm(vector)) / place.length)
-        bounds, _ = bounds_of(spec, lower, rates)
-        bounds = require_bounds(spec, bounds, rates, "path")
+        bounds, _ = bounds_for(spec, lower, rates, "path")
         share = None if whole is None else whole * place.length / total
         stretches.append(stretch_of(spec, place.length, bounds, share))
-    return stretches
+    if spec.minimum_duration is None:
+        return stretches
+    lasts = sum(stretch.law.duration for stretch in stretches)
+    least = spec.minimum_duration + (len(places) - 1) * (move.overlap or 0.0)
+    return stretches if lasts >= least else [stretch.scaled(least / lasts) for stretch in stretches]
 
 
 def _crowd(places: Sequence[PlaceCurve]) -> float:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import PlanningError
+from trajcli.frozen import frozen
 from trajcli.geometry.rotation import AXES, Axis
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.target import Fixed, meeting, partial_target, residuals
@@ -21,7 +20,7 @@ _ALL_SIX = 6
 _UPRIGHT = 1e-6  # rad from upright
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class ToolTarget:
     """A pose to go to, and what of it is fixed on the way there.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,12 +10,11 @@ from trajcli.curves.extrema import peaks
 from trajcli.curves.fit import MOST_PIECES
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount, PlanningError, Problem
+from trajcli.frozen import frozen
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.following.follower import Demands
 from trajcli.kinematics.following.track import StuckError
 from trajcli.kinematics.forward import forward
-from trajcli.kinematics.inverse.numeric import descend
-from trajcli.kinematics.inverse.solve import solve
 from trajcli.kinematics.inverse.target import residual_jacobian
 from trajcli.kinematics.jacobian import jacobian
 from trajcli.kinematics.robot import Robot
@@ -29,7 +27,7 @@ _REGULAR = 1e-3  # of the largest singular value: with more there is no singular
 _SLOPE = 1e-5  # of the whole: step of the difference that says how fast a joint would have to go
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Trouble:
     """Explains what goes wrong along a path, or over the time of a motion.
 
@@ -94,6 +92,8 @@ class Trouble:
 
     def _unreachable(self, at: float) -> PlanningError | None:
         """Return the error that the path leaves the arm's reach, if it does so beyond a place."""
+        from trajcli.kinematics.inverse.solve import solve
+
         places = np.linspace(at, self.end, _LOOKS)
         places[0] = min(at + _NEXT * self.end, self.end)
         found = solve(self.robot, self.demands(places, "left").target(), None)
@@ -118,6 +118,8 @@ class Trouble:
 
     def _last_reached(self, low: float, high: float, known: Array) -> float:
         """Return how far beyond `low`, where joint values (k, n) are known, some meet the target."""
+        from trajcli.kinematics.inverse.numeric import descend
+
         for _ in range(_BISECTIONS):
             middle = 0.5 * (low + high)
             target = self.demands(np.full(len(known), middle), "left").target()

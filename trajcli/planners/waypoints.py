@@ -28,8 +28,8 @@ from trajcli.units import Quantity
 
 _TIME = Quantity("time")
 _MERGE = Deviation(
-    "Points no joint of which is further than this from the point before are left out (angle unit, or length "
-    "unit where all joints are prismatic)."
+    "Points no joint of which is further than this from the point before are left out (angle or length unit, "
+    "as the joint is)."
 )
 _KEYS = ("csv", "positions", "times", "merge")
 
@@ -120,7 +120,7 @@ def _recorded(value: Mapping[str, Any], context: ReadingContext) -> Recorded:
     if ("csv" in value) == ("positions" in value):
         raise FlawError("expected a list of waypoints, {csv: PATH} or {positions: [...]}")
     points = _from_file(value, context) if "csv" in value else _inline(value, context)
-    merge = _merge(value["merge"], context) if "merge" in value else 0.0
+    merge = _merge(value["merge"], context) if "merge" in value else ()
     return Recorded(points.positions, points.times, points.file, merge)
 
 
@@ -154,11 +154,12 @@ def _inline(value: Mapping[str, Any], context: ReadingContext) -> Recorded:
     return Recorded(np.array(positions), times)
 
 
-def _merge(value: Any, context: ReadingContext) -> float:  # noqa: ANN401
+def _merge(value: Any, context: ReadingContext) -> tuple[float, ...]:  # noqa: ANN401
     try:
         return _MERGE.read(value, context)
     except FlawError as error:
-        raise FlawError(str(error), "merge") from None
+        error.flaws = [(("merge", *path), text, hint) for path, text, hint in error.flaws]
+        raise
 
 
 def _written(recorded: Recorded, context: ReadingContext) -> dict[str, Any]:

@@ -7,7 +7,6 @@ import re
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
 from itertools import islice
 from math import isfinite
 from pathlib import Path
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 from trajcli.columns import whole_number_columns
 from trajcli.curves.piecewise import Array
 from trajcli.errors import FileError, InputError, Place, Problem
+from trajcli.frozen import frozen
 from trajcli.streams.decimals import DECIMALS
 from trajcli.streams.scan import NotFixedError, scan_fixed
 
@@ -29,7 +29,7 @@ _NUMBER = re.compile(rb"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _SPACED = re.compile(rb"[eE \t\r\f\v]|\n\n|\A\n")  # exponents, blanks or empty lines
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Table:
     """The content of a CSV file.
 
@@ -57,7 +57,7 @@ class Table:
 
 
 def read_csv(source: str | Path) -> Table:
-    """Read a CSV file: a line of names, then lines of as many finite numbers.
+    """Read a CSV file: a line of names, perhaps behind a #, then lines of as many finite numbers.
 
     Lines may end in CR LF, the last one in nothing; empty lines are skipped.
 
@@ -85,7 +85,7 @@ def read_csv(source: str | Path) -> Table:
     return Table(names, columns, reader.decimals, file)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Rows:
     """A CSV file that is read block by block, so that memory does not grow with its length.
 
@@ -161,7 +161,8 @@ def _read_names(stream: BinaryIO, file: str) -> tuple[str, ...]:
         raise InputError(f"{file} is empty", hint="a CSV begins with a line of the columns' names")
     if "\0" in header or len(line) == _LONGEST_HEADER:
         raise InputError(f"{file} is not text", hint="a CSV begins with a line of the columns' names")
-    names = tuple(name.strip().removeprefix('"').removesuffix('"') for name in header.split(","))
+    listed = header.removeprefix("#")  # numpy.savetxt writes the names as a comment
+    names = tuple(name.strip().removeprefix('"').removesuffix('"') for name in listed.split(","))
     flaw = _flaw_of_names(names)
     if flaw:
         index, message, hint = flaw

@@ -49,7 +49,7 @@ def test_the_fit_keeps_its_promise_of_joints_and_tool(name, tolerance):
     arm, coarse = tracked(made)
     breaks = made.path.breaks
     misfit = misfit_of(arm, Tolerance(tolerance, tolerance), breaks, coarse.evaluate(probes(breaks)))
-    curve = fit(arm.exact, misfit, breaks, coarse.evaluate)
+    curve = fit(arm.solved, misfit, breaks, coarse.evaluate)
     places = np.linspace(0, made.path.length, 77)
     exact = arm.exact(places, "right", coarse.evaluate(places))
     fitted = curve.evaluate_orders(places, (0, 1, 2)).swapaxes(0, 1)
@@ -117,7 +117,7 @@ def test_a_tolerance_finer_than_rounding_is_met_as_far_as_rounding_lets_it():
     arm, coarse = tracked(made)
     breaks = made.path.breaks
     misfit = misfit_of(arm, Tolerance(1e-13, 1e-13), breaks, coarse.evaluate(probes(breaks)))
-    curve = fit(arm.exact, misfit, breaks, coarse.evaluate)
+    curve = fit(arm.solved, misfit, breaks, coarse.evaluate)
     places = np.linspace(0, made.path.length, 77)
     exact = arm.exact(places, "right", coarse.evaluate(places))
     assert np.abs(curve.evaluate(places) - exact[0]).max() < 1e-12

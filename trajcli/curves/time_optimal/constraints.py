@@ -9,19 +9,20 @@ Source: Pham and Pham (2018), sections II and III.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side
+from trajcli.frozen import frozen
 
 _FLAT = 1e-9  # a coefficient this much smaller than its neighbour is zero: it shifts the bound by as little
 _KINK = 1e-9  # of the largest derivative of a joint: a jump above it is a corner
 _ROUNDING = 1e-13  # of the largest derivative of all joints: the same, where one hardly moves
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Rows:
     """Rows a u + b x <= c and caps x <= cap at p places of a path.
 
@@ -104,7 +105,7 @@ def _nothing(begins: Array, ends: Array) -> Array:
     return np.asarray(np.maximum(_KINK * largest, _ROUNDING * largest.max()))
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Intervals:
     """Rows P x + R y <= C of the intervals of a grid, sd^2 = x at the near and y at the far end.
 

@@ -14,7 +14,6 @@ Source: Pham and Pham (2018), algorithm 1; the affine form of the scans is our o
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
@@ -22,6 +21,7 @@ from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.curves.time_optimal.constraints import Intervals
+from trajcli.frozen import frozen
 
 _HUGE = 1e100  # stands for an unlimited x: beyond it only the slopes of rows matter
 _STEPS = 100
@@ -59,7 +59,7 @@ class UnlimitedSpeedError(ValueError):
         )
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Controllable:
     """The sets [lower, upper] of x from which the end can be reached, each of shape (N + 1,).
 

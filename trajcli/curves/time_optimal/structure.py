@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import groupby
 from typing import Literal
 
@@ -10,12 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.frozen import comparable
 
 _BINDS = 0.95  # of a limit, on average over a piece: its ends reach the limit only as far as the grid is fine
 _STAYS = 0.01  # by which another limit must be nearer before it takes over
 
 
-@dataclass(frozen=True)
+@comparable
 class Binding:
     """A stretch of time in which one limit binds.
 

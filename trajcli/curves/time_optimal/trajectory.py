@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,6 +22,7 @@ from trajcli.curves.time_optimal.grid import first_grid, halved, most_intervals,
 from trajcli.curves.time_optimal.law import durations, law_of
 from trajcli.curves.time_optimal.resolution import excess, time_lost
 from trajcli.curves.time_optimal.solve import UnlimitedSpeedError, UnreachableSpeedError, solve
+from trajcli.frozen import frozen
 
 _LOST = 2e-3  # of the duration, by estimate: a finer grid would not gain more
 _WORTH = 1e-3  # of the mean duration of an interval: a smaller loss in one is not worth a new place
@@ -51,7 +51,7 @@ class UnsettledSpeedError(ValueError):
         )
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class TimeOptimal:
     """A time-optimal motion.
 
@@ -78,7 +78,7 @@ class TimeOptimal:
     stop_times: Array
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class _Problem:
     path: PiecewisePolynomial
     velocity: Array

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from trajcli.curves.piecewise import Array
+from trajcli.frozen import frozen
 from trajcli.geometry.rotation import AXES, Axis
 from trajcli.kinematics.inverse.target import Fixed, Target
 
 _LEVEL = 1e-12  # of a unit vector, squared: the heading of a vertical axis is not defined
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Demand:
     """The tool at N places of its path: what it fixes, and the first and second derivative of that.
 

@@ -12,16 +12,19 @@ Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
 from trajcli.curves.piecewise import Array, Side
+from trajcli.frozen import frozen
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.following.demand import Demand
 from trajcli.kinematics.following.hand import NO_HAND, Hand, hand_of
-from trajcli.kinematics.inverse.target import residual_jacobian, residuals
-from trajcli.kinematics.jacobian import jacobian_dot_qd, linearisation
+from trajcli.kinematics.following.solved import Solved, acceleration_bias
+from trajcli.kinematics.inverse.target import Target, residual_jacobian, residuals
+from trajcli.kinematics.jacobian import linearisation
 from trajcli.kinematics.robot import Robot
 
 Demands = Callable[[Array, Side], Demand]
@@ -51,7 +54,7 @@ class LostError(ValueError):
         self.missed = missed
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Follower:
     """An arm that follows a demand.
 
@@ -69,6 +72,11 @@ class Follower:
     held: Array
     hand: Hand = NO_HAND
 
+    @cached_property
+    def length(self) -> float:
+        """Length of the arm, m, by which positions are divided."""
+        return characteristic_length(self.robot)
+
     def exact(self, places: Array, side: Side, guess: Array) -> Array:
         """Return joint values and their first and second derivative, shape (3, N, n).
 
@@ -80,60 +88,68 @@ class Follower:
         Raises:
             LostError: When no joint values near the guess meet the target.
         """
+        return self.solved(places, side, guess).values
+
+    def solved(self, places: Array, side: Side, guess: Array) -> Solved:
+        """Return these values with what is known of the arm there.
+
+        Raises:
+            LostError: As `exact`.
+        """
         demand = self.demands(places, side)
-        q, poses, columns = self._solved(demand, guess, places)
-        slopes = self.rows(demand, poses, columns)
+        target = demand.target()
+        q, poses, columns, slopes = self._met(target, guess, places)
         other = self.hand.changed(demand, poses, slopes)
         if other.any():
             first_other = int(np.flatnonzero(other)[np.argmin(places[other])])
             raise LostError(np.sort(places[other]), q[first_other], (0.0, 0.0))
-        first = self._divided(slopes, self._scaled(demand.rates(), demand))
-        bias = jacobian_dot_qd(self.robot, q, first)
+        first = self._divided(slopes, self._scaled(demand.rates(), target))
+        bias = acceleration_bias(columns, first)
         twist = (columns @ first[..., None])[..., 0]
-        second = self._divided(slopes, self._scaled(demand.accelerations(poses, bias, twist), demand))
-        return np.stack([q, first, second])
+        second = self._divided(slopes, self._scaled(demand.accelerations(poses, bias, twist), target))
+        return Solved(np.stack([q, first, second]), demand, target, columns)
 
-    def _solved(self, demand: Demand, guess: Array, places: Array) -> tuple[Array, Array, Array]:
-        """Return joint values (N, n), poses of the tcp and Jacobians there."""
-        target = demand.target()
-        q = guess.copy()
-        poses, columns = linearisation(self.robot, q)
-        for _ in range(_ITERATIONS):
-            errors = self._errors(demand, poses, q)
-            step = self._divided(self.rows(demand, poses, columns), errors)
-            q = q + np.clip(step, -_LONGEST, _LONGEST)
+    def _met(self, target: Target, guess: Array, places: Array) -> tuple[Array, Array, Array, Array]:
+        """Return joint values (N, n) that meet the target, and there poses, Jacobians and scaled rows."""
+        q, short = guess, False
+        for iteration in range(_ITERATIONS + 1):
             poses, columns = linearisation(self.robot, q)
-            if (np.abs(step) <= _NEAR).all():
+            slopes = self._rows(target, poses, columns)
+            differences = residuals(target, poses)
+            errors = self._scaled(differences, target, (self.start - q) @ self.held.T)
+            if short or iteration == _ITERATIONS:
                 break
-        size = np.abs(self._errors(demand, poses, q)).max(axis=1)
+            step = self._divided(slopes, errors)
+            q = q + np.clip(step, -_LONGEST, _LONGEST)
+            short = bool((np.abs(step) <= _NEAR).all())
+        size = np.abs(errors).max(axis=1)
         lost = ~(size <= _GOOD) | (np.abs(q - guess).max(axis=1) > _ELSEWHERE)
         if lost.any():
             first = int(np.flatnonzero(lost)[np.argmin(places[lost])])
-            difference = residuals(target.rows([first]), poses[[first]])[0]
-            split = sum(demand.position)
-            missed = float(np.linalg.norm(difference[:split])), float(np.linalg.norm(difference[split:]))
+            split = sum(target.position)
+            parts = differences[first, :split], differences[first, split:]
+            missed = float(np.linalg.norm(parts[0])), float(np.linalg.norm(parts[1]))
             raise LostError(np.sort(places[lost]), q[first], missed)
-        return q, poses, columns
-
-    def _errors(self, demand: Demand, poses: Array, q: Array) -> Array:
-        differences = residuals(demand.target(), poses)
-        kept = (self.start - q) @ self.held.T
-        return np.concatenate([self._by_length(differences, demand), kept], axis=1)
+        return q, poses, columns, slopes
 
     def rows(self, demand: Demand, poses: Array, columns: Array) -> Array:
         """Return the scaled rows (N, m + f, n) of tcp poses (N, 4, 4) and Jacobians (N, 6, n) in world."""
-        rows = residual_jacobian(demand.target(), poses, columns)
-        rows[:, : sum(demand.position)] /= characteristic_length(self.robot)
+        return self._rows(demand.target(), poses, columns)
+
+    def _rows(self, target: Target, poses: Array, columns: Array) -> Array:
+        rows = residual_jacobian(target, poses, columns)
+        rows[:, : sum(target.position)] /= self.length
+        if not len(self.held):
+            return rows
         kept = np.broadcast_to(self.held, (len(poses), *self.held.shape))
         return np.concatenate([rows, kept], axis=1)
 
-    def _scaled(self, rates: Array, demand: Demand) -> Array:
-        still = np.zeros((len(rates), len(self.held)))
-        return np.concatenate([self._by_length(rates, demand), still], axis=1)
-
-    def _by_length(self, rows: Array, demand: Demand) -> Array:
-        scaled = rows.copy()
-        scaled[:, : sum(demand.position)] /= characteristic_length(self.robot)
+    def _scaled(self, rates: Array, target: Target, kept: Array | None = None) -> Array:
+        """Return rates of the target's rows, those of the position by length, with those that are kept."""
+        if kept is None:
+            kept = np.zeros((len(rates), len(self.held)))
+        scaled = np.concatenate([rates, kept], axis=1)
+        scaled[:, : sum(target.position)] /= self.length
         return scaled
 
     @staticmethod

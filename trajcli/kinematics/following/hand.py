@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
+from trajcli.frozen import frozen
 from trajcli.geometry.rotation import AXES
 from trajcli.kinematics.following.demand import Demand
 
@@ -15,7 +14,7 @@ _FLAT = 1e-12  # a determinant of scaled rows, which are of the size 1, that is 
 _OUTSIDE = 1e-9  # of a scaled row: what a basis of dependent rows may leave out
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Hand:
     """The sign of the determinant of the rows that joint rates must meet.
 

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from trajcli.curves.compose import scale_time
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, distinct
+from trajcli.frozen import frozen
 from trajcli.kinematics.following.demand import Demand
 from trajcli.kinematics.following.follower import Demands
 from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.kinematics.following.tool_path import ToolPath
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class ToolMotion:
     """The tool over the time of a move.
 

@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.curves.piecewise import Array, Side
-from trajcli.kinematics.dexterity import characteristic_length
+from trajcli.curves.piecewise import Array
+from trajcli.frozen import comparable, frozen
+from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.following.follower import Follower
+from trajcli.kinematics.following.solved import Solved
 from trajcli.kinematics.forward import forward
-from trajcli.kinematics.inverse.target import residuals
+from trajcli.kinematics.inverse.target import Target, residuals
 from trajcli.kinematics.inverse.turns import revolute
-from trajcli.kinematics.jacobian import jacobian
+
+Rows = NDArray[np.intp]
 
 _PROBES = 33  # places between neighbouring breaks, all together, at which the peaks are looked for
 _RACING = 1e-8  # of what the fastest joint does: near a singularity rounding leaves no less at the tool
 _ASIDE = 0.1  # of the speed with which a point of the arm's length would go
 
 
-@dataclass(frozen=True)
+@comparable
 class Tolerance:
     """What a joint curve may be off.
 
@@ -34,7 +37,7 @@ class Tolerance:
     angle: float = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Misfit:
     """By how many times the tolerance joint values and their derivatives are off.
 
@@ -51,30 +54,44 @@ class Misfit:
     joint_peaks: Array
     tool_peaks: Array
 
-    def __call__(self, places: Array, exact: Array, fitted: Array) -> Array:
-        """Return the misfit (N,) of fitted (3, N, n) from exact (3, N, n) values at places (N,)."""
-        off = np.abs(fitted - exact)
-        turning = revolute(self.follower.robot)
-        joint = np.where(turning, self.tolerance.angle, self.tolerance.position)
-        worst = (off[0] / joint).max(axis=1)
-        rows = jacobian(self.follower.robot, exact[0])
-        tool = np.array([self.tolerance.position, self.tolerance.angle])
-        scale = characteristic_length(self.follower.robot)
-        worst = np.maximum(worst, (self._beside(places, fitted[0]) / tool).max(axis=1))
+    def __call__(self, known: Solved, rows: Rows, fitted: Array) -> Array:
+        """Return the misfit (K,) of fitted (3, K, n) from the exact values at some rows of what is known."""
+        exact, columns = known.values[:, rows], known.columns[rows]
+        off = fitted - exact
+        size = np.abs(off)
+        worst = np.maximum(
+            (size[0] / self._joint).max(axis=1),
+            (self._beside(known.target.rows(rows), fitted[0]) / self._tool).max(axis=1),
+        )
         for order in (1, 2):
-            peaks = np.maximum(self.joint_peaks[order - 1], _by_kind(exact[order], turning))
-            worst = np.maximum(worst, (off[order] / (joint * peaks)).max(axis=1))
-            moved = (rows @ (fitted - exact)[order][..., None])[..., 0]
-            sizes = np.linalg.norm(moved.reshape(-1, 2, 3), axis=2)
-            racing = np.abs(exact[order]).max(axis=1, keepdims=True) * [_RACING * scale, _RACING]
-            worst = np.maximum(worst, (sizes / (tool * self.tool_peaks[order - 1] + racing)).max(axis=1))
+            peaks = np.maximum(self.joint_peaks[order - 1], _by_kind(exact[order], self._turning))
+            worst = np.maximum(worst, (size[order] / (self._joint * peaks)).max(axis=1))
+            moved = (columns @ off[order][..., None])[..., 0]
+            racing = np.abs(exact[order]).max(axis=1, keepdims=True) * self._racing
+            allowed = self._tool * self.tool_peaks[order - 1] + racing
+            worst = np.maximum(worst, (_sizes(moved) / allowed).max(axis=1))
         return np.asarray(worst)
 
-    def _beside(self, places: Array, joints: Array) -> Array:
-        """Return how far the tool is from its path, (N, 2), m and rad."""
-        demand = self.follower.demands(places, "right")
-        off = residuals(demand.target(), forward(self.follower.robot, joints))
-        split = sum(demand.position)
+    @cached_property
+    def _turning(self) -> Flags:
+        return revolute(self.follower.robot)
+
+    @cached_property
+    def _joint(self) -> Array:
+        return np.where(self._turning, self.tolerance.angle, self.tolerance.position)
+
+    @cached_property
+    def _tool(self) -> Array:
+        return np.array([self.tolerance.position, self.tolerance.angle])
+
+    @cached_property
+    def _racing(self) -> Array:
+        return _RACING * np.array([self.follower.length, 1.0])
+
+    def _beside(self, target: Target, joints: Array) -> Array:
+        """Return how far the tool is from its path, (K, 2), m and rad."""
+        off = residuals(target, forward(self.follower.robot, joints))
+        split = sum(target.position)
         sizes = [np.linalg.norm(off[:, :split], axis=1), np.linalg.norm(off[:, split:], axis=1)]
         return np.stack(sizes, axis=1)
 
@@ -88,24 +105,26 @@ def misfit_of(follower: Follower, tolerance: Tolerance, breaks: Array, guess: Ar
         breaks: Shape (m,), increasing.
         guess: Joint values near the exact ones at the places `probes(breaks)`, shape (N, n).
     """
-    places = probes(breaks)
-    side: Side = "right"
-    exact = follower.exact(places, side, guess)
-    turning = revolute(follower.robot)
+    known = follower.solved(probes(breaks), "right", guess)
+    exact, turning = known.values, revolute(follower.robot)
     duration = float(breaks[-1] - breaks[0])
     joint_peaks = np.stack([_by_kind(exact[order], turning) for order in (1, 2)])
-    demand = follower.demands(places, side)
-    rows = jacobian(follower.robot, exact[0])
-    rates = (rows @ exact[1][..., None])[..., 0].reshape(-1, 2, 3)
-    seconds = demand.second.reshape(-1, 2, 3)
-    tool_peaks = np.array([np.linalg.norm(part, axis=2).max(axis=0) for part in (rates, seconds)])
-    scale = characteristic_length(follower.robot)
+    rates = (known.columns @ exact[1][..., None])[..., 0]
+    tool_peaks = np.array([_sizes(part).max(axis=0) for part in (rates, known.demand.second)])
     for row in tool_peaks:  # what the tool does not do is measured by what it does
-        row[:] = max(row[0], _ASIDE * row[1] * scale), max(row[1], _ASIDE * row[0] / scale)
+        row[:] = (
+            max(row[0], _ASIDE * row[1] * follower.length),
+            max(row[1], _ASIDE * row[0] / follower.length),
+        )
     return Misfit(follower, tolerance, _floored(joint_peaks, duration), _floored(tool_peaks, duration))
 
 
-def _by_kind(rates: Array, turning: NDArray[np.bool_]) -> Array:
+def _sizes(twists: Array) -> Array:
+    """Return the sizes (N, 2) of the linear and the angular part of rows (N, 6)."""
+    return np.asarray(np.linalg.norm(twists.reshape(-1, 2, 3), axis=2))
+
+
+def _by_kind(rates: Array, turning: Flags) -> Array:
     """Return the largest rate (N, n) of any joint that turns, and of any that slides, for each joint (n,)."""
     largest = np.abs(rates).max(axis=0)
     kinds = (largest * turning).max(), (largest * ~turning).max()

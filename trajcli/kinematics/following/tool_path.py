@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from trajcli.curves.invert import times_at
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side
+from trajcli.frozen import frozen
 from trajcli.geometry.pose_curve import PosePath
 from trajcli.geometry.progress import Progress
 from trajcli.geometry.rotation import AXES, Axis
@@ -20,7 +19,7 @@ _THEN = 1e-12  # of the duration: a time this close to a break's is that time
 _ONE_TIME = 1e-9  # of the duration: breaks this close to each other are one
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class ToolPath:
     """Poses along a path, and which of their coordinates count.
 

@@ -6,9 +6,15 @@ import numpy as np
 
 from trajcli.curves.hermite import hermite_coefficients
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, horner
+from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.following.follower import Follower, LostError
 
-_FIRST = 1 / 8  # of a stretch between breaks
+_FIRST = 1 / 8  # of the first stretch between breaks
+_LOOKS = np.array([0.2, 0.5, 0.8])  # of a stretch: where it is asked how fast the tool moves
+_STILL = 1e-9  # lengths of the arm and rad: a stretch with less is done at once
+_SAME = 1e-6  # of a rate: as far as it does not jump at a break
+_SIDES: tuple[Side, Side] = ("left", "right")
+_REST = 0.7  # of what is left of a stretch: with a longer step it is done at once
 _SURE = 0.15  # rad or m: a prediction that is off by more may have led to another branch
 _BULGE = 10.0  # times that a curve through both ends of a step is to be nearer than a prediction from one
 _AIM = 0.05  # rad or m by which predictions may be off
@@ -45,22 +51,26 @@ def track(follower: Follower, breaks: Array) -> PiecewisePolynomial:
         StuckError: When the joints cannot be followed to the end.
     """
     shortest = _SHORTEST * float(breaks[-1] - breaks[0])
-    nodes, pieces, q = [float(breaks[0])], [], follower.start
-    for end in breaks[1:].tolist():
-        place, step = nodes[-1], (end - nodes[-1]) * _FIRST
-        state = _exact(follower, np.array([place]), "right", q[None])[:, 0]
+    nodes, pieces, paces = [float(breaks[0])], [], _paces(follower, breaks)
+    motion = float(breaks[1] - breaks[0]) * _FIRST * float(paces[0])
+    state = _exact(follower, breaks[:1], "right", follower.start[None])[:, 0]
+    turns = _turns(follower, breaks)
+    for end, pace, turned in zip(breaks[1:].tolist(), paces.tolist(), turns.tolist(), strict=True):
+        place, beyond = nodes[-1], len(nodes) > 1
+        if turned:
+            state, beyond = _exact(follower, np.array([place]), "right", state[:1])[:, 0], False
         while place < end:
-            step = min(step, end - place)
-            if step > 0.7 * (end - place):
-                step = end - place
+            step = end - place if motion > _REST * (end - place) * pace else motion / pace
             try:
                 reached, off = _tried(follower, place, step, state)
                 lost = None
             except LostError as error:
                 off, lost = np.inf, error
             if off > _SURE:
-                step *= 0.3
-                if step < shortest:
+                if beyond:  # derivatives may jump at the break: so far they are those before it
+                    state, beyond = _exact(follower, np.array([place]), "right", state[:1])[:, 0], False
+                motion = 0.3 * step * pace
+                if 0.3 * step < shortest:
                     raise StuckError(place, state[0], state[1], lost)
                 continue
             middle, last = reached[:, 0], reached[:, 1]
@@ -71,10 +81,25 @@ def track(follower: Follower, breaks: Array) -> PiecewisePolynomial:
             half = place + 0.5 * step
             place = end if step == end - place else place + step
             nodes += [half, place]
-            state = last
-            step *= float(np.clip((_AIM / max(off, 1e-12)) ** (1 / _ORDER), 0.5, 3.0))
-        q = state[0]
+            state, beyond = last, False
+            most = max(3.0, motion / (step * pace))
+            motion = step * pace * float(np.clip((_AIM / max(off, 1e-12)) ** (1 / _ORDER), 0.5, most))
     return PiecewisePolynomial(np.array(nodes), np.stack(pieces, axis=1))
+
+
+def _paces(follower: Follower, breaks: Array) -> Array:
+    """Return how fast the tool moves and turns in each stretch (m - 1,), in lengths of the arm and rad."""
+    inner = (breaks[:-1, None] + np.diff(breaks)[:, None] * _LOOKS).reshape(-1)
+    rates = follower.demands(inner, "right").first / np.repeat([follower.length, 1.0], 3)
+    paces = np.abs(rates).sum(axis=1).reshape(-1, _LOOKS.size).max(axis=1)
+    return np.asarray(np.maximum(paces, _STILL / np.diff(breaks)))
+
+
+def _turns(follower: Follower, breaks: Array) -> Flags:
+    """Return for each stretch (m - 1,) whether it begins in another direction than the one before ends."""
+    left, right = (follower.demands(breaks[1:-1], side).first for side in _SIDES)
+    sizes = np.abs([left, right]).max(axis=(0, 2))
+    return np.append(False, np.abs(left - right).max(axis=1) > _SAME * sizes)
 
 
 def _tried(follower: Follower, place: float, step: float, state: Array) -> tuple[Array, float]:

@@ -17,11 +17,11 @@ neighbours exchanged where a slide runs along the axis of a turn beside it: such
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
+from trajcli.frozen import frozen
 from trajcli.kinematics.columns import Column
 from trajcli.kinematics.inverse import slides
 from trajcli.kinematics.inverse.elbow import elbow, is_elbow
@@ -33,7 +33,7 @@ Reach = Callable[[Column, Column, Watch], Sequence[Value]]
 Found = tuple[str, tuple[Choice, ...], Reach]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Base:
     """Three joints that bring a point to a place.
 

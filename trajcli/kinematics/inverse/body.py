@@ -6,12 +6,12 @@ only s, the sum of their turns; elbow and pitch (4R) have joint 1 before it; rol
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
 
 from trajcli.curves.piecewise import Array
+from trajcli.frozen import frozen
 from trajcli.geometry.rotation import AXES, Axis, Flags
 from trajcli.kinematics.columns import dot
 from trajcli.kinematics.inverse.elbow import forward_sign, same_way
@@ -20,7 +20,7 @@ from trajcli.kinematics.jacobian import jacobian
 from trajcli.kinematics.robot import Robot
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Body:
     """The joints by what they do to one axis of the tool.
 

@@ -4,17 +4,25 @@ from __future__ import annotations
 
 from functools import lru_cache
 
+import numpy as np
+
+from trajcli.kinematics.dexterity import RANK_TOLERANCE, characteristic_length
 from trajcli.kinematics.inverse import planar, positioning, spherical_wrist, three_parallel
 from trajcli.kinematics.inverse.lines import Arm, arm_of
 from trajcli.kinematics.inverse.method import Method
+from trajcli.kinematics.jacobian import jacobian
 from trajcli.kinematics.robot import Robot
 
 FAMILIES = (planar.match, spherical_wrist.match, three_parallel.match, positioning.match)
+_PLACES = 3  # configurations: an arm that is singular in all of them is so everywhere
 
 
 @lru_cache(maxsize=16)
 def method_for(robot: Robot) -> Method:
     """Return how the inverse kinematics of a robot is found: the first family that fits, else numerically.
+
+    A family fits only where every joint counts: of a wrist by itself, or where two axes are one, no closed
+    form of lengths tells the joints.
 
     Axes count as parallel when the sine of their angle is at most 1e-9, and as meeting when their distance is
     at most 1e-9 of the arm's length.
@@ -25,9 +33,20 @@ def method_for(robot: Robot) -> Method:
     arm = arm_of(robot)
     for match in FAMILIES:
         method = match(arm)
-        if method is not None:
+        if method is not None and _every_joint_counts(robot, method):
             return method
     return numeric_method(arm)
+
+
+def _every_joint_counts(robot: Robot, method: Method) -> bool:
+    """Return whether the joints move what the method needs, place or pose, in as many ways as they are."""
+    count = len(robot.joints)
+    places = np.cos(np.square(np.arange(1.0, _PLACES * count + 1.0))).reshape(_PLACES, count)
+    moved = jacobian(robot, places)[:, : 3 if method.needs == "position" else 6]
+    moved[:, :3] /= characteristic_length(robot)
+    values = np.linalg.svd(moved, compute_uv=False)
+    least = RANK_TOLERANCE * np.maximum(values[:, :1], 1.0)  # all of them may be rounding
+    return bool((np.count_nonzero(values > least, axis=-1) == count).any())
 
 
 def numeric_method(arm: Arm) -> Method:

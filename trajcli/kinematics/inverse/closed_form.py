@@ -3,18 +3,19 @@
 Of two mirrored answers (joints 4 and 6 half a turn further, joint 5 bent the other way) the first is judged:
 the hand's rotation is the same product in both.
 
-Blocks do not know of each other, so that the answers are the same whatever the number of threads.
+Blocks do not know of each other, so that the answers are the same whatever the number of threads. What else
+is to be done with every answer is handed in, and done while the block is in the processor's cache.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from trajcli.curves.piecewise import Array
+from trajcli.frozen import frozen
 from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.columns import Entry
 from trajcli.kinematics.inverse.judge import Judge
@@ -23,13 +24,14 @@ from trajcli.kinematics.inverse.method import Choice, Method
 from trajcli.kinematics.inverse.subproblems import Mirrored, Opposed, Turn, Value, Watch, angle
 from trajcli.kinematics.robot import Robot
 
-_BLOCK = 4096  # poses at a time: eight branches of them stay in the processor's cache
+_BLOCK = 6250  # poses at a time: in the processor's cache, and long enough to hide the cost of a call
 _EACH = 3  # blocks for each thread at least: with fewer, threads cost more than they gain
 _WORKSPACE = 1 << 21  # numbers: more than the temporary arrays of a block
 _ORDER: tuple[Choice, ...] = ("shoulder", "elbow", "wrist")
+Settle = Callable[[slice, Array, Array], None]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Candidates:
     """Every branch of a flat batch of N poses, also where the pose is out of reach. Joints come first.
 
@@ -44,8 +46,17 @@ class Candidates:
     watched: Flags
 
 
-def candidates(robot: Robot, arm: Arm, method: Method, poses: Array) -> Candidates:
+def candidates(
+    robot: Robot, arm: Arm, method: Method, poses: Array, settle: Settle | None = None
+) -> Candidates:
     """Return all branches of poses (N, 4, 4) by a method that has a closed form.
+
+    Args:
+        robot: The arm.
+        arm: Its lines.
+        method: Its closed form.
+        poses: T_world_tcp.
+        settle: (which poses, their joints, their gaps) for each block, in any thread; may change them.
 
     Raises:
         ValueError: When the method has none.
@@ -59,6 +70,9 @@ def candidates(robot: Robot, arm: Arm, method: Method, poses: Array) -> Candidat
     watched = np.zeros(count, dtype=bool)
     order, judge, solve = _order(method), Judge(robot), method.solve
     places, misses = joints.transpose(order), gaps.transpose(order)
+    found = Candidates(
+        joints.reshape(len(joints), 2 ** len(twos), count), gaps.reshape(2, 2 ** len(twos), count), watched
+    )
 
     def fill(block: slice) -> None:
         rows = np.ascontiguousarray(poses[block, :3].reshape(-1, 12).T)
@@ -68,10 +82,11 @@ def candidates(robot: Robot, arm: Arm, method: Method, poses: Array) -> Candidat
             _write(value, place)
         misses[0, ..., block], misses[1, ..., block] = judge.gaps(_judged(values, len(twos)), goal)
         watched[block] = watch.rows
+        if settle is not None:
+            settle(block, found.joints[..., block], found.gaps[..., block])
 
     _each(fill, [slice(low, low + _BLOCK) for low in range(0, count, _BLOCK)])
-    branches = (2 ** len(twos), count)
-    return Candidates(joints.reshape(len(robot.joints), *branches), gaps.reshape(2, *branches), watched)
+    return found
 
 
 def _each(work: Callable[[slice], None], blocks: Sequence[slice]) -> None:

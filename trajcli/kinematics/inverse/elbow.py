@@ -1,8 +1,9 @@
 """Two turns about parallel axes in their plane, and the elbow arm that stands on them.
 
 The pair: R2 (l + R3 v) = w with l from axis 2 to axis 3, v from axis 3 to the point, all at right angles to
-the axes. Lengths give l . R3 v = (|w|^2 - |l|^2 - |v|^2) / 2, two answers for the third angle, mirror images
-of each other in the line of w; the second angle follows from the direction of w.
+the axes. Lengths give l . R3 v = (|w|^2 - |l|^2 - |v|^2) / 2 = x, two answers for the third angle, mirror
+images of each other in the line of w. Along l and across it l + R3 v is then (|l|^2 + x, +-y) / |l|, and the
+second angle leads from there to the direction of w.
 
 The elbow arm (axes 2 and 3 parallel, axis 1 not): turns about axes 2 and 3 do not change the component along
 them, so that h2 . R1^-1 t = h2 . p holds with the shoulder's offset and a1 in it. It has two answers for the
@@ -21,16 +22,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from trajcli.kinematics.columns import Column, difference, dot, minus, plus, product
+from trajcli.kinematics.columns import Column, difference, dot, minus, plus, product, total
 from trajcli.kinematics.inverse.lines import Floats, Line, across_floats, parallel
 from trajcli.kinematics.inverse.subproblems import (
-    FREE,
     Turn,
     Watch,
     across,
     levels,
     onto,
-    turned,
     turned_back,
     unit,
 )
@@ -54,11 +53,16 @@ def parallel_pair(
     hand = across(minus(point, three.point), axis)
     way = across(minus(aim, two.point), axis)
     level = product(0.5, difference(difference(dot(way, way), dot(hand, hand)), dot(link, link)))
-    turning = -same_way(two, three)
-    sign = turning if up is None else product(turning, dot(way, up))
-    third = levels(three.direction, hand, link, level, watch, watch.length**2, sign)
-    reached = plus(link, turned(hand, three.direction, third))
-    return unit(onto(axis, reached, way), watch, FREE * watch.length**2), third
+    same = same_way(two, three)
+    sign = -same if up is None else product(-same, dot(way, up))
+    third, (x, y) = levels(three.direction, hand, link, level, watch, watch.length**2, sign)
+    square = float(dot(link, link))
+    scale = watch.length * float(np.sqrt(square))
+    along, aside = unit((total(square, x), product(same, y)), watch, scale)
+    cosine, sine = unit(onto(axis, link, way), watch, scale)
+    middle = product(cosine, along), product(sine, along)
+    apart = product(sine, aside), product(difference(0.0, cosine), aside)
+    return watch.fork_again(middle, apart), third
 
 
 def shoulder_turn(
@@ -66,7 +70,8 @@ def shoulder_turn(
 ) -> Turn:
     """Return the turns (2, ..., B) about line one that give normal . R1^-1 (t - o) the value of the point."""
     level = dot(normal, minus(point, one.point))
-    return levels(one.opposite.direction, minus(target, one.point), normal, level, watch, watch.length, sign)
+    direction = one.opposite.direction
+    return levels(direction, minus(target, one.point), normal, level, watch, watch.length, sign)[0]
 
 
 def before(one: Line, target: Column, turn: Turn) -> Column:

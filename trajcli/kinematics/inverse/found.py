@@ -16,6 +16,7 @@ from trajcli.kinematics.inverse.numeric import refine
 from trajcli.kinematics.inverse.target import Target, closure_of
 from trajcli.kinematics.robot import Robot
 
+_EXACT = 1e-14  # m and rad: nothing is left to take away
 _ROUNDED = 1e-11  # m and rad: above, rounding has grown and one Newton step takes it away
 _NEAR = 1e-5  # m and rad: further off, a branch does not exist and is left where it is
 
@@ -26,7 +27,7 @@ class Found:
 
     Attributes:
         method: How they were found.
-        joints: Shape (n, branches, N).
+        joints: Shape (n, branches, N), with the turns chosen where nothing is suspect.
         closure: Shape (2, branches, N), m and rad.
         valid: Shape (branches, N).
         suspect: Shape (N,): poses whose answers may be singular or repeat each other.
@@ -85,7 +86,18 @@ def closures(robot: Robot, target: Target, joints: Array) -> Array:
     return closure.T.reshape(2, branches, poses).copy()
 
 
-def polish(robot: Robot, target: Target, joints: Array, closure: Array, watched: Flags) -> None:
+def rough(closure: Array) -> Flags:
+    """Return which poses (N,) have a branch that rounding keeps away, by closures (2, branches, N)."""
+    return np.asarray(_rough(np.maximum(closure[0], closure[1])).any(axis=0))
+
+
+def _rough(miss: Array) -> Flags:
+    return np.asarray((miss > _ROUNDED) & (miss < _NEAR))
+
+
+def polish(
+    robot: Robot, target: Target, joints: Array, closure: Array, watched: Flags, rows: NDArray[np.intp]
+) -> None:
     """Take rounding away from joints (n, branches, N) and closure (2, branches, N), in place.
 
     Args:
@@ -94,15 +106,16 @@ def polish(robot: Robot, target: Target, joints: Array, closure: Array, watched:
         joints: What a closed form found.
         closure: How far it is from the targets.
         watched: Shape (N,): poses where two branches fall together, and are taken further.
+        rows: The poses that are `rough` or watched.
     """
-    worst = np.maximum(closure[0], closure[1])
-    poor = (worst > _ROUNDED) & (worst < _NEAR)
-    if watched.any():
-        poor |= watched & (closure[0] < _NEAR)
-    branches, rows = np.nonzero(poor)
-    if len(rows):
-        some = target.rows(rows)
-        better = refine(robot, some, joints[:, branches, rows].T)
-        joints[:, branches, rows] = better.T
-        watched[rows] = True  # it may have moved onto its neighbour
-        closure[:, branches, rows] = closure_of(some, forward(robot, better)).T
+    near = closure[:, :, rows]
+    miss = np.maximum(near[0], near[1])
+    poor = _rough(miss) | (watched[rows] & (near[0] < _NEAR) & (miss > _EXACT))
+    branches, places = np.nonzero(poor)
+    if len(places):
+        poses = rows[places]
+        some = target.rows(poses)
+        better = refine(robot, some, joints[:, branches, poses].T)
+        joints[:, branches, poses] = better.T
+        watched[poses] = True  # it may have moved onto its neighbour
+        closure[:, branches, poses] = closure_of(some, forward(robot, better)).T

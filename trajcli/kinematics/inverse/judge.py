@@ -4,7 +4,7 @@ Forward kinematics takes the cosines and sines of the closed form, which saves m
 are their arc tangents to the last bit, and a pair that had not length 1 would show as a gap.
 
 Everything is seen from the first link, where the others start from exact zeros and ones: the goal is carried
-there through the base and the first joint, which has the fewest answers.
+there through the first joint, which has the fewest answers.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from trajcli.kinematics.columns import (
     Entry,
     advance,
     combine,
-    dot,
     minus,
     plus,
     product,
     scaled,
     total,
+    uncombine,
 )
 from trajcli.kinematics.inverse.lines import Floats, Goal
 from trajcli.kinematics.inverse.subproblems import Turn, added, turned_back
@@ -44,7 +44,7 @@ class Judge:
     """Forward kinematics of one robot, to be compared with goals."""
 
     def __init__(self, robot: Robot) -> None:
-        """Take the robot's links, base and tool.
+        """Take the robot's links and tool.
 
         Raises:
             InputError: When the robot has no geometry.
@@ -52,8 +52,6 @@ class Judge:
         self._links = links_of(robot)
         turns = np.transpose(cos_sin([link.theta for link in self._links])).tolist()
         self._offsets = [cast("Turn", tuple(turn)) for turn in turns]
-        self._into_base = [cast("Floats", tuple(row)) for row in robot.base[:3, :3].T.tolist()]
-        self._base = cast("Floats", tuple(robot.base[:3, 3].tolist()))
         self._tool_rows = robot.tool[:3, :3].tolist()
         self._tool_tip = robot.tool[:3, 3].tolist()
 
@@ -80,23 +78,19 @@ class Judge:
         return np.sqrt(_square(frame.p, self._seen_place(goal.p, first))), np.sqrt(turned)
 
     def _seen(self, vector: Column, value: Turn | Entry) -> Column:
-        """Return a direction in world as the first link sees it behind its joint."""
+        """Return a direction in the base as the first link sees it behind its joint."""
         link = self._links[0]
         turn, _ = _motion(link, self._offsets[0], value)
-        return turned_back(turned_back(self._in_base(vector), _X, link.before[1:]), _Z, turn)
+        return turned_back(turned_back(vector, _X, link.before[1:]), _Z, turn)
 
     def _seen_place(self, place: Column, value: Turn | Entry) -> Column:
-        """Return a place in world as the first link sees it behind its joint."""
+        """Return a place in the base as the first link sees it behind its joint."""
         link = self._links[0]
         a, *twist = link.before
         turn, distance = _motion(link, self._offsets[0], value)
-        local = advance(self._in_base(minus(place, self._base)), -a, _X)
+        local = advance(place, -a, _X)
         local = turned_back(local, _X, (twist[0], twist[1]))
         return turned_back(minus(local, scaled(distance, _Z)), _Z, turn)
-
-    def _in_base(self, vector: Column) -> Column:
-        first, second, third = (dot(row, vector) for row in self._into_base)
-        return first, second, third
 
 
 class _Frame:
@@ -149,14 +143,14 @@ class _Frame:
     def x(self) -> Column:
         """First axis."""
         cosine, sine = self._turn
-        join = plus if self._flip_y > 0.0 else minus
-        return join(scaled(cosine, self._x), scaled(sine, self._y))
+        join = combine if self._flip_y > 0.0 else uncombine
+        return join(cosine, self._x, sine, self._y)
 
     def _turned_y(self) -> Column:
         """Return the second axis but for its sign."""
         cosine, sine = self._turn
-        join = minus if self._flip_y > 0.0 else plus
-        return join(scaled(cosine, self._y), scaled(sine, self._x))
+        join = uncombine if self._flip_y > 0.0 else combine
+        return join(cosine, self._y, sine, self._x)
 
 
 def _motion(link: Link, offset: Turn, value: Turn | Entry) -> tuple[Turn, Entry]:
@@ -174,5 +168,11 @@ def _weighted(weights: Sequence[float], axes: Sequence[Column]) -> Column:
 
 def _square(a: Column, b: Column) -> Array:
     """Return |a - b|^2."""
-    first, second, third = (np.square(x - y) for x, y in zip(a, b, strict=True))
-    return np.asarray(first + second + third)
+    gaps = [np.asarray(x - y) for x, y in zip(a, b, strict=True)]
+    shape = np.broadcast_shapes(*(gap.shape for gap in gaps))
+    gaps.sort(key=lambda gap: gap.shape != shape)
+    first, second, third = (np.square(gap, out=gap) for gap in gaps)
+    result: Array = first if first.shape == shape else np.broadcast_to(first, shape).copy()
+    result += second
+    result += third
+    return result

@@ -10,7 +10,6 @@ Source: Murray, Li and Sastry, A Mathematical Introduction to Robotic Manipulati
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from math import hypot
 from typing import cast
@@ -18,6 +17,7 @@ from typing import cast
 import numpy as np
 
 from trajcli.curves.piecewise import Array
+from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.chain import links_of, travel
 from trajcli.kinematics.columns import Column, Entry, combine, cross, dot, minus, plus, scaled
 from trajcli.kinematics.dexterity import characteristic_length
@@ -31,7 +31,7 @@ Floats = tuple[float, float, float]
 _AXES: tuple[Floats, Floats, Floats] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-@dataclass(frozen=True)
+@comparable
 class Line:
     """The axis of one joint at zero: unit direction, pointing as the joint counts, and a point on it, m."""
 
@@ -46,7 +46,7 @@ class Line:
         return Line(self.prismatic, (-x + 0.0, -y + 0.0, -z + 0.0), self.point)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Arm:
     """The lines of all joints, the tcp's pose at zero in the base, and lengths to judge by.
 
@@ -91,24 +91,27 @@ class Goal:
     """One block of target poses as the displacement from zero: G with G H = T, whatever base and tool.
 
     Attributes:
-        x, y, z, p: Columns of the targets in world, each entry an array (B,).
+        x, y, z, p: Columns of the targets in the base, each entry an array (B,).
     """
 
     def __init__(self, arm: Arm, rows: Array) -> None:
         """Take the twelve upper entries of the poses, row by row, shape (12, B)."""
-        self.x, self.y, self.z, self.p = ((rows[i], rows[4 + i], rows[8 + i]) for i in range(4))
-        self._into_base = [cast("Floats", tuple(row)) for row in arm.base[:3, :3].T.tolist()]
-        self._base = cast("Floats", tuple(arm.base[:3, 3].tolist()))
+        into_base = [cast("Floats", tuple(row)) for row in arm.base[:3, :3].T.tolist()]
+        x, y, z, p = ((rows[i], rows[4 + i], rows[8 + i]) for i in range(4))
+        p = minus(p, cast("Floats", tuple(arm.base[:3, 3].tolist())))
+        self.x, self.y, self.z, self.p = (
+            (dot(into_base[0], v), dot(into_base[1], v), dot(into_base[2], v)) for v in (x, y, z, p)
+        )
         self._home = arm.home
 
     def direction(self, vector: Column) -> Column:
         """Return where the displacement turns a direction that was `vector` at zero."""
-        return self._in_base(self._turned(np.asarray(vector) @ self._home[:3, :3]))
+        return self._turned(np.asarray(vector) @ self._home[:3, :3])
 
     def point(self, point: Column) -> Column:
         """Return where the displacement takes a point of the tool that was at `point` at zero."""
         local = (np.asarray(point) - self._home[:3, 3]) @ self._home[:3, :3]
-        return self._in_base(minus(plus(self._turned(local), self.p), self._base))
+        return plus(self._turned(local), self.p)
 
     def view(self, vector: Column) -> Column:
         """Return what the displacement turns to `vector`: the inverse of `direction`."""
@@ -118,10 +121,6 @@ class Goal:
     def _turned(self, local: Array) -> Column:
         a, b, c = (0.0 if abs(entry) < _DUST else float(entry) for entry in local)
         return plus(combine(a, self.x, b, self.y), scaled(c, self.z))
-
-    def _in_base(self, vector: Column) -> Column:
-        first, second, third = (dot(row, vector) for row in self._into_base)
-        return first, second, third
 
 
 class InverseGoal(Goal):

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import product
 from typing import Literal
 
+from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.inverse.lines import Floats, Goal
 from trajcli.kinematics.inverse.subproblems import Value, Watch
 
@@ -15,7 +15,7 @@ Solver = Callable[[Goal, Watch], Sequence[Value]]
 NAMES = {"shoulder": ("left", "right"), "elbow": ("up", "down"), "wrist": ("no_flip", "flip")}
 
 
-@dataclass(frozen=True)
+@comparable
 class Branch:
     """The name of a branch, in the words of a job's `configuration`; None where there is no such choice."""
 
@@ -27,7 +27,7 @@ class Branch:
         return " ".join(name for name in (self.shoulder, self.elbow, self.wrist) if name) or "only"
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Method:
     """How the inverse kinematics of one arm is found.
 

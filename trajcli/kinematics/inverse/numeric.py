@@ -16,11 +16,10 @@ Robotics 27 (2011).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from trajcli.curves.piecewise import Array
+from trajcli.frozen import frozen
 from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.inverse.target import Target, residual_jacobian, residuals
@@ -39,7 +38,7 @@ _LONGEST = 1.0  # rad, or arm lengths, a joint goes in one step
 SAME = 1e-6  # rad or m, within which two answers are one
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Search:
     """What the search found for a flat batch.
 
@@ -74,20 +73,25 @@ def damped_step(errors: Array, slopes: Array, damping: Array) -> Array:
 
 def refine(robot: Robot, target: Target, q: Array, iterations: int = 4) -> Array:
     """Return joint values (K, n) moved by undamped least-squares steps, each kept only where it gains."""
+    return refined(robot, target, q, iterations)[0]
+
+
+def refined(robot: Robot, target: Target, q: Array, iterations: int) -> tuple[Array, Array, Array]:
+    """Return what `refine` does, with scaled residuals (K, m) and their Jacobian (K, m, n) there."""
     errors, slopes = linearised(robot, target, q)
+    q, running = q.copy(), np.arange(len(q))
     for _ in range(iterations):
-        if (np.abs(errors) <= DONE).all():
+        running = running[np.abs(errors[running]).max(axis=1) > DONE]
+        if not len(running):
             break
-        inverse = np.linalg.pinv(slopes, rcond=1e-9)
-        candidate = q + np.clip((inverse @ errors[..., None])[..., 0], -_LONGEST, _LONGEST)
-        new_errors, new_slopes = linearised(robot, target, candidate)
-        gains = np.square(new_errors).sum(axis=1) < np.square(errors).sum(axis=1)
-        if not gains.any():
-            break
-        q = np.where(gains[:, None], candidate, q)
-        errors = np.where(gains[:, None], new_errors, errors)
-        slopes = np.where(gains[:, None, None], new_slopes, slopes)
-    return q
+        inverse = np.linalg.pinv(slopes[running], rcond=1e-9)
+        step = (inverse @ errors[running, :, None])[..., 0]
+        trial = q[running] + np.clip(step, -_LONGEST, _LONGEST)
+        new_errors, new_slopes = linearised(robot, target.rows(running), trial)
+        gains = np.square(new_errors).sum(axis=1) < np.square(errors[running]).sum(axis=1)
+        running = running[gains]
+        q[running], errors[running], slopes[running] = trial[gains], new_errors[gains], new_slopes[gains]
+    return q, errors, slopes
 
 
 def descend(robot: Robot, target: Target, q: Array, bounds: Array | None) -> tuple[Array, Flags]:

@@ -19,8 +19,8 @@ Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from trajcli.frozen import frozen
 from trajcli.kinematics.columns import dot, minus, product
 from trajcli.kinematics.inverse.elbow import parallel_pair, same_way
 from trajcli.kinematics.inverse.lines import Arm, Floats, Goal, Line, aside, parallel, perpendicular
@@ -31,7 +31,7 @@ from trajcli.kinematics.inverse.subproblems import Turn, Value, Watch, added, on
 _NAMES = {"RR": "planar 2R", "RP": "planar RP", "RRR": "planar 3R", "RPR": "planar RPR"}
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Planar:
     """The solver of one arm.
 

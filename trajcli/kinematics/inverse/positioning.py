@@ -7,15 +7,15 @@ two or four, RPP two, PPP one. The orientation follows; a target that fixes it i
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from trajcli.frozen import frozen
 from trajcli.kinematics.inverse.bases import Base, base_of
 from trajcli.kinematics.inverse.lines import Arm, Floats, Goal
 from trajcli.kinematics.inverse.method import Method
 from trajcli.kinematics.inverse.subproblems import Value, Watch
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Positioning:
     """The solver of one arm."""
 

@@ -14,17 +14,18 @@ posture meets by search.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
+from trajcli.frozen import frozen
 from trajcli.geometry.rotation import Axis, Flags
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.body import body_of
 from trajcli.kinematics.inverse.closed_form import candidates
-from trajcli.kinematics.inverse.found import Found, closures, joined, polish
+from trajcli.kinematics.inverse.found import Found, closures, joined, polish, rough
 from trajcli.kinematics.inverse.lines import Arm
 from trajcli.kinematics.inverse.method import Method
 from trajcli.kinematics.inverse.nearest_member import nearest_members
@@ -40,7 +41,7 @@ _CORRECTIONS = 20
 _BLOCK = 256  # targets at a time, so that the memory that samples take does not grow with their number
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Postures:
     """Tells the posture of a configuration.
 
@@ -116,7 +117,7 @@ def _block(
     joints = _by_posture(raw.joints, poses)
     closure = closures(robot, target, joints)
     watched = poses.watched | raw.watched.reshape(-1, count).any(axis=0)
-    polish(robot, target, joints, closure, watched)
+    polish(robot, target, joints, closure, watched, np.flatnonzero(rough(closure) | watched))
     named = method if poses.ways == 1 else replace(method, choices=(*method.choices, "wrist"))
     found = Found(
         named, joints, closure, closure.max(axis=0) <= tolerance, watched, poses.free, poses.freedom, True
@@ -127,6 +128,8 @@ def _block(
         work.mend(found)
         work.bring_near(found)
         found.closure, found.suspect = closures(robot, target, found.joints), np.ones(count, dtype=bool)
+    else:
+        choose_turns(robot, found.joints, near.T)
     return found
 
 
@@ -146,7 +149,7 @@ def _by_posture(joints: Array, poses: WholePoses) -> Array:
     return np.take_along_axis(parted, own, axis=2).reshape(len(joints), -1, count)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class _Work:
     """Answers of sampled poses on their way to one for each posture: joints (n, postures, N), valid or not.
 

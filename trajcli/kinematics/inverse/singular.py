@@ -9,15 +9,14 @@ there too. A stretched elbow fails that, an aligned wrist does not.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
+from trajcli.frozen import frozen
 from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.inverse.nearest_member import MET
-from trajcli.kinematics.inverse.numeric import SAME, linearised, refine, starting_points
+from trajcli.kinematics.inverse.numeric import SAME, linearised, refined, starting_points
 from trajcli.kinematics.inverse.target import Target
 from trajcli.kinematics.inverse.turns import FULL, revolute
 from trajcli.kinematics.robot import Robot
@@ -29,7 +28,7 @@ _PLACES = 8  # configurations among which one is not singular
 _IN_LINE = 2  # joints that two axes in line leave free together
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Families:
     """What is known of K configurations.
 
@@ -51,16 +50,16 @@ def families(robot: Robot, target: Target, joints: Array, freedom: int = 0) -> F
         joints: Shape (K, n).
         freedom: How many motions the targets leave free where the arm is not singular.
     """
-    singular, lost = np.zeros(len(joints), dtype=bool), _null_space(robot, target, joints)
+    singular, lost = np.zeros(len(joints), dtype=bool), _null_space(linearised(robot, target, joints)[1])
     free = _joints_in(lost) if freedom else np.zeros(joints.shape, dtype=bool)
     candidates = np.flatnonzero(_count(lost) > freedom)
     if len(candidates):
         some, start = target.rows(candidates), joints[candidates]
         direction = lost[candidates, -1]
-        trial = refine(robot, some, start + _STEP * direction, 8)
+        trial, errors, slopes = refined(robot, some, start + _STEP * direction, 8)
         moved = np.abs(np.einsum("kn,kn->k", trial - start, direction)) > 0.4 * _STEP
-        there = _null_space(robot, some, trial)
-        real = moved & _met(robot, some, trial) & (_count(there) > freedom)
+        there, met = _null_space(slopes), np.linalg.norm(errors, axis=1) <= MET
+        real = moved & met & (_count(there) > freedom)
         singular[candidates[real]] = True
         free[candidates[real]] = _joints_in(there[real])
     return Families(singular, free)
@@ -69,7 +68,8 @@ def families(robot: Robot, target: Target, joints: Array, freedom: int = 0) -> F
 def freedom_of(robot: Robot, target: Target) -> int:
     """Return how many motions of its joints a flat target leaves to an arm that is not singular."""
     somewhere = starting_points(robot, _PLACES, 0)
-    lost = _null_space(robot, target.rows(np.zeros(_PLACES, dtype=np.intp)), somewhere)
+    _, slopes = linearised(robot, target.rows(np.zeros(_PLACES, dtype=np.intp)), somewhere)
+    lost = _null_space(slopes)
     return int(_count(lost).min())
 
 
@@ -84,7 +84,7 @@ def one_of_each(robot: Robot, joints: Array, valid: Flags, free: Flags, near: Ar
     few = (free.sum(axis=2) > 0) & (free.sum(axis=2) <= _IN_LINE)
     way = np.zeros(joints.shape) if near is None else joints - near[:, None]
     distance = np.abs(np.where(turning, way - FULL * np.round(way / FULL), way)).max(axis=2)
-    for i in range(1, valid.shape[1]):
+    for i in np.flatnonzero((few & keep).any(axis=0)):
         for j in range(i):
             gap = joints[:, i] - joints[:, j]
             gap = np.where(turning, gap - FULL * np.round(gap / FULL), gap)
@@ -96,11 +96,10 @@ def one_of_each(robot: Robot, joints: Array, valid: Flags, free: Flags, near: Ar
     return keep
 
 
-def _null_space(robot: Robot, target: Target, joints: Array) -> Array:
+def _null_space(slopes: Array) -> Array:
     """Return (K, n, n): rows that span the motions with the tcp at rest, zero for those that move it."""
-    _, slopes = linearised(robot, target, joints)
     _, values, right = np.linalg.svd(slopes)
-    size = np.zeros(joints.shape)
+    size = np.zeros(right.shape[:2])
     size[:, : values.shape[1]] = values
     lost = size <= RANK * values[:, :1]
     return np.where(lost[..., None], right, 0.0)
@@ -114,8 +113,3 @@ def _count(lost: Array) -> NDArray[np.intp]:
 def _joints_in(lost: Array) -> Flags:
     """Return the joints that take part in the motions of a null space, shape (K, n)."""
     return np.asarray((np.abs(lost) > _PART).any(axis=1))
-
-
-def _met(robot: Robot, target: Target, joints: Array) -> Flags:
-    errors, _ = linearised(robot, target, joints)
-    return np.asarray(np.linalg.norm(errors, axis=1) <= MET)

@@ -112,9 +112,9 @@ def ball(
     else:
         link, hand = minus(three.point, center), minus(point, three.point)
         level = product(0.5, difference(difference(dot(way, way), dot(hand, hand)), dot(link, link)))
-        third = levels(three.direction, hand, link, level, watch, watch.length**2)
+        third, _ = levels(three.direction, hand, link, level, watch, watch.length**2)
         hand = plus(link, turned(hand, three.direction, third))
-    second = levels(two.direction, hand, one.direction, dot(one.direction, way), watch, watch.length)
+    second, _ = levels(two.direction, hand, one.direction, dot(one.direction, way), watch, watch.length)
     first = onto(one.direction, turned(hand, two.direction, second), way)
     return unit(first, watch, FREE * watch.length**2), second, third
 

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
+from trajcli.frozen import frozen
 from trajcli.geometry.rotation import Axis, Flags
 from trajcli.kinematics.inverse.method import Branch, Method
 from trajcli.kinematics.inverse.turns import beyond
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Solutions:
     """Every branch of every target.
 

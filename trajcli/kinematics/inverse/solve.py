@@ -15,7 +15,7 @@ from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.choose import method_for
 from trajcli.kinematics.inverse.closed_form import candidates
 from trajcli.kinematics.inverse.complete import complete
-from trajcli.kinematics.inverse.found import Found, by_name, closures, polish
+from trajcli.kinematics.inverse.found import Found, by_name, closures, polish, rough
 from trajcli.kinematics.inverse.lines import PARALLEL, Arm, arm_of
 from trajcli.kinematics.inverse.method import Method
 from trajcli.kinematics.inverse.nearest_member import nearest_members
@@ -59,7 +59,6 @@ def solve(
     stuck = flat.orientation in ("direction", "yaw", "pitch") and _is_stuck(robot, arm, flat)
     found = _find(robot, arm, flat, close_to, tolerance)
     singular, free = _resolve(robot, flat, found, close_to, tolerance)
-    choose_turns(robot, found.joints, None if close_to is None else close_to.T)
     arrays = (found.joints, found.closure, free, found.valid[None], singular[None])
     joints, closure, freed, valid, lost = (_batch_first(array, wanted.batch) for array in arrays)
     bounds, fixed = robot.limits.position, flat.tool_axis if stuck else None
@@ -72,7 +71,7 @@ def _find(robot: Robot, arm: Arm, target: Target, near: Array | None, tolerance:
     if method.solve is None:
         return _searched(robot, method, target, near, tolerance)
     if fits(method, target, robot.base):
-        return _closed(robot, arm, method, target, tolerance)
+        return _closed(robot, arm, method, target, near, tolerance)
     from trajcli.kinematics.inverse.postures import Postures, by_postures
 
     if method.needs == "pose":
@@ -142,18 +141,29 @@ def _is_stuck(robot: Robot, arm: Arm, target: Target) -> bool:
     return stuck
 
 
-def _closed(robot: Robot, arm: Arm, method: Method, target: Target, tolerance: float) -> Found:
-    raw = candidates(robot, arm, method, target.poses)
-    joints, closure = raw.joints, raw.gaps
-    if not target.whole:
-        closure = closures(robot, target, joints)
-    polish(robot, target, joints, closure, raw.watched)
-    worst, free = np.maximum(closure[0], closure[1]), np.zeros(len(joints), dtype=bool)
-    found = Found(method, joints, closure, worst <= tolerance, raw.watched, free, 0, closed=True)
-    missed = np.flatnonzero(~found.valid.any(axis=0))
+def _closed(
+    robot: Robot, arm: Arm, method: Method, target: Target, near: Array | None, tolerance: float
+) -> Found:
+    count = len(target.poses)
+    valid, poor = np.zeros((len(method.branches), count), dtype=bool), np.zeros(count, dtype=bool)
+
+    def settle(rows: slice, joints: Array, closure: Array) -> None:
+        if not target.whole:
+            closure[:] = closures(robot, target.rows(rows), joints)
+        np.less_equal(np.maximum(closure[0], closure[1]), tolerance, out=valid[:, rows])
+        poor[rows] = rough(closure)
+        choose_turns(robot, joints, None if near is None else near[rows].T, np.pi)
+
+    raw = candidates(robot, arm, method, target.poses, settle)
+    joints, closure, watched = raw.joints, raw.gaps, raw.watched
+    rows = np.flatnonzero(poor | watched)
+    if len(rows):
+        polish(robot, target, joints, closure, watched, rows)
+        valid[:, rows] = closure[:, :, rows].max(axis=0) <= tolerance
+    missed = np.flatnonzero(~valid.any(axis=0))
     if len(missed):
-        found.closure[..., missed] = closures(robot, target.rows(missed), joints[..., missed])
-    return found
+        closure[..., missed] = closures(robot, target.rows(missed), joints[..., missed])
+    return Found(method, joints, closure, valid, watched, np.zeros(len(joints), dtype=bool), 0, closed=True)
 
 
 def _searched(robot: Robot, method: Method, target: Target, near: Array | None, tolerance: float) -> Found:
@@ -195,28 +205,31 @@ def _ordered(array: NDArray[Any], order: NDArray[np.intp]) -> NDArray[Any]:
 def _resolve(
     robot: Robot, target: Target, found: Found, near: Array | None, tolerance: float
 ) -> tuple[Flags, Flags]:
-    """Find the families of suspect poses, move to their nearest members, and drop repetitions.
+    """Find the families of suspect poses, move to their nearest members, drop repetitions, choose turns.
 
     Where the targets leave some freedom the members are the nearest ones already.
     """
     singular, free = np.zeros(found.valid.shape, dtype=bool), np.zeros(found.joints.shape, dtype=bool)
-    free[:] = found.free[:, None, None] & found.valid
+    if found.free.any():
+        free[:] = found.free[:, None, None] & found.valid
     suspects = np.flatnonzero(found.suspect)
     if not len(suspects):
         return singular, free
     some, close_to = target.rows(suspects), None if near is None else near[suspects]
-    joints, valid = found.joints[:, :, suspects].transpose(2, 1, 0).copy(), found.valid[:, suspects].T.copy()
+    before = found.joints[:, :, suspects].transpose(2, 1, 0)
+    joints, valid = before.copy(), found.valid[:, suspects].T.copy()
     lost, freed = _families(robot, some, joints, valid, found.freedom, close_to)
     valid = distinct(robot, joints, valid)
     if found.closed and not found.freedom and complete(robot, some, joints, valid, lost, close_to):
         lost, freed = _families(robot, some, joints, valid, 0, close_to)
-    closure = closures(robot, some, joints.transpose(2, 1, 0))
-    met = closure.max(axis=0) <= tolerance
-    valid = distinct(robot, joints, valid & met.T)
+    if (joints != before).any():
+        closure = closures(robot, some, joints.transpose(2, 1, 0))
+        valid = distinct(robot, joints, valid & (closure.max(axis=0) <= tolerance).T)
+        found.closure[:, :, suspects] = closure
     if found.closed:
         valid = one_of_each(robot, joints, valid, freed, close_to)
-    found.joints[:, :, suspects], found.closure[:, :, suspects] = joints.transpose(2, 1, 0), closure
-    found.valid[:, suspects] = valid.T
+    choose_turns(robot, joints.transpose(2, 1, 0), None if close_to is None else close_to.T)
+    found.joints[:, :, suspects], found.valid[:, suspects] = joints.transpose(2, 1, 0), valid.T
     singular[:, suspects], free[:, :, suspects] = (lost & valid).T, freed.transpose(2, 1, 0)
     return singular, free
 

@@ -18,9 +18,10 @@ and Oriolo, Robotics: Modelling, Planning and Control (2009), section 2.12.5.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
+from trajcli.frozen import frozen
 from trajcli.kinematics.columns import Column
 from trajcli.kinematics.inverse.bases import Base, base_of
 from trajcli.kinematics.inverse.elbow import same_way
@@ -45,7 +46,7 @@ from trajcli.kinematics.inverse.subproblems import (
 )
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class SphericalWrist:
     """The solver of one arm."""
 

@@ -11,11 +11,10 @@ Introduction to Robotic Manipulation (1994), section 3.3.2.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from trajcli.curves.piecewise import Array
+from trajcli.frozen import frozen
 from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.columns import (
     Column,
@@ -25,10 +24,11 @@ from trajcli.kinematics.columns import (
     difference,
     dot,
     minus,
+    minus_product,
     plus,
+    plus_product,
     product,
     scaled,
-    total,
 )
 from trajcli.kinematics.inverse.lines import PARALLEL, Floats, across_floats
 
@@ -59,6 +59,10 @@ class Watch:
     def fork(self, middle: Turn, aside: Turn) -> Turn:
         """Return middle + aside, and middle - aside, along the new first axis of one more choice."""
         self.choices += 1
+        return self.fork_again(middle, aside)
+
+    def fork_again(self, middle: Turn, aside: Turn) -> Turn:
+        """Return middle + aside, and middle - aside, along the axis of the last choice."""
         return self._either(middle[0], aside[0]), self._either(middle[1], aside[1])
 
     def _either(self, middle: Entry, aside: Entry) -> Array:
@@ -128,8 +132,8 @@ def added(first: Turn, second: Turn, sign: float = 1.0) -> Turn:
     """Return the turn by the first angle plus `sign` (1 or -1) times the second."""
     (ca, sa), (cb, sb) = first, second
     if sign < 0.0:
-        return total(product(ca, cb), product(sa, sb)), difference(product(sa, cb), product(ca, sb))
-    return difference(product(ca, cb), product(sa, sb)), total(product(sa, cb), product(ca, sb))
+        return plus_product(product(ca, cb), sa, sb), minus_product(product(sa, cb), ca, sb)
+    return minus_product(product(ca, cb), sa, sb), plus_product(product(sa, cb), ca, sb)
 
 
 def angle(turn: Turn, out: Array) -> Array:
@@ -162,7 +166,7 @@ def unit(turn: Turn, watch: Watch, scale: float = 1.0) -> Turn:
 
 def length(turn: Turn) -> Array:
     """Return the root of cosine^2 + sine^2."""
-    square = np.asarray(np.square(turn[0]) + np.square(turn[1]))
+    square = np.asarray(plus_product(product(turn[0], turn[0]), turn[1], turn[1]))
     return np.asarray(np.sqrt(square, out=square if square.ndim else None))
 
 
@@ -183,11 +187,14 @@ def levels(
     watch: Watch,
     scale: float = 1.0,
     sign: Entry = 1.0,
-) -> Turn:
+) -> tuple[Turn, Turn]:
     """Return the two turns about `axis` after which normal . vector is `level` (or comes nearest to it).
 
     normal . R(t) vector = A cos t + B sin t + C. With x = level - C and r^2 = A^2 + B^2 the answers are
     cos t = (A x - B y) / r^2, sin t = (B x + A y) / r^2 for y = +-sqrt(r^2 - x^2).
+
+    (x, y) of the first answer come second: where all is at right angles to the axis, they are the parts of
+    R(t) vector along normal and axis x normal, times the length of normal.
 
     Args:
         axis: Unit vector.
@@ -196,18 +203,12 @@ def levels(
         level: The aim.
         watch: Is told where r vanishes (the angle is free) and where the answers fall together.
         scale: The size that r is compared with.
-        sign: Of y in the first answer, by pose if it is an array; then axis . (vector x normal) = -y there.
+        sign: Of y in the first answer, by pose if it is an array.
     """
     a, b = onto(axis, vector, normal)
     x = difference(level, product(dot(axis, vector), dot(axis, normal)))
-    square = np.square(a) + np.square(b)
-    return _solved(a, b, x, np.asarray(square), np.asarray(square - np.square(x)), watch, (scale, sign))
-
-
-def _solved(
-    a: Entry, b: Entry, x: Entry, square: Array, rest: Array, watch: Watch, scale_sign: tuple[float, Entry]
-) -> Turn:
-    scale, sign = scale_sign
+    square = np.asarray(np.square(a) + np.square(b))
+    rest = np.asarray(minus_product(square, x, x))
     watch.note(np.abs(rest) <= TANGENT**2 * square)
     out = rest < 0.0
     if out.any():
@@ -222,10 +223,10 @@ def _solved(
         watch.note(np.asarray(free & np.ones_like(rest, dtype=bool)))
     a, b = a / square, b / square
     cosine, sine = watch.fork((product(a, x), product(b, x)), (product(difference(0.0, b), y), product(a, y)))
-    return (np.where(free, 1.0, cosine), np.where(free, 0.0, sine)) if some else (cosine, sine)
+    return (np.where(free, 1.0, cosine), np.where(free, 0.0, sine)) if some else (cosine, sine), (x, y)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Mirrored:
     """Turns of two answers half a turn apart: of a choice whose second answer mirrors the first.
 
@@ -245,7 +246,7 @@ class Mirrored:
         return np.stack([cosine, -cosine]), np.stack([sine, -sine])
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Opposed:
     """Turns of two answers by the same angle in opposite directions.
 
@@ -262,7 +263,7 @@ class Opposed:
     def both(self) -> Turn:
         """Return both answers as turns (2, ..., B)."""
         cosine, sine = self.turn
-        return np.stack([cosine, cosine]), np.stack([sine, -sine])
+        return cosine[None], np.stack([sine, -sine])
 
 
 def two_turns(
@@ -276,7 +277,7 @@ def two_turns(
     and pi.
     """
     if not square_wrist(first, second, vector):
-        turn = levels(second, vector, first, dot(first, aim), watch)
+        turn, _ = levels(second, vector, first, dot(first, aim), watch)
         return unit(onto(first, turned(vector, second, turn), aim), watch, FREE), turn
     side = across_floats(second, first)
     turn = dot(side, aim), dot(second, aim)

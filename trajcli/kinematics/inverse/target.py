@@ -6,7 +6,7 @@ world: of the fixed coordinates of the position, m, and of what is fixed of the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
+from trajcli.frozen import frozen
 from trajcli.geometry.axis_angle import exp, log
 from trajcli.geometry.rotation import AXES, Axis
 
@@ -22,7 +23,7 @@ _WHOLE = (True, True, True)
 _ALMOST_UPRIGHT = 1e-12  # of a unit vector: the heading of a vertical direction is not defined
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Target:
     """Targets of one kind.
 

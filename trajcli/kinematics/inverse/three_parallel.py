@@ -21,9 +21,9 @@ instead of lengths; Siciliano, Sciavicco, Villani and Oriolo, Robotics (2009), s
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 
+from trajcli.frozen import frozen
 from trajcli.kinematics.columns import Column, cross, dot, minus, product
 from trajcli.kinematics.inverse.elbow import before, forward_sign, parallel_pair, same_way, shoulder_turn
 from trajcli.kinematics.inverse.hand import hand
@@ -52,7 +52,7 @@ from trajcli.kinematics.inverse.subproblems import (
 _NAMES = {4: "elbow and pitch", 5: "elbow, pitch and roll", 6: "three parallel axes (UR)"}
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class ThreeParallel:
     """The solver of one arm.
 

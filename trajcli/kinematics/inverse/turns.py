@@ -32,29 +32,34 @@ def revolute(robot: Robot) -> Flags:
     return np.array([kind == "revolute" for kind in robot.joint_types])
 
 
-def choose_turns(robot: Robot, joints: Array, near: Array | None) -> None:
+def choose_turns(robot: Robot, joints: Array, near: Array | None, within: float = np.inf) -> None:
     """Move revolute joints (n, branches, N), in place, by full turns into their limits.
 
     Of several turns inside the limits the one nearest to `near` (n, N), or to zero, is taken; of none the one
     with the smallest excess.
+
+    Args:
+        robot: The arm.
+        joints: What is moved.
+        near: Joint values.
+        within: How far from zero no revolute joint is, rad: a joint with wide limits is not even looked at.
     """
     wide = widened(robot.limits.position)
     for i in np.flatnonzero(revolute(robot)):
         low, high = wide[i]
-        values = joints[i]
-        if near is not None:
-            values[:] = _turned(values, near[i], low, high)
+        if near is None and within <= np.pi and low <= -within and within <= high:
             continue
-        low_first, high_last = max(low, -np.pi), min(high, np.pi)
-        if low_first <= values.min(initial=0.0) and values.max(initial=0.0) <= high_last:
-            continue
-        outside = (values < low_first) | (values > high_last)
-        values[outside] = _turned(values[outside], 0.0, low, high)
+        values, aim = joints[i], np.asarray(0.0 if near is None else near[i])
+        outside = values < np.maximum(low, aim - np.pi)
+        outside |= values > np.minimum(high, aim + np.pi)
+        if outside.any():
+            aims = np.broadcast_to(aim, values.shape)[outside]
+            values[outside] = _turned(values[outside], aims, low, high)
 
 
-def _turned(values: Array, aim: Array | float, low: float, high: float) -> Array:
+def _turned(values: Array, aims: Array, low: float, high: float) -> Array:
     first, last = np.ceil((low - values) / FULL), np.floor((high - values) / FULL)
-    wanted = np.round((aim - values) / FULL)
+    wanted = np.round((aims - values) / FULL)
     inside = np.minimum(np.maximum(wanted, first), last)
     below, above = values + FULL * last, values + FULL * first
     outside = np.where(low - below <= above - high, last, first)

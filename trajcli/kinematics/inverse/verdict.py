@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from trajcli.errors import Amount, PlanningError, Problem
+from trajcli.frozen import comparable
 from trajcli.kinematics.inverse.solution import Solutions
 from trajcli.kinematics.robot import Robot
 
 
-@dataclass(frozen=True)
+@comparable
 class OutsideLimits:
     """The least violation with which a target can be met.
 
@@ -66,7 +65,7 @@ def check_reachable(robot: Robot, found: Solutions) -> None:
         metres, radians = found.shortfall[index].tolist()
         raise PlanningError(
             f"{robot.name} cannot reach the pose{which}: "
-            f"it comes within {metres:.6g} m and {radians:.6g} rad",
+            f"it comes within {metres:.6g} m and {round(radians, 12):.6g} rad",
             hint=_way_out(found),
         )
     raise PlanningError(_problem(robot, found, index, which))

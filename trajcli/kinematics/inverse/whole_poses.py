@@ -15,11 +15,10 @@ are coupled in another way.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from trajcli.curves.piecewise import Array
+from trajcli.frozen import frozen
 from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.columns import Column, minus, plus
 from trajcli.kinematics.forward import forward
@@ -46,7 +45,7 @@ SAMPLES = 48  # of what is free: neighbours are 7.5 degrees apart where it is on
 _GOLDEN = 0.6180339887498949  # multiples of it, modulo 1, are spread evenly: a second angle beside the first
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class WholePoses:
     """Poses that meet a flat batch of N targets, as far as the arm can stand so.
 
@@ -119,7 +118,7 @@ def _standing(body: Body, target: Target, near: Array) -> WholePoses:
     return WholePoses(poses, turns, watched, loose + rolling, free)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class _Task:
     """One block of targets for one arm.
 
@@ -192,7 +191,7 @@ class _Task:
         body = self.body
         up, tool = self._to_shoulder(body.up, shoulder), self._rolled(body.marker.direction, roll)
         height = np.sin(self.target.aims[:, 0])
-        return levels(body.axis.direction, tool, up, height, self.watch, 1.0, body.pitch_sign)
+        return levels(body.axis.direction, tool, up, height, self.watch, 1.0, body.pitch_sign)[0]
 
     def _aim(self) -> Column:
         """Return where the tool axis shall point, in the base; of a heading its level part."""

@@ -1,0 +1,93 @@
+"""Poses whose answers may be singular: they are looked at apart, and come back like all others."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from inverse_arms import arm, gap, random_joints
+from scipy.spatial.transform import Rotation
+
+from trajcli.kinematics.forward import forward
+from trajcli.kinematics.inverse.elbow import parallel_pair
+from trajcli.kinematics.inverse.lines import Line
+from trajcli.kinematics.inverse.solve import solve
+from trajcli.kinematics.inverse.subproblems import Watch
+from trajcli.kinematics.inverse.target import partial_target
+
+
+def suspect_joints(robot, rng, count):
+    """Return joints of which the first third is aligned at joint 5, the second stretched at joint 3."""
+    joints = random_joints(robot, rng, count)
+    joints[: count // 3, 4] = np.where(rng.random(count // 3) < 0.5, 0.0, np.pi)
+    joints[count // 3 : 2 * count // 3, 2] = 0.0
+    return joints
+
+
+@pytest.mark.parametrize("with_near", [False, True])
+@pytest.mark.parametrize("name", ["UR", "wrist over elbow"])
+def test_singular_poses_come_back_met_and_turned(name, with_near):
+    rng = np.random.default_rng(5)
+    low = rng.uniform(-5.0, -1.0, 6)
+    robot = arm(name, rng, np.stack([low, low + 2.0 * np.pi], axis=1))
+    joints = suspect_joints(robot, rng, 60)
+    near = joints + rng.normal(size=joints.shape) if with_near else None
+    poses = forward(robot, joints)
+    found = solve(robot, poses, near)
+    assert found.valid.any(axis=1).all()
+    assert (found.within_limits == found.valid).all()  # every angle has one turn inside a full turn
+    off = np.abs(forward(robot, found.joints) - poses[:, None])[..., :3, 3].max(axis=-1)
+    assert off[found.valid].max() < 1e-9
+    assert found.closure[found.valid].max() < 1e-9
+
+
+@pytest.mark.parametrize("name", ["UR", "wrist over elbow"])
+def test_poses_of_all_kinds_do_not_learn_of_each_other(name):
+    robot, rng = arm(name), np.random.default_rng(6)
+    poses = forward(robot, suspect_joints(robot, rng, 12))
+    together = solve(robot, poses)
+    for i, pose in enumerate(poses):
+        alone = solve(robot, pose)
+        assert (together.valid[i] == alone.valid).all()
+        assert (together.singular[i] == alone.singular).all()
+        assert together.joints[i] == pytest.approx(alone.joints, abs=1e-12)
+        assert together.closure[i] == pytest.approx(alone.closure, abs=1e-15)
+
+
+def test_turns_are_chosen_where_a_pitch_has_one_answer_for_each_posture():
+    rng = np.random.default_rng(8)
+    low = np.array([1.0, -4.0, 0.5, -6.0])
+    robot = arm("elbow and pitch", rng, np.stack([low, low + 2.0 * np.pi], axis=1))
+    joints = low + 2.0 * np.pi * rng.random((20, 4))
+    poses = forward(robot, joints)
+    target = partial_target(poses[:, :3, 3], pitch=np.arcsin(poses[:, 2, 2]))
+    found = solve(robot, target)
+    assert (found.within_limits == found.valid).all()
+    assert np.where(found.valid, gap(robot, found.joints, joints[:, None]), 1.0).min(axis=1).max() < 1e-6
+
+
+def turning(line, angle):
+    """Return the motion (4, 4) of a turn about a line."""
+    motion = np.eye(4)
+    motion[:3, :3] = Rotation.from_rotvec(angle * np.array(line.direction)).as_matrix()
+    motion[:3, 3] = line.point - motion[:3, :3] @ line.point
+    return motion
+
+
+@pytest.mark.parametrize("same", [1.0, -1.0])
+@pytest.mark.parametrize("hand", [0.3, 3e-9])
+def test_two_parallel_turns_meet_their_aim_also_where_the_second_is_free(same, hand):
+    rng = np.random.default_rng(9)
+    two = Line(prismatic=False, direction=(0.0, 0.6, 0.8), point=(0.1, 0.0, 0.2))
+    three = Line(prismatic=False, direction=(0.0, 0.6 * same, 0.8 * same), point=(0.5, 0.08, 0.14))
+    tip = np.append(three.point + hand * np.array([0.28, 0.768, -0.576]), 1.0)
+    motions = [turning(two, rng.uniform(-3, 3)) @ turning(three, rng.uniform(-3, 3)) for _ in range(20)]
+    aims = np.array([motion @ tip for motion in motions])
+    watch = Watch(20, 1.0)
+    turns = parallel_pair(two, three, tuple(tip[:3]), tuple(aims[:, :3].T), watch)
+    assert all(np.hypot(*turn) == pytest.approx(1.0, abs=3e-15) for turn in turns)
+    second, third = (np.arctan2(sine, cosine) for cosine, sine in turns)
+    for answer in range(2):
+        for i, aim in enumerate(aims):
+            reached = turning(two, second[answer, i]) @ turning(three, third[answer, i]) @ tip
+            assert reached == pytest.approx(aim, abs=3e-15 if hand > 1e-8 else 3.0 * hand)
+    assert watch.rows.all() == (hand < 1e-8)

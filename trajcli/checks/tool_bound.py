@@ -1,0 +1,134 @@
+"""The largest speeds and accelerations of the tool, for all t: rows, and a proof of what is between them.
+
+On each piece of the curve nine rows give a polynomial of degree 8. What the tool does between the rows is
+beside it by at most f^(9) / 9! times 8! / 4 (h / 8)^9, and that derivative is bounded by those of the joints.
+The polynomial itself lies within the hull of its Bernstein coefficients, which closes in on it when it is
+divided.
+
+Source: Isaacson and Keller, Analysis of Numerical Methods (1966), section 6.3 (equidistant nodes); Farouki,
+The Bernstein polynomial basis, Computer Aided Geometric Design 29 (2012).
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from math import comb, factorial
+
+import numpy as np
+
+from trajcli.curves.piecewise import Array, derivative_coefficients, horner, taylor_shift
+from trajcli.frozen import frozen
+from trajcli.kinematics.jacobian import jacobian_dot_qd, linearisation
+from trajcli.kinematics.majorant import growth, majorants
+from trajcli.kinematics.robot import Robot
+
+_DEGREE = 8
+_BETWEEN = factorial(_DEGREE) / 4 / _DEGREE ** (_DEGREE + 1)
+"""Bounds the product of the distances from nine equidistant nodes of a piece of length 1."""
+_CLOSE = 2.5e-7  # relative: of the remainder, and of the hull
+_SMALL = 1e-3  # m/s, rad/s or by s^2: what is smaller need not be known so well
+_HALVINGS, _DIVISIONS, _MOST = 8, 24, 1 << 16
+
+
+@frozen
+class Bound:
+    """The largest magnitude of a vector over time.
+
+    Attributes:
+        value: The largest one found.
+        time: Where that is.
+        most: What it does not exceed at any time.
+    """
+
+    value: float
+    time: float
+    most: float
+
+
+def tool_bounds(robot: Robot, breaks: Array, coefficients: Array) -> tuple[Bound, Bound, Bound, Bound]:
+    """Return the largest speed, angular speed, acceleration and angular acceleration of the tool.
+
+    Args:
+        robot: The arm.
+        breaks: Of the joints' curve, (P + 1,), s.
+        coefficients: Of its pieces, (degree + 1, P, n), highest power first, from the break on.
+    """
+    starts, lengths = breaks[:-1], np.diff(breaks)
+    long = lengths > 0
+    starts, lengths, coefficients = starts[long], lengths[long], coefficients[:, long]
+    if not lengths.size:
+        still = Bound(0.0, float(breaks[0]), 0.0)
+        return still, still, still, still
+    rows, rest = _known(robot, coefficients, lengths)
+    for _ in range(_HALVINGS):
+        scale = np.maximum(np.linalg.norm(rows, axis=3).max(axis=(1, 2)), _SMALL)
+        coarse = (rest > _CLOSE * scale[:, None]).any(axis=0)
+        if not coarse.any():
+            break
+        half, early = lengths[coarse] / 2, coefficients[:, coarse]
+        late = taylor_shift(early, np.broadcast_to(half[:, None], early.shape[1:]))
+        both = np.concatenate([early, late], axis=1)
+        more, left = _known(robot, both, np.tile(half, 2))
+        coefficients = np.concatenate([coefficients[:, ~coarse], both], axis=1)
+        starts = np.concatenate([starts[~coarse], starts[coarse], starts[coarse] + half])
+        lengths = np.concatenate([lengths[~coarse], half, half])
+        rows = np.concatenate([rows[:, ~coarse], more], axis=1)
+        rest = np.concatenate([rest[:, ~coarse], left], axis=1)
+    found = [_largest(vectors, beside, starts, lengths) for vectors, beside in zip(rows, rest, strict=True)]
+    return found[0], found[1], found[2], found[3]
+
+
+def _known(robot: Robot, coefficients: Array, lengths: Array) -> tuple[Array, Array]:
+    """Return v, w, a, e at nine rows of each piece (4, P, 9, 3), and how far beside they may be between them.
+
+    The latter has the shape (4, P).
+    """
+    inside = lengths[:, None] * np.linspace(0.0, 1.0, _DEGREE + 1)
+    q, qd, qdd = (
+        horner(derivative_coefficients(coefficients, order)[:, :, None], inside[..., None])
+        for order in range(3)
+    )
+    slopes = linearisation(robot, q)[1]
+    first = (slopes @ qd[..., None])[..., 0]
+    second = (slopes @ qdd[..., None])[..., 0] + jacobian_dot_qd(robot, q, qd)
+    rows = np.stack([first[..., :3], first[..., 3:], second[..., :3], second[..., 3:]])
+    n = _DEGREE + 1
+    place, spin = majorants(robot, q[:, 0], growth(coefficients, lengths, n + 2))
+    highest = np.stack(
+        [(n + 1) * place[n + 1], spin[n], (n + 1) * (n + 2) * place[n + 2], (n + 1) * spin[n + 1]]
+    )
+    return rows, highest * _BETWEEN * lengths**n
+
+
+def _largest(rows: Array, rest: Array, starts: Array, lengths: Array) -> Bound:
+    """Return the bound of vectors at nine rows of pieces (P, 9, 3), beside by `rest` (P,) between them."""
+    hull, halves = _matrices()
+    points = hull @ rows
+    value, time, most = 0.0, float(starts.min()), 0.0
+    for _ in range(_DIVISIONS):
+        sizes = np.linalg.norm(points, axis=2)
+        ends = sizes[:, [0, -1]]
+        piece, end = np.unravel_index(int(ends.argmax()), ends.shape)
+        if ends[piece, end] > value:
+            value, time = float(ends[piece, end]), float(starts[piece] + end * lengths[piece])
+        over = sizes.max(axis=1) + rest
+        wide = sizes.max(axis=1) > value + _CLOSE * max(value, _SMALL)
+        if not wide.any() or len(points) > _MOST:
+            return Bound(value, time, max(most, float(over.max())))
+        most = max(most, float(over[~wide].max(initial=0.0)))
+        points = (halves[:, None] @ points[wide]).reshape(-1, *points.shape[1:])
+        rest, lengths = np.tile(rest[wide], 2), np.tile(lengths[wide] / 2, 2)
+        starts = np.tile(starts[wide], 2)
+        starts[len(starts) // 2 :] += lengths[len(starts) // 2 :]
+    return Bound(value, time, max(most, float((np.linalg.norm(points, axis=2).max(axis=1) + rest).max())))
+
+
+@cache
+def _matrices() -> tuple[Array, Array]:
+    """Return what makes Bernstein coefficients of rows (9, 9), and those of both halves of them (2, 9, 9)."""
+    n, x = _DEGREE, np.linspace(0.0, 1.0, _DEGREE + 1)[:, None]
+    k = np.arange(n + 1)
+    chosen = np.array([comb(n, j) for j in range(n + 1)], dtype=np.float64)
+    hull = np.asarray(np.linalg.inv(chosen * x**k * (1.0 - x) ** (n - k)), dtype=np.float64)
+    first = np.array([[comb(i, j) / 2**i for j in range(n + 1)] for i in range(n + 1)])
+    return hull, np.stack([first, first[::-1, ::-1]])
