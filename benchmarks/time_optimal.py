@@ -17,7 +17,8 @@ def ours():
     from scipy.interpolate import CubicSpline
 
     from trajcli.curves.piecewise import PiecewisePolynomial
-    from trajcli.curves.time_optimal.constraints import constrained, joint_demand
+    from trajcli.curves.time_optimal.constraints import joint_demand
+    from trajcli.curves.time_optimal.intervals import constrained
     from trajcli.curves.time_optimal.law import law_of
     from trajcli.curves.time_optimal.solve import solve
 
@@ -28,7 +29,7 @@ def ours():
 
     def run():
         rows = constrained(grid, [joint_demand(path, velocity, acceleration)], nowhere)
-        return law_of(grid, solve(rows, 0.0, 0.0)[0]).duration
+        return law_of(grid, solve(rows, 0.0, 0.0).x).duration
 
     return run, _shown
 

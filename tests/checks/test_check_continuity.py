@@ -20,6 +20,10 @@ QUANTITIES = ("position", "velocity", "acceleration")
 PEAK = {"position": 2.0, "velocity": 1.875, "acceleration": 10 / np.sqrt(3)}
 
 
+def steps_of(*args):
+    return list(acceleration_steps(*args))
+
+
 def bump(kind: str, size: float, duration: float) -> np.ndarray:
     """Return the quintic (6,) that begins with a jump in one quantity and ends in nothing at all."""
     derivatives = np.zeros((3, 2, 1))
@@ -63,7 +67,7 @@ def test_a_valid_motion_has_no_jumps() -> None:
             [1.0, 0.0, 3.0], [-2.0, 0.0, 3.1], [0.4, 0.0, 3.1], duration=0.37, conditions=conditions
         )
         assert judge(curve, limits(3, jerk=1e9)) == []
-        assert acceleration_steps(trajectory(curve)) == []
+        assert steps_of(trajectory(curve)) == []
 
 
 def test_a_step_in_acceleration_is_legal_where_no_jerk_limit_is() -> None:
@@ -75,11 +79,11 @@ def test_a_step_in_acceleration_is_legal_where_no_jerk_limit_is() -> None:
         assert [(f.kind, f.time, f.hint) for f in found] == [("acceleration_jump", 1.0, JERK_HINT)]
         assert found[0].value == pytest.approx(0.25)
     whole = trajectory(curve, end=declared_end(curve))
-    steps = acceleration_steps(whole)
+    steps = steps_of(whole)
     assert [(s.move, s.joint, s.time) for s in steps] == [(0, "j1", 1.0)]
     assert steps[0].size == pytest.approx(0.25)
-    assert acceleration_steps(whole, [FREE]) == steps
-    assert acceleration_steps(whole, [LIMITED]) == []
+    assert steps_of(whole, [FREE]) == steps
+    assert steps_of(whole, [LIMITED]) == []
 
 
 def test_joints_are_judged_one_by_one() -> None:
@@ -89,7 +93,7 @@ def test_joints_are_judged_one_by_one() -> None:
     assert [(f.joint, f.kind, f.time) for f in check_continuity(whole, [bounds])] == [
         ("j3", "acceleration_jump", 0.0)
     ]
-    assert [(s.joint, s.time, round(s.size, 9)) for s in acceleration_steps(whole, [bounds])] == [
+    assert [(s.joint, s.time, round(s.size, 9)) for s in steps_of(whole, [bounds])] == [
         ("j1", 0.0, 6.0),
         ("j1", 1.0, 6.0),
     ]
@@ -128,7 +132,7 @@ def test_a_motion_that_begins_in_an_accelerating_arm_does_not_step() -> None:
     parabola = PiecewisePolynomial(np.array([0.0, 1.0]), np.array([1.0, 0.5, 3.0])[:, None, None])
     whole = trajectory(parabola, start=state([3.0], 0.5, 2.0), end=state([4.5], 2.5, 2.0))
     assert check_continuity(whole, [LIMITED]) == []
-    assert acceleration_steps(whole) == []
+    assert steps_of(whole) == []
 
 
 def test_a_jump_at_a_border_is_the_later_moves() -> None:
@@ -151,7 +155,7 @@ def test_a_step_at_a_border_is_a_finding_where_either_move_steps_and_limits_its_
 
     assert moves_found([cubic, quintic], [FREE, LIMITED]) == []
     assert moves_found([cubic, quintic], [LIMITED, FREE]) == [(0, 0.0)]
-    steps = acceleration_steps(trajectory(cubic, quintic), [FREE, LIMITED])
+    steps = steps_of(trajectory(cubic, quintic), [FREE, LIMITED])
     assert [(s.move, s.time) for s in steps] == [(0, 0.0), (0, 1.0)]
     back = between([1.0], [0.0], duration=1.0)
     assert moves_found([back, cubic], [LIMITED, FREE]) == []
@@ -171,7 +175,7 @@ def test_an_acceleration_of_a_rounding_is_zero() -> None:
     coefficients[3] += 1e-13
     whole = trajectory(cubics(0.0, 1.0)[0], PiecewisePolynomial(quintic.breaks, coefficients))
     assert check_continuity(whole, [FREE, LIMITED]) == []
-    assert [s.move for s in acceleration_steps(whole)] == [0, 0]
+    assert [s.move for s in steps_of(whole)] == [0, 0]
 
 
 def test_a_move_joined_with_the_same_acceleration_does_not_step() -> None:
@@ -180,7 +184,7 @@ def test_a_move_joined_with_the_same_acceleration_does_not_step() -> None:
         PiecewisePolynomial(np.array([0.0, 1.0]), np.array([1.0, 2.0, 1.0])[:, None, None]),
     ]
     whole = trajectory(*parts, end=state([4.0], 4.0))
-    assert [(s.time, s.size, s.move) for s in acceleration_steps(whole)] == [(0.0, 2.0, 0), (2.0, -2.0, 1)]
+    assert [(s.time, s.size, s.move) for s in steps_of(whole)] == [(0.0, 2.0, 0), (2.0, -2.0, 1)]
 
 
 def test_the_largest_of_many_steps_is_named_and_of_equal_ones_the_first() -> None:
@@ -192,7 +196,7 @@ def test_the_largest_of_many_steps_is_named_and_of_equal_ones_the_first() -> Non
     assert [f.time for f in check_continuity(trajectory(even), [LIMITED])] == [0.0]
     nearly = between([0.0], [1.0], [1.0], [2.0 + 1e-14], duration=1.0, conditions=2)
     assert [f.time for f in check_continuity(trajectory(nearly), [LIMITED])] == [0.0]
-    assert [s.time for s in acceleration_steps(trajectory(even))] == [0.0, 1.0, 2.0, 3.0]
+    assert [s.time for s in steps_of(trajectory(even))] == [0.0, 1.0, 2.0, 3.0]
 
 
 def steep_trapezoid(acceleration: float, length: float = 1.0) -> PiecewisePolynomial:
@@ -208,7 +212,7 @@ def test_a_steep_ramp_is_not_a_jump(acceleration: float) -> None:
     curve = steep_trapezoid(acceleration)
     whole = trajectory(curve, end=state([1.0 + 1 / acceleration]))
     assert check_continuity(whole, [FREE]) == []
-    assert len(acceleration_steps(whole)) == 4
+    assert len(steps_of(whole)) == 4
 
 
 def test_a_jump_beside_a_ramp_that_is_not_steep_is_a_jump() -> None:

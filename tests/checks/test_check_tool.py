@@ -127,6 +127,18 @@ def test_a_tool_beside_its_path(size):
     assert beside.factor is None
 
 
+def test_a_tool_above_its_path():
+    """The second joint lifts it: all three coordinates count."""
+    rows = shifted(RIGHT, [0, 2e-5, 0, 0, 0, 0])
+    (beside,) = [finding for finding in judged(rows) if finding.kind == "tool_path"]
+    times = np.linspace(0, DURATION, 2001)
+    went, told = (
+        forward(RIGHT.robot, each.trajectory.curve.evaluate(times))[:, :3, 3] for each in (rows, RIGHT)
+    )
+    assert beside.value == pytest.approx(np.linalg.norm(went - told, axis=1).max(), rel=1e-4)
+    assert np.linalg.norm((went - told)[:, :2], axis=1).max() < 0.9 * beside.value
+
+
 def test_less_than_the_tolerance_beside_its_path_passes():
     assert judged(shifted(RIGHT, [3e-7, 0, 0, 0, 0, 0])) == []
 

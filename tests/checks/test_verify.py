@@ -18,7 +18,7 @@ def test_a_valid_motion_passes_and_says_its_peaks() -> None:
     )
     verdict = verify(whole, [limits(2, position=6.0, velocity=1.0, acceleration=2.0, jerk=8.0)] * 2)
     assert verdict.passed
-    assert (verdict.findings, verdict.steps, verdict.unchecked) == ((), (), ())
+    assert (verdict.findings, list(verdict.steps), verdict.unchecked) == ((), [], ())
     assert len(verdict.peaks) == 2
     assert verdict.peaks[0][1].high == pytest.approx([1.875 / 2, 0.0])
     assert verdict.peaks[1][1].low == pytest.approx([-1.875 / 4, -1.875 / 2])
@@ -40,7 +40,7 @@ def test_the_verdict_holds_what_the_checks_find_by_move_and_time() -> None:
     ]
     separate = check_limits(whole, bounds) + check_continuity(whole, bounds)
     assert set(verdict.findings) == set(separate)
-    assert list(verdict.steps) == acceleration_steps(whole, bounds)
+    assert list(verdict.steps) == list(acceleration_steps(whole, bounds))
     assert [(s.move, s.time) for s in verdict.steps] == [(0, 0.0), (0, 1.0)]
 
 

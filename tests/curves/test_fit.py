@@ -120,6 +120,32 @@ def test_searches_begin_where_the_guess_says():
     np.testing.assert_allclose(curve.evaluate(t)[:, 0], answers(t)[0], atol=1e-6)
 
 
+def test_a_smooth_function_takes_few_questions_each_by_a_better_guess():
+    """Two of them are the ends alone; a guess that is off by 0.1 is left as soon as the pieces are nearer."""
+    asked = []
+
+    def exact(places, side, guess):
+        answer = waves(places)
+        asked.append(np.abs(guess - answer[0]).max())
+        return Known(answer)
+
+    curve = fit(exact, within(1e-9), ENDS, lambda places: waves(places)[0] + 0.1)
+    assert curve.pieces > 100
+    assert len(asked) <= 4
+    assert asked[:2] == pytest.approx([0.1, 0.1])
+    assert asked[-1] < 1e-7
+
+
+def test_pieces_that_are_worse_than_the_guess_are_no_guess():
+    def exact(places, side, guess):
+        assert np.abs(guess - waves(places * 9)[0]).max() <= 2e-3
+        value, slope, bend = waves(places * 9)
+        return Known(np.stack([value, 9 * slope, 81 * bend]))
+
+    curve = fit(exact, within(1e-3), ENDS, lambda places: waves(places * 9)[0] + 1e-3)
+    assert curve.pieces > 20
+
+
 def test_a_function_that_no_quintics_follow_is_named_with_its_place():
     def root(t):
         x = np.abs(t - np.sqrt(2)) + 1e-300

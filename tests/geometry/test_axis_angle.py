@@ -17,7 +17,20 @@ from trajcli.geometry.axis_angle import (
 
 DIRECTIONS = np.random.default_rng(3).normal(size=(60, 3))
 DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=-1, keepdims=True)
-ANGLES = [1e-300, 1e-12, 1e-7, 1e-3, 0.5, 2.0, 3.0, np.pi - 1e-3, np.pi - 1e-7, np.pi - 1e-10]
+ANGLES = [
+    1e-300,
+    1e-12,
+    1e-7,
+    1e-3,
+    0.5,
+    2.0,
+    2 * np.pi / 3 - 1e-9,
+    2 * np.pi / 3 + 1e-9,
+    3.0,
+    np.pi - 1e-3,
+    np.pi - 1e-7,
+    np.pi - 1e-10,
+]
 
 
 def test_exp_is_the_matrix_exponential():

@@ -231,6 +231,16 @@ def test_what_cannot_be_joined_is_refused():
             join(SQUARE, [0.1, radius])
 
 
+def test_places_in_any_order_have_the_same_values():
+    chain = join(STADIUM, 0.1)
+    places = np.random.default_rng(4).permutation(np.linspace(0, chain.length, 41))
+    for values in (chain.evaluate, chain.transport):
+        together = values(places)
+        for k, place in enumerate(places):
+            for rows, row in zip(together, values(np.array([place])), strict=True):
+                np.testing.assert_allclose(rows[k], row[0], rtol=0, atol=1e-13)
+
+
 def test_one_segment_is_a_chain():
     chain = join(SQUARE[:1], 0.1)
     assert chain.length == 1

@@ -48,6 +48,16 @@ def test_from_one_orientation_to_another_it_is_slerp(seed, length):
     assert not curve.stops.size
 
 
+@pytest.mark.parametrize("axis", np.eye(3).tolist())
+def test_it_turns_about_coordinate_axes_too(axis):
+    last = Rotation.from_rotvec(0.8 * np.array(axis)).as_matrix()
+    rotation, rate, change = AboutAxes.between(np.eye(3), last, 2.0).evaluate(np.array([0.0, 0.5, 2.0]))
+    expected = Rotation.from_rotvec(np.outer([0.0, 0.2, 0.8], axis)).as_matrix()
+    np.testing.assert_allclose(rotation, expected, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(rate, np.tile(np.array(axis) * 0.4, (3, 1)), rtol=0, atol=1e-15)
+    assert not change.any()
+
+
 def test_a_rotation_alone_goes_by_its_angle():
     start, end = random_rotations(4, 2)
     curve = AboutAxes.between(start, end)

@@ -11,8 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.checks.finding import Finding, Kind, Step
+from trajcli.checks.finding import Finding, Kind
 from trajcli.checks.limits import peaks_by_move
+from trajcli.checks.steps import Steps
 from trajcli.checks.tolerances import allowed_jump
 from trajcli.curves.extrema import Peaks
 from trajcli.curves.piecewise import Array
@@ -60,7 +61,7 @@ def acceleration_steps(
     trajectory: Trajectory,
     limits_by_move: Sequence[Limits] | None = None,
     peaks: Sequence[tuple[Peaks, ...]] | None = None,
-) -> list[Step]:
+) -> Steps:
     """Return the steps in acceleration in order of time, or only the legal ones.
 
     Args:
@@ -79,11 +80,8 @@ def acceleration_steps(
     rows, joints = np.nonzero(chosen)
     owners = np.where(jumps.begins, _later(trajectory), _earlier(trajectory))[rows, joints]
     times = (trajectory.curve.breaks - trajectory.curve.start)[rows]
-    columns = (owners.tolist(), joints.tolist(), times.tolist(), jumps.size[rows, joints].tolist())
-    return [
-        Step(trajectory.spans[owner].index, trajectory.joint_names[joint], time, size)
-        for owner, joint, time, size in zip(*columns, strict=True)
-    ]
+    moves = np.array([span.index for span in trajectory.spans])[owners]
+    return Steps(moves, joints, times, jumps.size[rows, joints], trajectory.joint_names)
 
 
 @frozen

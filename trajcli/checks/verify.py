@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from trajcli.checks.continuity import acceleration_steps, check_continuity
-from trajcli.checks.finding import Finding, Step
+from trajcli.checks.finding import Finding
 from trajcli.checks.limits import check_limits, peaks_by_move
+from trajcli.checks.steps import Steps
 from trajcli.checks.waypoints import check_waypoints
 from trajcli.curves.extrema import Peaks
 from trajcli.frozen import frozen
@@ -28,7 +29,7 @@ class Verdict:
     """
 
     findings: tuple[Finding, ...]
-    steps: tuple[Step, ...]
+    steps: Steps
     peaks: tuple[tuple[Peaks, ...], ...]
     unchecked: tuple[tuple[str, str], ...]
 
@@ -63,7 +64,7 @@ def verify(
     findings.sort(key=lambda finding: (place.get(finding.move or 0, 0), finding.time))
     return Verdict(
         findings=tuple(findings),
-        steps=tuple(acceleration_steps(trajectory, limits_by_move, peaks)),
+        steps=acceleration_steps(trajectory, limits_by_move, peaks),
         peaks=peaks,
         unchecked=_unchecked(trajectory, limits_by_move),
     )

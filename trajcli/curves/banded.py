@@ -4,11 +4,13 @@ The splines of this package lead to rows whose diagonal is larger than the sum o
 without exchanges is then stable, whatever the ratio of the lengths between waypoints. The precondition is
 checked, so that no matrix is ever solved inaccurately in silence.
 
-The sweeps run over plain floats: for the few components of a robot that is faster than array operations row
-by row, and the result is the same to the last bit on every machine.
+Long systems are halved until they are short: every other unknown is eliminated at once, which leaves rows of
+the same kind, as dominated by their diagonal. The sweeps over a short one run over plain floats: for the few
+components of a robot that is faster than array operations row by row. The result is the same to the last bit
+on every machine.
 
-Source: Golub and Van Loan, Matrix Computations, 4th edition (2013), sections 4.1 and 4.3; Higham, Accuracy
-and Stability of Numerical Algorithms, 2nd edition (2002), section 9.6.
+Source: Golub and Van Loan, Matrix Computations, 4th edition (2013), sections 4.1, 4.3 and 4.5 (cyclic
+reduction); Higham, Accuracy and Stability of Numerical Algorithms, 2nd edition (2002), section 9.6.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array
 
+_SHORT = 48  # unknowns: fewer are not worth halving
 _ROUNDING = 8 * np.finfo(np.float64).eps  # of a diagonal element: what forming a row may have cost
 
 
@@ -42,9 +45,35 @@ def solve_tridiagonal(lower: Array, diagonal: Array, upper: Array, right: Array)
             f"row {k} of the system has diagonal {float(diagonal[k])!r}, which is less than "
             f"its neighbours together, {float(beside[k])!r}, or not positive"
         )
-    factors, pivots = _factors(lower.tolist(), diagonal.tolist(), upper.tolist())
-    above = upper.tolist()
-    return np.array([_solution(factors, pivots, above, column) for column in right.T.tolist()]).T
+    return np.ascontiguousarray(_reduced(lower, diagonal, upper, np.ascontiguousarray(right.T)).T)
+
+
+def _reduced(lower: Array, diagonal: Array, upper: Array, right: Array) -> Array:
+    """Return the solution (n, m) for right sides (n, m)."""
+    m = diagonal.size
+    if m <= _SHORT:
+        factors, pivots = _factors(lower.tolist(), diagonal.tolist(), upper.tolist())
+        above = upper.tolist()
+        return np.array([_solution(factors, pivots, above, column) for column in right.tolist()])
+    pairs, links = m // 2, (m - 1) // 2  # odd unknowns, and those of them that have one after them
+    odd_lower, odd_upper = lower[1::2] / diagonal[1::2], upper[1::2] / diagonal[1::2]
+    odd_right = right[:, 1::2] / diagonal[1::2]
+    after, before = upper[0 : 2 * pairs : 2], lower[2::2]
+    kept, rest = diagonal[0::2].copy(), right[:, 0::2].copy()
+    kept[:pairs] -= after * odd_lower
+    kept[1:] -= before * odd_upper[:links]
+    rest[:, :pairs] -= after * odd_right
+    rest[:, 1:] -= before * odd_right[:, :links]
+    beyond, back = np.zeros(kept.size), np.zeros(kept.size)
+    beyond[:links] = -after[:links] * odd_upper[:links]
+    back[1:] = -before * odd_lower[:links]
+    even = _reduced(back, kept, beyond, rest)
+    found = np.empty_like(right)
+    found[:, 0::2] = even
+    odd_right -= odd_lower * even[:, :pairs]
+    odd_right[:, :links] -= odd_upper[:links] * even[:, 1 : links + 1]
+    found[:, 1::2] = odd_right
+    return found
 
 
 def _factors(

@@ -129,13 +129,20 @@ def compose(path: PiecewisePolynomial, law: PiecewisePolynomial) -> PiecewisePol
     outer = taylor_shift(
         path.coefficients[:, piece], (law.coefficients[-1, :, 0] - path.breaks[piece])[:, None]
     )
-    inner = law.coefficients.copy()
-    inner[-1] = 0.0
+    return PiecewisePolynomial(law.breaks, substituted(outer, law.coefficients[:-1]))
+
+
+def substituted(outer: Array, inner: Array) -> Array:
+    """Return the polynomials p(t r(t)), shape (d1 d2 + 1, ...), highest power first.
+
+    Args:
+        outer: Of p, shape (d1 + 1, ...).
+        inner: Of r, shape (d2, ...), which broadcasts against the trailing shape.
+    """
     result = outer[:1]
     for row in outer[1:]:
-        result = _product(result, inner)
-        result[-1] += row
-    return PiecewisePolynomial(law.breaks, result)
+        result = np.concatenate([_product(result, inner), row[None]])
+    return result
 
 
 def _crossings(path: PiecewisePolynomial, law: PiecewisePolynomial) -> Array:

@@ -11,10 +11,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from trajcli.curves.bernstein import control_points
 from trajcli.curves.critical import critical_points
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, derivative_coefficients, horner
 from trajcli.frozen import frozen
 
+_BLOCK = 2048  # stretches looked at together: what is computed of them stays in the processor's cache
+_MANY = 64  # stretches from which on it pays to look for roots only where control points leave room
 _SAME = 1e-12  # of the largest value: peaks closer than this are one peak, and the earliest is named
 
 
@@ -79,11 +82,13 @@ def peaks_between(
         ValueError: When an interval is not within the curve.
     """
     windows = _windows(curve, np.asarray(intervals, dtype=np.float64).reshape(-1, 2))
-    coefficients = curve.coefficients[:, windows.piece]
-    critical = critical_points(coefficients, curve.lengths[windows.piece], orders)
+    ends, worth = _surveyed(curve, windows, orders)
+    place = np.nonzero(worth)
+    chosen, lengths = curve.coefficients[:, windows.piece[place[0]], place[1]], windows.length[place[0]]
+    critical = critical_points(chosen[:, :, None], lengths, orders)
     found = [
-        _extremes(derivative_coefficients(coefficients, order), inside, windows)
-        for order, inside in zip(orders, critical, strict=True)
+        _extremes(at_ends, _within(derivative_coefficients(chosen, order), place, inside, windows), windows)
+        for order, at_ends, inside in zip(orders, ends, critical, strict=True)
     ]
     return [
         tuple(Peaks(*(values[k] for values in of_order)) for of_order in found)
@@ -119,6 +124,7 @@ class _Windows:
     Attributes:
         piece: Index of the piece, shape (w,).
         origin: Its first break, shape (w,).
+        length: Of the whole piece, shape (w,).
         start: Where the stretch begins, absolute, shape (w,).
         end: Where it ends, shape (w,).
         first: Index of the first stretch of each interval, shape (m,).
@@ -127,6 +133,7 @@ class _Windows:
 
     piece: NDArray[np.intp]
     origin: Array
+    length: Array
     start: Array
     end: Array
     first: NDArray[np.intp]
@@ -145,28 +152,93 @@ def _windows(curve: PiecewisePolynomial, intervals: Array) -> _Windows:
     piece = np.arange(interval.size) + (low - first)[interval]
     origin = curve.breaks[piece]
     begins = np.maximum(origin, start[interval])
-    return _Windows(
-        piece, origin, begins, np.minimum(curve.breaks[piece + 1], end[interval]), first, interval
-    )
+    ends = np.minimum(curve.breaks[piece + 1], end[interval])
+    return _Windows(piece, origin, curve.lengths[piece], begins, ends, first, interval)
 
 
-def _extremes(coefficients: Array, inside: Array, windows: _Windows) -> tuple[Array, Array, Array, Array]:
-    """Return low, its time, high, its time, each (m, n), of the polynomials (degree + 1, w, n)."""
-    start, end, origin = (values[:, None] for values in (windows.start, windows.end, windows.origin))
-    local = _candidates(inside, start - origin, end - origin)
-    values = horner(coefficients, local)
-    low = np.minimum.reduceat(values.min(axis=0), windows.first)
-    high = np.maximum.reduceat(values.max(axis=0), windows.first)
+def _surveyed(
+    curve: PiecewisePolynomial, windows: _Windows, orders: Sequence[int]
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Return what stands at both ends of all stretches, and where a peak may lie between them.
+
+    Returns:
+        Values of each order, shape (orders, 2, w, n), and whether control points leave room for more than
+        stands at any end, shape (w, n).
+    """
+    shape = (2, windows.piece.size, curve.dimension)
+    ends, worth = np.empty((len(orders), *shape)), np.full(shape[1:], windows.piece.size < _MANY)
+    few = bool(worth.all())
+    begin, end = windows.start - windows.origin, windows.end - windows.origin
+    for at_ends, order in zip(ends, orders, strict=True):
+        hull = np.empty((0, *shape[1:]) if few else shape)
+        for first in range(0, windows.piece.size, _BLOCK):
+            block = slice(first, first + _BLOCK)
+            rows = curve.coefficients[:, windows.piece[block]].transpose(0, 2, 1)  # long rows are fast
+            derivative = derivative_coefficients(np.ascontiguousarray(rows), order)
+            at_ends[0, block] = horner(derivative, begin[block]).T
+            at_ends[1, block] = horner(derivative, end[block]).T
+            if not few:
+                points = control_points(derivative, windows.length[block])
+                hull[0, block], hull[1, block] = points.min(axis=0).T, points.max(axis=0).T
+        if not few:
+            worth |= _leaves_room(hull, at_ends, windows)
+    return ends, worth
+
+
+def _leaves_room(hull: Array, at_ends: Array, windows: _Windows) -> NDArray[np.bool_]:
+    """Return where the extremes of control points (2, w, n) are beyond all values at ends (2, w, n)."""
+    low = np.minimum.reduceat(at_ends.min(axis=0), windows.first)[windows.interval]
+    high = np.maximum.reduceat(at_ends.max(axis=0), windows.first)[windows.interval]
+    rounding = _SAME * np.abs(hull).max(axis=0)
+    return np.asarray((hull[0] < low + rounding) | (hull[1] > high - rounding))
+
+
+@frozen
+class _Within:
+    """Candidates inside stretches; c pairs of a stretch and a component have some.
+
+    Attributes:
+        place: Indices of stretch and component, each of shape (c,); no pair stands there twice.
+        times: Absolute, shape (k, c).
+        values: Shape (k, c).
+    """
+
+    place: tuple[NDArray[np.intp], ...]
+    times: Array
+    values: Array
+
+
+def _within(
+    coefficients: Array, place: tuple[NDArray[np.intp], ...], inside: Array, windows: _Windows
+) -> _Within:
+    """Return the candidates at places from polynomials (degree + 1, c) and critical points (k, c, 1)."""
+    start, end, origin = (values[place[0]] for values in (windows.start, windows.end, windows.origin))
+    local = np.clip(inside[:, :, 0], start - origin, end - origin)
+    return _Within(place, np.minimum(local + origin, end), horner(coefficients, local))
+
+
+def _extremes(ends: Array, within: _Within, windows: _Windows) -> tuple[Array, Array, Array, Array]:
+    """Return low, its time, high, its time, each (m, n), from values at ends (2, w, n) and within."""
+    place, least, most = within.place, ends.min(axis=0), ends.max(axis=0)
+    least[place] = np.minimum(least[place], within.values.min(axis=0, initial=np.inf))
+    most[place] = np.maximum(most[place], within.values.max(axis=0, initial=-np.inf))
+    low, high = np.minimum.reduceat(least, windows.first), np.maximum.reduceat(most, windows.first)
     same = _SAME * np.maximum(np.abs(low), np.abs(high))
-    times = np.minimum(local + origin, end)
-    times[-1] = end
-    low_time = _earliest(values <= (low + same)[windows.interval], times, windows)
-    high_time = _earliest(values >= (high - same)[windows.interval], times, windows)
+    below, above = (low + same)[windows.interval], (high - same)[windows.interval]
+    low_time = _earliest(ends <= below, within.values <= below[place], within, windows)
+    high_time = _earliest(ends >= above, within.values >= above[place], within, windows)
     return low, low_time, high, high_time
 
 
-def _earliest(chosen: NDArray[np.bool_], times: Array, windows: _Windows) -> Array:
-    return np.minimum.reduceat(np.where(chosen, times, np.inf).min(axis=0), windows.first)
+def _earliest(
+    at_ends: NDArray[np.bool_], inside: NDArray[np.bool_], within: _Within, windows: _Windows
+) -> Array:
+    """Return the earliest time of the candidates that are chosen, shape (m, n)."""
+    times = np.where(at_ends[1], windows.end[:, None], np.inf)
+    times[at_ends[0]] = np.broadcast_to(windows.start[:, None], times.shape)[at_ends[0]]
+    first = np.where(inside, within.times, np.inf).min(axis=0, initial=np.inf)
+    times[within.place] = np.minimum(times[within.place], first)
+    return np.minimum.reduceat(times, windows.first)
 
 
 def _candidates(inside: Array, start: Array, end: Array) -> Array:

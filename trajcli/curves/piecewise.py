@@ -199,6 +199,8 @@ def concatenate(curves: Sequence[PiecewisePolynomial]) -> PiecewisePolynomial:
     Curves of no length contribute nothing unless all have none.
     """
     long = [curve for curve in curves if curve.duration > 0] or list(curves[:1])
+    if len(long) == 1:
+        return long[0]
     degree = max(curve.degree for curve in long)
     breaks, end = [long[0].breaks[:1]], long[0].start
     for curve in long:

@@ -48,8 +48,10 @@ def difference(a: Entry, b: Entry) -> Entry:
 def plus_product(p: Entry, a: Entry, b: Entry) -> Entry:
     """Return p + a b, written over the product where that is a new array: half the time of another one."""
     step = product(a, b)
-    if step is a or step is b or isinstance(step, float) or not _holds(step, p):
+    if step is a or step is b or isinstance(step, float) or isinstance(p, float):
         return total(p, step)
+    if step.shape[-p.ndim :] != p.shape:
+        return p + step
     step += p
     return step
 
@@ -57,17 +59,12 @@ def plus_product(p: Entry, a: Entry, b: Entry) -> Entry:
 def minus_product(p: Entry, a: Entry, b: Entry) -> Entry:
     """Return p - a b, likewise."""
     step = product(a, b)
-    if step is a or step is b or isinstance(step, float) or not _holds(step, p):
+    if step is a or step is b or isinstance(step, float) or isinstance(p, float):
         return difference(p, step)
+    if step.shape[-p.ndim :] != p.shape:
+        return p - step
     np.subtract(p, step, out=step)
     return step
-
-
-def _holds(array: Array, other: Entry) -> bool:
-    """Return whether the sum of an array and another one has the shape of the first."""
-    if isinstance(other, float) or not (array.ndim and other.ndim):
-        return False
-    return array.shape[-other.ndim :] == other.shape
 
 
 def combine(c: Entry, x: Column, s: Entry, y: Column) -> Column:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from trajcli.curves.piecewise import Array, taylor_shift
 from trajcli.frozen import frozen
+from trajcli.geometry.rotation import Flags
 
 _NOTHING = 1e-12  # of the largest term over the move: what is smaller came from rounding
 _CANCELS = 1e4  # times larger than what they add up to: of ten digits, six are left
@@ -47,28 +49,31 @@ def stretches(breaks: Array, coefficients: Array, *, join: bool = True) -> list[
         coefficients: Shape (degree + 1, pieces), highest power first, local to each break.
         join: Whether equal neighbours become one.
     """
+    starts, ends = breaks[:-1], breaks[1:]
+    local = _without_noise(coefficients[::-1].T, ends - starts)
+    absolute = _without_noise(taylor_shift(coefficients, -starts)[::-1].T, ends)
+    like = np.append(False, _equal(absolute[:-1], absolute[1:], ends[1:], 2 * _SAME))  # as the one before
     result: list[Stretch] = []
-    for piece in range(breaks.size - 1):
-        start, end = float(breaks[piece]), float(breaks[piece + 1])
-        local = _without_noise(coefficients[::-1, piece], end - start)
-        absolute = _without_noise(taylor_shift(coefficients[:, piece], np.array(-start))[::-1], end)
-        if join and result and _equal(result[-1].absolute, absolute, end):
-            result[-1] = Stretch(result[-1].start, end, result[-1].local, result[-1].absolute)
+    for piece, end in enumerate(ends.tolist()):
+        last = result[-1] if result else None
+        if join and last and like[piece] and _equal(last.absolute, absolute[piece], end, _SAME):
+            result[-1] = Stretch(last.start, end, last.local, last.absolute)
         else:
-            result.append(Stretch(start, end, local, absolute))
+            result.append(Stretch(float(starts[piece]), end, local[piece], absolute[piece]))
     return result
 
 
-def _without_noise(coefficients: Array, duration: float) -> Array:
-    """Return ascending coefficients without those whose term is mere rounding over the duration."""
-    terms = np.abs(coefficients) * duration ** np.arange(coefficients.size)
-    cleaned: Array = np.where(terms <= _NOTHING * terms.max(), 0.0, coefficients)
-    return cleaned
+def _without_noise(coefficients: Array, durations: Array) -> Array:
+    """Return ascending coefficients (pieces, n) without those whose term over the duration is rounding."""
+    terms = np.abs(coefficients) * durations[:, None] ** np.arange(coefficients.shape[1])
+    return np.where(terms <= _NOTHING * terms.max(axis=1, keepdims=True), 0.0, coefficients)
 
 
-def _equal(a: Array, b: Array, duration: float) -> bool:
-    powers = duration ** np.arange(a.size)
-    return bool((np.abs(a - b) * powers <= _SAME * (np.abs(a) * powers).max()).all())
+def _equal(a: Array, b: Array, durations: ArrayLike, same: float) -> Flags:
+    """Return whether polynomials (..., n) are equal as far as `same` of their largest term."""
+    powers = np.asarray(durations)[..., None] ** np.arange(a.shape[-1])
+    largest = (np.abs(a) * powers).max(axis=-1, keepdims=True)
+    return np.asarray((np.abs(a - b) * powers <= same * largest).all(axis=-1))
 
 
 def polynomial_text(coefficients: Array, variable: str = "t") -> str:

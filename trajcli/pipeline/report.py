@@ -51,7 +51,7 @@ def report_of(plan: Plan, *, reference: bool = False) -> Report:
         moves=[_move(plan, index, reference=reference) for index in range(len(plan.moves))],
         findings=[FindingReport(**asdict(finding)) for finding in verdict.findings],
         events=[EventReport(kind=e.kind, message=e.message, move=e.move) for e in plan.events],
-        steps=[StepReport(**asdict(step)) for step in verdict.steps],
+        steps=[StepReport(**vars(step)) for step in verdict.steps],
         unchecked=[UncheckedReport(joint=joint, quantity=quantity) for joint, quantity in verdict.unchecked],
     )
 

@@ -184,7 +184,7 @@ class Spline(ThroughPoints):
             times = fastest_spline_times(self.rule, points, robot)
         except ShapeError as error:
             raise _not_monotone(error, robot, given=False) from None
-        return times * (self.duration / times[-1]) if self.duration else times
+        return times / times[-1] * self.duration if self.duration else times
 
     def _curve(self, points: PointTable, times: Array, robot: Robot) -> PiecewisePolynomial:
         try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,8 @@ from topp_paths import random_bounds, spline, symmetric
 
 from trajcli.curves.hermite import hermite_pieces
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.curves.time_optimal.constraints import Intervals, Rows, constrained, joint_demand
+from trajcli.curves.time_optimal.constraints import Rows, joint_demand
+from trajcli.curves.time_optimal.intervals import constrained
 from trajcli.curves.time_optimal.solve import UnreachableSpeedError, controllable, solve
 
 CASES = yaml.safe_load((Path(__file__).parents[2] / "oracles" / "time_optimal.yaml").read_text())["cases"]
@@ -90,10 +92,10 @@ def test_scans_solve_the_linear_programmes(seed, moving):
     np.testing.assert_allclose(found.upper, upper, rtol=1e-6, atol=1e-9 * upper.max())
     np.testing.assert_allclose(found.lower, lower, rtol=1e-6, atol=1e-9 * upper.max())
     start = max(0.5 * upper[0], lower[0]) if moving else 0.0
-    x, ceiling = solve(intervals, np.sqrt(start), np.sqrt(end))
+    speeds = solve(intervals, np.sqrt(start), np.sqrt(end))
     expected = forward_by_programmes(path, grid, velocity, acceleration, found.upper, start)
-    np.testing.assert_allclose(x, expected, rtol=1e-5, atol=1e-7 * upper.max())
-    assert (x <= ceiling * (1 + 1e-12)).all()
+    np.testing.assert_allclose(speeds.x, expected, rtol=1e-5, atol=1e-7 * upper.max())
+    assert (speeds.x <= speeds.ceiling * (1 + 1e-12)).all()
 
 
 def test_an_end_that_is_too_fast_has_no_programme_either():
@@ -101,8 +103,8 @@ def test_an_end_that_is_too_fast_has_no_programme_either():
     velocity, acceleration = symmetric(1.0), symmetric(1.0)
     grid = np.union1d(np.linspace(0, 1, 31), path.breaks)
     intervals = constrained(grid, [joint_demand(path, velocity, acceleration)], NOWHERE)
-    allowed = np.sqrt(solve(intervals, 0.0, np.inf)[0][-1])
-    assert solve(intervals, 0.0, allowed * (1 - 1e-9))[0][-1] == pytest.approx(allowed**2)
+    allowed = np.sqrt(solve(intervals, 0.0, np.inf).x[-1])
+    assert solve(intervals, 0.0, allowed * (1 - 1e-9)).x[-1] == pytest.approx(allowed**2)
     with pytest.raises(UnreachableSpeedError, match="at the end") as caught:
         solve(intervals, 0.0, 1.01 * allowed)
     assert caught.value.allowed == pytest.approx(allowed, rel=1e-9)
@@ -121,8 +123,8 @@ def test_controllable_sets_of_another_library():
     demand = joint_demand(path, symmetric(*given["vmax"]), symmetric(*given["amax"]))
     grid = np.linspace(path.start, path.end, given["N"] + 1)
     both = constrained(grid, [demand], NOWHERE)
-    half = both.rows // 2  # the table is of the collocation scheme: rows at the near ends only
-    near = Intervals(grid, both.P[:, :half], both.R[:, :half], both.C[:, :half], both.cap)
+    half = len(both.P) // 2  # the table is of the collocation scheme: rows at the near ends only
+    near = replace(both, P=both.P[:half], R=both.R[:half], C=both.C[:half])
     found = controllable(near).upper
     np.testing.assert_allclose(found, case["expected"]["K_max"], rtol=0, atol=case["tolerance"])
 
@@ -160,6 +162,6 @@ def test_a_joint_that_turns_next_to_a_place_does_no_harm(seed):
     for turn in (0.0, 1.4e-16, -1.4e-16, 1e-13):
         grid = np.linspace(-1, 1, 41)
         grid[20] = turn
-        found.append(solve(constrained(grid, [demand], NOWHERE), 0.0, 0.0)[0])
+        found.append(solve(constrained(grid, [demand], NOWHERE), 0.0, 0.0).x)
     for other in found[1:]:
         np.testing.assert_allclose(other, found[0], rtol=1e-9, atol=1e-12)

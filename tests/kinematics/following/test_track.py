@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from followed_paths import CASES, solved
 
 from trajcli.curves.fit import fit
 from trajcli.geometry.arc import Arc
+from trajcli.geometry.chain import join
 from trajcli.geometry.line import Line
-from trajcli.geometry.orientation_curve import Fixed
+from trajcli.geometry.orientation_curve import AlongPath, Fixed
 from trajcli.geometry.pose_curve import PoseCurve
 from trajcli.kinematics.following.follower import follower
 from trajcli.kinematics.following.tolerance import Tolerance, misfit_of, probes
@@ -61,6 +65,41 @@ def test_the_fit_keeps_its_promise_of_joints_and_tool(name, tolerance):
         assert (
             np.abs(fitted[order] - exact[order]).max() <= 2 * tolerance * peak
         )  # between its probes the error may be larger
+
+
+def winding(radius, *, turning):
+    """Return a UR5e on short and shorter ways, their corners rounded or sharp, that end in an arc.
+
+    The tool keeps its orientation, or with `turning` its attitude to the path.
+    """
+    begun = CASES["ur5e, pose"]
+    start = begun.path.poses.evaluate(np.zeros(1))[0][0]
+    ways = np.tile([[0.03, 0.0, 0.0], [0.0, 0.002, 0.001], [-0.03, 0.01, 0.0]], (3, 1))
+    corners = start[:3, 3] + np.concatenate([np.zeros((1, 3)), np.cumsum(ways, axis=0)])
+    segments = [Line(*ends) for ends in pairwise(corners)]
+    segments.append(Arc(corners[-1], corners[-1] + [0.0, -0.01, 0.02], [1, 0, 0], 2.0))
+    chain = join(segments, radius)
+    kept = Fixed(start[:3, :3], chain.length)
+    poses = PoseCurve(chain, AlongPath(chain, start[:3, :3]) if turning else kept)
+    return replace(begun, path=ToolPath(poses, begun.path.position, "all"))
+
+
+@pytest.mark.parametrize(
+    ("radius", "turning", "questions"), [(0.0, False, 23), (0.001, False, 36), (0.001, True, 150)]
+)
+def test_short_ways_are_followed_in_few_steps(radius, turning, questions, monkeypatch):
+    """The step goes on from way to way; where the direction jumps, what was known before it is left."""
+    made, asked = winding(radius, turning=turning), []
+    arm = follower(made.robot, made.path.by_place, made.start, 0.0)
+    exact = type(arm).exact
+    monkeypatch.setattr(
+        type(arm), "exact", lambda self, places, *more: asked.append(places) or exact(self, places, *more)
+    )
+    curve = track(arm, made.path.breaks)
+    assert len(asked) <= questions
+    for place in np.linspace(0, made.path.length, 61):
+        near = curve.evaluate(place)
+        assert np.abs(solved(made, place, arm.held, near) - near).max() < 5e-3
 
 
 L1, L2, HAND = 0.3, 0.2, 0.1  # the links of the planar arm, m

@@ -8,16 +8,13 @@ Source: Pham and Pham (2018), sections II and III.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side
 from trajcli.frozen import frozen
 
-_FLAT = 1e-9  # a coefficient this much smaller than its neighbour is zero: it shifts the bound by as little
 _KINK = 1e-9  # of the largest derivative of a joint: a jump above it is a corner
 _ROUNDING = 1e-13  # of the largest derivative of all joints: the same, where one hardly moves
 
@@ -103,74 +100,3 @@ def _nothing(begins: Array, ends: Array) -> Array:
     """Return what counts as no derivative of each joint, shape (n,), from those at the ends of pieces."""
     largest = np.maximum(np.abs(begins), np.abs(ends)).max(axis=0)
     return np.asarray(np.maximum(_KINK * largest, _ROUNDING * largest.max()))
-
-
-@frozen
-class Intervals:
-    """Rows P x + R y <= C of the intervals of a grid, sd^2 = x at the near and y at the far end.
-
-    Between them sdd is constant. With D the length, u = (y - x) / 2D: the near row a u + b x <= c has
-    P = 2Db - a and R = a, the far row a u + b y <= c has P = -a and R = 2Db + a, and both have C = 2Dc.
-
-    Attributes:
-        grid: Places, shape (N + 1,), strictly increasing.
-        P: Shape (N, m).
-        R: Shape (N, m).
-        C: Shape (N, m).
-        cap: Largest x at each place, shape (N + 1,).
-    """
-
-    grid: Array
-    P: Array
-    R: Array
-    C: Array
-    cap: Array
-
-    @property
-    def rows(self) -> int:
-        """Number m of rows of each interval; the first half holds at the near end, the other at the far."""
-        return int(self.P.shape[1])
-
-    @property
-    def straight(self) -> NDArray[np.bool_]:
-        """Which intervals have b = 0 in all rows up to rounding, as on a straight line, shape (N,)."""
-        return np.asarray((np.abs(self.P + self.R) <= _FLAT * np.abs(self.R)).all(axis=1))
-
-    def tightened(self, velocity: Array, acceleration: Array) -> Intervals:
-        """Return the intervals with all speeds and rows divided by factors (N,) of their own."""
-        cap = self.cap.copy()
-        cap[:-1] /= velocity**2
-        cap[1:] = np.minimum(cap[1:], self.cap[1:] / velocity**2)
-        return replace(self, C=self.C / acceleration[:, None], cap=cap)
-
-
-def constrained(grid: Array, demands: Sequence[Demand], stops: Array) -> Intervals:
-    """Return the rows of all demands at both ends of every interval.
-
-    Args:
-        grid: Shape (N + 1,), strictly increasing.
-        demands: At least one.
-        stops: Places of the grid where x must be zero.
-    """
-    near = _joined([demand(grid[:-1], "right") for demand in demands])
-    far = _joined([demand(grid[1:], "left") for demand in demands])
-    double = 2.0 * np.diff(grid)[:, None]
-    P = np.concatenate([double * near.b - near.a, -far.a], axis=1)
-    R = np.concatenate([near.a, double * far.b + far.a], axis=1)
-    C = np.concatenate([double * near.c, double * far.c], axis=1)
-    P, R = _without_rounding(P, R), _without_rounding(R, P)
-    cap = np.full(grid.size, np.inf)
-    cap[:-1] = near.cap
-    cap[1:] = np.minimum(cap[1:], far.cap)
-    cap[np.isin(grid, stops)] = 0.0
-    return Intervals(grid, P, R, C, cap)
-
-
-def _joined(all_rows: Sequence[Rows]) -> Rows:
-    a, b, c = (np.concatenate([getattr(rows, name) for rows in all_rows], axis=1) for name in "abc")
-    return Rows(a, b, c, np.minimum.reduce([rows.cap for rows in all_rows]))
-
-
-def _without_rounding(values: Array, others: Array) -> Array:
-    small: NDArray[np.bool_] = np.abs(values) <= _FLAT * np.abs(others)
-    return np.where(small, 0.0, values)

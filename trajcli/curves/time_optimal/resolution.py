@@ -1,23 +1,32 @@
 """How good a solution on a grid is: the time that is lost, and the limits that are passed between places.
 
 A solution that loses no time has in each interval sd^2 at its ceiling, or sdd as large or as small as the
-limits allow at both ends. The limits hold at the places of the grid; the extremes between them are exact.
+limits allow at both ends. The limits hold at the places of the grid; between them control points bound what
+is used of them, and exceed it by no more than a sixth of what lies above the chord.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from trajcli.curves.critical import critical_points
-from trajcli.curves.extrema import piece_extremes
-from trajcli.curves.piecewise import Array, PiecewisePolynomial, derivative_coefficients, horner, taylor_shift
-from trajcli.curves.time_optimal.constraints import Intervals
-from trajcli.curves.time_optimal.law import durations
+from trajcli.curves.bernstein import control_points
+from trajcli.curves.compose import substituted
+from trajcli.curves.piecewise import (
+    Array,
+    PiecewisePolynomial,
+    derivative_coefficients,
+    horner,
+    increasing,
+    taylor_shift,
+)
+from trajcli.curves.time_optimal.intervals import Intervals
 
 _SOFT = 1e-9  # by which rows are eased, so that those with next to no say in sdd have none by rounding
+_BLOCK = 1024  # intervals at a time, whose polynomials stay in the processor's cache
 
 
-def time_lost(intervals: Intervals, x: Array, ceiling: Array) -> Array:
+def time_lost(intervals: Intervals, x: Array, ceiling: Array, lasting: Array) -> Array:
     """Return an estimate of the time lost in each interval, shape (N,).
 
     The acceleration that is not used, as a share of its range, costs half that share of the time; so does the
@@ -27,30 +36,22 @@ def time_lost(intervals: Intervals, x: Array, ceiling: Array) -> Array:
         intervals: N of them.
         x: sd^2 at the places, shape (N + 1,).
         ceiling: Largest sd^2 at the places, shape (N + 1,).
+        lasting: Durations, shape (N,).
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         below = np.where(ceiling > 0, 1.0 - x / ceiling, 0.0)
     more, less = _unused(intervals, x)
     unused = np.minimum.reduce([0.5 * (below[:-1] + below[1:]), more, less])
-    return np.asarray(0.5 * np.clip(unused, 0.0, 1.0) * durations(intervals.grid, x))
+    return np.asarray(0.5 * np.clip(unused, 0.0, 1.0) * lasting)
 
 
 def _unused(intervals: Intervals, x: Array) -> tuple[Array, Array]:
     """Return how much larger and smaller sdd could be, the mean of both ends, as shares of its range."""
-    double, half = 2.0 * np.diff(intervals.grid), intervals.rows // 2
-    u = np.diff(x) / double
-    near, far = slice(None, half), slice(half, None)
-    ends = (
-        (intervals.R[:, near], (intervals.P + intervals.R)[:, near] / double[:, None], x[:-1], near),
-        (-intervals.P[:, far], (intervals.P + intervals.R)[:, far] / double[:, None], x[1:], far),
-    )
-    more, less = np.zeros_like(u), np.zeros_like(u)
-    for a, b, place, rows in ends:
-        c = intervals.C[:, rows] / double[:, None] * (1.0 + _SOFT)
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            bounds = (c - b * place[:, None]) / a
-        high = np.where(a > 0, bounds, np.inf).min(axis=1)
-        low = np.where(a < 0, bounds, -np.inf).max(axis=1)
+    mean = np.diff(x) / (2.0 * intervals.way)
+    more, less = np.zeros_like(mean), np.zeros_like(mean)
+    for (low, high), u in zip(
+        intervals.ranges(x, _SOFT), (mean - intervals.swing, mean + intervals.swing), strict=True
+    ):
         span = high - low
         known = np.isfinite(span) & (span > 0)
         more += 0.5 * np.where(known, (high - u) / np.where(known, span, 1.0), 1.0)
@@ -58,40 +59,68 @@ def _unused(intervals: Intervals, x: Array) -> tuple[Array, Array]:
     return more, less
 
 
-def excess(path: PiecewisePolynomial, grid: Array, x: Array, velocity: Array, acceleration: Array) -> Array:
-    """Return the largest velocity and acceleration as multiples of their bounds, shape (2, N).
-
-    Between two places sdd = u is constant and sd^2 linear, so with q = sum c_m sigma^m the acceleration is
-    the derivative of V = sum (u (2m - 1) c_m + x (m + 1) c_{m+1}) sigma^m. Velocity is extreme where V' = 0.
+def excess(
+    path: PiecewisePolynomial, law: tuple[Array, Array], bounds: tuple[Array, Array], chosen: NDArray[np.intp]
+) -> Array:
+    """Return bounds of the largest velocity and acceleration as multiples of their limits, shape (2, k).
 
     Args:
-        path: q(s) with n joints; the grid holds its breaks.
-        grid: Places, shape (N + 1,).
-        x: sd^2 there.
-        velocity: Bounds, shape (n, 2).
-        acceleration: Bounds, shape (n, 2).
+        path: q(s) with n joints; the intervals hold its breaks.
+        law: Durations (N,) and coefficients (d + 1, N) of the pieces of s(t), one for each interval.
+        bounds: Limits of velocity and acceleration, each of shape (n, 2).
+        chosen: Indices of the k intervals to look at.
     """
-    lengths = np.diff(grid)
-    u = np.diff(x) / (2.0 * lengths)
-    piece = np.clip(np.searchsorted(path.breaks, grid[:-1], "right") - 1, 0, path.pieces - 1)
-    local = taylor_shift(path.coefficients[:, piece], (grid[:-1] - path.breaks[piece])[:, None])
-    V = _velocity_like(local, u[:, None], x[:-1, None])
-    low, high = piece_extremes(V, lengths, (1,))[0]
-    over_acceleration = np.maximum(high / acceleration[:, 1], low / acceleration[:, 0]).max(axis=1)
-    inside = critical_points(V, lengths, (0,))[0]
-    ends = np.zeros((1, *inside.shape[1:]))
-    sigma = np.concatenate([ends, inside, ends + lengths[:, None]])
-    speed = np.sqrt(np.maximum(x[:-1, None] + 2.0 * u[:, None] * sigma, 0.0))
-    qd = horner(derivative_coefficients(local, 1), sigma) * speed
-    over_velocity = np.maximum(qd / velocity[:, 1], qd / velocity[:, 0]).max(axis=(0, 2))
-    return np.stack([over_velocity, over_acceleration])
+    found = np.empty((2, chosen.size))
+    for first in range(0, chosen.size, _BLOCK):
+        block = slice(first, first + _BLOCK)
+        lasting, pieces = law[0][chosen[block]], law[1][:, chosen[block]]
+        found[:, block] = _excess(_composed(path, pieces), lasting, *bounds)
+    return found
 
 
-def _velocity_like(local: Array, u: Array, x: Array) -> Array:
-    """Return V, whose derivative is q'(sigma) u + q''(sigma) (x + 2 u sigma); highest power first."""
-    degree = local.shape[0] - 1
-    powers = np.arange(degree, 0, -1.0)[:, None, None]
-    V = np.zeros_like(local)
-    V[:-1] = u * (2.0 * powers - 1.0) * local[:-1]
-    V[1:-1] += x * powers[:-1] * local[:-2]
-    return V
+def _excess(q: Array, lasting: Array, velocity: Array, acceleration: Array) -> Array:
+    """Return the excess (2, w) of polynomials q(t) (d + 1, n, w) that last (w,)."""
+    over = _share(control_points(derivative_coefficients(q, 2), lasting), acceleration)
+    qd = derivative_coefficients(q, 1)
+    ends = np.stack([qd[-1], horner(qd, lasting)])
+    speed = _share(ends, velocity)
+    slowest = np.abs(velocity).min(axis=1)
+    with np.errstate(invalid="ignore"):
+        steepest = np.where(np.isfinite(slowest), np.abs(acceleration).max(axis=1) / slowest, 0.0).max()
+        most = speed + 0.5 * over * steepest * lasting
+    fast = np.flatnonzero(~(most <= 1.0))
+    speed[fast] = _share(control_points(qd[:, :, fast], lasting[fast]), velocity)
+    return np.stack([speed, over])
+
+
+def _share(values: Array, bounds: Array) -> Array:
+    """Return how much of the bounds (n, 2) values (k, n, w) use at most, shape (w,)."""
+    high, low = values.max(axis=0) / bounds[:, 1, None], values.min(axis=0) / bounds[:, 0, None]
+    return np.asarray(np.maximum(high, low).max(axis=0))
+
+
+def travelled(
+    path: PiecewisePolynomial, lasting: Array, pieces: Array
+) -> tuple[PiecewisePolynomial, PiecewisePolynomial]:
+    """Return the law s(t) and the trajectory q(s(t)), from t = 0 on.
+
+    Args:
+        path: q(s) with n joints, of degree d1.
+        lasting: Durations of the pieces of the law, shape (N,).
+        pieces: Their coefficients, each within one piece of the path, shape (d2 + 1, N).
+    """
+    degree, count = path.degree * (pieces.shape[0] - 1), lasting.size
+    found = np.empty((degree + 1, count, path.dimension))
+    for first in range(0, count, _BLOCK):
+        block = slice(first, first + _BLOCK)
+        found[:, block] = _composed(path, pieces[:, block]).transpose(0, 2, 1)
+    times = increasing(np.concatenate([[0.0], np.cumsum(lasting)]))
+    return PiecewisePolynomial(times, pieces[:, :, None]), PiecewisePolynomial(times, found)
+
+
+def _composed(path: PiecewisePolynomial, pieces: Array) -> Array:
+    """Return the coefficients (d1 d2 + 1, n, w) of q(s(t)) for pieces (d2 + 1, w) of s(t)."""
+    begins = pieces[-1]
+    piece = np.clip(np.searchsorted(path.breaks, begins, "right") - 1, 0, path.pieces - 1)
+    local = np.ascontiguousarray(path.coefficients[:, piece].transpose(0, 2, 1))
+    return substituted(taylor_shift(local, begins - path.breaks[piece]), pieces[:-1])

@@ -14,17 +14,17 @@ Source: Pham and Pham (2018), algorithm 1; the affine form of the scans is our o
 
 from __future__ import annotations
 
-from itertools import islice
-
 import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
-from trajcli.curves.time_optimal.constraints import Intervals
+from trajcli.curves.time_optimal.intervals import Intervals, blocks
+from trajcli.curves.time_optimal.scan import HUGE, scanned
 from trajcli.frozen import frozen
 
-_HUGE = 1e100  # stands for an unlimited x: beyond it only the slopes of rows matter
-_STEPS = 100
+_REACHES = (32, 128)  # intervals to either side of changed ones that are solved again with them
+_MOST = 0.5  # of all intervals: more are not worth being told apart
+_STEPS = 100  # of Newton
 _SAME = 1e-12
 
 
@@ -81,21 +81,54 @@ def controllable(intervals: Intervals, end_velocity: float = 0.0) -> Controllabl
         intervals: N of them.
         end_velocity: sd at the end, not negative; infinite for any.
     """
-    P, R, C, cap = intervals.P, intervals.R, intervals.C, intervals.cap
-    last = _ceiling(R[-1:], P[-1:], C[-1:], cap[-1:])
-    ceiling = np.append(_ceiling(P, R, C, cap[:-1]), last)
-    limits = ceiling.copy()
-    limits[-1] = min(limits[-1], end_velocity**2)
-    slopes, offsets = _affine(-R, P, C, (P > 0) & (R < 0))
-    upper = _scan(slopes[::-1], offsets[::-1], limits[::-1])[::-1]
+    P, R, C = intervals.P[:, ::-1], intervals.R[:, ::-1], intervals.C[:, ::-1]
+    ceiling = ceilings(intervals)
+    limits = ceiling[::-1].copy()
+    limits[0] = min(limits[0], end_velocity**2)
+    upper = scanned(R, P, C, (P > 0) & (R < 0), limits)[::-1]
     lower = np.zeros_like(upper)
     if np.isfinite(end_velocity):
         lower[-1] = end_velocity**2
     return Controllable(_lower(intervals, lower, upper) if lower[-1] > 0 else lower, upper, ceiling)
 
 
-def solve(intervals: Intervals, start_velocity: float, end_velocity: float) -> tuple[Array, Array]:
-    """Return x = sd^2 at each place, as large as possible, and the ceiling of x, both of shape (N + 1,).
+def ceilings(
+    intervals: Intervals, known: Array | None = None, changed: NDArray[np.bool_] | None = None
+) -> Array:
+    """Return the largest x at each place that its two intervals have room for, shape (N + 1,).
+
+    Args:
+        intervals: N of them.
+        known: What it was of intervals that differ only where `changed`.
+        changed: Shape (N,).
+    """
+    P, R, C, cap = intervals.P, intervals.R, intervals.C, intervals.cap
+    last = _ceiling(R[:, -1:], P[:, -1:], C[:, -1:], cap[-1:])
+    if known is None or changed is None:
+        return np.append(_blockwise(P, R, C, cap[:-1]), last)
+    found = np.append(np.minimum(known[:-1], cap[:-1]), last)
+    rows = np.flatnonzero(changed)
+    found[rows] = _blockwise(P[:, rows], R[:, rows], C[:, rows], cap[rows])
+    return found
+
+
+@frozen
+class Speeds:
+    """The fastest motion over a grid of N intervals, each of shape (N + 1,).
+
+    Attributes:
+        x: sd^2 at each place.
+        upper: The largest x from which the end can be reached.
+        ceiling: The largest x that its two intervals have room for.
+    """
+
+    x: Array
+    upper: Array
+    ceiling: Array
+
+
+def solve(intervals: Intervals, start_velocity: float, end_velocity: float) -> Speeds:
+    """Return the fastest motion.
 
     Args:
         intervals: N of them.
@@ -118,70 +151,94 @@ def solve(intervals: Intervals, start_velocity: float, end_velocity: float) -> t
         free = controllable(intervals, np.inf)
         allowed = float(np.sqrt(_forward(intervals, first, free.upper)[-1]))
         raise UnreachableSpeedError("end", float(grid[-1]), end_velocity, allowed)
-    return x, sets.ceiling
+    return Speeds(x, sets.upper, sets.ceiling)
+
+
+def solve_again(intervals: Intervals, before: Speeds, changed: NDArray[np.bool_]) -> Speeds | None:
+    """Return the fastest motion where few rows are others than before, or None where that is felt far away.
+
+    Args:
+        intervals: N of them.
+        before: The motion without the changes.
+        changed: Which intervals have lower limits than before, shape (N,).
+    """
+    found = Speeds(before.x.copy(), before.upper.copy(), ceilings(intervals, before.ceiling, changed))
+    for reach in _REACHES:
+        around = _Around(intervals, changed, reach)
+        if around.places.size > _MOST * changed.size:
+            break
+        around.solve(before, found)
+        if around.meets(before, found):
+            return found
+    return None
+
+
+class _Around:
+    """The surroundings of changed intervals, one after the other, with a gap between them."""
+
+    def __init__(self, intervals: Intervals, changed: NDArray[np.bool_], reach: int) -> None:
+        rows = np.flatnonzero(changed)
+        steps = np.zeros(changed.size + 1, dtype=np.intp)
+        np.add.at(steps, np.maximum(rows - reach, 0), 1)
+        np.add.at(steps, np.minimum(rows + reach + 1, changed.size), -1)
+        inside = np.cumsum(steps) > 0  # the last one, after the last interval, is not
+        self.places = np.flatnonzero(inside | np.append(False, inside[:-1]))
+        self.within = inside[self.places[:-1]]
+        self.begins = np.append(True, ~self.within)
+        self.ends = np.append(~self.within, True)
+        chosen = self.places[:-1]
+        self.P, self.R, self.C = (rows[:, chosen] for rows in (intervals.P, intervals.R, intervals.C))
+
+    def solve(self, before: Speeds, found: Speeds) -> None:
+        """Write into `found` what `before` becomes here, if it stays the same at the border."""
+        P, R, C, places, within = self.P, self.R, self.C, self.places, self.within
+        limits = np.where(
+            self.ends, np.minimum(before.upper[places], found.ceiling[places]), found.ceiling[places]
+        )
+        chosen = (P > 0) & (R < 0) & within
+        upper = scanned(R[:, ::-1], P[:, ::-1], C[:, ::-1], chosen[:, ::-1], limits[::-1])[::-1]
+        found.upper[places] = upper
+        limits = np.where(self.begins, np.minimum(before.x[places], upper), upper)
+        found.x[places] = scanned(P, R, C, (R > 0) & within, limits)
+
+    def meets(self, before: Speeds, found: Speeds) -> bool:
+        """Return whether nothing changes at the border."""
+        begins, ends = self.places[self.begins], self.places[self.ends]
+        same = np.array_equal(found.x[ends], before.x[ends]) and np.array_equal(
+            found.x[begins], before.x[begins]
+        )
+        begins = begins[begins > 0]
+        return same and np.array_equal(found.upper[begins], before.upper[begins])
 
 
 def _forward(intervals: Intervals, first: float, upper: Array) -> Array:
-    P, R, C = intervals.P, intervals.R, intervals.C
-    slopes, offsets = _affine(-P, R, C, R > 0)
     limits = upper.copy()
     limits[0] = first
-    return _scan(slopes, offsets, limits)
-
-
-def _affine(numerator: Array, divisor: Array, C: Array, chosen: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Return slopes and offsets of the chosen rows; of the others a bound that never binds."""
-    safe = np.where(chosen, divisor, 1.0)
-    return np.where(chosen, numerator / safe, 0.0), np.where(chosen, C / safe, np.inf)
-
-
-def _scan(slopes: Array, offsets: Array, limits: Array) -> Array:
-    """Return z: limits_0, then z_{i+1} = min(limits_{i+1}, the least of slopes_i z_i + offsets_i)."""
-    chosen = _lowest_lines(offsets, slopes * np.minimum(limits[:-1, None], _HUGE) + offsets)
-    lines = zip(slopes[chosen].tolist(), offsets[chosen].tolist(), strict=True)
-    z = float(limits[0])
-    found = [z]
-    for lowest, count in zip(limits[1:].tolist(), chosen.sum(axis=1).tolist(), strict=True):
-        z, before = lowest, z
-        for slope, offset in islice(lines, count):
-            value = slope * before + offset
-            if value < z:
-                z = value
-        z = max(0.0, z)  # zero is always allowed: what is below is rounding
-        found.append(z)
-    return np.array(found)
-
-
-def _lowest_lines(first: Array, last: Array) -> NDArray[np.bool_]:
-    """Return which lines of each row may be lowest somewhere, from their values (N, m) at both ends.
-
-    The lines that are lowest at an end stay, and those that are below either of these at its other end.
-    """
-    rows = np.arange(len(first))
-    at_first, at_last = first.argmin(axis=1), last.argmin(axis=1)
-    chosen: NDArray[np.bool_] = (first < first[rows, at_last][:, None]) & (
-        last < last[rows, at_first][:, None]
-    )
-    chosen[rows, at_first] = chosen[rows, at_last] = True
-    return chosen
+    return scanned(intervals.P, intervals.R, intervals.C, intervals.R > 0, limits)
 
 
 def _lower(intervals: Intervals, lower: Array, upper: Array) -> Array:
     """Return the lower ends of the controllable sets; infinite before the place where there is none left."""
-    P, R, C = intervals.P, intervals.R, intervals.C
-    fastest = np.minimum(_ceiling(R, P, C, intervals.cap[1:]), upper[1:])
-    slopes, offsets = _affine(R, -P, -C, (P < 0) & (R > 0))
-    offsets[np.isinf(offsets)] = -np.inf
+    P, R, C = intervals.P.T, intervals.R.T, intervals.C.T
+    fastest = np.minimum(_blockwise(intervals.R, intervals.P, intervals.C, intervals.cap[1:]), upper[1:])
     y = float(lower[-1])
     for i in range(lower.size - 2, -1, -1):
         if y > fastest[i] * (1.0 + _SAME):
             lower[: i + 1] = np.inf
             break
-        y = max(0.0, float((slopes[i] * y + offsets[i]).max()))
+        chosen = (P[i] < 0) & (R[i] > 0)
+        y = float(((C[i, chosen] - R[i, chosen] * y) / P[i, chosen]).max(initial=0.0))
         lower[i] = y
         if y == 0.0:
             break
     return lower
+
+
+def _blockwise(P: Array, R: Array, C: Array, cap: Array) -> Array:
+    found = np.empty(cap.size)
+    for block in blocks(cap.size):
+        found[block] = _ceiling(P[:, block], R[:, block], C[:, block], cap[block])
+    return found
 
 
 def _ceiling(P: Array, R: Array, C: Array, cap: Array) -> Array:
@@ -190,12 +247,10 @@ def _ceiling(P: Array, R: Array, C: Array, cap: Array) -> Array:
     The room for y, the smallest upper bound less the largest lower one, is concave in x and positive at zero,
     so Newton's steps from the right end at the crossing of the two rows that decide, after a few of them.
     """
-    nothing = np.zeros((len(P), 1))
-    P = np.concatenate([P, nothing], axis=1)
-    R = np.concatenate([R, nothing - 1.0], axis=1)
-    C = np.concatenate([C, nothing], axis=1)
     alone = (R == 0) & (P > 0)
-    x = np.minimum(np.minimum(cap, _HUGE), np.where(alone, C / np.where(alone, P, 1.0), np.inf).min(axis=1))
+    x = np.minimum(cap, HUGE)
+    if alone.any():
+        x = np.minimum(x, np.where(alone, C / np.where(alone, P, 1.0), np.inf).min(axis=0))
     live = np.arange(x.size)
     for _ in range(_STEPS):
         lower = _newton(P, R, C, x[live])
@@ -204,21 +259,22 @@ def _ceiling(P: Array, R: Array, C: Array, cap: Array) -> Array:
         if not live.size:
             break
         x[live] = lower[going]
-        P, R, C = P[going], R[going], C[going]
-    return np.where(x < _HUGE, x, np.inf)
+        P, R, C = P[:, going], R[:, going], C[:, going]
+    return np.where(x < HUGE, x, np.inf)
 
 
 def _newton(P: Array, R: Array, C: Array, x: Array) -> Array:
     """Return where the two rows that decide at `x` cross, or `x` where it obeys all rows."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        bounds = (C - P * x[:, None]) / R
-    high = np.where(R > 0, bounds, np.inf)
-    low = np.where(R < 0, bounds, -np.inf)
-    rows, k, j = np.arange(x.size), high.argmin(axis=1), low.argmax(axis=1)
-    top, bottom = high[rows, k], low[rows, j]
+        bounds = (C - P * x) / R
+    high, low = np.where(R > 0, bounds, np.inf), np.where(R < 0, bounds, -np.inf)
+    columns, k, j = np.arange(x.size), high.argmin(axis=0), low.argmax(axis=0)
+    top, bottom = high[k, columns], low[j, columns]
+    rest = bottom <= 0.0  # then y >= 0 decides, the row -y <= 0
+    bottom = np.where(rest, 0.0, bottom)
     over = bottom > top + _SAME * (np.abs(top) + np.abs(bottom))
-    rise, fall = R[rows, k], -R[rows, j]
-    slope = P[rows, k] * fall + P[rows, j] * rise
+    rise, fall = R[k, columns], np.where(rest, 1.0, -R[j, columns])
+    slope = P[k, columns] * fall + np.where(rest, 0.0, P[j, columns]) * rise
+    crossing = C[k, columns] * fall + np.where(rest, 0.0, C[j, columns]) * rise
     usable = over & (slope > 0)
-    crossing = (C[rows, k] * fall + C[rows, j] * rise) / np.where(usable, slope, 1.0)
-    return np.where(usable, crossing, x)
+    return np.where(usable, crossing / np.where(usable, slope, 1.0), x)

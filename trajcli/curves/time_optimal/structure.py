@@ -77,7 +77,8 @@ def _labels(used: Array) -> list[int]:
     labels: list[int] = []
     last = -1
     for piece, (column, most) in enumerate(zip(best, share, strict=True)):
-        if last < 0 or used[piece, last] < max(_BINDS, most - _STAYS):
+        stays = column == last and most >= _BINDS
+        if not stays and (last < 0 or used[piece, last] < max(_BINDS, most - _STAYS)):
             last = column if most >= _BINDS else -1
         labels.append(last)
     return labels

@@ -7,32 +7,28 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from trajcli.curves.compose import compose, scale_time
+from trajcli.curves.compose import scale_time
 from trajcli.curves.extrema import peaks
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.curves.time_optimal.constraints import (
-    Demand,
-    Intervals,
-    constrained,
-    corners,
-    is_at_rest,
-    joint_demand,
-)
-from trajcli.curves.time_optimal.grid import first_grid, halved, most_intervals, refined
-from trajcli.curves.time_optimal.law import durations, law_of
-from trajcli.curves.time_optimal.resolution import excess, time_lost
-from trajcli.curves.time_optimal.solve import UnlimitedSpeedError, UnreachableSpeedError, solve
+from trajcli.curves.time_optimal.constraints import Demand, corners, is_at_rest, joint_demand
+from trajcli.curves.time_optimal.grid import first_grid, halved, most_intervals, parts_for, refined
+from trajcli.curves.time_optimal.resolution import travelled
+from trajcli.curves.time_optimal.solution import Problem, Solution, solved
+from trajcli.curves.time_optimal.solve import UnlimitedSpeedError, UnreachableSpeedError
+from trajcli.curves.time_optimal.swing import carried_over
 from trajcli.frozen import frozen
 
-_LOST = 2e-3  # of the duration, by estimate: a finer grid would not gain more
-_WORTH = 1e-3  # of the mean duration of an interval: a smaller loss in one is not worth a new place
+_LOST = 2.5e-3  # of the duration, by estimate: a finer grid would not gain more
+_AIM = 1.2e-3  # of the duration: the estimate that a finer grid is made for
 _SWITCHING = (
     1e-8  # of an interval of a straight line: more is lost only where a switching place is to be found
 )
-_OVER = 1e-4  # by which a limit may be passed between places before tightening sets it right
+_SETTLED = 0.01  # of what is lost elsewhere: then switching places still move by more than they are off
+_FEW = 0.1  # of the intervals: for fewer new ones the whole solution is not worth finding again
 _ROUNDS = 8  # of refinement
 _TRIES = 4  # of halving the grid before a speed at an end is called too high
-_TIGHTENINGS, _MOST_TIGHTENINGS = 6, 40  # where the rest is stretched away, and where it must not be
+_TIGHTENINGS, _MOST_TIGHTENINGS = 8, 40  # where the rest is stretched away, and where it must not be
+_LOWERED = (1.1, 1.3, 2.0, 4.0, 16.0, 64.0)  # times the excess that limits are lowered by, turn by turn
 _EXACT = 1e-10  # a limit passed by less is kept
 
 
@@ -78,24 +74,6 @@ class TimeOptimal:
     stop_times: Array
 
 
-@frozen
-class _Problem:
-    path: PiecewisePolynomial
-    velocity: Array
-    acceleration: Array
-    demands: Sequence[Demand]
-    stops: Array
-    ends: tuple[float, float]
-
-    @property
-    def rests(self) -> bool:
-        """Whether it starts and ends at rest, so that it may be stretched."""
-        return all(end in (0.0, np.inf) for end in self.ends)
-
-    def over(self, grid: Array, x: Array) -> Array:
-        return excess(self.path, grid, x, self.velocity, self.acceleration)
-
-
 def time_optimal(
     path: PiecewisePolynomial,
     velocity: ArrayLike,
@@ -136,80 +114,91 @@ def time_optimal(
     )
     if not np.isfinite(bounds[1]).any() or path.duration == 0:
         raise UnlimitedSpeedError(path.start)
-    problem = _Problem(path, *bounds, demands, corners(path), (ends[0], ends[1]))
-    intervals, x, rounds, lost = _refined_solution(problem)
-    x, tightened = _tightened_solution(problem, intervals, x)
-    law, trajectory, stretch = _stretched(problem, law_of(intervals.grid, x))
-    stop_times = law.breaks[np.searchsorted(intervals.grid, problem.stops)]
-    return TimeOptimal(
-        trajectory, law, stretch, tightened, rounds, intervals.grid, lost, problem.stops, stop_times
-    )
+    problem = Problem(path, bounds, demands, corners(path), (ends[0], ends[1]))
+    found, rounds, lost = _refined_solution(problem)
+    found, tightened = _tightened_solution(found)
+    grid, pieces, over = found.grid, found.law, float(found.over.max())
+    del found  # the rows of a long path are large
+    law, trajectory, stretch = _stretched(problem, travelled(path, *pieces), over)
+    stops = problem.stops
+    stop_times = law.breaks[np.searchsorted(grid, stops)]
+    return TimeOptimal(trajectory, law, stretch, tightened, rounds, grid, lost, stops, stop_times)
 
 
-def _refined_solution(problem: _Problem) -> tuple[Intervals, Array, int, float]:
-    """Return the rows on a fine enough grid, sd^2 there, how often it was refined, and what is lost."""
+def _refined_solution(problem: Problem) -> tuple[Solution, int, float]:
+    """Return the solution on a fine enough grid, how often it was refined, and what is lost."""
     grid, most = first_grid(problem.path), most_intervals(problem.path)
+    swing, way = np.zeros(grid.size - 1), np.diff(grid)
     for rounds in range(_ROUNDS + 1):
-        intervals = constrained(grid, problem.demands, problem.stops)
         try:
-            x, ceiling = solve(intervals, *problem.ends)
+            found = solved(problem, grid, swing, way)
         except UnreachableSpeedError:  # a finer grid has room for a little more
             if rounds >= _TRIES or 2 * grid.size > most:
                 raise
             grid = halved(grid)
+            swing, way = np.zeros(grid.size - 1), np.diff(grid)
             continue
-        lost, whole = time_lost(intervals, x, ceiling), float(durations(grid, x).sum())
-        share = float(lost.sum()) / whole
-        worth = _WORTH * whole / lost.size if share > _LOST else np.inf
-        chosen = lost > np.where(intervals.straight, _SWITCHING * durations(grid, x), worth)
-        chosen |= problem.over(grid, x).max(axis=0) > 1.0 + _OVER
-        room = most - lost.size
-        if rounds == _ROUNDS or room <= 0 or not chosen.any():
+        parts, share = _parts(found, most - grid.size + 1)
+        if rounds == _ROUNDS or (parts == 1).all():
             break
-        grid = refined(grid, x, _worst(chosen, lost, room))
-    return intervals, x, rounds, share
+        finer = refined(grid, found.x, parts)
+        swing, way = carried_over(grid, finer, found.intervals.swing, found.intervals.way)
+        grid = finer
+    return found, rounds, share
 
 
-def _worst(chosen: NDArray[np.bool_], lost: Array, room: int) -> NDArray[np.bool_]:
-    """Return the chosen intervals, of too many those that lose most."""
-    if chosen.sum() <= room:
-        return chosen
-    kept = np.zeros_like(chosen)
-    kept[np.argsort(np.where(chosen, -lost, np.inf), kind="stable")[:room]] = True
-    return kept
+def _parts(found: Solution, room: int) -> tuple[NDArray[np.intp], float]:
+    """Return into how many parts to cut each interval, and the share of the duration that is lost."""
+    lost, lasting, straight = found.lost, found.law[0], found.intervals.straight
+    duration, bent = float(lasting.sum()), np.where(straight, 0.0, lost)
+    share = float(lost.sum()) / duration
+    parts = np.ones(lost.size, dtype=np.intp)
+    if share > _LOST and room > _FEW * lost.size:
+        parts = parts_for(bent, _AIM * duration, room)
+    switching = straight & (lost > _SWITCHING * lasting)
+    settled = lost[switching].sum() <= _SETTLED * bent.sum()
+    if not settled and (parts - 1).sum() + switching.sum() <= room:
+        parts[switching] = 2
+    return parts, share
 
 
-def _tightened_solution(problem: _Problem, intervals: Intervals, x: Array) -> tuple[Array, int]:
-    """Return sd^2 with limits lowered in intervals that pass them, and in how many.
+def _tightened_solution(found: Solution) -> tuple[Solution, int]:
+    """Return the solution with limits lowered in intervals that pass them, and in how many.
 
-    Twice the excess is taken off the rows of such an interval. The solution around it then moves a little, so
-    that it takes a few turns; where the motion may be stretched, what is left after these is left to that.
+    A little more than the excess is taken off the limits in such an interval. The solution around it then
+    moves, so that it takes a few turns, in which more and more is taken off the last ones; where the motion
+    may be stretched, what is left after these is left to that.
     """
-    grid = intervals.grid
-    tightened = np.zeros(grid.size - 1, dtype=bool)
-    for _ in range(_TIGHTENINGS if problem.rests else _MOST_TIGHTENINGS):
-        over = problem.over(grid, x)
-        passed = over > 1.0 + _EXACT
+    tightened = np.zeros(found.x.size - 1, dtype=bool)
+    for turn in range(_TIGHTENINGS if found.problem.rests else _MOST_TIGHTENINGS):
+        passed = found.over > 1.0 + _EXACT
         if not passed.any():
             break
         tightened |= passed.any(axis=0)
-        intervals = intervals.tightened(*np.where(passed, 2.0 * over - 1.0, 1.0))
-        x, _ = solve(intervals, *problem.ends)
-    return x, int(tightened.sum())
+        lowered = _LOWERED[min(turn, len(_LOWERED) - 1)]
+        factors = 1.0 + lowered * np.where(passed, found.over - 1.0, 0.0)
+        found = found.tightened(factors, swing=turn == 0)
+    return found, int(tightened.sum())
 
 
 def _stretched(
-    problem: _Problem, law: PiecewisePolynomial
+    problem: Problem, curves: tuple[PiecewisePolynomial, PiecewisePolynomial], over: float
 ) -> tuple[PiecewisePolynomial, PiecewisePolynomial, float]:
-    """Return the law and the trajectory, as much slower as the exact peaks ask for, and by what factor."""
-    trajectory = compose(problem.path, law)
+    """Return law and trajectory, as much slower as the exact peaks ask for, and by what factor.
+
+    Args:
+        problem: What was solved.
+        curves: Law and trajectory.
+        over: A bound of what they use of the limits.
+    """
+    law, trajectory = curves
+    if over <= 1.0 + _EXACT:
+        return law, trajectory, 1.0
     factors = []
-    for peak, bounds, root in zip(
-        peaks(trajectory, (1, 2)), (problem.velocity, problem.acceleration), (1.0, 0.5), strict=True
-    ):
-        over = np.maximum(peak.high / bounds[:, 1], peak.low / bounds[:, 0])
+    for peak, bounds, root in zip(peaks(trajectory, (1, 2)), problem.bounds, (1.0, 0.5), strict=True):
+        used = np.maximum(peak.high / bounds[:, 1], peak.low / bounds[:, 0])
         times = np.where(peak.high / bounds[:, 1] > peak.low / bounds[:, 0], peak.high_time, peak.low_time)
-        factors.append((float(over.max()) ** root, float(over.max()), float(times[over.argmax()])))
+        factors.append((float(used.max()) ** root, float(used.max()), float(times[used.argmax()])))
     stretch, worst, time = max(factors)
     if stretch <= 1.0 + _EXACT:
         return law, trajectory, 1.0

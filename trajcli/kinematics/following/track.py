@@ -12,7 +12,7 @@ from trajcli.kinematics.following.follower import Follower, LostError
 _FIRST = 1 / 8  # of the first stretch between breaks
 _LOOKS = np.array([0.2, 0.5, 0.8])  # of a stretch: where it is asked how fast the tool moves
 _STILL = 1e-9  # lengths of the arm and rad: a stretch with less is done at once
-_SAME = 1e-6  # of a rate: as far as it does not jump at a break
+_SAME = 1e-6  # of the largest: a derivative with less does not jump at a break
 _SIDES: tuple[Side, Side] = ("left", "right")
 _REST = 0.7  # of what is left of a stretch: with a longer step it is done at once
 _SURE = 0.15  # rad or m: a prediction that is off by more may have led to another branch
@@ -56,9 +56,9 @@ def track(follower: Follower, breaks: Array) -> PiecewisePolynomial:
     state = _exact(follower, breaks[:1], "right", follower.start[None])[:, 0]
     turns = _turns(follower, breaks)
     for end, pace, turned in zip(breaks[1:].tolist(), paces.tolist(), turns.tolist(), strict=True):
-        place, beyond = nodes[-1], len(nodes) > 1
+        place = nodes[-1]
         if turned:
-            state, beyond = _exact(follower, np.array([place]), "right", state[:1])[:, 0], False
+            state = _exact(follower, np.array([place]), "right", state[:1])[:, 0]
         while place < end:
             step = end - place if motion > _REST * (end - place) * pace else motion / pace
             try:
@@ -67,8 +67,6 @@ def track(follower: Follower, breaks: Array) -> PiecewisePolynomial:
             except LostError as error:
                 off, lost = np.inf, error
             if off > _SURE:
-                if beyond:  # derivatives may jump at the break: so far they are those before it
-                    state, beyond = _exact(follower, np.array([place]), "right", state[:1])[:, 0], False
                 motion = 0.3 * step * pace
                 if 0.3 * step < shortest:
                     raise StuckError(place, state[0], state[1], lost)
@@ -81,7 +79,7 @@ def track(follower: Follower, breaks: Array) -> PiecewisePolynomial:
             half = place + 0.5 * step
             place = end if step == end - place else place + step
             nodes += [half, place]
-            state, beyond = last, False
+            state = last
             most = max(3.0, motion / (step * pace))
             motion = step * pace * float(np.clip((_AIM / max(off, 1e-12)) ** (1 / _ORDER), 0.5, most))
     return PiecewisePolynomial(np.array(nodes), np.stack(pieces, axis=1))
@@ -96,10 +94,13 @@ def _paces(follower: Follower, breaks: Array) -> Array:
 
 
 def _turns(follower: Follower, breaks: Array) -> Flags:
-    """Return for each stretch (m - 1,) whether it begins in another direction than the one before ends."""
-    left, right = (follower.demands(breaks[1:-1], side).first for side in _SIDES)
-    sizes = np.abs([left, right]).max(axis=(0, 2))
-    return np.append(False, np.abs(left - right).max(axis=1) > _SAME * sizes)
+    """Return for each stretch (m - 1,) whether a derivative of the demand jumps where it begins."""
+    left, right = (follower.demands(breaks[1:-1], side) for side in _SIDES)
+    jumps = np.zeros(breaks.size - 2, dtype=bool)
+    for name in ("first", "second", "aims"):
+        one, other = getattr(left, name), getattr(right, name)
+        jumps |= np.abs(one - other).max(axis=1, initial=0.0) > _SAME * np.abs([one, other]).max(initial=0.0)
+    return np.append(False, jumps)
 
 
 def _tried(follower: Follower, place: float, step: float, state: Array) -> tuple[Array, float]:

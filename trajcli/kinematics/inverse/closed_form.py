@@ -69,13 +69,13 @@ def candidates(
     joints, gaps = np.empty((len(robot.joints), *twos, count)), np.empty((2, *twos, count))
     watched = np.zeros(count, dtype=bool)
     order, judge, solve = _order(method), Judge(robot), method.solve
-    places, misses = joints.transpose(order), gaps.transpose(order)
+    places, misses, flat = joints.transpose(order), gaps.transpose(order), poses.reshape(-1, 16)
     found = Candidates(
         joints.reshape(len(joints), 2 ** len(twos), count), gaps.reshape(2, 2 ** len(twos), count), watched
     )
 
     def fill(block: slice) -> None:
-        rows = np.ascontiguousarray(poses[block, :3].reshape(-1, 12).T)
+        rows = np.ascontiguousarray(flat[block, :12].T)
         goal, watch = Goal(arm, rows), Watch(rows.shape[1], arm.length)
         values = solve(goal, watch)
         for value, place in zip(values, places[..., block], strict=True):
@@ -115,7 +115,7 @@ def _write(value: Value, out: Array) -> None:
         out[...] = value
         return
     pair, answers = (value, ()) if isinstance(value, tuple) else (value.turn, (2,))
-    shape = (*answers, *np.broadcast_shapes(np.shape(pair[0]), np.shape(pair[1])))
+    shape = (*answers, *np.broadcast(*pair).shape)
     place = out if shape == out.shape else np.empty(shape)
     if isinstance(value, tuple):
         angle(value, place)

@@ -86,12 +86,8 @@ def closures(robot: Robot, target: Target, joints: Array) -> Array:
     return closure.T.reshape(2, branches, poses).copy()
 
 
-def rough(closure: Array) -> Flags:
-    """Return which poses (N,) have a branch that rounding keeps away, by closures (2, branches, N)."""
-    return np.asarray(_rough(np.maximum(closure[0], closure[1])).any(axis=0))
-
-
-def _rough(miss: Array) -> Flags:
+def rough(miss: Array) -> Flags:
+    """Return which answers rounding keeps from their targets, by how far they are away, m or rad."""
     return np.asarray((miss > _ROUNDED) & (miss < _NEAR))
 
 
@@ -106,11 +102,11 @@ def polish(
         joints: What a closed form found.
         closure: How far it is from the targets.
         watched: Shape (N,): poses where two branches fall together, and are taken further.
-        rows: The poses that are `rough` or watched.
+        rows: The poses that have a `rough` answer, or are watched.
     """
     near = closure[:, :, rows]
     miss = np.maximum(near[0], near[1])
-    poor = _rough(miss) | (watched[rows] & (near[0] < _NEAR) & (miss > _EXACT))
+    poor = rough(miss) | (watched[rows] & (near[0] < _NEAR) & (miss > _EXACT))
     branches, places = np.nonzero(poor)
     if len(places):
         poses = rows[places]

@@ -168,11 +168,8 @@ def _weighted(weights: Sequence[float], axes: Sequence[Column]) -> Column:
 
 def _square(a: Column, b: Column) -> Array:
     """Return |a - b|^2."""
-    gaps = [np.asarray(x - y) for x, y in zip(a, b, strict=True)]
-    shape = np.broadcast_shapes(*(gap.shape for gap in gaps))
-    gaps.sort(key=lambda gap: gap.shape != shape)
-    first, second, third = (np.square(gap, out=gap) for gap in gaps)
-    result: Array = first if first.shape == shape else np.broadcast_to(first, shape).copy()
-    result += second
-    result += third
-    return result
+    first, second, third = (np.asarray(x - y) for x, y in zip(a, b, strict=True))
+    for gap in (first, second, third):
+        np.square(gap, out=gap)
+    full = first if first.shape == np.broadcast(first, second, third).shape else None
+    return np.asarray(np.add(np.add(first, second, out=full), third, out=full))

@@ -117,7 +117,8 @@ def _block(
     joints = _by_posture(raw.joints, poses)
     closure = closures(robot, target, joints)
     watched = poses.watched | raw.watched.reshape(-1, count).any(axis=0)
-    polish(robot, target, joints, closure, watched, np.flatnonzero(rough(closure) | watched))
+    poor = rough(closure.max(axis=0)).any(axis=0)
+    polish(robot, target, joints, closure, watched, np.flatnonzero(poor | watched))
     named = method if poses.ways == 1 else replace(method, choices=(*method.choices, "wrist"))
     found = Found(
         named, joints, closure, closure.max(axis=0) <= tolerance, watched, poses.free, poses.freedom, True

@@ -86,10 +86,12 @@ def one_of_each(robot: Robot, joints: Array, valid: Flags, free: Flags, near: Ar
     distance = np.abs(np.where(turning, way - FULL * np.round(way / FULL), way)).max(axis=2)
     for i in np.flatnonzero((few & keep).any(axis=0)):
         for j in range(i):
+            alike = few[:, i] & keep[:, i] & keep[:, j] & (free[:, i] == free[:, j]).all(axis=1)
+            if not alike.any():
+                continue
             gap = joints[:, i] - joints[:, j]
             gap = np.where(turning, gap - FULL * np.round(gap / FULL), gap)
-            agree = ((np.abs(gap) <= SAME) | free[:, i]).all(axis=1) & (free[:, i] == free[:, j]).all(axis=1)
-            same = agree & few[:, i] & keep[:, i] & keep[:, j]
+            same = alike & ((np.abs(gap) <= SAME) | free[:, i]).all(axis=1)
             further = distance[:, i] >= distance[:, j] - SAME
             keep[:, i] &= ~(same & further)
             keep[:, j] &= ~(same & ~further)

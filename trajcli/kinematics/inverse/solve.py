@@ -150,8 +150,8 @@ def _closed(
     def settle(rows: slice, joints: Array, closure: Array) -> None:
         if not target.whole:
             closure[:] = closures(robot, target.rows(rows), joints)
-        np.less_equal(np.maximum(closure[0], closure[1]), tolerance, out=valid[:, rows])
-        poor[rows] = rough(closure)
+        miss = np.maximum(closure[0], closure[1])
+        valid[:, rows], poor[rows] = miss <= tolerance, rough(miss).any(axis=0)
         choose_turns(robot, joints, None if near is None else near[rows].T, np.pi)
 
     raw = candidates(robot, arm, method, target.poses, settle)

@@ -66,7 +66,7 @@ class Watch:
         return self._either(middle[0], aside[0]), self._either(middle[1], aside[1])
 
     def _either(self, middle: Entry, aside: Entry) -> Array:
-        shape = np.broadcast_shapes(np.shape(middle), np.shape(aside))
+        shape = np.broadcast(middle, aside).shape
         result = np.empty((2, *(1,) * (self.choices - len(shape)), *shape))
         np.add(middle, aside, out=result[0])
         np.subtract(middle, aside, out=result[1])
@@ -74,9 +74,9 @@ class Watch:
 
     def mirrored(self, turn: Turn) -> Mirrored:
         """Return a turn (..., B) as the first answer of the last choice, with axes for the choices before."""
-        cosine, sine = np.broadcast_arrays(*turn)
-        shape = (1,) * (self.choices - cosine.ndim) + cosine.shape
-        return Mirrored((cosine.reshape(shape), sine.reshape(shape)))
+        cosine, sine = (np.asarray(entry) for entry in turn)
+        shapes = [(1,) * (self.choices - entry.ndim) + entry.shape for entry in (cosine, sine)]
+        return Mirrored((cosine.reshape(shapes[0]), sine.reshape(shapes[1])))
 
     def note(self, where: Flags) -> None:
         """Note the poses of `where` (..., B)."""
