@@ -66,12 +66,13 @@ def test_each_straight_piece_takes_the_time_of_its_slowest_joint(guess):
     assert (found >= expected * (1 - 1e-9)).all()
 
 
-def test_cubics_at_rest_have_a_closed_form():
+@pytest.mark.parametrize("count", [30, 3000])
+def test_cubics_at_rest_have_a_closed_form(count):
     """The way D takes max(3 D / 2 V, sqrt(6 D / A), cbrt(12 D / J))."""
-    q = points(2, 30)
+    q = points(2, count)
     way = np.abs(np.diff(q, axis=0))[:, 0]
     expected = np.maximum.reduce([1.5 * way, np.sqrt(6 * way / 2), np.cbrt(12 * way / 9)])
-    found = fastest_durations(resting(q), np.full(29, 1.0), bounds(1, 2, 9))
+    found = fastest_durations(resting(q), np.full(count - 1, 1.0), bounds(1, 2, 9))
     assert found.sum() == pytest.approx(expected.sum(), rel=0.02)
     assert (found >= expected * (1 - 1e-9)).all()
 

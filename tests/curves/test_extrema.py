@@ -250,6 +250,42 @@ def test_pieces_that_are_no_curve_agree_with_scipys_roots() -> None:
                 assert high[k, joint] == pytest.approx(values.max(), rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.parametrize("degree", [1, 3, 6, 9])
+def test_many_pieces_agree_with_scipys_roots(degree: int) -> None:
+    """Of many pieces only some can hold a peak: each interval has its own, wherever it lies."""
+    rng = np.random.default_rng(degree)
+    breaks = np.cumsum(rng.uniform(0.5, 1.5, 201))
+    coefficients = rng.normal(size=(degree + 1, 200, 2))
+    for piece, length in enumerate(np.diff(breaks)):
+        for joint in range(2 if degree > 1 else 0):  # the same at both ends: what is large lies between
+            bump = np.polymul([-1.0, length, 0.0], coefficients[2:, piece, joint])
+            coefficients[:-1, piece, joint] = np.pad(bump, (degree + 1 - bump.size, 0))[:-1]
+    curve = PiecewisePolynomial(breaks, coefficients)
+    intervals = [
+        (breaks[0], breaks[-1]),
+        (breaks[3] + 0.2, breaks[90] + 0.1),
+        (breaks[91], breaks[200] - 0.3),
+    ]
+    for (start, end), found in zip(intervals, peaks_between(curve, intervals), strict=True):
+        for order, of_order in zip(ORDERS, found, strict=True):
+            for joint in range(2):
+                polynomial = PPoly(curve.coefficients[:, :, joint], breaks).derivative(order)
+                roots = polynomial.derivative().roots(extrapolate=False)
+                inner = np.concatenate([roots[np.isfinite(roots)], breaks])
+                at = np.concatenate([inner[(inner >= start) & (inner <= end)], [start, end]])
+                values = [curve.evaluate(at, order, side=side)[:, joint] for side in ("left", "right")]
+                values[0][at == start] = values[1][at == start]  # only the piece inside counts
+                values[1][at == end] = values[0][at == end]
+                rounding = 1e-9 * np.abs(values).max() + 1e-12
+                assert of_order.low[joint] == pytest.approx(np.min(values), abs=rounding)
+                assert of_order.high[joint] == pytest.approx(np.max(values), abs=rounding)
+                for peak, time in ((of_order.low, of_order.low_time), (of_order.high, of_order.high_time)):
+                    sides = [
+                        curve.evaluate(time[joint], order, side=side)[joint] for side in ("left", "right")
+                    ]
+                    assert np.abs(np.array(sides) - peak[joint]).min() <= rounding
+
+
 def test_coefficients_that_rounding_left_do_not_matter() -> None:
     clean = np.array([0.0, 0.0, -3.0, 3.0, 1.0])
     for noise in (1e-18, -1e-18, 1e-300, 5e-324):

@@ -13,6 +13,7 @@ from through_jobs import assert_joins, cases, curve_of, job_text, plan, refusal
 
 from trajcli.pipeline.explain import explanation
 from trajcli.pipeline.report import report_of
+from trajcli.planners.planner import stretched
 
 V, A = 2.0, 8.0
 LIMITS = {"velocity": V, "acceleration": A}
@@ -223,6 +224,13 @@ def test_one_job_through_the_command_line(tmp_path, capfd):
             assert json.loads(out)["duration"] == pytest.approx(1.5, rel=1e-4)
         else:
             assert "  which limit binds when (s):\n    0..0.5: acceleration + of j1\n" in out
+
+
+def test_a_stretch_is_a_concession_from_a_thousandth_on():
+    for factor, conceded in ((1.000008, False), (1.0009, False), (1.002, True), (1.3, True)):
+        event = stretched(factor)
+        assert event.concedes == conceded
+        assert f"stretched {factor} times" in event.message
 
 
 @pytest.mark.parametrize(("middle", "code"), [([[60, 30]], 0), ([[60, 30], [60, 30]], 1)])

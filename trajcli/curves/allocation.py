@@ -17,10 +17,8 @@ the estimation of sparse Jacobian matrices, J. Inst. Math. Appl. 13 (1974).
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trajcli.curves.block_tridiagonal import solve_block_tridiagonal
 from trajcli.curves.extrema import piece_extremes
@@ -179,9 +177,7 @@ def _improved(problem: _Problem, found: _Point, weight: float) -> _Point | None:
         gains = better.values(weight) - values
         if gains.sum() < 0:
             return better
-        outside = _around(_around(np.isinf(gains)))
         step = np.where(_windows(gains, 0.0).sum(axis=1) > 0, step / 2, step)
-        step = np.where(outside, step / 2, step)
     return None
 
 
@@ -225,12 +221,7 @@ def _all_uses(family: Family, durations: Array, bounds: Array) -> Array:
         return np.asarray(np.log(np.maximum(np.concatenate(parts, axis=1), 0.0)))
 
 
-def _around(chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which pieces (m,) have a chosen one near to them."""
-    return np.asarray(_windows(chosen, False).any(axis=1))
-
-
-def _windows(values: NDArray[Any], filling: float) -> NDArray[Any]:
+def _windows(values: Array, filling: float) -> Array:
     """Return what stands around each of the values (m,), shape (m, window)."""
     return np.lib.stride_tricks.sliding_window_view(np.pad(values, _REACH, constant_values=filling), _WINDOW)
 

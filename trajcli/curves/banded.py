@@ -45,7 +45,16 @@ def solve_tridiagonal(lower: Array, diagonal: Array, upper: Array, right: Array)
             f"row {k} of the system has diagonal {float(diagonal[k])!r}, which is less than "
             f"its neighbours together, {float(beside[k])!r}, or not positive"
         )
-    return np.ascontiguousarray(_reduced(lower, diagonal, upper, np.ascontiguousarray(right.T)).T)
+    columns = np.ascontiguousarray(right.T)
+    found = _reduced(lower, diagonal, upper, columns)
+    if (
+        diagonal.size > _SHORT
+    ):  # halving loses a digit in rows of mixed sizes; what it left over gives it back
+        left = columns - diagonal * found
+        left[:, 1:] -= lower[1:] * found[:, :-1]
+        left[:, :-1] -= upper[:-1] * found[:, 1:]
+        found += _reduced(lower, diagonal, upper, left)
+    return np.ascontiguousarray(found.T)
 
 
 def _reduced(lower: Array, diagonal: Array, upper: Array, right: Array) -> Array:

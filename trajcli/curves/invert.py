@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, horner
 
@@ -21,12 +22,20 @@ def times_at(law: PiecewisePolynomial, values: Array) -> Array:
     reached = np.maximum.accumulate(np.append(law.coefficients[-1, :, 0], law.piece_ends()[1][-1]))
     wanted = np.clip(values, reached[0], reached[-1])
     piece = np.clip(np.searchsorted(reached, wanted, "left") - 1, 0, law.pieces - 1)
+    times = np.where(wanted == reached[0], law.start, law.breaks[piece + 1])
+    inside = np.flatnonzero((wanted != reached[0]) & (wanted != reached[piece + 1]))
+    if inside.size:
+        times[inside] = _times_within(law, wanted[inside], piece[inside])
+    return times
+
+
+def _times_within(law: PiecewisePolynomial, values: Array, piece: NDArray[np.intp]) -> Array:
+    """Return the times (k,) at which the values (k,) are reached in the given pieces (k,)."""
     coefficients = law.coefficients[:, piece, 0].copy()
-    coefficients[-1] -= wanted
-    low, high = np.zeros(wanted.size), law.lengths[piece]
+    coefficients[-1] -= values
+    low, high = np.zeros(values.size), law.lengths[piece]
     for _ in range(_STEPS):
         middle = 0.5 * (low + high)
         below = horner(coefficients, middle) < 0
         low, high = np.where(below, middle, low), np.where(below, high, middle)
-    times = np.where(wanted == reached[piece + 1], law.breaks[piece + 1], law.breaks[piece] + high)
-    return np.asarray(np.where(wanted == reached[0], law.start, times))
+    return np.asarray(law.breaks[piece] + high)

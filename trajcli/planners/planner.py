@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 Resolve = Callable[["Target", Array], "Target"]
 WhenOverLimit = Literal["error", "slow"]
 _REMARKS = ("refined",)  # kinds of events that concede nothing
+_LITTLE = 1e-3  # relative: a law that is stretched by less still counts as the fastest
 
 
 @comparable
@@ -60,12 +61,18 @@ class Event:
 
     @property
     def concedes(self) -> bool:
-        """Whether anything was given up: a finer grid gives up nothing."""
+        """Whether anything was given up: a finer grid, or a law a thousandth longer, gives up nothing."""
         return self.kind not in _REMARKS
 
     def text(self, say: Callable[[Amount], str] = str) -> str:
         """Return the message with its amounts said by `say`."""
         return said(self.message, self.amounts, say)
+
+
+def stretched(factor: float) -> Event:
+    """Return the event of a time-optimal law that lasts `factor` times longer than it was found."""
+    text = f"stretched {factor:.9g} times to keep all limits between the places"
+    return Event("stretched" if factor > 1 + _LITTLE else "refined", text)
 
 
 @frozen

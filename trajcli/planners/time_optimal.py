@@ -21,7 +21,7 @@ from trajcli.frozen import comparable
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.deviation import Deviation
 from trajcli.planners.joint_path import JointPath, polyline_through, spline_through
-from trajcli.planners.planner import Event, Phase, Planned
+from trajcli.planners.planner import Event, Phase, Planned, stretched
 from trajcli.planners.point_to_point import missing_limit, standstill
 from trajcli.planners.poses import read_numbers
 from trajcli.planners.reading import FieldType, Flaw, FlawError, ReadingContext, refuse, shown
@@ -223,7 +223,7 @@ def _events(made: Solved) -> Iterator[Event]:
             f"to {made.grid.size} places on the path",
         )
     if made.stretch > 1 + _STRETCHED:
-        yield Event("stretched", f"stretched {made.stretch:.9g} times to keep all limits between the places")
+        yield stretched(made.stretch)
     if made.stops.size:
         times = ", ".join(f"{time:.6g}" for time in made.stop_times[:_MOST_STOPS].tolist())
         more = ", ..." if made.stops.size > _MOST_STOPS else ""

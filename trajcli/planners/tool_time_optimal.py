@@ -18,7 +18,7 @@ from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.planners.following_tool import Followed, Made
 from trajcli.planners.path_law import LawSpec
-from trajcli.planners.planner import Event, Phase
+from trajcli.planners.planner import Event, Phase, stretched
 from trajcli.planners.point_to_point import missing_limit
 
 _FINER = 0.5  # of the tolerance, for q(s): what the law multiplies it with must still be within
@@ -64,8 +64,7 @@ def fastest_along(joints: Followed, spec: LawSpec, tolerance: Tolerance, planner
     events = [Event("refined", text)]
     stretch = solved.stretch * left
     if stretch > 1 + _NOTED:
-        text = f"stretched {stretch:.9g} times to keep all limits between the places"
-        events.append(Event("stretched", text))
+        events.append(stretched(stretch))
     return Made(trajectory, motion, tuple(phases), tuple(events if solved.refinements else events[1:]))
 
 

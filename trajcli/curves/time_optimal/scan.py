@@ -108,9 +108,10 @@ def _side_by_side(values: Array, length: int, filling: float) -> Array:
 def _advance(slopes: Array, offsets: Array, tops: Array, found: Array, begins: Array) -> None:
     """Write into `found` (length, chunks) what z becomes, until all chunks meet what stands there."""
     z = begins
-    for step in range(len(found)):
-        lowest = (offsets[step] - slopes[step] * np.minimum(z, HUGE)).min(axis=0)
-        z = np.maximum(np.minimum(lowest, tops[step]), 0.0)
-        if (z == found[step]).all():
-            return
-        found[step] = z
+    with np.errstate(invalid="ignore"):  # of an unlimited z a line without slope says nothing
+        for step in range(len(found)):
+            lowest = np.fmin.reduce(offsets[step] - slopes[step] * z, axis=0)
+            z = np.maximum(np.fmin(lowest, tops[step]), 0.0)
+            if (z == found[step]).all():
+                return
+            found[step] = z

@@ -1,0 +1,68 @@
+"""Scans against the recurrence written down, and a solution found again against the whole one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from topp_paths import random_bounds, spline
+
+from trajcli.curves.time_optimal import scan, solve
+from trajcli.curves.time_optimal.constraints import joint_demand
+from trajcli.curves.time_optimal.intervals import constrained
+
+
+def recurrence(P, R, C, chosen, limits):
+    z = [float(limits[0])]
+    for i in range(P.shape[1]):
+        lines = [(C[k, i] / R[k, i]) - (P[k, i] / R[k, i]) * z[-1] for k in np.flatnonzero(chosen[:, i])]
+        z.append(max(0.0, min([float(limits[i + 1]), *lines])))
+    return np.array(z)
+
+
+@pytest.mark.parametrize("count", [1, 2, 50, 700])
+@pytest.mark.parametrize(("many", "block"), [(0, 8192), (1000, 8192), (0, 100), (1000, 33)])
+def test_scans_are_the_recurrence(monkeypatch, count, many, block):
+    monkeypatch.setattr(scan, "_MANY", many)
+    monkeypatch.setattr(scan, "_BLOCK", block)
+    rng = np.random.default_rng(count)
+    P, C = rng.normal(-0.6, 0.6, (5, count)), rng.uniform(0, 0.3, (5, count))
+    R, limits = rng.uniform(0.5, 1.5, (5, count)), rng.uniform(0.2, 3, count + 1)
+    chosen = rng.random((5, count)) < 0.6
+    R[:, ::7] *= -1
+    chosen[:, ::7] &= R[:, ::7] > 0
+    limits[rng.random(count + 1) < 0.1] = np.inf
+    limits[0] = 0.4
+    np.testing.assert_array_equal(scan.scanned(P, R, C, chosen, limits), recurrence(P, R, C, chosen, limits))
+
+
+@pytest.mark.parametrize("end", [0.0, 0.05])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_few_lowered_limits_change_the_solution_around_them(seed, end):
+    rng = np.random.default_rng(seed)
+    path, (velocity, acceleration) = (
+        spline(rng.uniform(-1, 1, (40, 3)), np.arange(40.0)),
+        random_bounds(rng, 3),
+    )
+    grid = np.linspace(path.start, path.end, 39 * 20 + 1)
+    rows = constrained(grid, [joint_demand(path, velocity, acceleration)], np.empty(0))
+    before = solve.solve(rows, 0.0, end)
+    factors = np.ones((2, grid.size - 1))
+    factors[:, rng.choice(grid.size - 1, 5)] = rng.uniform(1, 1.2, (2, 5))
+    lowered, changed = rows.tightened(*factors), (factors != 1).any(axis=0)
+    whole, found = solve.solve(lowered, 0.0, end), solve.solve_again(lowered, before, changed)
+    assert found is not None
+    for name in ("x", "upper", "ceiling"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(whole, name))
+    assert 0 < (whole.x != before.x).sum() < grid.size / 2
+
+
+@pytest.mark.parametrize(("bounds", "place"), [([-1.0, 50.0], 990), ([-50.0, 1.0], 10)])
+def test_what_is_felt_far_away_is_not_found_again(bounds, place):
+    """A joint that brakes, or speeds up, nearly all the way: what changes at one end is felt to the other."""
+    path = spline(np.array([[0.0], [1.0]]))
+    demand = joint_demand(path, np.array([[-9.0, 9.0]]), np.array([bounds]))
+    rows = constrained(np.linspace(0, 1, 1001), [demand], np.empty(0))
+    factors = np.ones((2, 1000))
+    factors[1, place] = 1.5
+    before = solve.solve(rows, 0.0, 0.0)
+    assert solve.solve_again(rows.tightened(*factors), before, factors[1] != 1) is None
