@@ -8,11 +8,13 @@ from contextlib import suppress
 import numpy as np
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.time_optimal.again import solve_again
+from trajcli.curves.time_optimal.ceiling import ceilings
 from trajcli.curves.time_optimal.constraints import Demand
 from trajcli.curves.time_optimal.intervals import Intervals, Limited, limited
 from trajcli.curves.time_optimal.law import pieces_of, swings, ways
 from trajcli.curves.time_optimal.resolution import excess, time_lost
-from trajcli.curves.time_optimal.solve import Speeds, UnreachableSpeedError, solve, solve_again
+from trajcli.curves.time_optimal.solve import Speeds, UnreachableSpeedError, solve
 from trajcli.curves.time_optimal.swing import wanted_swings
 from trajcli.frozen import frozen
 
@@ -106,8 +108,10 @@ class Solution:
             with suppress(UnreachableSpeedError):  # then there may be one with the swings as they are
                 return _judged(problem, demands, rows, solve(rows, *problem.ends))
         rows, changed = self.intervals.tightened(*factors), (factors != 1.0).any(axis=0)
-        speeds = solve_again(rows, self.speeds, changed) if changed.mean() < _FEW else None
-        return _judged(problem, demands, rows, speeds or solve(rows, *problem.ends), self)
+        ceiling = ceilings(rows, self.speeds.ceiling, changed)
+        few = changed.mean() < _FEW
+        speeds = solve_again(rows, self.speeds, changed, ceiling) if few else None
+        return _judged(problem, demands, rows, speeds or solve(rows, *problem.ends, ceiling), self)
 
 
 def _judged(

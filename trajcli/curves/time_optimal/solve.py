@@ -15,16 +15,13 @@ Source: Pham and Pham (2018), algorithm 1; the affine form of the scans is our o
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
-from trajcli.curves.time_optimal.intervals import Intervals, blocks
-from trajcli.curves.time_optimal.scan import HUGE, scanned
+from trajcli.curves.time_optimal.ceiling import ceilings, largest
+from trajcli.curves.time_optimal.intervals import Intervals
+from trajcli.curves.time_optimal.scan import scanned
 from trajcli.frozen import frozen
 
-_REACHES = (32, 128)  # intervals to either side of changed ones that are solved again with them
-_MOST = 0.5  # of all intervals: more are not worth being told apart
-_STEPS = 100  # of Newton
 _SAME = 1e-12
 
 
@@ -74,15 +71,18 @@ class Controllable:
     ceiling: Array
 
 
-def controllable(intervals: Intervals, end_velocity: float = 0.0) -> Controllable:
+def controllable(
+    intervals: Intervals, end_velocity: float = 0.0, ceiling: Array | None = None
+) -> Controllable:
     """Return the controllable sets.
 
     Args:
         intervals: N of them.
         end_velocity: sd at the end, not negative; infinite for any.
+        ceiling: As from `ceilings`, where it is known.
     """
     P, R, C = intervals.P[:, ::-1], intervals.R[:, ::-1], intervals.C[:, ::-1]
-    ceiling = ceilings(intervals)
+    ceiling = ceilings(intervals) if ceiling is None else ceiling
     limits = ceiling[::-1].copy()
     limits[0] = min(limits[0], end_velocity**2)
     upper = scanned(R, P, C, (P > 0) & (R < 0), limits)[::-1]
@@ -90,26 +90,6 @@ def controllable(intervals: Intervals, end_velocity: float = 0.0) -> Controllabl
     if np.isfinite(end_velocity):
         lower[-1] = end_velocity**2
     return Controllable(_lower(intervals, lower, upper) if lower[-1] > 0 else lower, upper, ceiling)
-
-
-def ceilings(
-    intervals: Intervals, known: Array | None = None, changed: NDArray[np.bool_] | None = None
-) -> Array:
-    """Return the largest x at each place that its two intervals have room for, shape (N + 1,).
-
-    Args:
-        intervals: N of them.
-        known: What it was of intervals that differ only where `changed`.
-        changed: Shape (N,).
-    """
-    P, R, C, cap = intervals.P, intervals.R, intervals.C, intervals.cap
-    last = _ceiling(R[:, -1:], P[:, -1:], C[:, -1:], cap[-1:])
-    if known is None or changed is None:
-        return np.append(_blockwise(P, R, C, cap[:-1]), last)
-    found = np.append(np.minimum(known[:-1], cap[:-1]), last)
-    rows = np.flatnonzero(changed)
-    found[rows] = _blockwise(P[:, rows], R[:, rows], C[:, rows], cap[rows])
-    return found
 
 
 @frozen
@@ -127,19 +107,22 @@ class Speeds:
     ceiling: Array
 
 
-def solve(intervals: Intervals, start_velocity: float, end_velocity: float) -> Speeds:
+def solve(
+    intervals: Intervals, start_velocity: float, end_velocity: float, ceiling: Array | None = None
+) -> Speeds:
     """Return the fastest motion.
 
     Args:
         intervals: N of them.
         start_velocity: sd at the start, not negative; infinite for the largest possible.
         end_velocity: sd at the end likewise.
+        ceiling: As from `ceilings`, where it is known.
 
     Raises:
         UnreachableSpeedError: When there is no motion with these velocities.
         UnlimitedSpeedError: When some x is not bounded.
     """
-    sets = controllable(intervals, end_velocity)
+    sets = controllable(intervals, end_velocity, ceiling)
     first = min(start_velocity**2, float(sets.upper[0]))
     grid = intervals.grid
     if np.isfinite(start_velocity) and first < start_velocity**2 * (1.0 - _SAME):
@@ -148,67 +131,10 @@ def solve(intervals: Intervals, start_velocity: float, end_velocity: float) -> S
     if not np.isfinite(x).all():
         raise UnlimitedSpeedError(float(grid[int(np.argmin(np.isfinite(x)))]))
     if first < sets.lower[0] * (1.0 - _SAME):
-        free = controllable(intervals, np.inf)
+        free = controllable(intervals, np.inf, sets.ceiling)
         allowed = float(np.sqrt(_forward(intervals, first, free.upper)[-1]))
         raise UnreachableSpeedError("end", float(grid[-1]), end_velocity, allowed)
     return Speeds(x, sets.upper, sets.ceiling)
-
-
-def solve_again(intervals: Intervals, before: Speeds, changed: NDArray[np.bool_]) -> Speeds | None:
-    """Return the fastest motion where few rows are others than before, or None where that is felt far away.
-
-    Args:
-        intervals: N of them.
-        before: The motion without the changes.
-        changed: Which intervals have lower limits than before, shape (N,).
-    """
-    found = Speeds(before.x.copy(), before.upper.copy(), ceilings(intervals, before.ceiling, changed))
-    for reach in _REACHES:
-        around = _Around(intervals, changed, reach)
-        if around.places.size > _MOST * changed.size:
-            break
-        around.solve(before, found)
-        if around.meets(before, found):
-            return found
-    return None
-
-
-class _Around:
-    """The surroundings of changed intervals, one after the other, with a gap between them."""
-
-    def __init__(self, intervals: Intervals, changed: NDArray[np.bool_], reach: int) -> None:
-        rows = np.flatnonzero(changed)
-        steps = np.zeros(changed.size + 1, dtype=np.intp)
-        np.add.at(steps, np.maximum(rows - reach, 0), 1)
-        np.add.at(steps, np.minimum(rows + reach + 1, changed.size), -1)
-        inside = np.cumsum(steps) > 0  # the last one, after the last interval, is not
-        self.places = np.flatnonzero(inside | np.append(False, inside[:-1]))
-        self.within = inside[self.places[:-1]]
-        self.begins = np.append(True, ~self.within)
-        self.ends = np.append(~self.within, True)
-        chosen = self.places[:-1]
-        self.P, self.R, self.C = (rows[:, chosen] for rows in (intervals.P, intervals.R, intervals.C))
-
-    def solve(self, before: Speeds, found: Speeds) -> None:
-        """Write into `found` what `before` becomes here, if it stays the same at the border."""
-        P, R, C, places, within = self.P, self.R, self.C, self.places, self.within
-        limits = np.where(
-            self.ends, np.minimum(before.upper[places], found.ceiling[places]), found.ceiling[places]
-        )
-        chosen = (P > 0) & (R < 0) & within
-        upper = scanned(R[:, ::-1], P[:, ::-1], C[:, ::-1], chosen[:, ::-1], limits[::-1])[::-1]
-        found.upper[places] = upper
-        limits = np.where(self.begins, np.minimum(before.x[places], upper), upper)
-        found.x[places] = scanned(P, R, C, (R > 0) & within, limits)
-
-    def meets(self, before: Speeds, found: Speeds) -> bool:
-        """Return whether nothing changes at the border."""
-        begins, ends = self.places[self.begins], self.places[self.ends]
-        same = np.array_equal(found.x[ends], before.x[ends]) and np.array_equal(
-            found.x[begins], before.x[begins]
-        )
-        begins = begins[begins > 0]
-        return same and np.array_equal(found.upper[begins], before.upper[begins])
 
 
 def _forward(intervals: Intervals, first: float, upper: Array) -> Array:
@@ -220,7 +146,7 @@ def _forward(intervals: Intervals, first: float, upper: Array) -> Array:
 def _lower(intervals: Intervals, lower: Array, upper: Array) -> Array:
     """Return the lower ends of the controllable sets; infinite before the place where there is none left."""
     P, R, C = intervals.P.T, intervals.R.T, intervals.C.T
-    fastest = np.minimum(_blockwise(intervals.R, intervals.P, intervals.C, intervals.cap[1:]), upper[1:])
+    fastest = np.minimum(largest(intervals.R, intervals.P, intervals.C, intervals.cap[1:]), upper[1:])
     y = float(lower[-1])
     for i in range(lower.size - 2, -1, -1):
         if y > fastest[i] * (1.0 + _SAME):
@@ -232,49 +158,3 @@ def _lower(intervals: Intervals, lower: Array, upper: Array) -> Array:
         if y == 0.0:
             break
     return lower
-
-
-def _blockwise(P: Array, R: Array, C: Array, cap: Array) -> Array:
-    found = np.empty(cap.size)
-    for block in blocks(cap.size):
-        found[block] = _ceiling(P[:, block], R[:, block], C[:, block], cap[block])
-    return found
-
-
-def _ceiling(P: Array, R: Array, C: Array, cap: Array) -> Array:
-    """Return the largest x <= cap of each interval for which some y >= 0 obeys all rows.
-
-    The room for y, the smallest upper bound less the largest lower one, is concave in x and positive at zero,
-    so Newton's steps from the right end at the crossing of the two rows that decide, after a few of them.
-    """
-    alone = (R == 0) & (P > 0)
-    x = np.minimum(cap, HUGE)
-    if alone.any():
-        x = np.minimum(x, np.where(alone, C / np.where(alone, P, 1.0), np.inf).min(axis=0))
-    live = np.arange(x.size)
-    for _ in range(_STEPS):
-        lower = _newton(P, R, C, x[live])
-        going = lower < x[live]
-        live = live[going]
-        if not live.size:
-            break
-        x[live] = lower[going]
-        P, R, C = P[:, going], R[:, going], C[:, going]
-    return np.where(x < HUGE, x, np.inf)
-
-
-def _newton(P: Array, R: Array, C: Array, x: Array) -> Array:
-    """Return where the two rows that decide at `x` cross, or `x` where it obeys all rows."""
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        bounds = (C - P * x) / R
-    high, low = np.where(R > 0, bounds, np.inf), np.where(R < 0, bounds, -np.inf)
-    columns, k, j = np.arange(x.size), high.argmin(axis=0), low.argmax(axis=0)
-    top, bottom = high[k, columns], low[j, columns]
-    rest = bottom <= 0.0  # then y >= 0 decides, the row -y <= 0
-    bottom = np.where(rest, 0.0, bottom)
-    over = bottom > top + _SAME * (np.abs(top) + np.abs(bottom))
-    rise, fall = R[k, columns], np.where(rest, 1.0, -R[j, columns])
-    slope = P[k, columns] * fall + np.where(rest, 0.0, P[j, columns]) * rise
-    crossing = C[k, columns] * fall + np.where(rest, 0.0, C[j, columns]) * rise
-    usable = over & (slope > 0)
-    return np.where(usable, crossing / np.where(usable, slope, 1.0), x)

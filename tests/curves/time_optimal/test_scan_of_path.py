@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 from topp_paths import random_bounds, spline
 
-from trajcli.curves.time_optimal import scan, solve
+from trajcli.curves.time_optimal import scan
+from trajcli.curves.time_optimal.again import solve_again
+from trajcli.curves.time_optimal.ceiling import ceilings
 from trajcli.curves.time_optimal.constraints import joint_demand
 from trajcli.curves.time_optimal.intervals import constrained
+from trajcli.curves.time_optimal.solve import solve
 
 
 def recurrence(P, R, C, chosen, limits):
@@ -35,6 +38,10 @@ def test_scans_are_the_recurrence(monkeypatch, count, many, block):
     np.testing.assert_array_equal(scan.scanned(P, R, C, chosen, limits), recurrence(P, R, C, chosen, limits))
 
 
+def again(rows, before, changed):
+    return solve_again(rows, before, changed, ceilings(rows, before.ceiling, changed))
+
+
 @pytest.mark.parametrize("end", [0.0, 0.05])
 @pytest.mark.parametrize("seed", range(3))
 def test_a_few_lowered_limits_change_the_solution_around_them(seed, end):
@@ -45,11 +52,11 @@ def test_a_few_lowered_limits_change_the_solution_around_them(seed, end):
     )
     grid = np.linspace(path.start, path.end, 39 * 20 + 1)
     rows = constrained(grid, [joint_demand(path, velocity, acceleration)], np.empty(0))
-    before = solve.solve(rows, 0.0, end)
+    before = solve(rows, 0.0, end)
     factors = np.ones((2, grid.size - 1))
     factors[:, rng.choice(grid.size - 1, 5)] = rng.uniform(1, 1.2, (2, 5))
     lowered, changed = rows.tightened(*factors), (factors != 1).any(axis=0)
-    whole, found = solve.solve(lowered, 0.0, end), solve.solve_again(lowered, before, changed)
+    whole, found = solve(lowered, 0.0, end), again(lowered, before, changed)
     assert found is not None
     for name in ("x", "upper", "ceiling"):
         np.testing.assert_array_equal(getattr(found, name), getattr(whole, name))
@@ -64,5 +71,5 @@ def test_what_is_felt_far_away_is_not_found_again(bounds, place):
     rows = constrained(np.linspace(0, 1, 1001), [demand], np.empty(0))
     factors = np.ones((2, 1000))
     factors[1, place] = 1.5
-    before = solve.solve(rows, 0.0, 0.0)
-    assert solve.solve_again(rows.tightened(*factors), before, factors[1] != 1) is None
+    before = solve(rows, 0.0, 0.0)
+    assert again(rows.tightened(*factors), before, factors[1] != 1) is None
