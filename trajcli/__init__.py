@@ -17,6 +17,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from trajcli.version import __version__
+
 if TYPE_CHECKING:
     from trajcli.checks.finding import Finding
     from trajcli.checks.verify import Verdict
@@ -41,8 +43,6 @@ if TYPE_CHECKING:
     from trajcli.pipeline.report import report_of, verification_error
     from trajcli.pipeline.write import write_plan
     from trajcli.trajectory import State, Trajectory
-
-__version__ = "0.1.0"
 
 _HOMES = {
     "trajcli.checks.finding": ("Finding",),

@@ -44,7 +44,7 @@ def main() -> NoReturn:
 def _run() -> int:
     try:
         if sys.argv[1:] == ["--version"]:  # typer would import pydantic to read an option of its own
-            from trajcli import __version__
+            from trajcli.version import __version__
 
             print(f"trajcli {__version__}")  # noqa: T201
             return 0

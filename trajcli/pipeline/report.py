@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import asdict
 
-from trajcli import __version__
 from trajcli.checks.finding import Finding
 from trajcli.curves.extrema import Peaks
 from trajcli.errors import Amount, Problem, VerificationError, said
@@ -30,6 +29,7 @@ from trajcli.pipeline.tool_report import tool_report
 from trajcli.planners.operational import OperationalMove
 from trajcli.planners.point_to_point import PointToPoint
 from trajcli.planners.through_points import ThroughPoints
+from trajcli.version import __version__
 
 _JUMPS = {"position_jump": 0, "velocity_jump": 1, "acceleration_jump": 2}
 

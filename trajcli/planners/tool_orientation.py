@@ -7,11 +7,11 @@ from typing import Literal
 
 import numpy as np
 
+from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, PlanningError
 from trajcli.geometry.orientation_curve import AboutAxes, AlongPath, Fixed, OrientationCurve
 from trajcli.geometry.place_curve import PlaceCurve
 from trajcli.geometry.progress import Progress
-from trajcli.geometry.rotation import Array
 from trajcli.planners.tool_target import ToolTarget
 
 Orientation = Literal["axis_angle", "euler", "fixed", "tangent"]

@@ -23,10 +23,18 @@ import numpy as np
 
 from trajcli.frozen import frozen
 from trajcli.kinematics.columns import Column
-from trajcli.kinematics.inverse import slides
 from trajcli.kinematics.inverse.elbow import elbow, is_elbow
 from trajcli.kinematics.inverse.lines import Arm, Floats, Line, meeting_point, parallel, perpendicular
 from trajcli.kinematics.inverse.method import Choice
+from trajcli.kinematics.inverse.slides import (
+    INDEPENDENT,
+    ahead_of,
+    ball,
+    cartesian,
+    cylindrical,
+    scara,
+    stanford,
+)
 from trajcli.kinematics.inverse.subproblems import Value, Watch
 
 Reach = Callable[[Column, Column, Watch], Sequence[Value]]
@@ -90,22 +98,22 @@ def _match(lines: tuple[Line, ...], length: float, forward: Floats | None) -> Fo
             return _match_turns_and_slide(lines, length, forward)
         case "RPP":
             normal = np.cross(lines[1].direction, lines[2].direction)
-            fits = np.linalg.norm(np.cross(normal, lines[0].direction)) > slides.INDEPENDENT
-            return ("cylindrical base", ("shoulder",), partial(slides.cylindrical, lines)) if fits else None
+            fits = np.linalg.norm(np.cross(normal, lines[0].direction)) > INDEPENDENT
+            return ("cylindrical base", ("shoulder",), partial(cylindrical, lines)) if fits else None
         case "PPP":
-            independent = abs(np.linalg.det([line.direction for line in lines])) > slides.INDEPENDENT
-            return ("Cartesian base", (), partial(slides.cartesian, lines)) if independent else None
+            independent = abs(np.linalg.det([line.direction for line in lines])) > INDEPENDENT
+            return ("Cartesian base", (), partial(cartesian, lines)) if independent else None
     return None
 
 
 def _match_turns(lines: tuple[Line, ...], length: float, forward: Floats | None) -> Found | None:
     one, two, three = lines
     if is_elbow(lines):
-        ahead = forward or slides.ahead_of(one, two)
+        ahead = forward or ahead_of(one, two)
         return "elbow", ("shoulder", "elbow"), partial(elbow, lines, forward=ahead)
     center = meeting_point(one, two, length)
     if center is not None and not parallel(two, three):
-        return "two axes that meet", ("elbow", "shoulder"), partial(slides.ball, lines, center)
+        return "two axes that meet", ("elbow", "shoulder"), partial(ball, lines, center)
     return None
 
 
@@ -114,11 +122,11 @@ def _match_turns_and_slide(lines: tuple[Line, ...], length: float, forward: Floa
     if parallel(one, two):
         if perpendicular(one, three):
             return None
-        return "SCARA base", ("elbow",), partial(slides.scara, lines)
+        return "SCARA base", ("elbow",), partial(scara, lines)
     if perpendicular(two, three):
-        ahead = forward or slides.ahead_of(one, two)
-        return "Stanford base", ("shoulder", "elbow"), partial(slides.stanford, lines, forward=ahead)
+        ahead = forward or ahead_of(one, two)
+        return "Stanford base", ("shoulder", "elbow"), partial(stanford, lines, forward=ahead)
     center = meeting_point(one, two, length)
     if center is None or parallel(two, three):
         return None
-    return "Stanford base", ("elbow", "shoulder"), partial(slides.ball, lines, center)
+    return "Stanford base", ("elbow", "shoulder"), partial(ball, lines, center)
