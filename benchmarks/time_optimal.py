@@ -17,10 +17,10 @@ def ours():
     from scipy.interpolate import CubicSpline
 
     from trajcli.curves.piecewise import PiecewisePolynomial
-    from trajcli.curves.time_optimal.constraints import joint_demand
-    from trajcli.curves.time_optimal.intervals import constrained
-    from trajcli.curves.time_optimal.law import law_of
-    from trajcli.curves.time_optimal.solve import solve
+    from trajcli.curves.time_optimal.collocation import collocation_rows
+    from trajcli.curves.time_optimal.constraints import joint_constraint
+    from trajcli.curves.time_optimal.passes import solve
+    from trajcli.curves.time_optimal.time_law import law_of
 
     s, points, velocity, acceleration = _problem()
     spline = CubicSpline(s, points, bc_type="not-a-knot")
@@ -28,7 +28,7 @@ def ours():
     grid, nowhere = np.linspace(0.0, 1.0, INTERVALS + 1), np.empty(0)
 
     def run():
-        rows = constrained(grid, [joint_demand(path, velocity, acceleration)], nowhere)
+        rows = collocation_rows(grid, [joint_constraint(path, velocity, acceleration)], nowhere)
         return law_of(grid, solve(rows, 0.0, 0.0).x).duration
 
     return run, _shown

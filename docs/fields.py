@@ -15,14 +15,28 @@ from trajcli.job.robot_model import JointModel
 from trajcli.planners import PLANNERS, Planner
 from trajcli.planners.arc_fields import ArcFields
 from trajcli.planners.blends import BlendDurations
-from trajcli.planners.bounds import UNLIMITED, Bounds, JointBound, LimitsSpec, Scale, ToolLimitsSpec
+from trajcli.planners.bounds import (
+    UNLIMITED,
+    Bounds,
+    JointBound,
+    LimitsSpec,
+    Scale,
+    ToolLimitsSpec,
+)
 from trajcli.planners.deviation import Deviation
 from trajcli.planners.fields import Target
 from trajcli.planners.operational import ToleranceSpec
 from trajcli.planners.path import Segment
 from trajcli.planners.path_law import LawSpec
 from trajcli.planners.per_joint import PerJoint
-from trajcli.planners.pose_fields import AxisAngle, Configuration, Direction, Euler, Matrix, Numbers
+from trajcli.planners.pose_fields import (
+    AxisAngle,
+    Configuration,
+    Direction,
+    Euler,
+    Matrix,
+    Numbers,
+)
 from trajcli.planners.poses import Pose
 from trajcli.planners.reading import FieldType, Number
 from trajcli.planners.time_optimal import PathParameter

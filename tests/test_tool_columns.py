@@ -14,7 +14,7 @@ from test_samples import random_curve, rows_of, trajectory_of
 from trajcli.columns import column_names
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.errors import InputError
-from trajcli.geometry.quaternion import without_jumps
+from trajcli.geometry.rotation import without_jumps
 from trajcli.job.read import job_from_text, load_job
 from trajcli.kinematics.robot import Joint, Robot, unlimited
 from trajcli.pipeline.plan import plan_job

@@ -8,7 +8,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from trajcli.units import Quantity, UnitError, Units, factor, parse_quantity, to_si, to_user, unit_name
+from trajcli.units import (
+    Quantity,
+    UnitError,
+    Units,
+    factor,
+    parse_quantity,
+    to_si,
+    to_user,
+    unit_name,
+)
 
 ANGLE, VELOCITY, ACCELERATION, JERK = (Quantity("angle", order) for order in range(4))
 LENGTH, SPEED, LENGTH2, LENGTH3 = (Quantity("length", order) for order in range(4))

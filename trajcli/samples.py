@@ -10,7 +10,14 @@ from math import ceil, isfinite
 
 import numpy as np
 
-from trajcli.columns import JOINT_ORDERS, TOOL_COLUMNS, Group, check_groups, joint_factors, tool_factors
+from trajcli.columns import (
+    JOINT_ORDERS,
+    TOOL_COLUMNS,
+    Group,
+    check_groups,
+    joint_factors,
+    tool_factors,
+)
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, read_only
 from trajcli.errors import InputError
 from trajcli.frozen import comparable, frozen
@@ -192,7 +199,7 @@ def _of_tool(group: Group, robot: Robot | None, motion: Array, last: Array | Non
         last: Quaternion of the row before, (4,); None before the first.
     """
     # a plan without these columns does not pay for the imports
-    from trajcli.geometry.quaternion import quaternion_from_matrix, without_jumps
+    from trajcli.geometry.rotation import quaternion_from_matrix, without_jumps
     from trajcli.kinematics.forward import forward
     from trajcli.kinematics.jacobian import tcp_acceleration, tcp_twist
 

@@ -9,13 +9,12 @@ import pytest
 
 from trajcli.checks.tool import check_tool
 from trajcli.checks.tool_rows import ToolRows
-from trajcli.curves.compose import scale_time
 from trajcli.curves.hermite import hermite_pieces
+from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.geometry.line import Line
-from trajcli.geometry.orientation_curve import AboutAxes
-from trajcli.geometry.pose_curve import PoseCurve
-from trajcli.geometry.progress import Progress
+from trajcli.geometry.paths.orientation import AxisAngleOrientation, SegmentProgress
+from trajcli.geometry.paths.pose import PoseCurve
+from trajcli.geometry.paths.position import Line
 from trajcli.job.robot_source import load_robot
 from trajcli.kinematics.following.motion import motion_along
 from trajcli.kinematics.following.tolerance import Tolerance
@@ -63,7 +62,7 @@ def moving(tcp=None, *, the_law=None, turn=(0.0, 0.0, TURN), tolerance=1e-6) -> 
     from scipy.spatial.transform import Rotation
 
     last = Rotation.from_rotvec(turn).as_matrix() @ pose[:3, :3]
-    turning = AboutAxes(np.stack([pose[:3, :3], last]), Progress.even(place.length))
+    turning = AxisAngleOrientation(np.stack([pose[:3, :3], last]), SegmentProgress.even(place.length))
     path = ToolPath(PoseCurve(place, turning), WHOLE, "all")
     s = the_law or law(place.length)
     motion = motion_along(path, s, s.breaks, Tolerance(tolerance, tolerance))

@@ -7,8 +7,8 @@ import pytest
 from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize
 
-from trajcli.curves.allocation import fastest_durations
 from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.curves.splines.time_allocation import fastest_durations
 
 FREE = (-np.inf, np.inf)
 

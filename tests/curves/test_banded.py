@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from spline_laws import SEEDS, _solved
 
-from trajcli.curves import banded
-from trajcli.curves.banded import solve_tridiagonal
+from trajcli.curves import linear_systems as banded
+from trajcli.curves.linear_systems import solve_tridiagonal
 
 
 def dominant_system(rng, m, n=3, spread=1e4):

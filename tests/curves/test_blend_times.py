@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
-from trajcli.curves.blend_times import fastest_blends
-from trajcli.curves.blends import blended
 from trajcli.curves.extrema import peaks
+from trajcli.curves.parabolic_blends.blends import blended
+from trajcli.curves.parabolic_blends.fastest import fastest_blends
 
 STARTS = 6
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import PPoly
 
-from trajcli.curves.blends import Shrunk, blended
+from trajcli.curves.parabolic_blends.blends import Shrunk, blended
 
 ENDS = st.sampled_from(["centred", "inside"])
 

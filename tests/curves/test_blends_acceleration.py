@@ -8,8 +8,8 @@ from blend_cases import COUNTS, JOINTS, SEEDS, assert_continuous, chords, polyli
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from trajcli.curves.blend_accelerations import BlendAccelerationError
-from trajcli.curves.blends import blended, blended_by_acceleration
+from trajcli.curves.parabolic_blends.blends import blended, blended_by_acceleration
+from trajcli.curves.parabolic_blends.durations import BlendAccelerationError
 
 
 def strong(t, q, rng):

@@ -8,8 +8,8 @@ from blend_cases import JOINTS, SEEDS, assert_continuous, assert_no_slivers, cho
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from trajcli.curves.blends import blended, blended_by_acceleration
 from trajcli.curves.extrema import peaks_between
+from trajcli.curves.parabolic_blends.blends import blended, blended_by_acceleration
 
 ENDS = st.sampled_from(["centred", "inside"])
 COUNTS = st.integers(3, 10)

@@ -9,7 +9,7 @@ import pytest
 import yaml
 from blend_cases import chords
 
-from trajcli.curves.blends import blended, blended_by_acceleration
+from trajcli.curves.parabolic_blends.blends import blended, blended_by_acceleration
 
 ORACLES = Path(__file__).parents[1] / "oracles" / "blends.yaml"
 CASES = yaml.safe_load(ORACLES.read_text(encoding="utf-8"))["cases"]

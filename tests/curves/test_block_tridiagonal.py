@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from trajcli.curves.block_tridiagonal import solve_block_tridiagonal
+from trajcli.curves.linear_systems import solve_block_tridiagonal
 
 
 def system(seed, blocks, size):

@@ -8,7 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import PPoly
 
-from trajcli.curves.compose import along_line, coast_until, hold_until, merge_breaks, reverse, scale_time
+from trajcli.curves.operations import (
+    along_line,
+    coast_until,
+    hold_until,
+    merge_breaks,
+    reverse,
+    scale_time,
+)
 from trajcli.curves.piecewise import PiecewisePolynomial, concatenate, constant
 
 ORDERS = (0, 1, 2, 3)

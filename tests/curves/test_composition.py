@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import PPoly
 
-from trajcli.curves.compose import compose
+from trajcli.curves.operations import compose
 from trajcli.curves.piecewise import PiecewisePolynomial, constant
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from trajcli.curves.feasible import smallest_feasible
+from trajcli.curves.smallest_feasible import smallest_feasible
 
 
 def outside(*intervals: tuple[float, float]):

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from trajcli.curves.fit import FitError, fit
 from trajcli.curves.hermite import hermite_pieces
-from trajcli.curves.invert import times_at
+from trajcli.curves.hermite_fit import FitError, fit
+from trajcli.curves.operations import times_at
 from trajcli.curves.piecewise import PiecewisePolynomial
 
 ENDS = np.array([0.0, 3.0])

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from trajcli.curves.invert import times_at
+from trajcli.curves.operations import times_at
 from trajcli.curves.piecewise import PiecewisePolynomial
 
 

@@ -12,8 +12,8 @@ from scipy.interpolate import CubicSpline
 from spline_laws import SEEDS, assert_equals_exact, assert_through, exact_spline, jump, uneven_times
 
 from trajcli.curves.extrema import peaks
-from trajcli.curves.spline import clamped, natural, not_a_knot
-from trajcli.curves.spline_virtual import continuous_acceleration
+from trajcli.curves.splines.cubic import clamped, natural, not_a_knot
+from trajcli.curves.splines.virtual_points import continuous_acceleration
 
 ENDS = [(False, False), (True, False), (False, True), (True, True)]
 

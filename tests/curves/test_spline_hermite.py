@@ -12,7 +12,7 @@ from scipy.interpolate import BPoly, CubicHermiteSpline
 from spline_laws import SEEDS, assert_through, jump, uneven_times
 
 from trajcli.curves.extrema import peaks
-from trajcli.curves.spline_hermite import (
+from trajcli.curves.splines.hermite import (
     computed_accelerations,
     computed_velocities,
     cubic_through,

@@ -9,15 +9,15 @@ import pytest
 import yaml
 from numpy.polynomial import Polynomial
 
-from trajcli.curves.spline import clamped
-from trajcli.curves.spline_hermite import (
+from trajcli.curves.splines.cubic import clamped
+from trajcli.curves.splines.hermite import (
     computed_accelerations,
     computed_velocities,
     cubic_through,
     parabola_velocities,
     quintic_through,
 )
-from trajcli.curves.spline_virtual import continuous_acceleration, virtual_points
+from trajcli.curves.splines.virtual_points import continuous_acceleration, virtual_points
 
 FOLDER = Path(__file__).parents[1] / "oracles"
 CASES = yaml.safe_load((FOLDER / "splines.yaml").read_text(encoding="utf-8"))["cases"]

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from spline_laws import SEEDS, assert_equals_exact, assert_through, exact_spline, uneven_times
 
-from trajcli.curves.spline_virtual import continuous_acceleration, virtual_points
+from trajcli.curves.splines.virtual_points import continuous_acceleration, virtual_points
 
 STEPS = st.lists(st.sampled_from([1, 3, 16, 100, 1024, 10000]), min_size=3, max_size=6)
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from trajcli.errors import InputError, PlanningError
-from trajcli.geometry.arc import Arc
+from trajcli.geometry.paths.arc import Arc
 
 COORDINATE = st.floats(-1, 1).map(lambda x: round(x, 6))
 POINT = st.tuples(COORDINATE, COORDINATE, COORDINATE).map(np.array)

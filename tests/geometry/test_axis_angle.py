@@ -6,7 +6,7 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation, Slerp
 
 from trajcli.errors import InputError
-from trajcli.geometry.axis_angle import (
+from trajcli.geometry.rotation import (
     axis_angle_from_matrix,
     cross_matrix,
     exp,

@@ -16,11 +16,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from trajcli.errors import InputError, PlanningError
-from trajcli.geometry.arc import Arc
-from trajcli.geometry.chain import join
-from trajcli.geometry.corner import turn_between
-from trajcli.geometry.line import Line
-from trajcli.geometry.place_curve import Stretch
+from trajcli.geometry.paths.arc import Arc
+from trajcli.geometry.paths.chain import join
+from trajcli.geometry.paths.corner import turn_between
+from trajcli.geometry.paths.position import Line, PartOfCurve
 
 COMPONENT = st.floats(-1, 1).map(lambda x: round(x, 3))
 VECTOR = st.tuples(COMPONENT, COMPONENT, COMPONENT).map(np.array)
@@ -207,12 +206,12 @@ def test_the_attitude_of_a_chain_turns_as_its_parts_do():
 
 def test_a_stretch_of_an_arc_has_its_own_attitude():
     arc = Arc([1, 0, 0], [0, 0, 0], [0, 0, 1], 3.0)
-    part = Stretch(arc, 1.0, 2.5)
+    part = PartOfCurve(arc, 1.0, 2.5)
     attitude_is_kept(part)
     np.testing.assert_allclose(
         Rotation.from_matrix(part.transport(np.array([1.5]))[0]).as_rotvec(), [[0, 0, 1.5]], atol=1e-14
     )
-    both = Stretch(join(SQUARE), 0.5, 2.0)
+    both = PartOfCurve(join(SQUARE), 0.5, 2.0)
     np.testing.assert_array_equal(both.breaks, [0.5])
     np.testing.assert_array_equal(both.stops, [0.5])
 

@@ -9,15 +9,15 @@ from scipy.integrate import quad, solve_ivp
 from scipy.spatial.transform import Rotation
 
 from trajcli.errors import InputError, PlanningError
-from trajcli.geometry.arc import Arc
-from trajcli.geometry.corner import (
+from trajcli.geometry.paths.arc import Arc
+from trajcli.geometry.paths.corner import (
     corner_values,
     curvature_jumps,
     room_for_radius,
     round_corner,
     turn_between,
 )
-from trajcli.geometry.line import Line
+from trajcli.geometry.paths.position import Line
 
 COMPONENT = st.floats(-1, 1).map(lambda x: round(x, 4))
 VECTOR = st.tuples(COMPONENT, COMPONENT, COMPONENT).map(np.array)

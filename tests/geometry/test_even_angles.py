@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from trajcli.errors import InputError
-from trajcli.geometry.chain import join
-from trajcli.geometry.even_angles import EvenAngles, even_angles, nearest_angles
-from trajcli.geometry.line import Line
-from trajcli.geometry.progress import Progress
+from trajcli.geometry.paths.chain import join
+from trajcli.geometry.paths.euler_interpolation import EulerInterpolation, euler_interpolation, nearest_angles
+from trajcli.geometry.paths.orientation import SegmentProgress
+from trajcli.geometry.paths.position import Line
 
 SEQUENCES = ["".join(s) for s in product("xyz", repeat=3) if s[0] != s[1] != s[2]]
 FRAMES = ["current", "fixed"]
@@ -28,7 +28,7 @@ def scipys(sequence, frame, angles):
 @pytest.mark.parametrize("sequence", SEQUENCES)
 def test_the_angles_change_evenly(sequence, frame):
     start, end = np.array([0.3, -0.4, 1.0]), np.array([-2.0, 1.1, 7.5])
-    curve = EvenAngles.between(start, end, sequence.upper(), frame, 0.8)
+    curve = EulerInterpolation.between(start, end, sequence.upper(), frame, 0.8)
     s = np.linspace(0, 0.8, 9)
     way = start + np.outer(s / 0.8, end - start)
     np.testing.assert_allclose(curve.evaluate(s)[0], scipys(sequence, frame, way), rtol=0, atol=1e-14)
@@ -44,7 +44,7 @@ def test_the_angles_change_evenly(sequence, frame):
 def test_over_a_chain(angles, sequence, frame):
     corners = [[0, 0, 0], [1, 0, 0], [1, 0.5, 0], [0.3, 0.5, 0.4]]
     chain = join([Line(a, b) for a, b in pairwise(corners)], [0.2, 0])
-    curve = EvenAngles(np.array(angles), chain.progress, sequence, frame)
+    curve = EulerInterpolation(np.array(angles), chain.progress, sequence, frame)
     keeps_the_laws_of_a_rotation(curve.evaluate, curve, tolerance=1e-5)
     continuous(curve.evaluate, curve.breaks[:3])
     ends = curve.evaluate(np.array([0, chain.stops[0], chain.length]))[0]
@@ -57,7 +57,7 @@ def test_over_a_chain(angles, sequence, frame):
 @given(ANGLES, ANGLES, st.sampled_from(SEQUENCES), st.sampled_from(FRAMES))
 def test_what_was_not_typed_is_read_nearest(first, last, sequence, frame):
     matrices = np.array([scipys(sequence, frame, row) for row in (first, last)])
-    curve = even_angles(matrices, None, sequence, frame, [None, last])
+    curve = euler_interpolation(matrices, None, sequence, frame, [None, last])
     np.testing.assert_array_equal(curve.angles[1], last)
     np.testing.assert_allclose(scipys(sequence, frame, curve.angles[0]), matrices[0], rtol=0, atol=1.1e-10)
     if curve.locked == ():
@@ -68,7 +68,7 @@ def test_what_was_not_typed_is_read_nearest(first, last, sequence, frame):
 
 def test_of_typed_angles_whole_turns_are_made():
     matrices = np.tile(np.eye(3), (2, 1, 1))
-    curve = even_angles(matrices, None, "zyx", "current", [[0, 0, 0], [2 * np.pi, 0, 0]])
+    curve = euler_interpolation(matrices, None, "zyx", "current", [[0, 0, 0], [2 * np.pi, 0, 0]])
     assert curve.length == pytest.approx(2 * np.pi)
     np.testing.assert_allclose(curve.evaluate(np.array([np.pi]))[0][0], np.diag([-1, -1, 1]), atol=1e-15)
 
@@ -80,7 +80,9 @@ def test_of_typed_angles_whole_turns_are_made():
 def test_at_gimbal_lock_the_first_angle_is_the_neighbours_and_that_is_said(sequence, middle, frame):
     matrix, aim = scipys(sequence, frame, [0.3, middle, 0.9]), np.array([0.7, middle, 0.2])
     target = scipys(sequence, frame, aim)
-    curve = even_angles(np.array([matrix, target]), Progress.even(1.0), sequence, frame, [None, aim])
+    curve = euler_interpolation(
+        np.array([matrix, target]), SegmentProgress.even(1.0), sequence, frame, [None, aim]
+    )
     assert curve.locked == (0,)
     kept = 0 if frame == "current" else 2
     assert curve.angles[0, kept] == aim[kept]
@@ -112,7 +114,7 @@ def test_near_the_lock_nothing_is_said():
 
 def test_where_nothing_was_typed_the_last_is_read_first():
     matrices = Rotation.random(3, random_state=6).as_matrix()
-    curve = even_angles(matrices, Progress(np.array([0, 1.0, 2.0]), np.zeros(1)), "zyz")
+    curve = euler_interpolation(matrices, SegmentProgress(np.array([0, 1.0, 2.0]), np.zeros(1)), "zyz")
     for row, matrix in zip(curve.angles, matrices, strict=True):
         np.testing.assert_allclose(scipys("zyz", "current", row), matrix, rtol=0, atol=1e-12)
     assert np.abs(curve.angles[2]).max() <= np.pi
@@ -121,10 +123,10 @@ def test_where_nothing_was_typed_the_last_is_read_first():
 
 def test_what_does_not_fit_is_refused():
     with pytest.raises(InputError, match="'xxy' is no sequence"):
-        EvenAngles.between([0, 0, 0], [1, 1, 1], "xxy")
+        EulerInterpolation.between([0, 0, 0], [1, 1, 1], "xxy")
     with pytest.raises(InputError, match="1 segments need 2 orientations, not 3"):
-        EvenAngles(np.zeros((3, 3)), Progress.even(1.0), "xyz")
+        EulerInterpolation(np.zeros((3, 3)), SegmentProgress.even(1.0), "xyz")
     with pytest.raises(InputError, match="finite triples"):
-        EvenAngles.between([0, 0, np.nan], [1, 1, 1], "xyz")
+        EulerInterpolation.between([0, 0, np.nan], [1, 1, 1], "xyz")
     with pytest.raises(InputError, match="2 orientations and 1 triples"):
-        even_angles(np.tile(np.eye(3), (2, 1, 1)), None, "xyz", typed=[None])
+        euler_interpolation(np.tile(np.eye(3), (2, 1, 1)), None, "xyz", typed=[None])

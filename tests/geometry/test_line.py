@@ -5,8 +5,7 @@ import pytest
 from curve_laws import attitude_is_kept, keeps_the_laws_of_a_place
 
 from trajcli.errors import InputError, PlanningError
-from trajcli.geometry.line import Line
-from trajcli.geometry.place_curve import Pivot, Stretch
+from trajcli.geometry.paths.position import Line, PartOfCurve, Pivot
 
 
 def test_a_line_goes_straight_from_end_to_end():
@@ -52,7 +51,7 @@ def test_what_lies_outside_is_refused_and_rounding_is_not():
 
 
 def test_a_stretch_is_a_part_of_the_whole():
-    part = Stretch(Line([0, 0, 0], [2, 0, 0]), 0.5, 1.25)
+    part = PartOfCurve(Line([0, 0, 0], [2, 0, 0]), 0.5, 1.25)
     assert part.length == 0.75
     np.testing.assert_allclose(part.evaluate(np.array([0, 0.75]))[0][:, 0], [0.5, 1.25])
     with pytest.raises(ValueError, match="leaves"):

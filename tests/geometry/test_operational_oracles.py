@@ -12,13 +12,12 @@ import numpy as np
 import pytest
 import yaml
 
-from trajcli.geometry.arc import Arc
-from trajcli.geometry.chain import join
-from trajcli.geometry.even_angles import EvenAngles
-from trajcli.geometry.line import Line
-from trajcli.geometry.orientation_curve import AboutAxes
-from trajcli.geometry.place_curve import SAME_PLACE, Pivot
-from trajcli.geometry.pose_curve import PoseCurve
+from trajcli.geometry.paths.arc import Arc
+from trajcli.geometry.paths.chain import join
+from trajcli.geometry.paths.euler_interpolation import EulerInterpolation
+from trajcli.geometry.paths.orientation import AxisAngleOrientation
+from trajcli.geometry.paths.pose import PoseCurve
+from trajcli.geometry.paths.position import SAME_PLACE, Line, Pivot
 
 FILE = Path(__file__).parents[1] / "oracles" / "operational.yaml"
 CASES = yaml.safe_load(FILE.read_text(encoding="utf-8"))["cases"]
@@ -136,7 +135,7 @@ def test_an_arc_through_three_points(case):
 def test_angles_under_a_cubic(case):
     given, rows = case["inputs"], np.array(case["expected"]["samples_t_phi_dphi"])
     sequence, frame = given["convention"].split()
-    curve = EvenAngles.between(given["phi_i"], given["phi_f"], sequence, frame)
+    curve = EulerInterpolation.between(given["phi_i"], given["phi_f"], sequence, frame)
     s, sd, _ = cubic(curve.length, given["T"], rows[:, 0])
     angles, slopes, _ = curve.angles_at(s)
     np.testing.assert_allclose(angles, rows[:, 1:4], rtol=0, atol=case["tolerance"])
@@ -147,7 +146,7 @@ def test_angles_under_a_cubic(case):
 @of("orient_axis_angle")
 def test_a_rotation_under_a_cubic(case):
     start, end = (np.array(case["inputs"][name]) for name in ("R_i", "R_f"))
-    curve, rows = AboutAxes.between(start, end), np.array(case["expected"]["samples_t_theta"])
+    curve, rows = AxisAngleOrientation.between(start, end), np.array(case["expected"]["samples_t_theta"])
     close(curve.length, case, "theta_f")
     close(curve.vectors[0] / curve.angles[0], case, "axis_in_initial_frame")
     s, sd, sdd = cubic(curve.length, case["inputs"]["T"], rows[:, 0])
@@ -164,7 +163,7 @@ def test_a_rotation_under_a_cubic(case):
 @of("orient_axis_angle_pi")
 def test_half_a_turn(case):
     start, end = (np.array(case["inputs"][name]) for name in ("R_i", "R_f"))
-    curve = AboutAxes.between(start, end)
+    curve = AxisAngleOrientation.between(start, end)
     close(curve.length, case, "theta_f")
     close(curve.vectors[0] / np.pi, case, "axis_up_to_sign")  # its first component is positive
     assert curve.half_turns.all()
@@ -175,7 +174,7 @@ def test_half_a_turn(case):
 @of("orient_axis_angle_zero")
 def test_equal_orientations_are_held(case):
     start, end = (np.array(case["inputs"][name]) for name in ("R_i", "R_f"))
-    curve = AboutAxes.between(start, end, 2.0)
+    curve = AxisAngleOrientation.between(start, end, 2.0)
     close(curve.angles[0], case, "theta_f")
     for rotation in curve.evaluate(np.linspace(0, 2, 7))[0]:
         close(rotation, case, "R_any_t")
@@ -185,7 +184,7 @@ def test_equal_orientations_are_held(case):
 def test_poses_on_a_line(case):
     start, end = (np.array(case["inputs"][name], dtype=float) for name in ("T0", "T1"))
     line = Line(start[:3, 3], end[:3, 3])
-    curve = PoseCurve(line, AboutAxes.between(start[:3, :3], end[:3, :3], line.length))
+    curve = PoseCurve(line, AxisAngleOrientation.between(start[:3, :3], end[:3, :3], line.length))
     close(curve.evaluate(np.array(case["inputs"]["s"]) * curve.length)[0], case, "T")
 
 
@@ -193,7 +192,7 @@ def test_a_line_without_length_is_held():
     """The seed's formula divides by the distance of the points."""
     place = np.array([0.1, 0.2, 0.3])
     assert np.linalg.norm(place - place) <= SAME_PLACE
-    turn = AboutAxes.between(np.eye(3), np.eye(3))
+    turn = AxisAngleOrientation.between(np.eye(3), np.eye(3))
     held = PoseCurve(Pivot(place, place, turn.length), turn)
     pose, first, second = held.evaluate(np.zeros(2))
     np.testing.assert_array_equal(pose[:, :3, 3], [place, place])

@@ -10,12 +10,16 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
 from trajcli.errors import InputError
-from trajcli.geometry.arc import Arc
-from trajcli.geometry.chain import join
-from trajcli.geometry.line import Line
-from trajcli.geometry.orientation_curve import AboutAxes, AlongPath, Fixed, turn_vectors
-from trajcli.geometry.place_curve import Pivot
-from trajcli.geometry.progress import Progress
+from trajcli.geometry.paths.arc import Arc
+from trajcli.geometry.paths.chain import join
+from trajcli.geometry.paths.orientation import (
+    AxisAngleOrientation,
+    FixedOrientation,
+    SegmentProgress,
+    TangentOrientation,
+    turn_vectors,
+)
+from trajcli.geometry.paths.position import Line, Pivot
 
 SEEDS = st.integers(0, 10**6)
 CORNERS = [[0, 0, 0], [1, 0, 0], [1, 0.5, 0], [0.3, 0.5, 0.4], [0, 0, 1]]
@@ -33,7 +37,7 @@ def path(radius):
 @given(SEEDS, st.floats(0.01, 5))
 def test_from_one_orientation_to_another_it_is_slerp(seed, length):
     start, end = random_rotations(seed, 2)
-    curve = AboutAxes.between(start, end, length)
+    curve = AxisAngleOrientation.between(start, end, length)
     s = np.linspace(0, length, 11)
     rotation, rate, change = curve.evaluate(s)
     expected = Slerp([0, length], Rotation.from_matrix([start, end]))(s)
@@ -51,7 +55,9 @@ def test_from_one_orientation_to_another_it_is_slerp(seed, length):
 @pytest.mark.parametrize("axis", np.eye(3).tolist())
 def test_it_turns_about_coordinate_axes_too(axis):
     last = Rotation.from_rotvec(0.8 * np.array(axis)).as_matrix()
-    rotation, rate, change = AboutAxes.between(np.eye(3), last, 2.0).evaluate(np.array([0.0, 0.5, 2.0]))
+    rotation, rate, change = AxisAngleOrientation.between(np.eye(3), last, 2.0).evaluate(
+        np.array([0.0, 0.5, 2.0])
+    )
     expected = Rotation.from_rotvec(np.outer([0.0, 0.2, 0.8], axis)).as_matrix()
     np.testing.assert_allclose(rotation, expected, rtol=0, atol=1e-15)
     np.testing.assert_allclose(rate, np.tile(np.array(axis) * 0.4, (3, 1)), rtol=0, atol=1e-15)
@@ -60,12 +66,12 @@ def test_it_turns_about_coordinate_axes_too(axis):
 
 def test_a_rotation_alone_goes_by_its_angle():
     start, end = random_rotations(4, 2)
-    curve = AboutAxes.between(start, end)
+    curve = AxisAngleOrientation.between(start, end)
     assert curve.length == pytest.approx(Rotation.from_matrix(end @ start.T).magnitude(), rel=1e-14)
     np.testing.assert_allclose(np.linalg.norm(curve.evaluate(np.zeros(1))[1]), 1, rtol=1e-14)
-    held = AboutAxes.between(start, start)
+    held = AxisAngleOrientation.between(start, start)
     assert held.length < 1e-15
-    still = AboutAxes(np.array([start, start]), Progress.even(0.0)).evaluate(np.zeros(2))
+    still = AxisAngleOrientation(np.array([start, start]), SegmentProgress.even(0.0)).evaluate(np.zeros(2))
     np.testing.assert_allclose(still[0], [start, start], rtol=0, atol=1e-15)
     np.testing.assert_allclose(still[1], 0, rtol=0, atol=1e-15)
 
@@ -78,11 +84,11 @@ def test_half_a_turn_has_one_axis_whatever_the_rounding():
         half = Rotation.from_rotvec(np.pi * unit).as_matrix()
         for _ in range(20):
             start = random_rotations(int(noise.integers(1000)), 1)[0]
-            curve = AboutAxes.between(start, start @ half + 1e-15 * noise.normal(size=(3, 3)), 1.0)
+            curve = AxisAngleOrientation.between(start, start @ half + 1e-15 * noise.normal(size=(3, 3)), 1.0)
             np.testing.assert_allclose(curve.vectors[0], np.pi * expected, rtol=0, atol=1e-13)
             np.testing.assert_allclose(curve.evaluate(np.ones(1))[0][0], start @ half, rtol=0, atol=1e-14)
             assert curve.half_turns.all()
-    assert not AboutAxes.between(*random_rotations(1, 2)).half_turns.any()
+    assert not AxisAngleOrientation.between(*random_rotations(1, 2)).half_turns.any()
 
 
 def test_a_little_less_than_half_a_turn_is_not_turned_round():
@@ -95,7 +101,7 @@ def test_a_little_less_than_half_a_turn_is_not_turned_round():
 @given(SEEDS, st.sampled_from([0.0, 0.03, 0.2, 3.0, (0.1, 0, 0.2)]))
 def test_over_a_chain_the_rotation_is_smooth_where_the_path_is(seed, radius):
     chain, targets = path(radius), random_rotations(seed, len(CORNERS))
-    curve = AboutAxes(targets, chain.progress)
+    curve = AxisAngleOrientation(targets, chain.progress)
     keeps_the_laws_of_a_rotation(curve.evaluate, curve, tolerance=1e-6)
     sharp = chain.borders[1:-1][chain.half_widths == 0]
     np.testing.assert_allclose(
@@ -120,7 +126,7 @@ def test_over_a_chain_the_rotation_is_smooth_where_the_path_is(seed, radius):
 def test_the_rate_does_not_overshoot_in_a_rounded_corner():
     chain = path(0.1)
     turns = Rotation.from_rotvec([[0, 0, angle] for angle in (0, 1, 1.2, 3, 3.1)]).as_matrix()
-    curve = AboutAxes(turns, chain.progress)
+    curve = AxisAngleOrientation(turns, chain.progress)
     rate = curve.evaluate(np.linspace(0, curve.length, 2001))[1][:, 2]
     even = np.diff([0, 1, 1.2, 3, 3.1]) / np.diff(chain.borders)
     assert even.min() - 1e-12 < rate.min()
@@ -130,7 +136,7 @@ def test_the_rate_does_not_overshoot_in_a_rounded_corner():
 def test_blends_that_meet_have_one_break_between_them():
     corners = [[0, 0, 0], [0.7, 0, 0], [0.7, 0.3, 0], [0.1, 0.3, 0.1]]
     chain = join([Line(a, b) for a, b in itertools.pairwise(corners)], 0.25)
-    curve = AboutAxes(random_rotations(2, 4), chain.progress)
+    curve = AxisAngleOrientation(random_rotations(2, 4), chain.progress)
     assert np.diff(curve.breaks).min() > 1e-3
     assert curve.breaks.size == 5
 
@@ -138,21 +144,21 @@ def test_blends_that_meet_have_one_break_between_them():
 def test_equal_rates_need_no_stop():
     chain = join([Line([0, 0, 0], [1, 0, 0]), Line([1, 0, 0], [3, 0, 0])])
     turns = Rotation.from_rotvec([[0, 0, 0], [0.3, 0, 0], [0.9, 0, 0]]).as_matrix()
-    assert not AboutAxes(turns, chain.progress).stops.size
-    np.testing.assert_array_equal(AboutAxes(turns[[0, 1, 0]], chain.progress).stops, [1])
+    assert not AxisAngleOrientation(turns, chain.progress).stops.size
+    np.testing.assert_array_equal(AxisAngleOrientation(turns[[0, 1, 0]], chain.progress).stops, [1])
     faded = join(chain.segments, 0.2)
     assert not faded.stops.size
-    curve = AboutAxes(random_rotations(2, 3), faded.progress)
+    curve = AxisAngleOrientation(random_rotations(2, 3), faded.progress)
     assert not curve.stops.size
     np.testing.assert_allclose(curve.breaks, [0.8, 1, 1.2])
     continuous(curve.evaluate, curve.breaks)
     same = np.tile(random_rotations(3, 1), (3, 1, 1))
-    assert not AboutAxes(same, chain.progress).stops.size
+    assert not AxisAngleOrientation(same, chain.progress).stops.size
 
 
 def test_fixed():
     rotation = random_rotations(1, 1)[0]
-    curve = Fixed(rotation, 2.0)
+    curve = FixedOrientation(rotation, 2.0)
     for row, expected in zip(curve.evaluate(np.array([0, 2.0])), (rotation, 0, 0), strict=True):
         np.testing.assert_array_equal(row, np.broadcast_to(expected, row.shape))
     with pytest.raises(ValueError, match="leaves"):
@@ -170,7 +176,7 @@ def test_fixed():
 )
 def test_along_a_path_the_path_stays_where_it_is_seen_from_the_tool(place):
     start = random_rotations(7, 1)[0]
-    curve = AlongPath(place, start)
+    curve = TangentOrientation(place, start)
     s = np.linspace(0, place.length, 77)
     rotation, rate, _ = curve.evaluate(s)
     np.testing.assert_allclose(rotation[0], start, rtol=0, atol=1e-14)
@@ -189,14 +195,14 @@ def test_along_a_path_it_stops_where_the_curvature_jumps_and_jumps_at_sharp_corn
         Line([1, 1, 0], [0, 1, 0]),
         Line([0, 1, 0], [0, 1, 1]),
     ]
-    curve = AlongPath(join(segments), np.eye(3))
+    curve = TangentOrientation(join(segments), np.eye(3))
     np.testing.assert_allclose(curve.jumps, [2 + np.pi / 2], rtol=1e-15)
     np.testing.assert_allclose(curve.stops, [1, 1 + np.pi / 2, 2 + np.pi / 2], rtol=1e-15)
     left, right = sides(curve.evaluate, curve.jumps)
     assert Rotation.from_matrix(left[0] @ np.swapaxes(right[0], -1, -2)).magnitude() == pytest.approx(
         np.pi / 2
     )
-    rounded = AlongPath(join(segments, 0.2), np.eye(3))
+    rounded = TangentOrientation(join(segments, 0.2), np.eye(3))
     assert not rounded.stops.size
     assert not rounded.jumps.size
     continuous(rounded.evaluate, rounded.breaks, orders=2)
@@ -204,12 +210,12 @@ def test_along_a_path_it_stops_where_the_curvature_jumps_and_jumps_at_sharp_corn
 
 def test_what_does_not_fit_is_refused():
     with pytest.raises(InputError, match="1 segments need 2 orientations, not 3"):
-        AboutAxes(random_rotations(1, 3), Progress.even(1.0))
+        AxisAngleOrientation(random_rotations(1, 3), SegmentProgress.even(1.0))
     mirror = np.diag([1.0, 1.0, -1.0])
     for make in (
-        lambda: AboutAxes.between(mirror, np.eye(3)),
-        lambda: Fixed(mirror, 1.0),
-        lambda: AlongPath(Pivot(np.zeros(3), np.zeros(3), 1.0), mirror),
+        lambda: AxisAngleOrientation.between(mirror, np.eye(3)),
+        lambda: FixedOrientation(mirror, 1.0),
+        lambda: TangentOrientation(Pivot(np.zeros(3), np.zeros(3), 1.0), mirror),
     ):
         with pytest.raises(InputError, match="mirrors space"):
             make()

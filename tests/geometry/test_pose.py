@@ -6,7 +6,6 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 from trajcli.errors import InputError
-from trajcli.geometry.axis_angle import cross_matrix
 from trajcli.geometry.pose import (
     build,
     check_pose,
@@ -18,6 +17,7 @@ from trajcli.geometry.pose import (
     transform_points,
     twist_between,
 )
+from trajcli.geometry.rotation import cross_matrix
 
 A, B, C = (
     build(Rotation.random(50, random_state=n).as_matrix(), np.random.default_rng(n).normal(size=(50, 3)))

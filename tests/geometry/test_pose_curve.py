@@ -9,14 +9,12 @@ from scipy.linalg import expm, logm
 from scipy.spatial.transform import Rotation
 
 from trajcli.errors import InputError
-from trajcli.geometry.arc import Arc
-from trajcli.geometry.chain import join
-from trajcli.geometry.line import Line
-from trajcli.geometry.orientation_curve import AboutAxes, AlongPath, Fixed
-from trajcli.geometry.place_curve import Pivot
+from trajcli.geometry.paths.arc import Arc
+from trajcli.geometry.paths.chain import join
+from trajcli.geometry.paths.orientation import AxisAngleOrientation, FixedOrientation, TangentOrientation
+from trajcli.geometry.paths.pose import PoseCurve, PosePath, Screw
+from trajcli.geometry.paths.position import Line, Pivot
 from trajcli.geometry.pose import build
-from trajcli.geometry.pose_curve import PoseCurve, PosePath
-from trajcli.geometry.screw import Screw
 
 
 def random_poses(seed, count):
@@ -103,9 +101,9 @@ def test_a_screw_of_half_a_turn_has_one_axis_whatever_the_rounding():
 def test_place_and_orientation_side_by_side(place):
     start, end = Rotation.random(2, random_state=3).as_matrix()
     for orientation in (
-        AboutAxes.between(start, end, place.length),
-        Fixed(start, place.length),
-        AlongPath(place, start),
+        AxisAngleOrientation.between(start, end, place.length),
+        FixedOrientation(start, place.length),
+        TangentOrientation(place, start),
     ):
         curve = PoseCurve(place, orientation)
         is_a_pose_path(curve, tolerance=2e-5)
@@ -128,27 +126,29 @@ def test_breaks_of_both_are_one():
         [Line([0, 0, 0], [1, 0, 0]), Line([1, 0, 0], [1, 1, 0]), Line([1, 1, 0], [0, 1, 0])], [0.3, 0]
     )
     rotations = Rotation.random(4, random_state=3).as_matrix()
-    curve = PoseCurve(chain, AboutAxes(rotations, chain.progress))
+    curve = PoseCurve(chain, AxisAngleOrientation(rotations, chain.progress))
     expected = np.sort(
         [*chain.breaks, chain.borders[1]]
     )  # the middle of the blend is one of the orientation's
     np.testing.assert_allclose(curve.breaks, expected, rtol=1e-12)
     np.testing.assert_array_equal(curve.stops, chain.stops)
     assert not curve.jumps.size
-    along = PoseCurve(chain, AlongPath(chain, rotations[0]))
+    along = PoseCurve(chain, TangentOrientation(chain, rotations[0]))
     np.testing.assert_array_equal(along.jumps, chain.stops)
 
 
 def test_a_stop_for_the_rotation_alone():
     chain = join([Line([0, 0, 0], [1, 0, 0]), Line([1, 0, 0], [2, 0, 0])])
-    curve = PoseCurve(chain, AboutAxes(Rotation.random(3, random_state=3).as_matrix(), chain.progress))
+    curve = PoseCurve(
+        chain, AxisAngleOrientation(Rotation.random(3, random_state=3).as_matrix(), chain.progress)
+    )
     assert not chain.stops.size
     np.testing.assert_array_equal(curve.stops, [1])
 
 
 def test_a_rotation_in_place():
     start, end = Rotation.random(2, random_state=9).as_matrix()
-    orientation = AboutAxes.between(start, end)
+    orientation = AxisAngleOrientation.between(start, end)
     curve = PoseCurve(Pivot([1, 2, 3], [1, 2, 3], orientation.length), orientation)
     assert curve.in_place
     poses, first, second = curve.evaluate(np.linspace(0, curve.length, 4))
@@ -161,4 +161,4 @@ def test_a_rotation_in_place():
 
 def test_place_and_orientation_must_be_as_long():
     with pytest.raises(ValueError, match=r"differ in length: 3.0, 2.0"):
-        PoseCurve(Line([0, 0, 0], [1, 2, 2]), Fixed(np.eye(3), 2.0))
+        PoseCurve(Line([0, 0, 0], [1, 2, 2]), FixedOrientation(np.eye(3), 2.0))

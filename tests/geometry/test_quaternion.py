@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from trajcli.errors import InputError
-from trajcli.geometry.quaternion import (
+from trajcli.geometry.rotation import (
     canonical,
     check_quaternion,
     conjugate,

@@ -9,10 +9,17 @@ import pytest
 import yaml
 
 from trajcli.errors import InputError
-from trajcli.geometry.axis_angle import axis_angle_from_matrix, log, matrix_from_axis_angle, slerp
 from trajcli.geometry.euler import euler_from_matrix, matrix_from_euler, rpy_from_matrix
 from trajcli.geometry.pose import build, check_pose, compose, interpolate, invert
-from trajcli.geometry.rotation import check_rotation, compose_turns, rotation_about
+from trajcli.geometry.rotation import (
+    axis_angle_from_matrix,
+    check_rotation,
+    compose_turns,
+    log,
+    matrix_from_axis_angle,
+    rotation_about,
+    slerp,
+)
 
 FILE = Path(__file__).parents[1] / "oracles" / "rotations.yaml"
 CASES = yaml.safe_load(FILE.read_text(encoding="utf-8"))["cases"]

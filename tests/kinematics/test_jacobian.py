@@ -5,7 +5,7 @@ import oracle_robots as oracle
 import pytest
 
 from trajcli.errors import InputError
-from trajcli.geometry.axis_angle import log
+from trajcli.geometry.rotation import log
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.jacobian import jacobian, jacobian_dot_qd, tcp_acceleration, tcp_twist
 

@@ -7,6 +7,8 @@ behind it at the end, is a ramp to or from rest before or after that.
 
 Source: Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), sections 3.2
 and 3.2.7; Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.2.1.
+
+A velocity of one variable that is linear between knots; its position is a chain of parabolas.
 """
 
 from __future__ import annotations
@@ -14,8 +16,116 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from trajcli.curves.velocity_profile import Profile, Rates
+import numpy as np
+
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, increasing
 from trajcli.frozen import comparable
+
+_ROUNDING_OF_SPEED = 1e-14  # of the largest speed: speeds this close differ by rounding
+
+
+@comparable
+class MotionBounds:
+    """What a motion in one direction may do: all positive; speed may be infinite.
+
+    Attributes:
+        speed: Largest speed.
+        acceleration: Rate of speeding up.
+        deceleration: Rate of slowing down.
+    """
+
+    speed: float
+    acceleration: float
+    deceleration: float
+
+
+@comparable
+class VelocityProfile:
+    """A velocity that is linear between knots.
+
+    Attributes:
+        initial: Velocity at the start.
+        knots: (duration of the stretch, velocity at its end) in order; without knots it has no length.
+    """
+
+    initial: float
+    knots: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def duration(self) -> float:
+        """Seconds."""
+        return math.fsum(length for length, _ in self.knots)
+
+    @property
+    def distance(self) -> float:
+        """Signed distance covered."""
+        velocities = [self.initial, *(velocity for _, velocity in self.knots)]
+        return math.fsum(
+            (velocities[i] + velocities[i + 1]) / 2 * knot[0] for i, knot in enumerate(self.knots)
+        )
+
+    def then(self, other: VelocityProfile) -> VelocityProfile:
+        """Return this profile followed by another that starts with the velocity in which this one ends."""
+        return VelocityProfile(self.initial, self.knots + other.knots)
+
+    def mirrored(self) -> VelocityProfile:
+        """Return the profile in the opposite direction."""
+        return VelocityProfile(-self.initial, tuple((length, -velocity) for length, velocity in self.knots))
+
+    def stretched(self, factor: float) -> VelocityProfile:
+        """Return the profile that takes `factor` times as long over the same distance."""
+        return VelocityProfile(self.initial / factor, tuple((t * factor, v / factor) for t, v in self.knots))
+
+    def phases(self) -> list[tuple[str, float, float]]:
+        """Return (name, start, end) of each stretch: accelerate, cruise, decelerate or rest."""
+        named, start, before = [], 0.0, self.initial
+        for length, velocity in self.knots:
+            change = abs(velocity) - abs(before)
+            flat = "cruise" if velocity else "rest"
+            name = flat if change == 0 else "accelerate" if change > 0 else "decelerate"
+            if length > 0:
+                named.append((name, start, start + length))
+            start, before = start + length, velocity
+        return named
+
+    def curve(self, start: float, end: float, duration: float | None = None) -> PiecewisePolynomial:
+        """Return the position (n = 1) from `start`; its pieces are laid to end exactly in `end`.
+
+        Args:
+            start: Where it begins.
+            end: Where it ends: `start` plus the distance, rounding apart.
+            duration: When it ends: the duration, rounding apart.
+        """
+        knots = self._lasting_knots()
+        if not knots:
+            return PiecewisePolynomial(np.zeros(2), np.full((1, 1, 1), start))
+        lengths = np.array([length for length, _ in knots])
+        velocity = np.array([self.initial, *(v for _, v in knots)])
+        breaks = np.concatenate([[0.0], np.cumsum(lengths)])
+        breaks[-1] = breaks[-1] if duration is None else duration
+        breaks = increasing(breaks)
+        position = start + np.concatenate([[0.0], np.cumsum((velocity[1:] + velocity[:-1]) / 2 * lengths)])
+        position[1:] += (end - position[-1]) * breaks[1:] / breaks[-1]
+        slope = np.diff(velocity) / np.diff(breaks)  # so that velocities meet where breaks are rounded
+        coefficients: Array = np.stack([slope / 2, velocity[:-1], position[:-1]])[:, :, None]
+        return PiecewisePolynomial(breaks, coefficients)
+
+    def _lasting_knots(self) -> list[tuple[float, float]]:
+        """Return the knots without stretches of no length, and ramps between speeds equal but for rounding.
+
+        Such a ramp is shorter than the times of its ends are exact: its acceleration would be anything.
+        """
+        fastest = max(abs(velocity) for velocity in (self.initial, *(v for _, v in self.knots)))
+        shortest = 8 * math.ulp(self.duration)
+        kept: list[tuple[float, float]] = []
+        before = self.initial
+        for length, velocity in self.knots:
+            same = abs(velocity - before) <= _ROUNDING_OF_SPEED * fastest
+            if length > (shortest if same else 0.0):
+                kept.append((length, before if same else velocity))
+                before = kept[-1][1]
+        return kept
+
 
 _ROUNDING = 1e-12  # relative: what a speed, a distance or a duration may miss its bound by
 _DOUBLE = 1e-15  # relative: a discriminant this small is zero, and both roots are one
@@ -37,8 +147,14 @@ class InfeasibleProfileError(ValueError):
 
 
 def fastest_profile(
-    distance: float, initial: float, final: float, forward: Rates, backward: Rates, *, overshoot: bool = False
-) -> Profile:
+    distance: float,
+    initial: float,
+    final: float,
+    forward: MotionBounds,
+    backward: MotionBounds,
+    *,
+    overshoot: bool = False,
+) -> VelocityProfile:
     """Return the fastest profile over a signed `distance` from velocity `initial` to velocity `final`.
 
     Args:
@@ -61,11 +177,11 @@ def profile_of_duration(
     initial: float,
     final: float,
     duration: float,
-    forward: Rates,
-    backward: Rates,
+    forward: MotionBounds,
+    backward: MotionBounds,
     *,
     overshoot: bool = False,
-) -> Profile:
+) -> VelocityProfile:
     """Return the profile over a signed `distance` that lasts `duration` with the given ramps.
 
     The cruise speed is what is looked for; it may lie below the boundary speeds. The speeds of `forward` and
@@ -94,7 +210,7 @@ def profile_of_speed(
     duration: float,
     speed: float,
     deceleration: float | None = None,
-) -> Profile:
+) -> VelocityProfile:
     """Return the profile over a positive `distance` that lasts `duration` with cruise speed `speed`.
 
     The rate of the ramps is what is looked for: both the same, or that of speeding up where `deceleration` is
@@ -106,7 +222,7 @@ def profile_of_speed(
     low, high = _speeds_of_duration(distance, initial, final, duration, deceleration)
     surplus = speed * duration - distance
     if initial == final == speed and abs(surplus) <= _ROUNDING * distance:
-        return Profile(speed, ((duration, speed),))
+        return VelocityProfile(speed, ((duration, speed),))
     up, down = (speed - initial) ** 2 / 2, (speed - final) ** 2 / 2
     if deceleration is not None:
         surplus -= down / deceleration
@@ -136,7 +252,7 @@ def _speeds_of_duration(
 
 
 @comparable
-class _Way:
+class _ThreePartMotion:
     """A motion in three parts, of which the middle goes straight to its end and is still to be found.
 
     Attributes:
@@ -149,36 +265,42 @@ class _Way:
         rates: What the middle may do.
     """
 
-    before: Profile
-    after: Profile
+    before: VelocityProfile
+    after: VelocityProfile
     direction: int
     distance: float
     initial: float
     final: float
-    rates: Rates
+    rates: MotionBounds
 
-    def mirrored(self) -> _Way:
+    def mirrored(self) -> _ThreePartMotion:
         """Return the way in the opposite direction."""
         before, after = self.before.mirrored(), self.after.mirrored()
         return replace(self, before=before, after=after, direction=-self.direction)
 
-    def with_middle(self, middle: Profile) -> Profile:
+    def with_middle(self, middle: VelocityProfile) -> VelocityProfile:
         """Return the whole profile."""
         signed = middle if self.direction > 0 else middle.mirrored()
         return self.before.then(signed).then(self.after)
 
 
 def _way(
-    distance: float, initial: float, final: float, forward: Rates, backward: Rates, *, overshoot: bool
-) -> _Way:
+    distance: float,
+    initial: float,
+    final: float,
+    forward: MotionBounds,
+    backward: MotionBounds,
+    *,
+    overshoot: bool,
+) -> _ThreePartMotion:
     if distance < 0 or (distance == 0 and (initial < 0 or (initial == 0 and final < 0))):
         return _way(-distance, -initial, -final, backward, forward, overshoot=overshoot).mirrored()
     change = (initial - final) * (initial + final) / 2
     needed = change / forward.deceleration if change > 0 else -change / forward.acceleration
     fits = needed <= distance * (1 + _ROUNDING)
     if initial >= 0 and final >= 0 and fits:
-        before, after = Profile(initial), Profile(final)
-        return _Way(before, after, 1, distance, initial, final, forward)
+        before, after = VelocityProfile(initial), VelocityProfile(final)
+        return _ThreePartMotion(before, after, 1, distance, initial, final, forward)
     if initial >= 0 and not overshoot:
         reason = "turns" if final < 0 else "too_fast" if change > 0 else "too_slow"
         raise InfeasibleProfileError(reason, needed)
@@ -191,21 +313,21 @@ def _way(
     return replace(rest, after=rest.after.then(run_up))
 
 
-def _ramp(initial: float, final: float, rates: Rates) -> Profile:
+def _ramp(initial: float, final: float, rates: MotionBounds) -> VelocityProfile:
     faster = abs(final) > abs(initial)
     rate = rates.acceleration if faster else rates.deceleration
-    return Profile(initial, ((abs(final - initial) / rate, final),))
+    return VelocityProfile(initial, ((abs(final - initial) / rate, final),))
 
 
-def _fastest_middle(way: _Way) -> Profile:
+def _fastest_middle(way: _ThreePartMotion) -> VelocityProfile:
     if way.distance == 0:
-        return Profile(way.initial)
+        return VelocityProfile(way.initial)
     distance, initial, final, rates = way.distance, way.initial, way.final, way.rates
     a, d = rates.acceleration, rates.deceleration
     square = (2 * a * d * distance + d * initial**2 + a * final**2) / (a + d)
     peak = max(math.sqrt(square), initial, final)
     if peak <= rates.speed * (1 + _ROUNDING):
-        return Profile(initial, (((peak - initial) / a, peak), ((peak - final) / d, final)))
+        return VelocityProfile(initial, (((peak - initial) / a, peak), ((peak - final) / d, final)))
     cruise = rates.speed
     if min(initial, final) > cruise:
         cruise = max(cruise, _lowest_speed(way))
@@ -213,13 +335,13 @@ def _fastest_middle(way: _Way) -> Profile:
     fall = abs(cruise - final) / (d if cruise >= final else a)
     covered = (initial + cruise) / 2 * rise + (cruise + final) / 2 * fall
     flat = max(0.0, (distance - covered) / cruise)
-    return Profile(initial, ((rise, cruise), (flat, cruise), (fall, final)))
+    return VelocityProfile(initial, ((rise, cruise), (flat, cruise), (fall, final)))
 
 
-def _middle_of_duration(way: _Way, duration: float) -> Profile | None:
+def _middle_of_duration(way: _ThreePartMotion, duration: float) -> VelocityProfile | None:
     """Return the middle that lasts `duration`, or None; a ramp may lead up to the cruise or down to it."""
     if way.distance == 0:
-        return Profile(0.0, ((duration, 0.0),)) if way.initial == 0 and duration >= 0 else None
+        return VelocityProfile(0.0, ((duration, 0.0),)) if way.initial == 0 and duration >= 0 else None
     if duration <= 0:
         return None
     a, d, initial, final = way.rates.acceleration, way.rates.deceleration, way.initial, way.final
@@ -237,14 +359,14 @@ def _middle_of_duration(way: _Way, duration: float) -> Profile | None:
     return None
 
 
-def _lowest_speed(way: _Way) -> float:
+def _lowest_speed(way: _ThreePartMotion) -> float:
     """Return where slowing down at once meets speeding up at the end; 0 where there is time to stop."""
     a, d = way.rates.acceleration, way.rates.deceleration
     square = (way.initial**2 / d + way.final**2 / a - 2 * way.distance) * a * d / (a + d)
     return math.sqrt(max(0.0, square))
 
 
-def _slowest_middle(way: _Way) -> float:
+def _slowest_middle(way: _ThreePartMotion) -> float:
     """Return how long the middle can last: as long as wanted where it may stop, or nearly so."""
     lowest = _lowest_speed(way)
     if lowest == 0:
@@ -253,11 +375,13 @@ def _slowest_middle(way: _Way) -> float:
     return max(0.0, slowing / way.rates.deceleration + speeding / way.rates.acceleration)
 
 
-def _three(initial: float, cruise: float, final: float, rise: float, fall: float, duration: float) -> Profile:
+def _three(
+    initial: float, cruise: float, final: float, rise: float, fall: float, duration: float
+) -> VelocityProfile:
     flat = duration - rise - fall
     if flat <= _ROUNDING * duration:
         rise, flat = duration - fall, 0.0
-    return Profile(initial, ((rise, cruise), (flat, cruise), (fall, final)))
+    return VelocityProfile(initial, ((rise, cruise), (flat, cruise), (fall, final)))
 
 
 def _roots(a: float, b: float, c: float) -> list[float]:

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from trajcli.errors import InputError
-from trajcli.geometry.axis_angle import cross_matrix, exp, log, slerp
-from trajcli.geometry.rotation import Array, check_rotation
+from trajcli.geometry.rotation import Array, check_rotation, cross_matrix, exp, log, slerp
 
-Way = Literal["line", "screw"]
+PoseInterpolation = Literal["line", "screw"]
 LAST_ROW = 1e-9  # of the last row from (0, 0, 0, 1): it is never measured, only typed
 _SMALL = 1e-4  # rad, below which the limits of the factors of K^2 are exact to 1e-17
 
@@ -101,7 +100,7 @@ def twist_between(start: Array, end: Array) -> Array:
     return log_pose(invert(start) @ end)
 
 
-def interpolate(start: Array, end: Array, s: ArrayLike, way: Way = "line") -> Array:
+def interpolate(start: Array, end: Array, s: ArrayLike, way: PoseInterpolation = "line") -> Array:
     """Return the poses (*batch, 4, 4) on the way from `start` (s = 0) to `end` (s = 1).
 
     Args:

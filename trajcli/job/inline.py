@@ -17,7 +17,14 @@ from trajcli.job.messages import problems_of
 from trajcli.planners.pose_fields import PoseFields
 from trajcli.planners.poses import Pose
 from trajcli.planners.reading import AT_KEY, FlawError, ReadingContext
-from trajcli.units import Quantity, UnitError, Units, factor, parse_quantity, unit_name
+from trajcli.units import (
+    Quantity,
+    UnitError,
+    Units,
+    factor,
+    parse_quantity,
+    unit_name,
+)
 
 T = TypeVar("T")
 _NUMBER = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")

@@ -24,7 +24,14 @@ from yaml.scanner import ScannerError
 from trajcli.errors import InputError, Problem
 from trajcli.job.document import Document, Node, place
 from trajcli.job.scalars import ScalarError, resolve
-from trajcli.job.source import STDIN, check_characters, decode, read_bytes, split_lines, tab_problem
+from trajcli.job.source import (
+    STDIN,
+    check_characters,
+    decode,
+    read_bytes,
+    split_lines,
+    tab_problem,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable

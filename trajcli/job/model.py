@@ -28,7 +28,14 @@ from trajcli.planners.fields import NamedTarget
 from trajcli.planners.model import Model
 from trajcli.planners.planner import WhenOverLimit
 from trajcli.planners.poses import Pose
-from trajcli.planners.reading import FieldType, FlawError, Number, ReadingContext, refuse, shown
+from trajcli.planners.reading import (
+    FieldType,
+    FlawError,
+    Number,
+    ReadingContext,
+    refuse,
+    shown,
+)
 from trajcli.units import Quantity, Units
 
 ROBOT_DEFINITION = "a robot"

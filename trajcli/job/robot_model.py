@@ -14,7 +14,14 @@ from trajcli.kinematics.robot import QUANTITIES, Joint, Limits, Robot
 from trajcli.planners.bounds import UNLIMITED, Bound, JointBound, written_bound
 from trajcli.planners.model import Model
 from trajcli.planners.poses import Pose
-from trajcli.planners.reading import MAX_JOINTS, Number, ReadingContext, refuse, shown, written_number
+from trajcli.planners.reading import (
+    MAX_JOINTS,
+    Number,
+    ReadingContext,
+    refuse,
+    shown,
+    written_number,
+)
 from trajcli.units import Dimension, Quantity
 
 _ANGLE, _LENGTH = Quantity("angle"), Quantity("length")

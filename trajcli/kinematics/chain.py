@@ -16,7 +16,17 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import comparable, frozen
 from trajcli.geometry.rotation import cos_sin
-from trajcli.kinematics.columns import Column, Entry, advance, combine, dot, minus, product, scaled, total
+from trajcli.kinematics.columns import (
+    Column,
+    Entry,
+    advance,
+    combine,
+    dot,
+    minus,
+    product,
+    scaled,
+    total,
+)
 from trajcli.kinematics.robot import Robot
 
 _BLOCK = 4096  # configurations at a time: the arrays in use stay in the processor's cache

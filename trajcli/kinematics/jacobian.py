@@ -13,8 +13,23 @@ from numpy.typing import ArrayLike
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
-from trajcli.kinematics.chain import Axis, MovingFrame, blocks, configurations, links_of, travel
-from trajcli.kinematics.columns import ZERO, Column, advance, cross, dot, minus, plus
+from trajcli.kinematics.chain import (
+    Axis,
+    MovingFrame,
+    blocks,
+    configurations,
+    links_of,
+    travel,
+)
+from trajcli.kinematics.columns import (
+    ZERO,
+    Column,
+    advance,
+    cross,
+    dot,
+    minus,
+    plus,
+)
 from trajcli.kinematics.robot import Robot
 
 ReferenceFrame = Literal["world", "base", "tcp"]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from trajcli.columns import Column, parse_column
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Place, Problem
-from trajcli.geometry.quaternion import quaternion_from_matrix, without_jumps
+from trajcli.geometry.rotation import quaternion_from_matrix, without_jumps
 from trajcli.kinematics.dexterity import dexterity
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.jacobian import ReferenceFrame, jacobian

@@ -11,7 +11,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import frozen
 from trajcli.geometry.euler import euler_from_matrix, matrix_from_euler
-from trajcli.geometry.pose import Way, build, interpolate
+from trajcli.geometry.pose import PoseInterpolation, build, interpolate
 from trajcli.geometry.rotation import Frame, nearest_rotation
 from trajcli.pipeline.pose_steps import TypedAngles
 
@@ -56,7 +56,7 @@ def pose_path(
     start: End,
     end: End,
     s: Array,
-    way: Way = "line",
+    way: PoseInterpolation = "line",
     orientation: Orientation = "axis_angle",
     euler: tuple[str, Frame] | None = None,
 ) -> Array:

@@ -9,10 +9,9 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
-from trajcli.geometry.axis_angle import axis_angle_from_matrix
 from trajcli.geometry.euler import EulerAngles, check_sequence, euler_from_matrix, rpy_from_matrix
 from trajcli.geometry.pose import transform_points
-from trajcli.geometry.rotation import Frame
+from trajcli.geometry.rotation import Frame, axis_angle_from_matrix
 from trajcli.pipeline.pose_view import angles_view, plain, pose_view
 from trajcli.suggest import did_you_mean
 from trajcli.units import AngleUnit, LengthUnit, Quantity, Units, factor

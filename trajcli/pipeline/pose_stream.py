@@ -11,8 +11,7 @@ import numpy as np
 from trajcli.columns import Column, column_names, parse_column
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Place, PlanningError, Problem
-from trajcli.geometry.quaternion import QUATERNION_DEFECT, matrix_from_quaternion
-from trajcli.geometry.rotation import Flags
+from trajcli.geometry.rotation import QUATERNION_DEFECT, Flags, matrix_from_quaternion
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.choose import method_for
 from trajcli.kinematics.inverse.numeric import descend

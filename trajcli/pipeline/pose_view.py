@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from trajcli.curves.piecewise import Array
 from trajcli.geometry.euler import rpy_from_matrix
-from trajcli.geometry.quaternion import quaternion_from_matrix
+from trajcli.geometry.rotation import quaternion_from_matrix
 from trajcli.units import Quantity, Units, factor
 
 

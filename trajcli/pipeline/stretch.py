@@ -10,9 +10,9 @@ import numpy as np
 from trajcli.checks.finding import Finding
 from trajcli.checks.limits import peaks_by_move
 from trajcli.checks.verify import Verdict, verify
-from trajcli.curves.compose import scale_time
-from trajcli.curves.feasible import smallest_feasible
+from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import Array
+from trajcli.curves.smallest_feasible import smallest_feasible
 from trajcli.errors import Amount, PlanningError
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import QUANTITIES, Robot

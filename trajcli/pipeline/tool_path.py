@@ -13,7 +13,7 @@ from trajcli.planners.path import PathMove
 from trajcli.units import Quantity, Units, factor
 
 if TYPE_CHECKING:
-    from trajcli.geometry.screw import Screw
+    from trajcli.geometry.paths.pose import Screw
     from trajcli.kinematics.following.tool_path import ToolPath
 
 
@@ -43,9 +43,8 @@ def _drawing(
     path: ToolPath | None, units: Units, *, overlaps: bool
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     """Return the segments of a path and the corners between them."""
-    from trajcli.geometry.chain import Chain
-    from trajcli.geometry.pose_curve import PoseCurve
-    from trajcli.geometry.screw import Screw
+    from trajcli.geometry.paths.chain import Chain
+    from trajcli.geometry.paths.pose import PoseCurve, Screw
 
     if path is None:
         return [], []
@@ -92,8 +91,8 @@ def _screw(screw: Screw, units: Units) -> dict[str, Any]:
 
 
 def _segment(place: Any, units: Units) -> dict[str, Any]:  # noqa: ANN401
-    from trajcli.geometry.arc import Arc
-    from trajcli.geometry.place_curve import Pivot
+    from trajcli.geometry.paths.arc import Arc
+    from trajcli.geometry.paths.position import Pivot
 
     length, angle = (factor(Quantity(kind), units) for kind in ("length", "angle"))
     if isinstance(place, Pivot):

@@ -6,10 +6,10 @@ from typing import Literal
 
 import numpy as np
 
-from trajcli.curves.allocation import fastest_durations
-from trajcli.curves.blend_times import fastest_blends
-from trajcli.curves.blends import blended
+from trajcli.curves.parabolic_blends.blends import blended
+from trajcli.curves.parabolic_blends.fastest import fastest_blends
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.splines.time_allocation import fastest_durations
 from trajcli.errors import PlanningError
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Robot

@@ -9,8 +9,8 @@ import numpy as np
 from pydantic import Field, model_validator
 from pydantic.json_schema import JsonSchemaValue
 
-from trajcli.curves.blend_accelerations import BlendAccelerationError
-from trajcli.curves.blends import Blended, blended, blended_by_acceleration
+from trajcli.curves.parabolic_blends.blends import Blended, blended, blended_by_acceleration
+from trajcli.curves.parabolic_blends.durations import BlendAccelerationError
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount, PlanningError, Problem
 from trajcli.frozen import comparable
@@ -20,7 +20,14 @@ from trajcli.planners.fields import JointAccelerationMagnitudes
 from trajcli.planners.per_joint import flawed
 from trajcli.planners.planner import Event, Phase, Planned
 from trajcli.planners.point_to_point import missing_limit, require_rest, standstill
-from trajcli.planners.reading import FieldType, Flaw, FlawError, Number, ReadingContext, refuse
+from trajcli.planners.reading import (
+    FieldType,
+    Flaw,
+    FlawError,
+    Number,
+    ReadingContext,
+    refuse,
+)
 from trajcli.planners.recorded import Recorded
 from trajcli.planners.through_points import PointTable, ThroughPoints
 from trajcli.trajectory import Passage, State

@@ -6,8 +6,8 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from trajcli.curves.compose import along_line
 from trajcli.curves.cycloid import PEAKS, cycloid_law
+from trajcli.curves.operations import along_line
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.fields import Duration
 from trajcli.planners.planner import Planned

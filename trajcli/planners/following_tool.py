@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from trajcli.curves.fit import FitError, fit
+from trajcli.curves.hermite_fit import FitError, fit
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.frozen import frozen
 from trajcli.kinematics.following.follower import Follower, LostError, follower

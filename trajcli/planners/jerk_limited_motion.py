@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from trajcli.curves.compose import along_line, coast_until, hold_until, merge_breaks
+from trajcli.curves.operations import along_line, coast_until, hold_until, merge_breaks
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount
 from trajcli.frozen import frozen

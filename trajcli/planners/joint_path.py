@@ -7,9 +7,9 @@ from typing import Literal
 
 import numpy as np
 
-from trajcli.curves.blends import blended
+from trajcli.curves.parabolic_blends.blends import blended
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.curves.spline_shape import ShapeError
+from trajcli.curves.splines.shape_preserving import ShapeError
 from trajcli.errors import Amount, PlanningError, Problem
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Robot

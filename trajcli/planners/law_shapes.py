@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from trajcli.curves.compose import scale_time
 from trajcli.curves.hermite import hermite_coefficients
+from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount, PlanningError, Problem
 from trajcli.frozen import comparable, frozen
@@ -130,13 +130,13 @@ def _jerk_limited(length: float, bounds: PathBounds) -> Stretch:
 def _trapezoid(spec: LawSpec, length: float, bounds: PathBounds, duration: float | None) -> Stretch:
     from trajcli.curves.trapezoid import (
         InfeasibleProfileError,
+        MotionBounds,
         fastest_profile,
         profile_of_duration,
         profile_of_speed,
     )
-    from trajcli.curves.velocity_profile import Rates
 
-    rates = Rates(bounds.speed, bounds.acceleration, bounds.deceleration)
+    rates = MotionBounds(bounds.speed, bounds.acceleration, bounds.deceleration)
     try:
         if duration is None:
             profile = fastest_profile(length, 0.0, 0.0, rates, rates)

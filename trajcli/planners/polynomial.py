@@ -8,9 +8,9 @@ from typing import ClassVar
 import numpy as np
 
 from trajcli.curves.extrema import piece_extremes
-from trajcli.curves.feasible import smallest_feasible
 from trajcli.curves.hermite import hermite_coefficients
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.smallest_feasible import smallest_feasible
 from trajcli.errors import PlanningError, Problem
 from trajcli.kinematics.robot import Limits, Robot
 from trajcli.planners.fields import Duration

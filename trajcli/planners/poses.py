@@ -181,7 +181,7 @@ def _rpy(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401
 
 
 def _quaternion(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401
-    from trajcli.geometry.quaternion import check_quaternion, matrix_from_quaternion
+    from trajcli.geometry.rotation import check_quaternion, matrix_from_quaternion
 
     numbers = read_numbers(value, 4, _RATIO, context)
     check_quaternion(numbers)
@@ -189,7 +189,7 @@ def _quaternion(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401
 
 
 def _axis_angle(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401
-    from trajcli.geometry.axis_angle import matrix_from_axis_angle
+    from trajcli.geometry.rotation import matrix_from_axis_angle
 
     fields = _exactly(value, ("axis", "angle"), ())
     axis = read_axis(fields["axis"], context, "axis")

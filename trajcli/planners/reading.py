@@ -18,7 +18,14 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from trajcli.frozen import comparable
 from trajcli.planners.recorded import Recorded
-from trajcli.units import Quantity, UnitError, Units, factor, parse_quantity, unit_name
+from trajcli.units import (
+    Quantity,
+    UnitError,
+    Units,
+    factor,
+    parse_quantity,
+    unit_name,
+)
 
 MAX_JOINTS = 12
 Path = tuple[str | int, ...]

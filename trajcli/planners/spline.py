@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.curves.spline_shape import ShapeError
+from trajcli.curves.splines.shape_preserving import ShapeError
 from trajcli.errors import Amount, PlanningError, Problem
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.planner import Planned

@@ -8,16 +8,16 @@ from typing import Literal
 import numpy as np
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.curves.spline import clamped, natural, not_a_knot
-from trajcli.curves.spline_hermite import (
+from trajcli.curves.splines.cubic import clamped, natural, not_a_knot
+from trajcli.curves.splines.hermite import (
     computed_accelerations,
     computed_velocities,
     cubic_through,
     parabola_velocities,
     quintic_through,
 )
-from trajcli.curves.spline_shape import shape_preserving
-from trajcli.curves.spline_virtual import continuous_acceleration
+from trajcli.curves.splines.shape_preserving import shape_preserving
+from trajcli.curves.splines.virtual_points import continuous_acceleration
 from trajcli.planners.through_points import PointTable
 
 Rule = Literal[

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from trajcli.curves.allocation import fastest_durations
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.splines.time_allocation import fastest_durations
 from trajcli.errors import PlanningError, Problem
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.point_to_point import missing_limit

@@ -10,12 +10,11 @@ import numpy as np
 from pydantic import Field, model_validator
 from pydantic.json_schema import JsonSchemaValue
 
-from trajcli.curves.compose import scale_time
-from trajcli.curves.invert import times_at
-from trajcli.curves.time_optimal.solve import UnreachableSpeedError
-from trajcli.curves.time_optimal.structure import structure
-from trajcli.curves.time_optimal.trajectory import TimeOptimal as Solved
-from trajcli.curves.time_optimal.trajectory import UnsettledSpeedError, time_optimal
+from trajcli.curves.operations import scale_time, times_at
+from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion as Solved
+from trajcli.curves.time_optimal.parameterization import UnsettledSpeedError, time_optimal
+from trajcli.curves.time_optimal.passes import UnreachableSpeedError
+from trajcli.curves.time_optimal.switching import switching_structure
 from trajcli.errors import Amount, PlanningError, Problem
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import Robot
@@ -24,7 +23,14 @@ from trajcli.planners.joint_path import JointPath, polyline_through, spline_thro
 from trajcli.planners.planner import Event, Phase, Planned, stretched
 from trajcli.planners.point_to_point import missing_limit, standstill
 from trajcli.planners.poses import read_numbers
-from trajcli.planners.reading import FieldType, Flaw, FlawError, ReadingContext, refuse, shown
+from trajcli.planners.reading import (
+    FieldType,
+    Flaw,
+    FlawError,
+    ReadingContext,
+    refuse,
+    shown,
+)
 from trajcli.planners.recorded import Recorded
 from trajcli.planners.spline_rules import Rule
 from trajcli.planners.through_points import PointTable, ThroughPoints
@@ -160,7 +166,7 @@ class TimeOptimal(ThroughPoints):
         factor = 1.0 if self.duration is None else self.duration / duration
         _check_duration(self.duration, duration, points)
         passed = times_at(made.law, path.places)
-        binding = structure(made.trajectory, robot.limits.velocity, bounds)
+        binding = switching_structure(made.trajectory, robot.limits.velocity, bounds)
         return Planned(
             scale_time(made.trajectory, factor) if factor != 1 else made.trajectory,
             points.target,

@@ -9,8 +9,8 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount
-from trajcli.geometry.arc import Arc
-from trajcli.geometry.place_curve import SAME_PLACE, PlaceCurve
+from trajcli.geometry.paths.arc import Arc
+from trajcli.geometry.paths.position import SAME_PLACE, PositionCurve
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.arc_fields import ArcFields
@@ -58,7 +58,7 @@ def _by_angle(fields: ArcFields, before: Array) -> Arc:
     )
 
 
-def notes_of(places: Iterable[PlaceCurve]) -> tuple[Event, ...]:
+def notes_of(places: Iterable[PositionCurve]) -> tuple[Event, ...]:
     """Return an event for each arc whose center was moved."""
     text = "the center of the arc was moved by {by} to fit its ends"
     return tuple(

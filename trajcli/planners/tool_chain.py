@@ -8,10 +8,9 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount, InputError, PlanningError, Problem, TrajcliError
-from trajcli.geometry.chain import Chain, Corner, join
-from trajcli.geometry.line import Line
-from trajcli.geometry.place_curve import PlaceCurve
-from trajcli.geometry.pose_curve import PoseCurve
+from trajcli.geometry.paths.chain import Chain, Corner, join
+from trajcli.geometry.paths.pose import PoseCurve
+from trajcli.geometry.paths.position import Line, PositionCurve
 from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.robot import Robot
@@ -54,8 +53,8 @@ def chain_way(before: Array, move: PathMove, robot: Robot) -> Way:
     return replace(way, overlap=replace(motion, path=path), events=notes_of(places))
 
 
-def _segments(before: Array, move: PathMove, robot: Robot) -> tuple[list[PlaceCurve], list[ToolTarget]]:
-    places: list[PlaceCurve] = []
+def _segments(before: Array, move: PathMove, robot: Robot) -> tuple[list[PositionCurve], list[ToolTarget]]:
+    places: list[PositionCurve] = []
     targets: list[ToolTarget] = []
     pose = before
     for index, segment in enumerate(move.segments):
@@ -76,7 +75,7 @@ def _segments(before: Array, move: PathMove, robot: Robot) -> tuple[list[PlaceCu
     return places, targets
 
 
-def _segment(segment: Segment, pose: Array, robot: Robot) -> tuple[PlaceCurve, ToolTarget]:
+def _segment(segment: Segment, pose: Array, robot: Robot) -> tuple[PositionCurve, ToolTarget]:
     if segment.arc is not None:
         target = arc_target(segment.arc, pose, robot)
         return arc_of(segment.arc, pose, target, robot), target

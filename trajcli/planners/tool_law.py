@@ -11,7 +11,7 @@ import numpy as np
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate, distinct
 from trajcli.errors import MissingLimitError, Problem
 from trajcli.frozen import comparable, frozen
-from trajcli.geometry.place_curve import PlaceCurve
+from trajcli.geometry.paths.position import PositionCurve
 from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.robot import ToolLimits
 from trajcli.planners.law_shapes import PathBounds, Stretch, stretch_of
@@ -66,7 +66,7 @@ def rates_of(path: ToolPath) -> Rates:
     return Rates(way, _largest(second[..., :3]), turn, twist)
 
 
-def rates_of_segment(place: PlaceCurve, turn: float) -> Rates:
+def rates_of_segment(place: PositionCurve, turn: float) -> Rates:
     """Return the largest derivatives of a segment whose orientation turns evenly, by `turn` rad/m."""
     places = np.linspace(0.0, place.length, _SAMPLES)
     return Rates(1.0, _largest(place.evaluate(places)[2]), turn, 0.0)

@@ -9,9 +9,14 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, PlanningError
-from trajcli.geometry.orientation_curve import AboutAxes, AlongPath, Fixed, OrientationCurve
-from trajcli.geometry.place_curve import PlaceCurve
-from trajcli.geometry.progress import Progress
+from trajcli.geometry.paths.orientation import (
+    AxisAngleOrientation,
+    FixedOrientation,
+    OrientationCurve,
+    SegmentProgress,
+    TangentOrientation,
+)
+from trajcli.geometry.paths.position import PositionCurve
 from trajcli.planners.tool_target import ToolTarget
 
 Orientation = Literal["axis_angle", "euler", "fixed", "tangent"]
@@ -23,8 +28,8 @@ def orientation_along(
     how: Orientation,
     start: Array,
     targets: Sequence[ToolTarget],
-    place: PlaceCurve | None,
-    progress: Progress | None,
+    place: PositionCurve | None,
+    progress: SegmentProgress | None,
 ) -> OrientationCurve:
     """Return R(s) from the orientation at the start through those of the targets.
 
@@ -45,7 +50,7 @@ def orientation_along(
         if turns > _SAME:
             message = "orientation: fixed keeps the orientation, but the target asks for another one"
             raise PlanningError(message, hint="leave the target's orientation out, or use axis_angle")
-        return Fixed(start, 0.0 if progress is None else progress.length)
+        return FixedOrientation(start, 0.0 if progress is None else progress.length)
     if how == "tangent":
         if turns > _SAME:
             message = "orientation: tangent follows from the path, but the target asks for an orientation"
@@ -53,14 +58,20 @@ def orientation_along(
         if place is None:
             message = "orientation: tangent needs a path, and the tool stays in its place"
             raise PlanningError(message, hint="use axis_angle")
-        return AlongPath(place, start)
+        return TangentOrientation(place, start)
     if how == "euler":
         return _even(rotations, targets, progress)
-    return AboutAxes.between(*rotations) if progress is None else AboutAxes(rotations, progress)
+    return (
+        AxisAngleOrientation.between(*rotations)
+        if progress is None
+        else AxisAngleOrientation(rotations, progress)
+    )
 
 
-def _even(rotations: Array, targets: Sequence[ToolTarget], progress: Progress | None) -> OrientationCurve:
-    from trajcli.geometry.even_angles import even_angles
+def _even(
+    rotations: Array, targets: Sequence[ToolTarget], progress: SegmentProgress | None
+) -> OrientationCurve:
+    from trajcli.geometry.paths.euler_interpolation import euler_interpolation
 
     forms = {(typed[1], typed[2]) for target in targets if (typed := target.typed) is not None}
     if len(forms) != 1:
@@ -69,4 +80,4 @@ def _even(rotations: Array, targets: Sequence[ToolTarget], progress: Progress | 
         raise InputError(message, hint="give each target `euler` of one sequence, or `rpy`")
     sequence, frame = forms.pop()
     known = [None, *(None if target.typed is None else target.typed[0] for target in targets)]
-    return even_angles(rotations, progress, sequence, frame, known)  # type: ignore[arg-type]
+    return euler_interpolation(rotations, progress, sequence, frame, known)  # type: ignore[arg-type]

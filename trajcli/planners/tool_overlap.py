@@ -15,13 +15,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from trajcli.curves.compose import merge_breaks
+from trajcli.curves.operations import merge_breaks
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, concatenate, constant
 from trajcli.errors import Amount, PlanningError, Problem
 from trajcli.frozen import frozen
-from trajcli.geometry.axis_angle import exp
-from trajcli.geometry.orientation_curve import turn_vectors
-from trajcli.geometry.place_curve import PlaceCurve
+from trajcli.geometry.paths.orientation import turn_vectors
+from trajcli.geometry.paths.position import PositionCurve
+from trajcli.geometry.rotation import exp
 from trajcli.kinematics.following.demand import Demand
 from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.kinematics.following.tolerance import Tolerance
@@ -50,7 +50,7 @@ class Overlapped:
     """
 
     before: Array
-    places: tuple[PlaceCurve, ...]
+    places: tuple[PositionCurve, ...]
     vectors: Array
     laws: tuple[PiecewisePolynomial, ...]
     last: ToolTarget
@@ -86,7 +86,7 @@ class Overlapped:
 
 def overlapped(
     before: Array,
-    places: Sequence[PlaceCurve],
+    places: Sequence[PositionCurve],
     targets: Sequence[ToolTarget],
     move: PathMove,
     limits: ToolLimits,
@@ -118,7 +118,7 @@ def overlapped(
 
 
 def _stretches(
-    places: Sequence[PlaceCurve],
+    places: Sequence[PositionCurve],
     vectors: Array,
     move: PathMove,
     limits: ToolLimits,
@@ -143,7 +143,7 @@ def _stretches(
     return stretches if lasts >= least else [stretch.scaled(least / lasts) for stretch in stretches]
 
 
-def _crowd(places: Sequence[PlaceCurve]) -> float:
+def _crowd(places: Sequence[PositionCurve]) -> float:
     """Return how many accelerations along a segment add up to where one slows down and the next speeds up."""
     turns = [
         after.evaluate(np.zeros(1))[1][0] - before.evaluate(np.array([before.length]), "left")[1][0]

@@ -7,7 +7,7 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 from trajcli.errors import PlanningError
 from trajcli.frozen import frozen
-from trajcli.geometry.rotation import AXES, Axis
+from trajcli.geometry.rotation import AXES, AxisName
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.target import Fixed, meeting, partial_target, residuals
 from trajcli.kinematics.inverse.target import Target as Goal
@@ -37,7 +37,7 @@ class ToolTarget:
     pose: Array
     position: tuple[bool, bool, bool]
     orientation: Fixed
-    tool_axis: Axis = "z"
+    tool_axis: AxisName = "z"
     turn: float = 0.0
     joints: Array | None = None
     typed: tuple[Array, str, str] | None = None

@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 
-from trajcli.curves.compose import scale_time
+from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side
-from trajcli.curves.time_optimal.constraints import Demand as PathDemand
-from trajcli.curves.time_optimal.constraints import Rows
-from trajcli.curves.time_optimal.structure import structure
-from trajcli.curves.time_optimal.trajectory import time_optimal
+from trajcli.curves.time_optimal.constraints import ConstraintRows
+from trajcli.curves.time_optimal.constraints import PathConstraint as PathDemand
+from trajcli.curves.time_optimal.parameterization import time_optimal
+from trajcli.curves.time_optimal.switching import switching_structure
 from trajcli.kinematics.following.motion import motion_along
 from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.kinematics.following.tool_path import ToolPath
@@ -55,7 +55,7 @@ def fastest_along(joints: Followed, spec: LawSpec, tolerance: Tolerance, planner
         scale_time(each, factor) if factor > 1 else each for each in (solved.law, solved.trajectory)
     )
     motion = motion_along(path, law, law.breaks, tolerance, None)
-    binding = structure(solved.trajectory, robot.limits.velocity, robot.limits.acceleration)
+    binding = switching_structure(solved.trajectory, robot.limits.velocity, robot.limits.acceleration)
     phases = [
         Phase(f"{b.quantity} {'+' if b.sign > 0 else '-'}", b.start * factor, b.end * factor, b.joint)
         for b in binding
@@ -103,7 +103,7 @@ def tool_demand(path: ToolPath, limits: ToolLimits) -> PathDemand:
     is replaced by a polygon inside it, at most 2 % smaller. Across its axis a rotation gets 0.8, along 0.6.
     """
 
-    def rows(places: Array, side: Side) -> Rows:
+    def rows(places: Array, side: Side) -> ConstraintRows:
         _, first, second = path.poses.evaluate(np.clip(places, 0.0, path.length), side)
         way, turn = (np.linalg.norm(first[:, part], axis=1) for part in (slice(0, 3), slice(3, 6)))
         bend = np.linalg.norm(second[:, :3], axis=1)
@@ -113,7 +113,7 @@ def tool_demand(path: ToolPath, limits: ToolLimits) -> PathDemand:
             speed = np.minimum(limits.speed / way, limits.angular_speed / turn)
         cap = np.minimum(speed**2, more[3])
         joined = [np.concatenate(pair, axis=1) for pair in zip((a, b, c), more[:3], strict=True)]
-        return Rows(joined[0], joined[1], joined[2], cap)
+        return ConstraintRows(joined[0], joined[1], joined[2], cap)
 
     return rows
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from trajcli.curves.extrema import peaks
-from trajcli.curves.fit import MOST_PIECES
+from trajcli.curves.hermite_fit import MOST_PIECES
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount, PlanningError, Problem
 from trajcli.frozen import frozen

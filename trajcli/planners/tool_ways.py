@@ -8,11 +8,9 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
-from trajcli.geometry.line import Line
-from trajcli.geometry.orientation_curve import Fixed
-from trajcli.geometry.place_curve import SAME_PLACE, Pivot, PlaceCurve
-from trajcli.geometry.pose_curve import PoseCurve
-from trajcli.geometry.progress import Progress
+from trajcli.geometry.paths.orientation import FixedOrientation, SegmentProgress
+from trajcli.geometry.paths.pose import PoseCurve
+from trajcli.geometry.paths.position import SAME_PLACE, Line, Pivot, PositionCurve
 from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.fields import Target
@@ -21,7 +19,7 @@ from trajcli.planners.tool_orientation import orientation_along
 from trajcli.planners.tool_target import ToolTarget, tool_target
 
 if TYPE_CHECKING:
-    from trajcli.geometry.screw import Screw
+    from trajcli.geometry.paths.pose import Screw
 
 _SAME_ANGLE = 1e-12  # rad: a rotation by less is none
 
@@ -41,7 +39,7 @@ def line_way(before: Array, to: Target, orientation: Orientation, robot: Robot) 
 
 def screw_way(before: Array, to: Target, robot: Robot) -> Way:
     """Return the screw from a pose (4, 4) to a target."""
-    from trajcli.geometry.screw import Screw
+    from trajcli.geometry.paths.pose import Screw
 
     target = tool_target(to, before, robot)
     if target.orientation != "all":
@@ -55,15 +53,17 @@ def screw_way(before: Array, to: Target, robot: Robot) -> Way:
 
 def _no_way(before: Array, target: ToolTarget, to: Target) -> Way:
     """Return the way of length 0 to a target that is where the tool is."""
-    poses = PoseCurve(Pivot(before[:3, 3], target.pose[:3, 3], 0.0), Fixed(before[:3, :3], 0.0))
+    poses = PoseCurve(Pivot(before[:3, 3], target.pose[:3, 3], 0.0), FixedOrientation(before[:3, :3], 0.0))
     return Way(_tool_path(poses, target), target.joints, to.configuration)
 
 
 def way_of(
-    place: PlaceCurve, before: Array, target: ToolTarget, orientation: Orientation, to: Target | None
+    place: PositionCurve, before: Array, target: ToolTarget, orientation: Orientation, to: Target | None
 ) -> Way:
     """Return the way along a curve from a pose (4, 4), its orientation as it is told."""
-    turning = orientation_along(orientation, before[:3, :3], [target], place, Progress.even(place.length))
+    turning = orientation_along(
+        orientation, before[:3, :3], [target], place, SegmentProgress.even(place.length)
+    )
     configuration = None if to is None else to.configuration
     path = _tool_path(PoseCurve(place, turning), target, orientation)
     return Way(path, target.joints, configuration)

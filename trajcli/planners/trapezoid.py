@@ -8,15 +8,16 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from trajcli.curves.compose import along_line, hold_until, merge_breaks
+from trajcli.curves.operations import along_line, hold_until, merge_breaks
 from trajcli.curves.piecewise import Array
 from trajcli.curves.trapezoid import (
     InfeasibleProfileError,
+    MotionBounds,
+    VelocityProfile,
     fastest_profile,
     profile_of_duration,
     profile_of_speed,
 )
-from trajcli.curves.velocity_profile import Profile, Rates
 from trajcli.errors import Amount, PlanningError, Problem
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.fields import Duration, JointAccelerationMagnitudes, JointSpeeds, MinimumDuration
@@ -92,7 +93,9 @@ class Trapezoid(PointToPoint):
         initial, final = (_along(displacement, state.velocity, robot) for state in (start, end))
         forward, backward = self._rates(displacement, robot)
         size = np.where(displacement == 0, np.nan, np.abs(displacement))
-        law_rates = [Rates(*(float(np.nanmin(row / size)) for row in rows)) for rows in (forward, backward)]
+        law_rates = [
+            MotionBounds(*(float(np.nanmin(row / size)) for row in rows)) for rows in (forward, backward)
+        ]
         try:
             profile = self._profile(1.0, initial, final, law_rates[0], law_rates[1])
         except InfeasibleProfileError as error:
@@ -108,7 +111,7 @@ class Trapezoid(PointToPoint):
         forward, backward = self._rates(moving.astype(np.float64), robot)
         profiles = []
         for joint, distance in enumerate(displacement.tolist()):
-            rates = [Rates(*(float(row[joint]) for row in rows)) for rows in (forward, backward)]
+            rates = [MotionBounds(*(float(row[joint]) for row in rows)) for rows in (forward, backward)]
             speeds = float(start.velocity[joint]), float(end.velocity[joint])
             try:
                 profiles.append(self._profile(distance, *speeds, rates[0], rates[1]))
@@ -128,8 +131,8 @@ class Trapezoid(PointToPoint):
         return Planned(merge_breaks(curves), end, phases=phases, arrivals=tuple(arrivals))
 
     def _profile(
-        self, distance: float, initial: float, final: float, forward: Rates, backward: Rates
-    ) -> Profile:
+        self, distance: float, initial: float, final: float, forward: MotionBounds, backward: MotionBounds
+    ) -> VelocityProfile:
         """Return the profile of one variable from what the fields fix."""
         if self.duration is not None:
             if self.velocity is not None and (distance or initial or final):
@@ -147,7 +150,9 @@ class Trapezoid(PointToPoint):
             distance, initial, final, least, forward, backward, overshoot=self.overshoot
         )
 
-    def _of_speed(self, distance: float, initial: float, final: float, rates: Rates) -> Profile:
+    def _of_speed(
+        self, distance: float, initial: float, final: float, rates: MotionBounds
+    ) -> VelocityProfile:
         sign = math.copysign(1.0, distance)
         if distance == 0 or sign * initial < 0 or sign * final < 0:
             raise InfeasibleProfileError("turns")

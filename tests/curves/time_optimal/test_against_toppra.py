@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from topp_paths import TOLERANCE, assert_motion, over, random_bounds, spline
 
-from trajcli.curves.compose import compose
+from trajcli.curves.operations import compose
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.curves.time_optimal.trajectory import time_optimal
+from trajcli.curves.time_optimal.parameterization import time_optimal
 
 GRID = 8000
 

@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 from topp_paths import assert_motion, over, polyline, random_bounds, spline, symmetric
 
-from trajcli.curves.compose import reverse
+from trajcli.curves.operations import reverse
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.curves.time_optimal import trajectory
-from trajcli.curves.time_optimal.constraints import joint_demand
-from trajcli.curves.time_optimal.grid import first_grid, refined
-from trajcli.curves.time_optimal.intervals import constrained
-from trajcli.curves.time_optimal.solve import UnlimitedSpeedError, UnreachableSpeedError, controllable
-from trajcli.curves.time_optimal.trajectory import UnsettledSpeedError, time_optimal
+from trajcli.curves.time_optimal import parameterization as trajectory
+from trajcli.curves.time_optimal.collocation import collocation_rows, first_grid, refined
+from trajcli.curves.time_optimal.constraints import joint_constraint
+from trajcli.curves.time_optimal.parameterization import UnsettledSpeedError, time_optimal
+from trajcli.curves.time_optimal.passes import UnlimitedSpeedError, UnreachableSpeedError, controllable
 
 
 @pytest.mark.parametrize("scale", [1e4, 1e-4])
@@ -91,7 +90,9 @@ def test_speeds_at_the_ends(speeds):
 def test_a_speed_that_only_a_fine_grid_has_room_for():
     rng = np.random.default_rng(14)
     path, (velocity, acceleration) = spline(rng.uniform(-1, 1, (8, 3)), np.arange(8.0)), random_bounds(rng, 3)
-    first = constrained(first_grid(path), [joint_demand(path, 5 * velocity, acceleration)], np.empty(0))
+    first = collocation_rows(
+        first_grid(path), [joint_constraint(path, 5 * velocity, acceleration)], np.empty(0)
+    )
     assert controllable(first).upper[0] < 1.46**2
     found = time_optimal(path, 5 * velocity, acceleration, start_velocity=1.463)
     assert_motion(found, path, 5 * velocity, acceleration)

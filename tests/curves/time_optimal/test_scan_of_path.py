@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from topp_paths import random_bounds, spline
 
-from trajcli.curves.time_optimal import scan
-from trajcli.curves.time_optimal.again import solve_again
-from trajcli.curves.time_optimal.ceiling import ceilings
-from trajcli.curves.time_optimal.constraints import joint_demand
-from trajcli.curves.time_optimal.intervals import constrained
-from trajcli.curves.time_optimal.solve import solve
+from trajcli.curves.time_optimal import recurrence as recurrence_module
+from trajcli.curves.time_optimal.collocation import collocation_rows
+from trajcli.curves.time_optimal.constraints import joint_constraint
+from trajcli.curves.time_optimal.maximum_velocity import maximum_velocity_curve
+from trajcli.curves.time_optimal.passes import solve, solve_locally
 
 
 def recurrence(P, R, C, chosen, limits):
@@ -25,8 +24,8 @@ def recurrence(P, R, C, chosen, limits):
 @pytest.mark.parametrize("count", [1, 2, 50, 700])
 @pytest.mark.parametrize(("many", "block"), [(0, 8192), (1000, 8192), (0, 100), (1000, 33)])
 def test_scans_are_the_recurrence(monkeypatch, count, many, block):
-    monkeypatch.setattr(scan, "_MANY", many)
-    monkeypatch.setattr(scan, "_BLOCK", block)
+    monkeypatch.setattr(recurrence_module, "_MANY", many)
+    monkeypatch.setattr(recurrence_module, "_BLOCK", block)
     rng = np.random.default_rng(count)
     P, C = rng.normal(-0.6, 0.6, (5, count)), rng.uniform(0, 0.3, (5, count))
     R, limits = rng.uniform(0.5, 1.5, (5, count)), rng.uniform(0.2, 3, count + 1)
@@ -35,11 +34,13 @@ def test_scans_are_the_recurrence(monkeypatch, count, many, block):
     chosen[:, ::7] &= R[:, ::7] > 0
     limits[rng.random(count + 1) < 0.1] = np.inf
     limits[0] = 0.4
-    np.testing.assert_array_equal(scan.scanned(P, R, C, chosen, limits), recurrence(P, R, C, chosen, limits))
+    np.testing.assert_array_equal(
+        recurrence_module.solve_recurrence(P, R, C, chosen, limits), recurrence(P, R, C, chosen, limits)
+    )
 
 
 def again(rows, before, changed):
-    return solve_again(rows, before, changed, ceilings(rows, before.ceiling, changed))
+    return solve_locally(rows, before, changed, maximum_velocity_curve(rows, before.ceiling, changed))
 
 
 @pytest.mark.parametrize("end", [0.0, 0.05])
@@ -51,7 +52,7 @@ def test_a_few_lowered_limits_change_the_solution_around_them(seed, end):
         random_bounds(rng, 3),
     )
     grid = np.linspace(path.start, path.end, 39 * 20 + 1)
-    rows = constrained(grid, [joint_demand(path, velocity, acceleration)], np.empty(0))
+    rows = collocation_rows(grid, [joint_constraint(path, velocity, acceleration)], np.empty(0))
     before = solve(rows, 0.0, end)
     factors = np.ones((2, grid.size - 1))
     factors[:, rng.choice(grid.size - 1, 5)] = rng.uniform(1, 1.2, (2, 5))
@@ -67,8 +68,8 @@ def test_a_few_lowered_limits_change_the_solution_around_them(seed, end):
 def test_what_is_felt_far_away_is_not_found_again(bounds, place):
     """A joint that brakes, or speeds up, nearly all the way: what changes at one end is felt to the other."""
     path = spline(np.array([[0.0], [1.0]]))
-    demand = joint_demand(path, np.array([[-9.0, 9.0]]), np.array([bounds]))
-    rows = constrained(np.linspace(0, 1, 1001), [demand], np.empty(0))
+    demand = joint_constraint(path, np.array([[-9.0, 9.0]]), np.array([bounds]))
+    rows = collocation_rows(np.linspace(0, 1, 1001), [demand], np.empty(0))
     factors = np.ones((2, 1000))
     factors[1, place] = 1.5
     before = solve(rows, 0.0, 0.0)

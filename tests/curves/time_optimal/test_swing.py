@@ -9,8 +9,8 @@ import pytest
 from topp_paths import assert_motion, symmetric
 
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.curves.time_optimal.law import durations, law_of, swings, ways
-from trajcli.curves.time_optimal.trajectory import time_optimal
+from trajcli.curves.time_optimal.parameterization import time_optimal
+from trajcli.curves.time_optimal.time_law import distances_at_mean_speed, durations, feasible_ramps, law_of
 
 
 def some_law(seed):
@@ -18,7 +18,7 @@ def some_law(seed):
     grid = np.cumsum(rng.uniform(0.1, 1, 30))
     x = rng.uniform(0.0, 2.0, 30)
     x[[0, 7, -1]] = 0.0
-    return grid, x, swings(grid, x, rng.uniform(-3, 3, 29))
+    return grid, x, feasible_ramps(grid, x, rng.uniform(-3, 3, 29))
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -34,14 +34,14 @@ def test_a_law_passes_each_place_at_its_speed_and_never_turns_back(seed):
     assert law.evaluate(t, 1).min() >= -1e-12
     np.testing.assert_allclose(durations(grid, x, swing), law.lengths, rtol=1e-12)
     mean = (np.sqrt(x[1:]) + np.sqrt(x[:-1])) / 2
-    np.testing.assert_allclose(ways(grid, x, swing), mean * law.lengths, rtol=1e-12)
+    np.testing.assert_allclose(distances_at_mean_speed(grid, x, swing), mean * law.lengths, rtol=1e-12)
 
 
 def test_no_more_swing_than_keeps_the_speed_positive():
     grid, x = np.array([0.0, 1.0]), np.array([0.0, 1.0])
-    np.testing.assert_allclose(swings(grid, x, np.array([9.0])), [0.25])
-    np.testing.assert_allclose(swings(grid, x, np.array([9.0]), 0.5), [0.125])
-    np.testing.assert_allclose(swings(grid, x, np.array([-9.0])), [-9.0])
+    np.testing.assert_allclose(feasible_ramps(grid, x, np.array([9.0])), [0.25])
+    np.testing.assert_allclose(feasible_ramps(grid, x, np.array([9.0]), 0.5), [0.125])
+    np.testing.assert_allclose(feasible_ramps(grid, x, np.array([-9.0])), [-9.0])
 
 
 @pytest.mark.parametrize("powers", [[0.4, 1, 0], [0.5, -0.3, 1, 0], [-0.3, 0.5, 0.6, 0]])

@@ -7,7 +7,7 @@ from scipy.interpolate import CubicSpline
 
 from trajcli.curves.extrema import peaks
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.curves.time_optimal.trajectory import TimeOptimal
+from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion
 
 TOLERANCE = 1e-9
 
@@ -47,7 +47,7 @@ def over(
     )
 
 
-def assert_motion(found: TimeOptimal, path: PiecewisePolynomial, velocity, acceleration) -> None:
+def assert_motion(found: TimeOptimalMotion, path: PiecewisePolynomial, velocity, acceleration) -> None:
     """It follows the path from end to end, is smooth and keeps its limits for all t."""
     assert max(over(found.trajectory, velocity, acceleration)) <= 1.0 + TOLERANCE
     trajectory, law = found.trajectory, found.law

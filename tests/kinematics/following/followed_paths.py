@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from trajcli.geometry.arc import Arc
-from trajcli.geometry.line import Line
-from trajcli.geometry.orientation_curve import AboutAxes
-from trajcli.geometry.pose_curve import PoseCurve
-from trajcli.geometry.progress import Progress
+from trajcli.geometry.paths.arc import Arc
+from trajcli.geometry.paths.orientation import AxisAngleOrientation, SegmentProgress
+from trajcli.geometry.paths.pose import PoseCurve
+from trajcli.geometry.paths.position import Line
 from trajcli.job.robot_source import load_robot
 from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.forward import forward
@@ -43,7 +42,7 @@ def case(
     if bent:
         place = Arc.through(pose[:3, 3], (pose[:3, 3] + end) / 2 + [0.01, 0.0, 0.02], end)
     last = Rotation.from_rotvec(turn).as_matrix() @ pose[:3, :3]
-    turning = AboutAxes(np.stack([pose[:3, :3], last]), Progress.even(place.length))
+    turning = AxisAngleOrientation(np.stack([pose[:3, :3], last]), SegmentProgress.even(place.length))
     poses = PoseCurve(place, turning)
     fixed = (True, True, True)
     turns = (0.35,) if orientation in ("yaw", "pitch") else ()

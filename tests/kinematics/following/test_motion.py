@@ -7,16 +7,16 @@ import pytest
 from followed_paths import CASES
 
 from trajcli.curves.hermite import hermite_pieces
-from trajcli.geometry.chain import join
-from trajcli.geometry.line import Line
-from trajcli.geometry.orientation_curve import Fixed
-from trajcli.geometry.pose_curve import PoseCurve
+from trajcli.geometry.paths.chain import join
+from trajcli.geometry.paths.orientation import FixedOrientation
+from trajcli.geometry.paths.pose import PoseCurve
+from trajcli.geometry.paths.position import Line
 from trajcli.kinematics.following.motion import motion_along
 from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.kinematics.following.tool_path import ToolPath
 
 CORNER = join([Line([0, 0, 0], [0.3, 0, 0]), Line([0.3, 0, 0], [0.3, 0.4, 0])])
-PATH = ToolPath(PoseCurve(CORNER, Fixed(np.eye(3), CORNER.length)), (True, True, True), "all")
+PATH = ToolPath(PoseCurve(CORNER, FixedOrientation(np.eye(3), CORNER.length)), (True, True, True), "all")
 
 
 def stopping(*places):

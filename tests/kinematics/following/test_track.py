@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from followed_paths import CASES, solved
 
-from trajcli.curves.fit import fit
-from trajcli.geometry.arc import Arc
-from trajcli.geometry.chain import join
-from trajcli.geometry.line import Line
-from trajcli.geometry.orientation_curve import AlongPath, Fixed
-from trajcli.geometry.pose_curve import PoseCurve
+from trajcli.curves.hermite_fit import fit
+from trajcli.geometry.paths.arc import Arc
+from trajcli.geometry.paths.chain import join
+from trajcli.geometry.paths.orientation import FixedOrientation, TangentOrientation
+from trajcli.geometry.paths.pose import PoseCurve
+from trajcli.geometry.paths.position import Line
 from trajcli.kinematics.following.follower import follower
 from trajcli.kinematics.following.tolerance import Tolerance, misfit_of, probes
 from trajcli.kinematics.following.tool_path import ToolPath
@@ -79,8 +79,8 @@ def winding(radius, *, turning):
     segments = [Line(*ends) for ends in pairwise(corners)]
     segments.append(Arc(corners[-1], corners[-1] + [0.0, -0.01, 0.02], [1, 0, 0], 2.0))
     chain = join(segments, radius)
-    kept = Fixed(start[:3, :3], chain.length)
-    poses = PoseCurve(chain, AlongPath(chain, start[:3, :3]) if turning else kept)
+    kept = FixedOrientation(start[:3, :3], chain.length)
+    poses = PoseCurve(chain, TangentOrientation(chain, start[:3, :3]) if turning else kept)
     return replace(begun, path=ToolPath(poses, begun.path.position, "all"))
 
 
@@ -108,7 +108,7 @@ PLANAR = CASES["planar3r, yaw of x"].robot
 
 def wrist_path(place):
     """Return the path of a tool that heads along x, on a curve of its place."""
-    poses = PoseCurve(place, Fixed(np.eye(3), place.length))
+    poses = PoseCurve(place, FixedOrientation(np.eye(3), place.length))
     return ToolPath(poses, (True, True, True), "yaw", "x", (0.0,))
 
 

@@ -20,7 +20,7 @@ _ROUNDING = 1e-13  # of the largest derivative of all joints: the same, where on
 
 
 @frozen
-class Rows:
+class ConstraintRows:
     """Rows a u + b x <= c and caps x <= cap at p places of a path.
 
     Attributes:
@@ -36,11 +36,11 @@ class Rows:
     cap: Array
 
 
-Demand = Callable[[Array, Side], Rows]
+PathConstraint = Callable[[Array, Side], ConstraintRows]
 """Rows at the places (p,) of the path, seen from their left or their right side; k is always the same."""
 
 
-def joint_demand(path: PiecewisePolynomial, velocity: Array, acceleration: Array) -> Demand:
+def joint_constraint(path: PiecewisePolynomial, velocity: Array, acceleration: Array) -> PathConstraint:
     """Return the demand of joint limits.
 
     Args:
@@ -57,27 +57,27 @@ def joint_demand(path: PiecewisePolynomial, velocity: Array, acceleration: Array
     upper, lower = np.isfinite(acceleration[:, 1]), np.isfinite(acceleration[:, 0])
     limits = np.concatenate([acceleration[upper, 1], -acceleration[lower, 0]])
 
-    def rows(s: Array, side: Side) -> Rows:
+    def rows(s: Array, side: Side) -> ConstraintRows:
         first, second = path.evaluate_orders(s, (1, 2), side=side).transpose(1, 0, 2)
         a = np.concatenate([first[:, upper], -first[:, lower]], axis=1)
         b = np.concatenate([second[:, upper], -second[:, lower]], axis=1)
         rate = np.maximum(first / velocity[:, 1], first / velocity[:, 0]).max(axis=1)
         with np.errstate(divide="ignore", over="ignore"):
-            return Rows(a, b, np.broadcast_to(limits, a.shape), rate**-2.0)
+            return ConstraintRows(a, b, np.broadcast_to(limits, a.shape), rate**-2.0)
 
     return rows
 
 
-def speed_demand(limit: Callable[[Array], Array]) -> Demand:
+def speed_constraint(limit: Callable[[Array], Array]) -> PathConstraint:
     """Return the demand of a bound on sd.
 
     Args:
         limit: From places (p,) to the largest sd there, (p,), positive or infinite.
     """
 
-    def rows(s: Array, side: Side) -> Rows:
+    def rows(s: Array, side: Side) -> ConstraintRows:
         nothing = np.empty((s.size, 0))
-        return Rows(nothing, nothing, nothing, limit(s) ** 2)
+        return ConstraintRows(nothing, nothing, nothing, limit(s) ** 2)
 
     return rows
 

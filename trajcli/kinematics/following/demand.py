@@ -6,7 +6,7 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
-from trajcli.geometry.rotation import AXES, Axis
+from trajcli.geometry.rotation import AXES, AxisName
 from trajcli.kinematics.inverse.target import Fixed, Target
 
 _LEVEL = 1e-12  # of a unit vector, squared: the heading of a vertical axis is not defined
@@ -31,7 +31,7 @@ class Demand:
     second: Array
     position: tuple[bool, bool, bool]
     orientation: Fixed
-    tool_axis: Axis
+    tool_axis: AxisName
     aims: Array
 
     def target(self) -> Target:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from trajcli.curves.compose import scale_time
+from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, distinct
 from trajcli.frozen import frozen
 from trajcli.kinematics.following.demand import Demand

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from trajcli.curves.invert import times_at
+from trajcli.curves.operations import times_at
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side
 from trajcli.frozen import frozen
-from trajcli.geometry.pose_curve import PosePath
-from trajcli.geometry.progress import Progress
-from trajcli.geometry.rotation import AXES, Axis
+from trajcli.geometry.paths.orientation import SegmentProgress
+from trajcli.geometry.paths.pose import PosePath
+from trajcli.geometry.rotation import AXES, AxisName
 from trajcli.kinematics.following.demand import Demand
 from trajcli.kinematics.inverse.target import Fixed
 
@@ -35,9 +35,9 @@ class ToolPath:
     poses: PosePath
     position: tuple[bool, bool, bool]
     orientation: Fixed
-    tool_axis: Axis = "z"
+    tool_axis: AxisName = "z"
     turns: tuple[float, ...] = ()
-    progress: Progress | None = None
+    progress: SegmentProgress | None = None
 
     @property
     def length(self) -> float:
@@ -121,7 +121,7 @@ class ToolPath:
         if self.orientation not in ("yaw", "pitch"):
             return np.zeros((places.size, 0))
         begins = self.begins(self.poses.evaluate(np.zeros(1))[0][0], self.orientation, self.tool_axis)
-        done = (self.progress or Progress.even(self.length)).at(places, side)
+        done = (self.progress or SegmentProgress.even(self.length)).at(places, side)
         turns = np.append(self.turns, 0.0)
         before = np.concatenate([[0.0], np.cumsum(self.turns)])[done.segment]
         both = turns[np.stack([done.segment, done.segment + 1])]
@@ -130,7 +130,7 @@ class ToolPath:
         return np.stack([begins + before + value, slope * speed, second], axis=1)
 
     @staticmethod
-    def begins(pose: Array, orientation: Fixed, tool_axis: Axis) -> float:
+    def begins(pose: Array, orientation: Fixed, tool_axis: AxisName) -> float:
         """Return the yaw or the pitch of a pose (4, 4), rad."""
         axis = pose[:3, AXES.index(tool_axis)]
         if orientation == "yaw":

@@ -24,7 +24,14 @@ import numpy as np
 from trajcli.frozen import frozen
 from trajcli.kinematics.columns import Column
 from trajcli.kinematics.inverse.elbow import elbow, is_elbow
-from trajcli.kinematics.inverse.lines import Arm, Floats, Line, meeting_point, parallel, perpendicular
+from trajcli.kinematics.inverse.lines import (
+    Arm,
+    Floats,
+    Line,
+    meeting_point,
+    parallel,
+    perpendicular,
+)
 from trajcli.kinematics.inverse.method import Choice
 from trajcli.kinematics.inverse.slides import (
     INDEPENDENT,

@@ -12,10 +12,17 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
-from trajcli.geometry.rotation import AXES, Axis, Flags
+from trajcli.geometry.rotation import AXES, AxisName, Flags
 from trajcli.kinematics.columns import dot
 from trajcli.kinematics.inverse.elbow import forward_sign, same_way
-from trajcli.kinematics.inverse.lines import PARALLEL, Arm, Floats, Line, contains, parallel
+from trajcli.kinematics.inverse.lines import (
+    PARALLEL,
+    Arm,
+    Floats,
+    Line,
+    contains,
+    parallel,
+)
 from trajcli.kinematics.jacobian import jacobian
 from trajcli.kinematics.robot import Robot
 
@@ -89,7 +96,7 @@ class Body:
         ahead = np.einsum("ki,ki->k", way @ self.arm.base[:3, :3].T, np.cross(two, one))
         return np.asarray(forward_sign(self.shoulder, self.axis, self.arm.forward) * ahead < 0.0)
 
-    def heads_back(self, robot: Robot, joints: Array, poses: Array, tool_axis: Axis) -> Flags:
+    def heads_back(self, robot: Robot, joints: Array, poses: Array, tool_axis: AxisName) -> Flags:
         """Return which joints (K, n), at poses (K, 4, 4), meet their pitch in the second way, shape (K,)."""
         axis = jacobian(robot, joints)[:, 3:, self.together[0]]
         tool = poses[:, :3, AXES.index(tool_axis)]
@@ -97,7 +104,7 @@ class Body:
         return np.asarray(self.pitch_sign * side > 0.0)
 
 
-def body_of(arm: Arm, tool_axis: Axis) -> Body:
+def body_of(arm: Arm, tool_axis: AxisName) -> Body:
     """Return the body of an arm with parallel axes, for one axis of its tool."""
     turns = tuple(i for i, line in enumerate(arm.lines) if not line.prismatic)
     planar = parallel(*(arm.lines[i] for i in turns))
@@ -108,17 +115,17 @@ def body_of(arm: Arm, tool_axis: Axis) -> Body:
     return Body(arm, (1, 2, 3), arm.lines[0], roll, marker)
 
 
-def fixed_axis(arm: Arm, tool_axis: Axis) -> bool:
+def fixed_axis(arm: Arm, tool_axis: AxisName) -> bool:
     """Return whether no joint turns an axis of the tool."""
     return all(line.prismatic or parallel(_marker(arm, tool_axis), line) for line in arm.lines)
 
 
-def never_heads(arm: Arm, tool_axis: Axis) -> bool:
+def never_heads(arm: Arm, tool_axis: AxisName) -> bool:
     """Return whether an axis of the tool that no joint turns is vertical in world."""
     return _vertical(arm, _marker(arm, tool_axis).direction)
 
 
-def _marker(arm: Arm, tool_axis: Axis) -> Line:
+def _marker(arm: Arm, tool_axis: AxisName) -> Line:
     axis, tip = (cast("Floats", tuple(arm.home[:3, i].tolist())) for i in (AXES.index(tool_axis), 3))
     return Line(prismatic=False, direction=axis, point=tip)
 

@@ -21,7 +21,14 @@ from trajcli.kinematics.columns import Entry
 from trajcli.kinematics.inverse.judge import Judge
 from trajcli.kinematics.inverse.lines import Arm, Goal
 from trajcli.kinematics.inverse.method import Choice, Method
-from trajcli.kinematics.inverse.subproblems import Mirrored, Opposed, Turn, Value, Watch, angle
+from trajcli.kinematics.inverse.subproblems import (
+    Mirrored,
+    Opposed,
+    Turn,
+    Value,
+    Watch,
+    angle,
+)
 from trajcli.kinematics.robot import Robot
 
 _BLOCK = 6250  # poses at a time: in the processor's cache, and long enough to hide the cost of a call

@@ -22,7 +22,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from trajcli.kinematics.columns import Column, difference, dot, minus, plus, product, total
+from trajcli.kinematics.columns import (
+    Column,
+    difference,
+    dot,
+    minus,
+    plus,
+    product,
+    total,
+)
 from trajcli.kinematics.inverse.lines import Floats, Line, across_floats, parallel
 from trajcli.kinematics.inverse.subproblems import (
     Turn,

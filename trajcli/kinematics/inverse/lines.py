@@ -19,7 +19,16 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.chain import links_of, travel
-from trajcli.kinematics.columns import Column, Entry, combine, cross, dot, minus, plus, scaled
+from trajcli.kinematics.columns import (
+    Column,
+    Entry,
+    combine,
+    cross,
+    dot,
+    minus,
+    plus,
+    scaled,
+)
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.robot import Robot
 

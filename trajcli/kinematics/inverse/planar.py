@@ -23,10 +23,25 @@ from collections.abc import Sequence
 from trajcli.frozen import frozen
 from trajcli.kinematics.columns import dot, minus, product
 from trajcli.kinematics.inverse.elbow import parallel_pair, same_way
-from trajcli.kinematics.inverse.lines import Arm, Floats, Goal, Line, aside, parallel, perpendicular
+from trajcli.kinematics.inverse.lines import (
+    Arm,
+    Floats,
+    Goal,
+    Line,
+    aside,
+    parallel,
+    perpendicular,
+)
 from trajcli.kinematics.inverse.method import Method
 from trajcli.kinematics.inverse.slides import turn_and_slide
-from trajcli.kinematics.inverse.subproblems import Turn, Value, Watch, added, onto, unit
+from trajcli.kinematics.inverse.subproblems import (
+    Turn,
+    Value,
+    Watch,
+    added,
+    onto,
+    unit,
+)
 
 _NAMES = {"RR": "planar 2R", "RP": "planar RP", "RRR": "planar 3R", "RPR": "planar RPR"}
 

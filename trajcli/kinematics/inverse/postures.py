@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
-from trajcli.geometry.rotation import Axis, Flags
+from trajcli.geometry.rotation import AxisName, Flags
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.body import body_of
 from trajcli.kinematics.inverse.closed_form import candidates
@@ -57,7 +57,7 @@ class Postures:
     arm: Arm
     method: Method
     ways: int
-    tool_axis: Axis
+    tool_axis: AxisName
 
     def of(self, joints: Array) -> NDArray[np.intp]:
         """Return the index (K,) of the posture of joint values (K, n); -1 where singular ones have none."""

@@ -23,7 +23,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from trajcli.curves.piecewise import Array
-from trajcli.kinematics.columns import Column, Entry, advance, cross, difference, dot, minus, plus, product
+from trajcli.kinematics.columns import (
+    Column,
+    Entry,
+    advance,
+    cross,
+    difference,
+    dot,
+    minus,
+    plus,
+    product,
+)
 from trajcli.kinematics.inverse.elbow import before, forward_sign, parallel_pair, shoulder_turn
 from trajcli.kinematics.inverse.lines import Floats, Line, across_floats
 from trajcli.kinematics.inverse.subproblems import (

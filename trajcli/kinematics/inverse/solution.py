@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
-from trajcli.geometry.rotation import Axis, Flags
+from trajcli.geometry.rotation import AxisName, Flags
 from trajcli.kinematics.inverse.method import Branch, Method
 from trajcli.kinematics.inverse.turns import beyond
 
@@ -38,7 +38,7 @@ class Solutions:
     singular: Flags
     free: Flags
     bounds: Array
-    fixed_axis: Axis | None = None
+    fixed_axis: AxisName | None = None
 
     @property
     def names(self) -> tuple[Branch, ...]:

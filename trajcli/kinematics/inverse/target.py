@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import frozen
-from trajcli.geometry.axis_angle import exp, log
-from trajcli.geometry.rotation import AXES, Axis
+from trajcli.geometry.rotation import AXES, AxisName, exp, log
 
 Fixed = Literal["all", "direction", "yaw", "pitch", "none"]
 _WHOLE = (True, True, True)
@@ -39,7 +38,7 @@ class Target:
     poses: Array
     position: tuple[bool, bool, bool]
     orientation: Fixed
-    tool_axis: Axis
+    tool_axis: AxisName
     aims: Array
 
     @property
@@ -93,7 +92,7 @@ def partial_target(
     direction: ArrayLike | None = None,
     yaw: ArrayLike | None = None,
     pitch: ArrayLike | None = None,
-    tool_axis: Axis = "z",
+    tool_axis: AxisName = "z",
 ) -> Target:
     """Return targets that leave coordinates free.
 

@@ -1,0 +1,267 @@
+"""Curves out of curves: merged breaks, scaled and reversed time, a law laid on a line, a rest at the end.
+
+When an increasing function of time reaches given values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajcli.curves.extrema import critical_points, piece_extremes
+from trajcli.curves.piecewise import (
+    Array,
+    PiecewisePolynomial,
+    concatenate,
+    distinct,
+    horner,
+    increasing,
+    taylor_shift,
+)
+
+_ROUNDING = 4 * np.finfo(np.float64).eps  # of the largest time: what sums of phase durations may be apart
+_DEGREE = 10  # of a composition: beyond it rounding grows
+_NEAR = 1e6  # times rounding: a value of the law this near to a break may be one that it passes
+_REST = 1e-9  # of the peak velocity: less counts as standing still
+
+
+def merge_breaks(curves: Sequence[PiecewisePolynomial]) -> PiecewisePolynomial:
+    """Return the curve whose components are those of all `curves`, with the union of their breaks.
+
+    Breaks of different curves that lie apart by rounding only (4 epsilon of the largest time) become one, so
+    that no sliver pieces appear; short pieces that one curve has of its own stay.
+
+    Raises:
+        ValueError: When the curves do not cover the same interval.
+    """
+    start, end = min(curve.start for curve in curves), max(curve.end for curve in curves)
+    apart = _ROUNDING * max(abs(start), abs(end))
+    if any(curve.start - start > apart or end - curve.end > apart for curve in curves):
+        raise ValueError(f"curves to merge must all cover [{start!r}, {end!r}]")
+    if end == start:
+        return PiecewisePolynomial(curves[0].breaks, _stacked([curve.coefficients for curve in curves]))
+    inner = [curve.breaks[1:-1] for curve in curves]
+    owners = np.repeat(np.arange(len(curves)), [times.size for times in inner])
+    times = np.concatenate(inner)
+    order = np.lexsort((owners, times))
+    united, place = _united(times[order], owners[order], apart)
+    breaks = np.concatenate([[start], united, [end]])
+    split = []
+    for index, curve in enumerate(curves):
+        starts = np.concatenate([[0], 1 + place[owners[order] == index]])
+        piece = np.searchsorted(starts, np.arange(breaks.size - 1), "right") - 1
+        offset = breaks[:-1] - curve.breaks[piece]
+        offset[0] = 0.0
+        split.append(taylor_shift(curve.coefficients[:, piece, :], offset[:, None]))
+    return PiecewisePolynomial(breaks, _stacked(split))
+
+
+def _united(times: Array, owners: np.ndarray, apart: float) -> tuple[Array, np.ndarray]:
+    """Return the distinct times, and for each of `times` (sorted) the index of the one that stands for it."""
+    distinct: list[float] = []
+    place = np.empty(times.size, dtype=np.intp)
+    members: set[int] = set()
+    for k, (time, owner) in enumerate(zip(times.tolist(), owners.tolist(), strict=True)):
+        if not distinct or time - distinct[-1] > apart or owner in members:
+            distinct.append(time)
+            members = set()
+        members.add(owner)
+        place[k] = len(distinct) - 1
+    return np.array(distinct), place
+
+
+def _stacked(coefficients: Sequence[Array]) -> Array:
+    """Return coefficients (degree + 1, pieces, n_i) side by side, filled up to the highest degree."""
+    rows = max(block.shape[0] for block in coefficients)
+    filled = [np.pad(block, ((rows - block.shape[0], 0), (0, 0), (0, 0))) for block in coefficients]
+    return np.concatenate(filled, axis=2)
+
+
+def scale_time(curve: PiecewisePolynomial, factor: float) -> PiecewisePolynomial:
+    """Return the curve that starts when `curve` does and takes `factor` times as long."""
+    powers = np.arange(curve.degree, -1, -1)[:, None, None]
+    breaks = curve.start + (curve.breaks - curve.start) * factor
+    if curve.duration > 0:
+        breaks = increasing(breaks)
+    return PiecewisePolynomial(breaks, curve.coefficients / float(factor) ** powers)
+
+
+def reverse(curve: PiecewisePolynomial) -> PiecewisePolynomial:
+    """Return the curve run backwards over the same interval."""
+    signs = (-1.0) ** np.arange(curve.degree, -1, -1)[:, None, None]
+    at_ends = taylor_shift(curve.coefficients, curve.lengths[:, None])
+    breaks = curve.start + (curve.end - curve.breaks[::-1])
+    if curve.duration > 0:
+        breaks = increasing(breaks)
+    return PiecewisePolynomial(breaks, (signs * at_ends)[:, ::-1, :])
+
+
+def along_line(start: Array, displacement: Array, law: PiecewisePolynomial) -> PiecewisePolynomial:
+    """Return q(t) = start + displacement s(t).
+
+    Args:
+        start: Shape (n,).
+        displacement: Shape (n,).
+        law: s(t), of dimension 1.
+    """
+    coefficients = law.coefficients * displacement
+    coefficients[-1] += start
+    return PiecewisePolynomial(law.breaks, coefficients)
+
+
+def compose(path: PiecewisePolynomial, law: PiecewisePolynomial) -> PiecewisePolynomial:
+    """Return q(s(t)), whose breaks are those of the law and the times at which s passes breaks of the path.
+
+    Args:
+        path: q(s) of degree d1.
+        law: s(t) of dimension 1 and degree d2, with d1 d2 at most 10.
+
+    Raises:
+        ValueError: When the degree would be above 10, or the law leaves the path.
+    """
+    if path.degree * law.degree > _DEGREE or law.dimension != 1:
+        raise ValueError(
+            f"a path of degree {path.degree} and a law of degree {law.degree} and dimension {law.dimension}: "
+            f"dimension 1 and a product of at most {_DEGREE} are what can be composed exactly"
+        )
+    law = _split(law, _crossings(path, law))
+    middle = horner(law.coefficients, 0.5 * law.lengths[:, None])[:, 0]
+    piece = np.clip(np.searchsorted(path.breaks, middle, "right") - 1, 0, path.pieces - 1)
+    outer = taylor_shift(
+        path.coefficients[:, piece], (law.coefficients[-1, :, 0] - path.breaks[piece])[:, None]
+    )
+    return PiecewisePolynomial(law.breaks, substituted(outer, law.coefficients[:-1]))
+
+
+def substituted(outer: Array, inner: Array) -> Array:
+    """Return the polynomials p(t r(t)), shape (d1 d2 + 1, ...), highest power first.
+
+    Args:
+        outer: Of p, shape (d1 + 1, ...).
+        inner: Of r, shape (d2, ...), which broadcasts against the trailing shape.
+    """
+    result = outer[:1]
+    for row in outer[1:]:
+        result = np.concatenate([_product(result, inner), row[None]])
+    return result
+
+
+def _crossings(path: PiecewisePolynomial, law: PiecewisePolynomial) -> Array:
+    """Return the times inside pieces of the law at which it passes a break of the path."""
+    low, high = (values[:, 0] for values in piece_extremes(law.coefficients, law.lengths, (0,))[0])
+    apart = _ROUNDING * max(abs(path.start), abs(path.end), float(np.abs(law.coefficients[-1]).max()))
+    if low.min() < path.start - _NEAR * apart or high.max() > path.end + _NEAR * apart:
+        raise ValueError(
+            f"the law runs from {float(low.min())!r} to {float(high.max())!r}, "
+            f"the path from {path.start!r} to {path.end!r}"
+        )
+    first = np.searchsorted(path.breaks, low + apart, "right")
+    count = np.maximum(np.searchsorted(path.breaks, high - apart, "left") - first, 0)
+    piece = np.repeat(np.arange(law.pieces), count)
+    passed = path.breaks[np.arange(piece.size) + np.repeat(first - (np.cumsum(count) - count), count)]
+    offset = law.coefficients[:, piece].copy()
+    offset[-1, :, 0] -= passed
+    powers = np.arange(law.degree + 1, 0, -1)[:, None, None]
+    integral = np.concatenate([offset / powers, np.zeros((1, piece.size, 1))])
+    local = critical_points(integral, law.lengths[piece], (0,))[0][:, :, 0]
+    inside = (local > 0) & (local < law.lengths[piece])
+    inside &= np.abs(horner(offset[:, :, 0], local)) <= _NEAR * apart  # the rest stands in for missing roots
+    return np.asarray((law.breaks[piece] + local)[inside])
+
+
+def _split(curve: PiecewisePolynomial, times: Array) -> PiecewisePolynomial:
+    """Return the same curve with further breaks, save those that only rounding sets apart from others."""
+    if not times.size:
+        return curve
+    apart = _ROUNDING * max(abs(curve.start), abs(curve.end))
+    after = np.clip(np.searchsorted(curve.breaks, times), 1, curve.pieces)
+    new = (times - curve.breaks[after - 1] > apart) & (curve.breaks[after] - times > apart)
+    breaks = distinct(np.append(curve.breaks, times[new]))
+    piece = np.searchsorted(curve.breaks, breaks[:-1], "right") - 1
+    offset = breaks[:-1] - curve.breaks[piece]
+    return PiecewisePolynomial(breaks, taylor_shift(curve.coefficients[:, piece], offset[:, None]))
+
+
+def _product(a: Array, b: Array) -> Array:
+    """Return the products of polynomials (d + 1, ...), highest power first."""
+    result = np.zeros((a.shape[0] + b.shape[0] - 1, *np.broadcast_shapes(a.shape[1:], b.shape[1:])))
+    for k, row in enumerate(b):
+        result[k : k + a.shape[0]] += a * row
+    return result
+
+
+def hold_until(curve: PiecewisePolynomial, end: float) -> PiecewisePolynomial:
+    """Return the curve extended by a rest in its last value.
+
+    Args:
+        curve: Ends with velocity zero.
+        end: Not before the curve's end, rounding apart.
+
+    Raises:
+        ValueError: When the curve still moves at its end, or ends later than `end`.
+    """
+    velocity = np.abs(curve.piece_ends(1))
+    if (velocity[1, -1] > _REST * velocity.max(axis=(0, 1))).any():
+        raise ValueError(f"the curve still moves at its end, {curve.end!r}")
+    return _extended(curve, end, curve.piece_ends()[1][-1:])
+
+
+def coast_until(curve: PiecewisePolynomial, end: float) -> PiecewisePolynomial:
+    """Return the curve extended by a stretch in which its last velocity stays.
+
+    Args:
+        curve: Any.
+        end: Not before the curve's end, rounding apart.
+
+    Raises:
+        ValueError: When the curve ends later than `end`.
+    """
+    return _extended(curve, end, np.stack([curve.piece_ends(order)[1][-1] for order in (1, 0)]))
+
+
+def _extended(curve: PiecewisePolynomial, end: float, last: Array) -> PiecewisePolynomial:
+    """Return the curve followed by one piece with coefficients `last` (degree + 1, n)."""
+    gap, apart = end - curve.end, _ROUNDING * max(abs(curve.start), abs(end))
+    if gap < -apart:
+        raise ValueError(f"the curve ends at {curve.end!r}, after {end!r}")
+    if gap <= apart:
+        return curve
+    breaks = np.array([curve.end, end])
+    longer = concatenate([curve, PiecewisePolynomial(breaks, last[:, None, :])])
+    return PiecewisePolynomial(np.append(longer.breaks[:-1], end), longer.coefficients)
+
+
+_STEPS = 60  # of bisection: a piece is divided to its last bit
+
+
+def times_at(law: PiecewisePolynomial, values: Array) -> Array:
+    """Return the earliest times (k,) at which s(t), which never decreases, reaches the values (k,).
+
+    Values outside the law's range are taken to its ends.
+
+    Args:
+        law: Of dimension 1.
+        values: Shape (k,).
+    """
+    reached = np.maximum.accumulate(np.append(law.coefficients[-1, :, 0], law.piece_ends()[1][-1]))
+    wanted = np.clip(values, reached[0], reached[-1])
+    piece = np.clip(np.searchsorted(reached, wanted, "left") - 1, 0, law.pieces - 1)
+    times = np.where(wanted == reached[0], law.start, law.breaks[piece + 1])
+    inside = np.flatnonzero((wanted != reached[0]) & (wanted != reached[piece + 1]))
+    if inside.size:
+        times[inside] = _times_within(law, wanted[inside], piece[inside])
+    return times
+
+
+def _times_within(law: PiecewisePolynomial, values: Array, piece: NDArray[np.intp]) -> Array:
+    """Return the times (k,) at which the values (k,) are reached in the given pieces (k,)."""
+    coefficients = law.coefficients[:, piece, 0].copy()
+    coefficients[-1] -= values
+    low, high = np.zeros(values.size), law.lengths[piece]
+    for _ in range(_STEPS):
+        middle = 0.5 * (low + high)
+        below = horner(coefficients, middle) < 0
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return np.asarray(law.breaks[piece] + high)

@@ -1,0 +1,1 @@
+"""Linear segments with parabolic blends. numpy only."""

@@ -1,0 +1,154 @@
+"""Curves through waypoints whose derivatives are known at every waypoint, and rules that find them.
+
+Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning and Control (2009), section
+4.2.1; for the bound of three slopes de Boor and Swartz, Piecewise monotone interpolation, J. Approx. Theory
+21 (1977).
+"""
+
+from __future__ import annotations
+
+from math import factorial
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from trajcli.curves.hermite import hermite_coefficients
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.splines.waypoints import Waypoints
+
+_FLAT = 4 * np.finfo(np.float64).eps  # of two neighbours: a difference that rounding explains has no sign
+_MOST = 3.0  # times the smaller slope beside a point: what keeps a cubic monotone whatever its other end does
+
+
+def cubic_through(times: ArrayLike, positions: ArrayLike, velocities: ArrayLike) -> PiecewisePolynomial:
+    """Return the cubics with given velocities: position and velocity are continuous.
+
+    Args:
+        times: Shape (m,), strictly increasing, m >= 2.
+        positions: Shape (m, n).
+        velocities: Shape (m, n).
+
+    Raises:
+        ValueError: When times do not increase, or shapes do not fit.
+    """
+    points = Waypoints(np.asarray(times), np.asarray(positions))
+    return _through(points, np.stack([points.positions, points.rows(velocities, "velocities")]))
+
+
+def quintic_through(
+    times: ArrayLike, positions: ArrayLike, velocities: ArrayLike, accelerations: ArrayLike
+) -> PiecewisePolynomial:
+    """Return the quintics with given velocities and accelerations: both are continuous.
+
+    Args:
+        times: Shape (m,), strictly increasing, m >= 2.
+        positions: Shape (m, n).
+        velocities: Shape (m, n); `parabola_velocities` finds some.
+        accelerations: Shape (m, n); `computed_accelerations` finds some.
+
+    Raises:
+        ValueError: When times do not increase, or shapes do not fit.
+    """
+    points = Waypoints(np.asarray(times), np.asarray(positions))
+    given = points.rows(velocities, "velocities"), points.rows(accelerations, "accelerations")
+    return _through(points, np.stack([points.positions, *given]))
+
+
+def computed_velocities(times: ArrayLike, positions: ArrayLike, first: ArrayLike, last: ArrayLike) -> Array:
+    """Return velocities (m, n): the mean of the slopes beside a point, zero where they differ in sign.
+
+    A flat neighbour has the sign zero and gives zero; a change that is rounding of the positions is flat.
+
+    Args:
+        times: Shape (m,), strictly increasing, m >= 2.
+        positions: Shape (m, n).
+        first: Velocity at the first point, shape (n,).
+        last: Velocity at the last point, shape (n,).
+
+    Raises:
+        ValueError: When times do not increase, or shapes do not fit.
+    """
+    points = Waypoints(np.asarray(times), np.asarray(positions))
+    slopes = points.slopes
+    mean = (slopes[:-1] + slopes[1:]) / 2
+    return _between(points, np.where(_same_direction(points), mean, 0.0), first, last)
+
+
+def parabola_velocities(times: ArrayLike, positions: ArrayLike, first: ArrayLike, last: ArrayLike) -> Array:
+    """Return velocities (m, n) for quintics: of the parabola through three neighbours, held within bounds.
+
+    Zero where the slopes beside a point differ in sign or one is flat, and at most three times the smaller of
+    the two. Where the points are evenly spaced this is the mean of `computed_velocities`, unless the bound is
+    reached. Where they are not, the parabola is exact to one order more, and the bound keeps a short steep
+    stretch from throwing the long one beside it off its way.
+
+    Args:
+        times: Shape (m,), strictly increasing, m >= 2.
+        positions: Shape (m, n).
+        first: Velocity at the first point, shape (n,).
+        last: Velocity at the last point, shape (n,).
+
+    Raises:
+        ValueError: When times do not increase, or shapes do not fit.
+    """
+    points = Waypoints(np.asarray(times), np.asarray(positions))
+    before, after = points.slopes[:-1], points.slopes[1:]
+    share = (points.lengths[1:] / (points.lengths[:-1] + points.lengths[1:]))[:, None]
+    size = share * np.abs(before) + (1 - share) * np.abs(after)
+    held = np.minimum(size, _MOST * np.minimum(np.abs(before), np.abs(after)))
+    inner = np.where(_same_direction(points), np.copysign(held, before), 0.0)
+    return _between(points, inner, first, last)
+
+
+def computed_accelerations(
+    times: ArrayLike, velocities: ArrayLike, first: ArrayLike, last: ArrayLike
+) -> Array:
+    """Return accelerations (m, n) for quintics: the rule of `parabola_velocities`, for the velocities.
+
+    So a stretch at rest stays at rest, one of constant velocity stays straight, and where the velocity is
+    largest there is no acceleration. With the velocities of `parabola_velocities` too, a quintic between
+    two inner points that are dq apart leaves the box of the two by at most 0.0128 dq.
+
+    Args:
+        times: Shape (m,), strictly increasing, m >= 2.
+        velocities: At the waypoints, shape (m, n).
+        first: Acceleration at the first point, shape (n,).
+        last: Acceleration at the last point, shape (n,).
+
+    Raises:
+        ValueError: When times do not increase, or shapes do not fit.
+    """
+    return parabola_velocities(times, velocities, first, last)
+
+
+def _through(points: Waypoints, derivatives: Array) -> PiecewisePolynomial:
+    """Return Hermite pieces, given derivatives (k, m, n).
+
+    Each is the Taylor polynomial of its start and a Hermite polynomial for what that misses at the other end.
+    The latter is small where points are close in time, and so is its rounding: a velocity divided by
+    the square of a short time would spoil the continuity of the acceleration.
+    """
+    start, end, duration = derivatives[:, :-1], derivatives[:, 1:], points.lengths[:, None]
+    order = derivatives.shape[0]
+    missed = end - start
+    for i in range(order):
+        for j in range(1, order - i):
+            missed[i] -= start[i + j] * (duration**j / factorial(j))
+    coefficients = hermite_coefficients(np.zeros_like(start), missed, duration)
+    for i in range(order):
+        coefficients[-1 - i] = start[i] / factorial(i)
+    return PiecewisePolynomial(points.times, coefficients)
+
+
+def _same_direction(points: Waypoints) -> NDArray[np.bool_]:
+    """Return where the slopes beside an inner point have the same sign, neither being flat; (m - 2, n)."""
+    change = np.diff(points.positions, axis=0)
+    size = np.abs(points.positions)
+    signs = np.where(np.abs(change) <= _FLAT * np.maximum(size[:-1], size[1:]), 0.0, np.sign(change))
+    same: NDArray[np.bool_] = signs[:-1] * signs[1:] > 0
+    return same
+
+
+def _between(points: Waypoints, inner: Array, first: ArrayLike, last: ArrayLike) -> Array:
+    ends = points.row(first, "the value at the first point"), points.row(last, "the value at the last point")
+    return np.concatenate([ends[0][None], inner, ends[1][None]])

@@ -1,0 +1,259 @@
+"""When to pass the points of a spline so that it is over soonest: durations of its pieces from its limits.
+
+The durations h minimise their sum while every piece keeps its limits. With y = log h, and c_i(y) the
+logarithm of what a piece uses of a limit, the minimiser of
+
+    sum h - mu sum_i log(-c_i(y))
+
+tends to the optimum as mu does to zero, and is never more than mu times the number of limits above it where c
+is convex. Newton's steps need the slopes of c: durations far from a piece hardly matter to it, so every ninth
+one is varied at once, and the Hessian diag(h) + mu sum (c'_i c'_i^T) / c_i^2 is banded. The slopes change
+slowly, so that they serve several steps. All costs are proportional to the number of points.
+
+Source: Boyd and Vandenberghe, Convex Optimization (2004), sections 11.2 and 11.3; Curtis, Powell and Reid, On
+the estimation of sparse Jacobian matrices, J. Inst. Math. Appl. 13 (1974).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from trajcli.curves.extrema import piece_extremes
+from trajcli.curves.linear_systems import solve_block_tridiagonal
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.smallest_feasible import smallest_feasible
+from trajcli.frozen import frozen
+
+CurveFamily = Callable[[Array], PiecewisePolynomial]
+
+_REACH = 4  # durations to either side that matter to a piece: in a C2 cubic each further one counts a quarter
+_WINDOW = 2 * _REACH + 1
+_BAND = _WINDOW - 1
+_VARIED = 1e-6  # of a duration
+_ROOM = 1e-10  # relative; a tenth of the tolerance with which limits are verified
+_HIDDEN = -3.0  # log of a share of 5 %: limits of which less is used do not steer
+_INSIDE = 1.03  # times the feasible start, to begin inside
+_BARRIERS = (
+    (0.04, 1e-2),
+    (0.004, 3e-3),
+    (0.0008, 3e-4),
+)  # mu, of the mean duration; and the gain, of the sum of
+# durations, below which a step ends the round
+_STEPS = 12  # of Newton for each barrier
+_HALVINGS = 12
+_LONGEST = 0.7  # of log h in one step
+_NEARER = 0.6  # of the way to the limits in one step, by the slopes
+_FAR = 0.2  # of log h: slopes from further away are found anew
+_AMPLE = 1e4
+
+
+@frozen
+class _Problem:
+    """What is solved.
+
+    Attributes:
+        family: The curve from 0 whose pieces, or runs of pieces, last as long as it is told.
+        bounds: Shape (3, n, 2).
+    """
+
+    family: CurveFamily
+    bounds: Array
+
+    def uses(self, y: Array) -> Array:
+        """Return c, the log of what each piece uses of those limits that count, shape (m, r)."""
+        return np.maximum(_all_uses(self.family, np.exp(y), self.bounds), _HIDDEN)
+
+    def slopes(self, y: Array, uses: Array) -> Array:
+        """Return d c / d y, shape (m, r, window): entry w of piece k is about duration k - reach + w."""
+        places = np.arange(y.size)
+        slopes = np.zeros((*uses.shape, _WINDOW))
+        for colour in range(min(_WINDOW, y.size)):
+            varied = y + _VARIED * (places % _WINDOW == colour)
+            change = (self.uses(varied) - uses) / _VARIED
+            entry = (colour - places + _REACH) % _WINDOW
+            owner = places - _REACH + entry
+            inside = (owner >= 0) & (owner < y.size)
+            slopes[places[inside], :, entry[inside]] = change[inside]
+        return slopes
+
+
+@frozen
+class _Point:
+    """Durations, and what is known of the limits there.
+
+    Attributes:
+        y: Their logarithms, shape (m,).
+        uses: c, shape (m, r).
+        origin: Where the slopes are from, shape (m,).
+        slopes: Shape (m, r, window).
+    """
+
+    y: Array
+    uses: Array
+    origin: Array
+    slopes: Array
+
+    def values(self, weight: float) -> Array:
+        """Return each piece's part of what is minimised, shape (m,); infinite outside the limits."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            barriers = np.log(-self.uses).sum(axis=1)
+        inside = self.uses.max(axis=1) < 0
+        return np.where(inside, np.exp(self.y) - weight * np.where(inside, barriers, 0.0), np.inf)
+
+    def step(self, weight: float) -> Array:
+        """Return Newton's step, shape (m,), nowhere more of it than stays inside the limits by the slopes."""
+        h, steep = np.exp(self.y), self.slopes / -self.uses[:, :, None]
+        gradient = _scattered(weight * steep.sum(axis=1), h.size) + h
+        curvature = weight * (steep.transpose(0, 2, 1) @ steep)
+        step = -solve_block_tridiagonal(*_blocks(curvature, h), gradient)
+        step = np.clip(step, -_LONGEST, _LONGEST)
+        nearer = (steep @ _windows(step, 0.0)[:, :, None]).max(axis=(1, 2))  # 1: at the limits
+        return np.asarray(step * _windows(_NEARER / np.maximum(nearer, _NEARER), 1.0).min(axis=1))
+
+
+def fastest_durations(family: CurveFamily, guess: Array, bounds: Array) -> Array | None:
+    """Return the durations (m,) of the pieces of the fastest curve of a family that keeps its limits.
+
+    The optimum is a local one. None where no stretch of the guess keeps the limits.
+
+    Args:
+        family: The curve from 0 whose pieces, or runs of pieces, last as long as it is told, shape (m,).
+        guess: Positive, shape (m,).
+        bounds: Lower and upper limits of velocity, acceleration and jerk, shape (3, n, 2), infinite if none.
+    """
+    start = _stretched(family, guess, bounds)
+    if start is None or guess.size == 1:
+        return start
+    problem, y = _Problem(family, bounds), np.log(start * _INSIDE)
+    uses = problem.uses(y)
+    found = _Point(y, uses, y, problem.slopes(y, uses))
+    for cost, enough in _BARRIERS:
+        found = _centred(problem, found, cost * float(start.mean()), enough)
+    best = _stretched(family, np.exp(found.y), bounds)
+    return best if best is not None and best.sum() < start.sum() else start
+
+
+def _centred(problem: _Problem, found: _Point, weight: float, enough: float) -> _Point:
+    """Return the minimiser of a barrier from a start inside the limits; a start outside comes back.
+
+    Args:
+        problem: What is solved.
+        found: The start.
+        weight: mu, s.
+        enough: The gain below which a step is the last one, of the sum of durations.
+    """
+    for _ in range(_STEPS):
+        if np.abs(found.y - found.origin).max() > _FAR:
+            found = _renewed(problem, found)
+        exact, better, gain = found.origin is found.y, _improved(problem, found, weight), 0.0
+        if better is not None:
+            gain = float((found.values(weight) - better.values(weight)).sum() / np.exp(found.y).sum())
+            found = better
+        if gain < enough and exact:
+            break
+        if gain < enough:  # by slopes from far away
+            found = _renewed(problem, found)
+    return found
+
+
+def _renewed(problem: _Problem, found: _Point) -> _Point:
+    return _Point(found.y, found.uses, found.y, problem.slopes(found.y, found.uses))
+
+
+def _improved(problem: _Problem, found: _Point, weight: float) -> _Point | None:
+    """Return a point with a smaller value in about the direction of Newton's step, or None if there is none.
+
+    The step is halved around those pieces where it makes things worse.
+    """
+    values = found.values(weight)
+    if not np.isfinite(values).all():
+        return None
+    step = found.step(weight)
+    for _ in range(_HALVINGS):
+        y = found.y + step
+        better = _Point(y, problem.uses(y), found.origin, found.slopes)
+        gains = better.values(weight) - values
+        if gains.sum() < 0:
+            return better
+        step = np.where(_windows(gains, 0.0).sum(axis=1) > 0, step / 2, step)
+    return None
+
+
+def _stretched(family: CurveFamily, durations: Array, bounds: Array) -> Array | None:
+    """Return the durations times the smallest factor that keeps the limits."""
+    orders = np.repeat(np.array(_orders(bounds), dtype=np.float64), bounds.shape[1])
+    factor = float(np.exp((_all_uses(family, durations, bounds) / orders).max()))
+    if factor == 0:
+        return None
+    if _excess(family, durations * factor, bounds) <= _ROOM:  # ends at rest: limits scale as powers of time
+        return durations * factor * (1 + _ROOM)
+
+    def excess(factors: Array) -> Array:
+        return np.array([_excess(family, durations * f, bounds) for f in factors.tolist()]) - _ROOM
+
+    found = smallest_feasible(excess, factor / 10, factor * _AMPLE, block=1)
+    return None if found is None else durations * found
+
+
+def _excess(family: CurveFamily, durations: Array, bounds: Array) -> float:
+    return float(_all_uses(family, durations, bounds).max())
+
+
+def _orders(bounds: Array) -> list[int]:
+    """Return the derivatives that are limited at all."""
+    return [order for order in (1, 2, 3) if np.isfinite(bounds[order - 1]).any()] or [1]
+
+
+def _all_uses(family: CurveFamily, durations: Array, bounds: Array) -> Array:
+    """Return log of what each piece uses of each limit, shape (m, r); what it does not use is -inf."""
+    curve = family(durations)
+    begins = np.concatenate([[0.0], np.cumsum(durations)[:-1]]) + 0.25 * durations.min()
+    first = np.maximum.accumulate(np.searchsorted(curve.breaks, begins, "right") - 1)
+    orders, parts = _orders(bounds), []
+    extremes = piece_extremes(curve.coefficients, curve.lengths, orders)
+    for order, (low, high) in zip(orders, extremes, strict=True):
+        limits = bounds[order - 1]
+        share = np.maximum(low / limits[:, 0], high / limits[:, 1])
+        parts.append(np.maximum.reduceat(share, first, axis=0))
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(np.maximum(np.concatenate(parts, axis=1), 0.0)))
+
+
+def _windows(values: Array, filling: float) -> Array:
+    """Return what stands around each of the values (m,), shape (m, window)."""
+    return np.lib.stride_tricks.sliding_window_view(np.pad(values, _REACH, constant_values=filling), _WINDOW)
+
+
+def _scattered(values: Array, size: int) -> Array:
+    """Return the sums over all windows, shape (size,), of values (m, window)."""
+    total = np.zeros(size + 2 * _REACH)
+    for entry in range(_WINDOW):
+        total[entry : entry + size] += values[:, entry]
+    return total[_REACH : _REACH + size]
+
+
+def _blocks(curvature: Array, diagonal: Array) -> tuple[Array, Array]:
+    """Return the diagonal blocks (b, band, band) and those to their right (b - 1, band, band) of the Hessian.
+
+    Args:
+        curvature: Shape (m, window, window).
+        diagonal: What is added to the diagonal, shape (m,).
+    """
+    m = diagonal.size
+    count = -(-m // _BAND)
+    band = np.zeros((_BAND + 1, m + 2 * _REACH))
+    for v in range(_WINDOW):
+        for w in range(v, _WINDOW):
+            band[w - v, v : v + m] += curvature[:, v, w]
+    band = np.pad(band[:, _REACH : _REACH + m], ((0, 0), (0, (count + 1) * _BAND - m)))
+    band[0, :m] += diagonal
+    band[0, m:] = 1.0
+    rows = np.arange(count)[:, None, None] * _BAND + np.arange(_BAND)[:, None]
+    ahead = np.arange(_BAND) - np.arange(_BAND)[:, None]
+    upper = np.where(ahead >= 0, band[np.clip(ahead, 0, _BAND), rows], 0.0)
+    inner = upper + np.swapaxes(np.where(ahead > 0, upper, 0.0), 1, 2)
+    reach = ahead + _BAND
+    right = np.where(reach <= _BAND, band[np.clip(reach, 0, _BAND), rows], 0.0)
+    return inner, right[:-1]

@@ -1,0 +1,86 @@
+"""The switching structure of a motion: which limit of which joint binds when."""
+
+from __future__ import annotations
+
+from itertools import groupby
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.frozen import comparable
+
+_BINDS = 0.95  # of a limit, on average over a piece: its ends reach the limit only as far as the grid is fine
+_STAYS = 0.01  # by which another limit must be nearer before it takes over
+
+
+@comparable
+class Binding:
+    """A stretch of time in which one limit binds.
+
+    Attributes:
+        start: s.
+        end: s.
+        joint: Index from 0.
+        quantity: Of the limit.
+        sign: 1 for the upper limit, -1 for the lower one.
+    """
+
+    start: float
+    end: float
+    joint: int
+    quantity: Literal["velocity", "acceleration"]
+    sign: Literal[-1, 1]
+
+
+def switching_structure(
+    trajectory: PiecewisePolynomial, velocity: ArrayLike, acceleration: ArrayLike
+) -> list[Binding]:
+    """Return the stretches in which a limit binds, in order; where none is named, the motion switches.
+
+    Of several limits that bind the one that already did is named, else the one that is nearest.
+
+    Args:
+        trajectory: q(t) with n joints, in short pieces.
+        velocity: Bounds, shape (n, 2).
+        acceleration: Bounds, shape (n, 2).
+    """
+    used = np.concatenate([_used(trajectory, 1, velocity), _used(trajectory, 2, acceleration)], axis=1)
+    labels = _labels(used)
+    found, times, n = [], trajectory.breaks, trajectory.dimension
+    for label, group in groupby(range(trajectory.pieces), labels.__getitem__):
+        pieces = list(group)
+        if label < 0:
+            continue
+        side, joint = divmod(label, n)
+        found.append(
+            Binding(
+                float(times[pieces[0]]),
+                float(times[pieces[-1] + 1]),
+                joint,
+                "velocity" if side < 2 else "acceleration",
+                1 if side % 2 == 0 else -1,
+            )
+        )
+    return found
+
+
+def _used(trajectory: PiecewisePolynomial, order: int, bounds: ArrayLike) -> Array:
+    """Return the shares of the upper and of the lower bounds in use, means over both ends, (pieces, 2 n)."""
+    limits = np.asarray(bounds, dtype=np.float64)
+    mean = 0.5 * np.add(*trajectory.piece_ends(order))
+    return np.concatenate([mean / limits[:, 1], mean / limits[:, 0]], axis=1)
+
+
+def _labels(used: Array) -> list[int]:
+    """Return for each piece which column binds, or -1."""
+    best, share = used.argmax(axis=1).tolist(), used.max(axis=1).tolist()
+    labels: list[int] = []
+    last = -1
+    for piece, (column, most) in enumerate(zip(best, share, strict=True)):
+        stays = column == last and most >= _BINDS
+        if not stays and (last < 0 or used[piece, last] < max(_BINDS, most - _STAYS)):
+            last = column if most >= _BINDS else -1
+        labels.append(last)
+    return labels

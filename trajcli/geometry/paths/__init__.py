@@ -1,0 +1,1 @@
+"""Paths of the tool X(s): position, orientation, composite paths, rounded corners. numpy only."""

@@ -1,0 +1,189 @@
+"""Orientation whose three angles change evenly: component by component, not the shortest rotation.
+
+Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning and Control (2009), section
+4.3.3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from trajcli.errors import InputError
+from trajcli.frozen import frozen
+from trajcli.geometry.euler import check_sequence, euler_from_matrix, matrix_from_euler
+from trajcli.geometry.paths.orientation import SegmentProgress, check_targets, rate_jumps
+from trajcli.geometry.paths.position import Side, Triple
+from trajcli.geometry.rotation import AXES, Array, Frame, rotation_about
+
+_TURN = 2.0 * np.pi
+_DIGITS = 9  # to which two triples must differ before one is nearer
+_MET = 1e-10  # of an entry of a matrix, by which a rotation is still met
+
+
+@frozen
+class EulerInterpolation:
+    """Three angles about the axes of a sequence, each going evenly along each segment.
+
+    Through a rounded corner of a chain the rates fade from those of one segment into those of the next one.
+
+    Attributes:
+        angles: Shape (k + 1, 3), rad, at the borders of the k segments; whole turns between neighbours are
+            made.
+        progress: How far each segment is done.
+        sequence: Such as "ZYZ".
+        frame: Whether the axes move along.
+        locked: Targets (from 0) at gimbal lock, of whose first and third angle only the sum or difference was
+            determined, so that the split was chosen.
+    """
+
+    angles: Array
+    progress: SegmentProgress
+    sequence: str
+    frame: Frame = "current"
+    locked: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_sequence(self.sequence)
+        check_targets(self.angles, self.progress)
+        if self.angles.shape[1:] != (3,) or not np.isfinite(self.angles).all():
+            raise InputError(f"angles must be finite triples, they have shape {self.angles.shape}")
+
+    @classmethod
+    def between(
+        cls,
+        start: ArrayLike,
+        end: ArrayLike,
+        sequence: str,
+        frame: Frame = "current",
+        length: float | None = None,
+    ) -> EulerInterpolation:
+        """Return the way from one triple (3,), rad, to another.
+
+        Args:
+            start: At s = 0.
+            end: At s = `length`.
+            sequence: Such as "ZYZ".
+            frame: Whether the axes move along.
+            length: How far s goes; None: as far as the triples are apart, rad.
+        """
+        angles = np.array([start, end], dtype=np.float64)
+        distance = float(np.linalg.norm(angles[1] - angles[0]))
+        return cls(angles, SegmentProgress.even(distance if length is None else length), sequence, frame)
+
+    @property
+    def length(self) -> float:
+        """How far s goes."""
+        return self.progress.length
+
+    @property
+    def breaks(self) -> Array:
+        """Where the rates begin to change, the border, and where they have changed."""
+        return self.progress.breaks
+
+    @property
+    def stops(self) -> Array:
+        """Borders without a blend at which the rate jumps."""
+        return rate_jumps(self, self.progress)
+
+    @property
+    def jumps(self) -> Array:
+        """None."""
+        return np.empty(0)
+
+    def angles_at(self, s: Array, side: Side = "right") -> Triple:
+        """Return the angles (N, 3), rad, and their first and second derivative by s."""
+        done = self.progress.at(s, side)
+        steps = np.concatenate([np.diff(self.angles, axis=0), np.zeros((1, 3))])
+        one, other = steps[done.segment], steps[done.segment + 1]
+        values, slopes, bends = (
+            one * row[0][:, None] + other * row[1][:, None] for row in (done.value, done.slope, done.bend)
+        )
+        return self.angles[done.segment] + values, slopes, bends
+
+    def evaluate(self, s: Array, side: Side = "right") -> Triple:
+        """Return R, w', w'' as `OrientationCurve` says.
+
+        w' is the sum of the three axes, as turned so far, times their rates; each axis is carried by those
+        before it.
+        """
+        angles, slopes, bends = self.angles_at(s, side)
+        turned = np.tile(np.eye(3), (angles.shape[0], 1, 1))
+        rate, change = np.zeros(angles.shape), np.zeros(angles.shape)
+        order = range(3) if self.frame == "current" else range(2, -1, -1)
+        for n in order:
+            name = self.sequence.lower()[n]
+            axis = turned[:, :, AXES.index(name)]
+            own = axis * slopes[:, n, None]
+            change = change + axis * bends[:, n, None] + np.cross(rate, own)
+            rate = rate + own
+            turned = np.matmul(turned, rotation_about(name, angles[:, n]))  # type: ignore[arg-type]
+        return turned, rate, change
+
+
+def euler_interpolation(
+    rotations: Array,
+    progress: SegmentProgress | None,
+    sequence: str,
+    frame: Frame = "current",
+    typed: Sequence[ArrayLike | None] | None = None,
+) -> EulerInterpolation:
+    """Return the way through orientations, the angles of those that were not typed read from their matrices.
+
+    Each is read as the triple, with the whole turns, that is nearest to its neighbour's, beginning at the
+    last typed one, or at the last of all, nearest to zero. At gimbal lock the first angle (on fixed axes the
+    last) is its neighbour's; `locked` says so.
+
+    Args:
+        rotations: Shape (k + 1, 3, 3).
+        progress: Of the k segments; None with two orientations: over the distance of their angles, rad.
+        sequence: Such as "ZYZ".
+        frame: Whether the axes move along.
+        typed: Angles (3,), rad, in this very sequence and frame, or None for each orientation.
+
+    Raises:
+        InputError: When the sequence is none, or the numbers of things do not fit.
+    """
+    known = [
+        None if row is None else np.asarray(row, dtype=np.float64) for row in typed or [None] * len(rotations)
+    ]
+    if len(known) != len(rotations):
+        raise InputError(f"{len(rotations)} orientations and {len(known)} triples of angles do not fit")
+    anchor = max((n for n, row in enumerate(known) if row is not None), default=len(rotations) - 1)
+    locked, angles = [], np.zeros((len(rotations), 3))
+    for n in [*range(anchor, -1, -1), *range(anchor + 1, len(rotations))]:
+        row = known[n]
+        if row is None:
+            aim = np.zeros(3) if n == anchor else angles[n + 1 if n < anchor else n - 1]
+            row, is_locked = nearest_angles(rotations[n], sequence, frame, aim)
+            locked.extend([n] if is_locked else [])
+        angles[n] = row
+    if progress is None:
+        progress = SegmentProgress.even(float(np.linalg.norm(angles[-1] - angles[0])))
+    return EulerInterpolation(angles, progress, sequence, frame, tuple(sorted(locked)))
+
+
+def nearest_angles(rotation: Array, sequence: str, frame: Frame, aim: Array) -> tuple[Array, bool]:
+    """Return the angles (3,), rad, of a rotation (3, 3) nearest to `aim` (3,), and whether they lock."""
+    read = euler_from_matrix(sequence, rotation, frame)
+    candidates = [read.angles, read.alternative]
+    if read.singular:
+        candidates = [_split(row, int(read.lock), rotation, sequence, frame, aim) for row in candidates]
+    candidates = [row + _TURN * np.round((aim - row) / _TURN) for row in candidates]
+    best = min(candidates, key=lambda row: round(float(np.abs(row - aim).max()), _DIGITS))
+    return np.asarray(best), bool(read.singular)
+
+
+def _split(angles: Array, lock: int, rotation: Array, sequence: str, frame: Frame, aim: Array) -> Array:
+    """Return angles (3,) at gimbal lock with the first one of `aim`, where that is the same rotation.
+
+    Beside the lock they are determined, though hardly: there they stay, so that the rotation is met.
+    """
+    kept, other = (0, 2) if frame == "current" else (2, 0)
+    result = angles.copy()
+    result[other] -= lock * (aim[kept] - angles[kept])
+    result[kept] = aim[kept]
+    same = np.abs(matrix_from_euler(sequence, result, frame) - rotation).max() <= _MET
+    return result if same else angles

@@ -1,0 +1,367 @@
+"""Orientation along a path, as a function of the path's arc length.
+
+How far each segment of a path is done, by the path's arc length: smoothly through rounded corners.
+
+Segment i goes from border i to border i+1, and its fraction from 0 to 1 with slope 1/length. Through a
+rounded corner, from h before its border to h after it, the slope of the segment behind falls to zero as 1 - S
+and that of the one ahead rises as S, with S = 3x^2 - 2x^3: the fractions are twice continuously
+differentiable there.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajcli.errors import InputError
+from trajcli.frozen import frozen
+from trajcli.geometry.paths.position import PositionCurve, Side, Smooth, Triple, inside
+from trajcli.geometry.rotation import Array, Flags, axis_angle_from_matrix, check_rotation, exp
+
+_ROUNDING = 1e-12  # of the length, by which two blends that meet may be apart
+
+
+class SegmentFractions(NamedTuple):
+    """The two neighbouring segments that are under way at each place.
+
+    Attributes:
+        segment: Index (N,) of the first one; those before it are done, those after the second not begun.
+        value: Shape (2, N).
+        slope: Shape (2, N), 1/m.
+        bend: Shape (2, N), 1/m^2.
+    """
+
+    segment: NDArray[np.intp]
+    value: Array
+    slope: Array
+    bend: Array
+
+
+@frozen
+class SegmentProgress:
+    """The fractions done of the k segments of a path.
+
+    Attributes:
+        borders: Shape (k + 1,), m, from 0 to the path's length.
+        half_widths: Shape (k - 1,), m: half the length of the blend at each inner border, 0 where there is
+            none.
+    """
+
+    borders: Array
+    half_widths: Array
+
+    @classmethod
+    def even(cls, length: float) -> SegmentProgress:
+        """Return the progress of one segment from 0 to `length`."""
+        return cls(np.array([0.0, length]), np.empty(0))
+
+    @property
+    def length(self) -> float:
+        """Length of the path."""
+        return float(self.borders[-1])
+
+    @property
+    def segments(self) -> int:
+        """Number k of segments."""
+        return self.borders.size - 1
+
+    @property
+    def breaks(self) -> Array:
+        """Inner places, increasing, where a derivative of a fraction jumps."""
+        inner, room = self.borders[1:-1], _ROUNDING * self.length
+        places = np.sort(np.concatenate([inner - self.half_widths, inner, inner + self.half_widths]))
+        places = places[(places > room) & (places < self.length - room)]  # a blend may begin at an end
+        return np.asarray(places[np.diff(places, prepend=-np.inf) > room])
+
+    def at(self, s: Array, side: Side = "right") -> SegmentFractions:
+        """Return the fractions at s (N,).
+
+        Raises:
+            ValueError: When a place lies outside the path.
+        """
+        places = inside(s, self.length)
+        inner, widths = self.borders[1:-1], self.half_widths
+        # within a segment, from which place on its end is the border to look at
+        turns = (inner[:-1] + widths[:-1] + inner[1:] - widths[1:]) / 2.0
+        lengths = np.where(
+            np.diff(self.borders) > 0.0, np.diff(self.borders), 1.0
+        )  # or it stays at its start
+        if self.segments == 1:  # a neighbour that never begins
+            inner, widths, lengths = np.array([np.inf]), np.zeros(1), np.append(lengths, 1.0)
+        segment = np.searchsorted(turns, places, side)
+        value, slope, bend = _ramp(places, inner[segment], widths[segment], side)
+        first, second = lengths[segment], lengths[segment + 1]
+        behind = (places - self.borders[segment] - value) / first
+        return SegmentFractions(
+            segment,
+            np.array([behind, value / second]),
+            np.array([(1.0 - slope) / first, slope / second]),
+            np.array([-bend / first, bend / second]),
+        )
+
+
+def _ramp(s: Array, border: Array, width: Array, side: Side) -> tuple[Array, Array, Array]:
+    """Return a function of slope 0 before border - width and 1 after border + width, and two derivatives."""
+    after = s > border if side == "left" else s >= border
+    sharp = width == 0.0
+    whole = np.where(sharp, 1.0, 2.0 * width)
+    x = np.clip((s - np.where(sharp, 0.0, border - width)) / whole, 0.0, 1.0)
+    value = np.where(sharp | (x >= 1.0), np.maximum(s - border, 0.0), whole * x**3 * (1.0 - x / 2.0))
+    slope = np.where(sharp, after, x * x * (3.0 - 2.0 * x))
+    return value, slope, np.where(sharp, 0.0, 6.0 * x * (1.0 - x) / whole)
+
+
+_RATE_JUMP = 1e-9  # of the larger of two rates
+_RATE_NOISE = 1e-10  # rad/m, what remains of the difference of two orientations that are meant to be the same
+_NOISE = 1e-9  # a component of an axis as small as this says nothing by its sign
+
+
+class OrientationCurve(Protocol):
+    """A rotation R(s), s from 0 to `length`.
+
+    Attributes:
+        length: How far s goes: m, or rad where the place rests.
+        breaks: Inner places (k,), increasing, where a derivative may jump.
+        stops: Those of them where the rate w' jumps, or R: a law must stop there.
+        jumps: Those of them where R jumps: the tool must turn there, or the path be refused.
+    """
+
+    @property
+    def length(self) -> float:
+        """How far s goes."""
+        ...
+
+    @property
+    def breaks(self) -> Array:
+        """Where a derivative may jump."""
+        ...
+
+    @property
+    def stops(self) -> Array:
+        """Where a law must stop."""
+        ...
+
+    @property
+    def jumps(self) -> Array:
+        """Where the orientation jumps."""
+        ...
+
+    def evaluate(self, s: Array, side: Side = "right") -> Triple:
+        """Return R (N, 3, 3), its rate w' (N, 3), rad for each unit of s, in world axes, and w'' (N, 3).
+
+        Args:
+            s: Shape (N,).
+            side: Which of two neighbouring pieces speaks at a break.
+
+        Raises:
+            ValueError: When s lies outside.
+        """
+        ...
+
+
+@frozen
+class FixedOrientation(Smooth):
+    """An orientation that stays.
+
+    Attributes:
+        rotation: Shape (3, 3).
+        length: How far s goes.
+    """
+
+    rotation: Array
+    length: float
+
+    def __post_init__(self) -> None:
+        check_rotation(self.rotation)
+
+    def evaluate(self, s: Array, side: Side = "right") -> Triple:
+        """Return R, w', w'' as `OrientationCurve` says; both sides are the same."""
+        count = inside(s, self.length).size
+        return np.tile(self.rotation, (count, 1, 1)), np.zeros((count, 3)), np.zeros((count, 3))
+
+
+@frozen
+class AxisAngleOrientation:
+    """From each orientation to the next one about the fixed axis of the shortest rotation.
+
+    Over a chain the rotation goes evenly along each segment; through a rounded corner one rotation fades into
+    the next one: R = R_i exp(g v) exp(h w), with v and w the rotation vectors of the two segments and g and h
+    their fractions done. Half a turn has two shortest ways; the one is taken whose axis has its first
+    component positive that is not zero.
+
+    Attributes:
+        rotations: Shape (k + 1, 3, 3), at the borders of the k segments.
+        progress: How far each segment is done.
+
+    Source: Kim, Kim and Shin, A general construction scheme for unit quaternion curves, SIGGRAPH (1995):
+    products of exponentials with cumulative weights.
+    """
+
+    rotations: Array
+    progress: SegmentProgress
+
+    def __post_init__(self) -> None:
+        check_targets(self.rotations, self.progress)
+        for rotation in self.rotations:
+            check_rotation(rotation)
+
+    @classmethod
+    def between(cls, start: Array, end: Array, length: float | None = None) -> AxisAngleOrientation:
+        """Return the way from one orientation to another, each (3, 3).
+
+        Args:
+            start: At s = 0.
+            end: At s = `length`.
+            length: How far s goes; None: as far as the angle, rad.
+        """
+        rotations = np.array([start, end], dtype=np.float64)
+        angle = float(np.linalg.norm(turn_vectors(rotations[:1], rotations[1:])))
+        return cls(rotations, SegmentProgress.even(angle if length is None else length))
+
+    @property
+    def length(self) -> float:
+        """How far s goes."""
+        return self.progress.length
+
+    @property
+    def breaks(self) -> Array:
+        """Where one rotation begins to fade into the next one, the border, and where it has done so."""
+        return self.progress.breaks
+
+    @property
+    def stops(self) -> Array:
+        """Borders without a blend at which the rate jumps."""
+        return rate_jumps(self, self.progress)
+
+    @property
+    def jumps(self) -> Array:
+        """None."""
+        return np.empty(0)
+
+    @cached_property
+    def vectors(self) -> Array:
+        """Rotation vectors (k, 3), rad, of the segments, in axes of the orientation each starts from."""
+        return turn_vectors(self.rotations[:-1], self.rotations[1:])
+
+    @property
+    def angles(self) -> Array:
+        """Angles (k,), rad."""
+        return np.asarray(np.linalg.norm(self.vectors, axis=-1))
+
+    @property
+    def half_turns(self) -> Flags:
+        """Segments (k,) of half a turn, for which the opposite axis would do as well."""
+        read = axis_angle_from_matrix(np.swapaxes(self.rotations[:-1], -1, -2) @ self.rotations[1:])
+        return read.sign_free
+
+    def evaluate(self, s: Array, side: Side = "right") -> Triple:
+        """Return R, w', w'' as `OrientationCurve` says."""
+        if self.progress.segments == 1:
+            return self._evenly(s)
+        done = self.progress.at(s, side)
+        vectors = np.concatenate([self.vectors, np.zeros((1, 3))])
+        v, w = vectors[done.segment], vectors[done.segment + 1]
+        start = self.rotations[done.segment]
+        middle = start @ exp(v * done.value[0][:, None])
+        first, second = (start @ v[..., None])[..., 0], (middle @ w[..., None])[..., 0]
+        one, other = first * done.slope[0][:, None], second * done.slope[1][:, None]
+        change = first * done.bend[0][:, None] + second * done.bend[1][:, None] + np.cross(one, other)
+        return middle @ exp(w * done.value[1][:, None]), one + other, change
+
+    def _evenly(self, s: Array) -> Triple:
+        """Return what `evaluate` does for the one rotation of a single segment."""
+        done = inside(s, self.length) / (self.length or 1.0)
+        vector, start = self.vectors[0], self.rotations[0]
+        rate = np.tile(start @ vector / (self.length or 1.0), (done.size, 1))
+        turned = exp(vector * done[:, None]) if vector.any() else np.eye(3)[None]
+        return np.broadcast_to(start @ turned, (done.size, 3, 3)), rate, np.zeros((done.size, 3))
+
+
+@frozen
+class TangentOrientation:
+    """The tool keeps its attitude to the path: R = Q(s) R(0), Q how the path has turned.
+
+    On a line it stays, on an arc it turns about the arc's axis, on a rounded corner it turns with the
+    direction and does not roll about it.
+
+    Attributes:
+        place: The path.
+        start: Orientation (3, 3) at its start.
+    """
+
+    place: PositionCurve
+    start: Array
+
+    def __post_init__(self) -> None:
+        check_rotation(self.start)
+
+    @property
+    def length(self) -> float:
+        """Length of the path, m."""
+        return self.place.length
+
+    @property
+    def breaks(self) -> Array:
+        """Breaks of the path."""
+        return self.place.breaks
+
+    @property
+    def stops(self) -> Array:
+        """Where the direction jumps, or the curvature, with which the rate jumps."""
+        places = self.place.breaks
+        if not places.size:
+            return places
+        left, right = self.place.transport(places, "left")[1], self.place.transport(places, "right")[1]
+        return np.array(sorted({*places[_differ(left, right)].tolist(), *self.jumps.tolist()}))
+
+    @property
+    def jumps(self) -> Array:
+        """Corners of the path: there the tool would have to turn by the corner's angle in no time."""
+        return self.place.stops
+
+    def evaluate(self, s: Array, side: Side = "right") -> Triple:
+        """Return R, w', w'' as `OrientationCurve` says."""
+        rotation, rate, change = self.place.transport(s, side)
+        return rotation @ self.start, rate, change
+
+
+def turn_vectors(start: Array, end: Array) -> Array:
+    """Return the rotation vectors (*batch, 3), rad, of the shortest rotations from `start` (*batch, 3, 3).
+
+    They are in axes of `start`. Of half a turn within 1e-9 rad, where rounding would choose, the axis has
+    its first component positive.
+    """
+    read = axis_angle_from_matrix(np.swapaxes(start, -1, -2) @ end)
+    first = np.argmax(np.abs(read.axis) > _NOISE, axis=-1)[..., None]
+    opposite = read.sign_free & (np.take_along_axis(read.axis, first, axis=-1)[..., 0] < 0.0)
+    angle = np.where(opposite, read.angle - 2.0 * np.pi, read.angle)
+    return np.asarray(read.axis * angle[..., None])
+
+
+def check_targets(targets: Array, progress: SegmentProgress) -> None:
+    """Check that there is one target for each border of the segments.
+
+    Raises:
+        InputError: When there is not.
+    """
+    if len(targets) != progress.segments + 1:
+        raise InputError(
+            f"{progress.segments} segments need {progress.segments + 1} orientations, not {len(targets)}"
+        )
+
+
+def rate_jumps(curve: OrientationCurve, progress: SegmentProgress) -> Array:
+    """Return the borders (k,) without a blend at which the rate of an orientation jumps."""
+    sharp: Array = progress.borders[1:-1][progress.half_widths == 0.0]
+    if not sharp.size:
+        return sharp
+    return np.asarray(sharp[_differ(curve.evaluate(sharp, "left")[1], curve.evaluate(sharp, "right")[1])])
+
+
+def _differ(left: Array, right: Array) -> Flags:
+    larger = np.maximum(np.linalg.norm(left, axis=-1), np.linalg.norm(right, axis=-1))
+    differ: Flags = np.linalg.norm(left - right, axis=-1) > _RATE_JUMP * larger + _RATE_NOISE
+    return differ

@@ -1,0 +1,180 @@
+"""Poses along a path: a curve of the place and a curve of the orientation with the same s.
+
+The motion at constant twist from one pose to another: the tool goes along a helix by its arc length.
+
+Source: Murray, Li and Sastry, A Mathematical Introduction to Robotic Manipulation (1994), section 2.3.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from trajcli.frozen import frozen
+from trajcli.geometry.paths.orientation import OrientationCurve, turn_vectors
+from trajcli.geometry.paths.position import SAME_PLACE, Pivot, PositionCurve, Side, Smooth, Triple, inside
+from trajcli.geometry.pose import build, check_pose, exp_pose, invert
+from trajcli.geometry.rotation import Array
+
+_SAME = 1e-9  # of the length: two breaks as near as this are one
+
+
+class PosePath(Protocol):
+    """A pose X(s), s from 0 to `length`; with a law s(t), v = X' sd and a = X'' sd^2 + X' sdd.
+
+    Attributes:
+        length: m of arc length, or rad where the place rests; zero for no motion.
+        in_place: Whether the place rests and s is an angle.
+        breaks: Inner places (k,), increasing, where a derivative may jump.
+        stops: Those of them where X' jumps, or X: a law must stop there.
+        jumps: Those of them where the orientation jumps.
+    """
+
+    @property
+    def length(self) -> float:
+        """How far s goes."""
+        ...
+
+    @property
+    def in_place(self) -> bool:
+        """Whether the place rests."""
+        ...
+
+    @property
+    def breaks(self) -> Array:
+        """Where a derivative may jump."""
+        ...
+
+    @property
+    def stops(self) -> Array:
+        """Where a law must stop."""
+        ...
+
+    @property
+    def jumps(self) -> Array:
+        """Where the orientation jumps."""
+        ...
+
+    def evaluate(self, s: Array, side: Side = "right") -> Triple:
+        """Return the poses X (N, 4, 4), X' = [v', w'] (N, 6) and X'' = [v'', w''] (N, 6) in world axes.
+
+        Args:
+            s: Shape (N,), m or rad.
+            side: Which of two neighbouring pieces speaks at a break.
+
+        Raises:
+            ValueError: When s lies outside.
+        """
+        ...
+
+
+@frozen
+class PoseCurve:
+    """Place and orientation side by side.
+
+    Attributes:
+        place: p(s), of some length, or a `Pivot`.
+        orientation: R(s), as long.
+    """
+
+    place: PositionCurve
+    orientation: OrientationCurve
+
+    def __post_init__(self) -> None:
+        difference = abs(self.place.length - self.orientation.length)
+        if difference > _SAME * self.place.length:
+            raise ValueError(
+                f"place and orientation differ in length: {self.place.length!r}, {self.orientation.length!r}"
+            )
+
+    @property
+    def length(self) -> float:
+        """Length of the place's curve, m, or of the rotation alone, rad."""
+        return self.place.length
+
+    @property
+    def in_place(self) -> bool:
+        """Whether the place rests and s is an angle."""
+        return isinstance(self.place, Pivot)
+
+    @property
+    def breaks(self) -> Array:
+        """Where a derivative may jump."""
+        return self._united(self.place.breaks, self.orientation.breaks)
+
+    @property
+    def stops(self) -> Array:
+        """Where a law must stop."""
+        return self._united(self.place.stops, self.orientation.stops)
+
+    @property
+    def jumps(self) -> Array:
+        """Where the orientation jumps."""
+        return self.orientation.jumps
+
+    def evaluate(self, s: Array, side: Side = "right") -> Triple:
+        """Return X, X', X'' as `PosePath` says."""
+        places, velocity, bend = self.place.evaluate(s, side)
+        rotations, rate, change = self.orientation.evaluate(s, side)
+        first, second = np.concatenate([velocity, rate], axis=-1), np.concatenate([bend, change], axis=-1)
+        return build(rotations, places), first, second
+
+    def _united(self, first: Array, second: Array) -> Array:
+        """Return the places of both, those of the second that are beside one of the first left out."""
+        if not first.size:
+            return second
+        near = np.abs(second[:, None] - first).min(axis=-1) <= _SAME * self.length
+        return np.sort(np.concatenate([first, second[~near]]))
+
+
+@frozen
+class Screw(Smooth):
+    """Poses X(s) = start exp(s twist), the twist constant in the tool's axes.
+
+    Half a turn has two ways; the rotation is the one that `AboutAxes` takes.
+
+    Attributes:
+        start: Shape (4, 4).
+        end: Shape (4, 4).
+    """
+
+    start: Array
+    end: Array
+
+    def __post_init__(self) -> None:
+        check_pose(self.start)
+        check_pose(self.end)
+
+    @cached_property
+    def twist(self) -> Array:
+        """The whole motion as a twist (6,), m and rad, in axes of the start."""
+        motion = invert(self.start) @ self.end
+        vector = turn_vectors(self.start[:3, :3], self.end[:3, :3])
+        # exp takes v to V v, linear in v: its columns are where unit vectors go
+        units = np.concatenate([np.eye(3), np.tile(vector, (3, 1))], axis=-1)
+        columns = exp_pose(units)[:, :3, 3].T
+        return np.concatenate([np.linalg.solve(columns, motion[:3, 3]), vector])
+
+    @cached_property
+    def length(self) -> float:
+        """Arc length of the tool's helix, m, or the angle, rad, where the tool does not go anywhere."""
+        way, angle = np.linalg.norm(self.twist[:3]), np.linalg.norm(self.twist[3:])
+        return float(angle if way <= SAME_PLACE else way)
+
+    @property
+    def in_place(self) -> bool:
+        """Whether the tool only turns and s is an angle."""
+        return bool(np.linalg.norm(self.twist[:3]) <= SAME_PLACE)
+
+    def evaluate(self, s: Array, side: Side = "right") -> Triple:
+        """Return X, X', X'' as `PosePath` says; both sides are the same."""
+        twist = self.twist / (self.length or 1.0)
+        poses = self.start @ exp_pose(inside(s, self.length)[:, None] * twist)
+        velocity, rate = (poses[:, :3, :3] @ part for part in (twist[:3], twist[3:]))
+        return (
+            poses,
+            np.concatenate([velocity, rate], axis=-1),
+            np.concatenate([np.cross(rate, velocity), np.zeros_like(rate)], axis=-1),
+        )
