@@ -267,7 +267,7 @@ LOOKS_FOR_PLUGINS = {"importlib.metadata", "email", "zipfile", "socket"}
 OF_OTHER_JOBS = {
     "trajcli.planners.cubic",
     "trajcli.planners.spline",
-    "trajcli.kinematics.chain",
+    "trajcli.kinematics.serial_chain",
     "trajcli.job.report",
 }
 

@@ -237,11 +237,11 @@ def planar(elbow) -> ToolRows:
         """The tool is told exactly where the joints bring it."""
 
     def timed(times, side):
-        from trajcli.kinematics.following.demand import Demand
+        from trajcli.kinematics.following.tool_path import ToolReference
 
         poses = forward(robot, curve.evaluate(np.clip(times, 0, DURATION)))
         zero = np.zeros((len(poses), 6))
-        return Demand(
+        return ToolReference(
             poses,
             zero,
             zero,
@@ -274,11 +274,11 @@ def test_a_wrist_that_passes_its_middle_changes_the_branch():
     curve = hermite_pieces(np.array([0.0, DURATION]), states)
 
     def timed(times, side):
-        from trajcli.kinematics.following.demand import Demand
+        from trajcli.kinematics.following.tool_path import ToolReference
 
         poses = forward(robot, curve.evaluate(np.clip(times, 0, DURATION)))
         zero = np.zeros((len(poses), 6))
-        return Demand(poses, zero, zero, WHOLE, "all", "z", zero[:, :0])
+        return ToolReference(poses, zero, zero, WHOLE, "all", "z", zero[:, :0])
 
     motion = dataclasses.replace(
         RIGHT.motion, path=None, timed=timed, breaks=np.array([0.0, DURATION]), law=law()

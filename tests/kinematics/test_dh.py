@@ -4,8 +4,8 @@ import numpy as np
 import oracle_robots as oracle
 import pytest
 
-from trajcli.kinematics.dh import in_convention, link_transforms
 from trajcli.kinematics.forward import forward
+from trajcli.kinematics.serial_chain import in_convention, link_transforms
 
 ARMS = pytest.mark.parametrize("arm", oracle.robots(), ids=lambda arm: arm["id"])
 OTHER = {"standard": "modified", "modified": "standard"}

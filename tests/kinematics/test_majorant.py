@@ -11,7 +11,7 @@ from numpy.polynomial import chebyshev
 
 from trajcli.job.robot_source import load_robot
 from trajcli.kinematics.forward import forward
-from trajcli.kinematics.majorant import growth, majorants
+from trajcli.kinematics.tool_majorants import growth, majorants
 
 ORDER, LENGTH = 11, 0.3
 RNG = np.random.default_rng(11)

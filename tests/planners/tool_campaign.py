@@ -14,8 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 from tool_jobs import Fields, arm
 
-from trajcli.kinematics.following.demand import Demand
-from trajcli.kinematics.following.tool_path import ToolPath
+from trajcli.kinematics.following.tool_path import ToolPath, ToolReference
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import Robot
 
@@ -248,5 +247,5 @@ def way_of(task_: Task, loaded: Any) -> ToolPath:
     return loaded.job.moves[0].way(before, loaded.robot).path
 
 
-def demand_at(path: ToolPath, places: np.ndarray) -> Demand:
+def demand_at(path: ToolPath, places: np.ndarray) -> ToolReference:
     return path.by_place(places, "left")

@@ -19,8 +19,8 @@ import numpy as np
 from trajcli.curves.piecewise import Array, derivative_coefficients, horner, taylor_shift
 from trajcli.frozen import frozen
 from trajcli.kinematics.jacobian import jacobian_dot_qd, linearisation
-from trajcli.kinematics.majorant import growth, majorants
 from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.tool_majorants import growth, majorants
 
 _DEGREE = 8
 _BETWEEN = factorial(_DEGREE) / 4 / _DEGREE ** (_DEGREE + 1)

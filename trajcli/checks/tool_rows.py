@@ -11,7 +11,7 @@ from trajcli.checks.tool_bound import Bound, tool_bounds
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
 from trajcli.kinematics.following.motion import ToolMotion
-from trajcli.kinematics.inverse.target import Target, residuals
+from trajcli.kinematics.inverse.target import IkTarget, residuals
 from trajcli.kinematics.jacobian import linearisation
 from trajcli.kinematics.robot import Robot
 from trajcli.trajectory import Span, Trajectory
@@ -52,7 +52,7 @@ class ToolRows:
         return np.append(rows, self.span.duration)
 
     @cached_property
-    def target(self) -> Target:
+    def target(self) -> IkTarget:
         """What the tool was told at these times."""
         return self.motion.demand(self.times).target()
 

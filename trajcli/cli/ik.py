@@ -12,7 +12,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import comparable
 from trajcli.job.inline import inline_target
-from trajcli.kinematics.inverse.solution import Solutions
+from trajcli.kinematics.inverse.solutions import Solutions
 from trajcli.pipeline.arm import Arm, open_arm
 from trajcli.pipeline.inverse_answers import answers, find_answers, require_answer
 from trajcli.planners.goal import goal_of

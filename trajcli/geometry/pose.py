@@ -9,7 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from trajcli.errors import InputError
-from trajcli.geometry.rotation import Array, check_rotation, cross_matrix, exp, log, slerp
+from trajcli.geometry.rotation import (
+    Array,
+    check_rotation,
+    cross_matrix,
+    exp,
+    log,
+    slerp,
+)
 
 PoseInterpolation = Literal["line", "screw"]
 LAST_ROW = 1e-9  # of the last row from (0, 0, 0, 1): it is never measured, only typed

@@ -11,8 +11,8 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 
 Entry = float | Array
-Column = tuple[Entry, Entry, Entry]
-ZERO: Column = (0.0, 0.0, 0.0)
+VectorEntries = tuple[Entry, Entry, Entry]
+ZERO: VectorEntries = (0.0, 0.0, 0.0)
 
 
 def product(a: Entry, b: Entry) -> Entry:
@@ -67,18 +67,18 @@ def minus_product(p: Entry, a: Entry, b: Entry) -> Entry:
     return step
 
 
-def combine(c: Entry, x: Column, s: Entry, y: Column) -> Column:
+def combine(c: Entry, x: VectorEntries, s: Entry, y: VectorEntries) -> VectorEntries:
     """Return c x + s y."""
     return advance(scaled(c, x), s, y)
 
 
-def uncombine(c: Entry, x: Column, s: Entry, y: Column) -> Column:
+def uncombine(c: Entry, x: VectorEntries, s: Entry, y: VectorEntries) -> VectorEntries:
     """Return c x - s y."""
     first, second, third = scaled(c, x)
     return minus_product(first, s, y[0]), minus_product(second, s, y[1]), minus_product(third, s, y[2])
 
 
-def advance(p: Column, distance: Entry, axis: Column) -> Column:
+def advance(p: VectorEntries, distance: Entry, axis: VectorEntries) -> VectorEntries:
     """Return p + distance * axis."""
     if p is ZERO or axis is ZERO or (isinstance(distance, float) and distance in (0.0, 1.0)):
         return plus(p, scaled(distance, axis))
@@ -89,33 +89,33 @@ def advance(p: Column, distance: Entry, axis: Column) -> Column:
     )
 
 
-def plus(a: Column, b: Column) -> Column:
+def plus(a: VectorEntries, b: VectorEntries) -> VectorEntries:
     """Return a + b."""
     if a is ZERO or b is ZERO:
         return b if a is ZERO else a
     return total(a[0], b[0]), total(a[1], b[1]), total(a[2], b[2])
 
 
-def minus(a: Column, b: Column) -> Column:
+def minus(a: VectorEntries, b: VectorEntries) -> VectorEntries:
     """Return a - b."""
     if b is ZERO:
         return a
     return difference(a[0], b[0]), difference(a[1], b[1]), difference(a[2], b[2])
 
 
-def scaled(factor: Entry, a: Column) -> Column:
+def scaled(factor: Entry, a: VectorEntries) -> VectorEntries:
     """Return factor * a."""
     if isinstance(factor, float) and factor in (0.0, 1.0):
         return a if factor else ZERO
     return product(factor, a[0]), product(factor, a[1]), product(factor, a[2])
 
 
-def dot(a: Column, b: Column) -> Entry:
+def dot(a: VectorEntries, b: VectorEntries) -> Entry:
     """Return the scalar product."""
     return plus_product(plus_product(product(a[0], b[0]), a[1], b[1]), a[2], b[2])
 
 
-def cross(a: Column, b: Column) -> Column:
+def cross(a: VectorEntries, b: VectorEntries) -> VectorEntries:
     """Return the vector product."""
     return (
         minus_product(product(a[1], b[2]), a[2], b[1]),

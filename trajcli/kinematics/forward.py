@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from trajcli.curves.piecewise import Array
-from trajcli.kinematics.chain import MovingFrame, blocks, configurations, links_of, travel
 from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.serial_chain import MovingFrame, blocks, configurations, links_of, travel
 
 
 def forward(robot: Robot, q: ArrayLike) -> Array:

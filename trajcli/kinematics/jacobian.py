@@ -13,17 +13,9 @@ from numpy.typing import ArrayLike
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
-from trajcli.kinematics.chain import (
-    Axis,
-    MovingFrame,
-    blocks,
-    configurations,
-    links_of,
-    travel,
-)
 from trajcli.kinematics.columns import (
     ZERO,
-    Column,
+    VectorEntries,
     advance,
     cross,
     dot,
@@ -31,6 +23,14 @@ from trajcli.kinematics.columns import (
     plus,
 )
 from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.serial_chain import (
+    JointAxis,
+    MovingFrame,
+    blocks,
+    configurations,
+    links_of,
+    travel,
+)
 
 ReferenceFrame = Literal["world", "base", "tcp"]
 
@@ -140,14 +140,16 @@ def _start(robot: Robot, frame: ReferenceFrame) -> Array:
     return np.eye(4) if frame == "base" else robot.base
 
 
-def _columns(axis: Axis, p: Column) -> tuple[Column, Column]:
+def _columns(axis: JointAxis, p: VectorEntries) -> tuple[VectorEntries, VectorEntries]:
     """Return the linear and the angular velocity of the point p for unit speed of one joint."""
     if axis.prismatic:
         return axis.direction, ZERO
     return cross(axis.direction, minus(p, axis.point)), axis.direction
 
 
-def _bias(axes: Sequence[Axis], p: Column, rate: Sequence[Array]) -> tuple[Column, Column]:
+def _bias(
+    axes: Sequence[JointAxis], p: VectorEntries, rate: Sequence[Array]
+) -> tuple[VectorEntries, VectorEntries]:
     velocity = linear = angular = ZERO
     for axis, speed in zip(axes, rate, strict=True):
         velocity = advance(velocity, speed, _columns(axis, p)[0])
@@ -166,10 +168,10 @@ def _bias(axes: Sequence[Axis], p: Column, rate: Sequence[Array]) -> tuple[Colum
     return linear, angular
 
 
-def _seen(vector: Column, tcp: MovingFrame, frame: ReferenceFrame) -> Column:
+def _seen(vector: VectorEntries, tcp: MovingFrame, frame: ReferenceFrame) -> VectorEntries:
     return (dot(tcp.x, vector), dot(tcp.y, vector), dot(tcp.z, vector)) if frame == "tcp" else vector
 
 
-def _write(out: Array, vector: Column) -> None:
+def _write(out: Array, vector: VectorEntries) -> None:
     for i, entry in enumerate(vector):
         out[:, i] = entry

@@ -15,8 +15,8 @@ from trajcli.errors import Amount, InputError
 from trajcli.frozen import frozen
 from trajcli.job.inline import inline_number, inline_pose
 from trajcli.job.robot_source import RobotSheet, catalogue_names, load_sheet
-from trajcli.kinematics.chain import links_of
 from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.serial_chain import links_of
 from trajcli.units import Quantity, Units, factor, to_user, unit_name
 
 

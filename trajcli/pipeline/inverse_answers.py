@@ -14,11 +14,10 @@ from trajcli.errors import InputError, PlanningError
 from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.dexterity import RANK_TOLERANCE, characteristic_length
 from trajcli.kinematics.forward import forward
-from trajcli.kinematics.inverse.solution import Solutions
+from trajcli.kinematics.inverse.joint_turns import all_turns
+from trajcli.kinematics.inverse.solutions import Solutions, check_reachable
 from trajcli.kinematics.inverse.solve import solve
-from trajcli.kinematics.inverse.target import Target, residual_jacobian
-from trajcli.kinematics.inverse.turns import all_turns
-from trajcli.kinematics.inverse.verdict import check_reachable
+from trajcli.kinematics.inverse.target import IkTarget, residual_jacobian
 from trajcli.kinematics.jacobian import jacobian
 from trajcli.kinematics.robot import Robot
 from trajcli.pipeline.arm import Arm
@@ -31,7 +30,7 @@ _AROUND, _SPREAD = 4, 0.1  # configurations, rad or m: an arm is regular almost 
 
 
 def find_answers(
-    arm: Arm, target: Target, configuration: Configuration | None, near: Array | None, tolerance: float
+    arm: Arm, target: IkTarget, configuration: Configuration | None, near: Array | None, tolerance: float
 ) -> tuple[Solutions, Flags]:
     """Return all branches of one target, and which of them are answers as it is asked for, shape (branches,).
 
@@ -66,7 +65,7 @@ def answers(
     arm: Arm,
     found: Solutions,
     chosen: Flags,
-    target: Target,
+    target: IkTarget,
     near: Array | None = None,
     *,
     every: bool = False,
@@ -125,7 +124,7 @@ def require_answer(arm: Arm, found: Solutions, chosen: Flags, configuration: Con
 
 
 def _answer(
-    arm: Arm, found: Solutions, branch: int, joints: Array, target: Target, singular: bool
+    arm: Arm, found: Solutions, branch: int, joints: Array, target: IkTarget, singular: bool
 ) -> dict[str, Any]:
     names = {choice: name for choice, name in asdict(found.names[branch]).items() if name is not None}
     told = {
@@ -140,7 +139,7 @@ def _answer(
     return told
 
 
-def free_directions(arm: Arm, joints: Array, target: Target) -> Iterator[Array]:
+def free_directions(arm: Arm, joints: Array, target: IkTarget) -> Iterator[Array]:
     """Yield unit vectors (n,) of joint values, in the user's units, that leave what is fixed of the pose."""
     _, values, right = np.linalg.svd(_held(arm.robot, joints[None], target)[0])
     rank = min(int(_rank(values)), len(joints) - 1)
@@ -149,7 +148,7 @@ def free_directions(arm: Arm, joints: Array, target: Target) -> Iterator[Array]:
         yield shown / np.linalg.norm(shown)
 
 
-def ranks(robot: Robot, joints: Array, target: Target) -> tuple[NDArray[np.intp], int]:
+def ranks(robot: Robot, joints: Array, target: IkTarget) -> tuple[NDArray[np.intp], int]:
     """Return in how many directions of what the target fixes the tcp can move: (K,) here, and nearby.
 
     Args:
@@ -165,7 +164,7 @@ def ranks(robot: Robot, joints: Array, target: Target) -> tuple[NDArray[np.intp]
     return found[: len(joints)], int(found.max())
 
 
-def _held(robot: Robot, joints: Array, target: Target) -> Array:
+def _held(robot: Robot, joints: Array, target: IkTarget) -> Array:
     """Return the Jacobians (K, m, n) of what the target fixes, lengths divided by the length of the arm."""
     held = residual_jacobian(target.flat(), forward(robot, joints), jacobian(robot, joints))
     held[:, : sum(target.position)] /= characteristic_length(robot)

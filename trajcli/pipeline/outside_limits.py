@@ -8,7 +8,7 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import comparable
-from trajcli.kinematics.inverse.turns import beyond
+from trajcli.kinematics.inverse.joint_turns import beyond
 from trajcli.kinematics.robot import Robot
 
 

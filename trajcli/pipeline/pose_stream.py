@@ -13,13 +13,12 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Place, PlanningError, Problem
 from trajcli.geometry.rotation import QUATERNION_DEFECT, Flags, matrix_from_quaternion
 from trajcli.kinematics.forward import forward
-from trajcli.kinematics.inverse.choose import method_for
+from trajcli.kinematics.inverse.families.choose import method_for
+from trajcli.kinematics.inverse.joint_turns import FULL, beyond, choose_turns, revolute
 from trajcli.kinematics.inverse.numeric import descend
-from trajcli.kinematics.inverse.solution import Solutions
+from trajcli.kinematics.inverse.solutions import Solutions, check_reachable
 from trajcli.kinematics.inverse.solve import fits, solve
-from trajcli.kinematics.inverse.target import Target, closure_of, partial_target
-from trajcli.kinematics.inverse.turns import FULL, beyond, choose_turns, revolute
-from trajcli.kinematics.inverse.verdict import check_reachable
+from trajcli.kinematics.inverse.target import IkTarget, closure_of, partial_target
 from trajcli.pipeline.arm import Arm
 from trajcli.pipeline.joint_stream import Stream
 from trajcli.streams.table import Rows
@@ -78,7 +77,7 @@ def _follow(arm: Arm, rows: Rows, wanted: _Wanted, near: Array | None, tolerance
 class _Follower:
     """Takes the nearest answer row by row; a closed form solves the rows of a block together."""
 
-    def __init__(self, arm: Arm, target: Target, last: Array, tolerance: float) -> None:
+    def __init__(self, arm: Arm, target: IkTarget, last: Array, tolerance: float) -> None:
         self._arm, self._target, self._tolerance = arm, target, tolerance
         self._turning = revolute(arm.robot)
         method = method_for(arm.robot)
@@ -157,7 +156,7 @@ def _of_row(
     return PlanningError(first, *problems[1:])
 
 
-def _targets(block: Array, wanted: _Wanted, done: int, file: str) -> Target:
+def _targets(block: Array, wanted: _Wanted, done: int, file: str) -> IkTarget:
     position = block[:, wanted.position] * wanted.factors
     if not wanted.rotation:
         return partial_target(position)

@@ -17,8 +17,8 @@ from trajcli.planners.pose_fields import Configuration
 from trajcli.trajectory import State
 
 if TYPE_CHECKING:
-    from trajcli.kinematics.inverse.solution import Solutions
-    from trajcli.kinematics.inverse.target import Target as Goal
+    from trajcli.kinematics.inverse.solutions import Solutions
+    from trajcli.kinematics.inverse.target import IkTarget as Goal
 
 _NOTED = 1e-12  # a smaller defect of a rotation matrix is rounding
 _CHOICES = ("shoulder", "elbow", "wrist")
@@ -86,8 +86,8 @@ def start_state(target: Target, robot: Robot) -> tuple[State, Reached | None]:
 
 
 def _on_nearest_branch(target: Target, robot: Robot, near: Array) -> Reached:
+    from trajcli.kinematics.inverse.solutions import check_reachable
     from trajcli.kinematics.inverse.solve import solve
-    from trajcli.kinematics.inverse.verdict import check_reachable
     from trajcli.planners.goal import goal_of
 
     goal = goal_of(target)

@@ -11,7 +11,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.frozen import comparable
 from trajcli.job.robot_source import RobotSheet
 from trajcli.kinematics.forward import forward
-from trajcli.kinematics.inverse.choose import method_for
+from trajcli.kinematics.inverse.families.choose import method_for
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.pipeline.pose_view import pose_view
 from trajcli.units import Quantity, factor, to_user

@@ -12,9 +12,9 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.frozen import frozen
 from trajcli.kinematics.following.follower import Follower, LostError, follower
 from trajcli.kinematics.following.motion import ToolMotion
-from trajcli.kinematics.following.tolerance import Tolerance, misfit_of, probes
+from trajcli.kinematics.following.tolerance import Tolerance, probes, tolerance_ratio
 from trajcli.kinematics.following.tool_path import ToolPath
-from trajcli.kinematics.following.track import StuckError, track
+from trajcli.kinematics.following.tracking import StuckError, track_branch
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.planner import Event, Phase
 from trajcli.planners.tool_trouble import Trouble
@@ -96,7 +96,7 @@ def followed(robot: Robot, path: ToolPath, start: Array) -> Followed:
     """
     exact = follower(robot, path.by_place, start, 0.0)
     try:
-        return Followed(robot, path, exact, track(exact, path.breaks))
+        return Followed(robot, path, exact, track_branch(exact, path.breaks))
     except StuckError as error:
         raise trouble_on(robot, path, exact).stuck(error) from None
 
@@ -112,7 +112,7 @@ def followed_in_time(robot: Robot, motion: ToolMotion, start: Array) -> Piecewis
     exact = replace(known, demands=motion.timed)
     trouble = trouble_of(robot, motion, exact)
     try:
-        coarse = track(exact, motion.breaks)
+        coarse = track_branch(exact, motion.breaks)
     except StuckError as error:
         raise trouble.stuck(error) from None
     return _fitted(exact, motion.breaks, coarse.evaluate, motion.tolerance, trouble)
@@ -126,7 +126,7 @@ def _fitted(
     trouble: Trouble,
 ) -> PiecewisePolynomial:
     try:
-        misfit = misfit_of(exact, tolerance, breaks, guess(probes(breaks)))
+        misfit = tolerance_ratio(exact, tolerance, breaks, guess(probes(breaks)))
         return fit(exact.solved, misfit, breaks, guess)
     except (LostError, FitError) as error:
         at = float(error.places[0]) if isinstance(error, LostError) else error.place

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
-from trajcli.kinematics.inverse.target import Target, partial_target
+from trajcli.kinematics.inverse.target import IkTarget, partial_target
 from trajcli.planners.pose_fields import PoseFields
 
 _UPRIGHT = 1e-9  # rad: a pitch this close to a quarter turn is one
 
 
-def goal_of(fields: PoseFields) -> Target:
+def goal_of(fields: PoseFields) -> IkTarget:
     """Return the coordinates of the tcp's pose that a target fixes."""
     pose = fields.full_pose()
     position = pose[:3, 3] if fields.gives_position else None

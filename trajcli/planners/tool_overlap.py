@@ -22,10 +22,9 @@ from trajcli.frozen import frozen
 from trajcli.geometry.paths.orientation import turn_vectors
 from trajcli.geometry.paths.position import PositionCurve
 from trajcli.geometry.rotation import exp
-from trajcli.kinematics.following.demand import Demand
 from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.kinematics.following.tolerance import Tolerance
-from trajcli.kinematics.following.tool_path import ToolPath
+from trajcli.kinematics.following.tool_path import ToolPath, ToolReference
 from trajcli.kinematics.robot import ToolLimits
 from trajcli.planners.law_shapes import Stretch, stretch_of
 from trajcli.planners.path import PathMove
@@ -56,7 +55,7 @@ class Overlapped:
     last: ToolTarget
     turns: Array
 
-    def timed(self, times: Array, side: Side) -> Demand:
+    def timed(self, times: Array, side: Side) -> ToolReference:
         """Return the demand at times (N,)."""
         count = times.size
         poses = np.tile(self.before, (count, 1, 1))
@@ -81,7 +80,9 @@ class Overlapped:
             aims = aims[:, :0]
         else:
             aims[:, 0] += ToolPath.begins(self.before, target.orientation, target.tool_axis)
-        return Demand(poses, first, second, target.position, target.orientation, target.tool_axis, aims)
+        return ToolReference(
+            poses, first, second, target.position, target.orientation, target.tool_axis, aims
+        )
 
 
 def overlapped(

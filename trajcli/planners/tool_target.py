@@ -9,8 +9,8 @@ from trajcli.errors import PlanningError
 from trajcli.frozen import frozen
 from trajcli.geometry.rotation import AXES, AxisName
 from trajcli.kinematics.forward import forward
-from trajcli.kinematics.inverse.target import Fixed, meeting, partial_target, residuals
-from trajcli.kinematics.inverse.target import Target as Goal
+from trajcli.kinematics.inverse.target import IkTarget as Goal
+from trajcli.kinematics.inverse.target import OrientationConstraint, meeting, partial_target, residuals
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.fields import Target
 from trajcli.planners.goal import goal_of
@@ -36,7 +36,7 @@ class ToolTarget:
 
     pose: Array
     position: tuple[bool, bool, bool]
-    orientation: Fixed
+    orientation: OrientationConstraint
     tool_axis: AxisName = "z"
     turn: float = 0.0
     joints: Array | None = None

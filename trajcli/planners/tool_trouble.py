@@ -12,8 +12,8 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount, PlanningError, Problem
 from trajcli.frozen import frozen
 from trajcli.kinematics.dexterity import characteristic_length
-from trajcli.kinematics.following.follower import Demands
-from trajcli.kinematics.following.track import StuckError
+from trajcli.kinematics.following.follower import ReferenceAt
+from trajcli.kinematics.following.tracking import StuckError
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.target import residual_jacobian
 from trajcli.kinematics.jacobian import jacobian
@@ -41,7 +41,7 @@ class Trouble:
     """
 
     robot: Robot
-    demands: Demands
+    demands: ReferenceAt
     end: float
     law: PiecewisePolynomial | None
     in_place: bool

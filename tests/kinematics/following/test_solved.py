@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from trajcli.job.robot_source import load_robot
-from trajcli.kinematics.following.solved import acceleration_bias
+from trajcli.kinematics.following.follower import acceleration_bias
 from trajcli.kinematics.jacobian import jacobian
 
 

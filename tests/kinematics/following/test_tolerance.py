@@ -7,22 +7,22 @@ import pytest
 from followed_paths import CASES
 
 from trajcli.kinematics.following.follower import follower
-from trajcli.kinematics.following.tolerance import Misfit, Tolerance, misfit_of, probes
-from trajcli.kinematics.following.track import track
+from trajcli.kinematics.following.tolerance import Tolerance, ToleranceRatio, probes, tolerance_ratio
+from trajcli.kinematics.following.tracking import track_branch
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.jacobian import jacobian
 
 MADE = CASES["ur5e, pose on an arc"]
 ARM = follower(MADE.robot, MADE.path.by_place, MADE.start, 0.0)
-COARSE = track(ARM, MADE.path.breaks)
+COARSE = track_branch(ARM, MADE.path.breaks)
 PLACES = np.linspace(0.1, 0.9, 5) * MADE.path.length
 KNOWN = ARM.solved(PLACES, "right", COARSE.evaluate(PLACES))
 ROWS = np.array([3, 1])
 
 
-def misfit(**tolerance) -> Misfit:
+def misfit(**tolerance) -> ToleranceRatio:
     breaks = MADE.path.breaks
-    return misfit_of(ARM, Tolerance(**tolerance), breaks, COARSE.evaluate(probes(breaks)))
+    return tolerance_ratio(ARM, Tolerance(**tolerance), breaks, COARSE.evaluate(probes(breaks)))
 
 
 def changed(order, size):

@@ -16,9 +16,9 @@ from trajcli.geometry.paths.orientation import FixedOrientation, TangentOrientat
 from trajcli.geometry.paths.pose import PoseCurve
 from trajcli.geometry.paths.position import Line
 from trajcli.kinematics.following.follower import follower
-from trajcli.kinematics.following.tolerance import Tolerance, misfit_of, probes
+from trajcli.kinematics.following.tolerance import Tolerance, probes, tolerance_ratio
 from trajcli.kinematics.following.tool_path import ToolPath
-from trajcli.kinematics.following.track import StuckError, track
+from trajcli.kinematics.following.tracking import StuckError, track_branch
 from trajcli.kinematics.forward import forward
 
 NAMES = [
@@ -32,7 +32,7 @@ NAMES = [
 
 def tracked(made):
     arm = follower(made.robot, made.path.by_place, made.start, 0.0)
-    return arm, track(arm, made.path.breaks)
+    return arm, track_branch(arm, made.path.breaks)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -52,7 +52,7 @@ def test_the_fit_keeps_its_promise_of_joints_and_tool(name, tolerance):
     made = CASES[name]
     arm, coarse = tracked(made)
     breaks = made.path.breaks
-    misfit = misfit_of(arm, Tolerance(tolerance, tolerance), breaks, coarse.evaluate(probes(breaks)))
+    misfit = tolerance_ratio(arm, Tolerance(tolerance, tolerance), breaks, coarse.evaluate(probes(breaks)))
     curve = fit(arm.solved, misfit, breaks, coarse.evaluate)
     places = np.linspace(0, made.path.length, 77)
     exact = arm.exact(places, "right", coarse.evaluate(places))
@@ -95,7 +95,7 @@ def test_short_ways_are_followed_in_few_steps(radius, turning, questions, monkey
     monkeypatch.setattr(
         type(arm), "exact", lambda self, places, *more: asked.append(places) or exact(self, places, *more)
     )
-    curve = track(arm, made.path.breaks)
+    curve = track_branch(arm, made.path.breaks)
     assert len(asked) <= questions
     for place in np.linspace(0, made.path.length, 61):
         near = curve.evaluate(place)
@@ -130,7 +130,7 @@ def test_it_is_stuck_where_the_reach_ends():
     begin = np.array([wrist[0] + HAND, wrist[1], 0.0])
     path = wrist_path(Line(begin, begin + np.array([0.0, 0.4, 0.0])))
     with pytest.raises(StuckError) as caught:
-        track(follower(PLANAR, path.by_place, standing(wrist), 0.0), path.breaks)
+        track_branch(follower(PLANAR, path.by_place, standing(wrist), 0.0), path.breaks)
     edge = np.sqrt((L1 + L2) ** 2 - 0.35**2) - 0.05
     assert edge - 1e-5 < caught.value.place < edge
     assert 0 < caught.value.joints[1] < 0.02
@@ -144,7 +144,7 @@ def test_it_does_not_pass_from_one_elbow_to_the_other(gap):
     turn = np.array([np.cos(0.3), np.sin(0.3), 0.0])
     points = near * turn * [1, -1, 1], np.array([edge - gap, 0, 0]), near * turn
     path = wrist_path(Arc.through(*(point + np.array([HAND, 0, 0]) for point in points)))
-    curve = track(follower(PLANAR, path.by_place, standing(points[0][:2]), 0.0), path.breaks)
+    curve = track_branch(follower(PLANAR, path.by_place, standing(points[0][:2]), 0.0), path.breaks)
     elbow = curve.evaluate(np.linspace(0, path.length, 2001))[:, 1]
     assert (elbow > 0).all()
     assert curve.evaluate(path.length / 2)[1] == pytest.approx(elbow_of(edge - gap), abs=0.02)
@@ -155,7 +155,7 @@ def test_a_tolerance_finer_than_rounding_is_met_as_far_as_rounding_lets_it():
     made = CASES["ur5e, pose on an arc"]
     arm, coarse = tracked(made)
     breaks = made.path.breaks
-    misfit = misfit_of(arm, Tolerance(1e-13, 1e-13), breaks, coarse.evaluate(probes(breaks)))
+    misfit = tolerance_ratio(arm, Tolerance(1e-13, 1e-13), breaks, coarse.evaluate(probes(breaks)))
     curve = fit(arm.solved, misfit, breaks, coarse.evaluate)
     places = np.linspace(0, made.path.length, 77)
     exact = arm.exact(places, "right", coarse.evaluate(places))

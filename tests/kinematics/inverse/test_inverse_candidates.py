@@ -11,14 +11,14 @@ import pytest
 from inverse_arms import FAMILIES, arm, gap, random_joints, turning
 from scipy.spatial.transform import Rotation
 
-from trajcli.kinematics.dh import in_convention
 from trajcli.kinematics.forward import forward
-from trajcli.kinematics.inverse import closed_form
-from trajcli.kinematics.inverse.choose import method_for
-from trajcli.kinematics.inverse.closed_form import candidates
-from trajcli.kinematics.inverse.lines import arm_of
+from trajcli.kinematics.inverse.families import batch as closed_form
+from trajcli.kinematics.inverse.families.batch import candidates
+from trajcli.kinematics.inverse.families.choose import method_for
+from trajcli.kinematics.inverse.families.screw_axes import axis_geometry
+from trajcli.kinematics.inverse.joint_turns import choose_turns
 from trajcli.kinematics.inverse.solve import solve
-from trajcli.kinematics.inverse.turns import choose_turns
+from trajcli.kinematics.serial_chain import in_convention
 
 COUNT = 40_000  # six blocks and a part of one
 
@@ -80,7 +80,7 @@ def test_gaps_are_distances_and_bound_angles_also_where_a_pose_is_out_of_reach(n
         robot = replace(robot, joints=(first, *robot.joints[1:]))
     poses = forward(robot, random_joints(robot, rng, 40))
     poses[20:, :3, 3] *= 1.5
-    found = candidates(robot, arm_of(robot), method_for(robot), poses)
+    found = candidates(robot, axis_geometry(robot), method_for(robot), poses)
     assert np.abs(found.joints[turning(robot)]).max(initial=0.0) <= np.pi
     metres, radians = gaps_by_peer(robot, found.joints, poses)
     assert found.gaps[0] == pytest.approx(metres, abs=1e-11)
@@ -96,7 +96,7 @@ def test_an_aligned_wrist_is_met_by_the_closed_form_itself(signs):
     joints = random_joints(robot, rng, 30)
     joints[:, 4] = 0.0
     poses = forward(robot, joints)
-    found = candidates(robot, arm_of(robot), method_for(robot), poses)
+    found = candidates(robot, axis_geometry(robot), method_for(robot), poses)
     away = np.angle(np.exp(1j * (found.joints[:3] - joints.T[:3, None])))
     same_base = np.abs(away).max(axis=0) < 1e-6
     assert (same_base.sum(axis=0) == 2).all()

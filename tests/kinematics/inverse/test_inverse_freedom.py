@@ -11,7 +11,7 @@ from inverse_arms import arm, gap, random_joints
 from oracle_robots import robot_of, robots
 
 from trajcli.kinematics.forward import forward
-from trajcli.kinematics.inverse.nearest_member import nearest_members
+from trajcli.kinematics.inverse.self_motion import nearest_on_self_motions
 from trajcli.kinematics.inverse.solve import solve
 from trajcli.kinematics.inverse.target import partial_target, residuals
 
@@ -148,7 +148,7 @@ def test_a_member_stops_at_the_limit_and_not_before():
     target = partial_target(forward(robot, start)[:, :3, 3])
     for wanted, reached in ((3.0, 2.0), (-1.5, -1.0), (0.6, 0.6)):
         near = np.array([[0.3, 0.7, 0.1, wanted]])
-        assert nearest_members(robot, target, start, near)[0, 3] == pytest.approx(reached, abs=1e-12)
+        assert nearest_on_self_motions(robot, target, start, near)[0, 3] == pytest.approx(reached, abs=1e-12)
 
 
 def test_a_joint_at_its_limit_is_held_while_others_go_on():
@@ -233,7 +233,7 @@ def test_members_come_nearer_by_whole_turns_and_along_the_family_and_stay_inside
     low, high = joints.min(axis=0) - 0.01 * span, joints.max(axis=0) + 0.01 * span
     robot = replace(robot, limits=replace(robot.limits, position=np.stack([low, high], axis=1)))
     near = joints + rng.uniform(-1, 1, joints.shape) * span
-    members = nearest_members(robot, target, joints, near)
+    members = nearest_on_self_motions(robot, target, joints, near)
     assert np.abs(residuals(target, forward(robot, members))).max() < 1e-9
     assert (members >= low).all()
     assert (members <= high).all()
@@ -250,4 +250,4 @@ def test_members_come_nearer_by_whole_turns_and_along_the_family_and_stay_inside
             assert abs(left) < 1e-5 or blocked.any()
     robot = replace(robot, limits=replace(robot.limits, position=np.tile([-np.inf, np.inf], (len(low), 1))))
     turns = 2 * np.pi * rng.integers(-2, 3, joints.shape) * turning
-    assert nearest_members(robot, target, joints + turns, joints) == pytest.approx(joints, abs=1e-9)
+    assert nearest_on_self_motions(robot, target, joints + turns, joints) == pytest.approx(joints, abs=1e-9)

@@ -9,10 +9,10 @@ from oracle_robots import load, robot_of, robots
 
 from trajcli.errors import InputError, PlanningError
 from trajcli.kinematics.forward import forward
+from trajcli.kinematics.inverse.joint_turns import all_turns
+from trajcli.kinematics.inverse.solutions import check_reachable, least_violation
 from trajcli.kinematics.inverse.solve import solve
 from trajcli.kinematics.inverse.target import partial_target
-from trajcli.kinematics.inverse.turns import all_turns
-from trajcli.kinematics.inverse.verdict import check_reachable, least_violation
 
 TAU = 2 * np.pi
 

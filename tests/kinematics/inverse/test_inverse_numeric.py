@@ -10,7 +10,7 @@ from oracle_robots import random_arm, robot_of, robots
 from trajcli.errors import InputError
 from trajcli.kinematics.dexterity import dexterity
 from trajcli.kinematics.forward import forward
-from trajcli.kinematics.inverse.choose import method_for
+from trajcli.kinematics.inverse.families.choose import method_for
 from trajcli.kinematics.inverse.solve import solve
 from trajcli.kinematics.robot import Joint, Robot, unlimited
 

@@ -12,11 +12,11 @@ from scipy.spatial.transform import Rotation
 
 from trajcli.errors import InputError, PlanningError
 from trajcli.kinematics.forward import forward
-from trajcli.kinematics.inverse.choose import method_for
+from trajcli.kinematics.inverse.families.choose import method_for
 from trajcli.kinematics.inverse.numeric import distinct, search
+from trajcli.kinematics.inverse.solutions import check_reachable
 from trajcli.kinematics.inverse.solve import solve
 from trajcli.kinematics.inverse.target import partial_target
-from trajcli.kinematics.inverse.verdict import check_reachable
 from trajcli.kinematics.robot import Joint, Robot, unlimited
 
 H = np.pi / 2

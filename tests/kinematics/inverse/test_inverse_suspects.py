@@ -8,10 +8,10 @@ from inverse_arms import arm, gap, random_joints
 from scipy.spatial.transform import Rotation
 
 from trajcli.kinematics.forward import forward
-from trajcli.kinematics.inverse.elbow import parallel_pair
-from trajcli.kinematics.inverse.lines import Line
+from trajcli.kinematics.inverse.families.elbow import parallel_pair
+from trajcli.kinematics.inverse.families.screw_axes import ScrewAxis
+from trajcli.kinematics.inverse.families.subproblems import DegeneracyFlags
 from trajcli.kinematics.inverse.solve import solve
-from trajcli.kinematics.inverse.subproblems import Watch
 from trajcli.kinematics.inverse.target import partial_target
 
 
@@ -77,12 +77,12 @@ def turning(line, angle):
 @pytest.mark.parametrize("hand", [0.3, 3e-9])
 def test_two_parallel_turns_meet_their_aim_also_where_the_second_is_free(same, hand):
     rng = np.random.default_rng(9)
-    two = Line(prismatic=False, direction=(0.0, 0.6, 0.8), point=(0.1, 0.0, 0.2))
-    three = Line(prismatic=False, direction=(0.0, 0.6 * same, 0.8 * same), point=(0.5, 0.08, 0.14))
+    two = ScrewAxis(prismatic=False, direction=(0.0, 0.6, 0.8), point=(0.1, 0.0, 0.2))
+    three = ScrewAxis(prismatic=False, direction=(0.0, 0.6 * same, 0.8 * same), point=(0.5, 0.08, 0.14))
     tip = np.append(three.point + hand * np.array([0.28, 0.768, -0.576]), 1.0)
     motions = [turning(two, rng.uniform(-3, 3)) @ turning(three, rng.uniform(-3, 3)) for _ in range(20)]
     aims = np.array([motion @ tip for motion in motions])
-    watch = Watch(20, 1.0)
+    watch = DegeneracyFlags(20, 1.0)
     turns = parallel_pair(two, three, tuple(tip[:3]), tuple(aims[:, :3].T), watch)
     assert all(np.hypot(*turn) == pytest.approx(1.0, abs=3e-15) for turn in turns)
     second, third = (np.arctan2(sine, cosine) for cosine, sine in turns)

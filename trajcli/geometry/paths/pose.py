@@ -14,7 +14,15 @@ import numpy as np
 
 from trajcli.frozen import frozen
 from trajcli.geometry.paths.orientation import OrientationCurve, turn_vectors
-from trajcli.geometry.paths.position import SAME_PLACE, Pivot, PositionCurve, Side, Smooth, Triple, inside
+from trajcli.geometry.paths.position import (
+    SAME_PLACE,
+    Pivot,
+    PositionCurve,
+    Side,
+    Smooth,
+    Triple,
+    inside,
+)
 from trajcli.geometry.pose import build, check_pose, exp_pose, invert
 from trajcli.geometry.rotation import Array
 

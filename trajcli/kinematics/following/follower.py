@@ -7,6 +7,10 @@ the place on the path alone, the same forwards and backwards.
 
 Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning and Control (2009), sections
 3.5 and 3.7; Baillieul, Kinematic programming alternatives for redundant manipulators (ICRA 1985).
+
+What is known of an arm at places of a path where its joints meet the demand.
+
+On which side of the singular configurations an arm is: a branch ends where it would change.
 """
 
 from __future__ import annotations
@@ -16,18 +20,118 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array, Side
 from trajcli.frozen import frozen
+from trajcli.geometry.rotation import AXES
 from trajcli.kinematics.dexterity import characteristic_length
-from trajcli.kinematics.following.demand import Demand
-from trajcli.kinematics.following.hand import NO_HAND, Hand, hand_of
-from trajcli.kinematics.following.solved import Solved, acceleration_bias
-from trajcli.kinematics.inverse.target import Target, residual_jacobian, residuals
+from trajcli.kinematics.following.tool_path import ToolReference
+from trajcli.kinematics.inverse.target import IkTarget, residual_jacobian, residuals
 from trajcli.kinematics.jacobian import linearisation
 from trajcli.kinematics.robot import Robot
 
-Demands = Callable[[Array, Side], Demand]
+
+@frozen
+class JointState:
+    """Joints at N places, and what was computed to find them: judging a fit there asks for it again.
+
+    Attributes:
+        values: Joint values and their first and second derivative, shape (3, N, n).
+        demand: Of the tool there.
+        target: Of that demand.
+        columns: Jacobians in world, shape (N, 6, n).
+    """
+
+    values: Array
+    demand: ToolReference
+    target: IkTarget
+    columns: Array
+
+
+def acceleration_bias(columns: Array, rates: Array) -> Array:
+    """Return the part of the tcp's acceleration that does not come from qdd, shape (N, 6).
+
+    A joint turns the columns of those behind it, and moves the tcp under the axes of those before it: either
+    way the change of the linear column is the angular column of the joint nearer to the base times the linear
+    column of the other.
+
+    Args:
+        columns: Jacobians in world, shape (N, 6, n).
+        rates: Joint velocities, shape (N, n).
+
+    Source: Haviland and Corke, A systematic approach to computing the manipulator Jacobian and Hessian using
+    the elementary transform sequence (2020), section 4.
+    """
+    moved = columns * rates[:, None, :]
+    linear, angular = moved[:, :3], moved[:, 3:]
+    spin = np.cumsum(angular, axis=2)
+    before = np.zeros_like(spin)
+    before[:, :, 1:] = spin[:, :, :-1]
+    bias = np.cross(spin + before, linear, axis=1), np.cross(before, angular, axis=1)
+    return np.asarray(np.concatenate(bias, axis=1).sum(axis=2))
+
+
+_FLAT = 1e-12  # a determinant of scaled rows, which are of the size 1, that is none
+_OUTSIDE = 1e-9  # of a scaled row: what a basis of dependent rows may leave out
+
+
+@frozen
+class Aspect:
+    """The sign of the determinant of the rows that joint rates must meet.
+
+    Attributes:
+        sign: 1 or -1; 0 where it cannot be told, as in a singular configuration.
+        basis: Of the rows where they depend on each other, as those of a planar arm do, shape (n, m).
+    """
+
+    sign: float
+    basis: Array
+
+    def changed(self, demand: ToolReference, poses: Array, rows: Array) -> NDArray[np.bool_]:
+        """Return where it is the other one, (N,), at tcp poses (N, 4, 4) with scaled rows (N, m, n)."""
+        if self.sign == 0:
+            return np.zeros(len(rows), dtype=bool)
+        return np.asarray(self.sign * _signs(_completed(demand, poses, rows), self.basis) < 0)
+
+
+NO_HAND = Aspect(0.0, np.empty((0, 0)))
+
+
+def aspect_of(demand: ToolReference, poses: Array, rows: Array) -> Aspect:
+    """Return the hand of one configuration, a batch of one.
+
+    Args:
+        demand: Of the tool there.
+        poses: Of the tcp, shape (1, 4, 4).
+        rows: Scaled, shape (1, m, n).
+    """
+    completed = _completed(demand, poses, rows)
+    basis = np.linalg.svd(completed[0])[0][:, : completed.shape[2]].T
+    return Aspect(float(_signs(completed, basis)[0]), basis)
+
+
+def _signs(rows: Array, basis: Array) -> Array:
+    if rows.shape[1] > rows.shape[2]:
+        square = basis @ rows
+        if np.abs(rows - basis.T @ square).max() > _OUTSIDE:
+            return np.zeros(len(rows))  # the rows span another space here: their bases do not compare
+        rows = square
+    values = np.linalg.det(rows)
+    return np.asarray(np.where(np.abs(values) > _FLAT, np.sign(values), 0.0))
+
+
+def _completed(demand: ToolReference, poses: Array, rows: Array) -> Array:
+    """Return the rows; the three of a direction are two, a column of the axis makes up for the third."""
+    if demand.orientation != "direction":
+        return rows
+    column = np.zeros((*rows.shape[:2], 1))
+    split = sum(demand.position)
+    column[:, split : split + 3, 0] = poses[:, :3, AXES.index(demand.tool_axis)]
+    return np.concatenate([rows, column], axis=2)
+
+
+ReferenceAt = Callable[[Array, Side], ToolReference]
 
 _ITERATIONS = 12
 _NEAR = 1e-8  # rad or m: after a step as short as this Newton's method is at what rounding allows
@@ -67,10 +171,10 @@ class Follower:
     """
 
     robot: Robot
-    demands: Demands
+    demands: ReferenceAt
     start: Array
     held: Array
-    hand: Hand = NO_HAND
+    hand: Aspect = NO_HAND
 
     @cached_property
     def length(self) -> float:
@@ -90,7 +194,7 @@ class Follower:
         """
         return self.solved(places, side, guess).values
 
-    def solved(self, places: Array, side: Side, guess: Array) -> Solved:
+    def solved(self, places: Array, side: Side, guess: Array) -> JointState:
         """Return these values with what is known of the arm there.
 
         Raises:
@@ -107,9 +211,9 @@ class Follower:
         bias = acceleration_bias(columns, first)
         twist = (columns @ first[..., None])[..., 0]
         second = self._divided(slopes, self._scaled(demand.accelerations(poses, bias, twist), target))
-        return Solved(np.stack([q, first, second]), demand, target, columns)
+        return JointState(np.stack([q, first, second]), demand, target, columns)
 
-    def _met(self, target: Target, guess: Array, places: Array) -> tuple[Array, Array, Array, Array]:
+    def _met(self, target: IkTarget, guess: Array, places: Array) -> tuple[Array, Array, Array, Array]:
         """Return joint values (N, n) that meet the target, and there poses, Jacobians and scaled rows."""
         q, short = guess, False
         for iteration in range(_ITERATIONS + 1):
@@ -132,11 +236,11 @@ class Follower:
             raise LostError(np.sort(places[lost]), q[first], missed)
         return q, poses, columns, slopes
 
-    def rows(self, demand: Demand, poses: Array, columns: Array) -> Array:
+    def rows(self, demand: ToolReference, poses: Array, columns: Array) -> Array:
         """Return the scaled rows (N, m + f, n) of tcp poses (N, 4, 4) and Jacobians (N, 6, n) in world."""
         return self._rows(demand.target(), poses, columns)
 
-    def _rows(self, target: Target, poses: Array, columns: Array) -> Array:
+    def _rows(self, target: IkTarget, poses: Array, columns: Array) -> Array:
         rows = residual_jacobian(target, poses, columns)
         rows[:, : sum(target.position)] /= self.length
         if not len(self.held):
@@ -144,7 +248,7 @@ class Follower:
         kept = np.broadcast_to(self.held, (len(poses), *self.held.shape))
         return np.concatenate([rows, kept], axis=1)
 
-    def _scaled(self, rates: Array, target: Target, kept: Array | None = None) -> Array:
+    def _scaled(self, rates: Array, target: IkTarget, kept: Array | None = None) -> Array:
         """Return rates of the target's rows, those of the position by length, with those that are kept."""
         if kept is None:
             kept = np.zeros((len(rates), len(self.held)))
@@ -163,7 +267,7 @@ class Follower:
         return np.asarray((np.linalg.pinv(slopes, rcond=1e-12) @ rates[..., None])[..., 0])
 
 
-def follower(robot: Robot, demands: Demands, start: Array, place: float) -> Follower:
+def follower(robot: Robot, demands: ReferenceAt, start: Array, place: float) -> Follower:
     """Return the follower that begins in joint values `start` (n,) at a place of the path.
 
     Args:
@@ -183,4 +287,4 @@ def follower(robot: Robot, demands: Demands, start: Array, place: float) -> Foll
     rank = int((values > _RANK * values[:, :1]).sum(axis=1).max())
     _, _, right = np.linalg.svd(bare.rows(demand, *here)[0])
     held = Follower(robot, demands, start, right[rank:])
-    return replace(held, hand=hand_of(demand, here[0], held.rows(demand, *here)))
+    return replace(held, hand=aspect_of(demand, here[0], held.rows(demand, *here)))

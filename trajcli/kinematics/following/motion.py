@@ -9,10 +9,9 @@ import numpy as np
 from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, distinct
 from trajcli.frozen import frozen
-from trajcli.kinematics.following.demand import Demand
-from trajcli.kinematics.following.follower import Demands
+from trajcli.kinematics.following.follower import ReferenceAt
 from trajcli.kinematics.following.tolerance import Tolerance
-from trajcli.kinematics.following.tool_path import ToolPath
+from trajcli.kinematics.following.tool_path import ToolPath, ToolReference
 
 
 @frozen
@@ -31,13 +30,13 @@ class ToolMotion:
 
     path: ToolPath | None
     law: PiecewisePolynomial
-    timed: Demands
+    timed: ReferenceAt
     breaks: Array
     tolerance: Tolerance
     in_place: bool = False
     ruled_by: str | None = None
 
-    def demand(self, times: Array, side: Side = "right") -> Demand:
+    def demand(self, times: Array, side: Side = "right") -> ToolReference:
         """Return what the tool is told at times (N,) from the start of the move."""
         return self.timed(np.clip(times, self.law.start, self.law.end), side)
 
@@ -45,7 +44,7 @@ class ToolMotion:
         """Return the same way in `factor` times the time."""
         timed = self.timed
 
-        def slower(times: Array, side: Side) -> Demand:
+        def slower(times: Array, side: Side) -> ToolReference:
             demand = timed(np.clip(times / factor, self.law.start, self.law.end), side)
             aims = demand.aims.copy()
             if aims.shape[1]:
@@ -75,7 +74,7 @@ def motion_along(
     """
     passed = path.passed(law, law_breaks)
 
-    def timed(times: Array, side: Side) -> Demand:
+    def timed(times: Array, side: Side) -> ToolReference:
         return path.by_time(law, times, side, passed)
 
     breaks = distinct(np.concatenate([law_breaks, passed]))

@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import comparable, frozen
 from trajcli.geometry.rotation import Flags
-from trajcli.kinematics.following.follower import Follower
-from trajcli.kinematics.following.solved import Solved
+from trajcli.kinematics.following.follower import Follower, JointState
 from trajcli.kinematics.forward import forward
-from trajcli.kinematics.inverse.target import Target, residuals
-from trajcli.kinematics.inverse.turns import revolute
+from trajcli.kinematics.inverse.joint_turns import revolute
+from trajcli.kinematics.inverse.target import IkTarget, residuals
 
-Rows = NDArray[np.intp]
+RowIndices = NDArray[np.intp]
 
 _PROBES = 33  # places between neighbouring breaks, all together, at which the peaks are looked for
 _RACING = 1e-8  # of what the fastest joint does: near a singularity rounding leaves no less at the tool
@@ -38,7 +37,7 @@ class Tolerance:
 
 
 @frozen
-class Misfit:
+class ToleranceRatio:
     """By how many times the tolerance joint values and their derivatives are off.
 
     Attributes:
@@ -54,7 +53,7 @@ class Misfit:
     joint_peaks: Array
     tool_peaks: Array
 
-    def __call__(self, known: Solved, rows: Rows, fitted: Array) -> Array:
+    def __call__(self, known: JointState, rows: RowIndices, fitted: Array) -> Array:
         """Return the misfit (K,) of fitted (3, K, n) from the exact values at some rows of what is known."""
         exact, columns = known.values[:, rows], known.columns[rows]
         off = fitted - exact
@@ -88,7 +87,7 @@ class Misfit:
     def _racing(self) -> Array:
         return _RACING * np.array([self.follower.length, 1.0])
 
-    def _beside(self, target: Target, joints: Array) -> Array:
+    def _beside(self, target: IkTarget, joints: Array) -> Array:
         """Return how far the tool is from its path, (K, 2), m and rad."""
         off = residuals(target, forward(self.follower.robot, joints))
         split = sum(target.position)
@@ -96,7 +95,7 @@ class Misfit:
         return np.stack(sizes, axis=1)
 
 
-def misfit_of(follower: Follower, tolerance: Tolerance, breaks: Array, guess: Array) -> Misfit:
+def tolerance_ratio(follower: Follower, tolerance: Tolerance, breaks: Array, guess: Array) -> ToleranceRatio:
     """Return the misfit, its peaks looked for between breaks.
 
     Args:
@@ -116,7 +115,9 @@ def misfit_of(follower: Follower, tolerance: Tolerance, breaks: Array, guess: Ar
             max(row[0], _ASIDE * row[1] * follower.length),
             max(row[1], _ASIDE * row[0] / follower.length),
         )
-    return Misfit(follower, tolerance, _floored(joint_peaks, duration), _floored(tool_peaks, duration))
+    return ToleranceRatio(
+        follower, tolerance, _floored(joint_peaks, duration), _floored(tool_peaks, duration)
+    )
 
 
 def _sizes(twists: Array) -> Array:

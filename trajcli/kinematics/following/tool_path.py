@@ -1,4 +1,7 @@
-"""The way of the tool, and what it demands of the joints at every place and at every time."""
+"""The way of the tool, and what it demands of the joints at every place and at every time.
+
+What a moving tool demands of the joints: where it is, how fast, and how that changes.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +13,92 @@ from trajcli.frozen import frozen
 from trajcli.geometry.paths.orientation import SegmentProgress
 from trajcli.geometry.paths.pose import PosePath
 from trajcli.geometry.rotation import AXES, AxisName
-from trajcli.kinematics.following.demand import Demand
-from trajcli.kinematics.inverse.target import Fixed
+from trajcli.kinematics.inverse.target import IkTarget, OrientationConstraint
+
+_LEVEL = 1e-12  # of a unit vector, squared: the heading of a vertical axis is not defined
+
+
+@frozen
+class ToolReference:
+    """The tool at N places of its path: what it fixes, and the first and second derivative of that.
+
+    Attributes:
+        poses: Shape (N, 4, 4), T_world_tcp; what is not fixed does not matter.
+        first: Shape (N, 6), (v, w) at the tcp in world; m and rad per unit of the parameter.
+        second: Shape (N, 6), its derivative.
+        position: Which of x, y and z in world are fixed.
+        orientation: What is fixed of the orientation, as in `Target`.
+        tool_axis: Which axis of the tcp is meant by direction, yaw and pitch.
+        aims: Yaw or pitch with two derivatives, shape (N, 3), rad; (N, 0) otherwise.
+    """
+
+    poses: Array
+    first: Array
+    second: Array
+    position: tuple[bool, bool, bool]
+    orientation: OrientationConstraint
+    tool_axis: AxisName
+    aims: Array
+
+    def target(self) -> IkTarget:
+        """Return the targets, a flat batch of N."""
+        aims = self.aims[:, :1]
+        if self.orientation == "direction":
+            aims = self.poses[:, :3, AXES.index(self.tool_axis)]
+        return IkTarget(self.poses, self.position, self.orientation, self.tool_axis, aims)
+
+    def rates(self) -> Array:
+        """Return the rates (N, m) that the rows of `residual_jacobian` must have."""
+        return self._joined(self.first[:, :3], self._turning_rates())
+
+    def accelerations(self, poses: Array, bias: Array, twist: Array) -> Array:
+        """Return what the rows of `residual_jacobian`, times qdd, must be, shape (N, m).
+
+        Args:
+            poses: The tcp as it is, (N, 4, 4): it may be turned about what is left free.
+            bias: The part of its acceleration that does not come from qdd, (N, 6).
+            twist: Its velocity, (N, 6).
+        """
+        linear = self.second[:, :3] - bias[:, :3]
+        if self.orientation in ("all", "none"):
+            return self._joined(linear, self.second[:, 3:] - bias[:, 3:])
+        spin = twist[:, 3:]
+        axis = poses[:, :3, AXES.index(self.tool_axis)]
+        swing = np.cross(spin, axis)
+        drift = np.cross(bias[:, 3:], axis) + np.cross(spin, swing)  # of the axis' second derivative
+        if self.orientation == "direction":
+            wanted = self._axis_acceleration()
+            return self._joined(linear, np.cross(axis, wanted - drift))
+        return self._joined(linear, self._angle_acceleration(axis, swing, drift)[:, None])
+
+    def _angle_acceleration(self, axis: Array, swing: Array, drift: Array) -> Array:
+        """Return what is left of the second derivative of yaw or pitch, shape (N,)."""
+        level = np.maximum(np.square(axis[:, :2]).sum(axis=1), _LEVEL)
+        level_rate = 2 * (axis[:, :2] * swing[:, :2]).sum(axis=1)
+        if self.orientation == "yaw":
+            drifted = (axis[:, 0] * drift[:, 1] - axis[:, 1] * drift[:, 0]) / level
+            return np.asarray(self.aims[:, 2] - drifted + self.aims[:, 1] * level_rate / level)
+        root = np.sqrt(level)
+        steeper = swing[:, 2] * level_rate / (2 * level * root)
+        return np.asarray(self.aims[:, 2] - drift[:, 2] / root + steeper)
+
+    def _turning_rates(self) -> Array:
+        spin = self.first[:, 3:]
+        if self.orientation in ("yaw", "pitch"):
+            return self.aims[:, 1:2]
+        if self.orientation == "direction":
+            axis = self.poses[:, :3, AXES.index(self.tool_axis)]
+            return np.asarray(spin - axis * (axis * spin).sum(axis=1, keepdims=True))
+        return spin
+
+    def _axis_acceleration(self) -> Array:
+        axis, spin = self.poses[:, :3, AXES.index(self.tool_axis)], self.first[:, 3:]
+        return np.asarray(np.cross(self.second[:, 3:], axis) + np.cross(spin, np.cross(spin, axis)))
+
+    def _joined(self, linear: Array, turning: Array) -> Array:
+        parts = [linear[:, list(self.position)]]
+        return np.concatenate(parts if self.orientation == "none" else [*parts, turning], axis=1)
+
 
 _AT_BREAK = 1e-12  # of the length: a place this near to a break is at it
 _BESIDE = 1e-13  # of the length: how far before or after a break the tool is that is not at it
@@ -34,7 +121,7 @@ class ToolPath:
 
     poses: PosePath
     position: tuple[bool, bool, bool]
-    orientation: Fixed
+    orientation: OrientationConstraint
     tool_axis: AxisName = "z"
     turns: tuple[float, ...] = ()
     progress: SegmentProgress | None = None
@@ -49,12 +136,12 @@ class ToolPath:
         """Places where a second derivative may jump, the ends included."""
         return np.concatenate([[0.0], self.poses.breaks, [self.length]])
 
-    def by_place(self, places: Array, side: Side) -> Demand:
+    def by_place(self, places: Array, side: Side) -> ToolReference:
         """Return the demand at places (N,), derivatives by s."""
         places = self._onto_breaks(np.asarray(places))
         return self._demand(places, side, np.ones(places.size), np.zeros(places.size))
 
-    def by_time(self, law: PiecewisePolynomial, times: Array, side: Side, passed: Array) -> Demand:
+    def by_time(self, law: PiecewisePolynomial, times: Array, side: Side, passed: Array) -> ToolReference:
         """Return the demand at times (N,) of a law s(t), derivatives by t.
 
         Args:
@@ -104,10 +191,10 @@ class ToolPath:
         high = np.where(before < after, edges[after], edges[before + 1] - gap)
         return np.clip(np.clip(places, low, high), 0.0, self.length)
 
-    def _demand(self, places: Array, side: Side, speed: Array, acceleration: Array) -> Demand:
+    def _demand(self, places: Array, side: Side, speed: Array, acceleration: Array) -> ToolReference:
         poses, first, second = self.poses.evaluate(places, side)
         rate, change = speed[:, None], acceleration[:, None]
-        return Demand(
+        return ToolReference(
             poses,
             first * rate,
             second * rate**2 + first * change,
@@ -130,7 +217,7 @@ class ToolPath:
         return np.stack([begins + before + value, slope * speed, second], axis=1)
 
     @staticmethod
-    def begins(pose: Array, orientation: Fixed, tool_axis: AxisName) -> float:
+    def begins(pose: Array, orientation: OrientationConstraint, tool_axis: AxisName) -> float:
         """Return the yaw or the pitch of a pose (4, 4), rad."""
         axis = pose[:3, AXES.index(tool_axis)]
         if orientation == "yaw":

@@ -12,18 +12,25 @@ held inside its limits while searching, and the answers nearest to the given con
 
 Source: Sugihara, Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method, IEEE Trans.
 Robotics 27 (2011).
+
+Answers that a closed form misses where it is singular, found by search and put in free places.
+
+At a singular pose a closed form takes one member of the family before it knows whether the joints that come
+after can follow: a UR with its wrist aligned may reach the pose with some turns of joint 6 and not with
+others. The search starts from the given configuration; where no branch is valid, from all seeds.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
 from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.dexterity import characteristic_length
-from trajcli.kinematics.inverse.target import Target, residual_jacobian, residuals
-from trajcli.kinematics.inverse.turns import FULL, revolute
+from trajcli.kinematics.inverse.joint_turns import FULL, revolute
+from trajcli.kinematics.inverse.target import IkTarget, residual_jacobian, residuals
 from trajcli.kinematics.jacobian import linearisation
 from trajcli.kinematics.robot import Robot
 
@@ -39,7 +46,7 @@ SAME = 1e-6  # rad or m, within which two answers are one
 
 
 @frozen
-class Search:
+class SearchResult:
     """What the search found for a flat batch.
 
     Attributes:
@@ -51,7 +58,7 @@ class Search:
     found: Flags
 
 
-def linearised(robot: Robot, target: Target, q: Array) -> tuple[Array, Array]:
+def linearised(robot: Robot, target: IkTarget, q: Array) -> tuple[Array, Array]:
     """Return scaled residuals (K, m) and their Jacobian (K, m, n) at joint values (K, n)."""
     poses, whole = linearisation(robot, q)
     errors, slopes = residuals(target, poses), residual_jacobian(target, poses, whole)
@@ -71,12 +78,12 @@ def damped_step(errors: Array, slopes: Array, damping: Array) -> Array:
     return np.asarray(np.linalg.solve(system, transposed @ errors[..., None])[..., 0])
 
 
-def refine(robot: Robot, target: Target, q: Array, iterations: int = 4) -> Array:
+def refine(robot: Robot, target: IkTarget, q: Array, iterations: int = 4) -> Array:
     """Return joint values (K, n) moved by undamped least-squares steps, each kept only where it gains."""
     return refined(robot, target, q, iterations)[0]
 
 
-def refined(robot: Robot, target: Target, q: Array, iterations: int) -> tuple[Array, Array, Array]:
+def refined(robot: Robot, target: IkTarget, q: Array, iterations: int) -> tuple[Array, Array, Array]:
     """Return what `refine` does, with scaled residuals (K, m) and their Jacobian (K, m, n) there."""
     errors, slopes = linearised(robot, target, q)
     q, running = q.copy(), np.arange(len(q))
@@ -94,7 +101,7 @@ def refined(robot: Robot, target: Target, q: Array, iterations: int) -> tuple[Ar
     return q, errors, slopes
 
 
-def descend(robot: Robot, target: Target, q: Array, bounds: Array | None) -> tuple[Array, Flags]:
+def descend(robot: Robot, target: IkTarget, q: Array, bounds: Array | None) -> tuple[Array, Flags]:
     """Return joint values (K, n) after the search from seeds (K, n), and which met their targets.
 
     Args:
@@ -121,7 +128,7 @@ def descend(robot: Robot, target: Target, q: Array, bounds: Array | None) -> tup
     return result, found
 
 
-def search(robot: Robot, target: Target, near: Array | None) -> Search:
+def search(robot: Robot, target: IkTarget, near: Array | None) -> SearchResult:
     """Return what all seeds find for flat targets (N); `near` (N, n) is the first seed where given."""
     count, joints = target.poses.shape[0], len(robot.joints)
     seeds = SEEDS if joints > target.coordinates else SEEDS_OF_ALL
@@ -130,10 +137,10 @@ def search(robot: Robot, target: Target, near: Array | None) -> Search:
         block = np.arange(low, min(low + _BLOCK, count))
         some = _search_block(robot, target.rows(block), None if near is None else near[block], seeds)
         result[block], found[block] = some.joints, some.found
-    return Search(result, found)
+    return SearchResult(result, found)
 
 
-def _search_block(robot: Robot, target: Target, near: Array | None, seeds: int) -> Search:
+def _search_block(robot: Robot, target: IkTarget, near: Array | None, seeds: int) -> SearchResult:
     count, joints = target.poses.shape[0], len(robot.joints)
     bounds = robot.limits.position if joints > target.coordinates else None
     result, found = np.zeros((count, seeds, joints)), np.zeros((count, seeds), dtype=bool)
@@ -150,7 +157,7 @@ def _search_block(robot: Robot, target: Target, near: Array | None, seeds: int) 
         values, met = descend(robot, target.rows(pairs), starts.reshape(-1, joints), bounds)
         result[missing] = values.reshape(-1, seeds, joints)
         found[missing] = met.reshape(-1, seeds)
-    return Search(result, found)
+    return SearchResult(result, found)
 
 
 def starting_points(robot: Robot, seeds: int, attempt: int) -> Array:
@@ -186,3 +193,54 @@ def distinct(robot: Robot, joints: Array, usable: Flags, within: float = SAME) -
         same = (np.abs(gap).max(axis=-1) <= within) & keep[:, :i]
         keep[:, i] &= ~same.any(axis=1)
     return keep
+
+
+_LAST = 1e6  # rad or m: free places come before taken ones
+
+
+def recover_lost_solutions(
+    robot: Robot, target: IkTarget, joints: Array, valid: Flags, singular: Flags, near: Array | None
+) -> bool:
+    """Put answers that are missing into `joints` (N, branches, n) and mark them in `valid`, both in place.
+
+    An answer takes the place of the branch that is not valid and comes nearest to it, so that it keeps that
+    branch's name; where all are valid, of the nearest other member of a family.
+
+    Args:
+        robot: The arm.
+        target: A flat batch of N, the suspect poses.
+        joints: Shape (N, branches, n).
+        valid: Shape (N, branches).
+        singular: Shape (N, branches): which valid ones belong to a family.
+        near: Shape (N, n); None for none.
+
+    Returns:
+        Whether anything was put in.
+    """
+    changed = False
+    if near is not None:
+        answers, met = descend(robot, target, near, None)
+        changed |= _place(robot, joints, valid, singular, (np.flatnonzero(met), answers[met]))
+    rows = np.flatnonzero(~valid.any(axis=1))
+    if len(rows):
+        found = search(robot, target.rows(rows), None)
+        for answer in range(found.joints.shape[1]):
+            some = found.found[:, answer]
+            changed |= _place(robot, joints, valid, singular, (rows[some], found.joints[some, answer]))
+    return changed
+
+
+def _place(
+    robot: Robot, joints: Array, valid: Flags, singular: Flags, answers: tuple[NDArray[np.intp], Array]
+) -> bool:
+    rows, values = answers
+    gap = joints[rows] - values[:, None]
+    gap = np.abs(np.where(revolute(robot), gap - FULL * np.round(gap / FULL), gap)).max(axis=-1)
+    known = (valid[rows] & (gap <= SAME)).any(axis=1)
+    fixed = valid[rows] & ~singular[rows]
+    cost = np.where(fixed, np.inf, gap + np.where(valid[rows], _LAST, 0.0))
+    branch = np.argmin(cost, axis=1)
+    new = ~known & ~fixed.all(axis=1)
+    joints[rows[new], branch[new]] = values[new]
+    valid[rows[new], branch[new]] = True
+    return bool(new.any())

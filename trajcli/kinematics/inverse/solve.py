@@ -10,24 +10,27 @@ from numpy.typing import ArrayLike, NDArray
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.geometry.rotation import AXES, Flags
-from trajcli.kinematics.chain import configurations
 from trajcli.kinematics.forward import forward
-from trajcli.kinematics.inverse.choose import method_for
-from trajcli.kinematics.inverse.closed_form import candidates
-from trajcli.kinematics.inverse.complete import complete
-from trajcli.kinematics.inverse.found import Found, by_name, closures, polish, rough
-from trajcli.kinematics.inverse.lines import PARALLEL, Arm, arm_of
-from trajcli.kinematics.inverse.method import Method
-from trajcli.kinematics.inverse.nearest_member import nearest_members
-from trajcli.kinematics.inverse.numeric import SAME, distinct, search
-from trajcli.kinematics.inverse.singular import families, freedom_of, one_of_each
-from trajcli.kinematics.inverse.solution import Solutions
-from trajcli.kinematics.inverse.target import Target, pose_target
-from trajcli.kinematics.inverse.turns import beyond, choose_turns
+from trajcli.kinematics.inverse.answers import Answers, by_name, closures, polish, rough
+from trajcli.kinematics.inverse.families.batch import candidates
+from trajcli.kinematics.inverse.families.choose import method_for
+from trajcli.kinematics.inverse.families.method import IkMethod
+from trajcli.kinematics.inverse.families.screw_axes import PARALLEL, AxisGeometry, axis_geometry
+from trajcli.kinematics.inverse.joint_turns import beyond, choose_turns
+from trajcli.kinematics.inverse.numeric import SAME, distinct, recover_lost_solutions, search
+from trajcli.kinematics.inverse.self_motion import (
+    freedom_of,
+    nearest_on_self_motions,
+    one_of_each,
+    self_motions,
+)
+from trajcli.kinematics.inverse.solutions import Solutions
+from trajcli.kinematics.inverse.target import IkTarget, pose_target
 from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.serial_chain import configurations
 
 if TYPE_CHECKING:
-    from trajcli.kinematics.inverse.postures import Postures
+    from trajcli.kinematics.inverse.partial_targets import Postures
 
 TOLERANCE = 1e-9  # m and rad: what a branch may miss its target by
 _LAST = 1e6  # rad or m: sorts answers outside the limits behind all others
@@ -36,7 +39,7 @@ _SAME_MEMBER = 1e-3  # rad or m: nearest members of families that are no further
 
 
 def solve(
-    robot: Robot, target: Target | ArrayLike, near: ArrayLike | None = None, tolerance: float = TOLERANCE
+    robot: Robot, target: IkTarget | ArrayLike, near: ArrayLike | None = None, tolerance: float = TOLERANCE
 ) -> Solutions:
     """Return every configuration of a robot that meets its targets.
 
@@ -53,8 +56,8 @@ def solve(
     """
     if not tolerance > 0.0:
         raise InputError(f"the tolerance must be positive, it is {tolerance:.6g}")
-    wanted = target if isinstance(target, Target) else pose_target(target)
-    arm, flat = arm_of(robot), wanted.flat()
+    wanted = target if isinstance(target, IkTarget) else pose_target(target)
+    arm, flat = axis_geometry(robot), wanted.flat()
     close_to = _near(robot, near, wanted.batch)
     stuck = flat.orientation in ("direction", "yaw", "pitch") and _is_stuck(robot, arm, flat)
     found = _find(robot, arm, flat, close_to, tolerance)
@@ -65,14 +68,14 @@ def solve(
     return Solutions(found.method, joints, valid[..., 0], closure, lost[..., 0], freed, bounds, fixed)
 
 
-def _find(robot: Robot, arm: Arm, target: Target, near: Array | None, tolerance: float) -> Found:
+def _find(robot: Robot, arm: AxisGeometry, target: IkTarget, near: Array | None, tolerance: float) -> Answers:
     """Return the answers of the method that fits the arm and the targets."""
     method = method_for(robot)
     if method.solve is None:
         return _searched(robot, method, target, near, tolerance)
     if fits(method, target, robot.base):
         return _closed(robot, arm, method, target, near, tolerance)
-    from trajcli.kinematics.inverse.postures import Postures, by_postures
+    from trajcli.kinematics.inverse.partial_targets import Postures, by_postures
 
     if method.needs == "pose":
         start = np.zeros((len(target.poses), len(arm.lines))) if near is None else near
@@ -83,7 +86,7 @@ def _find(robot: Robot, arm: Arm, target: Target, near: Array | None, tolerance:
     return _named(found, Postures(robot, arm, method, 1, target.tool_axis))
 
 
-def _named(found: Found, postures: Postures) -> Found:
+def _named(found: Answers, postures: Postures) -> Answers:
     """Return the answers of a search by the branches that the closed form knows for their whole poses."""
     columns, rows = np.nonzero(found.valid)
     own = np.full(found.valid.shape, -1)
@@ -98,7 +101,7 @@ def _batch_first(array: NDArray[Any], batch: tuple[int, ...]) -> NDArray[Any]:
     return np.moveaxis(array.reshape(*array.shape[:2], *batch), (0, 1), (-1, -2))
 
 
-def fits(method: Method, target: Target, base: Array) -> bool:
+def fits(method: IkMethod, target: IkTarget, base: Array) -> bool:
     """Return whether a closed form answers targets of this kind, with T_world_base (4, 4)."""
     if method.needs == "pose":
         return target.whole
@@ -107,13 +110,13 @@ def fits(method: Method, target: Target, base: Array) -> bool:
     return not unfixed.any() or bool(np.abs(idle[unfixed]).min() >= 1.0 - PARALLEL)
 
 
-def numeric_instead(method: Method, target: Target) -> Method:
+def numeric_instead(method: IkMethod, target: IkTarget) -> IkMethod:
     """Return the numeric method for targets that leave free what a closed form needs."""
     reason = (
         f"the target fixes {target.coordinates} coordinates, "
         f"the closed form ({method.name}) needs the whole {method.needs}"
     )
-    return Method("numeric: damped Newton from many seeds", "numeric", (), reason)
+    return IkMethod("numeric: damped Newton from many seeds", "numeric", (), reason)
 
 
 def _near(robot: Robot, near: ArrayLike | None, batch: tuple[int, ...]) -> Array | None:
@@ -123,13 +126,13 @@ def _near(robot: Robot, near: ArrayLike | None, batch: tuple[int, ...]) -> Array
     return np.broadcast_to(values, (*batch, values.shape[-1])).reshape(-1, values.shape[-1])
 
 
-def _is_stuck(robot: Robot, arm: Arm, target: Target) -> bool:
+def _is_stuck(robot: Robot, arm: AxisGeometry, target: IkTarget) -> bool:
     """Return whether no joint turns the tool axis that a target means.
 
     Raises:
         InputError: When its yaw is asked for, and it is always vertical.
     """
-    from trajcli.kinematics.inverse.body import fixed_axis, never_heads
+    from trajcli.kinematics.inverse.tool_axis import fixed_axis, never_heads
 
     stuck = fixed_axis(arm, target.tool_axis)
     if stuck and target.orientation == "yaw" and never_heads(arm, target.tool_axis):
@@ -142,8 +145,8 @@ def _is_stuck(robot: Robot, arm: Arm, target: Target) -> bool:
 
 
 def _closed(
-    robot: Robot, arm: Arm, method: Method, target: Target, near: Array | None, tolerance: float
-) -> Found:
+    robot: Robot, arm: AxisGeometry, method: IkMethod, target: IkTarget, near: Array | None, tolerance: float
+) -> Answers:
     count = len(target.poses)
     valid, poor = np.zeros((len(method.branches), count), dtype=bool), np.zeros(count, dtype=bool)
 
@@ -163,10 +166,12 @@ def _closed(
     missed = np.flatnonzero(~valid.any(axis=0))
     if len(missed):
         closure[..., missed] = closures(robot, target.rows(missed), joints[..., missed])
-    return Found(method, joints, closure, valid, watched, np.zeros(len(joints), dtype=bool), 0, closed=True)
+    return Answers(method, joints, closure, valid, watched, np.zeros(len(joints), dtype=bool), 0, closed=True)
 
 
-def _searched(robot: Robot, method: Method, target: Target, near: Array | None, tolerance: float) -> Found:
+def _searched(
+    robot: Robot, method: IkMethod, target: IkTarget, near: Array | None, tolerance: float
+) -> Answers:
     """Return the nearest answers that a search finds; of families their nearest members."""
     search_result, freedom = search(robot, target, near), freedom_of(robot, target)
     joints = np.ascontiguousarray(np.moveaxis(search_result.joints, 0, -1).swapaxes(0, 1))
@@ -176,7 +181,7 @@ def _searched(robot: Robot, method: Method, target: Target, near: Array | None, 
     within = SAME
     if freedom:
         seeds, rows = np.nonzero(valid)
-        members = nearest_members(robot, target.rows(rows), joints[:, seeds, rows].T, aim[rows])
+        members = nearest_on_self_motions(robot, target.rows(rows), joints[:, seeds, rows].T, aim[rows])
         joints[:, seeds, rows], within = members.T, _SAME_MEMBER
     closure = closures(robot, target, joints)
     valid &= closure.max(axis=0) <= tolerance
@@ -194,7 +199,7 @@ def _searched(robot: Robot, method: Method, target: Target, near: Array | None, 
         _ordered(valid, last),
     )
     every, free = np.ones(valid.shape[1], dtype=bool), np.zeros(len(joints), dtype=bool)
-    return Found(method, joints, closure, valid, every, free, freedom, closed=False)
+    return Answers(method, joints, closure, valid, every, free, freedom, closed=False)
 
 
 def _ordered(array: NDArray[Any], order: NDArray[np.intp]) -> NDArray[Any]:
@@ -203,7 +208,7 @@ def _ordered(array: NDArray[Any], order: NDArray[np.intp]) -> NDArray[Any]:
 
 
 def _resolve(
-    robot: Robot, target: Target, found: Found, near: Array | None, tolerance: float
+    robot: Robot, target: IkTarget, found: Answers, near: Array | None, tolerance: float
 ) -> tuple[Flags, Flags]:
     """Find the families of suspect poses, move to their nearest members, drop repetitions, choose turns.
 
@@ -220,7 +225,11 @@ def _resolve(
     joints, valid = before.copy(), found.valid[:, suspects].T.copy()
     lost, freed = _families(robot, some, joints, valid, found.freedom, close_to)
     valid = distinct(robot, joints, valid)
-    if found.closed and not found.freedom and complete(robot, some, joints, valid, lost, close_to):
+    if (
+        found.closed
+        and not found.freedom
+        and recover_lost_solutions(robot, some, joints, valid, lost, close_to)
+    ):
         lost, freed = _families(robot, some, joints, valid, 0, close_to)
     if (joints != before).any():
         closure = closures(robot, some, joints.transpose(2, 1, 0))
@@ -235,7 +244,7 @@ def _resolve(
 
 
 def _families(
-    robot: Robot, target: Target, joints: Array, valid: Flags, freedom: int, near: Array | None
+    robot: Robot, target: IkTarget, joints: Array, valid: Flags, freedom: int, near: Array | None
 ) -> tuple[Flags, Flags]:
     """Return what is singular (N, branches) of valid joints (N, branches, n), and what is free.
 
@@ -245,9 +254,11 @@ def _families(
     rows, places = np.nonzero(valid)
     if not len(rows):
         return lost, freed
-    known = families(robot, target.rows(rows), joints[rows, places], freedom)
+    known = self_motions(robot, target.rows(rows), joints[rows, places], freedom)
     lost[rows, places], freed[rows, places] = known.singular, known.free
     if near is not None and not freedom and known.singular.any():
         rows, places = rows[known.singular], places[known.singular]
-        joints[rows, places] = nearest_members(robot, target.rows(rows), joints[rows, places], near[rows])
+        joints[rows, places] = nearest_on_self_motions(
+            robot, target.rows(rows), joints[rows, places], near[rows]
+        )
     return lost, freed

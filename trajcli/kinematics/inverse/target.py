@@ -17,13 +17,13 @@ from trajcli.errors import InputError
 from trajcli.frozen import frozen
 from trajcli.geometry.rotation import AXES, AxisName, exp, log
 
-Fixed = Literal["all", "direction", "yaw", "pitch", "none"]
+OrientationConstraint = Literal["all", "direction", "yaw", "pitch", "none"]
 _WHOLE = (True, True, True)
 _ALMOST_UPRIGHT = 1e-12  # of a unit vector: the heading of a vertical direction is not defined
 
 
 @frozen
-class Target:
+class IkTarget:
     """Targets of one kind.
 
     Attributes:
@@ -37,7 +37,7 @@ class Target:
 
     poses: Array
     position: tuple[bool, bool, bool]
-    orientation: Fixed
+    orientation: OrientationConstraint
     tool_axis: AxisName
     aims: Array
 
@@ -58,11 +58,11 @@ class Target:
         """Shape of the batch."""
         return self.poses.shape[:-2]
 
-    def rows(self, index: ArrayLike | slice) -> Target:
+    def rows(self, index: ArrayLike | slice) -> IkTarget:
         """Return the targets of some rows of a flat batch."""
         return replace(self, poses=self.poses[index], aims=self.aims[index])  # type: ignore[index]
 
-    def flat(self) -> Target:
+    def flat(self) -> IkTarget:
         """Return the same targets with one batch dimension."""
         aims = (
             self.aims.reshape(-1, self.aims.shape[-1])
@@ -72,7 +72,7 @@ class Target:
         return replace(self, poses=self.poses.reshape(-1, 4, 4), aims=aims)
 
 
-def pose_target(poses: ArrayLike) -> Target:
+def pose_target(poses: ArrayLike) -> IkTarget:
     """Return targets that fix the whole pose (*batch, 4, 4).
 
     Raises:
@@ -81,7 +81,7 @@ def pose_target(poses: ArrayLike) -> Target:
     values = np.asarray(poses, dtype=np.float64)
     if values.shape[-2:] != (4, 4) or not np.isfinite(values).all():
         raise InputError(f"a pose has 4x4 finite entries, this array has shape {values.shape}")
-    return Target(values, _WHOLE, "all", "z", np.empty((*values.shape[:-2], 0)))
+    return IkTarget(values, _WHOLE, "all", "z", np.empty((*values.shape[:-2], 0)))
 
 
 def partial_target(
@@ -93,7 +93,7 @@ def partial_target(
     yaw: ArrayLike | None = None,
     pitch: ArrayLike | None = None,
     tool_axis: AxisName = "z",
-) -> Target:
+) -> IkTarget:
     """Return targets that leave coordinates free.
 
     Args:
@@ -126,12 +126,12 @@ def partial_target(
     counts = fixed if place is not None else (False, False, False)
     if kind == "rotation":
         poses[..., :3, :3] = value
-        return Target(poses, counts, "all", tool_axis, np.empty((*batch, 0)))
+        return IkTarget(poses, counts, "all", tool_axis, np.empty((*batch, 0)))
     aims = np.broadcast_to(_aims(kind, value), (*batch, {"none": 0, "direction": 3}.get(kind, 1)))
-    return Target(poses, counts, kind, tool_axis, aims)  # type: ignore[arg-type]
+    return IkTarget(poses, counts, kind, tool_axis, aims)  # type: ignore[arg-type]
 
 
-def residuals(target: Target, poses: Array) -> Array:
+def residuals(target: IkTarget, poses: Array) -> Array:
     """Return the differences (K, m) of flat targets from the tcp's poses (K, 4, 4), position first."""
     parts = [(target.poses[:, :3, 3] - poses[:, :3, 3])[:, list(target.position)]]
     axis = poses[:, :3, AXES.index(target.tool_axis)]
@@ -147,7 +147,7 @@ def residuals(target: Target, poses: Array) -> Array:
     return np.concatenate(parts, axis=1)
 
 
-def residual_jacobian(target: Target, poses: Array, jacobians: Array) -> Array:
+def residual_jacobian(target: IkTarget, poses: Array, jacobians: Array) -> Array:
     """Return how the joints change the tcp's part of the residuals, (K, m, n), from J (K, 6, n) in world."""
     linear, angular = jacobians[:, :3][:, list(target.position)], jacobians[:, 3:]
     axis = poses[:, :3, AXES.index(target.tool_axis)]
@@ -167,7 +167,7 @@ def residual_jacobian(target: Target, poses: Array, jacobians: Array) -> Array:
     return np.concatenate([linear, turning], axis=1)
 
 
-def closure_of(target: Target, poses: Array) -> Array:
+def closure_of(target: IkTarget, poses: Array) -> Array:
     """Return by how much flat targets are missed (K, 2): m, and rad."""
     differences = residuals(target, poses)
     split = sum(target.position)
@@ -175,7 +175,7 @@ def closure_of(target: Target, poses: Array) -> Array:
     return np.stack([np.linalg.norm(part, axis=1) for part in parts], axis=1)
 
 
-def meeting(target: Target, poses: Array) -> Array:
+def meeting(target: IkTarget, poses: Array) -> Array:
     """Return poses (N, 4, 4), T_world_tcp, moved and turned the shortest way so that they meet flat targets.
 
     Args:
@@ -195,7 +195,7 @@ def meeting(target: Target, poses: Array) -> Array:
     return result
 
 
-def _turning_axis(target: Target, poses: Array) -> Array:
+def _turning_axis(target: IkTarget, poses: Array) -> Array:
     """Return the axes (N, 3) about which a turn changes the yaw alone, or the pitch alone."""
     if target.orientation == "yaw":
         return np.array([[0.0, 0.0, 1.0]])

@@ -40,7 +40,7 @@ class StuckError(ValueError):
         self.lost = lost
 
 
-def track(follower: Follower, breaks: Array) -> PiecewisePolynomial:
+def track_branch(follower: Follower, breaks: Array) -> PiecewisePolynomial:
     """Return a coarse curve of joint values along the path, good enough as a guess everywhere on it.
 
     Args:

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from trajcli.curves.piecewise import Array
 from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.forward import forward
-from trajcli.kinematics.inverse.method import Branch, Method
+from trajcli.kinematics.inverse.families.method import Branch, IkMethod
 from trajcli.kinematics.inverse.numeric import refine
-from trajcli.kinematics.inverse.target import Target, closure_of
+from trajcli.kinematics.inverse.target import IkTarget, closure_of
 from trajcli.kinematics.robot import Robot
 
 _EXACT = 1e-14  # m and rad: nothing is left to take away
@@ -22,7 +22,7 @@ _NEAR = 1e-5  # m and rad: further off, a branch does not exist and is left wher
 
 
 @dataclass(eq=False)
-class Found:
+class Answers:
     """Answers; joints come first, poses last.
 
     Attributes:
@@ -36,7 +36,7 @@ class Found:
         closed: Whether a closed form found them.
     """
 
-    method: Method
+    method: IkMethod
     joints: Array
     closure: Array
     valid: Flags
@@ -46,7 +46,7 @@ class Found:
     closed: bool
 
 
-def joined(parts: Sequence[Found]) -> Found:
+def joined(parts: Sequence[Answers]) -> Answers:
     """Return answers of several blocks, found in one way, as those of one batch."""
     joints, closure, valid, suspect = (
         np.concatenate([getattr(part, name) for part in parts], axis=-1)
@@ -55,7 +55,7 @@ def joined(parts: Sequence[Found]) -> Found:
     return replace(parts[0], joints=joints, closure=closure, valid=valid, suspect=suspect)
 
 
-def by_name(found: Found, own: NDArray[np.intp], names: Sequence[Branch]) -> Found:
+def by_name(found: Answers, own: NDArray[np.intp], names: Sequence[Branch]) -> Answers:
     """Return answers in columns by name, at least one for each.
 
     Args:
@@ -78,7 +78,7 @@ def by_name(found: Found, own: NDArray[np.intp], names: Sequence[Branch]) -> Fou
     return replace(found, method=method, joints=joints, closure=closure, valid=valid)
 
 
-def closures(robot: Robot, target: Target, joints: Array) -> Array:
+def closures(robot: Robot, target: IkTarget, joints: Array) -> Array:
     """Return how far joints (n, branches, N) are from flat targets, shape (2, branches, N)."""
     count, branches, poses = joints.shape
     repeated = target.rows(np.tile(np.arange(poses), branches))
@@ -92,7 +92,7 @@ def rough(miss: Array) -> Flags:
 
 
 def polish(
-    robot: Robot, target: Target, joints: Array, closure: Array, watched: Flags, rows: NDArray[np.intp]
+    robot: Robot, target: IkTarget, joints: Array, closure: Array, watched: Flags, rows: NDArray[np.intp]
 ) -> None:
     """Take rounding away from joints (n, branches, N) and closure (2, branches, N), in place.
 

@@ -7,9 +7,9 @@ from functools import lru_cache
 import numpy as np
 
 from trajcli.kinematics.dexterity import RANK_TOLERANCE, characteristic_length
-from trajcli.kinematics.inverse import planar, positioning, spherical_wrist, three_parallel
-from trajcli.kinematics.inverse.lines import Arm, arm_of
-from trajcli.kinematics.inverse.method import Method
+from trajcli.kinematics.inverse.families import planar, positioning, spherical_wrist, three_parallel
+from trajcli.kinematics.inverse.families.method import IkMethod
+from trajcli.kinematics.inverse.families.screw_axes import AxisGeometry, axis_geometry
 from trajcli.kinematics.jacobian import jacobian
 from trajcli.kinematics.robot import Robot
 
@@ -18,7 +18,7 @@ _PLACES = 3  # configurations: an arm that is singular in all of them is so ever
 
 
 @lru_cache(maxsize=16)
-def method_for(robot: Robot) -> Method:
+def method_for(robot: Robot) -> IkMethod:
     """Return how the inverse kinematics of a robot is found: the first family that fits, else numerically.
 
     A family fits only where every joint counts: of a wrist by itself, or where two axes are one, no closed
@@ -30,7 +30,7 @@ def method_for(robot: Robot) -> Method:
     Raises:
         InputError: When the robot has no geometry.
     """
-    arm = arm_of(robot)
+    arm = axis_geometry(robot)
     for match in FAMILIES:
         method = match(arm)
         if method is not None and _every_joint_counts(robot, method):
@@ -38,7 +38,7 @@ def method_for(robot: Robot) -> Method:
     return numeric_method(arm)
 
 
-def _every_joint_counts(robot: Robot, method: Method) -> bool:
+def _every_joint_counts(robot: Robot, method: IkMethod) -> bool:
     """Return whether the joints move what the method needs, place or pose, in as many ways as they are."""
     count = len(robot.joints)
     places = np.cos(np.square(np.arange(1.0, _PLACES * count + 1.0))).reshape(_PLACES, count)
@@ -49,11 +49,11 @@ def _every_joint_counts(robot: Robot, method: Method) -> bool:
     return bool((np.count_nonzero(values > least, axis=-1) == count).any())
 
 
-def numeric_method(arm: Arm) -> Method:
+def numeric_method(arm: AxisGeometry) -> IkMethod:
     """Return the method for arms that no closed form fits."""
     count = len(arm.lines)
     if count > 6:
         reason = f"{count} joints are more than the six coordinates of a pose: the answers are a family"
     else:
         reason = f"no closed form for this chain ({arm.kinds}) is among the families"
-    return Method("numeric: damped Newton from many seeds", "numeric", (), reason)
+    return IkMethod("numeric: damped Newton from many seeds", "numeric", (), reason)

@@ -23,7 +23,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from trajcli.kinematics.columns import (
-    Column,
+    VectorEntries,
     difference,
     dot,
     minus,
@@ -31,10 +31,10 @@ from trajcli.kinematics.columns import (
     product,
     total,
 )
-from trajcli.kinematics.inverse.lines import Floats, Line, across_floats, parallel
-from trajcli.kinematics.inverse.subproblems import (
+from trajcli.kinematics.inverse.families.screw_axes import Floats, ScrewAxis, across_floats, parallel
+from trajcli.kinematics.inverse.families.subproblems import (
+    DegeneracyFlags,
     Turn,
-    Watch,
     across,
     levels,
     onto,
@@ -43,13 +43,18 @@ from trajcli.kinematics.inverse.subproblems import (
 )
 
 
-def same_way(a: Line, b: Line) -> float:
+def same_way(a: ScrewAxis, b: ScrewAxis) -> float:
     """Return 1 or -1 for parallel lines of the same or the opposite direction."""
     return float(np.sign(dot(a.direction, b.direction)))
 
 
 def parallel_pair(
-    two: Line, three: Line, point: Column, aim: Column, watch: Watch, up: Floats | None = None
+    two: ScrewAxis,
+    three: ScrewAxis,
+    point: VectorEntries,
+    aim: VectorEntries,
+    watch: DegeneracyFlags,
+    up: Floats | None = None,
 ) -> tuple[Turn, Turn]:
     """Return the turns about two parallel lines that bring `point` to `aim`, both (2, ..., B).
 
@@ -74,7 +79,12 @@ def parallel_pair(
 
 
 def shoulder_turn(
-    one: Line, normal: Column, point: Column, target: Column, watch: Watch, sign: float
+    one: ScrewAxis,
+    normal: VectorEntries,
+    point: VectorEntries,
+    target: VectorEntries,
+    watch: DegeneracyFlags,
+    sign: float,
 ) -> Turn:
     """Return the turns (2, ..., B) about line one that give normal . R1^-1 (t - o) the value of the point."""
     level = dot(normal, minus(point, one.point))
@@ -82,18 +92,22 @@ def shoulder_turn(
     return levels(direction, minus(target, one.point), normal, level, watch, watch.length, sign)[0]
 
 
-def before(one: Line, target: Column, turn: Turn) -> Column:
+def before(one: ScrewAxis, target: VectorEntries, turn: Turn) -> VectorEntries:
     """Return where a point was before the turn about a line."""
     return plus(turned_back(minus(target, one.point), one.direction, turn), one.point)
 
 
-def forward_sign(one: Line, two: Line, forward: Floats) -> float:
+def forward_sign(one: ScrewAxis, two: ScrewAxis, forward: Floats) -> float:
     """Return the sign with which the first answer of `shoulder_turn` reaches along `forward`."""
     return float(np.copysign(1.0, dot(forward, across_floats(two.direction, one.direction))))
 
 
 def elbow(
-    lines: Sequence[Line], point: Column, target: Column, watch: Watch, forward: Floats
+    lines: Sequence[ScrewAxis],
+    point: VectorEntries,
+    target: VectorEntries,
+    watch: DegeneracyFlags,
+    forward: Floats,
 ) -> tuple[Turn, Turn, Turn]:
     """Return the turns that bring `point` (at zero) to `target`: choices shoulder, then elbow."""
     one, two, three = lines
@@ -103,6 +117,6 @@ def elbow(
     return first, second, third
 
 
-def is_elbow(lines: Sequence[Line]) -> bool:
+def is_elbow(lines: Sequence[ScrewAxis]) -> bool:
     """Return whether `elbow` fits."""
     return parallel(lines[1], lines[2]) and not parallel(lines[0], lines[1])

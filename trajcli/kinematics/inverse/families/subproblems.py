@@ -17,8 +17,8 @@ from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
 from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.columns import (
-    Column,
     Entry,
+    VectorEntries,
     combine,
     cross,
     difference,
@@ -30,14 +30,14 @@ from trajcli.kinematics.columns import (
     product,
     scaled,
 )
-from trajcli.kinematics.inverse.lines import PARALLEL, Floats, across_floats
+from trajcli.kinematics.inverse.families.screw_axes import PARALLEL, Floats, across_floats
 
 Turn = tuple[Entry, Entry]
 FREE = 1e-8  # of the length at hand: closer to its axis a point does not tell its angle
 TANGENT = 1e-6  # rad, within which two answers are one: the square root of rounding, and room
 
 
-class Watch:
+class DegeneracyFlags:
     """Notes in which poses of a block an angle is free, or two answers fall together.
 
     Attributes:
@@ -84,7 +84,7 @@ class Watch:
             self.rows |= where.reshape(-1, where.shape[-1]).any(axis=0)
 
 
-def across(vector: Column, axis: Floats) -> Column:
+def across(vector: VectorEntries, axis: Floats) -> VectorEntries:
     """Return the part of a vector at right angles to a unit axis."""
     for i in range(3):
         if abs(axis[i]) == 1.0:
@@ -93,7 +93,7 @@ def across(vector: Column, axis: Floats) -> Column:
     return minus(vector, scaled(dot(axis, vector), axis))
 
 
-def along(vector: Column, axis: Floats) -> Column:
+def along(vector: VectorEntries, axis: Floats) -> VectorEntries:
     """Return the part of a vector along a unit axis."""
     for i in range(3):
         if abs(axis[i]) == 1.0:
@@ -102,7 +102,7 @@ def along(vector: Column, axis: Floats) -> Column:
     return scaled(dot(axis, vector), axis)
 
 
-def turned(vector: Column, axis: Floats, turn: Turn) -> Column:
+def turned(vector: VectorEntries, axis: Floats, turn: Turn) -> VectorEntries:
     """Return a vector turned about a unit axis."""
     plane = _plane(axis)
     if plane is None:
@@ -114,7 +114,7 @@ def turned(vector: Column, axis: Floats, turn: Turn) -> Column:
     return result[0], result[1], result[2]
 
 
-def turned_back(vector: Column, axis: Floats, turn: Turn) -> Column:
+def turned_back(vector: VectorEntries, axis: Floats, turn: Turn) -> VectorEntries:
     """Return a vector turned about a unit axis the other way."""
     return turned(vector, (-axis[0], -axis[1], -axis[2]), turn)
 
@@ -147,7 +147,7 @@ def half_turn_more(angles: Array, out: Array) -> None:
     np.subtract(angles, np.copysign(np.pi, angles), out=out)
 
 
-def onto(axis: Floats, vector: Column, aim: Column) -> Turn:
+def onto(axis: Floats, vector: VectorEntries, aim: VectorEntries) -> Turn:
     """Return the turn about `axis` that brings `vector` into the half-plane of `aim`; its length is not 1.
 
     One answer. Both vectors' parts along the axis do not matter; it is the nearest where they differ.
@@ -159,7 +159,7 @@ def onto(axis: Floats, vector: Column, aim: Column) -> Turn:
     return added((aim[i], aim[j]), (vector[i], vector[j]), -1.0)
 
 
-def unit(turn: Turn, watch: Watch, scale: float = 1.0) -> Turn:
+def unit(turn: Turn, watch: DegeneracyFlags, scale: float = 1.0) -> Turn:
     """Return a turn of length 1; where it has none (1e-8 `scale`) the angle is free, zero is taken."""
     return _divided(turn, length(turn), watch, scale)
 
@@ -170,7 +170,7 @@ def length(turn: Turn) -> Array:
     return np.asarray(np.sqrt(square, out=square if square.ndim else None))
 
 
-def _divided(turn: Turn, size: Array, watch: Watch, scale: float = 1.0) -> Turn:
+def _divided(turn: Turn, size: Array, watch: DegeneracyFlags, scale: float = 1.0) -> Turn:
     free = np.asarray(size < FREE * scale)
     if free.any():
         watch.note(free)
@@ -181,10 +181,10 @@ def _divided(turn: Turn, size: Array, watch: Watch, scale: float = 1.0) -> Turn:
 
 def levels(
     axis: Floats,
-    vector: Column,
-    normal: Column,
+    vector: VectorEntries,
+    normal: VectorEntries,
     level: Entry,
-    watch: Watch,
+    watch: DegeneracyFlags,
     scale: float = 1.0,
     sign: Entry = 1.0,
 ) -> tuple[Turn, Turn]:
@@ -267,7 +267,7 @@ class Opposed:
 
 
 def two_turns(
-    first: Floats, second: Floats, vector: Floats, aim: Column, watch: Watch
+    first: Floats, second: Floats, vector: Floats, aim: VectorEntries, watch: DegeneracyFlags
 ) -> tuple[Turn | Mirrored, Turn | Opposed]:
     """Return the turns about `first`, and those about `second` before, that bring `vector` to `aim`.
 

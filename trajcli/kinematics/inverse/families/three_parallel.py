@@ -24,23 +24,29 @@ from collections.abc import Sequence
 from functools import partial
 
 from trajcli.frozen import frozen
-from trajcli.kinematics.columns import Column, cross, dot, minus, product
-from trajcli.kinematics.inverse.elbow import before, forward_sign, parallel_pair, same_way, shoulder_turn
-from trajcli.kinematics.inverse.hand import hand
-from trajcli.kinematics.inverse.lines import (
-    Arm,
+from trajcli.kinematics.columns import VectorEntries, cross, dot, minus, product
+from trajcli.kinematics.inverse.families.elbow import (
+    before,
+    forward_sign,
+    parallel_pair,
+    same_way,
+    shoulder_turn,
+)
+from trajcli.kinematics.inverse.families.method import Choice, IkMethod
+from trajcli.kinematics.inverse.families.screw_axes import (
+    AxisGeometry,
+    Displacement,
     Floats,
-    Goal,
     across_floats,
     meeting_point,
     parallel,
 )
-from trajcli.kinematics.inverse.method import Choice, Method
-from trajcli.kinematics.inverse.subproblems import (
+from trajcli.kinematics.inverse.families.spherical_wrist import wrist_turns
+from trajcli.kinematics.inverse.families.subproblems import (
+    DegeneracyFlags,
     Mirrored,
     Turn,
     Value,
-    Watch,
     across,
     added,
     onto,
@@ -61,10 +67,10 @@ class ThreeParallel:
         point: A point, at zero, that the joints after the fourth do not move.
     """
 
-    arm: Arm
+    arm: AxisGeometry
     point: Floats
 
-    def __call__(self, goal: Goal, watch: Watch) -> Sequence[Value]:
+    def __call__(self, goal: Displacement, watch: DegeneracyFlags) -> Sequence[Value]:
         """Return the joints: choices shoulder, wrist where there are six joints, elbow."""
         one, two, three, four = self.arm.lines[:4]
         axis = two.direction
@@ -79,7 +85,7 @@ class ThreeParallel:
         fourth = rest[0], product(same_way(two, four), rest[1])
         return [first, second, third, fourth, *after]
 
-    def _sum(self, goal: Goal, first: Turn, watch: Watch) -> tuple[Turn, list[Value]]:
+    def _sum(self, goal: Displacement, first: Turn, watch: DegeneracyFlags) -> tuple[Turn, list[Value]]:
         """Return the turn about h that joints 2 to 4 make together, and the turns of the joints after."""
         one, two, *_, last = self.arm.lines
         axis = two.direction
@@ -87,7 +93,7 @@ class ThreeParallel:
         if len(self.arm.lines) == 6:
             five = self.arm.lines[4].direction
             axes = axis, five, last.direction
-            total, fifth, sixth = hand(
+            total, fifth, sixth = wrist_turns(
                 axes, partial(turned_back, axis=one.direction, turn=first), seen, goal, watch
             )
             return total.both() if isinstance(total, Mirrored) else total, [fifth, sixth]
@@ -98,14 +104,16 @@ class ThreeParallel:
         ) == 5 else []
 
 
-def _roll(goal: Goal, last: Floats, axis: Floats, seen: Column, watch: Watch) -> Turn:
+def _roll(
+    goal: Displacement, last: Floats, axis: Floats, seen: VectorEntries, watch: DegeneracyFlags
+) -> Turn:
     """Return the angle about the last axis after which the tool sees h where it points."""
     cosine = dot(goal.direction(across(axis, last)), seen)
     sine = dot(goal.direction(cross(axis, last)), seen)
     return unit((cosine, sine), watch)
 
 
-def match(arm: Arm) -> Method | None:
+def match(arm: AxisGeometry) -> IkMethod | None:
     """Return the method where axes 2, 3 and 4 are parallel, 1 is not, and the rest fits."""
     count, lines = len(arm.lines), arm.lines
     if not 4 <= count <= 6 or set(arm.kinds) != {"R"} or not parallel(*lines[1:4]) or parallel(*lines[:2]):
@@ -126,4 +134,4 @@ def match(arm: Arm) -> Method | None:
     if point is None:
         return None
     names: tuple[Choice, ...] = tuple(choices)  # type: ignore[arg-type]
-    return Method(_NAMES[count], _NAMES[count], names, reason, ThreeParallel(arm, point))
+    return IkMethod(_NAMES[count], _NAMES[count], names, reason, ThreeParallel(arm, point))

@@ -22,22 +22,22 @@ from collections.abc import Sequence
 
 from trajcli.frozen import frozen
 from trajcli.kinematics.columns import dot, minus, product
-from trajcli.kinematics.inverse.elbow import parallel_pair, same_way
-from trajcli.kinematics.inverse.lines import (
-    Arm,
+from trajcli.kinematics.inverse.families.elbow import parallel_pair, same_way
+from trajcli.kinematics.inverse.families.method import IkMethod
+from trajcli.kinematics.inverse.families.positioning import turn_and_slide
+from trajcli.kinematics.inverse.families.screw_axes import (
+    AxisGeometry,
+    Displacement,
     Floats,
-    Goal,
-    Line,
+    ScrewAxis,
     aside,
     parallel,
     perpendicular,
 )
-from trajcli.kinematics.inverse.method import Method
-from trajcli.kinematics.inverse.slides import turn_and_slide
-from trajcli.kinematics.inverse.subproblems import (
+from trajcli.kinematics.inverse.families.subproblems import (
+    DegeneracyFlags,
     Turn,
     Value,
-    Watch,
     added,
     onto,
     unit,
@@ -58,13 +58,13 @@ class Planar:
         tip: The tcp at zero.
     """
 
-    plane: tuple[Line, ...]
+    plane: tuple[ScrewAxis, ...]
     places: tuple[int, ...]
     rise: int | None
-    lines: tuple[Line, ...]
+    lines: tuple[ScrewAxis, ...]
     tip: Floats
 
-    def __call__(self, goal: Goal, watch: Watch) -> Sequence[Value]:
+    def __call__(self, goal: Displacement, watch: DegeneracyFlags) -> Sequence[Value]:
         """Return the joints: choice elbow."""
         one, two, *rest = self.plane
         point = rest[0].point if rest else self.tip
@@ -88,12 +88,12 @@ class Planar:
         return values
 
 
-def _angle_of_tool(one: Line, goal: Goal, watch: Watch) -> Turn:
+def _angle_of_tool(one: ScrewAxis, goal: Displacement, watch: DegeneracyFlags) -> Turn:
     marker = aside(one.direction)
     return unit(onto(one.direction, marker, goal.direction(marker)), watch)
 
 
-def match(arm: Arm) -> Method | None:
+def match(arm: AxisGeometry) -> IkMethod | None:
     """Return the method where all turns are about parallel axes and the slides stand as in the list above."""
     turns = [line for line in arm.lines if not line.prismatic]
     if not turns or not parallel(*turns):
@@ -111,5 +111,5 @@ def match(arm: Arm) -> Method | None:
     name = "SCARA" if rises else _NAMES[kinds]
     reason = "all turns are about parallel axes" + (", and the slide runs along them" if rises else "")
     if len(plane) == 3:
-        return Method(name, name, ("elbow",), reason, solver)
-    return Method(name, name, ("elbow",), reason, solver, "position", turns[0].direction)
+        return IkMethod(name, name, ("elbow",), reason, solver)
+    return IkMethod(name, name, ("elbow",), reason, solver, "position", turns[0].direction)

@@ -14,12 +14,12 @@ from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
 from trajcli.geometry.rotation import AXES, AxisName, Flags
 from trajcli.kinematics.columns import dot
-from trajcli.kinematics.inverse.elbow import forward_sign, same_way
-from trajcli.kinematics.inverse.lines import (
+from trajcli.kinematics.inverse.families.elbow import forward_sign, same_way
+from trajcli.kinematics.inverse.families.screw_axes import (
     PARALLEL,
-    Arm,
+    AxisGeometry,
     Floats,
-    Line,
+    ScrewAxis,
     contains,
     parallel,
 )
@@ -28,7 +28,7 @@ from trajcli.kinematics.robot import Robot
 
 
 @frozen
-class Body:
+class ToolAxisModel:
     """The joints by what they do to one axis of the tool.
 
     Attributes:
@@ -39,14 +39,14 @@ class Body:
         marker: The tool axis at zero, a line through the tcp.
     """
 
-    arm: Arm
+    arm: AxisGeometry
     together: tuple[int, ...]
-    shoulder: Line | None
-    roll: Line | None
-    marker: Line
+    shoulder: ScrewAxis | None
+    roll: ScrewAxis | None
+    marker: ScrewAxis
 
     @property
-    def axis(self) -> Line:
+    def axis(self) -> ScrewAxis:
         """The first of the parallel axes."""
         return self.arm.lines[self.together[0]]
 
@@ -104,32 +104,32 @@ class Body:
         return np.asarray(self.pitch_sign * side > 0.0)
 
 
-def body_of(arm: Arm, tool_axis: AxisName) -> Body:
+def tool_axis_model(arm: AxisGeometry, tool_axis: AxisName) -> ToolAxisModel:
     """Return the body of an arm with parallel axes, for one axis of its tool."""
     turns = tuple(i for i, line in enumerate(arm.lines) if not line.prismatic)
     planar = parallel(*(arm.lines[i] for i in turns))
     roll = arm.lines[4] if len(arm.lines) == 5 else None
     marker = _marker(arm, tool_axis)
     if planar:
-        return Body(arm, turns, None, None, marker)
-    return Body(arm, (1, 2, 3), arm.lines[0], roll, marker)
+        return ToolAxisModel(arm, turns, None, None, marker)
+    return ToolAxisModel(arm, (1, 2, 3), arm.lines[0], roll, marker)
 
 
-def fixed_axis(arm: Arm, tool_axis: AxisName) -> bool:
+def fixed_axis(arm: AxisGeometry, tool_axis: AxisName) -> bool:
     """Return whether no joint turns an axis of the tool."""
     return all(line.prismatic or parallel(_marker(arm, tool_axis), line) for line in arm.lines)
 
 
-def never_heads(arm: Arm, tool_axis: AxisName) -> bool:
+def never_heads(arm: AxisGeometry, tool_axis: AxisName) -> bool:
     """Return whether an axis of the tool that no joint turns is vertical in world."""
     return _vertical(arm, _marker(arm, tool_axis).direction)
 
 
-def _marker(arm: Arm, tool_axis: AxisName) -> Line:
+def _marker(arm: AxisGeometry, tool_axis: AxisName) -> ScrewAxis:
     axis, tip = (cast("Floats", tuple(arm.home[:3, i].tolist())) for i in (AXES.index(tool_axis), 3))
-    return Line(prismatic=False, direction=axis, point=tip)
+    return ScrewAxis(prismatic=False, direction=axis, point=tip)
 
 
-def _vertical(arm: Arm, direction: Floats) -> bool:
+def _vertical(arm: AxisGeometry, direction: Floats) -> bool:
     x, y, _ = arm.base[:3, :3] @ direction
     return bool(np.hypot(x, y) <= PARALLEL)

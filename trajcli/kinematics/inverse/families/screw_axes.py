@@ -18,10 +18,9 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import comparable, frozen
-from trajcli.kinematics.chain import links_of, travel
 from trajcli.kinematics.columns import (
-    Column,
     Entry,
+    VectorEntries,
     combine,
     cross,
     dot,
@@ -31,6 +30,7 @@ from trajcli.kinematics.columns import (
 )
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.serial_chain import links_of, travel
 
 PARALLEL = 1e-9  # sine of the angle: an alpha typed with ten digits is meant to be a right angle
 MEETING = 1e-9  # of the arm's length: a picometre, where drawings say a tenth of a millimetre
@@ -41,7 +41,7 @@ _AXES: tuple[Floats, Floats, Floats] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 
 
 
 @comparable
-class Line:
+class ScrewAxis:
     """The axis of one joint at zero: unit direction, pointing as the joint counts, and a point on it, m."""
 
     prismatic: bool
@@ -49,14 +49,14 @@ class Line:
     point: Floats
 
     @property
-    def opposite(self) -> Line:
+    def opposite(self) -> ScrewAxis:
         """The same line for the joint read backwards: its motion is undone by the same value."""
         x, y, z = self.direction
-        return Line(self.prismatic, (-x + 0.0, -y + 0.0, -z + 0.0), self.point)
+        return ScrewAxis(self.prismatic, (-x + 0.0, -y + 0.0, -z + 0.0), self.point)
 
 
 @frozen
-class Arm:
+class AxisGeometry:
     """The lines of all joints, the tcp's pose at zero in the base, and lengths to judge by.
 
     Attributes:
@@ -67,7 +67,7 @@ class Arm:
         length: The arm's characteristic length, m.
     """
 
-    lines: tuple[Line, ...]
+    lines: tuple[ScrewAxis, ...]
     home: Array
     base: Array
     forward: Floats
@@ -80,7 +80,7 @@ class Arm:
 
 
 @lru_cache(maxsize=16)
-def arm_of(robot: Robot) -> Arm:
+def axis_geometry(robot: Robot) -> AxisGeometry:
     """Return the lines of a robot.
 
     Raises:
@@ -88,22 +88,22 @@ def arm_of(robot: Robot) -> Arm:
     """
     links = links_of(robot)
     axes, tcp = travel(links, np.eye(4), robot.tool, cast("Sequence[Array]", [0.0] * len(links)))
-    lines = tuple(Line(axis.prismatic, _clean(axis.direction), _clean(axis.point)) for axis in axes)
+    lines = tuple(ScrewAxis(axis.prismatic, _clean(axis.direction), _clean(axis.point)) for axis in axes)
     home = np.eye(4)
     home[:3] = np.array([_clean(column) for column in (tcp.x, tcp.y, tcp.z, tcp.p)]).T
     turn = links[0].theta
     forward = _clean((float(np.cos(turn)), float(np.sin(turn)), 0.0))
-    return Arm(lines, home, robot.base, forward, characteristic_length(robot))
+    return AxisGeometry(lines, home, robot.base, forward, characteristic_length(robot))
 
 
-class Goal:
+class Displacement:
     """One block of target poses as the displacement from zero: G with G H = T, whatever base and tool.
 
     Attributes:
         x, y, z, p: Columns of the targets in the base, each entry an array (B,).
     """
 
-    def __init__(self, arm: Arm, rows: Array) -> None:
+    def __init__(self, arm: AxisGeometry, rows: Array) -> None:
         """Take the twelve upper entries of the poses, row by row, shape (12, B)."""
         into_base = [cast("Floats", tuple(row)) for row in arm.base[:3, :3].T.tolist()]
         x, y, z, p = ((rows[i], rows[4 + i], rows[8 + i]) for i in range(4))
@@ -113,55 +113,55 @@ class Goal:
         )
         self._home = arm.home
 
-    def direction(self, vector: Column) -> Column:
+    def direction(self, vector: VectorEntries) -> VectorEntries:
         """Return where the displacement turns a direction that was `vector` at zero."""
         return self._turned(np.asarray(vector) @ self._home[:3, :3])
 
-    def point(self, point: Column) -> Column:
+    def point(self, point: VectorEntries) -> VectorEntries:
         """Return where the displacement takes a point of the tool that was at `point` at zero."""
         local = (np.asarray(point) - self._home[:3, 3]) @ self._home[:3, :3]
         return plus(self._turned(local), self.p)
 
-    def view(self, vector: Column) -> Column:
+    def view(self, vector: VectorEntries) -> VectorEntries:
         """Return what the displacement turns to `vector`: the inverse of `direction`."""
         first, second, third = (dot(self.direction(axis), vector) for axis in _AXES)
         return first, second, third
 
-    def _turned(self, local: Array) -> Column:
+    def _turned(self, local: Array) -> VectorEntries:
         a, b, c = (0.0 if abs(entry) < _DUST else float(entry) for entry in local)
         return plus(combine(a, self.x, b, self.y), scaled(c, self.z))
 
 
-class InverseGoal(Goal):
+class InverseDisplacement(Displacement):
     """The inverse displacements of a goal, for arms that are read from the tool to the base."""
 
-    def __init__(self, goal: Goal) -> None:
+    def __init__(self, goal: Displacement) -> None:
         """Take the goal to invert."""
         self._columns = [goal.direction(axis) for axis in _AXES]
         self._origin = goal.point((0.0, 0.0, 0.0))
 
-    def direction(self, vector: Column) -> Column:
+    def direction(self, vector: VectorEntries) -> VectorEntries:
         """Return where the inverse displacement turns a direction."""
         first, second, third = (dot(column, vector) for column in self._columns)
         return first, second, third
 
-    def point(self, point: Column) -> Column:
+    def point(self, point: VectorEntries) -> VectorEntries:
         """Return where the inverse displacement takes a point."""
         return self.direction(minus(point, self._origin))
 
 
-def parallel(*lines: Line) -> bool:
+def parallel(*lines: ScrewAxis) -> bool:
     """Return whether all lines have one direction, or the opposite one."""
     crossed = (cross(lines[0].direction, line.direction) for line in lines[1:])
     return all(hypot(*map(float, normal)) <= PARALLEL for normal in crossed)
 
 
-def perpendicular(a: Line, b: Line) -> bool:
+def perpendicular(a: ScrewAxis, b: ScrewAxis) -> bool:
     """Return whether two directions are at right angles."""
     return abs(float(np.dot(a.direction, b.direction))) <= PARALLEL
 
 
-def meeting_point(a: Line, b: Line, length: float) -> Floats | None:
+def meeting_point(a: ScrewAxis, b: ScrewAxis, length: float) -> Floats | None:
     """Return the point where two lines that are not parallel meet within 1e-9 of `length`; None elsewhere."""
     if parallel(a, b):
         return None
@@ -174,13 +174,13 @@ def meeting_point(a: Line, b: Line, length: float) -> Floats | None:
     return _clean(tuple(pa + along * ua))
 
 
-def contains(line: Line, point: Floats, length: float) -> bool:
+def contains(line: ScrewAxis, point: Floats, length: float) -> bool:
     """Return whether a point lies on a line within 1e-9 of `length`."""
     offset = np.cross(np.subtract(point, line.point), line.direction)
     return float(np.linalg.norm(offset)) <= MEETING * length
 
 
-def common_point(lines: Sequence[Line], length: float) -> Floats | None:
+def common_point(lines: Sequence[ScrewAxis], length: float) -> Floats | None:
     """Return the point in which three lines meet, neighbours not parallel; None where they do not."""
     point = meeting_point(lines[0], lines[1], length)
     if point is None or parallel(lines[1], lines[2]) or not contains(lines[2], point, length):

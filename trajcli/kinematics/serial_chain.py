@@ -2,11 +2,16 @@
 
 A turn about z stays pending until an axis is needed, so that neighbouring parallel axes add their angles
 instead of multiplying matrices.
+
+Denavit-Hartenberg rows: the transform of each link, and the change from one convention to the other.
+
+A standard row is Rz(theta) Tz(d) Tx(a) Rx(alpha), a modified one Rx(alpha) Tx(a) Rz(theta) Tz(d).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -15,10 +20,11 @@ from numpy.typing import ArrayLike
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import comparable, frozen
-from trajcli.geometry.rotation import cos_sin
+from trajcli.geometry.pose import build
+from trajcli.geometry.rotation import cos_sin, rotation_about
 from trajcli.kinematics.columns import (
-    Column,
     Entry,
+    VectorEntries,
     advance,
     combine,
     dot,
@@ -27,7 +33,7 @@ from trajcli.kinematics.columns import (
     scaled,
     total,
 )
-from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.robot import Convention, Robot
 
 _BLOCK = 4096  # configurations at a time: the arrays in use stay in the processor's cache
 
@@ -48,12 +54,12 @@ class Link:
 
 
 @frozen
-class Axis:
+class JointAxis:
     """The axis of one joint: its direction, pointing as the joint counts, and a point on it."""
 
     prismatic: bool
-    direction: Column
-    point: Column
+    direction: VectorEntries
+    point: VectorEntries
 
 
 @lru_cache(maxsize=16)
@@ -111,7 +117,7 @@ class MovingFrame:
         self._x, self._y, self.z, self.p = (tuple(column) for column in columns)
         self._angle: Entry = 0.0
         self._turned: tuple[Entry, Entry] | None = None
-        self._x_now: Column | None = None
+        self._x_now: VectorEntries | None = None
 
     def move(self, link: Link, q: Array) -> None:
         """Move by a joint: turn about z by theta and slide along z by d, one of them with q."""
@@ -149,7 +155,7 @@ class MovingFrame:
         self._angle, self._turned, self._x_now = 0.0, None, None
 
     @property
-    def x(self) -> Column:
+    def x(self) -> VectorEntries:
         """First axis."""
         if self._x_now is None:
             cosine, sine = self._cos_sin()
@@ -157,7 +163,7 @@ class MovingFrame:
         return self._x_now
 
     @property
-    def y(self) -> Column:
+    def y(self) -> VectorEntries:
         """Second axis."""
         cosine, sine = self._cos_sin()
         return minus(scaled(cosine, self._y), scaled(sine, self._x))
@@ -183,13 +189,65 @@ class MovingFrame:
 
 def travel(
     links: Sequence[Link], base: Array, tool: Array, q: Sequence[Array]
-) -> tuple[list[Axis], MovingFrame]:
+) -> tuple[list[JointAxis], MovingFrame]:
     """Return the axes of all joints, and the frame of the tcp, for one block of configurations."""
     frame, axes = MovingFrame(base), []
     for link, value in zip(links, q, strict=True):
         frame.screw(*link.before)
-        axes.append(Axis(link.prismatic, scaled(link.sign, frame.z), frame.p))
+        axes.append(JointAxis(link.prismatic, scaled(link.sign, frame.z), frame.p))
         frame.move(link, value)
         frame.screw(*link.after)
     frame.attach(tool)
     return axes, frame
+
+
+def link_transforms(robot: Robot, q: ArrayLike) -> Array:
+    """Return the pose of each link's frame in the one before, shape (*batch, n, 4, 4).
+
+    Args:
+        robot: Its base and tool do not enter.
+        q: Joint values (*batch, n), rad or m.
+
+    Raises:
+        InputError: When the robot has no geometry, or q has not n finite values.
+    """
+    links, values = links_of(robot), configurations(robot, q)
+    result = np.empty((*values.shape, 4, 4))
+    for i, link in enumerate(links):
+        change = link.sign * values[..., i]
+        theta = np.full_like(change, link.theta) if link.prismatic else change + link.theta
+        joint = build(rotation_about("z", theta))
+        joint[..., 2, 3] = change + link.d if link.prismatic else link.d
+        result[..., i, :, :] = _screw(*link.before) @ joint @ _screw(*link.after)
+    return result
+
+
+def in_convention(robot: Robot, convention: Convention) -> Robot:
+    """Return the same arm in the given convention: every q has the same pose of the tcp.
+
+    The screw a, alpha of a row moves over to the neighbouring joint. What is left over at the end of the
+    chain goes into the tool (standard to modified) or into the base (modified to standard), so that
+    T_world_base and T_flange_tcp may change.
+
+    Raises:
+        InputError: When the robot has no geometry.
+    """
+    links, joints = links_of(robot), robot.joints
+    if convention == robot.convention:
+        return robot
+    base, tool = robot.base, robot.tool
+    if convention == "modified":
+        screws = [(0.0, 0.0), *((joint.a, joint.alpha) for joint in joints[:-1])]
+        tool = _screw(*links[-1].after) @ tool
+    else:
+        screws = [*((joint.a, joint.alpha) for joint in joints[1:]), (0.0, 0.0)]
+        base = base @ _screw(*links[0].before)
+    moved = tuple(replace(joint, a=a, alpha=alpha) for joint, (a, alpha) in zip(joints, screws, strict=True))
+    return replace(robot, joints=moved, convention=convention, base=base, tool=tool)
+
+
+def _screw(a: float, cosine: float, sine: float) -> Array:
+    """Return the slide by `a` along x and the turn about it."""
+    return np.array(
+        [[1.0, 0.0, 0.0, a], [0.0, cosine, -sine, 0.0], [0.0, sine, cosine, 0.0], [0.0, 0.0, 0.0, 1.0]]
+    )

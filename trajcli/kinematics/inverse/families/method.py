@@ -7,11 +7,11 @@ from itertools import product
 from typing import Literal
 
 from trajcli.frozen import comparable, frozen
-from trajcli.kinematics.inverse.lines import Floats, Goal
-from trajcli.kinematics.inverse.subproblems import Value, Watch
+from trajcli.kinematics.inverse.families.screw_axes import Displacement, Floats
+from trajcli.kinematics.inverse.families.subproblems import DegeneracyFlags, Value
 
 Choice = Literal["shoulder", "elbow", "wrist"]
-Solver = Callable[[Goal, Watch], Sequence[Value]]
+Solver = Callable[[Displacement, DegeneracyFlags], Sequence[Value]]
 NAMES = {"shoulder": ("left", "right"), "elbow": ("up", "down"), "wrist": ("no_flip", "flip")}
 
 
@@ -28,7 +28,7 @@ class Branch:
 
 
 @frozen
-class Method:
+class IkMethod:
     """How the inverse kinematics of one arm is found.
 
     Attributes:
