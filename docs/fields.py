@@ -12,10 +12,7 @@ from pydantic.fields import FieldInfo
 from docs.markdown import first_sentence, table
 from trajcli.job.model import Output, RobotSource, UnitsSpec
 from trajcli.job.robot_model import JointModel
-from trajcli.planners import PLANNERS, Planner
-from trajcli.planners.arc_fields import ArcFields
-from trajcli.planners.blends import BlendDurations
-from trajcli.planners.bounds import (
+from trajcli.language.limits import (
     UNLIMITED,
     Bounds,
     JointBound,
@@ -23,24 +20,26 @@ from trajcli.planners.bounds import (
     Scale,
     ToolLimitsSpec,
 )
-from trajcli.planners.deviation import Deviation
-from trajcli.planners.fields import Target
+from trajcli.language.numbers import FieldType, Number
+from trajcli.language.per_joint import JointDistance, PerJoint
+from trajcli.language.poses import Pose
+from trajcli.language.targets import (
+    AxisAngleSpec,
+    Configuration,
+    Direction,
+    EulerSpec,
+    Matrix,
+    Numbers,
+    Target,
+)
+from trajcli.language.waypoints import PointsField, Waypoint
+from trajcli.planners import PLANNERS, Planner
+from trajcli.planners.arc_fields import ArcFields
+from trajcli.planners.blends import BlendDurations
 from trajcli.planners.operational import ToleranceSpec
 from trajcli.planners.path import Segment
 from trajcli.planners.path_law import LawSpec
-from trajcli.planners.per_joint import PerJoint
-from trajcli.planners.pose_fields import (
-    AxisAngle,
-    Configuration,
-    Direction,
-    Euler,
-    Matrix,
-    Numbers,
-)
-from trajcli.planners.poses import Pose
-from trajcli.planners.reading import FieldType, Number
 from trajcli.planners.time_optimal import PathParameter
-from trajcli.planners.waypoints import PointsField, Waypoint
 from trajcli.units import Quantity, Units, unit_name
 
 SECTIONS: dict[type, str] = {
@@ -50,8 +49,8 @@ SECTIONS: dict[type, str] = {
     Target: "[state](#states)",
     Output: "[output](#output)",
     JointModel: "[joint](#joints)",
-    AxisAngle: "[axis and angle](#axis-and-angle)",
-    Euler: "[Euler angles](#euler-angles)",
+    AxisAngleSpec: "[axis and angle](#axis-and-angle)",
+    EulerSpec: "[Euler angles](#euler-angles)",
     Configuration: "[configuration](#configuration)",
     Waypoint: "[waypoint](#waypoints)",
     ToolLimitsSpec: "[limits of the tool](#limits-of-the-tool)",
@@ -125,7 +124,7 @@ def _reader_form(reader: FieldType) -> str:
         JointBound: "[bound](#bounds)",
         Pose: "[pose](#poses)",
         RobotSource: "[robot](#robot)",
-        Deviation: f"number at least 0, {_BY_JOINT}",
+        JointDistance: f"number at least 0, {_BY_JOINT}",
         BlendDurations: "number above 0, or a list of them",
         PathParameter: "`chord` or `centripetal` or `uniform` or a list of numbers",
     }
@@ -169,8 +168,8 @@ def _unit(field: FieldInfo) -> str:
         return "joint" + ("", "/s", "/s^2", "/s^3")[reader.order]
     if isinstance(reader, Number | Numbers):
         return _quantity_unit(reader.quantity)
-    if isinstance(reader, Deviation | BlendDurations):
-        return "joint" if isinstance(reader, Deviation) else "s"
+    if isinstance(reader, JointDistance | BlendDurations):
+        return "joint" if isinstance(reader, JointDistance) else "s"
     listed = [item for item in get_args(_bare(field.annotation)) if get_origin(item) is Annotated]
     inner = [item for arm in listed for item in get_args(arm) if isinstance(item, Number)]
     return _quantity_unit(inner[0].quantity) if inner else ""

@@ -16,15 +16,14 @@ from trajcli.job.load import read_document
 from trajcli.job.model import Job, Output, UnitsSpec
 from trajcli.job.robot_model import JointModel, RobotModel
 from trajcli.job.robot_source import CATALOGUE, catalogue_names
+from trajcli.language.limits import LimitsSpec, Scale, ToolLimitsSpec
+from trajcli.language.numbers import MAX_JOINTS
+from trajcli.language.poses import SEQUENCES
+from trajcli.language.targets import AxisAngleSpec, Configuration, EulerSpec, Target
+from trajcli.language.waypoints import Waypoint
 from trajcli.planners import PLANNERS
-from trajcli.planners.bounds import LimitsSpec, Scale, ToolLimitsSpec
-from trajcli.planners.fields import Target
 from trajcli.planners.planner import Planner
 from trajcli.planners.point_to_point import PointToPoint
-from trajcli.planners.pose_fields import AxisAngle, Configuration, Euler
-from trajcli.planners.poses import SEQUENCES
-from trajcli.planners.reading import MAX_JOINTS
-from trajcli.planners.waypoints import Waypoint
 
 _INTRODUCTION = """\
 A job is one YAML document. Numbers follow YAML 1.2; anchors, tags, duplicate keys, unknown keys, NaN
@@ -147,7 +146,7 @@ def job_reference() -> str:
     parts += ["## Job", field_table(Job, {"points": "none"})]
     parts += ["## Units", field_table(UnitsSpec), *_strings_with_units()]
     parts += ["## States", _STATES, field_table(Target, {"joints": "see the planner"}), _POSE_TARGETS]
-    parts += ["### Axis and angle", field_table(AxisAngle), "### Euler angles", field_table(Euler)]
+    parts += ["### Axis and angle", field_table(AxisAngleSpec), "### Euler angles", field_table(EulerSpec)]
     parts += ["### Configuration", _CONFIGURATION, field_table(Configuration)]
     parts += ["### Waypoints", _WAYPOINTS, field_table(Waypoint, {"joints": "a pose instead"})]
     parts += ["## Values by joint", _VALUES]

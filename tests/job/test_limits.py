@@ -10,7 +10,7 @@ import pytest
 from trajcli.errors import InputError
 from trajcli.job.limits import with_move_limits
 from trajcli.job.read import LoadedJob, job_from_text
-from trajcli.planners.bounds import LimitsSpec
+from trajcli.language.limits import LimitsSpec
 
 DEG = math.pi / 180
 ROBOT = """{joints: [{name: turn, position: [-90, 90], velocity: 100, acceleration: [-300, 200]},

@@ -7,8 +7,8 @@ from fractions import Fraction
 import numpy as np
 
 from trajcli.kinematics.robot import Joint, Limits, Robot
+from trajcli.language.numbers import ReadingContext
 from trajcli.planners.jerk_limited import JerkLimited
-from trajcli.planners.reading import ReadingContext
 from trajcli.trajectory import State
 
 

@@ -9,8 +9,8 @@ import pytest
 import yaml
 
 from trajcli.kinematics.robot import Joint, Limits, Robot
+from trajcli.language.numbers import ReadingContext
 from trajcli.planners.jerk_limited import JerkLimited
-from trajcli.planners.reading import ReadingContext
 from trajcli.trajectory import State
 
 CASES = yaml.safe_load((Path(__file__).parents[1] / "oracles" / "jerk_limited.yaml").read_text("utf-8"))[

@@ -13,9 +13,9 @@ from trajcli.errors import InputError
 from trajcli.frozen import comparable
 from trajcli.job.inline import inline_target
 from trajcli.kinematics.inverse.solutions import Solutions
+from trajcli.language.targets import ik_target
 from trajcli.pipeline.arm import Arm, open_arm
 from trajcli.pipeline.inverse_answers import answers, find_answers, require_answer
-from trajcli.planners.goal import goal_of
 from trajcli.streams.csv import Digits
 
 
@@ -48,7 +48,7 @@ def run_ik(robot: str, words: Sequence[str], options: IkOptions) -> int:
     if options.pose is None:
         return _stream(arm, near, options)
     asked = inline_target(options.pose, "--pose", arm.units)
-    target = goal_of(asked)
+    target = ik_target(asked)
     found, chosen = find_answers(arm, target, asked.configuration, near, options.tolerance)
     told = answers(arm, found, chosen, target, near, every=options.every, turns=options.turns)
     if options.as_json:

@@ -17,8 +17,8 @@ from typing import Any
 from trajcli.job.read import LoadedJob
 from trajcli.job.robot_model import robot_as_mapping
 from trajcli.kinematics.robot import Robot
-from trajcli.planners.bounds import ToolLimitsSpec
-from trajcli.planners.reading import ReadingContext
+from trajcli.language.limits import ToolLimitsSpec
+from trajcli.language.numbers import ReadingContext
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _YAML_WORDS = {"null", "true", "false"}

@@ -14,9 +14,9 @@ from trajcli.errors import InputError, Problem
 from trajcli.job.document import Document
 from trajcli.job.load import parse_document, read_document
 from trajcli.job.messages import problems_of
-from trajcli.planners.pose_fields import PoseFields
-from trajcli.planners.poses import Pose
-from trajcli.planners.reading import AT_KEY, FlawError, ReadingContext
+from trajcli.language.numbers import AT_KEY, FlawError, ReadingContext
+from trajcli.language.poses import Pose
+from trajcli.language.targets import PoseFields
 from trajcli.units import (
     Quantity,
     UnitError,

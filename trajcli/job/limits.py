@@ -11,7 +11,7 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount, InputError, Problem
 from trajcli.kinematics.robot import QUANTITIES, Limits, Robot, ToolLimits
-from trajcli.planners.bounds import LimitsSpec
+from trajcli.language.limits import LimitsSpec
 from trajcli.planners.planner import Event
 
 _ROUNDING = 1e-12  # relative: a limit that differs by less was meant to be the same, in another unit

@@ -11,8 +11,8 @@ from pydantic_core import ErrorDetails
 
 from trajcli.errors import Problem
 from trajcli.job.load import Document
+from trajcli.language.numbers import AT_KEY, Flaw, shown
 from trajcli.planners import PLANNERS
-from trajcli.planners.reading import AT_KEY, Flaw, shown
 from trajcli.suggest import did_you_mean, valid_names
 
 Path = tuple[str | int, ...]

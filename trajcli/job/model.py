@@ -22,20 +22,20 @@ from pydantic_core import CoreSchema, core_schema
 from trajcli.columns import Group
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import Robot
-from trajcli.planners import PLANNERS, Planner, moves_adapter
-from trajcli.planners.bounds import LimitsSpec
-from trajcli.planners.fields import NamedTarget
-from trajcli.planners.model import Model
-from trajcli.planners.planner import WhenOverLimit
-from trajcli.planners.poses import Pose
-from trajcli.planners.reading import (
+from trajcli.language.limits import LimitsSpec
+from trajcli.language.numbers import (
     FieldType,
     FlawError,
+    Model,
     Number,
     ReadingContext,
     refuse,
     shown,
 )
+from trajcli.language.poses import Pose
+from trajcli.language.targets import NamedTarget
+from trajcli.planners import PLANNERS, Planner, moves_adapter
+from trajcli.planners.planner import WhenOverLimit
 from trajcli.units import Quantity, Units
 
 ROBOT_DEFINITION = "a robot"

@@ -22,8 +22,8 @@ from trajcli.job.override import Setting, overridden, parse_setting
 from trajcli.job.recording import reader_of
 from trajcli.job.robot_source import find_robot
 from trajcli.kinematics.robot import Robot, unlimited
+from trajcli.language.numbers import ReadingContext
 from trajcli.planners.planner import Event
-from trajcli.planners.reading import ReadingContext
 from trajcli.units import Quantity, Units, to_user, unit_name
 
 _UNREAD = Robot("unread", (), unlimited(0), None, np.eye(4), np.eye(4))

@@ -14,8 +14,8 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import FileError, InputError, Problem
 from trajcli.job.load import Document
 from trajcli.kinematics.robot import Robot
-from trajcli.planners.reading import FlawError
-from trajcli.planners.recorded import Recorded
+from trajcli.language.numbers import FlawError
+from trajcli.language.recorded import Recorded
 
 if TYPE_CHECKING:
     from trajcli.streams.table import Table

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from trajcli.planners.model import Model
+from trajcli.language.numbers import Model
 
 Seconds = Annotated[float, Field(description="Seconds.")]
 Quantity = Literal["position", "velocity", "acceleration", "jerk"]

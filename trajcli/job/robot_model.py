@@ -11,17 +11,17 @@ from pydantic_core import CoreSchema, core_schema
 
 from trajcli.job.model import UnitsSpec
 from trajcli.kinematics.robot import QUANTITIES, Joint, Limits, Robot
-from trajcli.planners.bounds import UNLIMITED, Bound, JointBound, written_bound
-from trajcli.planners.model import Model
-from trajcli.planners.poses import Pose
-from trajcli.planners.reading import (
+from trajcli.language.limits import UNLIMITED, JointBound, LowerUpper, written_bound
+from trajcli.language.numbers import (
     MAX_JOINTS,
+    Model,
     Number,
     ReadingContext,
     refuse,
     shown,
     written_number,
 )
+from trajcli.language.poses import Pose
 from trajcli.units import Dimension, Quantity
 
 _ANGLE, _LENGTH = Quantity("angle"), Quantity("length")
@@ -40,12 +40,12 @@ class JointModel(Model):
     a: Annotated[float, Number(_LENGTH, "Length along x (length unit).")] = 0.0
     alpha: Annotated[float, Number(_ANGLE, "Angle about x (angle unit).")] = 0.0
     sign: Annotated[Literal[1, -1], Field(description="Direction in which the joint counts.")] = 1
-    position: Annotated[Bound, JointBound(0, "Range [lower, upper] (angle or length unit).")] = UNLIMITED
-    velocity: Annotated[Bound, JointBound(1, "Velocity limit, or [lower, upper], per s.")] = UNLIMITED
-    acceleration: Annotated[Bound, JointBound(2, "Acceleration limit, or [lower, upper], per s^2.")] = (
+    position: Annotated[LowerUpper, JointBound(0, "Range [lower, upper] (angle or length unit).")] = UNLIMITED
+    velocity: Annotated[LowerUpper, JointBound(1, "Velocity limit, or [lower, upper], per s.")] = UNLIMITED
+    acceleration: Annotated[LowerUpper, JointBound(2, "Acceleration limit, or [lower, upper], per s^2.")] = (
         UNLIMITED
     )
-    jerk: Annotated[Bound, JointBound(3, "Jerk limit, or [lower, upper], per s^3.")] = UNLIMITED
+    jerk: Annotated[LowerUpper, JointBound(3, "Jerk limit, or [lower, upper], per s^3.")] = UNLIMITED
 
     @model_validator(mode="before")
     @classmethod

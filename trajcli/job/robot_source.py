@@ -14,7 +14,7 @@ from trajcli.job.load import Document, read_document
 from trajcli.job.messages import problems_of
 from trajcli.job.robot_model import RobotModel
 from trajcli.kinematics.robot import Robot
-from trajcli.planners.reading import ReadingContext, shown
+from trajcli.language.numbers import ReadingContext, shown
 from trajcli.suggest import did_you_mean, nearest, valid_names
 from trajcli.units import Units
 

@@ -20,10 +20,10 @@ from trajcli.kinematics.inverse.solve import solve
 from trajcli.kinematics.inverse.target import IkTarget, residual_jacobian
 from trajcli.kinematics.jacobian import jacobian
 from trajcli.kinematics.robot import Robot
+from trajcli.language.targets import Configuration
 from trajcli.pipeline.arm import Arm
 from trajcli.pipeline.differential import simplest
 from trajcli.pipeline.pose_view import plain
-from trajcli.planners.pose_fields import Configuration
 
 _LOST = max(RANK_TOLERANCE, 1e-7)  # of the largest singular value: answers meet their target within rounding
 _AROUND, _SPREAD = 4, 0.1  # configurations, rad or m: an arm is regular almost everywhere around

@@ -14,9 +14,9 @@ from trajcli.errors import Amount, Place, TrajcliError
 from trajcli.frozen import frozen
 from trajcli.job.limits import with_move_limits
 from trajcli.job.read import LoadedJob
+from trajcli.language.targets import Target
 from trajcli.pipeline.reach import Reached, mended, start_state, with_joints
 from trajcli.pipeline.stretch import PlannedMove, aligned, slowed
-from trajcli.planners.fields import Target
 from trajcli.planners.planner import Event, Planner
 from trajcli.trajectory import Span, State, Trajectory
 

@@ -12,8 +12,8 @@ from trajcli.frozen import comparable, frozen
 from trajcli.geometry.pose import invert
 from trajcli.geometry.rotation import Frame, compose_turns
 from trajcli.job.inline import inline_document, read_at
-from trajcli.planners.poses import Pose, read_numbers
-from trajcli.planners.reading import FlawError, ReadingContext, shown
+from trajcli.language.numbers import FlawError, ReadingContext, shown
+from trajcli.language.poses import Pose, read_numbers
 from trajcli.units import Quantity, Units
 
 _OWN_KEYS = ("frame", "invert")

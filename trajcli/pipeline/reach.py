@@ -11,9 +11,8 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, PlanningError, Problem
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Robot
-from trajcli.planners.fields import Target
+from trajcli.language.targets import Configuration, Target
 from trajcli.planners.planner import Event
-from trajcli.planners.pose_fields import Configuration
 from trajcli.trajectory import State
 
 if TYPE_CHECKING:
@@ -88,9 +87,9 @@ def start_state(target: Target, robot: Robot) -> tuple[State, Reached | None]:
 def _on_nearest_branch(target: Target, robot: Robot, near: Array) -> Reached:
     from trajcli.kinematics.inverse.solutions import check_reachable
     from trajcli.kinematics.inverse.solve import solve
-    from trajcli.planners.goal import goal_of
+    from trajcli.language.targets import ik_target
 
-    goal = goal_of(target)
+    goal = ik_target(target)
     found = solve(robot, goal, near)
     check_reachable(robot, found)
     chosen = _of_configuration(

@@ -7,10 +7,8 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from trajcli.planners.fields import NamedTarget
-from trajcli.planners.model import Model
-from trajcli.planners.pose_fields import Direction, Numbers, Row
-from trajcli.planners.reading import Flaw, Number, refuse
+from trajcli.language.numbers import Flaw, Model, Number, refuse
+from trajcli.language.targets import Direction, NamedTarget, Numbers, Row
 from trajcli.planners.tool_fields import flaws_of_target
 from trajcli.units import Quantity
 

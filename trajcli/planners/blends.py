@@ -15,12 +15,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount, PlanningError, Problem
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import Robot
-from trajcli.planners.blend_times import blend_times
-from trajcli.planners.fields import JointAccelerationMagnitudes
-from trajcli.planners.per_joint import flawed
-from trajcli.planners.planner import Event, Phase, Planned
-from trajcli.planners.point_to_point import missing_limit, require_rest, standstill
-from trajcli.planners.reading import (
+from trajcli.language.numbers import (
     FieldType,
     Flaw,
     FlawError,
@@ -28,7 +23,12 @@ from trajcli.planners.reading import (
     ReadingContext,
     refuse,
 )
-from trajcli.planners.recorded import Recorded
+from trajcli.language.per_joint import flawed
+from trajcli.language.recorded import Recorded
+from trajcli.language.targets import JointAccelerationMagnitudes
+from trajcli.planners.blend_times import blend_times
+from trajcli.planners.planner import Event, Phase, Planned
+from trajcli.planners.point_to_point import missing_limit, require_rest, standstill
 from trajcli.planners.through_points import PointTable, ThroughPoints
 from trajcli.trajectory import Passage, State
 from trajcli.units import Quantity

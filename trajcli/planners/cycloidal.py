@@ -9,7 +9,7 @@ import numpy as np
 from trajcli.curves.cycloid import PEAKS, cycloid_law
 from trajcli.curves.operations import along_line
 from trajcli.kinematics.robot import Robot
-from trajcli.planners.fields import Duration
+from trajcli.language.targets import Duration
 from trajcli.planners.planner import Planned
 from trajcli.planners.point_to_point import (
     PointToPoint,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar, Literal
 
 from trajcli.kinematics.robot import Robot
-from trajcli.planners.fields import Duration
+from trajcli.language.targets import Duration
 from trajcli.planners.planner import Planned, Planner
 from trajcli.planners.point_to_point import require_rest, standstill
 from trajcli.trajectory import State

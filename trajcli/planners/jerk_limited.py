@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from trajcli.kinematics.robot import Robot
-from trajcli.planners.fields import MinimumDuration
+from trajcli.language.targets import MinimumDuration
 from trajcli.planners.planner import Planned
 from trajcli.planners.point_to_point import PointToPoint
 from trajcli.trajectory import State

@@ -10,12 +10,11 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Robot
-from trajcli.planners.model import Model
+from trajcli.language.numbers import Model, Number
+from trajcli.language.targets import Configuration
 from trajcli.planners.path_law import LawSpec
 from trajcli.planners.planner import Event, Planned, Planner
 from trajcli.planners.point_to_point import require_rest, standstill
-from trajcli.planners.pose_fields import Configuration
-from trajcli.planners.reading import Number
 from trajcli.trajectory import State
 from trajcli.units import Quantity
 

@@ -9,11 +9,10 @@ from pydantic import Field, model_validator
 
 from trajcli.curves.piecewise import Array
 from trajcli.kinematics.robot import Robot
+from trajcli.language.numbers import Flaw, Model, Number, refuse
+from trajcli.language.targets import NamedTarget
 from trajcli.planners.arc_fields import ArcFields
-from trajcli.planners.fields import NamedTarget
-from trajcli.planners.model import Model
 from trajcli.planners.operational import OperationalMove, Way
-from trajcli.planners.reading import Flaw, Number, refuse
 from trajcli.planners.tool_fields import flaws_of_target
 from trajcli.units import Quantity
 

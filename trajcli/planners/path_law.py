@@ -6,10 +6,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from trajcli.planners.bounds import AngularAcceleration, AngularSpeed, ToolAcceleration, ToolJerk, ToolSpeed
-from trajcli.planners.fields import Duration, MinimumDuration
-from trajcli.planners.model import Model
-from trajcli.planners.reading import Flaw, refuse
+from trajcli.language.limits import AngularAcceleration, AngularSpeed, ToolAcceleration, ToolJerk, ToolSpeed
+from trajcli.language.numbers import Flaw, Model, refuse
+from trajcli.language.targets import Duration, MinimumDuration
 
 Shape = Literal["trapezoid", "cubic", "quintic", "cycloidal", "jerk_limited", "time_optimal"]
 

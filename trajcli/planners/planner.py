@@ -12,13 +12,13 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount, PlanningError, said
 from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Robot
-from trajcli.planners.bounds import LimitsSpec
-from trajcli.planners.model import Model
+from trajcli.language.limits import LimitsSpec
+from trajcli.language.numbers import Model
 from trajcli.trajectory import Passage, State
 
 if TYPE_CHECKING:
     from trajcli.kinematics.following.motion import ToolMotion
-    from trajcli.planners.fields import Target
+    from trajcli.language.targets import Target
 
 Resolve = Callable[["Target", Array], "Target"]
 WhenOverLimit = Literal["error", "slow"]

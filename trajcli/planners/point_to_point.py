@@ -11,9 +11,9 @@ from pydantic import Field, model_validator
 from trajcli.curves.piecewise import Array, constant
 from trajcli.errors import Amount, MissingLimitError, PlanningError, Problem
 from trajcli.kinematics.robot import QUANTITIES, Limits, Robot
-from trajcli.planners.fields import NamedTarget
+from trajcli.language.numbers import refuse
+from trajcli.language.targets import NamedTarget
 from trajcli.planners.planner import Planned, Planner, Resolve
-from trajcli.planners.reading import refuse
 from trajcli.trajectory import State
 
 _NOTHING = 1e-15  # rad or m: a move this short is none; a thousandth of what counts as a jump

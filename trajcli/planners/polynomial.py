@@ -13,7 +13,7 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.curves.smallest_feasible import smallest_feasible
 from trajcli.errors import PlanningError, Problem
 from trajcli.kinematics.robot import Limits, Robot
-from trajcli.planners.fields import Duration
+from trajcli.language.targets import Duration
 from trajcli.planners.planner import Planned
 from trajcli.planners.point_to_point import (
     PointToPoint,

@@ -8,9 +8,9 @@ from pydantic import Field, model_validator
 
 from trajcli.curves.piecewise import Array
 from trajcli.kinematics.robot import Robot
-from trajcli.planners.fields import NamedTarget
+from trajcli.language.numbers import refuse
+from trajcli.language.targets import NamedTarget
 from trajcli.planners.operational import OperationalMove, Way
-from trajcli.planners.reading import refuse
 from trajcli.planners.tool_fields import flaws_of_target
 
 

@@ -12,15 +12,15 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.curves.splines.shape_preserving import ShapeError
 from trajcli.errors import Amount, PlanningError, Problem
 from trajcli.kinematics.robot import Robot
+from trajcli.language.numbers import FieldPath, Flaw, refuse
+from trajcli.language.recorded import Recorded
+from trajcli.language.targets import Numbers
+from trajcli.language.waypoints import Waypoint
 from trajcli.planners.planner import Planned
 from trajcli.planners.point_to_point import standstill
-from trajcli.planners.pose_fields import Numbers
-from trajcli.planners.reading import Flaw, Path, refuse
-from trajcli.planners.recorded import Recorded
 from trajcli.planners.spline_rules import FREE_ENDS, IMPOSES, Rule, curve_through
 from trajcli.planners.spline_times import fastest_spline_times
 from trajcli.planners.through_points import PointTable, ThroughPoints, passage_through
-from trajcli.planners.waypoints import Waypoint
 from trajcli.trajectory import State
 from trajcli.units import Quantity
 
@@ -95,7 +95,7 @@ class Spline(ThroughPoints):
         for k, point in enumerate(self.listed):
             if point.blend is not None:
                 last = self.to is not None and k == len(self.listed) - 1
-                path: Path = ("to",) if last else ("through", k)
+                path: FieldPath = ("to",) if last else ("through", k)
                 yield (*path, "blend"), "a spline goes through its points", "use blends, or leave it out"
 
     def _flaws_of_target(self) -> Iterator[Flaw]:
@@ -108,7 +108,7 @@ class Spline(ThroughPoints):
                 text = f"rule {self.rule} does not impose the {name} at its end"
                 yield (*path, name), text, "use continuous_acceleration or quintic, or leave it out"
 
-    def _target(self) -> tuple[Path, Waypoint | None]:
+    def _target(self) -> tuple[FieldPath, Waypoint | None]:
         if self.to is not None:
             return ("to",), self.to
         if isinstance(self.through, Recorded):
@@ -118,7 +118,7 @@ class Spline(ThroughPoints):
     def _flaws_of_virtual_times(self) -> Iterator[Flaw]:
         if self.virtual_times is None:
             return
-        path: Path = ("virtual_times",)
+        path: FieldPath = ("virtual_times",)
         if self.rule != "continuous_acceleration":
             yield (
                 path,

@@ -14,11 +14,11 @@ from pydantic import Field, model_validator
 from trajcli.curves.piecewise import Array
 from trajcli.errors import PlanningError, TrajcliError
 from trajcli.frozen import frozen
-from trajcli.planners.fields import Duration, Target
+from trajcli.language.numbers import Flaw, refuse
+from trajcli.language.recorded import Recorded
+from trajcli.language.targets import Duration, Target
+from trajcli.language.waypoints import NamedWaypoint, Through, Waypoint
 from trajcli.planners.planner import Event, Planner, Resolve
-from trajcli.planners.reading import Flaw, refuse
-from trajcli.planners.recorded import Recorded
-from trajcli.planners.waypoints import NamedWaypoint, Through, Waypoint
 from trajcli.trajectory import Passage, State
 
 _SAME_TIME = 1e-9  # relative: a duration and the time of the last point that agree

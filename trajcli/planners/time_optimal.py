@@ -18,12 +18,7 @@ from trajcli.curves.time_optimal.switching import switching_structure
 from trajcli.errors import Amount, PlanningError, Problem
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import Robot
-from trajcli.planners.deviation import Deviation
-from trajcli.planners.joint_path import JointPath, polyline_through, spline_through
-from trajcli.planners.planner import Event, Phase, Planned, stretched
-from trajcli.planners.point_to_point import missing_limit, standstill
-from trajcli.planners.poses import read_numbers
-from trajcli.planners.reading import (
+from trajcli.language.numbers import (
     FieldType,
     Flaw,
     FlawError,
@@ -31,7 +26,12 @@ from trajcli.planners.reading import (
     refuse,
     shown,
 )
-from trajcli.planners.recorded import Recorded
+from trajcli.language.per_joint import JointDistance
+from trajcli.language.poses import read_numbers
+from trajcli.language.recorded import Recorded
+from trajcli.planners.joint_path import JointPath, polyline_through, spline_through
+from trajcli.planners.planner import Event, Phase, Planned, stretched
+from trajcli.planners.point_to_point import missing_limit, standstill
 from trajcli.planners.spline_rules import Rule
 from trajcli.planners.through_points import PointTable, ThroughPoints
 from trajcli.trajectory import Passage, State
@@ -97,7 +97,7 @@ class TimeOptimal(ThroughPoints):
     corner: (
         Annotated[
             tuple[float, ...],
-            Deviation(
+            JointDistance(
                 "Of the polyline: how far a joint may pass from a corner (angle unit, or length unit for "
                 "prismatic joints); 0 or left out: stop there."
             ),

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from trajcli.planners.fields import Target
-from trajcli.planners.reading import Flaw, Path
+from trajcli.language.numbers import FieldPath, Flaw
+from trajcli.language.targets import Target
 
 
-def flaws_of_target(target: Target, path: Path, planner: str) -> Iterator[Flaw]:
+def flaws_of_target(target: Target, path: FieldPath, planner: str) -> Iterator[Flaw]:
     """Yield what is wrong with the target of a move along a path: it is a place, and at rest."""
     if not target.is_place:
         yield path, f"{planner} needs a pose or `joints` in its target", None

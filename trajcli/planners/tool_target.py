@@ -12,8 +12,7 @@ from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.target import IkTarget as Goal
 from trajcli.kinematics.inverse.target import OrientationConstraint, meeting, partial_target, residuals
 from trajcli.kinematics.robot import Robot
-from trajcli.planners.fields import Target
-from trajcli.planners.goal import goal_of
+from trajcli.language.targets import Target, ik_target
 
 _WHOLE = (True, True, True)
 _ALL_SIX = 6
@@ -52,7 +51,7 @@ def tool_target(target: Target, before: Array, robot: Robot) -> ToolTarget:
     if target.joints is not None:
         joints = np.array(target.joints)
         return ToolTarget(forward(robot, joints), _WHOLE, "all", joints=joints)
-    goal = goal_of(target)
+    goal = ik_target(target)
     position = goal.poses[:3, 3] if target.gives_position else before[:3, 3]
     if goal.orientation == "none":
         pose = before.copy()

@@ -13,7 +13,7 @@ from trajcli.geometry.paths.pose import PoseCurve
 from trajcli.geometry.paths.position import SAME_PLACE, Line, Pivot, PositionCurve
 from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.robot import Robot
-from trajcli.planners.fields import Target
+from trajcli.language.targets import Target
 from trajcli.planners.operational import Orientation, Way
 from trajcli.planners.tool_orientation import orientation_along
 from trajcli.planners.tool_target import ToolTarget, tool_target

@@ -20,10 +20,10 @@ from trajcli.curves.trapezoid import (
 )
 from trajcli.errors import Amount, PlanningError, Problem
 from trajcli.kinematics.robot import Robot
-from trajcli.planners.fields import Duration, JointAccelerationMagnitudes, JointSpeeds, MinimumDuration
+from trajcli.language.numbers import refuse
+from trajcli.language.targets import Duration, JointAccelerationMagnitudes, JointSpeeds, MinimumDuration
 from trajcli.planners.planner import Phase, Planned
 from trajcli.planners.point_to_point import PointToPoint, missing_limit, same_state, standstill
-from trajcli.planners.reading import refuse
 from trajcli.planners.trapezoid_errors import explain_infeasible
 from trajcli.trajectory import State
 

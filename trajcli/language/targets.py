@@ -1,35 +1,55 @@
-"""The fields of a pose target: what it leaves out is free."""
+"""The fields of a pose target: what it leaves out is free.
+
+Fields that several planners share: times, values by joint, targets.
+
+The coordinates of the tcp's pose that a target fixes.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated, Any, Literal
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+import numpy as np
+from pydantic import (
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    ValidationError,
+    model_validator,
+)
 from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, core_schema
 
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import comparable
-from trajcli.planners.model import Model
-from trajcli.planners.poses import Pose, read_numbers
-from trajcli.planners.reading import (
+from trajcli.language.numbers import (
     SI,
     FieldType,
     FlawError,
+    Model,
     Number,
     ReadingContext,
     refuse,
     shown,
     written_number,
 )
+from trajcli.language.per_joint import PerJoint
+from trajcli.language.poses import Pose, read_numbers
+from trajcli.suggest import did_you_mean, valid_names
+from trajcli.trajectory import State
 from trajcli.units import Quantity
+
+if TYPE_CHECKING:
+    from trajcli.kinematics.inverse.target import IkTarget
 
 _ANGLE, _LENGTH, _RATIO = Quantity("angle"), Quantity("length"), Quantity("ratio")
 _ROTATIONS = ("rpy", "quat_wxyz", "matrix", "axis_angle", "euler")
 _AIMS = ("yaw", "pitch", "direction")
 _NUMBER: JsonSchemaValue = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": "^[-+.0-9]"}]}
 
-Axis = Literal["x", "y", "z"]
+AxisName = Literal["x", "y", "z"]
 Row = tuple[float, ...]
 
 
@@ -123,14 +143,14 @@ class Matrix(FieldType):
         return {"type": "array", "items": row, "minItems": 3, "maxItems": 4}
 
 
-class AxisAngle(Model):
+class AxisAngleSpec(Model):
     """A rotation by an angle about an axis."""
 
     axis: Annotated[Row, Direction("x, y, z, or three numbers; only the direction counts.")]
     angle: Annotated[float, Number(_ANGLE, "Angle, right-handed about the axis (angle unit).")]
 
 
-class Euler(Model):
+class EulerSpec(Model):
     """Euler angles."""
 
     sequence: Annotated[
@@ -160,15 +180,15 @@ class PoseFields(Model):
     matrix: (
         Annotated[tuple[Row, ...], Matrix("Rotation 3x3, or homogeneous 4x4 with the position.")] | None
     ) = None
-    axis_angle: AxisAngle | None = None
-    euler: Euler | None = None
+    axis_angle: AxisAngleSpec | None = None
+    euler: EulerSpec | None = None
     yaw: Annotated[float, Number(_ANGLE, "Heading of the tool axis in world (angle unit).")] | None = None
     pitch: (
         Annotated[float, Number(_ANGLE, "Elevation of the tool axis over the x-y plane (angle unit).")] | None
     ) = None
     direction: Annotated[Row, Direction("Where the tool axis points, in world.")] | None = None
     tool_axis: Annotated[
-        Axis | None,
+        AxisName | None,
         Field(description="The axis of the tcp that yaw, pitch and direction mean; z if left out."),
     ] = None
     configuration: Configuration | None = None
@@ -223,3 +243,141 @@ class PoseFields(Model):
         if form == "matrix":
             written[form] = [list(row) for row in written[form]]
         return Pose("").read(written, SI)
+
+
+Duration = Annotated[float, Number(Quantity("time"), "Duration of the move, s.", above=0.0)]
+MinimumDuration = Annotated[
+    float, Number(Quantity("time"), "The move lasts at least this long, s.", above=0.0)
+]
+JointPositions = Annotated[
+    tuple[float, ...],
+    PerJoint(0, "Position of each joint (angle or length unit): one for all, a list, or by joint name."),
+]
+JointVelocities = Annotated[
+    tuple[float, ...],
+    PerJoint(1, "Velocity of each joint, per s; joints left out of a mapping are 0.", zero_missing=True),
+]
+JointAccelerations = Annotated[
+    tuple[float, ...],
+    PerJoint(
+        2, "Acceleration of each joint, per s^2; joints left out of a mapping are 0.", zero_missing=True
+    ),
+]
+JointSpeeds = Annotated[tuple[float, ...], PerJoint(1, "Speed of each joint, per s, above 0.", above=0.0)]
+JointAccelerationMagnitudes = Annotated[
+    tuple[float, ...],
+    PerJoint(2, "Magnitude of the acceleration of each joint, per s^2, above 0.", above=0.0),
+]
+
+
+class Target(PoseFields, defer_build=False):  # made once, not for each planner that has it
+    """The state that a point names, or that a move starts from or ends in: by its joints, or by a pose."""
+
+    joints: JointPositions | None = None
+    velocity: JointVelocities | None = None
+    acceleration: JointAccelerations | None = None
+
+    @model_validator(mode="after")
+    def _says_something(self) -> Target:
+        if self.joints is not None and self.gives_pose:
+            key = self.pose_keys[0]
+            raise refuse([((key,), f"joints and {key} exclude each other", "leave one of them out")])
+        if self.joints is None and self.velocity is None and not self.gives_pose:
+            text = "a state needs `joints` or a pose (or `velocity` alone, for a stop)"
+            raise refuse([((), text, None)])
+        return self
+
+    @property
+    def is_place(self) -> bool:
+        """Whether it says where to be, and not only how fast."""
+        return self.joints is not None or self.gives_pose
+
+    def as_state(self) -> State:
+        """Return the state; what is not given is zero.
+
+        Raises:
+            ValueError: When the target has no joints.
+        """
+        if self.joints is None:
+            raise ValueError("a target without joints is no state")
+        zero = (0.0,) * len(self.joints)
+        return State(
+            np.array(self.joints), np.array(self.velocity or zero), np.array(self.acceleration or zero)
+        )
+
+
+class Named:
+    """Lets the name of a point stand for the point."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
+        return core_schema.with_info_wrap_validator_function(self._read, handler(source))
+
+    @staticmethod
+    def _read(
+        value: Any,  # noqa: ANN401
+        validate: core_schema.ValidatorFunctionWrapHandler,
+        info: core_schema.ValidationInfo,
+    ) -> Any:  # noqa: ANN401
+        if not isinstance(value, str):
+            if not isinstance(value, Mapping | Target):
+                hint = "write {joints: ...}, or the name of a point"
+                raise refuse([((), f"expected a state, got {shown(value)}", hint)])
+            return validate(value)
+        state = _look_up(value, (info.context or SI).points)
+        try:
+            return validate(state)
+        except ValidationError:
+            raise refuse([]) from None  # the flaw is the point's, and is reported where the point stands
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        name = {"type": "string", "description": "Name of a point under `points`."}
+        return {"anyOf": [name, handler(schema)]}
+
+
+def _look_up(name: str, points: Mapping[str, Any]) -> Any:  # noqa: ANN401
+    """Return the state that a point's name stands for; the point may itself be the name of another."""
+    state, seen = name, [name]
+    while state in points:
+        state = points[state]
+        if not isinstance(state, str):
+            return state
+        if state in seen:
+            raise refuse(
+                [((), f"the point '{state}' is named by itself ({' -> '.join([*seen, state])})", None)]
+            )
+        seen.append(state)
+    if len(seen) > 1:
+        raise refuse([])  # reported where the point that names it stands
+    raise refuse([((), f"there is no point '{name}'", _known(name, points))])
+
+
+def _known(name: str, points: Mapping[str, Any]) -> str:
+    return did_you_mean(name, points) or valid_names(points, "points") or "the job has no `points`"
+
+
+NamedTarget = Annotated[Target, Named()]
+
+
+_UPRIGHT = 1e-9  # rad: a pitch this close to a quarter turn is one
+
+
+def ik_target(fields: PoseFields) -> IkTarget:
+    """Return the coordinates of the tcp's pose that a target fixes."""
+    from trajcli.kinematics.inverse.target import partial_target
+
+    pose = fields.full_pose()
+    position = pose[:3, 3] if fields.gives_position else None
+    if fields.rotation_form is not None:
+        return partial_target(position, rotation=pose[:3, :3])
+    if fields.pitch is not None and math.pi / 2 - abs(fields.pitch) <= _UPRIGHT:
+        upright = (0.0, 0.0, math.copysign(1.0, fields.pitch))  # there the elevation has no slope to follow
+        return partial_target(position, direction=upright, tool_axis=fields.tool_axis or "z")
+    return partial_target(
+        position,
+        direction=fields.direction,
+        yaw=fields.yaw,
+        pitch=fields.pitch,
+        tool_axis=fields.tool_axis or "z",
+    )

@@ -10,11 +10,7 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
-from trajcli.planners.deviation import Deviation
-from trajcli.planners.fields import Named, Target
-from trajcli.planners.per_joint import PerJoint
-from trajcli.planners.poses import read_numbers
-from trajcli.planners.reading import (
+from trajcli.language.numbers import (
     AT_KEY,
     SI,
     FlawError,
@@ -23,11 +19,14 @@ from trajcli.planners.reading import (
     refuse,
     shown,
 )
-from trajcli.planners.recorded import Recorded
+from trajcli.language.per_joint import JointDistance, PerJoint
+from trajcli.language.poses import read_numbers
+from trajcli.language.recorded import Recorded
+from trajcli.language.targets import Named, Target
 from trajcli.units import Quantity
 
 _TIME = Quantity("time")
-_MERGE = Deviation(
+_MERGE = JointDistance(
     "Points no joint of which is further than this from the point before are left out (angle or length unit, "
     "as the joint is)."
 )

@@ -3,6 +3,8 @@
 A field type is an annotation, such as `Annotated[float, Number(...)]`, that pydantic asks for a validator
 and for a JSON schema. The reading context says which units the file uses and which joints the robot has;
 without one (a planner built in Python) values are SI.
+
+The base of everything that a job file may hold.
 """
 
 from __future__ import annotations
@@ -12,12 +14,19 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    ValidationInfo,
+    model_validator,
+)
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from trajcli.frozen import comparable
-from trajcli.planners.recorded import Recorded
+from trajcli.language.recorded import Recorded
 from trajcli.units import (
     Quantity,
     UnitError,
@@ -28,8 +37,8 @@ from trajcli.units import (
 )
 
 MAX_JOINTS = 12
-Path = tuple[str | int, ...]
-Flaw = tuple[Path, str, str | None]
+FieldPath = tuple[str | int, ...]
+Flaw = tuple[FieldPath, str, str | None]
 """Where below a value something is wrong, what, and what would fix it."""
 AT_KEY = "\0key"
 """Last step of a path that means a key itself, not the value behind it."""
@@ -211,3 +220,19 @@ class Number(FieldType):
         if self.quantity.dimension == "ratio":
             return number
         return {"anyOf": [number, {"type": "string", "pattern": "^[-+.0-9]"}]}
+
+
+class Model(BaseModel):
+    """Base of everything that a job file may hold: frozen, and strict about unknown keys."""
+
+    # Most models stand only in others, and never need the reader that would be made with each class.
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _nothing_left_empty(cls, data: Any, info: ValidationInfo) -> Any:  # noqa: ANN401
+        # `duration:` with nothing behind it is a slip of the pen: only what a file leaves out is left out
+        if info.context is None or not isinstance(data, dict) or None not in data.values():
+            return data
+        optional = {name for name, field in cls.model_fields.items() if field.default is None}
+        return {key: NULL if value is None and key in optional else value for key, value in data.items()}

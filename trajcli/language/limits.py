@@ -9,24 +9,24 @@ from pydantic.json_schema import JsonSchemaValue
 
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import QUANTITIES
-from trajcli.planners.model import Model
-from trajcli.planners.per_joint import per_joint_schema, read_per_joint
-from trajcli.planners.reading import (
+from trajcli.language.numbers import (
     FieldType,
     FlawError,
+    Model,
     Number,
     ReadingContext,
     read_number,
     shown,
     written_number,
 )
+from trajcli.language.per_joint import per_joint_schema, read_per_joint
 from trajcli.units import Quantity
 
-Bound = tuple[float, float]
-UNLIMITED: Bound = (-math.inf, math.inf)
+LowerUpper = tuple[float, float]
+UNLIMITED: LowerUpper = (-math.inf, math.inf)
 
 
-def read_bound(value: Any, quantity: Quantity, context: ReadingContext) -> Bound:  # noqa: ANN401
+def read_bound(value: Any, quantity: Quantity, context: ReadingContext) -> LowerUpper:  # noqa: ANN401
     """Return (lower, upper) in SI from a magnitude, a pair by direction, or null for unlimited.
 
     Raises:
@@ -60,7 +60,7 @@ def _read_end(value: Any, index: int, quantity: Quantity, context: ReadingContex
         raise FlawError(str(error), index) from None
 
 
-def written_bound(bound: Bound, quantity: Quantity) -> list[float | str] | None:
+def written_bound(bound: LowerUpper, quantity: Quantity) -> list[float | str] | None:
     """Return (lower, upper) in SI as it may stand in a file of any units, to be read bit by bit."""
     return None if bound == UNLIMITED else [written_number(end, quantity) for end in bound]
 
@@ -79,7 +79,7 @@ class JointBound(FieldType):
     order: int
     description: str
 
-    def read(self, value: Any, context: ReadingContext) -> Bound:  # noqa: ANN401
+    def read(self, value: Any, context: ReadingContext) -> LowerUpper:  # noqa: ANN401
         """Return (lower, upper) in SI."""
         return read_bound(value, context.joint_quantity(0, self.order), context)
 
@@ -95,10 +95,10 @@ class Bounds(FieldType):
     order: int
     description: str
 
-    def read(self, value: Any, context: ReadingContext) -> tuple[Bound | None, ...]:  # noqa: ANN401
+    def read(self, value: Any, context: ReadingContext) -> tuple[LowerUpper | None, ...]:  # noqa: ANN401
         """Return (lower, upper) in SI for each joint."""
 
-        def read_one(item: Any, joint: int) -> Bound:  # noqa: ANN401
+        def read_one(item: Any, joint: int) -> LowerUpper:  # noqa: ANN401
             return read_bound(item, context.joint_quantity(joint, self.order), context)
 
         try:
@@ -114,7 +114,7 @@ class Bounds(FieldType):
             raise
         return bounds if any(bound is not None for bound in bounds) else ()
 
-    def write(self, value: tuple[Bound | None, ...], context: ReadingContext) -> dict[str, Any]:
+    def write(self, value: tuple[LowerUpper | None, ...], context: ReadingContext) -> dict[str, Any]:
         """Return the bounds by joint name; without names, nothing can be written."""
         names = context.joint_names or ()
         return {
@@ -177,16 +177,16 @@ class LimitsSpec(Model, defer_build=False):  # made once, not for each planner t
     """Limits that replace or tighten others; what is left out stays as it is, null is unlimited."""
 
     position: Annotated[
-        tuple[Bound | None, ...], Bounds(0, "Range of each joint (angle or length unit).")
+        tuple[LowerUpper | None, ...], Bounds(0, "Range of each joint (angle or length unit).")
     ] = ()
-    velocity: Annotated[tuple[Bound | None, ...], Bounds(1, "Velocity limit of each joint, per s.")] = ()
+    velocity: Annotated[tuple[LowerUpper | None, ...], Bounds(1, "Velocity limit of each joint, per s.")] = ()
     acceleration: Annotated[
-        tuple[Bound | None, ...], Bounds(2, "Acceleration limit of each joint, per s^2.")
+        tuple[LowerUpper | None, ...], Bounds(2, "Acceleration limit of each joint, per s^2.")
     ] = ()
-    jerk: Annotated[tuple[Bound | None, ...], Bounds(3, "Jerk limit of each joint, per s^3.")] = ()
+    jerk: Annotated[tuple[LowerUpper | None, ...], Bounds(3, "Jerk limit of each joint, per s^3.")] = ()
     scale: Scale = Scale()
     tcp: ToolLimitsSpec | None = None
 
-    def of_order(self, order: int) -> tuple[Bound | None, ...]:
+    def of_order(self, order: int) -> tuple[LowerUpper | None, ...]:
         """Return the bounds of a derivative, of order 0 (position) to 3 (jerk); empty where none is given."""
         return getattr(self, QUANTITIES[order])  # type: ignore[no-any-return]

@@ -1,4 +1,7 @@
-"""Values by joint: one for all joints, a list, or a mapping by joint name."""
+"""Values by joint: one for all joints, a list, or a mapping by joint name.
+
+A distance in joint space: how far each joint may be from a point.
+"""
 
 from __future__ import annotations
 
@@ -8,15 +11,15 @@ from typing import Any
 from pydantic.json_schema import JsonSchemaValue
 
 from trajcli.frozen import comparable
-from trajcli.planners.reading import (
+from trajcli.language.numbers import (
     AT_KEY,
     MAX_JOINTS,
     SI,
+    FieldPath,
     FieldType,
     Flaw,
     FlawError,
     Number,
-    Path,
     ReadingContext,
     shown,
     written_number,
@@ -92,7 +95,7 @@ def _read_items(
         try:
             values[index] = read_one(item, index)
         except FlawError as error:
-            prefix: Path = () if key is None else (key,)
+            prefix: FieldPath = () if key is None else (key,)
             flaws += [((*prefix, *path), text, hint) for path, text, hint in error.flaws]
             if key is None:
                 break
@@ -147,3 +150,26 @@ def per_joint_schema(one: JsonSchemaValue) -> JsonSchemaValue:
     """Return the schema of `one` for all joints, a list, or a mapping by joint name."""
     listed = {"type": "array", "items": one, "minItems": 1, "maxItems": MAX_JOINTS}
     return {"anyOf": [one, listed, {"type": "object", "additionalProperties": one}]}
+
+
+@comparable
+class JointDistance(FieldType):
+    """A distance for each joint, an angle or a length as the joint is; one number stands for all."""
+
+    description: str
+
+    def read(self, value: Any, context: ReadingContext) -> tuple[float, ...]:  # noqa: ANN401
+        """Return one distance for each joint, rad or m."""
+
+        def read_one(item: Any, joint: int) -> float:  # noqa: ANN401
+            return Number(context.joint_quantity(joint, 0), "", at_least=0.0).read(item, context)
+
+        return read_per_joint(value, context, read_one)
+
+    def write(self, value: tuple[float, ...], context: ReadingContext) -> list[float | str]:
+        """Return a list with the SI unit of each joint."""
+        return [written_number(v, context.joint_quantity(i, 0)) for i, v in enumerate(value)]
+
+    def json_schema(self) -> JsonSchemaValue:
+        """Return the schema of one number for all joints, a list, or a mapping by joint name."""
+        return per_joint_schema(Number(Quantity("angle"), "", at_least=0.0).json_schema())

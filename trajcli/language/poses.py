@@ -11,7 +11,7 @@ from pydantic.json_schema import JsonSchemaValue
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import comparable
-from trajcli.planners.reading import (
+from trajcli.language.numbers import (
     AT_KEY,
     FieldType,
     FlawError,

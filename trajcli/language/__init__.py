@@ -1,0 +1,1 @@
+"""Values of the job file as pydantic types: numbers with units, limits, poses, targets, waypoints."""
