@@ -34,12 +34,12 @@ from trajcli.language.targets import (
 )
 from trajcli.language.waypoints import PointsField, Waypoint
 from trajcli.planners import PLANNERS, Planner
-from trajcli.planners.arc_fields import ArcFields
-from trajcli.planners.blends import BlendDurations
-from trajcli.planners.operational import ToleranceSpec
-from trajcli.planners.path import Segment
-from trajcli.planners.path_law import LawSpec
-from trajcli.planners.time_optimal import PathParameter
+from trajcli.planners.tool_path.arc import ArcFields
+from trajcli.planners.tool_path.law import LawSpec
+from trajcli.planners.tool_path.move import ToleranceSpec
+from trajcli.planners.tool_path.path import Segment
+from trajcli.planners.waypoints.blends import BlendDurations
+from trajcli.planners.waypoints.time_optimal import PathParameter
 from trajcli.units import Quantity, Units, unit_name
 
 SECTIONS: dict[type, str] = {

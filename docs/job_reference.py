@@ -23,7 +23,7 @@ from trajcli.language.targets import AxisAngleSpec, Configuration, EulerSpec, Ta
 from trajcli.language.waypoints import Waypoint
 from trajcli.planners import PLANNERS
 from trajcli.planners.planner import Planner
-from trajcli.planners.point_to_point import PointToPoint
+from trajcli.planners.point_to_point.point_to_point import PointToPoint
 
 _INTRODUCTION = """\
 A job is one YAML document. Numbers follow YAML 1.2; anchors, tags, duplicate keys, unknown keys, NaN

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from docs.fields import field_table
-from trajcli.planners.arc_fields import ArcFields
-from trajcli.planners.operational import ToleranceSpec
-from trajcli.planners.path import Segment
-from trajcli.planners.path_law import LawSpec
+from trajcli.planners.tool_path.arc import ArcFields
+from trajcli.planners.tool_path.law import LawSpec
+from trajcli.planners.tool_path.move import ToleranceSpec
+from trajcli.planners.tool_path.path import Segment
 
 _PATHS = """\
 `line`, `arc`, `path` and `screw` lead the tcp along a path in space; the joints follow. They start and end

@@ -265,8 +265,8 @@ def test_help_imports_no_numbers() -> None:
 HEAVY_FOR_A_PLAN = {"scipy", "ruckig", "toppra", "matplotlib", "mcap", "trajcli.geometry", "jsonschema"}
 LOOKS_FOR_PLUGINS = {"importlib.metadata", "email", "zipfile", "socket"}
 OF_OTHER_JOBS = {
-    "trajcli.planners.cubic",
-    "trajcli.planners.spline",
+    "trajcli.planners.point_to_point.cycloidal",
+    "trajcli.planners.waypoints.spline",
     "trajcli.kinematics.serial_chain",
     "trajcli.job.report",
 }
@@ -280,6 +280,6 @@ def test_a_small_plan_imports_nothing_heavy() -> None:
 
 def test_inverse_kinematics_imports_nothing_heavy() -> None:
     modules = modules_after("ik", "--robot", "ur5e", "--pose", "{xyz: [0.4, 0.1, 0.25], rpy: [180, 0, 0]}")
-    planning = {"trajcli.planners.point_to_point", "trajcli.pipeline.plan", "trajcli.checks"}
+    planning = {"trajcli.planners.point_to_point.point_to_point", "trajcli.pipeline.plan", "trajcli.checks"}
     assert "trajcli.kinematics.inverse.solve" in modules
     assert not modules & ((HEAVY_FOR_A_PLAN | LOOKS_FOR_PLUGINS | planning) - {"trajcli.geometry"})

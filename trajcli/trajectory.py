@@ -39,7 +39,7 @@ def resting(position: Array) -> State:
 
 
 @frozen
-class Passage:
+class ViaPoints:
     """The points that a move passes, its start and its target among them.
 
     Attributes:
@@ -56,9 +56,9 @@ class Passage:
         for name in ("times", "points", "missed"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
-    def scaled(self, factor: float) -> Passage:
+    def scaled(self, factor: float) -> ViaPoints:
         """Return the passage of the same points in a motion that takes `factor` times as long."""
-        return Passage(self.times * factor, self.points, self.missed)
+        return ViaPoints(self.times * factor, self.points, self.missed)
 
 
 @frozen
@@ -71,7 +71,7 @@ class Promise:
         robot: The arm with the limits in force; given where there is a tool.
     """
 
-    passage: Passage | None = None
+    passage: ViaPoints | None = None
     tool: ToolMotion | None = None
     robot: Robot | None = None
 

@@ -22,7 +22,7 @@ from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.jacobian import tcp_acceleration, tcp_twist
 from trajcli.kinematics.robot import Limits, Robot, ToolLimits, unlimited
-from trajcli.planners.following_tool import followed
+from trajcli.planners.tool_path.follow import followed
 from trajcli.trajectory import Span, Trajectory, resting
 
 WHOLE = (True, True, True)

@@ -10,14 +10,14 @@ from trajcli.checks.verify import verify
 from trajcli.checks.waypoints import check_waypoints
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.kinematics.robot import Limits
-from trajcli.trajectory import Passage, Promise
+from trajcli.trajectory import Promise, ViaPoints
 
 POINTS = np.array([[0.0, 1.0], [1.0, 1.0], [0.5, -2.0]])  # passed every 2 s
 TIMES = np.array([0.0, 2.0, 4.0])
 
 
 def promise(times=TIMES, points=POINTS, missed=0.0):
-    return Passage(
+    return ViaPoints(
         np.asarray(times), points, np.broadcast_to(np.asarray(missed, dtype=float), points.shape).copy()
     )
 
@@ -82,7 +82,7 @@ def test_a_distance_is_promised_too(missed):
 def test_times_are_those_of_the_move():
     first, second = passing(), between([0.5, -2.0], [2.0, 2.0])
     whole = trajectory(first, second)
-    shifted = Passage(np.array([0.0, 2.0]), np.array([[0.5, -2.0], [2.0, 2.0]]), np.zeros((2, 2)))
+    shifted = ViaPoints(np.array([0.0, 2.0]), np.array([[0.5, -2.0], [2.0, 2.0]]), np.zeros((2, 2)))
     assert check_waypoints(whole, [None, shifted]) == []
     wrong = check_waypoints(whole, [promise(), promise()])
     assert {finding.move for finding in wrong} == {1}

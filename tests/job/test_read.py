@@ -10,9 +10,9 @@ import pytest
 
 from trajcli.errors import FileError, InputError
 from trajcli.job.read import LoadedJob, job_from_text, load_job
-from trajcli.planners.hold import Hold
-from trajcli.planners.quintic import Quintic
-from trajcli.planners.trapezoid import Trapezoid
+from trajcli.planners.point_to_point.point_to_point import Hold
+from trajcli.planners.point_to_point.polynomial import Quintic
+from trajcli.planners.point_to_point.trapezoid import Trapezoid
 
 DEG = math.pi / 180
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from trajcli.kinematics.robot import Joint, Limits, Robot
 from trajcli.language.numbers import ReadingContext
-from trajcli.planners.jerk_limited import JerkLimited
+from trajcli.planners.point_to_point.jerk_limited import JerkLimited
 from trajcli.trajectory import State
 
 

@@ -22,8 +22,7 @@ from jerk_limited_moves import (
 )
 
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.planners.profile import Task
-from trajcli.planners.ruckig_solve import fastest
+from trajcli.planners.point_to_point.ruckig import BoundaryProblem, fastest
 
 SEEDS, JOINTS = st.integers(0, 2**32 - 1), st.integers(1, 12)
 
@@ -186,7 +185,9 @@ def example():
 
 
 def test_boundary_judge_sees_a_phase_that_is_a_billionth_of_a_second_too_long():
-    task = Task("x", (0.0, 0.3, 0.1), (2.0, -0.4, 0.2), np.array([[-1.0, 1.0], [-2.0, 2.0], [-5.0, 5.0]]))
+    task = BoundaryProblem(
+        "x", (0.0, 0.3, 0.1), (2.0, -0.4, 0.2), np.array([[-1.0, 1.0], [-2.0, 2.0], [-5.0, 5.0]])
+    )
     profile = fastest(task)
     start, end = state([0.0], 0.3, 0.1), state([2.0], -0.4, 0.2)
     assert misses(profile.curve(), start, end) == []

@@ -8,8 +8,7 @@ from jerk_limited_moves import arm, excesses, misses, move_to, peaks, ruckigs_ow
 
 from trajcli.job.read import job_from_text
 from trajcli.pipeline.plan import plan_job
-from trajcli.planners.profile import Task
-from trajcli.planners.ruckig_solve import fastest, fastest_of
+from trajcli.planners.point_to_point.ruckig import BoundaryProblem, fastest, fastest_of
 
 
 @pytest.mark.parametrize("synchronize", ["time", "none"])
@@ -82,7 +81,7 @@ def test_tiny_displacement_beside_a_long_one(distance):
 def test_phases_below_the_resolution_of_time_are_not_used():
     """At full jerk this motion has phases of 9e-15 s and 2e-6 s in 669 s, where times are 1e-13 s apart."""
     bounds = np.array([[-0.18254439, 0.18254439], [-0.748663695, 0.748663695], [-521.984172, 521.984172]])
-    task = Task("x", (0.0, 0.0, 0.0), (-1.006994087494479e-06, 0.0, 0.0), bounds)
+    task = BoundaryProblem("x", (0.0, 0.0, 0.0), (-1.006994087494479e-06, 0.0, 0.0), bounds)
     curve = fastest_of(task, 668.9044570713021).curve()
     assert curve.end == 668.9044570713021
     assert steps(curve) < 1e-11
@@ -137,7 +136,9 @@ def test_solver_without_a_jerk_or_acceleration_limit(control, order):
     bounds = np.array([[-2.0, 2.0], [-3.0, 3.0], [-np.inf, np.inf]])
     if order == 1:
         bounds[1] = [-np.inf, np.inf]
-    task = Task("x", (1.0, 0.5 * (order - 1), 0.0), (6.0, -0.5 * (order - 1), 0.0), bounds, control)
+    task = BoundaryProblem(
+        "x", (1.0, 0.5 * (order - 1), 0.0), (6.0, -0.5 * (order - 1), 0.0), bounds, control
+    )
     profile = fastest(task)
     if control == "velocity":
         assert profile.duration == pytest.approx(1 / 3, rel=1e-12)

@@ -7,8 +7,12 @@ import pytest
 from jerk_limited_moves import arm, move_to, state
 
 from trajcli.errors import MissingLimitError, PlanningError
-from trajcli.planners.profile import Task
-from trajcli.planners.ruckig_solve import fastest, fastest_of, together
+from trajcli.planners.point_to_point.ruckig import (
+    BoundaryProblem,
+    fastest,
+    fastest_of,
+    together,
+)
 
 ROBOT = arm([1.0, 2.0], [2.0, 3.0], [5.0, 6.0])
 
@@ -110,7 +114,7 @@ def test_joint_that_moves_at_its_end_cannot_wait():
 
 def test_solver_says_what_it_cannot_find():
     bounds = np.array([[-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0]])
-    task = Task("j7", (0.0, 0.0, 0.0), (1.0, 3.0, 0.0), bounds)
+    task = BoundaryProblem("j7", (0.0, 0.0, 0.0), (1.0, 3.0, 0.0), bounds)
     with pytest.raises(PlanningError, match="j7: no motion within"):
         fastest(task)
     with pytest.raises(PlanningError, match="lasts 12"):
@@ -120,8 +124,8 @@ def test_solver_says_what_it_cannot_find():
 def test_common_duration_leaps_over_gaps():
     """A joint that passes through its target and one that is slow: the first must loop, or wait for long."""
     bounds = np.array([[-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0]])
-    passing = Task("j1", (0.0, 0.9, 0.0), (1.0, 0.9, 0.0), bounds)
-    slow = Task("j2", (0.0, 0.0, 0.0), (0.3, 0.0, 0.0), bounds)
+    passing = BoundaryProblem("j1", (0.0, 0.9, 0.0), (1.0, 0.9, 0.0), bounds)
+    slow = BoundaryProblem("j2", (0.0, 0.0, 0.0), (0.3, 0.0, 0.0), bounds)
     alone = [fastest(passing), fastest(slow)]
     chosen = together([passing, slow], alone)
     assert chosen[0].duration == chosen[1].duration

@@ -10,7 +10,7 @@ import yaml
 
 from trajcli.kinematics.robot import Joint, Limits, Robot
 from trajcli.language.numbers import ReadingContext
-from trajcli.planners.jerk_limited import JerkLimited
+from trajcli.planners.point_to_point.jerk_limited import JerkLimited
 from trajcli.trajectory import State
 
 CASES = yaml.safe_load((Path(__file__).parents[1] / "oracles" / "jerk_limited.yaml").read_text("utf-8"))[

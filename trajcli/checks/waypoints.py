@@ -8,10 +8,10 @@ import numpy as np
 
 from trajcli.checks.finding import Finding
 from trajcli.checks.tolerances import waypoint_tolerance
-from trajcli.trajectory import Passage, Trajectory
+from trajcli.trajectory import Trajectory, ViaPoints
 
 
-def check_waypoints(trajectory: Trajectory, passages: Sequence[Passage | None]) -> list[Finding]:
+def check_waypoints(trajectory: Trajectory, passages: Sequence[ViaPoints | None]) -> list[Finding]:
     """Return for each move and joint the point that is passed furthest from where it was promised, if any.
 
     Args:

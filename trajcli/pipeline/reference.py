@@ -7,8 +7,7 @@ import numpy as np
 from trajcli.errors import PlanningError
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import QUANTITIES, Limits
-from trajcli.planners.profile import Task
-from trajcli.planners.ruckig_solve import fastest
+from trajcli.planners.point_to_point.ruckig import BoundaryProblem, fastest
 from trajcli.trajectory import State
 
 _ROUNDING = 1e-12
@@ -72,7 +71,7 @@ def fastest_duration(start: State, end: State, limits: Limits) -> Bound | NoBoun
     return bound
 
 
-def _task(start: State, end: State, limits: Limits, joint: int) -> Task:
+def _task(start: State, end: State, limits: Limits, joint: int) -> BoundaryProblem:
     bounds = np.stack([limits.of_order(order)[joint] for order in (1, 2, 3)])
     bounds[2] = np.abs(bounds[2]).max() * np.array([-1.0, 1.0])
     counts = float(np.isfinite(bounds[2, 1]))
@@ -82,10 +81,10 @@ def _task(start: State, end: State, limits: Limits, joint: int) -> Task:
         ends.append((float(state.position[joint]), *rates))
     if abs(ends[1][0] - ends[0][0]) <= _NOWHERE:
         ends[1] = (ends[0][0], *ends[1][1:])
-    return Task(f"joint {joint + 1}", ends[0], ends[1], bounds)
+    return BoundaryProblem(f"joint {joint + 1}", ends[0], ends[1], bounds)
 
 
-def _why_unbounded(task: Task) -> str | None:
+def _why_unbounded(task: BoundaryProblem) -> str | None:
     for order in (1, 2):
         low, high = task.bounds[order - 1].tolist()
         if not np.isfinite([low, high]).all():

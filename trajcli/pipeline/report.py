@@ -26,9 +26,9 @@ from trajcli.pipeline.reference import NoBound, fastest_duration
 from trajcli.pipeline.stretch import PlannedMove
 from trajcli.pipeline.tool_finding import tool_finding
 from trajcli.pipeline.tool_report import tool_report
-from trajcli.planners.operational import OperationalMove
-from trajcli.planners.point_to_point import PointToPoint
-from trajcli.planners.through_points import ThroughPoints
+from trajcli.planners.point_to_point.point_to_point import PointToPoint
+from trajcli.planners.tool_path.move import ToolPathMove
+from trajcli.planners.waypoints.through_points import ThroughPoints
 from trajcli.version import __version__
 
 _JUMPS = {"position_jump": 0, "velocity_jump": 1, "acceleration_jump": 2}
@@ -158,7 +158,7 @@ def _said(plan: Plan, finding: Finding) -> tuple[str, dict[str, Amount], str | N
 def _jump_remedy(move: PlannedMove, finding: Finding) -> str | None:
     if finding.kind == "acceleration_jump" and isinstance(move.planner, ThroughPoints):
         return "use spline with rule continuous_acceleration or quintic, or say limits: {jerk: null}"
-    if finding.kind == "acceleration_jump" and isinstance(move.planner, OperationalMove):
+    if finding.kind == "acceleration_jump" and isinstance(move.planner, ToolPathMove):
         return "use `law: {shape: quintic}` or jerk_limited, or say limits: {jerk: null}"
     if finding.hint is not None or move.planned.begins is None:
         return finding.hint

@@ -9,7 +9,7 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 from trajcli.pipeline.polynomials import stretches
 from trajcli.pipeline.stretch import PlannedMove
-from trajcli.planners.path import PathMove
+from trajcli.planners.tool_path.path import PathMove
 from trajcli.units import Quantity, Units, factor
 
 if TYPE_CHECKING:

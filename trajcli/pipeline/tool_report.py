@@ -9,7 +9,7 @@ import numpy as np
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.job.report import LowestSpeedReport, ToolPeakReport, ToolReport
 from trajcli.pipeline.stretch import PlannedMove
-from trajcli.planners.operational import OperationalMove
+from trajcli.planners.tool_path.move import ToolPathMove
 from trajcli.trajectory import Span, Trajectory
 
 _HELD = 0.999  # of the wanted speed: that much counts as holding it
@@ -63,7 +63,7 @@ def _length(law: PiecewisePolynomial) -> float:
 
 def wanted_speed(move: PlannedMove) -> float | None:
     """Return the speed along the path that is asked for, m/s, or rad/s in place; None where none is."""
-    if not isinstance(move.planner, OperationalMove) or move.planned.tool is None:
+    if not isinstance(move.planner, ToolPathMove) or move.planned.tool is None:
         return None
     law, limits = move.planner.law, move.robot.limits.tcp
     if move.planned.tool.in_place:

@@ -14,20 +14,20 @@ from pydantic import Field, TypeAdapter
 from trajcli.planners.planner import Planner
 
 _WHERE = {
-    "cubic": "cubic.Cubic",
-    "quintic": "quintic.Quintic",
-    "septic": "septic.Septic",
-    "cycloidal": "cycloidal.Cycloidal",
-    "trapezoid": "trapezoid.Trapezoid",
-    "jerk_limited": "jerk_limited.JerkLimited",
-    "spline": "spline.Spline",
-    "blends": "blends.Blends",
-    "time_optimal": "time_optimal.TimeOptimal",
-    "line": "line.Line",
-    "arc": "arc.Arc",
-    "path": "path.PathMove",
-    "screw": "screw.Screw",
-    "hold": "hold.Hold",
+    "cubic": "point_to_point.polynomial.Cubic",
+    "quintic": "point_to_point.polynomial.Quintic",
+    "septic": "point_to_point.polynomial.Septic",
+    "cycloidal": "point_to_point.cycloidal.Cycloidal",
+    "trapezoid": "point_to_point.trapezoid.Trapezoid",
+    "jerk_limited": "point_to_point.jerk_limited.JerkLimited",
+    "spline": "waypoints.spline.Spline",
+    "blends": "waypoints.blends.Blends",
+    "time_optimal": "waypoints.time_optimal.TimeOptimal",
+    "line": "tool_path.line.LineMove",
+    "arc": "tool_path.arc.ArcMove",
+    "path": "tool_path.path.PathMove",
+    "screw": "tool_path.line.ScrewMove",
+    "hold": "point_to_point.point_to_point.Hold",
 }
 """The module and class of each planner, by its name in job files."""
 
@@ -36,7 +36,7 @@ class _Planners(Mapping[str, type[Planner]]):
     """Every planner by its name; one that is asked for is loaded."""
 
     def __getitem__(self, tag: str) -> type[Planner]:
-        module, _, name = _WHERE[tag].partition(".")
+        module, _, name = _WHERE[tag].rpartition(".")
         planner: type[Planner] = getattr(import_module(f"trajcli.planners.{module}"), name)
         return planner
 

@@ -14,7 +14,7 @@ from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Robot
 from trajcli.language.limits import LimitsSpec
 from trajcli.language.numbers import Model
-from trajcli.trajectory import Passage, State
+from trajcli.trajectory import State, ViaPoints
 
 if TYPE_CHECKING:
     from trajcli.kinematics.following.motion import ToolMotion
@@ -101,7 +101,7 @@ class Planned:
     events: tuple[Event, ...] = ()
     arrivals: tuple[float, ...] | None = None
     closed_form: Literal["cycloid"] | None = None
-    passage: Passage | None = None
+    passage: ViaPoints | None = None
     origin: float = 0.0
     begins: State | None = None
     tool: ToolMotion | None = None

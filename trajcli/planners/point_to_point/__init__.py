@@ -1,0 +1,1 @@
+"""Planners from joint state to joint state (PTP)."""

@@ -1,0 +1,325 @@
+"""Fastest motions of one variable under bounds on velocity, acceleration and jerk, solved by ruckig.
+
+Ruckig sees one variable at a time, from position zero, in units that suit it. What it returns are phases; the
+end of the motion is then laid into its target, which ruckig misses by up to 1e-8. Several variables arrive
+together in the shortest time in which each can arrive: the set of such times may have gaps, so the time is
+raised until all agree.
+
+Source: Berscheid and Kroeger, Jerk-limited Real-time Trajectory Generation with Arbitrary Target States
+(RSS 2021).
+
+What one variable shall do, and the motion that does it: how a solver is asked, and how it answers.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import product
+from typing import Any, Literal
+
+import numpy as np
+
+from trajcli.curves.phases import PhaseChain
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.errors import Amount, PlanningError, Problem
+from trajcli.frozen import frozen
+from trajcli.planners.planner import Phase
+
+Control = Literal["position", "velocity"]
+
+_STILL = 1e-9  # of the peak velocity: less counts as rest
+
+
+@frozen
+class BoundaryProblem:
+    """What one variable shall do.
+
+    Attributes:
+        name: For messages.
+        initial: (position, velocity, acceleration) at the start.
+        final: The same at the end; the position is ignored under velocity control.
+        bounds: Shape (3, 2), lower and upper, of velocity, acceleration and jerk; infinite ones are allowed.
+            Of the two bounds of the jerk the smaller magnitude holds both ways.
+        control: Whether the final position is imposed.
+    """
+
+    name: str
+    initial: tuple[float, float, float]
+    final: tuple[float, float, float]
+    bounds: Array
+    control: Control = "position"
+
+    @property
+    def order(self) -> int:
+        """The derivative that is constant in each phase: the lowest above which nothing is bounded."""
+        _, acceleration, jerk = (bool(np.isfinite(bound).all()) for bound in self.bounds)
+        return 3 if jerk else 2 if acceleration else 1
+
+    @property
+    def displacement(self) -> float:
+        """Position to cover; zero under velocity control."""
+        return self.final[0] - self.initial[0] if self.control == "position" else 0.0
+
+    @property
+    def steady(self) -> bool:
+        """Whether constant velocity, or rest, is all that is asked."""
+        anywhere = self.control == "velocity" or self.displacement == self.initial[1] == 0
+        return anywhere and self.initial[1] == self.final[1] and self.initial[2] == self.final[2] == 0
+
+    @property
+    def rests(self) -> bool:
+        """Whether it goes from rest to rest."""
+        return self.control == "position" and not any((*self.initial[1:], *self.final[1:]))
+
+    @property
+    def done(self) -> bool:
+        """Whether the start is the target already."""
+        return self.displacement == 0 and self.initial[1:] == self.final[1:]
+
+
+@frozen
+class PhaseProfile:
+    """The motion of one variable.
+
+    Attributes:
+        position: At the start.
+        chain: Its phases, relative to that position.
+        duration: Seconds.
+        braking: How many of the first phases only lead back into the bounds.
+    """
+
+    position: float
+    chain: PhaseChain
+    duration: float
+    braking: int = 0
+
+    def curve(self) -> PiecewisePolynomial:
+        """Return the position over [0, duration], n = 1."""
+        return self.chain.curve(self.position, self.duration)
+
+    def phases(self, joint: int | None) -> list[Phase]:
+        """Return the phases by name, equal neighbours joined."""
+        times = np.concatenate([[0.0], np.cumsum(self.chain.durations)])
+        times[-1] = self.duration
+        named: list[Phase] = []
+        for k, name in enumerate(self._names()):
+            start, end = float(times[k]), float(times[k + 1])
+            if named and named[-1].name == name:
+                start = named.pop().start
+            named.append(Phase(name, start, end, joint))
+        return named
+
+    def _names(self) -> list[str]:
+        chain, names = self.chain, []
+        for k, constant in enumerate(chain.constants.tolist()):
+            velocity, acceleration, jerk = (*chain.states[k][1:].tolist(), constant, 0.0, 0.0)[:3]
+            speed = chain.peaks[1] if chain.order > 1 else 1.0
+            if k < self.braking:
+                names.append("brake")
+            elif jerk:
+                names.append("jerk +" if jerk > 0 else "jerk -")
+            elif acceleration:
+                names.append("constant acceleration")
+            else:
+                names.append("cruise" if abs(velocity) > _STILL * speed else "rest")
+        return names
+
+
+_LANDED = 1e-12  # relative to the joint's peaks: a larger miss means that other units may do better
+_ACCEPTABLE = 1e-9  # the same: a larger miss is a jump, and the phases are wrong
+_COARSE = 1e-11  # the same: what rounding times may do to the velocity
+_ROUNDING = 1e-12
+_SHAVED = (0.0, 1e-14, 1e-13, 5e-13)  # of the acceleration limits: tried in turn where ruckig finds nothing
+
+
+def fastest(task: BoundaryProblem) -> PhaseProfile:
+    """Return the fastest motion.
+
+    Raises:
+        PlanningError: When there is none.
+    """
+    return _solve(task, None)
+
+
+def fastest_of(task: BoundaryProblem, duration: float) -> PhaseProfile:
+    """Return the motion that lasts `duration`, or longer where none lasts just that long.
+
+    Raises:
+        PlanningError: When there is none.
+    """
+    return _solve(task, duration)
+
+
+def together(
+    tasks: Sequence[BoundaryProblem], profiles: Sequence[PhaseProfile], minimum_duration: float = 0.0
+) -> list[PhaseProfile]:
+    """Return motions of one common duration, the shortest that all tasks allow.
+
+    Args:
+        tasks: One for each variable.
+        profiles: Their fastest motions.
+        minimum_duration: The common duration is at least this, s.
+
+    Raises:
+        PlanningError: When some task has no motion of such a duration.
+    """
+    chosen = list(profiles)
+    duration = max([minimum_duration, *(profile.duration for profile in profiles)])
+    agreed = False
+    while not agreed:
+        agreed = True
+        for k, task in enumerate(tasks):
+            if chosen[k].duration == duration:
+                continue
+            chosen[k] = profiles[k] if profiles[k].duration == duration else fastest_of(task, duration)
+            if chosen[k].duration > duration:
+                duration, agreed = chosen[k].duration, False
+    return chosen
+
+
+def _solve(task: BoundaryProblem, duration: float | None) -> PhaseProfile:
+    if task.steady or (task.done and duration is None):
+        return _steady(task, duration or 0.0)
+    if task.rests and duration is not None:
+        return _slowed(task, fastest(task), duration)
+    return _found(task, duration)
+
+
+def _slowed(task: BoundaryProblem, quickest: PhaseProfile, duration: float) -> PhaseProfile:
+    """Return a motion from rest to rest that takes longer than it needs.
+
+    Full jerk for a tiny displacement in a long time would make phases that are too short for the resolution
+    of time; these, and what ruckig cannot do, are done by stretching the fastest motion.
+    """
+    try:
+        profile = _found(task, duration)
+    except PlanningError:
+        profile = None
+    if profile is not None and profile.chain.coarseness <= _COARSE:
+        return profile
+    longer = max(duration, quickest.duration)
+    return PhaseProfile(quickest.position, quickest.chain.stretched(longer), longer)
+
+
+def _found(task: BoundaryProblem, duration: float | None) -> PhaseProfile:
+    best, least = None, _ACCEPTABLE
+    for shave, (time_unit, length_unit) in product(_SHAVED, _units(task, duration)):
+        found = _ask_ruckig(_shaved(task, shave), duration, time_unit, length_unit)
+        if found is None:
+            continue
+        profile, miss = _landed(found, duration)
+        if miss <= _LANDED:
+            return profile
+        if miss <= least:
+            best, least = profile, miss
+    if best is not None:
+        return best
+    message = f"{task.name}: no motion within the velocity, acceleration and jerk limits could be found"
+    message += " that lasts {duration}" if duration else ""
+    hint = "change the end velocity or acceleration, or the duration, or raise the limits"
+    amounts = {"duration": Amount(duration)} if duration else {}
+    raise PlanningError(Problem(message, hint, joint=task.name, amounts=amounts))
+
+
+def _shaved(task: BoundaryProblem, part: float) -> BoundaryProblem:
+    """Return the task with a little less acceleration.
+
+    Where a limit is just reached, a case of ruckig's ends and the next begins, and rounding may leave it with
+    neither: a displacement of 2 a^3 / j^2 is such a place.
+    """
+    return (
+        replace(task, bounds=task.bounds * (1.0 - part * np.array([[0.0], [1.0], [0.0]]))) if part else task
+    )
+
+
+def _steady(task: BoundaryProblem, duration: float) -> PhaseProfile:
+    """Return the motion of constant velocity, or the one of no length that has arrived already."""
+    initial = np.array([0.0, *task.initial[1:]])[: task.order]
+    final = np.array([task.initial[1] * duration, *task.final[1:]])[: task.order]
+    constants = [task.initial[1] if task.order == 1 else 0.0] if duration > 0 else []
+    chain = PhaseChain(initial, final, np.full(len(constants), duration), np.array(constants))
+    return PhaseProfile(task.initial[0], chain.with_cruises() if constants else chain, duration)
+
+
+def _landed(found: PhaseProfile, duration: float | None) -> tuple[PhaseProfile, float]:
+    """Return the motion laid into its target, and by how much it still misses it."""
+    free = found.chain.polished()
+    if duration is None or (found.duration > duration * (1 + 1e-12) and free.duration > duration):
+        return replace(found, chain=free, duration=free.duration), free.defect()
+    kept = found.chain.polished(duration)
+    return replace(found, chain=kept, duration=duration), kept.defect(duration)
+
+
+def _units(task: BoundaryProblem, duration: float | None) -> Iterator[tuple[float, float]]:
+    """Yield units of time (s) and length for ruckig.
+
+    Its tolerances are absolute, and it refuses durations above 7600. Units that are powers of two change
+    nothing else. Those of the task itself come first.
+    """
+    bounds = np.abs(task.bounds).min(axis=1)
+    change, distance = abs(task.final[1] - task.initial[1]), abs(task.displacement)
+    times = [
+        distance / bounds[0],
+        change / bounds[1],
+        (change / bounds[2]) ** 0.5,
+        (distance / bounds[2]) ** (1 / 3),
+    ]
+    time = 2.0 ** round(math.log2(duration or max(times) or 1.0))
+    for power in (0, 8, -8, 16, -16):
+        for time_unit in (1.0, time / 1024, time):
+            yield time_unit, 2.0**power
+
+
+def _ask_ruckig(
+    task: BoundaryProblem, duration: float | None, time_unit: float, length_unit: float
+) -> PhaseProfile | None:
+    """Return ruckig's answer, or None when it fails."""
+    import ruckig
+
+    units = np.array([length_unit / time_unit**order for order in range(4)])
+    wanted = ruckig.InputParameter(1)
+    interfaces = ruckig.ControlInterface
+    wanted.control_interface = interfaces.Position if task.control == "position" else interfaces.Velocity
+    wanted.current_position, wanted.target_position = [0.0], [task.displacement / length_unit]
+    lower, upper = (task.bounds / units[1:, None]).T.tolist()
+    wanted.current_velocity = [task.initial[1] / units[1]]
+    wanted.current_acceleration = [task.initial[2] / units[2]]
+    wanted.target_velocity = [_inside(task.final[1] / units[1], lower[0], upper[0])]
+    wanted.target_acceleration = [_inside(task.final[2] / units[2], lower[1], upper[1])]
+    wanted.min_velocity, wanted.max_velocity = [lower[0]], [upper[0]]
+    wanted.min_acceleration, wanted.max_acceleration = [lower[1]], [upper[1]]
+    wanted.max_jerk = [min(-lower[2], upper[2])]
+    if duration is not None:
+        wanted.minimum_duration = duration / time_unit
+    answer = ruckig.Trajectory(1)
+    try:
+        result = ruckig.Ruckig(1).calculate(wanted, answer)
+    except (ruckig.RuckigError, ValueError):
+        return None
+    if result not in (ruckig.Result.Working, ruckig.Result.Finished):
+        return None
+    return _profile(task, answer, time_unit, units)
+
+
+def _inside(value: float, lower: float, upper: float) -> float:
+    """Return the value, laid onto the bound that it exceeds by rounding."""
+    inside = min(max(value, lower), upper)
+    return inside if abs(value - inside) <= _ROUNDING * abs(value) else value
+
+
+def _profile(task: BoundaryProblem, answer: Any, time_unit: float, units: Array) -> PhaseProfile:  # noqa: ANN401
+    """Return the phases of ruckig's answer in SI; those of length zero are left out."""
+    found, order = answer.profiles[0][0], task.order
+    parts = [(part.t, getattr(part, " vaj"[order])) for part in (found.brake, found, found.accel)]
+    phases = [
+        [(t * time_unit, c * units[order]) for t, c in zip(*part, strict=False) if t > 0] for part in parts
+    ]
+    lengths, constants = np.array([phase for part in phases for phase in part]).reshape(-1, 2).T
+    initial = np.array([0.0, *task.initial[1:]])[:order]
+    final = np.array([task.displacement, *task.final[1:]])[:order]
+    if task.control == "velocity":
+        final[0] = np.nan
+    chain = PhaseChain(initial, final, lengths, constants).with_cruises()
+    return PhaseProfile(task.initial[0], chain, answer.duration * time_unit, len(phases[0]))

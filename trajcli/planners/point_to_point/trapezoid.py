@@ -1,0 +1,294 @@
+"""Trapezoidal velocity: the slides' 2-1-2, one law for all joints or one for each.
+
+Why there is no such trapezoid, with the interval of what there is.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from trajcli.errors import Amount, PlanningError, Problem
+
+if TYPE_CHECKING:
+    from trajcli.curves.trapezoid import InfeasibleProfileError
+    from trajcli.kinematics.robot import Robot
+import math
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from trajcli.curves.operations import along_line, hold_until, merge_breaks
+from trajcli.curves.piecewise import Array
+from trajcli.curves.trapezoid import (
+    InfeasibleProfileError,
+    MotionBounds,
+    VelocityProfile,
+    fastest_profile,
+    profile_of_duration,
+    profile_of_speed,
+)
+from trajcli.kinematics.robot import Robot
+from trajcli.language.numbers import refuse
+from trajcli.language.targets import Duration, JointAccelerationMagnitudes, JointSpeeds, MinimumDuration
+from trajcli.planners.planner import Phase, Planned
+from trajcli.planners.point_to_point.point_to_point import (
+    PointToPoint,
+    missing_limit,
+    same_state,
+    standstill,
+)
+from trajcli.trajectory import State
+
+_HINTS = {
+    "speed": "choose a velocity inside the interval, or change the duration",
+    "acceleration": "raise the acceleration, or the duration",
+    "duration": "choose a duration inside the interval",
+    "too_fast": "say `overshoot: true`, raise the deceleration, or start slower",
+    "too_slow": "raise the acceleration, end slower, or say `overshoot: true`",
+    "turns": "say `overshoot: true` and at most one of duration and velocity, or let the arm start and end "
+    "in the direction of the motion",
+}
+
+
+def explain_infeasible(
+    error: InfeasibleProfileError, joint: int, size: float, move: Trapezoid, robot: Robot
+) -> PlanningError:
+    """Return the error in terms of one joint.
+
+    Args:
+        error: What the profile said, in units of the law.
+        joint: The joint that rules.
+        size: Joint units per unit of the law.
+        move: What was asked for.
+        robot: For the names.
+    """
+    name = robot.joint_names[joint]
+    amounts: dict[str, Amount] = {}
+    if error.reason in ("speed", "acceleration"):
+        order = 1 if error.reason == "speed" else 2
+        given = (move.velocity or (0.0,) * 12)[joint] if order == 1 else _acceleration(move, robot, joint)
+        amounts = {
+            "low": Amount(error.low * size, order, joint),
+            "high": Amount(error.high * size, order, joint),
+            "given": Amount(given, order, joint),
+            "duration": Amount(move.duration or 0.0),
+        }
+    elif error.reason == "duration":
+        amounts = {"low": Amount(error.low), "high": Amount(error.high)}
+    elif error.reason in ("too_fast", "too_slow"):
+        amounts = {"needed": Amount(error.low * size, 0, joint)}
+    message = _message(error, name)
+    return PlanningError(Problem(message, _HINTS[error.reason], joint=name, amounts=amounts))
+
+
+def _message(error: InfeasibleProfileError, name: str) -> str:
+    unbounded = error.high == float("inf")
+    return {
+        "speed": f"no trapezoid of {{duration}}: the velocity of {name} must be above {{low}} "
+        "and at most {high}, got {given}",
+        "acceleration": f"no trapezoid of {{duration}}: the acceleration of {name} must be at least {{low}}, "
+        "got {given}",
+        "duration": f"no trapezoid for {name}: its duration must be at least {{low}}"
+        + ("" if unbounded else " and at most {high}"),
+        "too_fast": f"{name} is too fast to end in the target: it needs {{needed}} to slow down",
+        "too_slow": f"{name} cannot reach its end velocity in time: it needs {{needed}} to speed up",
+        "turns": f"{name} would have to turn round to start and end with the given velocities",
+    }[error.reason]
+
+
+def _acceleration(move: Trapezoid, robot: Robot, joint: int) -> float:
+    if move.acceleration is not None:
+        return move.acceleration[joint]
+    return float(abs(robot.limits.acceleration[joint]).min())
+
+
+_OFF = 1e-9  # relative: a velocity this little off the line is on it
+_SAME_TIME = 1e-12  # relative: joints that arrive this close to each other arrive together
+_STILL = 1e-15  # per s: a thousandth of what counts as a jump
+
+
+class Trapezoid(PointToPoint):
+    """Speed up, cruise, slow down. The acceleration steps at the ends of the ramps.
+
+    Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.2.1.
+    """
+
+    continuity: ClassVar[Literal[1, 2]] = 1
+    imposes: ClassVar[int] = 1
+
+    planner: Literal["trapezoid"] = "trapezoid"
+    duration: Duration | None = None
+    velocity: JointSpeeds | None = None
+    acceleration: JointAccelerationMagnitudes | None = None
+    deceleration: JointAccelerationMagnitudes | None = None
+    minimum_duration: MinimumDuration | None = None
+    synchronize: Annotated[
+        Literal["time", "none"],
+        Field(
+            description="time: one law for all joints, straight in joint space; "
+            "none: each joint arrives by itself."
+        ),
+    ] = "time"
+    overshoot: Annotated[
+        bool,
+        Field(
+            strict=True, description="A start too fast to stop in time may run past the target and return."
+        ),
+    ] = False
+
+    @model_validator(mode="after")
+    def _not_overdetermined(self) -> Trapezoid:
+        if self.duration and self.velocity and self.acceleration:
+            text = "duration, velocity and acceleration together ask too much of a trapezoid"
+            raise refuse([(("acceleration",), text, "leave one of the three out")])
+        if self.duration and self.minimum_duration:
+            raise refuse([(("minimum_duration",), "duration and minimum_duration exclude each other", None)])
+        if self.duration and self.velocity and self.overshoot:
+            text = "a trapezoid of given duration and velocity does not overshoot"
+            raise refuse([(("overshoot",), text, "leave one of the three out")])
+        return self
+
+    def plan(self, start: State, robot: Robot) -> Planned:
+        """Return the move to the target.
+
+        Raises:
+            MissingLimitError: When the acceleration follows neither from the fields nor from the limits.
+            PlanningError: When no such trapezoid exists; names the interval of what does.
+        """
+        end = self.to.as_state()
+        wanted = self.duration or self.minimum_duration or 0.0
+        if same_state(start, end) and (start.at_rest or not wanted):
+            return standstill(end, wanted)
+        return (
+            self._together(start, end, robot) if self.synchronize == "time" else self._each(start, end, robot)
+        )
+
+    def _together(self, start: State, end: State, robot: Robot) -> Planned:
+        displacement = end.position - start.position
+        initial, final = (_along(displacement, state.velocity, robot) for state in (start, end))
+        forward, backward = self._rates(displacement, robot)
+        size = np.where(displacement == 0, np.nan, np.abs(displacement))
+        law_rates = [
+            MotionBounds(*(float(np.nanmin(row / size)) for row in rows)) for rows in (forward, backward)
+        ]
+        try:
+            profile = self._profile(1.0, initial, final, law_rates[0], law_rates[1])
+        except InfeasibleProfileError as error:
+            joint = int(np.nanargmin(forward[0 if error.reason == "speed" else 1] / size))
+            raise explain_infeasible(error, joint, float(size[joint]), self, robot) from None
+        law = profile.curve(0.0, 1.0, self.duration)
+        phases = tuple(Phase(*phase) for phase in profile.phases())
+        return Planned(along_line(start.position, displacement, law), end, law=law, phases=phases)
+
+    def _each(self, start: State, end: State, robot: Robot) -> Planned:
+        displacement = end.position - start.position
+        moving = (displacement != 0) | (start.velocity != 0) | (end.velocity != 0)
+        forward, backward = self._rates(moving.astype(np.float64), robot)
+        profiles = []
+        for joint, distance in enumerate(displacement.tolist()):
+            rates = [MotionBounds(*(float(row[joint]) for row in rows)) for rows in (forward, backward)]
+            speeds = float(start.velocity[joint]), float(end.velocity[joint])
+            try:
+                profiles.append(self._profile(distance, *speeds, rates[0], rates[1]))
+            except InfeasibleProfileError as error:
+                raise explain_infeasible(error, joint, 1.0, self, robot) from None
+        duration = self.duration or max(profile.duration for profile in profiles)
+        curves, arrivals = [], []
+        for joint, profile in enumerate(profiles):
+            last = profile.duration >= duration * (1 - _SAME_TIME)
+            arrivals.append(duration if last else profile.duration)
+            if end.velocity[joint] and not last:
+                raise _cannot_wait(joint, profile.duration, duration, end, robot)
+            ends = float(start.position[joint]), float(end.position[joint])
+            curve = profile.curve(*ends, arrivals[joint])
+            curves.append(curve if last else hold_until(curve, duration))
+        phases = tuple(Phase(*phase, joint=j) for j, p in enumerate(profiles) for phase in p.phases())
+        return Planned(merge_breaks(curves), end, phases=phases, arrivals=tuple(arrivals))
+
+    def _profile(
+        self, distance: float, initial: float, final: float, forward: MotionBounds, backward: MotionBounds
+    ) -> VelocityProfile:
+        """Return the profile of one variable from what the fields fix."""
+        if self.duration is not None:
+            if self.velocity is not None and (distance or initial or final):
+                return self._of_speed(distance, initial, final, forward if distance > 0 else backward)
+            return profile_of_duration(
+                distance, initial, final, self.duration, forward, backward, overshoot=self.overshoot
+            )
+        profile = fastest_profile(distance, initial, final, forward, backward, overshoot=self.overshoot)
+        least = self.minimum_duration or 0.0
+        if profile.duration >= least or profile.duration == 0:
+            return profile
+        if initial == 0 and final == 0:
+            return profile.stretched(least / profile.duration)
+        return profile_of_duration(
+            distance, initial, final, least, forward, backward, overshoot=self.overshoot
+        )
+
+    def _of_speed(
+        self, distance: float, initial: float, final: float, rates: MotionBounds
+    ) -> VelocityProfile:
+        sign = math.copysign(1.0, distance)
+        if distance == 0 or sign * initial < 0 or sign * final < 0:
+            raise InfeasibleProfileError("turns")
+        deceleration = rates.deceleration if self.deceleration is not None else None
+        arguments = abs(distance), abs(initial), abs(final), self.duration or 0.0, rates.speed
+        profile = profile_of_speed(*arguments, deceleration)
+        return profile if sign > 0 else profile.mirrored()
+
+    def _rates(self, displacement: Array, robot: Robot) -> tuple[list[Array], list[Array]]:
+        """Return (speed, acceleration, deceleration), each (n,), along the displacement and against it."""
+        velocity, acceleration = robot.limits.velocity, robot.limits.acceleration
+        given = [
+            None if v is None else np.array(v) for v in (self.velocity, self.acceleration, self.deceleration)
+        ]
+        slowing = given[2] if given[2] is not None else given[1]
+        ways = []
+        for sign in (1, -1):
+            back = (sign * displacement < 0)[:, None]
+            speed, faster = (np.where(back, -b[:, ::-1], b)[:, 1] for b in (velocity, acceleration))
+            slower = np.where(back, acceleration[:, ::-1], -acceleration)[:, 0]
+            rows = zip((given[0], given[1], slowing), (speed, faster, slower), strict=True)
+            ways.append([limit if value is None else value for value, limit in rows])
+        if self.duration is None or self.velocity is None:
+            self._require_acceleration(ways, displacement, robot)
+        return ways[0], ways[1]
+
+    def _require_acceleration(self, ways: list[list[Array]], displacement: Array, robot: Robot) -> None:
+        unbounded = ~np.isfinite(ways[0][1:] + ways[1][1:]).all(axis=0) & (displacement != 0)
+        if unbounded.any():
+            lacking = np.flatnonzero(unbounded).tolist()
+            also = "give the move an `acceleration`, or `duration` and `velocity`"
+            raise missing_limit(self.tag, "acceleration", lacking, robot, "for its ramps", also)
+
+
+def _along(displacement: Array, velocity: Array, robot: Robot) -> float:
+    """Return the speed of the law that has the given joint velocities."""
+    square = float(displacement @ displacement)
+    speed = float(velocity @ displacement) / square if square else 0.0
+    off = np.abs(velocity - speed * displacement)
+    if off.max() > _OFF * np.abs(velocity).max() + _STILL:
+        joint = int(off.argmax())
+        message = (
+            "trapezoid moves all joints along one straight line, but {velocity} of "
+            + robot.joint_names[joint]
+        )
+        hint = "say `synchronize: none`, or use jerk_limited or cubic"
+        amounts = {"velocity": Amount(float(velocity[joint]), 1, joint)}
+        raise PlanningError(
+            Problem(message + " leaves it", hint, joint=robot.joint_names[joint], amounts=amounts)
+        )
+    return speed
+
+
+def _cannot_wait(joint: int, arrival: float, duration: float, end: State, robot: Robot) -> PlanningError:
+    name = robot.joint_names[joint]
+    message = f"{name} arrives after {{arrival}} at {{velocity}} and cannot wait there until {{duration}}"
+    amounts = {
+        "arrival": Amount(arrival),
+        "velocity": Amount(float(end.velocity[joint]), 1, joint),
+        "duration": Amount(duration),
+    }
+    hint = "give the move a `duration`, end it at rest, or use jerk_limited"
+    return PlanningError(Problem(message, hint, joint=name, amounts=amounts))

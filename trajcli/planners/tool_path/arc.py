@@ -1,0 +1,134 @@
+"""A circular arc or a helix of the tool.
+
+Fields that give an arc of the tool.
+
+From the fields of a move to the way of its tool: an arc.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from trajcli.curves.piecewise import Array
+from trajcli.errors import Amount
+from trajcli.geometry.paths.arc import Arc
+from trajcli.geometry.paths.position import SAME_PLACE, PositionCurve
+from trajcli.kinematics.forward import forward
+from trajcli.kinematics.robot import Robot
+from trajcli.language.numbers import Flaw, Model, Number, refuse
+from trajcli.language.targets import Direction, NamedTarget, Numbers, Row
+from trajcli.planners.planner import Event
+from trajcli.planners.tool_path.line import planned_path
+from trajcli.planners.tool_path.move import Orientation, PlannedPath, ToolPathMove
+from trajcli.planners.tool_path.target import ToolTarget, flaws_of_target, tool_target
+from trajcli.units import Quantity
+
+_LENGTH, _ANGLE = Quantity("length"), Quantity("angle")
+
+
+class ArcFields(Model):
+    """A circular arc: through a point, about a center, or by an angle about an axis."""
+
+    via: Annotated[
+        NamedTarget | None, Field(description="A point that the arc passes; its place counts.")
+    ] = None
+    to: Annotated[NamedTarget | None, Field(description="Where the arc ends, or the name of a point.")] = None
+    center: Annotated[Row, Numbers(3, _LENGTH, "Center of the circle, in world (length unit).")] | None = None
+    axis: (
+        Annotated[Row, Direction("Axis of the circle, in world: the arc goes right-handed about it.")] | None
+    ) = None
+    angle: Annotated[float, Number(_ANGLE, "Signed, also several turns (angle unit).")] | None = None
+    pitch: Annotated[float, Number(_LENGTH, "Way along the axis for each turn (length unit).")] = 0.0
+
+    @model_validator(mode="after")
+    def _is_one_arc(self) -> ArcFields:
+        flaws = list(self._flaws())
+        if flaws:
+            raise refuse(flaws)
+        return self
+
+    def _flaws(self) -> Iterator[Flaw]:
+        forms = "give `via` and `to`, `center` and `to`, or `center`, `axis` and `angle`"
+        given = {name for name in ("via", "to", "center", "axis", "angle") if getattr(self, name) is not None}
+        if given not in (
+            {"via", "to"},
+            {"center", "to"},
+            {"center", "to", "axis"},
+            {"center", "axis", "angle"},
+        ):
+            yield (), f"an arc is not given by {', '.join(sorted(given)) or 'nothing'}", forms
+        elif self.pitch and "angle" not in given:
+            yield ("pitch",), "a helix is given by center, axis and angle", "leave pitch out"
+        for name in ("via", "to"):
+            target = getattr(self, name)
+            if target is not None:
+                yield from flaws_of_target(target, (name,), "an arc")
+        if self.via is not None and self.via.joints is None and not self.via.gives_position:
+            yield ("via",), "the point that an arc passes needs `xyz`", None
+
+
+class ArcMove(ToolPathMove, ArcFields):
+    """Along a circle, also several turns, or a helix.
+
+    Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.3.1.
+    """
+
+    planner: Literal["arc"] = "arc"
+
+    def way(self, before: Array, robot: Robot) -> PlannedPath:
+        """Return the arc from the pose `before` (4, 4)."""
+        return arc_path(before, self, self.orientation, robot)
+
+
+_ALL_SIX = 6
+
+
+def arc_path(before: Array, fields: ArcFields, orientation: Orientation, robot: Robot) -> PlannedPath:
+    """Return the way along an arc from a pose (4, 4)."""
+    target = arc_target(fields, before, robot)
+    place = arc_of(fields, before, target, robot)
+    way = planned_path(place, before, target, orientation, fields.to)
+    return replace(way, events=notes_of([place]))
+
+
+def arc_target(fields: ArcFields, before: Array, robot: Robot) -> ToolTarget:
+    """Return where an arc ends; one that is given by its angle ends with the orientation it begins with."""
+    if fields.to is not None:
+        return tool_target(fields.to, before, robot)
+    place = _by_angle(fields, before)
+    pose = before.copy()
+    pose[:3, 3] = place.end
+    return ToolTarget(pose, (True, True, True), "all" if len(robot.joints) >= _ALL_SIX else "none")
+
+
+def arc_of(fields: ArcFields, before: Array, target: ToolTarget, robot: Robot) -> Arc:
+    """Return the arc from a pose (4, 4) to a target."""
+    if fields.to is None:
+        return _by_angle(fields, before)
+    start, end = before[:3, 3], target.pose[:3, 3]
+    if fields.via is not None:
+        joints = fields.via.joints
+        via = fields.via.full_pose() if joints is None else forward(robot, np.array(joints))
+        return Arc.through(start, via[:3, 3], end)
+    return Arc.around(start, np.array(fields.center), end, fields.axis)
+
+
+def _by_angle(fields: ArcFields, before: Array) -> Arc:
+    return Arc(
+        before[:3, 3], np.array(fields.center), np.array(fields.axis), fields.angle or 0.0, fields.pitch
+    )
+
+
+def notes_of(places: Iterable[PositionCurve]) -> tuple[Event, ...]:
+    """Return an event for each arc whose center was moved."""
+    text = "the center of the arc was moved by {by} to fit its ends"
+    return tuple(
+        Event("moved_center", text, amounts={"by": Amount(place.moved, 0, None, "length")})
+        for place in places
+        if isinstance(place, Arc) and place.moved > SAME_PLACE
+    )

@@ -1,0 +1,147 @@
+"""The fastest law along a path of the tool that joints and tool allow."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from trajcli.curves.operations import scale_time
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side
+from trajcli.curves.time_optimal.constraints import ConstraintRows
+from trajcli.curves.time_optimal.constraints import PathConstraint as PathDemand
+from trajcli.curves.time_optimal.parameterization import time_optimal
+from trajcli.curves.time_optimal.switching import switching_structure
+from trajcli.kinematics.following.motion import motion_along
+from trajcli.kinematics.following.tolerance import Tolerance
+from trajcli.kinematics.following.tool_path import ToolPath
+from trajcli.kinematics.robot import Robot, ToolLimits
+from trajcli.planners.planner import Event, Phase, stretched
+from trajcli.planners.point_to_point.point_to_point import missing_limit
+from trajcli.planners.tool_path.follow import FollowedPath, JointMotion
+from trajcli.planners.tool_path.law import LawSpec
+
+_FINER = 0.5  # of the tolerance, for q(s): what the law multiplies it with must still be within
+_CORNERS = 16  # of the polygon inside the circle of accelerations
+_BETWEEN = 6  # places of a piece at which the limits of the tool are looked at, its ends included
+_STRETCHED = 1e-9
+_NOTED = 1e-6  # relative: a smaller stretch is not worth an event
+
+
+def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, planner: str) -> JointMotion:
+    """Return the fastest motion along a path within the limits of joints and tool.
+
+    Args:
+        joints: Along the path.
+        spec: What it names replaces the limits of the tool.
+        tolerance: How near the joints' curve must be.
+        planner: Tag for messages.
+
+    Raises:
+        MissingLimitError: When a moving joint has no limit of acceleration.
+        PlanningError: When the joints cannot follow.
+    """
+    robot, path = joints.robot, joints.path
+    curve = joints.by_place(Tolerance(tolerance.position * _FINER, tolerance.angle * _FINER))
+    _require_acceleration(curve, robot, planner)
+    tcp = _limits(spec, robot.limits.tcp)
+    solved = time_optimal(
+        curve, robot.limits.velocity, robot.limits.acceleration, further=[tool_constraint(path, tcp)]
+    )
+    left = _left_over(path, solved.law, tcp)
+    least = spec.minimum_duration or 0.0
+    factor = max(left, least / solved.trajectory.duration)
+    law, trajectory = (
+        scale_time(each, factor) if factor > 1 else each for each in (solved.law, solved.trajectory)
+    )
+    motion = motion_along(path, law, law.breaks, tolerance, None)
+    binding = switching_structure(solved.trajectory, robot.limits.velocity, robot.limits.acceleration)
+    phases = [
+        Phase(f"{b.quantity} {'+' if b.sign > 0 else '-'}", b.start * factor, b.end * factor, b.joint)
+        for b in binding
+    ]
+    text = f"the grid was refined {solved.refinements} times, to {solved.grid.size} places"
+    events = [Event("refined", text)]
+    stretch = solved.stretch * left
+    if stretch > 1 + _NOTED:
+        events.append(stretched(stretch))
+    return JointMotion(trajectory, motion, tuple(phases), tuple(events if solved.refinements else events[1:]))
+
+
+def _left_over(path: ToolPath, law: PiecewisePolynomial, limits: ToolLimits) -> float:
+    """Return how many times longer the law must last to keep the tool's limits between the places."""
+    part = np.linspace(0.0, 1.0, _BETWEEN)
+    times = (law.breaks[:-1, None] + law.lengths[:, None] * part).reshape(-1)
+    passed = path.passed(law, law.breaks)
+    demand = path.by_time(law, np.clip(times, law.start, law.end), "right", passed)
+    shares = []
+    for order, rows in ((1, demand.first), (2, demand.second)):
+        for name, some in (("", rows[:, :3]), ("angular_", rows[:, 3:])):
+            limit = getattr(limits, name + ("speed", "acceleration")[order - 1])
+            shares.append((float(np.linalg.norm(some, axis=1).max()) / limit) ** (1 / order))
+    worst = max(shares)
+    return worst * (1 + _STRETCHED) if worst > 1 else 1.0
+
+
+def _limits(spec: LawSpec, limits: ToolLimits) -> ToolLimits:
+    given = spec.model_dump(include={"speed", "acceleration", "angular_speed", "angular_acceleration"})
+    return ToolLimits(**{**vars(limits), **{name: v for name, v in given.items() if v is not None}})
+
+
+def _require_acceleration(curve: PiecewisePolynomial, robot: Robot, planner: str) -> None:
+    moving = np.abs(curve.piece_ends(1)).max(axis=(0, 1)) > 0
+    lacking = np.flatnonzero(moving & ~np.isfinite(robot.limits.acceleration).all(axis=1))
+    if lacking.size:
+        why = "for the fastest law"
+        raise missing_limit(planner, "acceleration", lacking.tolist(), robot, why, "use another law `shape`")
+
+
+def tool_constraint(path: ToolPath, limits: ToolLimits) -> PathDemand:
+    """Return what the limits of the tool demand of sd and sdd along a path.
+
+    An acceleration is the sum of one along the path and one across it: the circle of those that are allowed
+    is replaced by a polygon inside it, at most 2 % smaller. Across its axis a rotation gets 0.8, along 0.6.
+    """
+
+    def rows(places: Array, side: Side) -> ConstraintRows:
+        _, first, second = path.poses.evaluate(np.clip(places, 0.0, path.length), side)
+        way, turn = (np.linalg.norm(first[:, part], axis=1) for part in (slice(0, 3), slice(3, 6)))
+        bend = np.linalg.norm(second[:, :3], axis=1)
+        a, b, c = _translation_rows(way, bend, limits.acceleration)
+        more = _rotation_rows(first[:, 3:], second[:, 3:], turn, limits.angular_acceleration)
+        with np.errstate(divide="ignore"):
+            speed = np.minimum(limits.speed / way, limits.angular_speed / turn)
+        cap = np.minimum(speed**2, more[3])
+        joined = [np.concatenate(pair, axis=1) for pair in zip((a, b, c), more[:3], strict=True)]
+        return ConstraintRows(joined[0], joined[1], joined[2], cap)
+
+    return rows
+
+
+def _translation_rows(way: Array, bend: Array, limit: float) -> tuple[Array, Array, Array]:
+    count = way.size
+    if not bend.any():
+        ones = np.ones((count, 1)) * way[:, None]
+        return np.hstack([ones, -ones]), np.zeros((count, 2)), np.full((count, 2), limit)
+    angles = np.pi * (np.arange(_CORNERS // 2) + 0.5) / (_CORNERS // 2)
+    apothem = limit * math.cos(math.pi / _CORNERS)
+    return (
+        way[:, None] * np.cos(angles),
+        bend[:, None] * np.sin(angles),
+        np.full((count, angles.size), apothem),
+    )
+
+
+def _rotation_rows(
+    rate: Array, change: Array, turn: Array, limit: float
+) -> tuple[Array, Array, Array, Array]:
+    """Return rows (N, 2) and caps (N,) of the angular acceleration."""
+    axis = rate / np.where(turn > 0, turn, 1.0)[:, None]
+    along = (change * axis).sum(axis=1)
+    across = np.linalg.norm(change - axis * along[:, None], axis=1)
+    bent = bool(across.any())
+    a = np.stack([turn, -turn], axis=1)
+    b = np.stack([along, -along], axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        cap = np.where(across > 0, 0.8 * limit / across, np.inf)
+    return a, b, np.full((turn.size, 2), (0.6 if bent else 1.0) * limit), cap

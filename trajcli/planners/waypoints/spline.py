@@ -1,0 +1,346 @@
+"""One smooth curve through all points: the slides' 2.2, and the splines that numerical analysis knows.
+
+Which curve each rule of `spline` means, and what it lets its ends impose.
+
+When a spline passes its points, where only the limits say how fast it may be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Annotated, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.splines.cubic import clamped, natural, not_a_knot
+from trajcli.curves.splines.hermite import (
+    computed_accelerations,
+    computed_velocities,
+    cubic_through,
+    parabola_velocities,
+    quintic_through,
+)
+from trajcli.curves.splines.shape_preserving import ShapeError, shape_preserving
+from trajcli.curves.splines.time_allocation import fastest_durations
+from trajcli.curves.splines.virtual_points import continuous_acceleration
+from trajcli.errors import Amount, PlanningError, Problem
+from trajcli.kinematics.robot import Robot
+from trajcli.language.numbers import FieldPath, Flaw, refuse
+from trajcli.language.recorded import Recorded
+from trajcli.language.targets import Numbers
+from trajcli.language.waypoints import Waypoint
+from trajcli.planners.planner import Planned
+from trajcli.planners.point_to_point.point_to_point import missing_limit, standstill
+from trajcli.planners.waypoints.through_points import PointTable, ThroughPoints, via_points
+from trajcli.trajectory import State
+from trajcli.units import Quantity
+
+Rule = Literal[
+    "imposed",
+    "computed",
+    "continuous_acceleration",
+    "natural",
+    "clamped",
+    "not_a_knot",
+    "quintic",
+    "shape_preserving",
+]
+FREE_ENDS: tuple[Rule, ...] = ("natural", "not_a_knot")
+IMPOSES: dict[Rule, int] = {
+    "imposed": 1,
+    "computed": 1,
+    "continuous_acceleration": 2,
+    "natural": 0,
+    "clamped": 1,
+    "not_a_knot": 0,
+    "quintic": 2,
+    "shape_preserving": 1,
+}
+"""Highest derivative that the ends impose."""
+
+
+def curve_through(
+    rule: Rule, points: PointTable, times: Array, virtual_times: Sequence[float] | None = None
+) -> PiecewisePolynomial:
+    """Return the curve of a rule.
+
+    Args:
+        rule: Its name.
+        points: m of them.
+        times: Shape (m,), increasing, the first zero.
+        virtual_times: Of the two virtual points of continuous_acceleration.
+
+    Raises:
+        ShapeError: When an end velocity does not let shape_preserving be monotone.
+        ValueError: When a virtual time is outside its interval.
+    """
+    q, (first, last), (start, end) = points.positions, points.rates[0, [0, -1]], points.rates[1, [0, -1]]
+    match rule:
+        case "imposed":
+            return cubic_through(times, q, points.rates[0])
+        case "computed":
+            return cubic_through(times, q, computed_velocities(times, q, first, last))
+        case "continuous_acceleration":
+            return continuous_acceleration(times, q, (first, last), (start, end), virtual_times)
+        case "natural":
+            return natural(times, q, *_imposed(first, last))
+        case "not_a_knot":
+            return not_a_knot(times, q, *_imposed(first, last))
+        case "clamped":
+            return clamped(times, q, first, last)
+        case "shape_preserving":
+            return shape_preserving(times, q, first, last)
+        case _:
+            return _quintic(points, times)
+
+
+def _imposed(first: Array, last: Array) -> tuple[Array | None, Array | None]:
+    """Return the end velocities that are not zero: at a point at rest the rule decides."""
+    return first if first.any() else None, last if last.any() else None
+
+
+def _quintic(points: PointTable, times: Array) -> PiecewisePolynomial:
+    """Return the quintics; what a point does not give is computed."""
+    ends = points.rates[:, [0, -1]]
+    velocities = parabola_velocities(times, points.positions, *ends[0])
+    given = points.given.copy()
+    given[:, [0, -1]] = True
+    velocities = np.where(given[0][:, None], points.rates[0], velocities)
+    accelerations = computed_accelerations(times, velocities, *ends[1])
+    accelerations = np.where(given[1][:, None], points.rates[1], accelerations)
+    return quintic_through(times, points.positions, velocities, accelerations)
+
+
+_LEAST = 1e-3  # of the mean duration: a piece between points that hardly differ begins with this much
+
+
+def fastest_spline_times(rule: Rule, points: PointTable, robot: Robot) -> Array:
+    """Return the times (m,) of the fastest curve of a rule that keeps the limits, the first zero.
+
+    Raises:
+        MissingLimitError: When a moving joint has no limit at all.
+        PlanningError: When no durations keep the limits.
+    """
+    bounds = np.stack([robot.limits.of_order(order) for order in (1, 2, 3)])
+    moving = np.ptp(points.positions, axis=0) > 0
+    lacking = np.flatnonzero(moving & ~np.isfinite(bounds).all(axis=2).any(axis=0))
+    if lacking.size:
+        also = "give every waypoint a `time`"
+        raise missing_limit(
+            "spline", "velocity", lacking.tolist(), robot, "to find when it passes its points", also
+        )
+
+    def family(durations: Array) -> PiecewisePolynomial:
+        return curve_through(rule, points, np.concatenate([[0.0], np.cumsum(durations)]))
+
+    durations = fastest_durations(family, _guess(points, bounds), bounds)
+    if durations is None:
+        message = f"no times let rule {rule} pass these points within all limits"
+        hint = "an imposed velocity or acceleration asks too much: lower it, or give every waypoint a `time`"
+        raise PlanningError(Problem(message, hint))
+    return np.concatenate([[0.0], np.cumsum(durations)])
+
+
+def _guess(points: PointTable, bounds: Array) -> Array:
+    """Return the time that the slowest joint needs for each piece, if it could stop at every point."""
+    chords = np.abs(np.diff(points.positions, axis=0))
+    needed = np.zeros(len(chords))
+    for order, limits in enumerate(bounds, 1):
+        least = np.abs(limits).min(axis=1)
+        needed = np.maximum(needed, ((chords / least) ** (1 / order)).max(axis=1))
+    return np.asarray(np.maximum(needed, _LEAST * needed.mean()))
+
+
+_INNER = {"imposed": 1, "quintic": 2}
+
+
+class Spline(ThroughPoints):
+    """A smooth curve through all points, at times that are given or follow from the limits.
+
+    Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.2.2; Biagiotti and
+    Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), chapter 4.
+    """
+
+    continuity: ClassVar[Literal[1, 2]] = 1
+
+    planner: Literal["spline"] = "spline"
+    rule: Annotated[
+        Rule,
+        Field(
+            description="What fixes the curve between the points. imposed: velocities of the waypoints; "
+            "computed: velocities from the slopes, zero where their sign changes; continuous_acceleration: "
+            "two virtual points let the ends impose velocity and acceleration; natural, clamped, not_a_knot: "
+            "cubic splines of numerical analysis; quintic: continuous acceleration with given or computed "
+            "inner values; shape_preserving: monotone between points, no overshoot."
+        ),
+    ] = "continuous_acceleration"
+    virtual_times: (
+        Annotated[
+            tuple[float, ...],
+            Numbers(2, Quantity("time"), "Times of the two virtual points of continuous_acceleration, s."),
+        ]
+        | None
+    ) = None
+
+    @property
+    def joins(self) -> Literal[1, 2]:
+        """Acceleration joins where the rule imposes it at both ends."""
+        return 2 if IMPOSES[self.rule] == 2 else 1
+
+    @model_validator(mode="after")
+    def _says_what_the_rule_needs(self) -> Spline:
+        flaws = [
+            *self._flaws_inside(),
+            *self._flaws_of_blends(),
+            *self._flaws_of_target(),
+            *self._flaws_of_virtual_times(),
+        ]
+        if flaws:
+            raise refuse(flaws)
+        return self
+
+    def _flaws_inside(self) -> Iterator[Flaw]:
+        lacking = "rule imposed needs the velocity of every waypoint between start and target"
+        if isinstance(self.through, Recorded):
+            if self.rule == "imposed":
+                yield ("rule",), lacking, "recorded points have none: use computed"
+            return
+        between = self.through if self.to is not None else self.through[:-1]
+        for k, point in enumerate(between):
+            if self.rule == "imposed" and point.velocity is None:
+                yield ("through", k), lacking, "give it a `velocity`, or use computed"
+            for order, name in ((1, "velocity"), (2, "acceleration")):
+                if order > _INNER.get(self.rule, 0) and getattr(point, name) is not None:
+                    instead = "leave it out, or use quintic"
+                    yield (
+                        ("through", k, name),
+                        f"rule {self.rule} computes the {name} between the ends",
+                        instead,
+                    )
+
+    def _flaws_of_blends(self) -> Iterator[Flaw]:
+        for k, point in enumerate(self.listed):
+            if point.blend is not None:
+                last = self.to is not None and k == len(self.listed) - 1
+                path: FieldPath = ("to",) if last else ("through", k)
+                yield (*path, "blend"), "a spline goes through its points", "use blends, or leave it out"
+
+    def _flaws_of_target(self) -> Iterator[Flaw]:
+        path, target = self._target()
+        if target is None:
+            return
+        for order, name in ((1, "velocity"), (2, "acceleration")):
+            values = getattr(target, name)
+            if order > IMPOSES[self.rule] and any(values or ()):
+                text = f"rule {self.rule} does not impose the {name} at its end"
+                yield (*path, name), text, "use continuous_acceleration or quintic, or leave it out"
+
+    def _target(self) -> tuple[FieldPath, Waypoint | None]:
+        if self.to is not None:
+            return ("to",), self.to
+        if isinstance(self.through, Recorded):
+            return (), None
+        return ("through", len(self.through) - 1), self.through[-1]
+
+    def _flaws_of_virtual_times(self) -> Iterator[Flaw]:
+        if self.virtual_times is None:
+            return
+        path: FieldPath = ("virtual_times",)
+        if self.rule != "continuous_acceleration":
+            yield (
+                path,
+                f"rule {self.rule} has no virtual points",
+                "leave it out, or use continuous_acceleration",
+            )
+            return
+        between = isinstance(self.through, Recorded) or len(self.listed) > 1
+        if not self.timed and (between or not self.duration):
+            yield path, "virtual times need waypoints with times", "give each waypoint a `time`"
+        elif not isinstance(self.through, Recorded):
+            yield from self._flaws_of_intervals(*self.virtual_times)
+
+    def _flaws_of_intervals(self, first: float, last: float) -> Iterator[Flaw]:
+        times = [0.0, *(point.time or self.duration or 0.0 for point in self.listed)]
+        if 0 < first < times[1] and times[-2] < last < times[-1] and first < last:
+            return
+        spans = " and ".join(f"{a:.12g} to {b:.12g} s" for a, b in (times[:2], times[-2:]))
+        text = f"the virtual points must lie inside the first interval and inside the last one, {spans}"
+        yield ("virtual_times",), text, "leave it out for their middles"
+
+    def told_to_last(self, duration: float) -> Self:
+        """Return the planner whose points, virtual ones too, are passed in the same proportion.
+
+        Raises:
+            PlanningError: When virtual times belong to a recording whose end nothing but its file says.
+        """
+        longer = super().told_to_last(duration)
+        if self.virtual_times is None:
+            return longer
+        last = self._last_time() or self.duration
+        if last is None:
+            raise PlanningError("virtual times cannot be stretched with a recording", hint="leave them out")
+        times = tuple(time * (duration / last) for time in self.virtual_times)
+        return longer.model_copy(update={"virtual_times": times})
+
+    def plan(self, start: State, robot: Robot) -> Planned:
+        """Return the curve through all points.
+
+        Raises:
+            MissingLimitError: When times are left out and a moving joint has no limit.
+            PlanningError: When no times keep the limits, or the ends ask for what the rule cannot do.
+        """
+        points = self.waypoints(start)
+        if points.times is None and not np.ptp(points.positions, axis=0).any() and not points.rates.any():
+            return standstill(points.target, self.duration or 0.0)
+        times = self._times_of(points, robot)
+        curve = self._curve(points, times, robot)
+        return Planned(
+            curve,
+            self._end(points, curve),
+            passage=via_points(points, times),
+            begins=_beginning(curve) if self.rule in FREE_ENDS else None,
+            events=points.events,
+        )
+
+    def _times_of(self, points: PointTable, robot: Robot) -> Array:
+        if points.times is not None:
+            return points.times
+        if self.duration and points.count == 2:
+            return np.array([0.0, self.duration])
+        try:
+            times = fastest_spline_times(self.rule, points, robot)
+        except ShapeError as error:
+            raise _not_monotone(error, robot, given=False) from None
+        return times / times[-1] * self.duration if self.duration else times
+
+    def _curve(self, points: PointTable, times: Array, robot: Robot) -> PiecewisePolynomial:
+        try:
+            return curve_through(self.rule, points, times, self.virtual_times)
+        except ShapeError as error:
+            raise _not_monotone(error, robot, given=points.times is not None) from None
+        except ValueError as error:  # a virtual time outside its interval
+            raise PlanningError(str(error), hint="give other `virtual_times`, or leave them out") from None
+
+    def _end(self, points: PointTable, curve: PiecewisePolynomial) -> State:
+        if self.rule not in FREE_ENDS:
+            return points.target
+        return State(points.positions[-1], curve.piece_ends(1)[1][-1], np.zeros(curve.dimension))
+
+
+def _not_monotone(error: ShapeError, robot: Robot, *, given: bool) -> PlanningError:
+    name, joint = robot.joint_names[error.component], error.component
+    message = f"{{velocity}} of {name} at the {error.end} point keeps the curve from being monotone"
+    amounts = {"velocity": Amount(error.velocity, 1, joint)}
+    if given:
+        message += ", {low} to {high} would not"
+        amounts |= {"low": Amount(error.low, 1, joint), "high": Amount(error.high, 1, joint)}
+    hint = "change that velocity, or use another rule than shape_preserving"
+    hint += "" if given else ", or give every waypoint a `time`"
+    return PlanningError(Problem(message, hint, joint=name, amounts=amounts))
+
+
+def _beginning(curve: PiecewisePolynomial) -> State:
+    position, velocity = (curve.piece_ends(order)[0][0] for order in (0, 1))
+    return State(position, velocity, np.zeros_like(position))

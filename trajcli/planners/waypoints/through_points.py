@@ -1,0 +1,291 @@
+"""What planners through a sequence of points share: the points as numbers, and when they are passed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from trajcli.curves.piecewise import Array
+from trajcli.errors import PlanningError, TrajcliError
+from trajcli.frozen import frozen
+from trajcli.language.numbers import Flaw, refuse
+from trajcli.language.recorded import Recorded
+from trajcli.language.targets import Duration, Target
+from trajcli.language.waypoints import NamedWaypoint, Through, Waypoint
+from trajcli.planners.planner import Event, Planner, Resolve
+from trajcli.trajectory import State, ViaPoints
+
+_SAME_TIME = 1e-9  # relative: a duration and the time of the last point that agree
+
+
+@frozen
+class PointTable:
+    """The points of a move as numbers, its start first and its target last.
+
+    Attributes:
+        positions: Shape (m, n), rad or m.
+        times: Shape (m,), s from the start of the move, the first zero; None where they are to be found.
+        rates: Velocities and accelerations, shape (2, m, n); zero where none is given.
+        given: Which points give a velocity, and which an acceleration, shape (2, m).
+        blends: Shape (m,), s; zero where none is given.
+        events: What was left out.
+    """
+
+    positions: Array
+    times: Array | None
+    rates: Array
+    given: NDArray[np.bool_]
+    blends: Array
+    events: tuple[Event, ...] = ()
+
+    @property
+    def target(self) -> State:
+        """The state of the last point."""
+        return State(self.positions[-1], self.rates[0, -1], self.rates[1, -1])
+
+    @property
+    def count(self) -> int:
+        """How many points there are."""
+        return len(self.positions)
+
+
+class ThroughPoints(Planner):
+    """A planner that passes points on the way to its target.
+
+    Attributes:
+        finds_times: Whether it always finds itself when it passes them, whatever a recording says.
+    """
+
+    finds_times: ClassVar[bool] = False
+
+    to: Annotated[
+        NamedWaypoint | None,
+        Field(description="The state in which the move ends; without it, the last point of `through`."),
+    ] = None
+    through: Annotated[
+        Through, Field(description="The points between start and target, or a file of recorded points.")
+    ] = ()
+    duration: Duration | None = None
+
+    @property
+    def listed(self) -> tuple[Waypoint, ...]:
+        """The points after the start that the job lists one by one, the target last."""
+        points = () if isinstance(self.through, Recorded) else self.through
+        return points if self.to is None else (*points, self.to)
+
+    @property
+    def timed(self) -> bool:
+        """Whether the points say when they are passed."""
+        if isinstance(self.through, Recorded):
+            return self.through.times is not None
+        return any(point.time is not None for point in self.through) or (
+            self.to is not None and self.to.time is not None
+        )
+
+    @model_validator(mode="after")
+    def _goes_somewhere(self) -> Self:
+        if self.to is None and not isinstance(self.through, Recorded) and not self.through:
+            raise refuse([((), f"{self.tag} needs points: `through`, `to` or both", None)])
+        return self
+
+    @model_validator(mode="after")
+    def _times_fit(self) -> Self:
+        if self.finds_times:
+            return self
+        flaws = [*self._lone_time()]
+        if self.timed:
+            flaws += [*self._lacking_times(), *self._disordered_times()]
+        if flaws:
+            raise refuse(flaws)
+        return self
+
+    def _lone_time(self) -> Iterator[Flaw]:
+        if isinstance(self.through, Recorded) and not self.timed and self.to is not None and self.to.time:
+            text = "the target has a time, but the recorded points have none: all or none"
+            yield ("to", "time"), text, "leave it out, or give the points their times"
+
+    def _lacking_times(self) -> list[Flaw]:
+        flaws: list[Flaw] = []
+        if not isinstance(self.through, Recorded):
+            flaws += [
+                (("through", k), "this waypoint has no `time`, others have: all or none", None)
+                for k, point in enumerate(self.through)
+                if point.time is None
+            ]
+        if self.to is not None and self.to.time is None and self.duration is None:
+            flaws.append((("to",), "the target has no time, other points have", "give the move a `duration`"))
+        last = self._last_time()
+        if self.duration and last and abs(last - self.duration) > _SAME_TIME * last:
+            text = f"the last point is reached after {last:.12g} s, which is not the duration"
+            flaws.append((("duration",), text, "leave one of them out"))
+        return flaws
+
+    def _last_time(self) -> float | None:
+        if self.to is not None:
+            return self.to.time
+        if isinstance(self.through, Recorded):
+            return None
+        return self.through[-1].time
+
+    def _disordered_times(self) -> list[Flaw]:
+        if isinstance(self.through, Recorded):
+            return []
+        ends = [] if self.to is None else [self.to.time or self.duration]
+        times = [(k, t) for k, t in enumerate([*(p.time for p in self.through), *ends]) if t is not None]
+        return [
+            (
+                ("through", k, "time") if k < len(self.through) else ("to",),
+                f"times must increase, but {time:.12g} s comes after {before:.12g} s",
+                None,
+            )
+            for (_, before), (k, time) in pairwise(times)
+            if time <= before
+        ]
+
+    def with_places(self, resolve: Resolve, near: Array) -> Self:
+        """Return the planner with joints in the place of poses, each near to the point before it.
+
+        Raises:
+            TrajcliError: What `resolve` raises, with the name of the point.
+        """
+        if not any(point.gives_pose for point in self.listed):
+            return self
+        recorded = isinstance(self.through, Recorded)
+        near = self.through.positions[-1] if isinstance(self.through, Recorded) else near
+        points = []
+        for index, point in enumerate(self.listed):
+            try:
+                resolved = resolve(point, near)
+            except TrajcliError as error:
+                last = self.to is not None and index == len(self.listed) - 1
+                raise _of_point(error, "target" if last else f"waypoint {index}") from None
+            near = resolved.as_state().position
+            points.append(_placed(point, resolved))
+        if self.to is None:
+            return self.model_copy(update={"through": tuple(points)})
+        through = self.through if recorded else tuple(points[:-1])
+        return self.model_copy(update={"through": through, "to": points[-1]})
+
+    def told_to_last(self, duration: float) -> Self:
+        """Return the planner whose points are passed in the same proportion, the last after `duration` s."""
+        last = self._last_time() or self.duration
+        scaled: dict[str, object] = {"duration": duration}
+        if self.timed and last:  # without: a recording is the end, and follows `duration`
+            factor = duration / last
+            scaled["through"] = _at_times(self.through, factor)
+            scaled["to"] = self.to and _at(self.to, factor)
+        return self.model_copy(update=scaled)
+
+    def waypoints(self, start: State) -> PointTable:
+        """Return the points as numbers; repeated ones are left out where nothing says when they are passed.
+
+        Args:
+            start: Where the move begins.
+        """
+        recorded = self.through
+        if not isinstance(recorded, Recorded):
+            points = self._stacked(start, None)
+            return points if points.times is not None else _without_repeats(points)
+        here = start.position
+        kept = recorded.after(here, None if self.to is None else self.to.as_state().position)
+        points = self._stacked(start, kept)
+        dropped = len(recorded.positions) - int(recorded.begins_at(here)) - len(kept.positions)
+        return replace(points, events=_merged(dropped, recorded)) if dropped else points
+
+    def _stacked(self, start: State, recorded: Recorded | None) -> PointTable:
+        listed = self.listed
+        rows = [start.position] if recorded is None else [start.position, *recorded.positions]
+        before = len(rows)
+        positions = np.array([*rows, *(point.as_state().position for point in listed)])
+        rates, given = np.zeros((2, *positions.shape)), np.zeros((2, len(positions)), dtype=bool)
+        rates[:, 0], given[:, 0] = (start.velocity, start.acceleration), True
+        blends = np.zeros(len(positions))
+        for k, point in enumerate(listed, before):
+            for order, values in enumerate((point.velocity, point.acceleration)):
+                if values is not None:
+                    rates[order, k], given[order, k] = values, True
+            blends[k] = point.blend or 0.0
+        return PointTable(positions, self._times(recorded), rates, given, blends)
+
+    def _times(self, recorded: Recorded | None) -> Array | None:
+        if not self.timed:
+            return None
+        listed = [point.time or self.duration or 0.0 for point in self.listed]
+        times = None if recorded is None else recorded.times
+        before: list[float] = [] if times is None else times.tolist()
+        if before and before[-1] > 0 and self.to is None and self.duration:
+            before = [time * (self.duration / before[-1]) for time in before]
+        times = np.array([0.0, *before, *listed])
+        late = np.flatnonzero(np.diff(times) <= 0)
+        if late.size and late[0] == 0 and before:
+            raise PlanningError(
+                f"the recording begins at t = {before[0]:.12g} s, but not where the arm then stands",
+                hint="go to its first point in a move before, or give a larger `merge` or a later `t`",
+            )
+        if late.size:
+            message = (
+                f"the target is reached after {times[-1]:.12g} s, "
+                f"the last recorded point after {times[-2]:.12g} s"
+            )
+            raise PlanningError(message, hint="give the target a later `time`")
+        return times
+
+
+def _placed(point: Waypoint, resolved: Target) -> Waypoint:
+    """Return the point with the joints that reach it."""
+    if not point.gives_pose:
+        return point
+    return Waypoint(**resolved.model_dump(), time=point.time, blend=point.blend)
+
+
+def via_points(points: PointTable, times: Array) -> ViaPoints:
+    """Return the promise to be in every point at its time (m,)."""
+    return ViaPoints(times, points.positions, np.zeros_like(points.positions))
+
+
+def _at_times(points: tuple[Waypoint, ...] | Recorded, factor: float) -> tuple[Waypoint, ...] | Recorded:
+    if isinstance(points, Recorded):
+        return points if points.times is None else replace(points, times=points.times * factor)
+    return tuple(_at(point, factor) for point in points)
+
+
+def _of_point(error: TrajcliError, name: str) -> TrajcliError:
+    return type(error)(*(replace(p, message=f"{name}: {p.message}") for p in error.problems))
+
+
+def _at(point: Waypoint, factor: float) -> Waypoint:
+    return point if point.time is None else point.model_copy(update={"time": point.time * factor})
+
+
+def _merged(count: int, recorded: Recorded) -> tuple[Event, ...]:
+    text = (
+        f"left out {count} of {len(recorded.positions)} points of {recorded.file}: too near to the one before"
+    )
+    return (Event("merged", text),)
+
+
+def _without_repeats(points: PointTable) -> PointTable:
+    """Return the points without those that stand where the one before stands, the start and target apart."""
+    same = (np.diff(points.positions, axis=0) == 0).all(axis=1)
+    if not same.any() or points.count == 2:
+        return points
+    keep = np.append(True, ~same)
+    if not keep[-1]:  # the target stays, because it may say how fast
+        keep[-1], keep[np.flatnonzero(keep[:-1])[-1]] = True, keep[:-1].sum() == 1
+    keep[0] = True
+    count = points.count - int(keep.sum())
+    text = f"left out {count} waypoint{'s' * (count != 1)} that repeat{'s' * (count == 1)} the one before"
+    return replace(
+        points,
+        positions=points.positions[keep],
+        rates=points.rates[:, keep],
+        given=points.given[:, keep],
+        blends=points.blends[keep],
+        events=(*points.events, Event("merged", text)),
+    )
