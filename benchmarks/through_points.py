@@ -108,7 +108,7 @@ def _planned(planner: str, count: int, *, timed: bool = False):
     import json
 
     from trajcli.job.read import job_from_text
-    from trajcli.pipeline.plan import plan_job
+    from trajcli.planning.plan import plan_job
 
     points = _points(count)
     table = {

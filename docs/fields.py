@@ -11,7 +11,7 @@ from pydantic.fields import FieldInfo
 
 from docs.markdown import first_sentence, table
 from trajcli.job.model import Output, RobotSource, UnitsSpec
-from trajcli.job.robot_model import JointModel
+from trajcli.job.robot import JointModel
 from trajcli.language.limits import (
     UNLIMITED,
     Bounds,

@@ -12,10 +12,9 @@ from docs.markdown import ROOT, first_sentence, table
 from docs.planner_examples import EXAMPLES, LEFT_OUT, NOTES
 from docs.tool_path_reference import tool_path_sections
 from trajcli.columns import GROUPS, Group
-from trajcli.job.load import read_document
 from trajcli.job.model import Job, Output, UnitsSpec
-from trajcli.job.robot_model import JointModel, RobotModel
-from trajcli.job.robot_source import CATALOGUE, catalogue_names
+from trajcli.job.robot import CATALOGUE, JointModel, RobotModel, catalogue_names
+from trajcli.job.yaml.load import read_document
 from trajcli.language.limits import LimitsSpec, Scale, ToolLimitsSpec
 from trajcli.language.numbers import MAX_JOINTS
 from trajcli.language.poses import SEQUENCES

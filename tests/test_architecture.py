@@ -37,7 +37,6 @@ FLOORS = {
     "comparison": 7,
     "queries": 7,
     "output": 8,
-    "pipeline": 8,
     "cli": 9,
     "": 10,  # trajcli/__init__.py, the public face
     "__main__": 11,
@@ -45,7 +44,7 @@ FLOORS = {
 HOMES = {
     "pydantic": ("language/", "planners/", "job/"),
     "pydantic_core": ("language/", "planners/", "job/"),
-    "yaml": ("job/load.py", "job/yaml/"),
+    "yaml": ("job/yaml/",),
     "typer": ("cli/",),
     "click": ("cli/",),
     "mcap": ("streams/",),
@@ -280,6 +279,6 @@ def test_a_small_plan_imports_nothing_heavy() -> None:
 
 def test_inverse_kinematics_imports_nothing_heavy() -> None:
     modules = modules_after("ik", "--robot", "ur5e", "--pose", "{xyz: [0.4, 0.1, 0.25], rpy: [180, 0, 0]}")
-    planning = {"trajcli.planners.point_to_point.point_to_point", "trajcli.pipeline.plan", "trajcli.checks"}
+    planning = {"trajcli.planners.point_to_point.point_to_point", "trajcli.planning.plan", "trajcli.checks"}
     assert "trajcli.kinematics.inverse.solve" in modules
     assert not modules & ((HEAVY_FOR_A_PLAN | LOOKS_FOR_PLUGINS | planning) - {"trajcli.geometry"})

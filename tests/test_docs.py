@@ -14,9 +14,9 @@ from docs.generate import PAGES, shows_commands
 from docs.markdown import ROOT, Block, anchors, blocks, documents, links
 from trajcli.cli.app import app
 from trajcli.job.read import job_from_text
-from trajcli.job.robot_source import read_robot_file
+from trajcli.job.robot import read_robot_file
 from trajcli.job.schema import schema_of
-from trajcli.pipeline.plan import plan_job
+from trajcli.planning.plan import plan_job
 
 DOCUMENTS = documents()
 NAMES = [path.relative_to(ROOT).as_posix() for path in DOCUMENTS]

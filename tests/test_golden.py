@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from golden.regenerate import EXAMPLES, GOLDEN, golden_file, rows_of
 
+from trajcli.comparison.difference import compare
 from trajcli.curves import piecewise
-from trajcli.pipeline.compare import compare
 from trajcli.streams.table import read_csv
 
 PATHS = sorted(EXAMPLES.glob("*.yaml"))

@@ -17,8 +17,8 @@ from trajcli.errors import InputError
 from trajcli.geometry.rotation import without_jumps
 from trajcli.job.read import job_from_text, load_job
 from trajcli.kinematics.robot import Joint, Robot, unlimited
-from trajcli.pipeline.plan import plan_job
-from trajcli.pipeline.write import write_plan
+from trajcli.output.write import write_plan
+from trajcli.planning.plan import plan_job
 from trajcli.samples import ListedGrid, UniformGrid, sample
 from trajcli.streams.table import read_csv
 from trajcli.units import Units

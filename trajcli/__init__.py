@@ -37,11 +37,11 @@ if TYPE_CHECKING:
     from trajcli.job.model import Job
     from trajcli.job.read import LoadedJob, job_from_text, load_job
     from trajcli.job.report import Report
-    from trajcli.job.robot_source import catalogue_names, load_robot
+    from trajcli.job.robot import catalogue_names, load_robot
     from trajcli.kinematics.robot import Joint, Limits, Robot
-    from trajcli.pipeline.plan import Plan, plan_job
-    from trajcli.pipeline.report import report_of, verification_error
-    from trajcli.pipeline.write import write_plan
+    from trajcli.output.report import report_of, verification_error
+    from trajcli.output.write import write_plan
+    from trajcli.planning.plan import Plan, plan_job
     from trajcli.trajectory import State, Trajectory
 
 _HOMES = {
@@ -62,11 +62,11 @@ _HOMES = {
     "trajcli.job.model": ("Job",),
     "trajcli.job.read": ("LoadedJob", "job_from_text", "load_job"),
     "trajcli.job.report": ("Report",),
-    "trajcli.job.robot_source": ("catalogue_names", "load_robot"),
+    "trajcli.job.robot": ("catalogue_names", "load_robot"),
     "trajcli.kinematics.robot": ("Joint", "Limits", "Robot"),
-    "trajcli.pipeline.plan": ("Plan", "plan_job"),
-    "trajcli.pipeline.report": ("report_of", "verification_error"),
-    "trajcli.pipeline.write": ("write_plan",),
+    "trajcli.planning.plan": ("Plan", "plan_job"),
+    "trajcli.output.report": ("report_of", "verification_error"),
+    "trajcli.output.write": ("write_plan",),
     "trajcli.trajectory": ("State", "Trajectory"),
 }
 _MODULES = {name: module for module, names in _HOMES.items() for name in names}

@@ -7,15 +7,14 @@ import dataclasses
 import numpy as np
 import pytest
 
-from trajcli.checks.tool import check_tool
-from trajcli.checks.tool_rows import ToolRows
+from trajcli.checks.tool import SampledTool, check_tool
 from trajcli.curves.hermite import hermite_pieces
 from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.geometry.paths.orientation import AxisAngleOrientation, SegmentProgress
 from trajcli.geometry.paths.pose import PoseCurve
 from trajcli.geometry.paths.position import Line
-from trajcli.job.robot_source import load_robot
+from trajcli.job.robot import load_robot
 from trajcli.kinematics.following.motion import motion_along
 from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.kinematics.following.tool_path import ToolPath
@@ -54,7 +53,7 @@ def limited(robot: Robot, **tcp: float) -> Robot:
     )
 
 
-def moving(tcp=None, *, the_law=None, turn=(0.0, 0.0, TURN), tolerance=1e-6) -> ToolRows:
+def moving(tcp=None, *, the_law=None, turn=(0.0, 0.0, TURN), tolerance=1e-6) -> SampledTool:
     """Return a line of a UR5e with a rotation, followed within a tolerance."""
     robot, q = load_robot("ur5e"), np.array([0.3, -1.2, 1.4, -0.9, -1.3, 0.4])
     pose = forward(robot, q)
@@ -67,7 +66,7 @@ def moving(tcp=None, *, the_law=None, turn=(0.0, 0.0, TURN), tolerance=1e-6) -> 
     s = the_law or law(place.length)
     motion = motion_along(path, s, s.breaks, Tolerance(tolerance, tolerance))
     curve = followed(robot, path, q).by_time(motion)
-    return ToolRows(
+    return SampledTool(
         trajectory_of(robot, curve),
         Span(0, "line", 0.0, curve.duration, 2),
         limited(robot, **(tcp or {})),
@@ -85,7 +84,7 @@ ROOMY = {
 }
 
 
-def judged(rows: ToolRows, **fields) -> list:
+def judged(rows: SampledTool, **fields) -> list:
     return check_tool(dataclasses.replace(rows, **fields))
 
 
@@ -93,11 +92,11 @@ def kinds(findings) -> list[str]:
     return [finding.kind for finding in findings]
 
 
-def with_limits(rows: ToolRows, **tcp) -> ToolRows:
+def with_limits(rows: SampledTool, **tcp) -> SampledTool:
     return dataclasses.replace(rows, robot=limited(rows.robot, **tcp))
 
 
-def shifted(rows: ToolRows, offset) -> ToolRows:
+def shifted(rows: SampledTool, offset) -> SampledTool:
     """Return rows whose joints are moved by a bump in the middle of the motion."""
     curve = rows.trajectory.curve
     coefficients = curve.coefficients.copy()
@@ -197,7 +196,7 @@ def test_joints_that_race_make_the_tool_faster_than_its_law():
     """The law is slow enough; the curve that is judged goes the same way in half the time."""
     fast = trajectory_of(RIGHT.robot, scale_time(RIGHT.trajectory.curve, 0.5))
     motion = RIGHT.motion.scaled(0.5)
-    rows = ToolRows(fast, Span(0, "line", 0.0, fast.duration, 2), RIGHT.robot, motion)
+    rows = SampledTool(fast, Span(0, "line", 0.0, fast.duration, 2), RIGHT.robot, motion)
     assert judged(rows) == []
     found = judged(with_limits(rows, **{name: ROOMY[name] for name in ("speed", "acceleration")}))
     assert kinds(found) == ["tool_speed", "tool_acceleration"]
@@ -221,7 +220,7 @@ def test_a_step_of_acceleration_although_jerk_is_limited():
     assert "jerk_limited" in (found.hint or "")
 
 
-def planar(elbow) -> ToolRows:
+def planar(elbow) -> SampledTool:
     """Return a planar arm that goes along the tool's way for which its elbow has the given angles over time."""
     robot = load_robot("planar3r")
     t = np.linspace(0, DURATION, 65)
@@ -254,7 +253,7 @@ def planar(elbow) -> ToolRows:
     motion = dataclasses.replace(
         RIGHT.motion, path=None, timed=timed, breaks=np.array([0.0, DURATION]), law=law()
     )
-    return ToolRows(whole, Span(0, "line", 0.0, DURATION, 2), limited(robot), motion)
+    return SampledTool(whole, Span(0, "line", 0.0, DURATION, 2), limited(robot), motion)
 
 
 def test_an_elbow_that_straightens_through_changes_the_branch():
@@ -284,7 +283,7 @@ def test_a_wrist_that_passes_its_middle_changes_the_branch():
         RIGHT.motion, path=None, timed=timed, breaks=np.array([0.0, DURATION]), law=law()
     )
     whole = trajectory_of(robot, curve)
-    (found,) = judged(ToolRows(whole, whole.spans[0], limited(robot), motion))
+    (found,) = judged(SampledTool(whole, whole.spans[0], limited(robot), motion))
     assert found.kind == "branch"
     crossing = curve.evaluate(found.time)[4]
     assert abs(crossing) < 0.11  # the first of eight rows of a piece behind it

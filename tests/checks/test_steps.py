@@ -5,11 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from trajcli.checks.finding import Step
-from trajcli.checks.steps import Steps
+from trajcli.checks.finding import AccelerationStep, AccelerationSteps
 
-EXPECTED = [Step(2, "a", 0.5, 1.0), Step(2, "b", 0.5, -1.0), Step(4, "b", 0.75, 2.0)]
-STEPS = Steps(
+EXPECTED = [
+    AccelerationStep(2, "a", 0.5, 1.0),
+    AccelerationStep(2, "b", 0.5, -1.0),
+    AccelerationStep(4, "b", 0.75, 2.0),
+]
+STEPS = AccelerationSteps(
     np.array([2, 2, 4]),
     np.array([0, 1, 1]),
     np.array([0.5, 0.5, 0.75]),
@@ -30,4 +33,4 @@ def test_steps_are_a_sequence():
 
 def test_no_steps_are_nothing():
     nothing = np.empty(0, dtype=int)
-    assert not Steps(nothing, nothing, np.empty(0), np.empty(0), ("a",))
+    assert not AccelerationSteps(nothing, nothing, np.empty(0), np.empty(0), ("a",))

@@ -7,7 +7,7 @@ import pytest
 
 from trajcli.checks import tool_bound
 from trajcli.checks.tool_bound import tool_bounds
-from trajcli.job.robot_source import load_robot
+from trajcli.job.robot import load_robot
 from trajcli.kinematics.jacobian import tcp_acceleration, tcp_twist
 from trajcli.kinematics.robot import Robot
 

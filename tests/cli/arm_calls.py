@@ -13,7 +13,7 @@ import typer
 import yaml
 from running import Outcome
 
-from trajcli.cli.arm_app import register
+from trajcli.cli.arm_commands import register
 
 ORACLES = Path(__file__).parents[1] / "oracles"
 

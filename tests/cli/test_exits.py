@@ -122,7 +122,7 @@ def test_full_digits_are_bit_exact() -> None:
     import numpy as np
 
     from trajcli.job.read import job_from_text
-    from trajcli.pipeline.plan import plan_job
+    from trajcli.planning.plan import plan_job
 
     job = JOB.replace("{angle: deg}", "{}").replace("joints: 30", "joints: 0.7")
     code, out, _ = run("plan", "-", "--digits", "full", stdin=job)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from trajcli.cli.number_words import joined, sorted_words
+from trajcli.cli.arm_commands import joined, sorted_words
 
 TAKES = {"--robot": 1, "-r": 1, "--json": 0, "--point": 3}
 

@@ -9,7 +9,7 @@ import pytest
 import yaml
 from arm_calls import Arms
 
-from trajcli.job.robot_source import CATALOGUE, catalogue_names, load_robot
+from trajcli.job.robot import CATALOGUE, catalogue_names, load_robot
 from trajcli.kinematics.forward import forward
 
 

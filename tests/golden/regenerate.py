@@ -18,8 +18,8 @@ def rows_of(example: Path) -> bytes:
     """Return what `trajcli plan EXAMPLE` writes to standard output."""
     from trajcli.columns import column_names
     from trajcli.job.read import load_job
-    from trajcli.pipeline.plan import plan_job
-    from trajcli.pipeline.write import grid_of
+    from trajcli.output.write import grid_of
+    from trajcli.planning.plan import plan_job
     from trajcli.samples import sample
     from trajcli.streams.csv import write_csv
 

@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from trajcli.errors import FileError, InputError
-from trajcli.job.robot_source import CATALOGUE, catalogue_names, load_robot
+from trajcli.job.robot import CATALOGUE, catalogue_names, load_robot
 from trajcli.kinematics.forward import forward
 
 ORACLES = Path(__file__).parents[1] / "oracles"

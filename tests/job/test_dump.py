@@ -13,7 +13,7 @@ from random_mappings import jobs
 
 from trajcli.job.dump import dump_job
 from trajcli.job.read import LoadedJob, job_from_text, load_job
-from trajcli.pipeline.plan import plan_job
+from trajcli.planning.plan import plan_job
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.yaml"))
 

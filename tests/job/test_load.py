@@ -13,8 +13,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from trajcli.errors import InputError, TrajcliError
-from trajcli.job import load
-from trajcli.job.load import Document, parse_document
+from trajcli.job.yaml import load
+from trajcli.job.yaml.load import Document, parse_document
 
 JOB = """\
 # a job

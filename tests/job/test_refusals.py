@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from trajcli.errors import InputError, Problem
-from trajcli.job import load
-from trajcli.job.load import MAX_DEPTH, parse_document
-from trajcli.job.source import MAX_BYTES
+from trajcli.job.yaml import load
+from trajcli.job.yaml.load import MAX_DEPTH, parse_document
+from trajcli.job.yaml.source import MAX_BYTES
 
 START = "version: 1\n"
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from trajcli.job.scalars import ScalarError, resolve
+from trajcli.job.yaml.load import ScalarError, resolve
 
 VALUES = [
     ("", None),

@@ -13,10 +13,10 @@ from random_mappings import jobs
 
 from trajcli.cli.init import STARTER
 from trajcli.job.dump import dump_job
-from trajcli.job.load import read_document
 from trajcli.job.read import job_from_text
-from trajcli.job.robot_source import CATALOGUE
+from trajcli.job.robot import CATALOGUE
 from trajcli.job.schema import KINDS, SchemaKind, schema_of, schema_text
+from trajcli.job.yaml.load import read_document
 from trajcli.planners import PLANNERS
 
 ROOT = Path(__file__).parents[2]
@@ -70,7 +70,7 @@ def test_there_is_an_example_for_each_planner() -> None:
 def test_random_mappings_are_accepted_as_the_reader_does(plain: dict[str, Any]) -> None:
     loaded = job_from_text(json.dumps(plain, ensure_ascii=False))
     assert flaws("job", plain) == []
-    from trajcli.job.load import parse_document
+    from trajcli.job.yaml.load import parse_document
 
     assert flaws("job", parse_document(dump_job(loaded), "resolved").plain()) == []
 

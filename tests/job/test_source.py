@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import pytest
 
 from trajcli.errors import FileError, InputError
-from trajcli.job.load import read_document
+from trajcli.job.yaml.load import read_document
 
 TEXT = "a: 1\n"
 

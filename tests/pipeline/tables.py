@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from trajcli.pipeline.compare import compare
+from trajcli.comparison.difference import compare
 from trajcli.streams.table import Table
 
 

@@ -3,9 +3,8 @@ from __future__ import annotations
 import pytest
 from tables import motion
 
+from trajcli.comparison.difference import ALL, compare, parse_tolerances
 from trajcli.errors import InputError
-from trajcli.pipeline.column_tolerances import ALL, parse_tolerances
-from trajcli.pipeline.compare import compare
 
 
 @pytest.mark.parametrize(

@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 from tables import changed, exactly, motion, table, without
 
+from trajcli.comparison.difference import ALL, compare, describe
 from trajcli.errors import InputError
-from trajcli.pipeline.column_tolerances import ALL
-from trajcli.pipeline.compare import compare
-from trajcli.pipeline.difference import describe
 from trajcli.streams.table import Table
 
 

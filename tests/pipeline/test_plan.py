@@ -12,9 +12,9 @@ from independent_judge import broken_limits, extremes, step_breakers
 from random_jobs import MOST_JOINTS, RATES, TAGS, loaded, random_job
 
 from trajcli.errors import InputError, PlanningError
-from trajcli.pipeline.plan import Plan, plan_job
-from trajcli.pipeline.reference import Bound, fastest_duration
-from trajcli.pipeline.report import reference_of
+from trajcli.output.report import reference_of
+from trajcli.planning.lower_bound import LowerBound, fastest_duration
+from trajcli.planning.plan import Plan, plan_job
 
 SEEDS = st.integers(0, 2**32 - 1)
 few = settings(max_examples=40, deadline=None)
@@ -136,8 +136,8 @@ def test_no_planner_beats_the_bound(seed: int, tag: str, joints: int) -> None:
     (move,) = plan.moves
     begins = move.planned.begins or move.start  # a natural spline begins in motion
     bound = fastest_duration(begins, move.planned.end, move.robot.limits)
-    assume(isinstance(bound, Bound))
-    assert isinstance(bound, Bound)
+    assume(isinstance(bound, LowerBound))
+    assert isinstance(bound, LowerBound)
     assert move.duration >= bound.duration * (1 - 1e-9)
     told = reference_of(move)
     assert told.ratio is None or told.ratio >= 1 - 1e-9
@@ -160,7 +160,7 @@ def test_the_fastest_trapezoid_of_each_joint_is_the_bound(seed: int, joints: int
     assert plan is not None
     assert plan.verdict.passed
     bound = fastest_duration(plan.moves[0].start, plan.moves[0].planned.end, plan.moves[0].robot.limits)
-    assert isinstance(bound, Bound)
+    assert isinstance(bound, LowerBound)
     assert plan.trajectory.duration == pytest.approx(bound.duration, rel=1e-9)
 
 

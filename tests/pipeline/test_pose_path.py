@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from trajcli.errors import InputError
-from trajcli.pipeline.pose_path import End, parse_fractions, pose_path
-from trajcli.pipeline.pose_steps import TypedAngles
+from trajcli.queries.pose import PoseAtEnd, TypedAngles, parse_fractions, pose_path
 
 ANGLES = st.tuples(*[st.floats(-3, 3)] * 3)
 S = np.linspace(0, 1, 9)
@@ -20,7 +19,7 @@ def end(angles, xyz, typed=None):
     pose = np.eye(4)
     pose[:3, :3] = Rotation.from_euler("ZYZ", angles).as_matrix()
     pose[:3, 3] = xyz
-    return End(pose, typed)
+    return PoseAtEnd(pose, typed)
 
 
 @given(a=ANGLES, b=ANGLES, way=st.sampled_from(["line", "screw"]))

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from trajcli.errors import InputError, PlanningError
 from trajcli.job.dump import dump_job
 from trajcli.job.read import job_from_text
-from trajcli.pipeline.plan import plan_job
+from trajcli.planning.plan import plan_job
 
 JOB = """
 version: 1

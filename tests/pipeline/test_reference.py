@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from trajcli.kinematics.robot import Limits
-from trajcli.pipeline.reference import Bound, NoBound, fastest_duration
+from trajcli.planning.lower_bound import LowerBound, NoBound, fastest_duration
 from trajcli.trajectory import State
 
 
@@ -35,7 +35,7 @@ def test_rest_to_rest_without_jerk_limit_is_the_trapezoid(distance, speed, accel
     expected = 2 * np.sqrt(distance / acceleration) if reached else distance / speed + speed / acceleration
     for sign in (1, -1):
         bound = fastest_duration(state([0.0]), state([sign * distance]), limits([speed], [acceleration]))
-        assert isinstance(bound, Bound)
+        assert isinstance(bound, LowerBound)
         assert bound.duration == pytest.approx(expected, rel=1e-9)
 
 
@@ -58,7 +58,7 @@ def test_rest_to_rest_with_jerk_limit_is_the_double_s(distance, speed, accelerat
 
 def test_slowest_joint_binds():
     given_limits = limits([1.0, 1.0, 1.0], [1.0, 1.0, 1.0])
-    assert fastest_duration(state([0.0] * 3), state([0.1, -4.0, 2.0]), given_limits) == Bound(5.0, 1)
+    assert fastest_duration(state([0.0] * 3), state([0.1, -4.0, 2.0]), given_limits) == LowerBound(5.0, 1)
 
 
 def test_direction_of_the_limits_counts():
@@ -87,7 +87,7 @@ def test_accelerations_at_the_ends_count_with_a_jerk_limit_only():
 
 def test_same_state_takes_no_time():
     moving = state([1.0, 2.0], [0.5, -0.5])
-    assert fastest_duration(moving, moving, limits([np.inf, 1.0], [np.inf, 1.0])) == Bound(0.0, None)
+    assert fastest_duration(moving, moving, limits([np.inf, 1.0], [np.inf, 1.0])) == LowerBound(0.0, None)
 
 
 @pytest.mark.parametrize(
@@ -100,7 +100,7 @@ def test_same_state_takes_no_time():
 def test_unlimited_joint_that_moves_has_no_bound(quantity, given_limits):
     found = fastest_duration(state([0.0, 0.0]), state([1.0, 1.0]), given_limits)
     assert found == NoBound(f"its {quantity} is unlimited", 1)
-    assert isinstance(fastest_duration(state([0.0, 0.0]), state([1.0, 0.0]), given_limits), Bound)
+    assert isinstance(fastest_duration(state([0.0, 0.0]), state([1.0, 0.0]), given_limits), LowerBound)
 
 
 def test_state_outside_the_limits_has_no_bound():
@@ -136,7 +136,7 @@ def test_no_random_motion_within_the_limits_is_faster(seed):
     first, last = (state([s[0]], s[1], s[2]) for s in (states[0], states[-1]))
     for jerk in (np.abs(jerks).max() * (1 + 1e-9), np.inf):
         found = fastest_duration(first, last, limits([velocity], [acceleration], [jerk]))
-        if isinstance(found, Bound):
+        if isinstance(found, LowerBound):
             assert found.duration <= times.sum() * (1 + 1e-9)
         else:
             assert "leads out" in found.reason

@@ -13,8 +13,8 @@ from random_jobs import TAGS, loaded, random_job
 
 from trajcli.errors import InputError, PlanningError
 from trajcli.kinematics.robot import Limits
-from trajcli.pipeline.plan import Plan, plan_job
-from trajcli.pipeline.stretch import PlannedMove, lasting
+from trajcli.planning.plan import Plan, plan_job
+from trajcli.planning.retime import PlannedMove, with_duration
 
 SEEDS = st.integers(0, 2**32 - 1)
 few = settings(max_examples=15, deadline=None)
@@ -70,7 +70,7 @@ def test_slow_is_the_smallest_stretch_from_rest_to_rest(seed: int, tag: str) -> 
     (move,) = slow.moves
     assert move.duration == pytest.approx(0.05 * move.stretch, rel=1e-12)
     assert share(move) == pytest.approx(1, abs=1e-9)
-    assert share(lasting(move, move.duration * (1 - 1e-6))) > 1 + 5e-7
+    assert share(with_duration(move, move.duration * (1 - 1e-6))) > 1 + 5e-7
     (event,) = slow.events
     assert event.kind == "slowed"
     assert event.move == 0
@@ -102,7 +102,7 @@ def test_slow_is_the_smallest_stretch_between_moving_states(seed: int, tag: str,
     assert share(move) <= 1 + 1e-9
     assert np.array_equal(move.planned.end.velocity, job["moves"][0]["to"]["velocity"])
     for factor in [1 - 1e-6, *np.geomspace(1 / move.stretch, 0.999, 12)]:
-        assert share(lasting(move, move.duration * factor)) > 1, f"{factor} of the stretch would do"
+        assert share(with_duration(move, move.duration * factor)) > 1, f"{factor} of the stretch would do"
 
 
 def test_slow_finds_a_stretch_that_keeps_a_position_limit_too() -> None:

@@ -13,9 +13,9 @@ from scipy.optimize import minimize
 from through_jobs import assert_joins, assert_passes, cases, curve_of, plan, printed, refusal, timed
 
 from trajcli.job.read import job_from_text
-from trajcli.pipeline.explain import explanation
-from trajcli.pipeline.plan import plan_job
-from trajcli.pipeline.report import verification_error
+from trajcli.output.explain import explanation
+from trajcli.output.report import verification_error
+from trajcli.planning.plan import plan_job
 
 
 def blends(start, points, **fields):

@@ -17,7 +17,7 @@ from tool_jobs import job_text
 from trajcli.errors import PlanningError
 from trajcli.job.read import job_from_text
 from trajcli.kinematics.inverse.solve import solve
-from trajcli.pipeline.plan import Plan, plan_job
+from trajcli.planning.plan import Plan, plan_job
 
 ROWS = 31  # of a planned move that are compared
 LOOKS = 40  # places on the way to where a refused move ends

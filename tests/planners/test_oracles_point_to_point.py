@@ -15,9 +15,9 @@ from numpy.polynomial import Polynomial
 
 from trajcli.errors import PlanningError
 from trajcli.job.read import job_from_text
-from trajcli.pipeline.explain import explanation
-from trajcli.pipeline.plan import Plan, plan_job
-from trajcli.pipeline.write import grid_of
+from trajcli.output.explain import explanation
+from trajcli.output.write import grid_of
+from trajcli.planning.plan import Plan, plan_job
 from trajcli.samples import sample
 
 ORACLES = Path(__file__).parents[1] / "oracles" / "point_to_point.yaml"

@@ -19,8 +19,8 @@ from through_jobs import (
     timed,
 )
 
-from trajcli.pipeline.explain import explanation
-from trajcli.pipeline.report import report_of
+from trajcli.output.explain import explanation
+from trajcli.output.report import report_of
 
 RULES = [
     "imposed",

@@ -15,7 +15,7 @@ from trajcli.job.dump import dump_job
 from trajcli.job.read import job_from_text, load_job
 from trajcli.kinematics.forward import forward
 from trajcli.language.recorded import Recorded
-from trajcli.pipeline.plan import plan_job
+from trajcli.planning.plan import plan_job
 
 LIMITS = {"velocity": 2, "acceleration": 8}
 PLANNERS = ["spline", "blends", "time_optimal"]

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from through_jobs import assert_joins, cases, curve_of, job_text, plan, refusal
 
-from trajcli.pipeline.explain import explanation
-from trajcli.pipeline.report import report_of
+from trajcli.output.explain import explanation
+from trajcli.output.report import report_of
 from trajcli.planners.planner import stretched
 
 V, A = 2.0, 8.0
@@ -196,7 +196,7 @@ def test_where_which_limit_binds():
 
 
 def test_a_limit_of_jerk_is_a_violation_with_a_way_out():
-    from trajcli.pipeline.report import verification_error
+    from trajcli.output.report import verification_error
 
     made = fastest([[0.0], [1.0]], limits={**LIMITS, "jerk": 100}, passes=False)
     assert {finding.kind for finding in made.verdict.findings} >= {"acceleration_jump"}

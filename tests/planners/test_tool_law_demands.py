@@ -10,7 +10,7 @@ from tool_jobs import LENGTH, LIMITS, START, TCP, TO, line, plan, planned, poses
 
 from trajcli.errors import TrajcliError
 from trajcli.job.read import job_from_text
-from trajcli.pipeline.plan import plan_job
+from trajcli.planning.plan import plan_job
 
 TURN = {"rpy": [np.pi, 0, 0.8]}
 ANGLE = 0.8

@@ -14,8 +14,8 @@ from numpy.polynomial import Polynomial
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.errors import TrajcliError
 from trajcli.job.read import job_from_text
-from trajcli.pipeline.explain import explanation
-from trajcli.pipeline.plan import Plan, plan_job
+from trajcli.output.explain import explanation
+from trajcli.planning.plan import Plan, plan_job
 
 ORACLES = Path(__file__).parents[1] / "oracles"
 Fields = dict[str, Any]

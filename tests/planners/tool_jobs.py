@@ -11,11 +11,11 @@ import pytest
 
 from trajcli.errors import TrajcliError
 from trajcli.job.read import job_from_text
-from trajcli.job.robot_source import load_robot
+from trajcli.job.robot import load_robot
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.jacobian import tcp_acceleration, tcp_twist
 from trajcli.kinematics.robot import Robot
-from trajcli.pipeline.plan import Plan, plan_job
+from trajcli.planning.plan import Plan, plan_job
 
 Fields = dict[str, Any]
 TCP = {"speed": 0.25, "acceleration": 2.0, "angular_speed": 1.5, "angular_acceleration": 12.0}

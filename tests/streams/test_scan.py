@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from trajcli.streams.scan import NotFixedError, scan_fixed
+from trajcli.streams.decimals import NotFixedError, scan_fixed
 
 CELL = st.tuples(st.sampled_from(["", "-"]), st.integers(0, 8_999_999), st.integers(0, 999_999_999))
 

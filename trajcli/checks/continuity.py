@@ -11,9 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.checks.finding import Finding, Kind
+from trajcli.checks.finding import AccelerationSteps, Finding, FindingKind
 from trajcli.checks.limits import peaks_by_move
-from trajcli.checks.steps import Steps
 from trajcli.checks.tolerances import allowed_jump
 from trajcli.curves.extrema import Peaks
 from trajcli.curves.piecewise import Array
@@ -24,7 +23,7 @@ from trajcli.trajectory import Trajectory
 JERK_HINT = "use jerk_limited or quintic, or say limits: {jerk: null}"
 _SAME = 1e-12  # jumps that differ by less than this part are equal: the earliest is named
 _QUANTITIES = ("position", "velocity", "acceleration")
-_KINDS: tuple[Kind, ...] = ("position_jump", "velocity_jump", "acceleration_jump")
+_KINDS: tuple[FindingKind, ...] = ("position_jump", "velocity_jump", "acceleration_jump")
 
 
 def check_continuity(
@@ -61,7 +60,7 @@ def acceleration_steps(
     trajectory: Trajectory,
     limits_by_move: Sequence[Limits] | None = None,
     peaks: Sequence[tuple[Peaks, ...]] | None = None,
-) -> Steps:
+) -> AccelerationSteps:
     """Return the steps in acceleration in order of time, or only the legal ones.
 
     Args:
@@ -81,7 +80,7 @@ def acceleration_steps(
     owners = np.where(jumps.begins, _later(trajectory), _earlier(trajectory))[rows, joints]
     times = (trajectory.curve.breaks - trajectory.curve.start)[rows]
     moves = np.array([span.index for span in trajectory.spans])[owners]
-    return Steps(moves, joints, times, jumps.size[rows, joints], trajectory.joint_names)
+    return AccelerationSteps(moves, joints, times, jumps.size[rows, joints], trajectory.joint_names)
 
 
 @frozen

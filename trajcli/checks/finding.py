@@ -1,12 +1,20 @@
-"""What a check has to say."""
+"""What a check has to say.
+
+Steps in acceleration as a sequence: a long motion has one for every joint at every break.
+"""
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Sequence
+from typing import Literal, overload
 
-from trajcli.frozen import comparable
+import numpy as np
+from numpy.typing import NDArray
 
-Kind = Literal[
+from trajcli.curves.piecewise import Array
+from trajcli.frozen import comparable, frozen
+
+FindingKind = Literal[
     "position",
     "velocity",
     "acceleration",
@@ -25,7 +33,7 @@ Kind = Literal[
     "tool_jerk",
     "branch",
 ]
-Method = Literal["exact", "bounded", "sampled"]
+FindingMethod = Literal["exact", "bounded", "sampled"]
 
 
 @comparable
@@ -50,17 +58,17 @@ class Finding:
 
     move: int | None
     joint: str | None
-    kind: Kind
+    kind: FindingKind
     value: float
     limit: float
     time: float
-    method: Method = "exact"
+    method: FindingMethod = "exact"
     factor: float | None = None
     hint: str | None = None
 
 
 @comparable
-class Step:
+class AccelerationStep:
     """A step in a joint's acceleration, which is legal where the joint has no jerk limit.
 
     Attributes:
@@ -75,3 +83,39 @@ class Step:
     joint: str
     time: float
     size: float
+
+
+@frozen
+class AccelerationSteps(Sequence[AccelerationStep]):
+    """Steps in order of time, each made when it is asked for.
+
+    Attributes:
+        moves: Index of the move that each belongs to, shape (k,).
+        joints: Index of the joint, shape (k,).
+        times: Seconds from the start of the trajectory, shape (k,).
+        sizes: Acceleration after minus before, SI, shape (k,).
+        joint_names: Of all joints.
+    """
+
+    moves: NDArray[np.intp]
+    joints: NDArray[np.intp]
+    times: Array
+    sizes: Array
+    joint_names: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return self.times.size
+
+    @overload
+    def __getitem__(self, index: int) -> AccelerationStep: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[AccelerationStep]: ...
+
+    def __getitem__(self, index: int | slice) -> AccelerationStep | list[AccelerationStep]:
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
+        name = self.joint_names[int(self.joints[index])]
+        return AccelerationStep(
+            int(self.moves[index]), name, float(self.times[index]), float(self.sizes[index])
+        )

@@ -31,7 +31,7 @@ _HALVINGS, _DIVISIONS, _MOST = 8, 24, 1 << 16
 
 
 @frozen
-class Bound:
+class ToolPeak:
     """The largest magnitude of a vector over time.
 
     Attributes:
@@ -45,7 +45,9 @@ class Bound:
     most: float
 
 
-def tool_bounds(robot: Robot, breaks: Array, coefficients: Array) -> tuple[Bound, Bound, Bound, Bound]:
+def tool_bounds(
+    robot: Robot, breaks: Array, coefficients: Array
+) -> tuple[ToolPeak, ToolPeak, ToolPeak, ToolPeak]:
     """Return the largest speed, angular speed, acceleration and angular acceleration of the tool.
 
     Args:
@@ -57,7 +59,7 @@ def tool_bounds(robot: Robot, breaks: Array, coefficients: Array) -> tuple[Bound
     long = lengths > 0
     starts, lengths, coefficients = starts[long], lengths[long], coefficients[:, long]
     if not lengths.size:
-        still = Bound(0.0, float(breaks[0]), 0.0)
+        still = ToolPeak(0.0, float(breaks[0]), 0.0)
         return still, still, still, still
     rows, rest = _known(robot, coefficients, lengths)
     for _ in range(_HALVINGS):
@@ -100,7 +102,7 @@ def _known(robot: Robot, coefficients: Array, lengths: Array) -> tuple[Array, Ar
     return rows, highest * _BETWEEN * lengths**n
 
 
-def _largest(rows: Array, rest: Array, starts: Array, lengths: Array) -> Bound:
+def _largest(rows: Array, rest: Array, starts: Array, lengths: Array) -> ToolPeak:
     """Return the bound of vectors at nine rows of pieces (P, 9, 3), beside by `rest` (P,) between them."""
     hull, halves = _matrices()
     points = hull @ rows
@@ -114,13 +116,13 @@ def _largest(rows: Array, rest: Array, starts: Array, lengths: Array) -> Bound:
         over = sizes.max(axis=1) + rest
         wide = sizes.max(axis=1) > value + _CLOSE * max(value, _SMALL)
         if not wide.any() or len(points) > _MOST:
-            return Bound(value, time, max(most, float(over.max())))
+            return ToolPeak(value, time, max(most, float(over.max())))
         most = max(most, float(over[~wide].max(initial=0.0)))
         points = (halves[:, None] @ points[wide]).reshape(-1, *points.shape[1:])
         rest, lengths = np.tile(rest[wide], 2), np.tile(lengths[wide] / 2, 2)
         starts = np.tile(starts[wide], 2)
         starts[len(starts) // 2 :] += lengths[len(starts) // 2 :]
-    return Bound(value, time, max(most, float((np.linalg.norm(points, axis=2).max(axis=1) + rest).max())))
+    return ToolPeak(value, time, max(most, float((np.linalg.norm(points, axis=2).max(axis=1) + rest).max())))
 
 
 @cache

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from trajcli.checks.continuity import acceleration_steps, check_continuity
-from trajcli.checks.finding import Finding
+from trajcli.checks.finding import AccelerationSteps, Finding
 from trajcli.checks.limits import check_limits, peaks_by_move
-from trajcli.checks.steps import Steps
 from trajcli.checks.waypoints import check_waypoints
 from trajcli.curves.extrema import Peaks
 from trajcli.frozen import frozen
@@ -29,7 +28,7 @@ class Verdict:
     """
 
     findings: tuple[Finding, ...]
-    steps: Steps
+    steps: AccelerationSteps
     peaks: tuple[tuple[Peaks, ...], ...]
     unchecked: tuple[tuple[str, str], ...]
 
@@ -74,10 +73,12 @@ def _check_tools(trajectory: Trajectory, promises: Sequence[Promise]) -> list[Fi
     found: list[Finding] = []
     for span, promise in zip(trajectory.spans, promises, strict=True):
         if promise.tool is not None and promise.robot is not None:
-            from trajcli.checks.tool import check_tool  # a plan without paths does not pay for it
-            from trajcli.checks.tool_rows import ToolRows
+            from trajcli.checks.tool import (
+                SampledTool,
+                check_tool,  # a plan without paths does not pay for it
+            )
 
-            found += check_tool(ToolRows(trajectory, span, promise.robot, promise.tool))
+            found += check_tool(SampledTool(trajectory, span, promise.robot, promise.tool))
     return found
 
 

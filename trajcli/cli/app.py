@@ -7,7 +7,7 @@ from typing import Annotated, Literal, get_type_hints
 
 import typer
 
-from trajcli.cli.arm_app import register
+from trajcli.cli.arm_commands import register
 from trajcli.cli.outcome import guarded
 
 app = typer.Typer(

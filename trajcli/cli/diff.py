@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
+from trajcli.comparison.difference import compare, describe, parse_tolerances
 from trajcli.errors import InputError
-from trajcli.pipeline.column_tolerances import parse_tolerances
-from trajcli.pipeline.compare import compare
-from trajcli.pipeline.difference import describe
 from trajcli.streams.table import read_csv
 from trajcli.streams.whole_file import standard_output
 

@@ -1,22 +1,221 @@
-"""`trajcli explain`."""
+"""`trajcli explain`.
+
+What `explain` says of the tool on its path.
+
+What `explain` says of the points that a move passes.
+
+How a pose of a job is reached, in words.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from trajcli.cli.passing_text import passing_lines
-from trajcli.cli.reached_text import pose_reached_lines
-from trajcli.cli.tool_text import tool_lines
+import numpy as np
+
+from trajcli.cli.numbers import numbers
 from trajcli.job.read import load_job
-from trajcli.pipeline.arm import Arm
-from trajcli.pipeline.explain import closed_form, explanation, stretches_of
-from trajcli.pipeline.plan import Plan, plan_job
+from trajcli.output.explain import closed_form, explanation, polynomial_intervals_of
+from trajcli.output.polynomials import polynomial_text
+from trajcli.planning.plan import Plan, plan_job
+from trajcli.queries.arm import ArmInUnits
 from trajcli.streams.whole_file import standard_output
+from trajcli.units import Quantity, Units, to_user, unit_name
+
+_MOST_LAW_PIECES = 40  # pieces of a law that are listed
+_NOISE = 1e-6  # SI: a tool that turns, or goes, less than that does not
+_ZERO = 1e-9  # user units: a coordinate or an angle below that is rounding
+_REACHED = 0.999  # of the wanted speed
+_SPEED_OF = {"length": "speed", "angle": "angular_speed"}
+
+
+def tool_lines(move: Mapping[str, Any], units: Units) -> Iterator[str]:
+    """Yield the segments of the path, its law, and how the tool moved along it."""
+    path, tool = move["path"], move["tool"]
+    if path is None or tool is None:
+        return
+    yield f"  path: {path['length']:.9g} {path['unit']}"
+    yield from (f"    {_segment(segment, units)}" for segment in path["segments"])
+    yield from (f"    corner {n}: {_corner(corner, units)}" for n, corner in enumerate(path["corners"], 1))
+    yield from _law(path)
+    yield from _speeds(tool, move["start"], units)
+
+
+def _segment(segment: Mapping[str, Any], units: Units) -> str:
+    kind, length = segment["kind"], units.length
+    if kind == "screw":
+        where = f" through {_point(segment['point'])} {length}" if "point" in segment else ""
+        turned = f"{segment['angle']:.9g} {units.angle} about it"
+        along = f"{_clean(segment['advance']):.9g} {length} along it"
+        return f"screw about the axis {_point(segment['axis'])}{where}: {turned}, {along}"
+    if kind == "rotation":
+        return f"rotation by {segment['angle']:.9g} {units.angle} at {_point(segment['place'])} {length}"
+    ends = f"{_point(segment['start'])} to {_point(segment['end'])} {length}, length {segment['length']:.9g}"
+    if kind == "line":
+        return f"line from {ends}"
+    around = f"center {_point(segment['center'])}, axis {_point(segment['axis'])}"
+    size = f"radius {segment['radius']:.9g}, angle {segment['angle']:.9g} {units.angle}"
+    pitch = f", pitch {segment['pitch']:.9g}" if kind == "helix" else ""
+    return f"{kind} from {ends}: {around}, {size}{pitch}"
+
+
+def _corner(corner: Mapping[str, Any], units: Units) -> str:
+    where = f"at s = {corner['place']:.9g} {units.length}, turn {_clean(corner['turn']):.6g} {units.angle}"
+    if corner["kind"] != "rounded":
+        told = {
+            "stop": "stops there",
+            "overlap": "cut by overlapping in time",
+            "smooth": "goes on smoothly",
+            "bend": "the curvature jumps",
+        }
+        return f"{where}: {told[corner['kind']]}"
+    size = f"radius {corner['radius']:.6g}, passes at {corner['deviation']:.6g} {units.length}"
+    return f"{where}: rounded, {size}"
+
+
+def _law(path: Mapping[str, Any]) -> Iterator[str]:
+    law = path["law"]
+    if len(law) > _MOST_LAW_PIECES:
+        yield f"  s(t): {len(law)} pieces, listed by --json"
+        return
+    for piece in law:
+        when = f"{piece['start']:.10g} <= t <= {piece['end']:.10g}: " if len(law) > 1 else ""
+        yield f"  {when}s(t) = {polynomial_text(np.array(piece['absolute']))}"
+
+
+def _speeds(tool: Mapping[str, Any], start: float, units: Units) -> Iterator[str]:
+    yield "  tool:"
+    for peak in tool["peaks"]:
+        dimension, order = _quantity(peak["quantity"])
+        quantity = Quantity(dimension, order)  # type: ignore[arg-type]
+        if peak["value"] <= _NOISE:
+            continue
+        value, unit = to_user(peak["value"], quantity, units), unit_name(quantity, units)
+        limit = "no limit"
+        if peak["limit"] is not None:
+            used = 100 * peak["value"] / peak["limit"]
+            limit = f"limit {to_user(peak['limit'], quantity, units):.9g}, {used:.4g} % used"
+        name = peak["quantity"].replace("_", " ")
+        yield f"    {name}: at most {value:.6g} {unit} (t = {peak['time'] - start:.6g}); {limit}"
+    yield from _held(tool, units)
+    if tool["ruled_by"]:
+        yield f"    the limits of {tool['ruled_by']} say how fast"
+    off = to_user(tool["deviation"], Quantity("length"), units)
+    turned = to_user(tool["turned"], Quantity("angle"), units)
+    told = f"{_clean(off):.3g} {units.length}, turned by {_clean(turned):.3g} {units.angle}"
+    yield f"    off the path by at most {told}"
+
+
+def _held(tool: Mapping[str, Any], units: Units) -> Iterator[str]:
+    if tool["held"] is None:
+        return
+    dimension = "length" if tool["unit"] == "m" else "angle"
+    speed, place = Quantity(dimension, 1), Quantity(dimension)  # type: ignore[arg-type]
+    wanted = f"{to_user(tool['wanted_speed'], speed, units):.6g} {unit_name(speed, units)}"
+    if tool["held"] == 0:
+        top = next(p["value"] for p in tool["peaks"] if p["quantity"] == _SPEED_OF[dimension])
+        reached = "reached, but not held" if top >= _REACHED * tool["wanted_speed"] else "not reached"
+        yield f"    tool speed of {wanted} {reached}"
+        return
+    text = f"    tool speed of {wanted} held on {100 * tool['held']:.4g} % of the path"
+    lowest = tool["lowest"]
+    if lowest is not None:
+        text += f", lowest {to_user(lowest['speed'], speed, units):.4g} {unit_name(speed, units)}"
+        text += f" at s = {to_user(lowest['place'], place, units):.4g} {unit_name(place, units)}"
+        text += f" because of {lowest['joint']}" if lowest["joint"] else ""
+    yield text
+
+
+def _quantity(name: str) -> tuple[str, int]:
+    angular = name.startswith("angular_")
+    return "angle" if angular else "length", 1 if name.endswith("speed") else 2
+
+
+def _point(values: list[float]) -> str:
+    return "[" + ", ".join(f"{_clean(value):.9g}" for value in values) + "]"
+
+
+def _clean(value: float) -> float:
+    return value if abs(value) > _ZERO else 0.0
+
+
+_MOST_POINTS = 20  # points that are listed one by one
+_ROUNDING = 1e-12  # in units of the job: what is missed by less is met
+
+
+def passing_lines(move: Mapping[str, Any]) -> Iterator[str]:
+    """Yield when the points are passed, by how much beside, and where the curve leaves their range."""
+    if move["origin"]:
+        whole = f"from {-move['origin']:.6g} to {move['duration'] - move['origin']:.6g}"
+        yield f"  unshifted times: t - {move['origin']:.10g} s, {whole}"
+    passed = move["waypoints"]
+    if passed is not None:
+        yield from _points(passed, move["joints"], move["origin"])
+    for one in move["outside"] or ():
+        way = "above" if one["beyond"] > 0 else "below"
+        size = f"{abs(one['beyond']):.6g} {one['unit']}"
+        yield f"  {one['joint']} goes {size} {way} the points at t = {one['time']:.6g} s"
+
+
+def _points(passed: list[dict[str, Any]], joints: list[str], origin: float) -> Iterator[str]:
+    times = ", ".join(f"{point['time'] - origin:.6g}" for point in passed[:_MOST_POINTS])
+    more = f", ... {passed[-1]['time'] - origin:.6g}" if len(passed) > _MOST_POINTS else ""
+    yield f"  {len(passed)} points at (s{', unshifted' * bool(origin)}): {times}{more}"
+    if not any(any(point["missed"]) for point in passed):
+        return
+    for joint, name in enumerate(joints):
+        missed = [value if value > _ROUNDING else 0.0 for value in (p["missed"][joint] for p in passed)]
+        if any(missed):
+            listed = ", ".join(f"{value:.6g}" for value in missed[:_MOST_POINTS])
+            more = f", ... at most {max(missed):.6g}" if len(passed) > _MOST_POINTS else ""
+            yield f"  {name} passes them at a distance of ({passed[0]['units'][joint]}): {listed}{more}"
+
+
+def pose_reached_lines(move: Mapping[str, Any], arm: ArmInUnits) -> Iterator[str]:
+    """Yield what `explain` says of the poses from which a move comes and to which it goes."""
+    for key, head, origin in (
+        ("from_pose", "starts at a pose", "zero"),
+        ("to_pose", "goes to a pose", "where the arm comes from"),
+    ):
+        told = move[key]
+        if told is not None:
+            units = dict.fromkeys(arm.joint_unit(i) for i in range(len(arm.robot.joints)))
+            yield f"  {head}: joints {numbers(told['joints'])} ({', '.join(units)})"
+            yield f"    branch: {_branch(told)}; {_singular(told)}"
+            yield f"    chosen: {_choice(told['chosen'], origin)}"
+            if "free_direction" in told:
+                along = numbers(told["free_direction"])
+                yield f"    the arm can move without leaving the pose: joints along {along}"
+
+
+def _branch(told: Mapping[str, Any]) -> str:
+    return _named(told["branch"]) if told["branch"] else f"without a name ({told['method']})"
+
+
+def _named(names: Mapping[str, str]) -> str:
+    return ", ".join(f"{choice} {name}" for choice, name in names.items())
+
+
+def _singular(told: Mapping[str, Any]) -> str:
+    here, nearby = told["rank"]["here"], told["rank"]["nearby"]
+    return f"singular (rank {here}, nearby {nearby})" if told["singular"] else "not singular"
+
+
+def _choice(chosen: Mapping[str, Any], origin: str) -> str:
+    count, within = chosen["candidates"], chosen["within_limits"]
+    if within == 1:
+        return "the only answer within the limits"
+    answers = f"of {within} answers found within the limits, "
+    nearest = f"the nearest to {origin}"
+    if not chosen["configuration"]:
+        return answers + nearest
+    named = f"{_named(chosen['configuration'])} as the configuration says"
+    return answers + (f"{count} have {named}; of these {nearest}" if count > 1 else f"1 has {named}")
+
 
 _SYMBOLS = {"position": "q", "velocity": "qd", "acceleration": "qdd", "jerk": "qddd"}
-_ROUNDING = 1e-12
 _FITTED = 1e-9  # of the largest: rates of a joint that rests, where the arm follows its tool
 _MOST_PIECES = 100  # of a joint that are listed
 _TIME_DECIMALS = 12
@@ -35,7 +234,7 @@ def run_explain(job: str, overrides: Sequence[str], *, as_json: bool) -> int:
     with standard_output() as out:
         out.write((text + "\n").encode())
     if not plan.verdict.passed:
-        from trajcli.pipeline.report import verification_error
+        from trajcli.output.report import verification_error
 
         raise verification_error(plan)
     return 0
@@ -53,7 +252,7 @@ def _lines(plan: Plan, told: dict[str, Any]) -> Iterator[str]:
     for index, move in enumerate(told["moves"]):
         yield ""
         yield f"move {index}: {move['planner']}, {move['duration']:.10g} s, from t = {move['start']:.10g} s"
-        yield from pose_reached_lines(move, Arm(plan.loaded.robot, plan.loaded.units))
+        yield from pose_reached_lines(move, ArmInUnits(plan.loaded.robot, plan.loaded.units))
         yield from passing_lines(move)
         yield from tool_lines(move, plan.loaded.units)
         yield from _polynomials(plan, index)
@@ -77,7 +276,7 @@ def _polynomials(plan: Plan, index: int) -> Iterator[str]:
         count = move.planned.curve.pieces
         yield f"  joints: {count} pieces of degree {move.planned.curve.degree}, listed by --json"
         return
-    stretches = stretches_of(move, units)
+    stretches = polynomial_intervals_of(move, units)
     counts = {len(rows) for rows in stretches}
     if len(stretches) > 1 and len(counts) == 1 and min(counts) > _MOST_PIECES:
         yield f"  q1(t) .. q{len(stretches)}(t): {min(counts)} pieces each, listed by --json"

@@ -6,14 +6,13 @@ import sys
 from collections.abc import Sequence
 from typing import Any, Literal
 
-from trajcli.cli.matrix_text import pose_lines
-from trajcli.cli.printing import print_json, print_lines
+from trajcli.cli.numbers import pose_lines
+from trajcli.cli.outcome import print_json, print_lines
 from trajcli.errors import InputError
 from trajcli.frozen import comparable
 from trajcli.kinematics.forward import forward, link_poses
-from trajcli.pipeline.arm import Arm, open_arm
-from trajcli.pipeline.outside_limits import LimitWatch
-from trajcli.pipeline.pose_view import pose_view
+from trajcli.queries.arm import ArmInUnits, LimitWatch, open_arm
+from trajcli.queries.pose import pose_view
 from trajcli.streams.csv import Digits, write_csv
 from trajcli.streams.whole_file import standard_output
 
@@ -58,15 +57,15 @@ def run_fk(robot: str, words: Sequence[str], options: FkOptions) -> int:
     return 0
 
 
-def _lines(arm: Arm, told: dict[str, Any], frame: str) -> list[str]:
+def _lines(arm: ArmInUnits, told: dict[str, Any], frame: str) -> list[str]:
     lines = [f"pose of the tcp of {arm.robot.name} in {frame}:", *pose_lines(told, arm.units)]
     for link in told.get("links", []):
         lines += ["", f"frame of link {link['name']} in {frame}:", *pose_lines(link, arm.units)]
     return lines
 
 
-def _stream(arm: Arm, options: FkOptions) -> int:
-    from trajcli.pipeline.joint_stream import poses_of
+def _stream(arm: ArmInUnits, options: FkOptions) -> int:
+    from trajcli.queries.forward import poses_of
     from trajcli.streams.table import open_rows
 
     for name, given in (("--json", options.as_json), ("--links", options.links)):
@@ -80,7 +79,7 @@ def _stream(arm: Arm, options: FkOptions) -> int:
     return 0
 
 
-def _remark(arm: Arm, watch: LimitWatch, *, rows: bool = False) -> None:
+def _remark(arm: ArmInUnits, watch: LimitWatch, *, rows: bool = False) -> None:
     """Say on standard error that joint values are outside the limits of the robot; their poses stand."""
     first = watch.first
     if first is None:

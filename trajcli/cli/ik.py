@@ -6,16 +6,16 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from trajcli.cli.matrix_text import number, numbers
-from trajcli.cli.printing import print_json, print_lines
+from trajcli.cli.numbers import number, numbers
+from trajcli.cli.outcome import print_json, print_lines
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import comparable
 from trajcli.job.inline import inline_target
 from trajcli.kinematics.inverse.solutions import Solutions
 from trajcli.language.targets import ik_target
-from trajcli.pipeline.arm import Arm, open_arm
-from trajcli.pipeline.inverse_answers import answers, find_answers, require_answer
+from trajcli.queries.arm import ArmInUnits, open_arm
+from trajcli.queries.inverse import answers, find_answers, require_answer
 from trajcli.streams.csv import Digits
 
 
@@ -74,7 +74,7 @@ def _check(words: Sequence[str], options: IkOptions) -> None:
             raise InputError(f"{name} is for one pose, rows from standard input become a CSV")
 
 
-def _lines(arm: Arm, found: Solutions, told: Sequence[dict[str, Any]]) -> Iterator[str]:
+def _lines(arm: ArmInUnits, found: Solutions, told: Sequence[dict[str, Any]]) -> Iterator[str]:
     units = dict.fromkeys(arm.joint_unit(i) for i in range(len(arm.robot.joints)))
     count = f"{len(told)} answer{'s' * (len(told) != 1)}"
     yield f"{count} for {arm.robot.name} ({', '.join(units)}), by {found.method.name}:"
@@ -91,8 +91,8 @@ def _lines(arm: Arm, found: Solutions, told: Sequence[dict[str, Any]]) -> Iterat
     yield f"they miss the pose by at most {number(worst) if worst > 1e-12 else '1e-12'} (m, rad)"
 
 
-def _stream(arm: Arm, near: Array | None, options: IkOptions) -> int:
-    from trajcli.pipeline.pose_stream import joints_of
+def _stream(arm: ArmInUnits, near: Array | None, options: IkOptions) -> int:
+    from trajcli.queries.inverse_stream import joints_of
     from trajcli.streams.csv import write_csv
     from trajcli.streams.table import open_rows
     from trajcli.streams.whole_file import standard_output

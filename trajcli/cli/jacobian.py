@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from trajcli.cli.matrix_text import matrix_lines, number, numbers
-from trajcli.cli.printing import print_json, print_lines
+from trajcli.cli.numbers import matrix_lines, number, numbers
+from trajcli.cli.outcome import print_json, print_lines
 from trajcli.errors import InputError
 from trajcli.frozen import comparable
 from trajcli.kinematics.jacobian import ReferenceFrame
-from trajcli.pipeline.arm import Arm, open_arm
-from trajcli.pipeline.differential import differential
+from trajcli.queries.arm import ArmInUnits, open_arm
+from trajcli.queries.jacobian import jacobian_report
 from trajcli.streams.whole_file import standard_output
 
 _COMPONENTS = ("vx", "vy", "vz", "wx", "wy", "wz")
@@ -40,7 +40,7 @@ def run_jacobian(robot: str, words: Sequence[str], options: JacobianOptions) -> 
         return _stream(arm, options)
     q = arm.joint_values(words)
     qd = None if options.rates is None else arm.joint_values([options.rates], "--qd", 1)
-    told = differential(arm, q, options.frame, qd)
+    told = jacobian_report(arm, q, options.frame, qd)
     if options.as_json:
         print_json(told)
     else:
@@ -48,7 +48,7 @@ def run_jacobian(robot: str, words: Sequence[str], options: JacobianOptions) -> 
     return 0
 
 
-def _lines(arm: Arm, told: dict[str, Any], frame: str) -> Iterator[str]:
+def _lines(arm: ArmInUnits, told: dict[str, Any], frame: str) -> Iterator[str]:
     length, angle = arm.units.length, arm.units.angle
     rates = ", ".join(dict.fromkeys(arm.joint_unit(i, 1) for i in range(len(arm.robot.joints))))
     yield f"Jacobian of {arm.robot.name} in the axes of the {frame} frame"
@@ -76,8 +76,8 @@ def _sum(factors: Sequence[float], names: Sequence[str]) -> str:
     return text.removeprefix("+ ")
 
 
-def _stream(arm: Arm, options: JacobianOptions) -> int:
-    from trajcli.pipeline.joint_stream import jacobians_of
+def _stream(arm: ArmInUnits, options: JacobianOptions) -> int:
+    from trajcli.queries.forward import jacobians_of
     from trajcli.streams.csv import write_csv
     from trajcli.streams.table import open_rows
 

@@ -5,16 +5,25 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any, Literal
 
-from trajcli.cli.matrix_text import number, numbers, pose_lines
-from trajcli.cli.printing import print_json, print_lines
+from trajcli.cli.numbers import number, numbers, pose_lines
+from trajcli.cli.outcome import print_json, print_lines
 from trajcli.errors import InputError
 from trajcli.frozen import comparable
 from trajcli.geometry.pose import invert
 from trajcli.geometry.rotation import rotation_defect
 from trajcli.job.inline import inline_number
-from trajcli.pipeline.pose_path import End, Orientation, parse_fractions, pose_path
-from trajcli.pipeline.pose_report import parse_sequence, parse_units, pose_report
-from trajcli.pipeline.pose_steps import composed, read_end, read_steps
+from trajcli.queries.pose import (
+    OrientationInterpolation,
+    PoseAtEnd,
+    composed,
+    parse_fractions,
+    parse_sequence,
+    parse_units,
+    pose_path,
+    pose_report,
+    read_end,
+    read_steps,
+)
 from trajcli.units import Quantity, Units
 
 _ROUNDING = 1e-9  # of R^T R: above it is told, since it comes from rounded entries
@@ -31,7 +40,7 @@ class PoseOptions:
     to: str | None = None
     s: str | None = None
     path: Literal["line", "screw"] | None = None
-    orientation: Orientation | None = None
+    orientation: OrientationInterpolation | None = None
     as_json: bool = False
 
 
@@ -58,7 +67,7 @@ def run_pose(words: Sequence[str], options: PoseOptions) -> int:
     s = parse_fractions("0,0.5,1" if options.s is None else options.s)
     poses = pose_path(
         start,
-        End(target.pose, target.typed),
+        PoseAtEnd(target.pose, target.typed),
         s,
         options.path or "line",
         options.orientation or "axis_angle",
@@ -75,12 +84,12 @@ def run_pose(words: Sequence[str], options: PoseOptions) -> int:
     return 0
 
 
-def _start(words: Sequence[str], options: PoseOptions, units: Units) -> End:
+def _start(words: Sequence[str], options: PoseOptions, units: Units) -> PoseAtEnd:
     steps = read_steps(words, units)
     pose = composed(steps)
     if options.inverse:
-        return End(invert(pose), None)
-    return End(pose, steps[0].typed if len(steps) == 1 else None)
+        return PoseAtEnd(invert(pose), None)
+    return PoseAtEnd(pose, steps[0].typed if len(steps) == 1 else None)
 
 
 def _point(text: str, units: Units) -> list[float]:

@@ -6,12 +6,12 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from trajcli.cli.matrix_text import number, numbers, table_lines
-from trajcli.cli.printing import print_json, print_lines
+from trajcli.cli.numbers import number, numbers, table_lines
+from trajcli.cli.outcome import print_json, print_lines
 from trajcli.errors import InputError
-from trajcli.job.robot_source import catalogue_names
-from trajcli.pipeline.arm import open_sheet
-from trajcli.pipeline.robot_card import robot_card, robot_row
+from trajcli.job.robot import catalogue_names
+from trajcli.queries.arm import open_sheet
+from trajcli.queries.robot_card import robot_card, robot_row
 
 _WIDTH, _SOURCE = 100, 48  # columns of a paragraph, and of a source in the list
 _DH = ("theta", "d", "a", "alpha")

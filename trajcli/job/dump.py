@@ -15,7 +15,7 @@ from math import isfinite
 from typing import Any
 
 from trajcli.job.read import LoadedJob
-from trajcli.job.robot_model import robot_as_mapping
+from trajcli.job.robot import robot_as_mapping
 from trajcli.kinematics.robot import Robot
 from trajcli.language.limits import ToolLimitsSpec
 from trajcli.language.numbers import ReadingContext

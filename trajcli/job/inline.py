@@ -11,9 +11,9 @@ from pydantic import ValidationError
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Problem
-from trajcli.job.document import Document
-from trajcli.job.load import parse_document, read_document
 from trajcli.job.messages import problems_of
+from trajcli.job.yaml.document import Document
+from trajcli.job.yaml.load import parse_document, read_document
 from trajcli.language.numbers import AT_KEY, FlawError, ReadingContext
 from trajcli.language.poses import Pose
 from trajcli.language.targets import PoseFields

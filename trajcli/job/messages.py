@@ -10,12 +10,12 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from trajcli.errors import Problem
-from trajcli.job.load import Document
+from trajcli.job.yaml.load import Document
 from trajcli.language.numbers import AT_KEY, Flaw, shown
 from trajcli.planners import PLANNERS
 from trajcli.suggest import did_you_mean, valid_names
 
-Path = tuple[str | int, ...]
+FieldPath = tuple[str | int, ...]
 _KINDS = {
     "bool_parsing": "true or false",
     "bool_type": "true or false",
@@ -30,7 +30,7 @@ _KINDS = {
 
 
 def problems_of(
-    error: ValidationError, model: type[BaseModel], document: Document, prefix: Path = ()
+    error: ValidationError, model: type[BaseModel], document: Document, prefix: FieldPath = ()
 ) -> list[Problem]:
     """Return one problem for each flaw, at its place in the file, in the order of the file.
 
@@ -49,8 +49,8 @@ def problems_of(
 
 
 def _flaws(
-    detail: ErrorDetails, model: type[BaseModel], document: Document, prefix: Path
-) -> list[tuple[Path, str, str | None, bool]]:
+    detail: ErrorDetails, model: type[BaseModel], document: Document, prefix: FieldPath
+) -> list[tuple[FieldPath, str, str | None, bool]]:
     """Return (path in the file, message, hint, whether the key itself is wrong) of each flaw of one error."""
     kind, context, loc = detail["type"], detail.get("ctx", {}), detail["loc"]
     path = _path_in_file(loc, document, prefix)
@@ -72,7 +72,7 @@ def _flaws(
     return [(path, message, hint, False)]
 
 
-def _flaw(path: Path, text: str, hint: str | None) -> tuple[Path, str, str | None, bool]:
+def _flaw(path: FieldPath, text: str, hint: str | None) -> tuple[FieldPath, str, str | None, bool]:
     at_key = path[-1:] == (AT_KEY,)
     return path[:-1] if at_key else path, text, hint, at_key
 
@@ -108,7 +108,7 @@ def _described(field: FieldInfo) -> str | None:
     return text and text[0].lower() + text[1:].rstrip(".")
 
 
-def _path_in_file(loc: Path, document: Document, prefix: Path) -> Path:
+def _path_in_file(loc: FieldPath, document: Document, prefix: FieldPath) -> FieldPath:
     """Return the path of `loc` without the tags that pydantic puts in for the members of a union."""
     path = prefix
     for step in loc:
@@ -121,12 +121,12 @@ def _path_in_file(loc: Path, document: Document, prefix: Path) -> Path:
     return path
 
 
-def _field_names(model: type[BaseModel], loc: Path) -> list[str]:
+def _field_names(model: type[BaseModel], loc: FieldPath) -> list[str]:
     """Return the keys that may stand at `loc`, read off the model."""
     return list(_model_at(model, loc).model_fields)
 
 
-def _model_at(model: type[BaseModel], loc: Path) -> type[BaseModel]:
+def _model_at(model: type[BaseModel], loc: FieldPath) -> type[BaseModel]:
     """Return the model of the mapping at `loc`."""
     current = model
     for step in loc:

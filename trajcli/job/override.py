@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 from trajcli.errors import InputError, Place
 from trajcli.frozen import frozen
-from trajcli.job.document import Document, Node
-from trajcli.job.load import parse_document
+from trajcli.job.yaml.document import Document, Node
+from trajcli.job.yaml.load import parse_document
 
 _Steps = tuple[str | int, ...]
 

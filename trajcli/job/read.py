@@ -15,12 +15,12 @@ from trajcli.columns import TOOL_COLUMNS
 from trajcli.errors import Amount, InputError, Place, Problem
 from trajcli.frozen import frozen
 from trajcli.job.limits import looser_bounds, looser_problem, looser_tool_bounds, with_job_limits
-from trajcli.job.load import Document, parse_document, read_document
 from trajcli.job.messages import problems_of
 from trajcli.job.model import Job, UnitsSpec
 from trajcli.job.override import Setting, overridden, parse_setting
 from trajcli.job.recording import reader_of
-from trajcli.job.robot_source import find_robot
+from trajcli.job.robot import find_robot
+from trajcli.job.yaml.load import Document, parse_document, read_document
 from trajcli.kinematics.robot import Robot, unlimited
 from trajcli.language.numbers import ReadingContext
 from trajcli.planners.planner import Event

@@ -12,7 +12,7 @@ import numpy as np
 from trajcli.columns import Column, parse_column
 from trajcli.curves.piecewise import Array
 from trajcli.errors import FileError, InputError, Problem
-from trajcli.job.load import Document
+from trajcli.job.yaml.load import Document
 from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import FlawError
 from trajcli.language.recorded import Recorded

@@ -8,15 +8,15 @@ from pydantic import Field
 
 from trajcli.language.numbers import Model
 
-Seconds = Annotated[float, Field(description="Seconds.")]
-Quantity = Literal["position", "velocity", "acceleration", "jerk"]
+ReportSeconds = Annotated[float, Field(description="Seconds.")]
+JointQuantity = Literal["position", "velocity", "acceleration", "jerk"]
 
 
 class PeakReport(Model):
     """The extremes of one joint's quantity in one move."""
 
     joint: str
-    quantity: Quantity
+    quantity: JointQuantity
     low: Annotated[float, Field(description="Smallest value, SI.")]
     low_time: Annotated[float, Field(description="Where it is, seconds from the start of the trajectory.")]
     high: Annotated[float, Field(description="Largest value, SI.")]
@@ -31,7 +31,7 @@ class BindingReport(Model):
     """The limit that a move uses most."""
 
     joint: str
-    quantity: Quantity
+    quantity: JointQuantity
     used: Annotated[float, Field(description="Part of the bound that is used: 1 is all of it.")]
 
 
@@ -112,7 +112,7 @@ class MoveReport(Model):
     planner: str
     start: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
     end: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
-    duration: Seconds
+    duration: ReportSeconds
     continuity: Annotated[
         Literal[1, 2], Field(description="Derivatives that the planner joins without a jump.")
     ]
@@ -174,7 +174,7 @@ class UncheckedReport(Model):
     """A quantity that is not checked because it has no limit."""
 
     joint: str
-    quantity: Quantity
+    quantity: JointQuantity
 
 
 class Report(Model):
@@ -185,7 +185,7 @@ class Report(Model):
     verdict: Literal["verified", "violated"]
     job: Annotated[str, Field(description="The job's name.")]
     robot: Annotated[str, Field(description="The robot's name.")]
-    duration: Seconds
+    duration: ReportSeconds
     moves: list[MoveReport]
     findings: list[FindingReport]
     events: list[EventReport]

@@ -35,7 +35,7 @@ def _job() -> dict[str, Any]:
 
 
 def _robot() -> dict[str, Any]:
-    from trajcli.job.robot_model import RobotModel
+    from trajcli.job.robot import RobotModel
 
     schema: dict[str, Any] = _without_nulls(RobotModel.model_json_schema())
     return schema

@@ -11,8 +11,7 @@ import numpy as np
 from trajcli.columns import whole_number_columns
 from trajcli.curves.piecewise import Array
 from trajcli.errors import TrajcliError
-from trajcli.streams.decimals import encode_fixed, encode_full
-from trajcli.streams.scan import NotFixedError, scan_fixed
+from trajcli.streams.decimals import NotFixedError, encode_fixed, encode_full, scan_fixed
 from trajcli.streams.whole_file import whole_file
 
 Digits = Literal["fixed", "full"]

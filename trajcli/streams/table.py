@@ -19,8 +19,7 @@ from trajcli.columns import whole_number_columns
 from trajcli.curves.piecewise import Array
 from trajcli.errors import FileError, InputError, Place, Problem
 from trajcli.frozen import frozen
-from trajcli.streams.decimals import DECIMALS
-from trajcli.streams.scan import NotFixedError, scan_fixed
+from trajcli.streams.decimals import DECIMALS, NotFixedError, scan_fixed
 
 _CHUNK = 1 << 20  # bytes read at a time
 _LONGEST_HEADER = 1 << 16  # bytes; what has no line feed by then is no CSV
@@ -86,7 +85,7 @@ def read_csv(source: str | Path) -> Table:
 
 
 @frozen
-class Rows:
+class TableBlocks:
     """A CSV file that is read block by block, so that memory does not grow with its length.
 
     Attributes:
@@ -100,7 +99,7 @@ class Rows:
     file: str
 
 
-def open_rows(source: str | Path) -> Rows:
+def open_rows(source: str | Path) -> TableBlocks:
     """Open a CSV file as `read_csv` reads it; what is wrong with a row shows when its block is taken.
 
     Raises:
@@ -111,7 +110,7 @@ def open_rows(source: str | Path) -> Rows:
     with ExitStack() as stack:
         stream = stack.enter_context(_opened(source, file))
         names = _read_names(stream, file)
-        return Rows(names, _blocks(stack.pop_all(), stream, file, names), file)
+        return TableBlocks(names, _blocks(stack.pop_all(), stream, file, names), file)
 
 
 def _blocks(opened: ExitStack, stream: BinaryIO, file: str, names: tuple[str, ...]) -> Iterator[Array]:

@@ -11,7 +11,7 @@ from trajcli.geometry.paths.arc import Arc
 from trajcli.geometry.paths.orientation import AxisAngleOrientation, SegmentProgress
 from trajcli.geometry.paths.pose import PoseCurve
 from trajcli.geometry.paths.position import Line
-from trajcli.job.robot_source import load_robot
+from trajcli.job.robot import load_robot
 from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import Robot

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from trajcli.job.robot_source import load_robot
+from trajcli.job.robot import load_robot
 from trajcli.kinematics.following.follower import acceleration_bias
 from trajcli.kinematics.jacobian import jacobian
 

@@ -32,11 +32,7 @@ from trajcli.language.per_joint import flawed
 from trajcli.language.recorded import Recorded
 from trajcli.language.targets import JointAccelerationMagnitudes
 from trajcli.planners.planner import Event, Phase, Planned
-from trajcli.planners.point_to_point.point_to_point import (
-    missing_limit,
-    require_rest,
-    standstill,
-)
+from trajcli.planners.point_to_point.point_to_point import missing_limit, require_rest, standstill
 from trajcli.planners.waypoints.through_points import PointTable, ThroughPoints
 from trajcli.trajectory import State, ViaPoints
 from trajcli.units import Quantity

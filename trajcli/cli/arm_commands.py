@@ -1,0 +1,261 @@
+"""The commands about arms and poses. Only typer is imported here: `--help` must stay fast.
+
+A command whose words may be numbers: negative ones are no options, and an option may take several.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Annotated, Literal
+
+import typer
+import typer.core
+
+from trajcli.cli.outcome import guarded
+
+_NUMBER_LIKE = re.compile(r"[-+]?(?:\.?[0-9][^=]*|\.?nan|\.?inf(?:inity)?)", re.IGNORECASE)
+JOINED = ("--qd", "--near", "--point", "--s")
+"""Options that take all the numbers behind them."""
+
+
+class NumbersCommand(typer.core.TyperCommand):
+    """Takes `--qd 1 -2 3` as one option and `-90` as a number, with or without `--` before it."""
+
+    def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]
+        """Return what is left of the words when options are taken away."""
+        takes: dict[str, int] = {}
+        for parameter in self.get_params(ctx):
+            if getattr(parameter, "is_flag", None) is not None:  # an option
+                count = 0 if parameter.is_flag else parameter.nargs  # type: ignore[attr-defined]
+                takes |= dict.fromkeys(parameter.opts, count)
+        return super().parse_args(ctx, sorted_words(joined(args), takes))
+
+
+def joined(args: list[str]) -> list[str]:
+    """Return the words with the numbers behind each of `JOINED` put into one word, separated by commas.
+
+    A word that has commas itself holds all the numbers.
+    """
+    words: list[str] = []
+    rest = list(args)
+    while rest and rest[0] != "--":
+        word = rest.pop(0)
+        name, equals, value = word.partition("=")
+        if name not in JOINED:
+            words.append(word)
+            continue
+        values = [value] if equals else []
+        while rest and _NUMBER_LIKE.fullmatch(rest[0]) and "," not in "".join(values):
+            values.append(rest.pop(0))
+        words += [f"{name}={','.join(values)}"] if values else [word]
+    return words + rest
+
+
+def sorted_words(args: list[str], takes: Mapping[str, int]) -> list[str]:
+    """Return the words with options first, then `--`, then everything else in its order.
+
+    An option whose value is missing comes last and alone, so that `--` is not taken for it.
+
+    Args:
+        args: The words as they were typed.
+        takes: How many words each option takes.
+    """
+    options: list[str] = []
+    others: list[str] = []
+    rest = list(args)
+    while rest and rest[0] != "--":
+        word = rest.pop(0)
+        if word == "-" or not word.startswith("-") or _NUMBER_LIKE.fullmatch(word):
+            others.append(word)
+            continue
+        count = takes.get(word, 0)
+        if len(rest) < count or "--" in rest[:count]:
+            return [*options, word]
+        options += [word, *rest[:count]]
+        rest = rest[count:]
+    return [*options, "--", *others, *rest[1:]]
+
+
+Errors = Annotated[
+    Literal["text", "json"], typer.Option("--errors", help="How errors are written to stderr.")
+]
+RobotName = Annotated[
+    str, typer.Option("--robot", "-r", metavar="NAME|FILE", help="A robot of the catalogue, or a robot file.")
+]
+Tool = Annotated[
+    str | None,
+    typer.Option("--tool", metavar="POSE", help="T_flange_tcp as YAML or @FILE, instead of the robot's own."),
+]
+Si = Annotated[bool, typer.Option("--si", help="Numbers in rad and m, whatever units the robot's file has.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
+Joints = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="Q...", help="A value for each joint, in the units of the robot's file; - reads a CSV."
+    ),
+]
+DigitsOption = Annotated[
+    Literal["fixed", "full"],
+    typer.Option("--digits", help="Of a CSV. fixed: nine decimals; full: every bit."),
+]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands fk, ik, jacobian, pose and robots."""
+    app.command(cls=NumbersCommand)(fk)
+    app.command(cls=NumbersCommand)(ik)
+    app.command(cls=NumbersCommand)(jacobian)
+    app.command(cls=NumbersCommand)(pose)
+    app.command()(robots)
+
+
+@guarded
+def fk(
+    robot: RobotName,
+    joints: Joints,
+    tool: Tool = None,
+    frame: Annotated[
+        Literal["world", "base"], typer.Option("--frame", help="Where the pose is counted from.")
+    ] = "world",
+    links: Annotated[bool, typer.Option("--links", help="Also the frame of each link.")] = False,
+    si: Si = False,
+    as_json: Json = False,
+    digits: DigitsOption = "fixed",
+    errors: Errors = "text",
+) -> int:
+    """Say where the tool is: its pose for given joint values, or for each row of a CSV.
+
+    Joint values outside the robot's limits have a pose too; a line on stderr says which they are.
+    """
+    from trajcli.cli.fk import FkOptions, run_fk
+
+    return run_fk(robot, joints, FkOptions(tool, frame, links, si, as_json, digits))
+
+
+@guarded
+def ik(
+    robot: RobotName,
+    rows: Annotated[list[str] | None, typer.Argument(metavar="-", help="- reads poses from a CSV.")] = None,
+    pose: Annotated[
+        str | None,
+        typer.Option(
+            "--pose", metavar="POSE", help="T_world_tcp as YAML or @FILE; what it leaves out is free."
+        ),
+    ] = None,
+    near: Annotated[
+        str | None,
+        typer.Option(
+            "--near", metavar="Q...", help="Joint values to be near to, instead of zero; -- ends them."
+        ),
+    ] = None,
+    every: Annotated[bool, typer.Option("--all", help="Also answers outside the limits.")] = False,
+    turns: Annotated[
+        bool, typer.Option("--turns", help="Also every full turn of a joint that its limits allow.")
+    ] = False,
+    tolerance: Annotated[
+        float, typer.Option("--tolerance", metavar="TOL", help="What an answer may miss by, m and rad.")
+    ] = 1e-6,
+    tool: Tool = None,
+    si: Si = False,
+    as_json: Json = False,
+    digits: DigitsOption = "fixed",
+    errors: Errors = "text",
+) -> int:
+    """Find all joint values that bring the tool to a pose; of a CSV of poses, the way that stays nearest.
+
+    An answer is singular where the tool can move in fewer directions, of those that the pose fixes, than it
+    can nearby. What is free is a direction in which the joints can move while the pose is kept.
+    """
+    from trajcli.cli.ik import IkOptions, run_ik
+
+    options = IkOptions(pose, near, every, turns, tolerance, tool, si, as_json, digits)
+    return run_ik(robot, rows or [], options)
+
+
+@guarded
+def jacobian(
+    robot: RobotName,
+    joints: Joints,
+    tool: Tool = None,
+    frame: Annotated[
+        Literal["world", "base", "tcp"], typer.Option("--frame", help="In whose axes the rows are written.")
+    ] = "world",
+    rates: Annotated[
+        str | None,
+        typer.Option(
+            "--qd",
+            metavar="V...",
+            help="A rate for each joint, for the acceleration they cause; -- ends them.",
+        ),
+    ] = None,
+    si: Si = False,
+    as_json: Json = False,
+    errors: Errors = "text",
+) -> int:
+    """Say how the tool moves with the joints: the Jacobian, manipulability, rank, what is lost."""
+    from trajcli.cli.jacobian import JacobianOptions, run_jacobian
+
+    return run_jacobian(robot, joints, JacobianOptions(tool, frame, rates, si, as_json))
+
+
+@guarded
+def pose(
+    steps: Annotated[
+        list[str],
+        typer.Argument(metavar="STEP...", help="Poses as YAML or @FILE, with `frame` and `invert` beside."),
+    ],
+    units: Annotated[
+        str,
+        typer.Option("--units", metavar="UNITS", help="Of plain numbers, such as deg,mm; else rad and m."),
+    ] = "",
+    inverse: Annotated[bool, typer.Option("--inverse", help="Take the inverse of the result.")] = False,
+    point: Annotated[
+        str | None,
+        typer.Option(
+            "--point", metavar="X Y Z", help="A point in the pose's frame, to be said in the first."
+        ),
+    ] = None,
+    euler: Annotated[
+        str | None,
+        typer.Option("--euler", metavar="ZYZ[:fixed]", help="Also both triples of these angles."),
+    ] = None,
+    to: Annotated[
+        str | None, typer.Option("--to", metavar="POSE", help="Print poses on the way to this one.")
+    ] = None,
+    s: Annotated[
+        str | None, typer.Option("--s", metavar="S,...", help="Where on the way, from 0 to 1.")
+    ] = None,
+    path: Annotated[
+        Literal["line", "screw"] | None,
+        typer.Option("--path", help="line: the origin goes straight; screw: constant twist."),
+    ] = None,
+    orientation: Annotated[
+        Literal["axis_angle", "euler"] | None,
+        typer.Option("--orientation", help="On a line: about one axis, or by even Euler angles."),
+    ] = None,
+    as_json: Json = False,
+    errors: Errors = "text",
+) -> int:
+    """Multiply rotations and displacements about fixed and current axes; print every representation."""
+    from trajcli.cli.pose import PoseOptions, run_pose
+
+    options = PoseOptions(units, inverse, point, euler, to, s, path, orientation, as_json)
+    return run_pose(steps, options)
+
+
+@guarded
+def robots(
+    name: Annotated[
+        str | None, typer.Argument(metavar="NAME|FILE", help="One robot; without it all are listed.")
+    ] = None,
+    as_yaml: Annotated[
+        bool, typer.Option("--yaml", help="Print the robot's file, to start a new one from.")
+    ] = False,
+    as_json: Json = False,
+    errors: Errors = "text",
+) -> int:
+    """List the catalogue, or show a robot: DH table, limits, reach, inverse kinematics, source."""
+    from trajcli.cli.robots import run_robots
+
+    return run_robots(name, as_yaml=as_yaml, as_json=as_json)

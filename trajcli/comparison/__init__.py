@@ -1,0 +1,1 @@
+"""Comparison of sample streams: `trajcli diff`."""

@@ -1,0 +1,105 @@
+"""Write the rows of a plan, and its report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from trajcli.columns import column_names
+from trajcli.curves.piecewise import Array
+from trajcli.errors import InputError
+from trajcli.planning.plan import Plan
+from trajcli.samples import Grid, ListedGrid, UniformGrid, sample
+from trajcli.streams.csv import Digits, write_csv, write_verified
+from trajcli.streams.whole_file import standard_output, whole_file
+
+_OTHER_FORMATS = (".mcap", ".jsonl", ".json", ".yaml", ".yml", ".xlsx", ".parquet")
+
+
+def grid_of(plan: Plan) -> Grid:
+    """Return where the rows of a plan stand.
+
+    Raises:
+        InputError: When a listed time lies outside the trajectory, or the rate is too high for its times.
+    """
+    output, duration = plan.loaded.job.output, plan.trajectory.duration
+    try:
+        if output.times is not None:
+            return ListedGrid(duration, np.array(output.times), output.start_time)
+        return UniformGrid(duration, output.rate, output.start_time)
+    except InputError as error:
+        key = "rate" if output.times is None else "times"
+        raise error.located(place=plan.loaded.document.place(("output", key))) from None
+
+
+def check_output_name(path: str) -> None:
+    """Refuse the name of a file of another format.
+
+    Raises:
+        InputError: When the ending is that of a format which is not written.
+    """
+    wrong = next((ending for ending in _OTHER_FORMATS if path.lower().endswith(ending)), None)
+    if wrong:
+        raise InputError(f"rows are written as CSV, not as {wrong}", hint="name the file .csv")
+
+
+def write_rows(plan: Plan, grid: Grid, path: str | None, digits: Digits) -> None:
+    """Write the rows to a file, which appears whole or not at all, or to standard output.
+
+    Args:
+        plan: A verified plan.
+        grid: Where the rows stand.
+        path: The file; None or "-" is standard output.
+        digits: "fixed" for nine decimals, "full" for all bits.
+
+    Raises:
+        FileError: When it cannot be written.
+        BrokenPipeError: When the reader has closed the pipe.
+    """
+    loaded = plan.loaded
+    groups = loaded.job.output.columns
+    names = column_names(groups, loaded.robot.joint_types, loaded.units)
+
+    def rows() -> Iterator[Array]:
+        return sample(plan.trajectory, grid, groups, loaded.units, robot=loaded.robot)
+
+    if path is not None and path != "-":
+        write_verified(path, rows, names, digits)
+        return
+    with standard_output() as out:
+        write_csv(rows(), names, out, digits)
+
+
+def write_plan(plan: Plan, path: str | None = None, digits: Digits = "fixed") -> None:
+    """Write the rows of a plan that verifies, as `trajcli plan` does.
+
+    Args:
+        plan: The plan.
+        path: A CSV file, which appears whole or not at all; None or "-" is standard output.
+        digits: "fixed" for nine decimals, "full" for all bits.
+
+    Raises:
+        VerificationError: When the plan breaks a limit; nothing is written.
+        InputError: When the rows that the job asks for cannot be given.
+        FileError: When the file cannot be written.
+        BrokenPipeError: When the reader has closed the pipe.
+    """
+    if not plan.verdict.passed:
+        from trajcli.output.report import verification_error
+
+        raise verification_error(plan)
+    if path is not None:
+        check_output_name(path)
+    write_rows(plan, grid_of(plan), path, digits)
+
+
+def write_text(text: str, path: str) -> None:
+    """Write a text to a file, which appears whole or not at all; `-` is standard output.
+
+    Raises:
+        FileError: When it cannot be written.
+        BrokenPipeError: When the reader has closed the pipe.
+    """
+    with standard_output() if path == "-" else whole_file(path) as out:
+        out.write(text.encode())

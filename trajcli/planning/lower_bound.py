@@ -1,0 +1,95 @@
+"""A bound from below for the duration of a point-to-point move, from a solver that did not plan it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trajcli.errors import PlanningError
+from trajcli.frozen import comparable
+from trajcli.kinematics.robot import QUANTITIES, Limits
+from trajcli.planners.point_to_point.ruckig import BoundaryProblem, fastest
+from trajcli.trajectory import State
+
+_ROUNDING = 1e-12
+_NOWHERE = 1e-9  # rad or m: a joint that comes back so near to where it was has no way to go
+
+
+@comparable
+class LowerBound:
+    """No motion between the two states within the limits is faster.
+
+    Attributes:
+        duration: Seconds.
+        joint: Index of the joint that needs so long; None when no joint needs any time.
+    """
+
+    duration: float
+    joint: int | None
+
+
+@comparable
+class NoBound:
+    """Nothing can be said about the fastest motion.
+
+    Attributes:
+        reason: Why, as a clause: "its velocity is unlimited".
+        joint: Index of the joint that is the reason.
+    """
+
+    reason: str
+    joint: int
+
+
+def fastest_duration(start: State, end: State, limits: Limits) -> LowerBound | NoBound:
+    """Return the time that the slowest joint needs if each moves by itself, under exactly the given limits.
+
+    Without a jerk limit accelerations may step, and those at the ends do not count. Where the jerk limit
+    differs by direction the looser one holds both ways, so that the bound stays a bound. Position limits are
+    left out.
+
+    Args:
+        start: State at the start.
+        end: State at the end.
+        limits: Those that the motion was judged by.
+    """
+    bound = LowerBound(0.0, None)
+    for joint in range(start.position.size):
+        task = _task(start, end, limits, joint)
+        if task.done:
+            continue
+        reason = _why_unbounded(task)
+        if reason:
+            return NoBound(reason, joint)
+        try:
+            profile = fastest(task)
+        except PlanningError:
+            return NoBound("no motion within its limits could be found", joint)
+        if profile.braking:
+            return NoBound("its start state leads out of its limits", joint)
+        if profile.duration > bound.duration:
+            bound = LowerBound(profile.duration, joint)
+    return bound
+
+
+def _task(start: State, end: State, limits: Limits, joint: int) -> BoundaryProblem:
+    bounds = np.stack([limits.of_order(order)[joint] for order in (1, 2, 3)])
+    bounds[2] = np.abs(bounds[2]).max() * np.array([-1.0, 1.0])
+    counts = float(np.isfinite(bounds[2, 1]))
+    ends = []
+    for state in (start, end):
+        rates = float(state.velocity[joint]), counts * float(state.acceleration[joint])
+        ends.append((float(state.position[joint]), *rates))
+    if abs(ends[1][0] - ends[0][0]) <= _NOWHERE:
+        ends[1] = (ends[0][0], *ends[1][1:])
+    return BoundaryProblem(f"joint {joint + 1}", ends[0], ends[1], bounds)
+
+
+def _why_unbounded(task: BoundaryProblem) -> str | None:
+    for order in (1, 2):
+        low, high = task.bounds[order - 1].tolist()
+        if not np.isfinite([low, high]).all():
+            return f"its {QUANTITIES[order]} is unlimited"
+        for when, state in (("starts", task.initial), ("ends", task.final)):
+            if not low * (1 + _ROUNDING) <= state[order] <= high * (1 + _ROUNDING):
+                return f"it {when} outside its {QUANTITIES[order]} limit"
+    return None

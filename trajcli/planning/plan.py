@@ -1,0 +1,168 @@
+"""From a job to a judged trajectory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+
+import numpy as np
+
+from trajcli.checks.verify import Verdict, verify
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
+from trajcli.errors import Amount, Place, TrajcliError
+from trajcli.frozen import frozen
+from trajcli.job.limits import with_move_limits
+from trajcli.job.read import LoadedJob
+from trajcli.language.targets import Target
+from trajcli.planners.planner import Event, Planner
+from trajcli.planning.resolve_poses import ResolvedPose, nearest_rotation_events, resolve_target, start_state
+from trajcli.planning.retime import PlannedMove, align_to_period, slow_to_limits
+from trajcli.trajectory import Span, State, Trajectory
+
+
+@frozen
+class Plan:
+    """A planned and judged job.
+
+    Attributes:
+        loaded: The job.
+        moves: Its moves, in order.
+        trajectory: All of them, joined.
+        verdict: What the checks found.
+        events: Concessions, in order of the moves; the job's own first.
+        reached: How poses are reached, by the index of the move that goes there, or None for the job's
+            start; None where joints were given.
+    """
+
+    loaded: LoadedJob
+    moves: tuple[PlannedMove, ...]
+    trajectory: Trajectory
+    verdict: Verdict
+    events: tuple[Event, ...]
+    reached: Mapping[int | None, ResolvedPose | None]
+
+
+def plan_job(loaded: LoadedJob) -> Plan:
+    """Return the plan of a job, with its verdict: a verdict with findings is no error here.
+
+    Raises:
+        InputError: When a move loosens a limit, or lacks one it needs.
+        PlanningError: When a move has no curve.
+    """
+    moves: list[PlannedMove] = []
+    reached: dict[int | None, ResolvedPose | None] = {}
+    with _errors_at(loaded, loaded.document.place(("start",))):
+        state, reached[None] = start_state(loaded.job.start, loaded.robot)
+    events = [*loaded.events, *nearest_rotation_events(reached[None])]
+    before: Planner | None = None
+    for index, planner in enumerate(loaded.job.moves):
+        start = _handed_over(state, before, planner)
+        with _errors_of(loaded, index, planner):
+            reachable, reached[index] = _with_joints(planner, loaded, state)
+            move = _plan_move(loaded, index, reachable, start)
+        moves.append(move)
+        events += [
+            replace(event, move=index)
+            for event in (*nearest_rotation_events(reached[index]), *move.planned.events)
+        ]
+        state, before = move.planned.end, planner
+    trajectory = _joined(moves, loaded, _first_state(loaded, moves[0], events))
+    verdict = verify(trajectory, [move.robot.limits for move in moves], [move.promise for move in moves])
+    said = tuple(replace(event, message=event.text(loaded.say), amounts={}) for event in events)
+    return Plan(loaded, tuple(moves), trajectory, verdict, said, reached)
+
+
+def _plan_move(loaded: LoadedJob, index: int, planner: Planner, start: State) -> PlannedMove:
+    job = loaded.job
+    robot = with_move_limits(loaded.robot, planner.limits, index)
+    planned = planner.plan(start, robot)
+    move = PlannedMove(index, planner, start, robot, planned)
+    if (planner.when_over_limit or job.when_over_limit) == "slow":
+        move = slow_to_limits(move)
+    if job.output.align:
+        move = align_to_period(move, job.output.rate)
+    return move
+
+
+def _with_joints(planner: Planner, loaded: LoadedJob, state: State) -> tuple[Planner, ResolvedPose | None]:
+    """Return the planner with joints in the place of poses, and how the last one is reached, if it is one."""
+    found: list[ResolvedPose | None] = [None]
+
+    def resolve(target: Target, near: Array) -> Target:
+        resolved, reached = resolve_target(target, loaded.robot, near)
+        found[0] = reached
+        return resolved
+
+    return planner.with_places(resolve, state.position), found[0]
+
+
+def _handed_over(state: State, before: Planner | None, after: Planner) -> State:
+    """Return the state in which `after` starts: the acceleration is handed over between continuity 2 only."""
+    if before is None or (before.joins == 2 and after.joins == 2):
+        return state
+    return State(state.position, state.velocity, np.zeros_like(state.acceleration))
+
+
+def _first_state(loaded: LoadedJob, first: PlannedMove, events: list[Event]) -> State:
+    """Return the state in which the trajectory starts.
+
+    Where the job does not say how fast, and the first move's method leaves that open, it is the method's. So
+    is the place where a first blend begins that is centred on a point passed in motion.
+    """
+    begins, given = first.planned.begins, loaded.job.start.velocity
+    if begins is None or (given is not None and not np.array_equal(begins.velocity, first.start.velocity)):
+        return first.start
+    name = first.robot.joint_names
+    if given is None and begins.velocity.any():
+        joint = int(np.abs(begins.velocity).argmax())
+        message = f"the trajectory begins in motion, {name[joint]} with {{velocity}}"
+        amounts = {"velocity": Amount(float(begins.velocity[joint]), 1, joint)}
+        events.append(Event("begins_moving", message, first.index, amounts))
+    apart = begins.position - first.start.position
+    if apart.any():
+        joint = int(np.abs(apart).argmax())
+        message = f"the trajectory begins before its first point, {name[joint]} by {{distance}}"
+        amounts = {"distance": Amount(float(abs(apart[joint])), 0, joint)}
+        events.append(Event("begins_before", message, first.index, amounts))
+    return begins
+
+
+def _joined(moves: list[PlannedMove], loaded: LoadedJob, first: State) -> Trajectory:
+    curve = concatenate([move.planned.curve for move in moves])
+    spans, end = [], 0.0
+    for move in moves:
+        start, end = end, float(move.planned.curve.breaks[-1] + end)
+        spans.append(Span(move.index, move.planner.tag, start, end, move.planner.joins))
+    robot, last = loaded.robot, moves[-1].planned.end
+    laws = tuple(_way_of(move) for move in moves)
+    return Trajectory(curve, robot.joint_names, robot.joint_types, tuple(spans), first, last, laws)
+
+
+def _way_of(move: PlannedMove) -> PiecewisePolynomial | None:
+    """Return the way s(t) of the tool; while it turns in its place it has none."""
+    tool = move.planned.tool
+    return None if tool is None or tool.in_place else tool.law
+
+
+@contextmanager
+def _errors_of(loaded: LoadedJob, index: int, planner: Planner) -> Iterator[None]:
+    """Give errors the move they are about, its place in the file, and the job's units."""
+    try:
+        with _errors_at(loaded, loaded.place_of_move(index)):
+            yield
+    except TrajcliError as error:
+        problems = (
+            replace(p, message=f"move {index} ({planner.tag}): {p.message}", move=index)
+            for p in error.problems
+        )
+        raise type(error)(*problems) from None
+
+
+@contextmanager
+def _errors_at(loaded: LoadedJob, place: Place) -> Iterator[None]:
+    """Give errors their place in the file, and the job's units."""
+    try:
+        yield
+    except TrajcliError as error:
+        raise error.said_by(loaded.say).located(place=place) from None

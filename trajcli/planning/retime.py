@@ -1,0 +1,164 @@
+"""Make a planned move last longer: until it keeps its limits, or until it fills whole periods."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import ceil
+
+import numpy as np
+
+from trajcli.checks.finding import Finding
+from trajcli.checks.limits import peaks_by_move
+from trajcli.checks.verify import Verdict, verify
+from trajcli.curves.operations import scale_time
+from trajcli.curves.piecewise import Array
+from trajcli.curves.smallest_feasible import smallest_feasible
+from trajcli.errors import Amount, PlanningError
+from trajcli.frozen import frozen
+from trajcli.kinematics.robot import QUANTITIES, Robot
+from trajcli.planners.planner import Event, Planned, Planner
+from trajcli.planners.point_to_point.point_to_point import share_of_limits
+from trajcli.trajectory import Promise, Span, State, Trajectory
+
+_LONGEST = 1e4  # times the planned duration: a move that needs more is not over its limit, it is wrong
+_ROOM = 1e-10  # relative; a tenth of the tolerance of limits, so that rounding does not tip the later verdict
+_ONE_BY_ONE = 1  # stretches tried at once: each costs a plan of its own
+_WHOLE = 1e-9  # of a period: what is this close to whole is whole
+_TRIES = 50
+
+
+@frozen
+class PlannedMove:
+    """A move with all that it was planned from.
+
+    Attributes:
+        index: Number in the job, from 0.
+        planner: The move as it stands in the job.
+        start: State in which it begins.
+        robot: With the limits in force for this move.
+        planned: What the planner returned, stretched where that was asked for.
+        stretch: How many times longer it lasts than its planner said.
+    """
+
+    index: int
+    planner: Planner
+    start: State
+    robot: Robot
+    planned: Planned
+    stretch: float = 1.0
+
+    @property
+    def duration(self) -> float:
+        """Seconds."""
+        return self.planned.curve.duration
+
+    def alone(self) -> Trajectory:
+        """Return the trajectory of this move alone."""
+        span = Span(self.index, self.planner.tag, 0.0, self.duration, self.planner.joins)
+        names, types = self.robot.joint_names, self.robot.joint_types
+        return Trajectory(self.planned.curve, names, types, (span,), self.start, self.planned.end)
+
+    @property
+    def promise(self) -> Promise:
+        """What the move says of itself."""
+        return Promise(self.planned.passage, self.planned.tool, self.robot)
+
+    def verdict(self) -> Verdict:
+        """Return the verdict on this move alone."""
+        return verify(self.alone(), [self.robot.limits], [self.promise])
+
+
+def with_duration(move: PlannedMove, duration: float) -> PlannedMove:
+    """Return the move stretched to `duration` seconds.
+
+    From rest to rest its time is scaled; a move with boundary velocities is planned again for that duration.
+
+    Raises:
+        PlanningError: When the planner cannot last that long.
+    """
+    factor = duration / move.duration
+    if move.start.at_rest and move.planned.end.at_rest:
+        return replace(move, planned=_scaled(move.planned, factor), stretch=move.stretch * factor)
+    planned = move.planner.told_to_last(duration).plan(move.start, move.robot)
+    stretch = move.stretch * planned.curve.duration / move.duration
+    return replace(move, planned=planned, stretch=stretch)
+
+
+def _scaled(planned: Planned, factor: float) -> Planned:
+    return replace(
+        planned,
+        curve=scale_time(planned.curve, factor),
+        law=planned.law and scale_time(planned.law, factor),
+        phases=tuple(replace(p, start=p.start * factor, end=p.end * factor) for p in planned.phases),
+        arrivals=planned.arrivals and tuple(time * factor for time in planned.arrivals),
+        passage=planned.passage and planned.passage.scaled(factor),
+        origin=planned.origin * factor,
+        tool=planned.tool and planned.tool.scaled(factor),
+    )
+
+
+def slow_to_limits(move: PlannedMove) -> PlannedMove:
+    """Return the smallest stretch of the move that keeps its limits, with an event if it is one.
+
+    Where slowing down does not help (a position limit, a boundary velocity over its limit), the move comes
+    back as it was: the verdict on the whole trajectory will say so.
+    """
+    over = _over_limit(move)
+    if not over or move.duration == 0:
+        return move
+    if move.start.at_rest and move.planned.end.at_rest:
+        factors = [finding.factor for finding in over]
+        factor = None if None in factors else max(f for f in factors if f is not None)
+    else:
+        factor = smallest_feasible(lambda factors: _excess(move, factors), 1.0, _LONGEST, block=_ONE_BY_ONE)
+    if factor is None:
+        return move
+    slower = with_duration(move, move.duration * factor)
+    worst = max(over, key=lambda finding: finding.factor or 0.0)
+    message = (
+        f"stretched {slower.stretch:.6g} times, from {{before}} to {{after}}, "
+        f"to keep the {worst.kind.removeprefix('tool_')} limit of {worst.joint or 'the tool'}"
+    )
+    amounts = {"before": Amount(move.duration), "after": Amount(slower.duration)}
+    event = Event("slowed", message, move.index, amounts)
+    return replace(slower, planned=replace(slower.planned, events=(event, *slower.planned.events)))
+
+
+def _over_limit(move: PlannedMove) -> list[Finding]:
+    return [f for f in move.verdict().findings if f.kind in QUANTITIES or f.factor is not None]
+
+
+def _excess(move: PlannedMove, factors: Array) -> Array:
+    """Return by how much of a limit the move is over its limits when stretched by each of the factors."""
+    return np.array([_excess_of(move, move.duration * factor) for factor in factors.tolist()])
+
+
+def _excess_of(move: PlannedMove, duration: float) -> float:
+    try:
+        longer = with_duration(move, duration)
+    except PlanningError:
+        return np.inf
+    (peaks,) = peaks_by_move(longer.alone())
+    return float(share_of_limits([(p.low, p.high) for p in peaks], move.robot.limits)) - (1 + _ROOM)
+
+
+def align_to_period(move: PlannedMove, rate: float) -> PlannedMove:
+    """Return the move stretched to a whole number of periods; a move that keeps its limits goes on doing so.
+
+    Raises:
+        PlanningError: When the planner cannot last that long.
+    """
+    if move.duration == 0:
+        return move
+    periods = max(1, ceil(move.duration * rate - _WHOLE))
+    was_over = bool(_over_limit(move))
+    for extra in range(_TRIES):
+        wanted = (periods + extra) / rate
+        longer = with_duration(move, wanted) if wanted != move.duration else move
+        whole = abs(longer.duration - wanted) <= _WHOLE / rate
+        if whole and (was_over or not _over_limit(longer)):
+            return longer
+    raise PlanningError(
+        f"{move.planner.tag} cannot last a whole number of periods at {rate:g} Hz within its limits",
+        hint="leave `align` out, or change the rate",
+    )

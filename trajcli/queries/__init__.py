@@ -1,0 +1,1 @@
+"""Questions about an arm: forward and inverse kinematics, Jacobian, poses, robot card."""

@@ -1,0 +1,181 @@
+"""Every answer of inverse kinematics for one target, in the user's units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajcli.curves.piecewise import Array
+from trajcli.errors import InputError, PlanningError
+from trajcli.geometry.rotation import Flags
+from trajcli.kinematics.dexterity import RANK_TOLERANCE, characteristic_length
+from trajcli.kinematics.forward import forward
+from trajcli.kinematics.inverse.joint_turns import all_turns
+from trajcli.kinematics.inverse.solutions import Solutions, check_reachable
+from trajcli.kinematics.inverse.solve import solve
+from trajcli.kinematics.inverse.target import IkTarget, residual_jacobian
+from trajcli.kinematics.jacobian import jacobian
+from trajcli.kinematics.robot import Robot
+from trajcli.language.targets import Configuration
+from trajcli.queries.arm import ArmInUnits
+from trajcli.queries.jacobian import simplest
+from trajcli.queries.pose import plain
+
+_LOST = max(RANK_TOLERANCE, 1e-7)  # of the largest singular value: answers meet their target within rounding
+_AROUND, _SPREAD = 4, 0.1  # configurations, rad or m: an arm is regular almost everywhere around
+
+
+def find_answers(
+    arm: ArmInUnits,
+    target: IkTarget,
+    configuration: Configuration | None,
+    near: Array | None,
+    tolerance: float,
+) -> tuple[Solutions, Flags]:
+    """Return all branches of one target, and which of them are answers as it is asked for, shape (branches,).
+
+    Args:
+        arm: The arm.
+        target: One target.
+        configuration: The names that a branch must have.
+        near: Joint values (n,), rad or m; zero if absent.
+        tolerance: What an answer may miss the target by, m and rad.
+
+    Raises:
+        InputError: When a choice is asked for that the arm does not have for this target.
+    """
+    found = solve(arm.robot, target, near, tolerance)
+    wanted = _named(configuration)
+    for choice in wanted:
+        if getattr(found.names[0], choice) is None:
+            raise InputError(
+                f"{arm.robot.name} has no choice of {choice} for this target: {found.method.reason}",
+                hint=f"leave {choice} out of `configuration`",
+            )
+    return found, found.valid & found.named(**wanted)
+
+
+def _named(configuration: Configuration | None) -> dict[str, str]:
+    """Return the choices that are named."""
+    given = {} if configuration is None else configuration.model_dump()
+    return {choice: name for choice, name in given.items() if name is not None}
+
+
+def answers(
+    arm: ArmInUnits,
+    found: Solutions,
+    chosen: Flags,
+    target: IkTarget,
+    near: Array | None = None,
+    *,
+    every: bool = False,
+    turns: bool = False,
+) -> list[dict[str, Any]]:
+    """Return [{joints, branch, within_limits, closure, singular, free_direction?}] of one target.
+
+    `closure` is the larger of the miss in m and in rad. `singular`: of the directions that the target fixes,
+    the tcp can move in fewer than it can nearby, as `ranks` finds. `free_direction` is a unit vector of joint
+    values: the arm can move along it while what is fixed of the pose rests; without it the answer stands
+    alone, as that of a stretched arm does although it is singular.
+
+    Args:
+        arm: The arm.
+        found: All branches.
+        chosen: Which of them to return, shape (branches,).
+        target: What was asked for.
+        near: Joint values (n,): the nearest answer comes first.
+        every: Whether answers outside the limits count too.
+        turns: Whether every full turn that the limits allow is an answer of its own.
+    """
+    usable = np.flatnonzero(chosen if every else chosen & found.within_limits)
+    if not len(usable):
+        return []
+    here, nearby = ranks(arm.robot, found.joints[usable], target)
+    told = [
+        (joints, _answer(arm, found, branch, joints, target, lost))
+        for branch, lost in zip(usable.tolist(), (here < nearby).tolist(), strict=True)
+        for joints in (all_turns(arm.robot, found.joints[branch]) if turns else [found.joints[branch]])
+    ]
+    if near is not None:
+        told.sort(key=lambda pair: float(np.abs(pair[0] - near).max()))
+    return [answer for _, answer in told]
+
+
+def require_answer(
+    arm: ArmInUnits, found: Solutions, chosen: Flags, configuration: Configuration | None
+) -> None:
+    """Do nothing when one of the chosen branches is within the limits.
+
+    Raises:
+        PlanningError: By how much the target is out of reach; or which joint is outside its limits.
+    """
+    if (chosen & found.within_limits).any():
+        return
+    named = " ".join(_named(configuration).values())
+    if found.valid.any() and named:
+        others = [str(name) for name, fine in zip(found.names, found.within_limits, strict=True) if fine]
+        only = "only outside the limits" if chosen.any() else "not at all"
+        raise PlanningError(
+            f"{arm.robot.name} reaches the pose with {named} {only}",
+            hint=f"within the limits: {'; '.join(others)}" if others else "no other branch is inside either",
+        )
+    try:
+        check_reachable(arm.robot, found)
+    except PlanningError as error:
+        raise error.said_by(arm.say) from None
+
+
+def _answer(
+    arm: ArmInUnits, found: Solutions, branch: int, joints: Array, target: IkTarget, singular: bool
+) -> dict[str, Any]:
+    names = {choice: name for choice, name in asdict(found.names[branch]).items() if name is not None}
+    told = {
+        "joints": plain(joints / arm.joint_factors),
+        "branch": names,
+        "within_limits": bool(found.within_limits[branch]),
+        "closure": float(found.closure[branch].max()),
+        "singular": singular,
+    }
+    if found.free[branch].any():
+        told["free_direction"] = plain(next(free_directions(arm, joints, target)))
+    return told
+
+
+def free_directions(arm: ArmInUnits, joints: Array, target: IkTarget) -> Iterator[Array]:
+    """Yield unit vectors (n,) of joint values, in the user's units, that leave what is fixed of the pose."""
+    _, values, right = np.linalg.svd(_held(arm.robot, joints[None], target)[0])
+    rank = min(int(_rank(values)), len(joints) - 1)
+    for direction in simplest(right[rank:]):
+        shown = direction / arm.joint_factors
+        yield shown / np.linalg.norm(shown)
+
+
+def ranks(robot: Robot, joints: Array, target: IkTarget) -> tuple[NDArray[np.intp], int]:
+    """Return in how many directions of what the target fixes the tcp can move: (K,) here, and nearby.
+
+    Args:
+        robot: The arm.
+        joints: Shape (K, n), rad or m, K >= 1.
+        target: One target.
+    """
+    count = joints.shape[1]
+    steps = _SPREAD * np.cos(np.square(np.arange(1.0, _AROUND * count + 1.0))).reshape(_AROUND, count)
+    held = _held(robot, np.vstack([joints, joints[:1] + steps]), target)
+    values = np.asarray(np.linalg.svd(held, compute_uv=False), dtype=np.float64)
+    found = _rank(values)
+    return found[: len(joints)], int(found.max())
+
+
+def _held(robot: Robot, joints: Array, target: IkTarget) -> Array:
+    """Return the Jacobians (K, m, n) of what the target fixes, lengths divided by the length of the arm."""
+    held = residual_jacobian(target.flat(), forward(robot, joints), jacobian(robot, joints))
+    held[:, : sum(target.position)] /= characteristic_length(robot)
+    return held
+
+
+def _rank(values: Array) -> NDArray[np.intp]:
+    return np.asarray(np.count_nonzero(values > _LOST * values[..., :1], axis=-1))

@@ -1,0 +1,204 @@
+"""Poses from the columns of a CSV, and the joint values that follow them without jumps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from trajcli.columns import Column, column_names, parse_column
+from trajcli.curves.piecewise import Array
+from trajcli.errors import InputError, Place, PlanningError, Problem
+from trajcli.geometry.rotation import QUATERNION_DEFECT, Flags, matrix_from_quaternion
+from trajcli.kinematics.forward import forward
+from trajcli.kinematics.inverse.families.choose import method_for
+from trajcli.kinematics.inverse.joint_turns import FULL, beyond, choose_turns, revolute
+from trajcli.kinematics.inverse.numeric import descend
+from trajcli.kinematics.inverse.solutions import Solutions, check_reachable
+from trajcli.kinematics.inverse.solve import fits, solve
+from trajcli.kinematics.inverse.target import IkTarget, closure_of, partial_target
+from trajcli.queries.arm import ArmInUnits
+from trajcli.queries.forward import Stream
+from trajcli.streams.table import TableBlocks
+
+_STRETCH = 256  # rows that are looked at together
+_CLOSE = 0.2  # rad or m: a larger step may have missed a nearer answer, so all are sought
+_AXES, _QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
+
+
+class _PoseColumns(NamedTuple):
+    """Index of the time; index and metres per unit of x, y, z; indices of the quaternion, or none."""
+
+    time: int | None
+    position: list[int]
+    factors: Array
+    rotation: list[int]
+
+
+def joints_of(arm: ArmInUnits, rows: TableBlocks, near: Array | None, tolerance: float) -> Stream:
+    """Return t, where there is one, and joint values for each row of poses (x y z, and qw qx qy qz or none).
+
+    Of all answers within the limits the one nearest to the row before is taken, in the first row the one
+    nearest to `near`; the distance is the largest difference of any joint. Where no closed form fits, the row
+    before is continued by the shortest steps instead, and all answers are sought only where that fails.
+
+    Raises:
+        InputError: When a column is missing; when taken, if a row is wrong.
+        PlanningError: When taken, if a row cannot be reached within the limits.
+    """
+    wanted = _wanted(rows)
+    names = column_names(("q",), arm.robot.joint_types, arm.units)
+    return Stream(
+        [*([] if wanted.time is None else ["t"]), *names], _follow(arm, rows, wanted, near, tolerance)
+    )
+
+
+def _follow(
+    arm: ArmInUnits, rows: TableBlocks, wanted: _PoseColumns, near: Array | None, tolerance: float
+) -> Iterator[Array]:
+    last = np.zeros(len(arm.robot.joints)) if near is None else near
+    done = 0
+    for block in rows.blocks:
+        follower = _Follower(arm, _targets(block, wanted, done, rows.file), last, tolerance)
+        joints = np.empty((len(block), len(last)))
+        row = 0
+        while row < len(block):
+            try:
+                found = follower.take(row, last)
+            except PlanningError as error:
+                raise _of_row(arm, error, block, wanted, row, done) from None
+            joints[row : row + len(found)] = found
+            row, last = row + len(found), found[-1]
+        done += len(block)
+        times = block[:, :0] if wanted.time is None else block[:, [wanted.time]]
+        yield np.hstack([times, joints / arm.joint_factors])
+
+
+class _Follower:
+    """Takes the nearest answer row by row; a closed form solves the rows of a block together."""
+
+    def __init__(self, arm: ArmInUnits, target: IkTarget, last: Array, tolerance: float) -> None:
+        self._arm, self._target, self._tolerance = arm, target, tolerance
+        self._turning = revolute(arm.robot)
+        method = method_for(arm.robot)
+        self._found: Solutions | None = None
+        if method.solve is not None and fits(method, target, arm.robot.base):
+            self._found = solve(arm.robot, target, last, tolerance)
+            self._usable = self._found.within_limits
+            alone = self._found.singular.any(axis=-1) | ~self._usable.any(axis=-1)
+            self._alone: Flags = np.asarray(alone)
+
+    def take(self, row: int, last: Array) -> Array:
+        """Return the answers (k, n), k >= 1, of the rows from `row` on, each nearest to the one before.
+
+        Args:
+            row: Of the block.
+            last: Joint values (n,) of the row before.
+
+        Raises:
+            PlanningError: When the row has none within the limits.
+        """
+        if self._found is None:
+            continued = self._continued(row, last)
+            return self._solved_alone(row, last)[None] if continued is None else continued
+        if self._alone[row]:
+            return self._solved_alone(row, last)[None]
+        stretch = self._on_one_branch(self._found, row, last)
+        return stretch if len(stretch) else self._nearest(self._found, row, last)[None]
+
+    def _on_one_branch(self, found: Solutions, row: int, last: Array) -> Array:
+        """Return the answers while one branch stays the nearest and inside the limits; maybe none."""
+        rows = slice(row, row + _STRETCH)
+        joints, usable = found.joints[rows], self._usable[rows]
+        branch = int(self._apart(joints[0] - last, usable[0]).argmin())
+        along = joints[:, branch]
+        gaps = joints - np.concatenate([last[None], along[:-1]])[:, None]
+        same = self._apart(gaps, usable).argmin(axis=1) == branch
+        turns = np.where(self._turning, np.round(gaps[:, branch] / FULL), 0.0).cumsum(axis=0)
+        values = along - FULL * turns
+        inside = (beyond(values, found.bounds) == 0.0).all(axis=1)
+        ends = np.flatnonzero(~(same & inside & ~self._alone[rows]))
+        return np.asarray(values[: ends[0]] if len(ends) else values)
+
+    def _apart(self, gaps: Array, usable: Flags) -> Array:
+        """Return the largest difference of any joint, whole turns left out; infinite where not usable."""
+        wrapped = np.where(self._turning, gaps - FULL * np.round(gaps / FULL), gaps)
+        return np.where(usable, np.abs(wrapped).max(axis=-1), np.inf)
+
+    def _nearest(self, found: Solutions, row: int, last: Array) -> Array:
+        turned = np.ascontiguousarray(found.joints[row][self._usable[row]].T)[..., None]
+        choose_turns(self._arm.robot, turned, last[:, None])
+        best = int(np.abs(turned[..., 0] - last[:, None]).max(axis=0).argmin())
+        return np.array(turned[:, best, 0])
+
+    def _continued(self, row: int, last: Array) -> Array | None:
+        """Return the answer (1, n) that Newton's steps find near to the row before; None where they fail."""
+        robot, target = self._arm.robot, self._target.rows([row])
+        joints, found = descend(robot, target, last[None], robot.limits.position)
+        close = np.abs(joints - last).max() <= _CLOSE
+        inside = (beyond(joints, robot.limits.position) == 0.0).all()
+        met = found[0] and closure_of(target, forward(robot, joints)).max() <= self._tolerance
+        return joints if close and inside and met else None
+
+    def _solved_alone(self, row: int, last: Array) -> Array:
+        found = solve(self._arm.robot, self._target.rows(row), last, self._tolerance)
+        check_reachable(self._arm.robot, found)
+        return np.array(found.joints[int(found.nearest(last))])
+
+
+def _of_row(
+    arm: ArmInUnits, error: PlanningError, block: Array, wanted: _PoseColumns, row: int, done: int
+) -> PlanningError:
+    """Return the error with the row's number and time said in front."""
+    when = "" if wanted.time is None else f" (t = {block[row, wanted.time]:.9g} s)"
+    problems = error.said_by(arm.say).problems
+    first = replace(problems[0], message=f"row {done + row}{when}: {problems[0].message}")
+    return PlanningError(first, *problems[1:])
+
+
+def _targets(block: Array, wanted: _PoseColumns, done: int, file: str) -> IkTarget:
+    position = block[:, wanted.position] * wanted.factors
+    if not wanted.rotation:
+        return partial_target(position)
+    quaternions = block[:, wanted.rotation]
+    length = np.linalg.norm(quaternions, axis=1)
+    wrong = np.flatnonzero(np.abs(length - 1.0) > QUATERNION_DEFECT)
+    if wrong.size:
+        row = int(wrong[0])
+        raise InputError(
+            f"{file}, row {done + row}: the quaternion has length {length[row]:.6g} instead of 1",
+            hint=f"the allowed difference is {QUATERNION_DEFECT:g}; the columns are qw, qx, qy, qz",
+        )
+    return partial_target(position, rotation=matrix_from_quaternion(quaternions))
+
+
+def _wanted(rows: TableBlocks) -> _PoseColumns:
+    found: dict[str, tuple[int, Column]] = {}
+    for index, name in enumerate(rows.names):
+        column = parse_column(name)
+        usual = column.unit is None or (column.unit == "mm" and column.kind in _AXES)
+        if column.joint is None and column.kind in ("t", *_AXES, *_QUATERNION) and usual:
+            if column.kind in found:
+                raise _refused(
+                    rows, f"{found[column.kind][1].name} and {name} are columns of the same number"
+                )
+            found[column.kind] = index, column
+    missing = [name for name in _AXES if name not in found]
+    part = [name for name in _QUATERNION if name in found]
+    if part and len(part) < len(_QUATERNION):
+        missing += [name for name in _QUATERNION if name not in found]
+    if missing:
+        raise _refused(
+            rows, f"a pose has x, y, z and qw, qx, qy, qz: there is no column {', '.join(missing)}"
+        )
+    position = [found[name] for name in _AXES]
+    time = found["t"][0] if "t" in found else None
+    factors = np.array([column.factor for _, column in position])
+    return _PoseColumns(time, [index for index, _ in position], factors, [found[name][0] for name in part])
+
+
+def _refused(rows: TableBlocks, message: str) -> InputError:
+    hint = "x_mm, y_mm, z_mm are in mm; without quaternion the orientation is free"
+    return InputError(Problem(message, hint, Place(rows.file, 1, 1, ",".join(rows.names))))

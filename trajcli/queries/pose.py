@@ -1,0 +1,353 @@
+"""A chain of rotations and displacements about fixed and current axes, read as it stands and multiplied.
+
+Poses on the way from one pose to another, for values of s from 0 to 1.
+
+A pose in every representation, and where a representation is not determined by it.
+
+A pose as numbers in the user's units, in every form that commands print.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, cast
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from trajcli.curves.piecewise import Array
+from trajcli.errors import InputError
+from trajcli.frozen import comparable, frozen
+from trajcli.geometry.euler import (
+    EulerAngles,
+    check_sequence,
+    euler_from_matrix,
+    matrix_from_euler,
+    rpy_from_matrix,
+)
+from trajcli.geometry.pose import PoseInterpolation, build, interpolate, invert, transform_points
+from trajcli.geometry.rotation import (
+    Frame,
+    axis_angle_from_matrix,
+    compose_turns,
+    nearest_rotation,
+    quaternion_from_matrix,
+)
+from trajcli.job.inline import inline_document, read_at
+from trajcli.language.numbers import FlawError, ReadingContext, shown
+from trajcli.language.poses import Pose, read_numbers
+from trajcli.suggest import did_you_mean
+from trajcli.units import AngleUnit, LengthUnit, Quantity, Units, factor
+
+_OWN_KEYS = ("frame", "invert")
+
+
+@comparable
+class TypedAngles:
+    """Three angles as the user wrote them.
+
+    Attributes:
+        sequence: Of axes, such as "ZYZ".
+        frame: Whether the axes are current or fixed.
+        angles: Rad.
+    """
+
+    sequence: str
+    frame: Frame
+    angles: tuple[float, float, float]
+
+
+@frozen
+class PoseStep:
+    """One pose of the chain.
+
+    Attributes:
+        pose: Shape (4, 4), in m; a matrix has the entries that the user wrote.
+        frame: The axes it is carried out about: "current" those moved so far, "fixed" the first ones.
+        typed: Its orientation where that was written as three angles.
+    """
+
+    pose: Array
+    frame: Frame
+    typed: TypedAngles | None
+
+
+def read_steps(words: Sequence[str], units: Units) -> list[PoseStep]:
+    """Return the steps that words describe.
+
+    Args:
+        words: Each a pose as in a job, with `frame` and `invert` beside it, or @FILE.
+        units: Of plain numbers.
+
+    Raises:
+        InputError: When one is no step; a matrix that is no rotation within 1e-4 is refused with its defect.
+        FileError: When a file cannot be read.
+    """
+    names = ["STEP"] if len(words) == 1 else [f"STEP {number}" for number in range(1, len(words) + 1)]
+    return [read_step(word, name, units) for word, name in zip(words, names, strict=True)]
+
+
+def read_step(word: str, name: str, units: Units) -> PoseStep:
+    """Return the step that one word describes; `name` is what messages call it.
+
+    Raises:
+        InputError: When it is no step.
+        FileError: When its file cannot be read.
+    """
+    return read_at(inline_document(word, name), units, _step)
+
+
+def read_end(word: str, name: str, units: Units) -> PoseStep:
+    """Return the pose that one word describes, without `frame` and `invert`.
+
+    Raises:
+        InputError: When it is no pose.
+        FileError: When its file cannot be read.
+    """
+    return read_at(inline_document(word, name), units, _end)
+
+
+def composed(steps: Sequence[PoseStep]) -> Array:
+    """Return the pose (4, 4) that the steps lead to, each about its own axes."""
+    return compose_turns([(step.pose, step.frame) for step in steps], 4)
+
+
+def _step(value: Mapping[str, Any], context: ReadingContext) -> PoseStep:
+    frame, inverted = value.get("frame", "current"), value.get("invert", False)
+    if frame not in ("current", "fixed"):
+        raise FlawError(f"expected current or fixed, got {shown(frame)}", "frame")
+    if not isinstance(inverted, bool):
+        raise FlawError(f"expected true or false, got {shown(inverted)}", "invert")
+    fields = {key: item for key, item in value.items() if key not in _OWN_KEYS}
+    step = _end(fields, context)
+    if inverted:
+        return PoseStep(invert(step.pose), cast("Frame", frame), None)
+    return PoseStep(step.pose, cast("Frame", frame), step.typed)
+
+
+def _end(fields: Mapping[str, Any], context: ReadingContext) -> PoseStep:
+    if not fields:
+        hint = "such as {rpy: [0, 0, 90]} or {xyz: [1, 0, 0]}"
+        raise FlawError("neither a position nor an orientation is given", hint=hint)
+    pose = np.array(Pose("pose").read(fields, context))
+    if "matrix" in fields:
+        pose[:3, :3] = [row[:3] for row in fields["matrix"][:3]]
+    return PoseStep(pose, "current", _typed(fields, context))
+
+
+def _typed(fields: Mapping[str, Any], context: ReadingContext) -> TypedAngles | None:
+    """Return the angles of fields that were found to be a pose."""
+    if "rpy" in fields:
+        sequence, frame, given = "XYZ", "fixed", fields["rpy"]
+    elif "euler" in fields:
+        euler = fields["euler"]
+        sequence, frame, given = euler["sequence"], euler.get("frame", "current"), euler["angles"]
+    else:
+        return None
+    first, middle, last = read_numbers(given, 3, Quantity("angle"), context).tolist()
+    return TypedAngles(sequence, cast("Frame", frame), (first, middle, last))
+
+
+OrientationInterpolation = Literal["axis_angle", "euler"]
+_RPY: tuple[str, Frame] = ("XYZ", "fixed")
+
+
+@frozen
+class PoseAtEnd:
+    """One end of the way.
+
+    Attributes:
+        pose: Shape (4, 4).
+        typed: Its orientation where the user wrote it as three angles.
+    """
+
+    pose: Array
+    typed: TypedAngles | None
+
+
+def parse_fractions(text: str) -> Array:
+    """Return the values of "0,0.5,1", shape (k,).
+
+    Raises:
+        InputError: When one is no number from 0 to 1.
+    """
+    values = []
+    for word in text.replace(",", " ").split():
+        try:
+            value = float(word)
+        except ValueError:
+            value = float("nan")
+        if not 0.0 <= value <= 1.0:
+            raise InputError(f"--s: expected numbers from 0 to 1, got {word}", hint="such as --s 0,0.5,1")
+        values.append(value)
+    if not values:
+        raise InputError("--s holds no number", hint="such as --s 0,0.5,1")
+    return np.array(values)
+
+
+def pose_path(
+    start: PoseAtEnd,
+    end: PoseAtEnd,
+    s: Array,
+    way: PoseInterpolation = "line",
+    orientation: OrientationInterpolation = "axis_angle",
+    euler: tuple[str, Frame] | None = None,
+) -> Array:
+    """Return the poses (k, 4, 4) at s (k,).
+
+    Args:
+        start: At s = 0.
+        end: At s = 1.
+        s: From 0 to 1.
+        way: "line" for a straight line of the origin, "screw" for constant twist.
+        orientation: On a line: about one fixed axis, or "euler" for angles that change evenly, in the
+            sequence of the end; where the end was not typed as angles, in that of `euler`, else as rpy. Of
+            angles that were not typed, the triple and the turns nearest to the other end's are taken.
+        euler: Sequence and frame.
+
+    Raises:
+        InputError: When a screw is asked for with Euler angles.
+    """
+    ends = [build(nearest_rotation(pose[:3, :3]), pose[:3, 3]) for pose in (start.pose, end.pose)]
+    if way == "screw" and orientation == "euler":
+        message = "--orientation euler is for --path line: a screw turns about its own axis"
+        raise InputError(message, hint="leave one of them out")
+    poses = interpolate(ends[0], ends[1], s, way)
+    if orientation == "euler":
+        poses[:, :3, :3] = _even_angles(start, end, s, euler)
+    return poses
+
+
+def _even_angles(start: PoseAtEnd, end: PoseAtEnd, s: Array, euler: tuple[str, Frame] | None) -> Array:
+    sequence, frame = (end.typed.sequence, end.typed.frame) if end.typed else euler or _RPY
+    first, last = (_own(side, sequence, frame) for side in (start, end))
+    if last is None:
+        last = _nearest(end.pose, sequence, frame, np.zeros(3) if first is None else first)
+    if first is None:
+        first = _nearest(start.pose, sequence, frame, last)
+    angles = (1.0 - s)[:, None] * first + s[:, None] * last
+    return matrix_from_euler(sequence, angles, frame)
+
+
+def _own(side: PoseAtEnd, sequence: str, frame: Frame) -> Array | None:
+    """Return the angles that the user typed in this very sequence."""
+    typed = side.typed
+    if typed is None or (typed.sequence, typed.frame) != (sequence, frame):
+        return None
+    return np.array(typed.angles)
+
+
+def _nearest(pose: Array, sequence: str, frame: Frame, aim: Array) -> Array:
+    found = euler_from_matrix(sequence, pose[:3, :3], frame)
+    turn = 2.0 * np.pi
+    triples: Sequence[Array] = [
+        angles + turn * np.round((aim - angles) / turn) for angles in (found.angles, found.alternative)
+    ]
+    return min(triples, key=lambda angles: float(np.abs(angles - aim).max()))
+
+
+def pose_view(pose: Array, units: Units) -> dict[str, Any]:
+    """Return one pose (4, 4), in m, as {matrix, xyz, rpy, quat_wxyz} in the given units.
+
+    `matrix` has its translation in the unit of length; `rpy` are angles about the fixed axes x, y and z,
+    read off the matrix as it stands.
+    """
+    rotation = pose[:3, :3]
+    shown = np.array(pose)
+    shown[:3, 3] /= factor(Quantity("length"), units)
+    return {
+        "matrix": plain(shown),
+        "xyz": plain(shown[:3, 3]),
+        "rpy": angles_view(rpy_from_matrix(rotation).angles, units),
+        "quat_wxyz": plain(quaternion_from_matrix(rotation)),
+    }
+
+
+def angles_view(angles: Array, units: Units) -> list[float]:
+    """Return angles, rad, in the given units; of half a turn the positive one, which is the same."""
+    shown: list[float] = plain(np.where(angles == -np.pi, np.pi, angles) / factor(Quantity("angle"), units))
+    return shown
+
+
+def plain(values: ArrayLike) -> Any:  # noqa: ANN401
+    """Return an array as nested lists of floats, without negative zeros."""
+    return (np.asarray(values, dtype=np.float64) + 0.0).tolist()
+
+
+def parse_units(text: str) -> Units:
+    """Return the units that "deg,mm" names; what it leaves out is rad or m.
+
+    Raises:
+        InputError: When a word is none of rad, deg, m and mm, or two name units of the same kind.
+    """
+    chosen: dict[str, str] = {}
+    for word in filter(None, (part.strip() for part in text.split(","))):
+        if word not in ("rad", "deg", "m", "mm"):
+            raise InputError(f"--units: expected rad or deg, m or mm, got {word}", hint="such as deg,mm")
+        kind = "angle" if word in ("rad", "deg") else "length"
+        if kind in chosen:
+            raise InputError(f"--units: {chosen[kind]} and {word} are both units of {kind}")
+        chosen[kind] = word
+    angle: AngleUnit = "deg" if chosen.get("angle") == "deg" else "rad"
+    length: LengthUnit = "mm" if chosen.get("length") == "mm" else "m"
+    return Units(angle, length)
+
+
+def parse_sequence(text: str) -> tuple[str, Frame]:
+    """Return sequence and frame of "ZYZ" (current axes) or "ZYZ:fixed".
+
+    Raises:
+        InputError: When it is no sequence, or the frame is neither current nor fixed.
+    """
+    sequence, colon, frame = text.partition(":")
+    check_sequence(sequence)
+    if colon and frame not in ("current", "fixed"):
+        hint = did_you_mean(frame, ("current", "fixed")) or "such as ZYZ:fixed"
+        raise InputError(f"--euler {text}: expected current or fixed after the colon, got {frame}", hint=hint)
+    return sequence.upper(), "fixed" if frame == "fixed" else "current"
+
+
+def pose_report(
+    pose: Array, units: Units, euler: tuple[str, Frame] | None = None, point: Sequence[float] | None = None
+) -> dict[str, Any]:
+    """Return {matrix, xyz, rpy, quat_wxyz, axis_angle, euler?, determinant, point?, singular?} of one pose.
+
+    Args:
+        pose: Shape (4, 4), in m; angles are read off its entries as they are.
+        units: Of what is returned.
+        euler: Sequence and frame for `euler`, which holds both triples of angles.
+        point: A point (3,), m, in the pose's own frame, for `point`: the same in the frame the pose is in.
+    """
+    rotation = pose[:3, :3]
+    angle, length = factor(Quantity("angle"), units), factor(Quantity("length"), units)
+    about = axis_angle_from_matrix(rotation)
+    told = pose_view(pose, units)
+    told["axis_angle"] = {"axis": plain(about.axis), "angle": float(about.angle) / angle}
+    singular = _at_lock("rpy", ("x", "z"), rpy_from_matrix(rotation), units)
+    if euler is not None:
+        sequence, frame = euler
+        found = euler_from_matrix(sequence, rotation, frame)
+        told["euler"] = [angles_view(found.angles, units), angles_view(found.alternative, units)]
+        singular |= _at_lock("euler", ("the first axis", "the third"), found, units)
+    if about.axis_free:
+        singular["axis_angle"] = "the angle is zero: any axis is right"
+    elif about.sign_free:
+        singular["axis_angle"] = "the angle is half a turn: the opposite axis is right too"
+    told["determinant"] = float(np.linalg.det(rotation))
+    if point is not None:
+        told["point"] = plain(transform_points(pose, point) / length)
+    if singular:
+        told["singular"] = singular
+    return told
+
+
+def _at_lock(name: str, about: tuple[str, str], found: EulerAngles, units: Units) -> dict[str, str]:
+    """Return what to say of angles at gimbal lock, under the name of the representation."""
+    if not found.singular:
+        return {}
+    lock = int(found.lock)
+    first, _, third = (found.angles / factor(Quantity("angle"), units)).tolist()
+    value = f"{round(first + lock * third, 12) + 0.0:.9g} {units.angle}"
+    word, sign = ("sum", "plus") if lock > 0 else ("difference", "minus")
+    text = f"gimbal lock: of the angles about {about[0]} and {about[1]} only the {word} is determined "
+    return {name: text + f"(first {sign} third = {value})"}
