@@ -11,7 +11,7 @@ from blend_cases import chords
 
 from trajcli.curves.parabolic_blends.blends import blended, blended_by_acceleration
 
-ORACLES = Path(__file__).parents[1] / "oracles" / "blends.yaml"
+ORACLES = Path(__file__).parents[2] / "oracles" / "blends.yaml"
 CASES = yaml.safe_load(ORACLES.read_text(encoding="utf-8"))["cases"]
 
 

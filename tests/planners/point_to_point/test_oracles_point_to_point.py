@@ -20,7 +20,7 @@ from trajcli.output.write import grid_of
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.samples import sample
 
-ORACLES = Path(__file__).parents[1] / "oracles" / "point_to_point.yaml"
+ORACLES = Path(__file__).parents[2] / "oracles" / "point_to_point.yaml"
 CASES = yaml.safe_load(ORACLES.read_text(encoding="utf-8"))["cases"]
 DEGREES = {3: "cubic", 5: "quintic", 7: "septic"}
 Case = dict[str, Any]

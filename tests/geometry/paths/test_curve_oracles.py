@@ -19,7 +19,7 @@ from trajcli.geometry.paths.orientation import AxisAngleOrientation
 from trajcli.geometry.paths.pose import PoseCurve
 from trajcli.geometry.paths.position import SAME_PLACE, Line, Pivot
 
-FILE = Path(__file__).parents[1] / "oracles" / "operational.yaml"
+FILE = Path(__file__).parents[2] / "oracles" / "operational.yaml"
 CASES = yaml.safe_load(FILE.read_text(encoding="utf-8"))["cases"]
 
 

@@ -17,7 +17,7 @@ from trajcli.job.read import job_from_text
 from trajcli.output.explain import explanation
 from trajcli.planning.plan import Plan, plan_job
 
-ORACLES = Path(__file__).parents[1] / "oracles"
+ORACLES = Path(__file__).parents[2] / "oracles"
 Fields = dict[str, Any]
 
 

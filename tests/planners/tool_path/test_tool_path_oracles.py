@@ -15,7 +15,7 @@ from tool_jobs import plan, poses_of
 
 from trajcli.kinematics.jacobian import tcp_acceleration, tcp_twist
 
-FILE = Path(__file__).parents[1] / "oracles" / "operational.yaml"
+FILE = Path(__file__).parents[2] / "oracles" / "operational.yaml"
 CASES = yaml.safe_load(FILE.read_text(encoding="utf-8"))["cases"]
 PPP = {
     "convention": "standard",

@@ -19,7 +19,7 @@ from trajcli.curves.splines.hermite import (
 )
 from trajcli.curves.splines.virtual_points import continuous_acceleration, virtual_points
 
-FOLDER = Path(__file__).parents[1] / "oracles"
+FOLDER = Path(__file__).parents[2] / "oracles"
 CASES = yaml.safe_load((FOLDER / "splines.yaml").read_text(encoding="utf-8"))["cases"]
 MOVES = yaml.safe_load((FOLDER / "point_to_point.yaml").read_text(encoding="utf-8"))["cases"]
 

@@ -13,7 +13,7 @@ from trajcli.language.numbers import ReadingContext
 from trajcli.planners.point_to_point.jerk_limited import JerkLimited
 from trajcli.trajectory import State
 
-CASES = yaml.safe_load((Path(__file__).parents[1] / "oracles" / "jerk_limited.yaml").read_text("utf-8"))[
+CASES = yaml.safe_load((Path(__file__).parents[2] / "oracles" / "jerk_limited.yaml").read_text("utf-8"))[
     "cases"
 ]
 

@@ -8,7 +8,7 @@ import io
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from test_path_oracles import CASES, FREE, PPP, PPPRRR, clockwise, exact
+from test_tool_path_oracles import CASES, FREE, PPP, PPPRRR, clockwise, exact
 from tool_jobs import job_text
 
 
