@@ -11,11 +11,10 @@ from pydantic_core import ErrorDetails
 
 from trajcli.errors import Problem
 from trajcli.job.yaml.load import Document
-from trajcli.language.numbers import AT_KEY, Flaw, shown
+from trajcli.language.numbers import AT_KEY, FieldPath, Flaw, shown
 from trajcli.planners import PLANNERS
 from trajcli.suggest import did_you_mean, valid_names
 
-FieldPath = tuple[str | int, ...]
 _KINDS = {
     "bool_parsing": "true or false",
     "bool_type": "true or false",

@@ -17,7 +17,7 @@ from trajcli.trajectory import State
 
 if TYPE_CHECKING:
     from trajcli.kinematics.inverse.solutions import Solutions
-    from trajcli.kinematics.inverse.target import IkTarget as Goal
+    from trajcli.kinematics.inverse.target import IkTarget
 
 _NOTED = 1e-12  # a smaller defect of a rotation matrix is rounding
 _CHOICES = ("shoulder", "elbow", "wrist")
@@ -37,7 +37,7 @@ class ResolvedPose:
     """
 
     pose: Target
-    goal: Goal
+    goal: IkTarget
     near: Array
     found: Solutions
     usable: NDArray[np.bool_]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajcli.curves.hermite_fit import RowIndices
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import comparable, frozen
 from trajcli.geometry.rotation import Flags
@@ -14,8 +14,6 @@ from trajcli.kinematics.following.follower import Follower, JointState
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.joint_turns import revolute
 from trajcli.kinematics.inverse.target import IkTarget, residuals
-
-RowIndices = NDArray[np.intp]
 
 _PROBES = 33  # places between neighbouring breaks, all together, at which the peaks are looked for
 _RACING = 1e-8  # of what the fastest joint does: near a singularity rounding leaves no less at the tool

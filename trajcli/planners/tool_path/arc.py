@@ -24,8 +24,8 @@ from trajcli.language.numbers import Flaw, Model, Number, refuse
 from trajcli.language.targets import Direction, NamedTarget, Numbers, Row
 from trajcli.planners.planner import Event
 from trajcli.planners.tool_path.line import planned_path
-from trajcli.planners.tool_path.move import Orientation, PlannedPath, ToolPathMove
-from trajcli.planners.tool_path.target import ToolTarget, flaws_of_target, tool_target
+from trajcli.planners.tool_path.move import PlannedPath, ToolPathMove
+from trajcli.planners.tool_path.target import Orientation, ToolTarget, flaws_of_target, tool_target
 from trajcli.units import Quantity
 
 _LENGTH, _ANGLE = Quantity("length"), Quantity("angle")

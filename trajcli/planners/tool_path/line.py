@@ -21,8 +21,14 @@ from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import refuse
 from trajcli.language.targets import NamedTarget, Target
-from trajcli.planners.tool_path.move import Orientation, PlannedPath, ToolPathMove
-from trajcli.planners.tool_path.target import ToolTarget, flaws_of_target, orientation_along, tool_target
+from trajcli.planners.tool_path.move import PlannedPath, ToolPathMove
+from trajcli.planners.tool_path.target import (
+    Orientation,
+    ToolTarget,
+    flaws_of_target,
+    orientation_along,
+    tool_target,
+)
 
 if TYPE_CHECKING:
     from trajcli.geometry.paths.pose import Screw

@@ -18,6 +18,7 @@ from trajcli.language.targets import Configuration
 from trajcli.planners.planner import Event, Planned, Planner
 from trajcli.planners.point_to_point.point_to_point import require_rest, standstill
 from trajcli.planners.tool_path.law import LawSpec
+from trajcli.planners.tool_path.target import Orientation
 from trajcli.trajectory import State
 from trajcli.units import Quantity
 
@@ -32,8 +33,6 @@ from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.planners.tool_path.follow import JointMotion, diagnosis_of_motion, followed, followed_in_time
 from trajcli.planners.tool_path.law_bounds import law_over
 from trajcli.trajectory import resting
-
-Orientation = Literal["axis_angle", "euler", "fixed", "tangent"]
 
 
 class ToleranceSpec(Model):

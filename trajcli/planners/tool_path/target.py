@@ -25,8 +25,13 @@ from trajcli.geometry.paths.orientation import (
 from trajcli.geometry.paths.position import PositionCurve
 from trajcli.geometry.rotation import AXES, AxisName
 from trajcli.kinematics.forward import forward
-from trajcli.kinematics.inverse.target import IkTarget as Goal
-from trajcli.kinematics.inverse.target import OrientationConstraint, meeting, partial_target, residuals
+from trajcli.kinematics.inverse.target import (
+    IkTarget,
+    OrientationConstraint,
+    meeting,
+    partial_target,
+    residuals,
+)
 from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import FieldPath, Flaw
 from trajcli.language.targets import Target, ik_target
@@ -84,7 +89,7 @@ def tool_target(target: Target, before: Array, robot: Robot) -> ToolTarget:
     return ToolTarget(pose, _WHOLE, goal.orientation, goal.tool_axis, turn, typed=_typed(target))
 
 
-def _refuse_upright(goal: Goal, before: Array) -> None:
+def _refuse_upright(goal: IkTarget, before: Array) -> None:
     """Refuse a yaw or pitch from where the tool axis is upright: it has no heading to turn from.
 
     Raises:

@@ -8,8 +8,7 @@ import numpy as np
 
 from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side
-from trajcli.curves.time_optimal.constraints import ConstraintRows
-from trajcli.curves.time_optimal.constraints import PathConstraint as PathDemand
+from trajcli.curves.time_optimal.constraints import ConstraintRows, PathConstraint
 from trajcli.curves.time_optimal.parameterization import time_optimal
 from trajcli.curves.time_optimal.switching import switching_structure
 from trajcli.kinematics.following.motion import motion_along
@@ -96,7 +95,7 @@ def _require_acceleration(curve: PiecewisePolynomial, robot: Robot, planner: str
         raise missing_limit(planner, "acceleration", lacking.tolist(), robot, why, "use another law `shape`")
 
 
-def tool_constraint(path: ToolPath, limits: ToolLimits) -> PathDemand:
+def tool_constraint(path: ToolPath, limits: ToolLimits) -> PathConstraint:
     """Return what the limits of the tool demand of sd and sdd along a path.
 
     An acceleration is the sum of one along the path and one across it: the circle of those that are allowed

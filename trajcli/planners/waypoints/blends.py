@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 from pydantic.json_schema import JsonSchemaValue
 
 from trajcli.curves.parabolic_blends.blends import Blended, blended, blended_by_acceleration
+from trajcli.curves.parabolic_blends.corners import Ends
 from trajcli.curves.parabolic_blends.durations import BlendAccelerationError
 from trajcli.curves.parabolic_blends.fastest import fastest_blends
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
@@ -36,8 +37,6 @@ from trajcli.planners.point_to_point.point_to_point import missing_limit, requir
 from trajcli.planners.waypoints.through_points import PointTable, ThroughPoints
 from trajcli.trajectory import State, ViaPoints
 from trajcli.units import Quantity
-
-Ends = Literal["centred", "inside"]
 
 _SHARES = (0.15, 0.25, 0.35, 0.44)  # of the shorter segment: with more, two blends that pass exactly overlap
 

@@ -17,8 +17,7 @@ from trajcli.curves.operations import scale_time, times_at
 from trajcli.curves.parabolic_blends.blends import blended
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.curves.splines.shape_preserving import ShapeError
-from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion as Solved
-from trajcli.curves.time_optimal.parameterization import UnsettledSpeedError, time_optimal
+from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion, UnsettledSpeedError, time_optimal
 from trajcli.curves.time_optimal.passes import UnreachableSpeedError
 from trajcli.curves.time_optimal.switching import switching_structure
 from trajcli.errors import Amount, PlanningError, Problem
@@ -321,7 +320,7 @@ class TimeOptimal(ThroughPoints):
         return spline_through(self.rule or "not_a_knot", self.parameter or "chord", points, robot)
 
 
-def _solved(path: JointPath, robot: Robot) -> Solved:
+def _solved(path: JointPath, robot: Robot) -> TimeOptimalMotion:
     limits = robot.limits
     try:
         return time_optimal(
@@ -352,7 +351,7 @@ def _check_duration(wanted: float | None, fastest: float, points: PointTable) ->
         raise PlanningError(Problem(message, "leave `duration` out for the fastest", amounts=amounts))
 
 
-def _events(made: Solved) -> Iterator[Event]:
+def _events(made: TimeOptimalMotion) -> Iterator[Event]:
     if made.refinements:
         yield Event(
             "refined",
