@@ -95,7 +95,7 @@ Which branch is meant. `left` reaches along the x axis of the first link, `right
 bends joint 5 positively. `trajcli ik` lists the branches of a pose by these names."""
 
 _WAYPOINTS = """\
-A point that a move passes: the name of a point, or a state with a place and, if it is said when, a
+A point that a move passes: the name of a point, or a state with a position and, if it is said when, a
 `time`. Poses are reached on the branch nearest to the point before. A table `{positions: [[...], ...],
 times: [...]}` is the shorter form for joint values without anything else; `{csv: FILE}` takes the table
 from a file beside the job, with a column for each joint (`q1`, `q1_deg`, or the joint's name) and, if its
@@ -120,7 +120,7 @@ _MEANINGS: dict[Group, str] = {
     "pose": "`x y z qw qx qy qz`: position and unit quaternion of the tcp in world",
     "twist": "`vx vy vz wx wy wz`: velocity at the tcp and angular velocity, in world",
     "twistd": "`ax ay az ex ey ez`: time derivative of the twist",
-    "path": "`s sd sdd`: way of the tcp along the path of its move and two derivatives; 0 without a path",
+    "path": "`s sd sdd`: arc length of the tcp along the path of its move and two derivatives; 0 without a path",
     "move": "index of the move, from 0; at the border of two moves, that of the later one",
 }
 
@@ -134,7 +134,7 @@ geometry. The quaternion begins with w >= 0 (where w is zero but for rounding, w
 component above zero) and never jumps to the other sign from one row to the next.
 
 `path` is in the unit of length; s begins at 0 in each move along a path, and all three are 0 in other
-moves, also where the tool only turns in its place.
+moves, also where the tool only rotates about the tcp.
 
 Rows stand at `start_time + k / rate`; the last row is exactly the end."""
 

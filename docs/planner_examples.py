@@ -55,7 +55,7 @@ EXAMPLES = {
     ),
     "line": (
         f"{_UR5E}  - {{planner: line, to: {{xyz: [400, 300, 250]}}}}   # keeps its orientation\n"
-        "  - {planner: line, to: {rpy: [180, 0, 60]}}                 # turns in its place\n"
+        "  - {planner: line, to: {rpy: [180, 0, 60]}}                 # rotates about the tcp\n"
         "  - {planner: line, to: {xyz: [400, 100, 300], rpy: [180, 0, 0]},"
         " law: {shape: quintic, duration: 2}}\n"
     ),
@@ -125,7 +125,7 @@ rule has, which is an event at the start of a job that gives none, and a jump (a
 Points stand as for `spline`. The motion is straight from point to point; around each point a parabola
 lasts for its `blend`, or for `blend_durations`, or is as short as an `acceleration` allows (each joint by
 itself). A point between the ends is missed by the change of velocity times the blend's duration / 8, and
-`explain` says by how much; `exactly` passes it by way of two points beside it.
+`explain` says by how much; `exactly` passes it through two points beside it.
 
 With `end_blends: centred` the first and the last blend are centred on their times, so that the motion
 begins half a blend before the start and lasts half a blend longer; `inside` keeps the times of both ends.

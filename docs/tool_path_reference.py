@@ -12,15 +12,15 @@ _PATHS = """\
 `line`, `arc`, `path` and `screw` lead the tcp along a path in space; the joints follow. They start and end
 at rest. A target is a pose or the name of a point; without `xyz` the tool stays where it is and turns, and
 without an orientation it keeps the one it has (an arm with fewer than six joints leaves it free). Joint
-values may be a target too: the pose that belongs to them. What a target fixes holds all the way: a target
+values may be a target too: the pose that belongs to them. What a target fixes holds along the whole path: a target
 with `yaw` alone fixes nothing but the yaw along the path.
 
 The arm stays on the branch on which it starts, and arrives there: another `configuration` in the target is
 refused, and so is a path through a singularity, out of reach, or out of the range of a joint (exit 3, with
-the place s on the path and the joint). Joints that a target leaves free are held: see
+the position s on the path and the joint). Joints that a target leaves free are held: see
 [concepts](concepts.md#what-a-target-leaves-free).
 
-`orientation` says how the tool turns on the way: `axis_angle` about one fixed axis by the shortest angle,
+`orientation` says how the tool turns along the path: `axis_angle` about one fixed axis by the shortest angle,
 evenly in s; `euler` evenly in the three angles in which the target is given (`euler` or `rpy`), from
 those of the start that are nearest to them; `fixed` not at all; `tangent` with the path, so that the tool
 keeps its attitude to it, as along a seam."""
@@ -31,15 +31,15 @@ How s grows with time. Speeds, accelerations and the jerk that the law does not 
 the limits are verified. A polynomial then needs none, and a trapezoid the law's `speed`, or an acceleration;
 a polynomial that would exceed a speed, an acceleration or a jerk that the law names beside is refused. A
 path has one law from end to end, and its largest bend bounds the speed everywhere; only `time_optimal`
-goes place by place.
+goes point by point.
 
 Limits of joints are not looked at when a law is made, only when the move is verified, except by
 `time_optimal`, which needs and keeps those of velocity and acceleration; nor is a turn that the target
 leaves free. Another move that is too fast is refused with the factor, or stretched by it:
-`when_over_limit: slow`. A turn in place has no limit of jerk.
+`when_over_limit: slow`. A rotation about the tcp has no limit of jerk.
 
 Along a bent path the tool also accelerates across. Of an acceleration in `limits.tcp`, 0.6 goes along the
-path and 0.8 across where a path is bent anywhere (`time_optimal` divides it place by place). The
+path and 0.8 across where a path is bent anywhere (`time_optimal` divides it point by point). The
 `acceleration` of the law is the one along the path alone; what comes across is then only verified."""
 
 _TOLERANCE = """\
@@ -47,7 +47,7 @@ How near the joints' curve comes to the exact one; velocities and accelerations 
 peaks. Finer means more pieces: at most 4096 for a move."""
 
 _SEGMENTS = """\
-A segment begins where the one before it ends. `radius` is the way before and after the corner at its end
+A segment begins where the one before it ends. `radius` is the length before and after the corner at its end
 over which the path is rounded; it stands here for one corner or in the move for all."""
 
 _ARCS = """\
