@@ -1,0 +1,50 @@
+"""The rules of the architecture: the house keeps them, and each is seen to fail where it is broken."""
+
+from __future__ import annotations
+
+import file_rules
+import floor_rules
+import function_rules
+import pytest
+import word_rules
+from sources import Offence, Planted, Rule, Sources, the_sources
+
+RULES = [*file_rules.RULES, *function_rules.RULES, *floor_rules.RULES, *word_rules.RULES]
+PLANTED = [
+    pytest.param(rule, planted, id=f"{rule.name}-{number}")
+    for rule in RULES
+    for number, planted in enumerate(rule.planted)
+]
+
+
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.name)
+def test_the_house_keeps_the_rule(rule: Rule) -> None:
+    wrong = rule.offences(the_sources(), rule.exceptions)
+    assert not wrong, "\n" + "\n".join(f"{where}: {text}" for where, text in wrong)
+
+
+@pytest.mark.parametrize(("rule", "planted"), PLANTED)
+def test_a_planted_offence_is_found(rule: Rule, planted: Planted) -> None:
+    right, wrong = planted.test_folders
+    assert rule.offences(Sources(planted.clean, right), {}) == []
+    assert rule.offences(Sources({**planted.clean, **planted.wrong}, wrong), {}) == planted.offences
+
+
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.name)
+def test_a_rule_can_fail_and_has_few_exceptions(rule: Rule) -> None:
+    assert rule.planted
+    assert all(planted.offences for planted in rule.planted)
+    assert len(rule.exceptions) <= rule.most
+    assert all(len(reason.split()) > 2 for reason in rule.exceptions.values()), "an exception says why"
+
+
+def test_an_exception_is_accepted_once_and_refused_where_it_is_not_needed() -> None:
+    rule = next(rule for rule in RULES if rule.check is file_rules.files_are_not_too_long)
+    sources = Sources({"a.py": "\n" * 501, "b.py": "\n"})
+    assert rule.offences(sources, {"a.py": "a long table"}) == []
+    stale = rule.offences(sources, {"a.py": "a long table", "b.py": "none"})
+    assert stale == [Offence("b.py", "this exception is not needed")]
+
+
+def test_folders_of_one_shape_exist() -> None:
+    assert file_rules.ONE_SHAPE.keys() <= the_sources().folders
