@@ -259,6 +259,11 @@ RULES = [
                     )
                 ],
             ),
+            Planted(
+                {**_HALF, "curves/trapezoid.py": "", "samples.py": "import trajcli.curves.trapezoid\n"},
+                {"errors.py": "import trajcli.curves.trapezoid\n"},
+                [Offence("trajcli.curves", "packages import in a circle: trajcli.curves, trajcli.errors")],
+            ),
         ],
     ),
     Rule(

@@ -161,7 +161,11 @@ class Move:
 
 
 def _titled(wrong: str, offence: str) -> Planted:
-    clean = {"a.py": _TITLE, "job/a.py": '"""Job files with the place of everything."""\n'}
+    clean = {
+        "a.py": _TITLE,
+        "b.py": f'"""{"Long " * 21}text."""',
+        "job/a.py": '"""Job files with the place of everything."""\n',
+    }
     return Planted(clean, {"a.py": wrong}, [Offence("a.py", offence)])
 
 
@@ -197,7 +201,7 @@ RULES = [
         titles_are_noun_phrases,
         [
             _titled("x = 1\n", "has no docstring"),
-            _titled(f'"""{"Long " * 22}s."""\n', "its title has 112 characters, more than 110"),
+            _titled(f'"""{"Long " * 21}texts."""\n', "its title has 111 characters, more than 110"),
             _titled('"""Retiming"""\n', "its title ends without a period: Retiming"),
             _titled('"""What moves share."""\n', "its title begins with `What`: What moves share."),
             _titled(
