@@ -46,6 +46,9 @@ SAME_WORDS = {
 }
 """Literals that are compared with, and are the name of a planner by chance: file and literal."""
 
+SOLVERS: dict[str, str] = {}
+"""Why a file above the planners needs more of them than their contract: file and module."""
+
 OPEN_PLANNERS = (PLANNERS, f"{PLANNERS}.planner")
 
 
@@ -155,11 +158,11 @@ def planners_are_known_by_their_contract(sources: Sources) -> Iterator[Offence]:
     above = set(_above_planners(sources))
     for path, imported, target in _inner_imports(sources):
         if path in above and _room(target) == "planners" and target not in OPEN_PLANNERS:
-            yield Offence(path, f"line {imported.line} imports {target}: Planned says what there is to say")
+            yield Offence(f"{path} {target}", f"line {imported.line} imports more than a planner's contract")
 
 
 def tags_of_planners_are_not_compared(sources: Sources) -> Iterator[Offence]:
-    tags = _tags(sources)
+    tags = tags_of_planners(sources)
     for path in _above_planners(sources):
         for node in sources.nodes[path]:
             for text in _compared(node):
@@ -171,7 +174,7 @@ def _line(node: ast.AST) -> int:
     return getattr(node, "lineno", 0)
 
 
-def _tags(sources: Sources) -> set[str]:
+def tags_of_planners(sources: Sources) -> set[str]:
     """Return the names of the planners in jobs, the keys of the table `_WHERE`."""
     return {
         key.value
@@ -303,12 +306,14 @@ RULES = [
                 {"cli/explain.py": "def f():\n    from trajcli.planners.tool_path import line\n"},
                 [
                     Offence(
-                        "cli/explain.py",
-                        "line 2 imports trajcli.planners.tool_path.line: Planned says what there is to say",
+                        "cli/explain.py trajcli.planners.tool_path.line",
+                        "line 2 imports more than a planner's contract",
                     )
                 ],
             )
         ],
+        SOLVERS,
+        most=2,
     ),
     Rule(
         tags_of_planners_are_not_compared,

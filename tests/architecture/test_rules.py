@@ -9,6 +9,8 @@ import pytest
 import word_rules
 from sources import Offence, Planted, Rule, Sources, the_sources
 
+from trajcli.planners import PLANNERS
+
 RULES = [*file_rules.RULES, *function_rules.RULES, *floor_rules.RULES, *word_rules.RULES]
 PLANTED = [
     pytest.param(rule, planted, id=f"{rule.name}-{number}")
@@ -44,6 +46,10 @@ def test_an_exception_is_accepted_once_and_refused_where_it_is_not_needed() -> N
     assert rule.offences(sources, {"a.py": "a long table"}) == []
     stale = rule.offences(sources, {"a.py": "a long table", "b.py": "none"})
     assert stale == [Offence("b.py", "this exception is not needed")]
+
+
+def test_the_names_of_planners_are_read_from_their_table() -> None:
+    assert floor_rules.tags_of_planners(the_sources()) == set(PLANNERS)
 
 
 def test_folders_of_one_shape_exist() -> None:

@@ -75,7 +75,8 @@ def words_of(name: str) -> list[str]:
 def public_names_have_one_meaning(sources: Sources) -> Iterator[Offence]:
     meanings: dict[str, dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
     for path in sources.texts:
-        for name, meaning in _classes(sources.trees[path].body, path):
+        # what a module defines twice, for type checkers and at run time, has the meaning that stands first
+        for name, meaning in dict(reversed([*_classes(sources.trees[path].body, path)])).items():
             meanings[name][meaning].append(path)
     for path, imports in sources.imports.items():
         for imported in imports:
@@ -180,11 +181,14 @@ RULES = [
         [
             Planted(
                 {"a.py": _ALIAS, "b.py": "Array = np.ndarray\nMOST = 4\nclass _Line:\n    pass\n"},
-                {"b.py": "if TYPE_CHECKING:\n    Array = list\n"},
+                {"b.py": "if TYPE_CHECKING:\n    Array = list\nelse:\n    Array = np.ndarray\n"},
                 [Offence("Array", "has 2 meanings: a.py, b.py")],
             ),
             Planted(
-                {"a.py": _ALIAS, "b.py": "from trajcli.a import Line\n"},
+                {
+                    "a.py": _ALIAS,
+                    "b.py": "from trajcli.a import Line\nif N:\n    Arc = 1\nelse:\n    Arc = 2\n",
+                },
                 {"b.py": "class Line:\n    pass\n"},
                 [Offence("Line", "has 2 meanings: a.py, b.py")],
             ),
