@@ -173,7 +173,7 @@ class Rule:
 
     def offences(self, sources: Sources, exceptions: Mapping[str, str]) -> list[Offence]:
         """Return what breaks the rule without being an exception, and exceptions that break nothing."""
-        found = list(self.check(sources))
+        found = list(dict.fromkeys(self.check(sources)))
         stale = sorted(exceptions.keys() - {offence.where for offence in found})
         wrong = [offence for offence in found if offence.where not in exceptions]
         return [*wrong, *(Offence(where, "this exception is not needed") for where in stale)]
