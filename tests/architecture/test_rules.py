@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
 import file_rules
 import floor_rules
 import function_rules
 import pytest
 import word_rules
-from sources import Offence, Planted, Rule, Sources, the_sources
+from sources import ROOT, Offence, Planted, Rule, Sources, the_sources
 
 from trajcli.planners import PLANNERS
 
@@ -50,6 +52,18 @@ def test_an_exception_is_accepted_once_and_refused_where_it_is_not_needed() -> N
 
 def test_the_names_of_planners_are_read_from_their_table() -> None:
     assert floor_rules.tags_of_planners(the_sources()) == set(PLANNERS)
+
+
+def test_contributing_shows_the_same_floors() -> None:
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (\d+) \| (.*) \|$", text, re.MULTILINE)
+    shown = [set(re.findall(r"`(\w+)(?:/|\.py)`", row)) for _, row in rows]
+    assert [int(number) for number, _ in rows] == list(range(len(rows)))
+    for floor, rooms in enumerate(floor_rules.FLOORS[: len(rows)]):
+        others = {room for other in floor_rules.FLOORS if other != rooms for room in other}
+        assert set(rooms) <= shown[floor]
+        assert not shown[floor] & others
+    assert "cli" in shown[-1]
 
 
 def test_folders_of_one_shape_exist() -> None:
