@@ -1,0 +1,245 @@
+"""Rules about names and words: one name one meaning, the words of the field, titles of modules."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections import defaultdict
+from collections.abc import Iterator
+
+from sources import Offence, Planted, Rule, Sources
+
+HOMONYMS: dict[str, str] = {}
+"""Why one public class name has two meanings: at most three."""
+
+PRIVATE_WORDS = frozenset(
+    [
+        "way",
+        "ways",
+        "told",
+        "mended",
+        "swing",
+        "swings",
+        "ceiling",
+        "ceilings",
+        "hand",
+        "hands",
+        "body",
+        "bases",
+        "passing",
+        "again",
+        "trouble",
+        "scanned",
+    ]
+)
+"""Words that the field does not use for what we mean: none stands in a name, or in the title of a module."""
+
+PLACE = ("place", "places")
+PLACES = ("job/", "cli/", "planning/", "errors.py")
+"""A place is a position in a file: these files, and those that import `errors.Place`, speak of places."""
+
+NEEDED_WORDS: dict[str, str] = {}
+"""Why a name needs a private word, by file and name: such as the body of a text."""
+
+LONGEST_TITLE = 110
+QUESTIONS = ["What", "How", "Where", "When", "Why", "Which", "Who", "Whose", "Whether"]
+ORDERS = [
+    "Read",
+    "Write",
+    "Make",
+    "Run",
+    "Runs",
+    "Return",
+    "Returns",
+    "Keep",
+    "Stay",
+    "Hold",
+    "Put",
+    "Find",
+    "Compute",
+]
+OPENINGS = re.compile(
+    rf"(?:{'|'.join([*QUESTIONS, *ORDERS])})\b|The few\b|From\b.*?\bto\b",
+)
+"""What the title of a module does not begin with: it is a noun phrase, as in the index of a textbook."""
+
+_CAP_WORDS = re.compile(r"[A-Z]\w*[a-z]\w*")
+_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
+
+
+def words_of(name: str) -> list[str]:
+    """Return the words of an identifier in lower case: `_ToolWay2` -> tool, way."""
+    return [word.lower() for word in _WORD.findall(name)]
+
+
+def public_names_have_one_meaning(sources: Sources) -> Iterator[Offence]:
+    meanings: dict[str, dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
+    for path in sources.texts:
+        # what a module defines twice, for type checkers and at run time, has the meaning that stands first
+        for name, meaning in dict(reversed([*_classes(sources.trees[path].body, path)])).items():
+            meanings[name][meaning].append(path)
+    for path, imports in sources.imports.items():
+        for imported in imports:
+            if imported.name != imported.alias and imported.alias in meanings:
+                meanings[imported.alias][f"import {imported.dotted}"].append(path)
+    for name, by_meaning in sorted(meanings.items()):
+        if len(by_meaning) > 1:
+            places = sorted(path for paths in by_meaning.values() for path in paths)
+            yield Offence(name, f"has {len(by_meaning)} meanings: {', '.join(places)}")
+
+
+def _classes(body: list[ast.stmt], path: str) -> Iterator[tuple[str, str]]:
+    """Yield public classes and type aliases of a module: name, and what tells two of one name apart."""
+    for node in body:
+        if isinstance(node, ast.If):
+            yield from _classes([*node.body, *node.orelse], path)
+        elif isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+            yield node.name, f"class in {path}"
+        elif isinstance(node, ast.Assign | ast.AnnAssign) and node.value is not None:
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            names = (target.id for target in targets if isinstance(target, ast.Name))
+            yield from ((name, ast.unparse(node.value)) for name in names if _CAP_WORDS.fullmatch(name))
+
+
+def titles_are_noun_phrases(sources: Sources) -> Iterator[Offence]:
+    for path, tree in sources.trees.items():
+        title = (ast.get_docstring(tree) or "").partition("\n")[0]
+        if not title:
+            yield Offence(path, "has no docstring")
+            continue
+        if len(title) > LONGEST_TITLE:
+            yield Offence(path, f"its title has {len(title)} characters, more than {LONGEST_TITLE}")
+        if not title.endswith("."):
+            yield Offence(path, f"its title ends without a period: {title}")
+        if opening := OPENINGS.match(title):
+            yield Offence(path, f"its title begins with `{opening[0]}`: {title}")
+        for word in _private(sources, path, re.findall(r"[a-z]+", title.lower())):
+            yield Offence(path, f"its title says `{word}`: {title}")
+
+
+def names_are_words_of_the_field(sources: Sources) -> Iterator[Offence]:
+    for path, nodes in sources.nodes.items():
+        for word in _private(sources, path, words_of(path.removesuffix(".py"))):
+            yield Offence(path, f"the file's name says `{word}`")
+        names = {(name, line) for node in nodes for name, line in _defined(node)}
+        for name, line in sorted(names, key=lambda each: (each[1], each[0])):
+            for word in _private(sources, path, words_of(name)):
+                yield Offence(f"{path} {name}", f"line {line} says `{word}`")
+
+
+def _private(sources: Sources, path: str, words: list[str]) -> list[str]:
+    """Return which words are not to be said in a file."""
+    knows_places = any(imported.dotted == "trajcli.errors.Place" for imported in sources.imports[path])
+    free = PLACE if knows_places or path.startswith(PLACES) else ()
+    return sorted({*words} & {*PRIVATE_WORDS, *PLACE}.difference(free))
+
+
+def _defined(node: ast.AST) -> Iterator[tuple[str, int]]:
+    """Yield the names that a node defines, each with its line."""
+    if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+        yield node.name, node.lineno
+    elif isinstance(node, ast.arg):
+        yield node.arg, node.lineno
+    elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+        yield node.id, node.lineno
+    elif isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
+        yield node.attr, node.lineno
+    elif isinstance(node, ast.ExceptHandler | ast.MatchAs | ast.MatchStar) and node.name:
+        yield node.name, node.lineno
+    elif isinstance(node, ast.ImportFrom | ast.Import):
+        yield from ((alias.asname, node.lineno) for alias in node.names if alias.asname)
+
+
+_TITLE = '"""Retiming of planned moves: time scaling.\n\nWhat it says after that is free.\n"""\n'
+_ALIAS = "Array = np.ndarray\nMOST = 3\nclass Line:\n    pass\n"
+_MOVE = """\
+class Move:
+    place_of: int = 1
+    def plan(self, start, *, law=None):
+        for s in self.told(by=start): self.x = s
+        swinging = handed = [bodywork for bodywork in range(3)]
+"""
+
+
+def _titled(wrong: str, offence: str) -> Planted:
+    clean = {
+        "a.py": _TITLE,
+        "b.py": f'"""{"Long " * 21}text."""',
+        "job/a.py": '"""Job files with the place of everything."""\n',
+    }
+    return Planted(clean, {"a.py": wrong}, [Offence("a.py", offence)])
+
+
+def _named(old: str, new: str, name: str, line: int, word: str) -> Planted:
+    offence = Offence(f"job/a.py {name}", f"line {line} says `{word}`")
+    return Planted({"job/a.py": _MOVE}, {"job/a.py": _MOVE.replace(old, new)}, [offence])
+
+
+RULES = [
+    Rule(
+        public_names_have_one_meaning,
+        [
+            Planted(
+                {"a.py": _ALIAS, "b.py": "Array = np.ndarray\nMOST = 4\nclass _Line:\n    pass\n"},
+                {"b.py": "if TYPE_CHECKING:\n    Array = list\nelse:\n    Array = np.ndarray\n"},
+                [Offence("Array", "has 2 meanings: a.py, b.py")],
+            ),
+            Planted(
+                {
+                    "a.py": _ALIAS,
+                    "b.py": "from trajcli.a import Line\nif N:\n    Arc = 1\nelse:\n    Arc = 2\n",
+                },
+                {"b.py": "class Line:\n    pass\n"},
+                [Offence("Line", "has 2 meanings: a.py, b.py")],
+            ),
+            Planted(
+                {"a.py": _ALIAS, "b.py": "from trajcli.c import Arc as Curve\n"},
+                {"b.py": "from trajcli.c import Arc as Line\n"},
+                [Offence("Line", "has 2 meanings: a.py, b.py")],
+            ),
+        ],
+        HOMONYMS,
+        most=3,
+    ),
+    Rule(
+        titles_are_noun_phrases,
+        [
+            _titled("x = 1\n", "has no docstring"),
+            _titled(f'"""{"Long " * 21}texts."""\n', "its title has 111 characters, more than 110"),
+            _titled('"""Retiming"""\n', "its title ends without a period: Retiming"),
+            _titled('"""What moves share."""\n', "its title begins with `What`: What moves share."),
+            _titled(
+                '"""From a job to a plan."""\n',
+                "its title begins with `From a job to`: From a job to a plan.",
+            ),
+            _titled('"""The few problems."""\n', "its title begins with `The few`: The few problems."),
+            _titled('"""Read a job."""\n', "its title begins with `Read`: Read a job."),
+            _titled('"""The way of the tool."""\n', "its title says `way`: The way of the tool."),
+            _titled('"""Poses of a place."""\n', "its title says `place`: Poses of a place."),
+        ],
+    ),
+    Rule(
+        names_are_words_of_the_field,
+        [
+            _named("class Move", "class MoveTold", "MoveTold", 1, "told"),
+            _named("place_of", "hand_of", "hand_of", 2, "hand"),
+            _named("def plan", "def _plan_again", "_plan_again", 3, "again"),
+            _named("law=None", "ceiling=None", "ceiling", 3, "ceiling"),
+            _named("for s in", "for way1 in", "way1", 4, "way"),
+            _named("self.x =", "self.bases_of =", "bases_of", 4, "bases"),
+            Planted(
+                {
+                    "curves/a.py": "import x as s\nplacement = 1\n",
+                    "streams/a.py": "from trajcli.errors import Place\nplace = 1\n",
+                },
+                {"curves/swing.py": "import x as place\n"},
+                [
+                    Offence("curves/swing.py", "the file's name says `swing`"),
+                    Offence("curves/swing.py place", "line 1 says `place`"),
+                ],
+            ),
+        ],
+        NEEDED_WORDS,
+        most=3,
+    ),
+]
