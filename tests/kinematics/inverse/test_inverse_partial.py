@@ -101,7 +101,7 @@ def test_a_search_finds_as_many_answers(name, kind, axis, anyhow, most):
     assert found.count.max() <= most
     sought = search(robot, target, None)
     fixed = ~found.free[found.valid].any(axis=0)
-    counted = distinct(robot, sought.joints * fixed, sought.found).sum(axis=1)
+    counted = distinct(robot, sought.joints * fixed, sought.met).sum(axis=1)
     assert found.count.tolist() == counted.tolist()
 
 

@@ -80,13 +80,13 @@ class WholePoses:
     """
 
     poses: Array
-    first: Array | None
-    watched: Flags
+    shoulder: Array | None
+    degenerate: Flags
     freedom: int
     free: Flags
 
     @property
-    def ways(self) -> int:
+    def flips(self) -> int:
         """In how many ways a pitch or direction is met."""
         return len(self.poses)
 
@@ -100,7 +100,7 @@ def whole_poses(robot: Robot, arm: AxisGeometry, target: IkTarget, near: Array) 
         target: A flat batch of N.
         near: Joint values (N, n) from which what is free is sampled.
     """
-    joints = len(arm.lines)
+    joints = len(arm.axes)
     if joints == 6:
         others = forward(robot, starting_points(robot, SAMPLES - 1, 0))[:, None]
         poses = np.stack([meeting(target, start) for start in (forward(robot, near), *others)])
@@ -109,38 +109,38 @@ def whole_poses(robot: Robot, arm: AxisGeometry, target: IkTarget, near: Array) 
         return WholePoses(poses[None, None], None, nowhere, freedom, free)
     if not all(target.position) or target.orientation == "all":
         return None
-    body = tool_axis_model(arm, target.tool_axis)
-    coupled = {"direction": not body.tip_on_roll, "yaw": not body.upright}
-    return None if coupled.get(target.orientation, False) else _standing(body, target, near)
+    model = tool_axis_model(arm, target.tool_axis)
+    coupled = {"direction": not model.tip_on_roll, "yaw": not model.upright}
+    return None if coupled.get(target.orientation, False) else _attainable_poses(model, target, near)
 
 
-def _standing(body: ToolAxisModel, target: IkTarget, near: Array) -> WholePoses:
+def _attainable_poses(model: ToolAxisModel, target: IkTarget, near: Array) -> WholePoses:
     """Return the poses in which an arm of fewer than six joints can stand at the target."""
     kind = target.orientation
-    loose: bool = kind == "none" or body.steady or (kind == "pitch" and body.upright)
-    together = kind == "direction" and not body.rolls_in_place
-    samples = SAMPLES if loose or not (together or body.rolls_in_place) else 1
+    sum_free: bool = kind == "none" or model.axis_unturned or (kind == "pitch" and model.upright)
+    rolls_to_aim = kind == "direction" and not model.roll_irrelevant
+    samples = SAMPLES if sum_free or not (rolls_to_aim or model.roll_irrelevant) else 1
     steps = 2 * np.pi * np.arange(samples)[:, None]
-    s = (body.turned_together(near) + steps / samples).reshape(-1)
-    r = (near[:, -1] + (0.0 if body.rolls_in_place else _GOLDEN) * steps).reshape(-1)
+    s = (model.turn_sum(near) + steps / samples).reshape(-1)
+    r = (near[:, -1] + (0.0 if model.roll_irrelevant else _GOLDEN) * steps).reshape(-1)
     rows = target.rows(np.tile(np.arange(len(near)), samples))
-    task = _Task(body, rows, DegeneracyFlags(len(s), body.arm.length))
-    roll: Turn | None = None if together or body.roll is None else (np.cos(r), np.sin(r))
-    first = task.shoulder(roll)
-    rotations = task.rotations(first, s if loose else None, roll)
+    solver = _OrientationSolver(model, rows, DegeneracyFlags(len(s), model.arm.length))
+    roll: Turn | None = None if rolls_to_aim or model.roll is None else (np.cos(r), np.sin(r))
+    shoulder = solver.shoulder(roll)
+    rotations = solver.rotations(shoulder, s if sum_free else None, roll)
     shape = (*rotations.shape[:2], samples, len(near))
     poses = np.broadcast_to(target.poses, (*shape, 4, 4)).copy()
-    poses[..., :3, :3] = body.arm.base[:3, :3] @ rotations.reshape(*shape, 3, 3)
-    rolling = body.roll is not None and not together
+    poses[..., :3, :3] = model.arm.base[:3, :3] @ rotations.reshape(*shape, 3, 3)
+    rolling = model.roll is not None and not rolls_to_aim
     free = np.zeros(near.shape[1], dtype=bool)
-    free[-1] = rolling and body.rolls_in_place
-    watched: Flags = np.asarray(task.watch.rows.reshape(samples, -1).any(axis=0))
-    turns = None if first is None else np.stack(np.broadcast_arrays(*first)).reshape(2, *shape[1:])
-    return WholePoses(poses, turns, watched, loose + rolling, free)
+    free[-1] = rolling and model.roll_irrelevant
+    degenerate: Flags = np.asarray(solver.flags.rows.reshape(samples, -1).any(axis=0))
+    turns = None if shoulder is None else np.stack(np.broadcast_arrays(*shoulder)).reshape(2, *shape[1:])
+    return WholePoses(poses, turns, degenerate, sum_free + rolling, free)
 
 
 @frozen
-class _Task:
+class _OrientationSolver:
     """One block of targets for one arm.
 
     Attributes:
@@ -149,9 +149,9 @@ class _Task:
         watch: Of the block.
     """
 
-    body: ToolAxisModel
+    model: ToolAxisModel
     target: IkTarget
-    watch: DegeneracyFlags
+    flags: DegeneracyFlags
 
     def rotations(self, shoulder: Turn | None, s: Array | None, roll: Turn | None) -> Array:
         """Return how the tool can turn, in the base, shape (ways, shoulders, B, 3, 3).
@@ -164,73 +164,73 @@ class _Task:
         if s is not None:
             sums: Turn = np.cos(s), np.sin(s)
         elif self.target.orientation == "pitch":
-            sums = self._raised(shoulder, roll)
-        elif self.body.roll is not None and roll is None:
-            sums, roll = self._aimed_by_two(shoulder)
+            sums = self._for_pitch(shoulder, roll)
+        elif self.model.roll is not None and roll is None:
+            sums, roll = self._for_direction_with_roll(shoulder)
         else:
-            sums = self._aimed(shoulder, roll)
+            sums = self._for_direction(shoulder, roll)
         shoulders = 1 if shoulder is None else 2
-        ways = 2 ** (self.watch.choices - (shoulders - 1))
-        result = np.empty((ways, shoulders, len(self.target.poses), 3, 3))
-        for j, column in enumerate(self.body.arm.home[:3, :3].T.tolist()):
+        flips = 2 ** (self.flags.choices - (shoulders - 1))
+        result = np.empty((flips, shoulders, len(self.target.poses), 3, 3))
+        for j, column in enumerate(self.model.arm.home[:3, :3].T.tolist()):
             vector = self._rolled(tuple(column), roll)
-            vector = self._from_shoulder(turned(vector, self.body.axis.direction, sums), shoulder)
+            vector = self._from_shoulder(turned(vector, self.model.axis.direction, sums), shoulder)
             for i, entry in enumerate(vector):
-                full = np.broadcast_to(entry, (2,) * self.watch.choices + result.shape[2:3])
+                full = np.broadcast_to(entry, (2,) * self.flags.choices + result.shape[2:3])
                 result[..., i, j] = full.reshape(result.shape[:3])
         return result
 
     def shoulder(self, roll: Turn | None) -> Turn | None:
         """Return the turns of joint 1 that bring the tcp to its place."""
-        body, one = self.body, self.body.shoulder
+        model, one = self.model, self.model.shoulder
         if one is None:
             return None
-        tip: VectorEntries = body.marker.point
-        if body.roll is not None and roll is not None:
-            tip = plus(turned(minus(tip, body.roll.point), body.roll.direction, roll), body.roll.point)
-        base = body.arm.base
-        place = (self.target.poses[:, :3, 3] - base[:3, 3]) @ base[:3, :3]
-        sign = forward_sign(one, body.axis, body.arm.forward)
-        return shoulder_turn(one, body.axis.direction, tip, _column(place), self.watch, sign)
+        tip: VectorEntries = model.marker.point
+        if model.roll is not None and roll is not None:
+            tip = plus(turned(minus(tip, model.roll.point), model.roll.direction, roll), model.roll.point)
+        base = model.arm.base
+        position = (self.target.poses[:, :3, 3] - base[:3, 3]) @ base[:3, :3]
+        sign = forward_sign(one, model.axis, model.arm.forward)
+        return shoulder_turn(one, model.axis.direction, tip, _column(position), self.flags, sign)
 
-    def _aimed(self, shoulder: Turn | None, roll: Turn | None) -> Turn:
+    def _for_direction(self, shoulder: Turn | None, roll: Turn | None) -> Turn:
         aim = self._to_shoulder(self._aim(), shoulder)
-        tool = self._rolled(self.body.marker.direction, roll)
-        return unit(onto(self.body.axis.direction, tool, aim), self.watch)
+        tool = self._rolled(self.model.marker.direction, roll)
+        return unit(onto(self.model.axis.direction, tool, aim), self.flags)
 
-    def _aimed_by_two(self, shoulder: Turn | None) -> tuple[Turn, Turn]:
-        body = self.body
-        if body.roll is None:
+    def _for_direction_with_roll(self, shoulder: Turn | None) -> tuple[Turn, Turn]:
+        model = self.model
+        if model.roll is None:
             raise ValueError("the arm has no roll")
         aim = self._to_shoulder(self._aim(), shoulder)
         around, bend = two_turns(
-            body.axis.direction, body.roll.direction, body.marker.direction, aim, self.watch
+            model.axis.direction, model.roll.direction, model.marker.direction, aim, self.flags
         )
         return _both(around), _both(bend)
 
-    def _raised(self, shoulder: Turn | None, roll: Turn | None) -> Turn:
-        body = self.body
-        up, tool = self._to_shoulder(body.up, shoulder), self._rolled(body.marker.direction, roll)
+    def _for_pitch(self, shoulder: Turn | None, roll: Turn | None) -> Turn:
+        model = self.model
+        up, tool = self._to_shoulder(model.up, shoulder), self._rolled(model.marker.direction, roll)
         height = np.sin(self.target.aims[:, 0])
-        return levels(body.axis.direction, tool, up, height, self.watch, 1.0, body.pitch_sign)[0]
+        return levels(model.axis.direction, tool, up, height, self.flags, 1.0, model.pitch_sign)[0]
 
     def _aim(self) -> VectorEntries:
         """Return where the tool axis shall point, in the base; of a heading its level part."""
         aims = self.target.aims
         if self.target.orientation == "yaw":
             aims = np.hstack([np.cos(aims), np.sin(aims), np.zeros_like(aims)])
-        return _column(aims @ self.body.arm.base[:3, :3])
+        return _column(aims @ self.model.arm.base[:3, :3])
 
     def _rolled(self, vector: VectorEntries, roll: Turn | None) -> VectorEntries:
-        line = self.body.roll
-        return vector if line is None or roll is None else turned(vector, line.direction, roll)
+        axis = self.model.roll
+        return vector if axis is None or roll is None else turned(vector, axis.direction, roll)
 
     def _from_shoulder(self, vector: VectorEntries, shoulder: Turn | None) -> VectorEntries:
-        one = self.body.shoulder
+        one = self.model.shoulder
         return vector if one is None or shoulder is None else turned(vector, one.direction, shoulder)
 
     def _to_shoulder(self, vector: VectorEntries, shoulder: Turn | None) -> VectorEntries:
-        one = self.body.shoulder
+        one = self.model.shoulder
         return vector if one is None or shoulder is None else turned_back(vector, one.direction, shoulder)
 
 
@@ -264,19 +264,19 @@ class Postures:
     robot: Robot
     arm: AxisGeometry
     method: IkMethod
-    ways: int
+    flips: int
     tool_axis: AxisName
 
     def of(self, joints: Array) -> NDArray[np.intp]:
         """Return the index (K,) of the posture of joint values (K, n); -1 where singular ones have none."""
         poses = forward(self.robot, joints)
         index, gap = self.branch(joints, poses)
-        if len(self.arm.lines) < 6:
-            body = tool_axis_model(self.arm, self.tool_axis)
-            if body.shoulder is not None:
-                index = 2 * body.leans_back(self.robot, joints, poses) + index % 2
-            if self.ways == 2:
-                index = 2 * index + body.heads_back(self.robot, joints, poses, self.tool_axis)
+        if len(self.arm.axes) < 6:
+            model = tool_axis_model(self.arm, self.tool_axis)
+            if model.shoulder is not None:
+                index = 2 * model.shoulder_right(self.robot, joints, poses) + index % 2
+            if self.flips == 2:
+                index = 2 * index + model.flipped(self.robot, joints, poses, self.tool_axis)
         return np.where(gap <= SAME, index, -1)
 
     def branch(self, joints: Array, poses: Array) -> tuple[NDArray[np.intp], Array]:
@@ -322,44 +322,46 @@ def _block(
         return None
     samples, count = poses.poses.shape[2:4]
     raw = candidates(robot, arm, method, poses.poses.reshape(-1, 4, 4))
-    joints = _by_posture(raw.joints, poses)
+    joints = _sorted_by_posture(raw.joints, poses)
     closure = closures(robot, target, joints)
-    watched = poses.watched | raw.watched.reshape(-1, count).any(axis=0)
+    degenerate = poses.degenerate | raw.degenerate.reshape(-1, count).any(axis=0)
     poor = rough(closure.max(axis=0)).any(axis=0)
-    polish(robot, target, joints, closure, watched, np.flatnonzero(poor | watched))
-    named = method if poses.ways == 1 else replace(method, choices=(*method.choices, "wrist"))
-    found = Answers(
-        named, joints, closure, closure.max(axis=0) <= tolerance, watched, poses.free, poses.freedom, True
+    polish(robot, target, joints, closure, degenerate, np.flatnonzero(poor | degenerate))
+    named = method if poses.flips == 1 else replace(method, choices=(*method.choices, "wrist"))
+    answers = Answers(
+        named, joints, closure, closure.max(axis=0) <= tolerance, degenerate, poses.free, poses.freedom, True
     )
     if samples > 1:
-        work = _Work(Postures(robot, arm, method, poses.ways, target.tool_axis), target, near, tolerance)
-        work.take_nearest(found, samples)
-        work.mend(found)
-        work.bring_near(found)
-        found.closure, found.suspect = closures(robot, target, found.joints), np.ones(count, dtype=bool)
+        work = _PostureSearch(
+            Postures(robot, arm, method, poses.flips, target.tool_axis), target, near, tolerance
+        )
+        work.take_nearest(answers, samples)
+        work.fill_missing(answers)
+        work.move_nearest(answers)
+        answers.closure, answers.suspect = closures(robot, target, answers.joints), np.ones(count, dtype=bool)
     else:
-        choose_turns(robot, found.joints, near.T)
-    return found
+        choose_turns(robot, answers.joints, near.T)
+    return answers
 
 
-def _by_posture(joints: Array, poses: WholePoses) -> Array:
+def _sorted_by_posture(joints: Array, poses: WholePoses) -> Array:
     """Return joints (n, branches, all poses) as (n, postures * samples, N).
 
     A pose that was made for one turn of joint 1 counts for the answers with that turn only.
     """
-    ways, shoulders, samples, count = poses.poses.shape[:4]
-    parted = joints.reshape(len(joints), shoulders, -1, ways, shoulders, samples, count)
-    if poses.first is None:
+    flips, shoulders, samples, count = poses.poses.shape[:4]
+    parted = joints.reshape(len(joints), shoulders, -1, flips, shoulders, samples, count)
+    if poses.shoulder is None:
         return parted.reshape(len(joints), -1, count)
     parted = np.moveaxis(parted, 4, 1)
-    cosine, sine = poses.first[:, :, None, None, None]
+    cosine, sine = poses.shoulder[:, :, None, None, None]
     turns = parted[0][:, :, :1]
     own = (np.cos(turns) * cosine + np.sin(turns) * sine).argmax(axis=1)[None, :, None]
     return np.take_along_axis(parted, own, axis=2).reshape(len(joints), -1, count)
 
 
 @frozen
-class _Work:
+class _PostureSearch:
     """Answers of sampled poses on their way to one for each posture: joints (n, postures, N), valid or not.
 
     Attributes:
@@ -374,34 +376,34 @@ class _Work:
     near: Array
     tolerance: float
 
-    def take_nearest(self, found: Answers, samples: int) -> None:
+    def take_nearest(self, answers: Answers, samples: int) -> None:
         """Keep of answers (n, postures * samples, N) the nearest of each posture."""
-        cost = self._cost(found.joints, np.arange(len(self.near)))
-        cost = np.where(found.valid, cost, _MISSED * (1.0 + found.closure.max(axis=0)))
+        cost = self._cost(answers.joints, np.arange(len(self.near)))
+        cost = np.where(answers.valid, cost, _MISSED * (1.0 + answers.closure.max(axis=0)))
         best = cost.reshape(-1, samples, cost.shape[-1]).argmin(axis=1)
         best += samples * np.arange(len(best))[:, None]
-        found.joints = np.take_along_axis(found.joints, best[None], axis=1)
-        found.valid = np.take_along_axis(found.valid, best, axis=0)
+        answers.joints = np.take_along_axis(answers.joints, best[None], axis=1)
+        answers.valid = np.take_along_axis(answers.valid, best, axis=0)
         beside, met = descend(self.postures.robot, self.target, self.near, None)
-        self._offer(found, np.flatnonzero(met), beside[met])
+        self._offer(answers, np.flatnonzero(met), beside[met])
 
-    def mend(self, found: Answers) -> None:
+    def fill_missing(self, answers: Answers) -> None:
         """Seek the postures that no sample met, in place; for targets that none meets, search."""
         robot = self.postures.robot
-        index, rows = np.nonzero(~found.valid)
+        index, rows = np.nonzero(~answers.valid)
         if len(rows):
-            start = found.joints[:, index, rows].T
+            start = answers.joints[:, index, rows].T
             better = refine(robot, self.target.rows(rows), start, _CORRECTIONS)
-            found.joints[:, index, rows] = better.T
-            good = self._good(rows, better)
-            self._offer_branches(found, rows[good], better[good])
-        missing = np.flatnonzero(~found.valid.any(axis=0))
+            answers.joints[:, index, rows] = better.T
+            good = self._met(rows, better)
+            self._offer_branches(answers, rows[good], better[good])
+        missing = np.flatnonzero(~answers.valid.any(axis=0))
         if len(missing):
-            sought = search(robot, self.target.rows(missing), self.near[missing])
-            for met, values in zip(sought.found.T, sought.joints.swapaxes(0, 1), strict=True):
-                self._offer(found, missing[met], values[met])
+            search_result = search(robot, self.target.rows(missing), self.near[missing])
+            for met, values in zip(search_result.met.T, search_result.joints.swapaxes(0, 1), strict=True):
+                self._offer(answers, missing[met], values[met])
 
-    def _offer_branches(self, found: Answers, rows: NDArray[np.intp], joints: Array) -> None:
+    def _offer_branches(self, answers: Answers, rows: NDArray[np.intp], joints: Array) -> None:
         """Offer all branches of the whole poses of joints (K, n) for the targets `rows`."""
         if not len(rows):
             return
@@ -409,22 +411,22 @@ class _Work:
         branches = candidates(robot, own.arm, own.method, forward(robot, joints)).joints
         for values in np.moveaxis(branches, 0, -1):
             for some in _without_repetition(rows):
-                self._offer(found, rows[some], values[some])
+                self._offer(answers, rows[some], values[some])
 
-    def _offer(self, found: Answers, rows: NDArray[np.intp], joints: Array) -> None:
+    def _offer(self, answers: Answers, rows: NDArray[np.intp], joints: Array) -> None:
         """Take joints (K, n) for the targets `rows`, each at most once, where they are nearer than before."""
         if not len(rows):
             return
         joints = joints.T[:, None].copy()
         cost = self._cost(joints, rows)[0]
         index = self.postures.of(joints[:, 0].T)
-        good = self._good(rows, joints[:, 0].T) & (index >= 0)
+        good = self._met(rows, joints[:, 0].T) & (index >= 0)
         before = np.where(
-            found.valid[index, rows], self._cost(found.joints[:, index, rows][:, None], rows)[0], np.inf
+            answers.valid[index, rows], self._cost(answers.joints[:, index, rows][:, None], rows)[0], np.inf
         )
         good &= cost < before
-        found.joints[:, index[good], rows[good]] = joints[:, 0, good]
-        found.valid[index[good], rows[good]] = True
+        answers.joints[:, index[good], rows[good]] = joints[:, 0, good]
+        answers.valid[index[good], rows[good]] = True
 
     def _cost(self, joints: Array, rows: NDArray[np.intp]) -> Array:
         """Turn joints (n, columns, K) to the nearest turns, in place; return their distances (columns, K)."""
@@ -433,14 +435,14 @@ class _Work:
         outside = (beyond(joints.T, robot.limits.position) != 0.0).any(axis=-1).T
         return np.asarray(np.square(joints - near[:, None]).sum(axis=0) + _OUTSIDE * outside)
 
-    def _good(self, rows: NDArray[np.intp], joints: Array) -> Flags:
+    def _met(self, rows: NDArray[np.intp], joints: Array) -> Flags:
         """Return which joints (K, n) meet their targets, shape (K,)."""
         misses = closures(self.postures.robot, self.target.rows(rows), joints.T[:, None])
         return np.asarray(misses.max(axis=0)[0] <= self.tolerance)
 
-    def bring_near(self, found: Answers) -> None:
+    def move_nearest(self, answers: Answers) -> None:
         """Move valid joints along their families, in place, until they are nearest."""
-        index, rows = np.nonzero(found.valid)
+        index, rows = np.nonzero(answers.valid)
         if not len(rows):
             return
 
@@ -448,17 +450,17 @@ class _Work:
             posture = self.postures.of(moved)
             return np.asarray((posture == index[some]) | (posture < 0))
 
-        start, near = found.joints[:, index, rows].T, self.near[rows]
+        start, near = answers.joints[:, index, rows].T, self.near[rows]
         members = nearest_on_self_motions(
             self.postures.robot, self.target.rows(rows), start, near, same_posture
         )
-        found.joints[:, index, rows] = members.T
+        answers.joints[:, index, rows] = members.T
 
 
 def _without_repetition(rows: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
     """Yield places of `rows` (K,), so that no row comes twice in one of them."""
     left = np.arange(len(rows))
     while len(left):
-        _, first = np.unique(rows[left], return_index=True)
-        yield left[first]
-        left = np.delete(left, first)
+        _, shoulder = np.unique(rows[left], return_index=True)
+        yield left[shoulder]
+        left = np.delete(left, shoulder)

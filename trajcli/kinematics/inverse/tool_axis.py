@@ -14,7 +14,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
 from trajcli.geometry.rotation import AXES, AxisName, Flags
 from trajcli.kinematics.columns import dot
-from trajcli.kinematics.inverse.families.elbow import forward_sign, same_way
+from trajcli.kinematics.inverse.families.elbow import forward_sign, same_direction
 from trajcli.kinematics.inverse.families.screw_axes import (
     PARALLEL,
     AxisGeometry,
@@ -40,7 +40,7 @@ class ToolAxisModel:
     """
 
     arm: AxisGeometry
-    together: tuple[int, ...]
+    parallel_joints: tuple[int, ...]
     shoulder: ScrewAxis | None
     roll: ScrewAxis | None
     marker: ScrewAxis
@@ -48,7 +48,7 @@ class ToolAxisModel:
     @property
     def axis(self) -> ScrewAxis:
         """The first of the parallel axes."""
-        return self.arm.lines[self.together[0]]
+        return self.arm.axes[self.parallel_joints[0]]
 
     @property
     def up(self) -> Floats:
@@ -61,12 +61,12 @@ class ToolAxisModel:
         return self.shoulder is None and _vertical(self.arm, self.axis.direction)
 
     @property
-    def steady(self) -> bool:
+    def axis_unturned(self) -> bool:
         """Whether the parallel axes leave the tool axis as it is."""
         return self.roll is None and parallel(self.axis, self.marker)
 
     @property
-    def rolls_in_place(self) -> bool:
+    def roll_irrelevant(self) -> bool:
         """Whether no roll moves the tcp or the tool axis."""
         return self.roll is None or (self.tip_on_roll and parallel(self.roll, self.marker))
 
@@ -83,22 +83,24 @@ class ToolAxisModel:
         ahead = forward_sign(self.shoulder, self.axis, self.arm.forward)
         return ahead * float(np.copysign(1.0, dot(self.up, self.shoulder.direction)))
 
-    def turned_together(self, joints: Array) -> Array:
+    def turn_sum(self, joints: Array) -> Array:
         """Return the sums s (K,) of joint values (K, n)."""
-        return np.asarray(sum(same_way(self.axis, self.arm.lines[i]) * joints[:, i] for i in self.together))
+        return np.asarray(
+            sum(same_direction(self.axis, self.arm.axes[i]) * joints[:, i] for i in self.parallel_joints)
+        )
 
-    def leans_back(self, robot: Robot, joints: Array, poses: Array) -> Flags:
+    def shoulder_right(self, robot: Robot, joints: Array, poses: Array) -> Flags:
         """Return which joints (K, n), at poses (K, 4, 4), have the tcp behind joint 1, shape (K,)."""
         if self.shoulder is None:
             raise ValueError("the arm has no shoulder")
         one, two = np.moveaxis(jacobian(robot, joints)[:, 3:, :2], 2, 0)
-        way = (poses[:, :3, 3] - self.arm.base[:3, 3]) @ self.arm.base[:3, :3] - self.shoulder.point
-        ahead = np.einsum("ki,ki->k", way @ self.arm.base[:3, :3].T, np.cross(two, one))
+        offset = (poses[:, :3, 3] - self.arm.base[:3, 3]) @ self.arm.base[:3, :3] - self.shoulder.point
+        ahead = np.einsum("ki,ki->k", offset @ self.arm.base[:3, :3].T, np.cross(two, one))
         return np.asarray(forward_sign(self.shoulder, self.axis, self.arm.forward) * ahead < 0.0)
 
-    def heads_back(self, robot: Robot, joints: Array, poses: Array, tool_axis: AxisName) -> Flags:
+    def flipped(self, robot: Robot, joints: Array, poses: Array, tool_axis: AxisName) -> Flags:
         """Return which joints (K, n), at poses (K, 4, 4), meet their pitch in the second way, shape (K,)."""
-        axis = jacobian(robot, joints)[:, 3:, self.together[0]]
+        axis = jacobian(robot, joints)[:, 3:, self.parallel_joints[0]]
         tool = poses[:, :3, AXES.index(tool_axis)]
         side = axis[:, 0] * tool[:, 1] - axis[:, 1] * tool[:, 0]
         return np.asarray(self.pitch_sign * side > 0.0)
@@ -106,21 +108,21 @@ class ToolAxisModel:
 
 def tool_axis_model(arm: AxisGeometry, tool_axis: AxisName) -> ToolAxisModel:
     """Return the body of an arm with parallel axes, for one axis of its tool."""
-    turns = tuple(i for i, line in enumerate(arm.lines) if not line.prismatic)
-    planar = parallel(*(arm.lines[i] for i in turns))
-    roll = arm.lines[4] if len(arm.lines) == 5 else None
+    turns = tuple(i for i, axis in enumerate(arm.axes) if not axis.prismatic)
+    planar = parallel(*(arm.axes[i] for i in turns))
+    roll = arm.axes[4] if len(arm.axes) == 5 else None
     marker = _marker(arm, tool_axis)
     if planar:
         return ToolAxisModel(arm, turns, None, None, marker)
-    return ToolAxisModel(arm, (1, 2, 3), arm.lines[0], roll, marker)
+    return ToolAxisModel(arm, (1, 2, 3), arm.axes[0], roll, marker)
 
 
 def fixed_axis(arm: AxisGeometry, tool_axis: AxisName) -> bool:
     """Return whether no joint turns an axis of the tool."""
-    return all(line.prismatic or parallel(_marker(arm, tool_axis), line) for line in arm.lines)
+    return all(axis.prismatic or parallel(_marker(arm, tool_axis), axis) for axis in arm.axes)
 
 
-def never_heads(arm: AxisGeometry, tool_axis: AxisName) -> bool:
+def always_vertical(arm: AxisGeometry, tool_axis: AxisName) -> bool:
     """Return whether an axis of the tool that no joint turns is vertical in world."""
     return _vertical(arm, _marker(arm, tool_axis).direction)
 
