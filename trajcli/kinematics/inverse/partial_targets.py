@@ -1,28 +1,19 @@
-"""Closed forms for targets that leave something free: one answer for each posture.
+"""Partial targets: closed forms for targets that leave part of the pose free, one answer for each posture.
 
-A posture is a branch of the closed form with, where a pitch or a direction is met in two ways, its way: they
-are called "no_flip" and "flip" like those of a wrist. With fewer than six joints the shoulder is "left" where
-the tcp is on the side of the first link's x axis, so that it changes only where joint 1 is free; the closed
-form for whole poses looks at another point of axis 5.
+A posture is a branch of the closed form and, where two orientations meet a pitch or a direction, the choice
+between them, "no_flip" or "flip" like that of a wrist. With fewer than six joints the shoulder is "left"
+where the tcp is on the side of the first link's x axis, so that it changes only where joint 1 is free; the
+closed form for whole poses looks at another point of axis 5.
 
-The answers for all `whole_poses` are sorted by posture. Where the poses were samples, the answer of each that
-is nearest to where the arm is moves along its family until no other is nearer, without leaving its posture. A
-posture that no sample meets is sought from the sample that comes nearest to the target, and a target that no
-posture meets by search.
+The closed form answers whole poses that meet the target. With six joints the tool can have any orientation:
+the poses of sample configurations are turned the shortest way until they meet the target. With fewer joints
+the `ToolAxisModel` gives the orientations; None is returned where it couples orientation and position. What
+nothing fixes is sampled, starting from where the arm is.
 
-Whole poses for targets that leave part of the pose to the arm, so that its closed form answers them.
-
-With six joints the tool can stand anyhow, and the poses of sample configurations are turned the shortest way
-until they meet the target. With fewer joints it turns by R1 R(h, s) R5(r) (`body`):
-
-* joint 1 is found from the position, two answers; of a 5R arm with joint 5 at r, which is a 4R arm;
-* a direction, or a heading about upright axes, gives s as the angle of one vector;
-* a pitch gives s from the height of a vector, two answers: "no_flip" heads to the side of the first link's x
-  axis, of a planar arm to that of up x h;
-* a direction that is not that of axis 5 gives s and r, two answers, where joint 5 does not move the tcp.
-
-What nothing fixes is sampled, starting from where the arm is. None is returned where orientation and position
-are coupled in another way.
+The answers for all whole poses are sorted by posture. Where the poses were samples, the answer of each
+posture that is nearest to where the arm is moves along its self-motion manifold until no other is nearer,
+without leaving its posture. A posture that no sample meets is sought from the sample that comes nearest to
+the target, and a target that no posture meets by search.
 """
 
 from __future__ import annotations
@@ -36,46 +27,37 @@ from numpy.typing import NDArray
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
 from trajcli.geometry.rotation import AxisName, Flags
-from trajcli.kinematics.columns import VectorEntries, minus, plus
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.answers import Answers, closures, joined, polish, rough
 from trajcli.kinematics.inverse.families.batch import candidates
-from trajcli.kinematics.inverse.families.elbow import forward_sign, shoulder_turn
 from trajcli.kinematics.inverse.families.method import IkMethod
 from trajcli.kinematics.inverse.families.screw_axes import AxisGeometry
-from trajcli.kinematics.inverse.families.subproblems import (
-    DegeneracyFlags,
-    Mirrored,
-    Opposed,
-    Turn,
-    levels,
-    onto,
-    turned,
-    turned_back,
-    two_turns,
-    unit,
-)
+from trajcli.kinematics.inverse.families.subproblems import DegeneracyFlags, Turn
 from trajcli.kinematics.inverse.joint_turns import FULL, beyond, choose_turns, revolute
 from trajcli.kinematics.inverse.numeric import SAME, descend, refine, search, starting_points
 from trajcli.kinematics.inverse.self_motion import nearest_on_self_motions
 from trajcli.kinematics.inverse.target import IkTarget, meeting
-from trajcli.kinematics.inverse.tool_axis import ToolAxisModel, tool_axis_model
+from trajcli.kinematics.inverse.tool_axis import OrientationSolver, ToolAxisModel, tool_axis_model
 from trajcli.kinematics.robot import Robot
 
 SAMPLES = 48  # of what is free: neighbours are 7.5 degrees apart where it is one angle
 _GOLDEN = 0.6180339887498949  # multiples of it, modulo 1, are spread evenly: a second angle beside the first
+_OUTSIDE = 1e4  # rad or m, squared: answers outside the limits come behind those inside
+_MISSED = 1e6  # the same for those that miss the target
+_CORRECTIONS = 20
+_BLOCK = 256  # targets at a time, so that the memory that samples take does not grow with their number
 
 
 @frozen
 class WholePoses:
-    """Poses that meet a flat batch of N targets, as far as the arm can stand so.
+    """Poses that meet a flat batch of N targets, as far as the arm can take them.
 
     Attributes:
-        poses: Shape (ways, shoulders, samples, N, 4, 4), T_world_tcp.
-        first: Shape (2, shoulders, samples, N): cosine and sine of the turns of joint 1 that the poses were
-            made for; None where there is one shoulder only.
-        watched: Shape (N,): two ways fall together, or an angle is free.
-        freedom: How many motions of the joints the targets leave free.
+        poses: Shape (flips, shoulders, samples, N, 4, 4), T_world_tcp.
+        shoulder: Shape (2, shoulders, samples, N): cosine and sine of the turns of joint 1 that the poses
+            belong to; None where there is one shoulder only.
+        degenerate: Shape (N,): two orientations coincide, or an angle is free.
+        freedom: How many self-motions the targets leave.
         free: Shape (n,): joints that are free by themselves; in every sample they are where they were.
     """
 
@@ -87,16 +69,16 @@ class WholePoses:
 
     @property
     def flips(self) -> int:
-        """In how many ways a pitch or direction is met."""
+        """How many orientations meet a pitch or direction, 1 or 2."""
         return len(self.poses)
 
 
 def whole_poses(robot: Robot, arm: AxisGeometry, target: IkTarget, near: Array) -> WholePoses | None:
-    """Return whole poses for flat targets that leave some of it free; None where there is no such way.
+    """Return whole poses for flat targets that leave part of them free; None where no model gives them.
 
     Args:
         robot: One whose closed form needs the whole pose.
-        arm: Its lines.
+        arm: Its screw axes.
         target: A flat batch of N.
         near: Joint values (N, n) from which what is free is sampled.
     """
@@ -115,7 +97,7 @@ def whole_poses(robot: Robot, arm: AxisGeometry, target: IkTarget, near: Array) 
 
 
 def _attainable_poses(model: ToolAxisModel, target: IkTarget, near: Array) -> WholePoses:
-    """Return the poses in which an arm of fewer than six joints can stand at the target."""
+    """Return the poses in which an arm of fewer than six joints meets the targets."""
     kind = target.orientation
     sum_free: bool = kind == "none" or model.axis_unturned or (kind == "pitch" and model.upright)
     rolls_to_aim = kind == "direction" and not model.roll_irrelevant
@@ -124,7 +106,7 @@ def _attainable_poses(model: ToolAxisModel, target: IkTarget, near: Array) -> Wh
     s = (model.turn_sum(near) + steps / samples).reshape(-1)
     r = (near[:, -1] + (0.0 if model.roll_irrelevant else _GOLDEN) * steps).reshape(-1)
     rows = target.rows(np.tile(np.arange(len(near)), samples))
-    solver = _OrientationSolver(model, rows, DegeneracyFlags(len(s), model.arm.length))
+    solver = OrientationSolver(model, rows, DegeneracyFlags(len(s), model.arm.length))
     roll: Turn | None = None if rolls_to_aim or model.roll is None else (np.cos(r), np.sin(r))
     shoulder = solver.shoulder(roll)
     rotations = solver.rotations(shoulder, s if sum_free else None, roll)
@@ -140,125 +122,15 @@ def _attainable_poses(model: ToolAxisModel, target: IkTarget, near: Array) -> Wh
 
 
 @frozen
-class _OrientationSolver:
-    """One block of targets for one arm.
-
-    Attributes:
-        body: Of the arm.
-        target: B targets.
-        watch: Of the block.
-    """
-
-    model: ToolAxisModel
-    target: IkTarget
-    flags: DegeneracyFlags
-
-    def rotations(self, shoulder: Turn | None, s: Array | None, roll: Turn | None) -> Array:
-        """Return how the tool can turn, in the base, shape (ways, shoulders, B, 3, 3).
-
-        Args:
-            shoulder: Turns of joint 1.
-            s: Sums of the turns about the parallel axes (B,) where nothing else decides them.
-            roll: Turns of the last joint likewise.
-        """
-        if s is not None:
-            sums: Turn = np.cos(s), np.sin(s)
-        elif self.target.orientation == "pitch":
-            sums = self._for_pitch(shoulder, roll)
-        elif self.model.roll is not None and roll is None:
-            sums, roll = self._for_direction_with_roll(shoulder)
-        else:
-            sums = self._for_direction(shoulder, roll)
-        shoulders = 1 if shoulder is None else 2
-        flips = 2 ** (self.flags.choices - (shoulders - 1))
-        result = np.empty((flips, shoulders, len(self.target.poses), 3, 3))
-        for j, column in enumerate(self.model.arm.home[:3, :3].T.tolist()):
-            vector = self._rolled(tuple(column), roll)
-            vector = self._from_shoulder(turned(vector, self.model.axis.direction, sums), shoulder)
-            for i, entry in enumerate(vector):
-                full = np.broadcast_to(entry, (2,) * self.flags.choices + result.shape[2:3])
-                result[..., i, j] = full.reshape(result.shape[:3])
-        return result
-
-    def shoulder(self, roll: Turn | None) -> Turn | None:
-        """Return the turns of joint 1 that bring the tcp to its place."""
-        model, one = self.model, self.model.shoulder
-        if one is None:
-            return None
-        tip: VectorEntries = model.marker.point
-        if model.roll is not None and roll is not None:
-            tip = plus(turned(minus(tip, model.roll.point), model.roll.direction, roll), model.roll.point)
-        base = model.arm.base
-        position = (self.target.poses[:, :3, 3] - base[:3, 3]) @ base[:3, :3]
-        sign = forward_sign(one, model.axis, model.arm.forward)
-        return shoulder_turn(one, model.axis.direction, tip, _column(position), self.flags, sign)
-
-    def _for_direction(self, shoulder: Turn | None, roll: Turn | None) -> Turn:
-        aim = self._to_shoulder(self._aim(), shoulder)
-        tool = self._rolled(self.model.marker.direction, roll)
-        return unit(onto(self.model.axis.direction, tool, aim), self.flags)
-
-    def _for_direction_with_roll(self, shoulder: Turn | None) -> tuple[Turn, Turn]:
-        model = self.model
-        if model.roll is None:
-            raise ValueError("the arm has no roll")
-        aim = self._to_shoulder(self._aim(), shoulder)
-        around, bend = two_turns(
-            model.axis.direction, model.roll.direction, model.marker.direction, aim, self.flags
-        )
-        return _both(around), _both(bend)
-
-    def _for_pitch(self, shoulder: Turn | None, roll: Turn | None) -> Turn:
-        model = self.model
-        up, tool = self._to_shoulder(model.up, shoulder), self._rolled(model.marker.direction, roll)
-        height = np.sin(self.target.aims[:, 0])
-        return levels(model.axis.direction, tool, up, height, self.flags, 1.0, model.pitch_sign)[0]
-
-    def _aim(self) -> VectorEntries:
-        """Return where the tool axis shall point, in the base; of a heading its level part."""
-        aims = self.target.aims
-        if self.target.orientation == "yaw":
-            aims = np.hstack([np.cos(aims), np.sin(aims), np.zeros_like(aims)])
-        return _column(aims @ self.model.arm.base[:3, :3])
-
-    def _rolled(self, vector: VectorEntries, roll: Turn | None) -> VectorEntries:
-        axis = self.model.roll
-        return vector if axis is None or roll is None else turned(vector, axis.direction, roll)
-
-    def _from_shoulder(self, vector: VectorEntries, shoulder: Turn | None) -> VectorEntries:
-        one = self.model.shoulder
-        return vector if one is None or shoulder is None else turned(vector, one.direction, shoulder)
-
-    def _to_shoulder(self, vector: VectorEntries, shoulder: Turn | None) -> VectorEntries:
-        one = self.model.shoulder
-        return vector if one is None or shoulder is None else turned_back(vector, one.direction, shoulder)
-
-
-def _both(value: Turn | Mirrored | Opposed) -> Turn:
-    return value.both() if isinstance(value, Mirrored | Opposed) else value
-
-
-def _column(vectors: Array) -> VectorEntries:
-    x, y, z = np.ascontiguousarray(vectors.T)
-    return x, y, z
-
-
-_OUTSIDE = 1e4  # rad or m, squared: answers outside the limits come behind those inside
-_MISSED = 1e6  # the same for those that miss the target
-_CORRECTIONS = 20
-_BLOCK = 256  # targets at a time, so that the memory that samples take does not grow with their number
-
-
-@frozen
 class Postures:
-    """Tells the posture of a configuration.
+    """The postures of an arm, and which one a configuration has.
 
     Attributes:
         robot: The arm.
-        arm: Its lines.
+        arm: Its screw axes.
         method: Its closed form.
-        ways: In how many ways a pitch or direction is met.
-        tool_axis: That is meant by it.
+        flips: How many orientations meet a pitch or direction, 1 or 2.
+        tool_axis: The axis that these mean.
     """
 
     robot: Robot
@@ -295,7 +167,7 @@ def by_postures(
 
     Args:
         robot: The arm.
-        arm: Its lines.
+        arm: Its screw axes.
         method: Its closed form, which needs the whole pose.
         target: A flat batch of N that leaves some of the pose free.
         near: Joint values (N, n).
@@ -332,12 +204,11 @@ def _block(
         named, joints, closure, closure.max(axis=0) <= tolerance, degenerate, poses.free, poses.freedom, True
     )
     if samples > 1:
-        work = _PostureSearch(
-            Postures(robot, arm, method, poses.flips, target.tool_axis), target, near, tolerance
-        )
-        work.take_nearest(answers, samples)
-        work.fill_missing(answers)
-        work.move_nearest(answers)
+        postures = Postures(robot, arm, method, poses.flips, target.tool_axis)
+        reduction = _PostureReduction(postures, target, near, tolerance)
+        reduction.take_nearest(answers, samples)
+        reduction.fill_missing(answers)
+        reduction.move_nearest(answers)
         answers.closure, answers.suspect = closures(robot, target, answers.joints), np.ones(count, dtype=bool)
     else:
         choose_turns(robot, answers.joints, near.T)
@@ -347,13 +218,14 @@ def _block(
 def _sorted_by_posture(joints: Array, poses: WholePoses) -> Array:
     """Return joints (n, branches, all poses) as (n, postures * samples, N).
 
-    A pose that was made for one turn of joint 1 counts for the answers with that turn only.
+    A pose that belongs to one turn of joint 1 counts for the answers with that turn only.
     """
     flips, shoulders, samples, count = poses.poses.shape[:4]
+    # joint, branch (its shoulder, then the rest), pose (flip, shoulder it belongs to, sample, target)
     parted = joints.reshape(len(joints), shoulders, -1, flips, shoulders, samples, count)
     if poses.shoulder is None:
         return parted.reshape(len(joints), -1, count)
-    parted = np.moveaxis(parted, 4, 1)
+    parted = np.moveaxis(parted, 4, 1)  # the shoulder of the pose comes second
     cosine, sine = poses.shoulder[:, :, None, None, None]
     turns = parted[0][:, :, :1]
     own = (np.cos(turns) * cosine + np.sin(turns) * sine).argmax(axis=1)[None, :, None]
@@ -361,8 +233,8 @@ def _sorted_by_posture(joints: Array, poses: WholePoses) -> Array:
 
 
 @frozen
-class _PostureSearch:
-    """Answers of sampled poses on their way to one for each posture: joints (n, postures, N), valid or not.
+class _PostureReduction:
+    """Reduction of the answers of sampled poses to one for each posture, joints (n, postures, N).
 
     Attributes:
         postures: Of the arm.
@@ -377,7 +249,7 @@ class _PostureSearch:
     tolerance: float
 
     def take_nearest(self, answers: Answers, samples: int) -> None:
-        """Keep of answers (n, postures * samples, N) the nearest of each posture."""
+        """Keep of answers (n, postures * samples, N) the nearest of each posture, in place."""
         cost = self._cost(answers.joints, np.arange(len(self.near)))
         cost = np.where(answers.valid, cost, _MISSED * (1.0 + answers.closure.max(axis=0)))
         best = cost.reshape(-1, samples, cost.shape[-1]).argmin(axis=1)
@@ -388,7 +260,7 @@ class _PostureSearch:
         self._offer(answers, np.flatnonzero(met), beside[met])
 
     def fill_missing(self, answers: Answers) -> None:
-        """Seek the postures that no sample met, in place; for targets that none meets, search."""
+        """Refine towards the postures that no sample met, in place; for targets that none meets, search."""
         robot = self.postures.robot
         index, rows = np.nonzero(~answers.valid)
         if len(rows):
@@ -404,7 +276,7 @@ class _PostureSearch:
                 self._offer(answers, missing[met], values[met])
 
     def _offer_branches(self, answers: Answers, rows: NDArray[np.intp], joints: Array) -> None:
-        """Offer all branches of the whole poses of joints (K, n) for the targets `rows`."""
+        """Offer all branches of the closed form at the poses of joints (K, n) for the targets `rows`."""
         if not len(rows):
             return
         own, robot = self.postures, self.postures.robot
@@ -441,7 +313,7 @@ class _PostureSearch:
         return np.asarray(misses.max(axis=0)[0] <= self.tolerance)
 
     def move_nearest(self, answers: Answers) -> None:
-        """Move valid joints along their families, in place, until they are nearest."""
+        """Move valid joints along their self-motion manifolds, in place, until they are nearest."""
         index, rows = np.nonzero(answers.valid)
         if not len(rows):
             return
@@ -451,16 +323,14 @@ class _PostureSearch:
             return np.asarray((posture == index[some]) | (posture < 0))
 
         start, near = answers.joints[:, index, rows].T, self.near[rows]
-        members = nearest_on_self_motions(
-            self.postures.robot, self.target.rows(rows), start, near, same_posture
-        )
-        answers.joints[:, index, rows] = members.T
+        robot, target = self.postures.robot, self.target.rows(rows)
+        answers.joints[:, index, rows] = nearest_on_self_motions(robot, target, start, near, same_posture).T
 
 
 def _without_repetition(rows: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
-    """Yield places of `rows` (K,), so that no row comes twice in one of them."""
+    """Yield indices into `rows` (K,), so that no row comes twice in one of them."""
     left = np.arange(len(rows))
     while len(left):
-        _, shoulder = np.unique(rows[left], return_index=True)
-        yield left[shoulder]
-        left = np.delete(left, shoulder)
+        _, once = np.unique(rows[left], return_index=True)
+        yield left[once]
+        left = np.delete(left, once)
