@@ -87,10 +87,10 @@ def off(case_, place, joints):
         case "direction":
             parts.append(axis - aim)
         case "yaw":
-            angle = np.arctan2(begins[1], begins[0]) + part * path.turns[0]
+            angle = np.arctan2(begins[1], begins[0]) + part * path.angle_changes[0]
             parts.append((np.cos(angle) * axis[:, 1] - np.sin(angle) * axis[:, 0])[:, None])
         case "pitch":
-            parts.append((axis[:, 2] - np.sin(np.arcsin(begins[2]) + part * path.turns[0]))[:, None])
+            parts.append((axis[:, 2] - np.sin(np.arcsin(begins[2]) + part * path.angle_changes[0]))[:, None])
     return np.concatenate(parts, axis=1)
 
 

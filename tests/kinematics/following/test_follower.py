@@ -23,7 +23,7 @@ NAMES = list(CASES)
 
 
 def followed(case_):
-    return follower(case_.robot, case_.path.by_place, case_.start, 0.0)
+    return follower(case_.robot, case_.path.at_s, case_.start, 0.0)
 
 
 def around(case_, held, middle, step):
@@ -63,7 +63,7 @@ def test_derivatives_by_time(name):
     for time in times:
         near = solved(made, law.evaluate(time)[0], arm.held, near)
         rows.append(near)
-    timed = type(arm)(arm.robot, motion.timed, arm.start, arm.held)
+    timed = type(arm)(arm.robot, motion.reference_at, arm.start, arm.held)
     exact = timed.exact(np.array([middle]), "right", np.array([rows[3]]))[:, 0]
     for order, stencil in STENCILS.items():
         difference = stencil @ np.array(rows) / step**order
@@ -105,7 +105,7 @@ def test_a_guess_on_no_branch_is_lost_with_its_place():
     guess[2] -= 2.0
     with pytest.raises(LostError) as caught:
         arm.exact(places, "right", guess)
-    np.testing.assert_array_equal(caught.value.places, [0.02, 0.03])
+    np.testing.assert_array_equal(caught.value.s, [0.02, 0.03])
     assert caught.value.joints.shape == (6,)
 
 
@@ -114,7 +114,7 @@ def test_out_of_reach_is_lost_with_the_distance():
     far = case("planar3r", [0.3, 0.05, 0.02], "yaw", "x")
     assert made.path.length == pytest.approx(0.05)
     arm = followed(far)
-    beyond = arm.demands
+    beyond = arm.reference_at
 
     def stretched(places, side):
         demand = beyond(places, side)
@@ -145,12 +145,12 @@ def test_the_other_branch_is_no_answer():
 def test_a_direction_has_a_hand_too(name):
     made = CASES[name]
     arm = followed(made)
-    assert abs(arm.hand.sign) == 1.0
-    other = replace(arm, hand=replace(arm.hand, sign=-arm.hand.sign))
+    assert abs(arm.aspect.sign) == 1.0
+    other = replace(arm, aspect=replace(arm.aspect, sign=-arm.aspect.sign))
     with pytest.raises(LostError):
         other.exact(np.zeros(1), "right", made.start[None])
 
 
 def test_a_singular_start_has_no_hand():
     made = case("puma560", [0.2, 0.7, -0.8, 0.4, 0.0, -0.3])
-    assert followed(made).hand.sign == 0.0
+    assert followed(made).aspect.sign == 0.0

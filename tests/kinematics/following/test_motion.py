@@ -35,7 +35,7 @@ def test_beside_a_stop_the_tool_is_on_its_own_segment(factor, before):
     np.testing.assert_allclose(motion.breaks, factor * np.arange(3), rtol=1e-15)
     times = factor * np.array([1 - before, 1 + before])
     for side in ("left", "right"):
-        demand = motion.demand(times, side)
+        demand = motion.reference(times, side)
         assert np.abs(demand.second[0, 1:]).max() == 0  # along x, slowing down
         assert demand.second[0, 0] < 0
         assert np.abs(demand.second[1, [0, 2]]).max() == 0  # along y, speeding up
@@ -47,7 +47,7 @@ def test_at_a_stop_both_sides_are_told():
         np.arange(3.0), np.array([[0.0, 0.3, 0.7], [0, 0, 0]])[:, :, None]
     )  # cubic: it steps
     motion = motion_along(PATH, law, law.breaks, Tolerance())
-    left, right = (motion.demand(np.array([1.0]), side).second[0, :3] for side in ("left", "right"))
+    left, right = (motion.reference(np.array([1.0]), side).second[0, :3] for side in ("left", "right"))
     np.testing.assert_allclose(left, [-6 * 0.3, 0, 0], atol=1e-12)
     np.testing.assert_allclose(right, [0, 6 * 0.4, 0], atol=1e-12)
 
@@ -59,7 +59,7 @@ def test_the_same_way_in_more_time(name):
     law = stopping(0.0, path.length)
     motion = motion_along(path, law, law.breaks, Tolerance()).scaled(2.5)
     step, times = 1e-4, np.array([0.6, 1.3, 2.2])
-    before, here, after = (motion.demand(times + shift) for shift in (-step, 0, step))
+    before, here, after = (motion.reference(times + shift) for shift in (-step, 0, step))
     for order in (0, 1):
         if here.aims.shape[1]:
             slope = (after.aims[:, order] - before.aims[:, order]) / (2 * step)
@@ -68,7 +68,9 @@ def test_the_same_way_in_more_time(name):
     np.testing.assert_allclose(here.first[:, :3], moved, rtol=0, atol=1e-7)
     changed = (after.first - before.first) / (2 * step)
     np.testing.assert_allclose(here.second, changed, rtol=0, atol=1e-7)
-    np.testing.assert_allclose(motion.demand(np.array([2.5])).poses, motion.demand(np.array([9.0])).poses)
+    np.testing.assert_allclose(
+        motion.reference(np.array([2.5])).poses, motion.reference(np.array([9.0])).poses
+    )
 
 
 def test_breaks_of_path_and_law_that_are_one_are_one():

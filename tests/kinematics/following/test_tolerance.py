@@ -13,10 +13,10 @@ from trajcli.kinematics.forward import forward
 from trajcli.kinematics.jacobian import jacobian
 
 MADE = CASES["ur5e, pose on an arc"]
-ARM = follower(MADE.robot, MADE.path.by_place, MADE.start, 0.0)
+ARM = follower(MADE.robot, MADE.path.at_s, MADE.start, 0.0)
 COARSE = track_branch(ARM, MADE.path.breaks)
 PLACES = np.linspace(0.1, 0.9, 5) * MADE.path.length
-KNOWN = ARM.solved(PLACES, "right", COARSE.evaluate(PLACES))
+KNOWN = ARM.joint_state(PLACES, "right", COARSE.evaluate(PLACES))
 ROWS = np.array([3, 1])
 
 
@@ -56,7 +56,7 @@ def test_a_rate_that_is_off_moves_the_tool_at_another_one(order):
 
 def test_peaks_are_those_of_the_tool_and_of_any_joint():
     judge, places = misfit(), np.linspace(0, MADE.path.length, 2001)
-    known = ARM.solved(places, "right", COARSE.evaluate(places))
+    known = ARM.joint_state(places, "right", COARSE.evaluate(places))
     _, first, second = MADE.path.poses.evaluate(places)
     for rates, peaks in ((first, judge.tool_peaks[0]), (second, judge.tool_peaks[1])):
         sizes = [np.linalg.norm(part, axis=1).max() for part in (rates[:, :3], rates[:, 3:])]

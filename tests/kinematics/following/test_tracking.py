@@ -31,7 +31,7 @@ NAMES = [
 
 
 def tracked(made):
-    arm = follower(made.robot, made.path.by_place, made.start, 0.0)
+    arm = follower(made.robot, made.path.at_s, made.start, 0.0)
     return arm, track_branch(arm, made.path.breaks)
 
 
@@ -53,12 +53,12 @@ def test_the_fit_keeps_its_promise_of_joints_and_tool(name, tolerance):
     arm, coarse = tracked(made)
     breaks = made.path.breaks
     misfit = tolerance_ratio(arm, Tolerance(tolerance, tolerance), breaks, coarse.evaluate(probes(breaks)))
-    curve = fit(arm.solved, misfit, breaks, coarse.evaluate)
+    curve = fit(arm.joint_state, misfit, breaks, coarse.evaluate)
     places = np.linspace(0, made.path.length, 77)
     exact = arm.exact(places, "right", coarse.evaluate(places))
     fitted = curve.evaluate_orders(places, (0, 1, 2)).swapaxes(0, 1)
     assert np.abs(fitted[0] - exact[0]).max() <= tolerance
-    aside = forward(made.robot, fitted[0])[:, :3, 3] - arm.demands(places, "right").poses[:, :3, 3]
+    aside = forward(made.robot, fitted[0])[:, :3, 3] - arm.reference_at(places, "right").poses[:, :3, 3]
     assert np.linalg.norm(aside, axis=1).max() <= tolerance
     for order in (1, 2):
         peak = np.abs(exact[order]).max()
@@ -90,7 +90,7 @@ def winding(radius, *, turning):
 def test_short_ways_are_followed_in_few_steps(radius, turning, questions, monkeypatch):
     """The step goes on from way to way; where the direction jumps, what was known before it is left."""
     made, asked = winding(radius, turning=turning), []
-    arm = follower(made.robot, made.path.by_place, made.start, 0.0)
+    arm = follower(made.robot, made.path.at_s, made.start, 0.0)
     exact = type(arm).exact
     monkeypatch.setattr(
         type(arm), "exact", lambda self, places, *more: asked.append(places) or exact(self, places, *more)
@@ -130,9 +130,9 @@ def test_it_is_stuck_where_the_reach_ends():
     begin = np.array([wrist[0] + HAND, wrist[1], 0.0])
     path = wrist_path(Line(begin, begin + np.array([0.0, 0.4, 0.0])))
     with pytest.raises(StuckError) as caught:
-        track_branch(follower(PLANAR, path.by_place, standing(wrist), 0.0), path.breaks)
+        track_branch(follower(PLANAR, path.at_s, standing(wrist), 0.0), path.breaks)
     edge = np.sqrt((L1 + L2) ** 2 - 0.35**2) - 0.05
-    assert edge - 1e-5 < caught.value.place < edge
+    assert edge - 1e-5 < caught.value.s < edge
     assert 0 < caught.value.joints[1] < 0.02
     assert np.abs(caught.value.rates).max() > 100
 
@@ -144,7 +144,7 @@ def test_it_does_not_pass_from_one_elbow_to_the_other(gap):
     turn = np.array([np.cos(0.3), np.sin(0.3), 0.0])
     points = near * turn * [1, -1, 1], np.array([edge - gap, 0, 0]), near * turn
     path = wrist_path(Arc.through(*(point + np.array([HAND, 0, 0]) for point in points)))
-    curve = track_branch(follower(PLANAR, path.by_place, standing(points[0][:2]), 0.0), path.breaks)
+    curve = track_branch(follower(PLANAR, path.at_s, standing(points[0][:2]), 0.0), path.breaks)
     elbow = curve.evaluate(np.linspace(0, path.length, 2001))[:, 1]
     assert (elbow > 0).all()
     assert curve.evaluate(path.length / 2)[1] == pytest.approx(elbow_of(edge - gap), abs=0.02)
@@ -156,7 +156,7 @@ def test_a_tolerance_finer_than_rounding_is_met_as_far_as_rounding_lets_it():
     arm, coarse = tracked(made)
     breaks = made.path.breaks
     misfit = tolerance_ratio(arm, Tolerance(1e-13, 1e-13), breaks, coarse.evaluate(probes(breaks)))
-    curve = fit(arm.solved, misfit, breaks, coarse.evaluate)
+    curve = fit(arm.joint_state, misfit, breaks, coarse.evaluate)
     places = np.linspace(0, made.path.length, 77)
     exact = arm.exact(places, "right", coarse.evaluate(places))
     assert np.abs(curve.evaluate(places) - exact[0]).max() < 1e-12

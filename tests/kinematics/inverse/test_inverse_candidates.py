@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conventions import in_convention
 from inverse_arms import FAMILIES, arm, gap, random_joints, turning
 from scipy.spatial.transform import Rotation
 
@@ -18,7 +19,6 @@ from trajcli.kinematics.inverse.families.choose import method_for
 from trajcli.kinematics.inverse.families.screw_axes import axis_geometry
 from trajcli.kinematics.inverse.joint_turns import choose_turns
 from trajcli.kinematics.inverse.solve import solve
-from trajcli.kinematics.serial_chain import in_convention
 
 COUNT = 40_000  # six blocks and a part of one
 
