@@ -1,4 +1,4 @@
-"""The closed form as it runs: blocks and threads that no pose may learn of, and what judges its answers."""
+"""The closed form as it runs: blocks and threads that no pose may learn of, and the check of its residuals."""
 
 from __future__ import annotations
 
