@@ -271,8 +271,8 @@ class _PostureReduction:
             self._offer_branches(answers, rows[good], better[good])
         missing = np.flatnonzero(~answers.valid.any(axis=0))
         if len(missing):
-            search_result = search(robot, self.target.rows(missing), self.near[missing])
-            for met, values in zip(search_result.met.T, search_result.joints.swapaxes(0, 1), strict=True):
+            searched = search(robot, self.target.rows(missing), self.near[missing])
+            for met, values in zip(searched.met.T, searched.joints.swapaxes(0, 1), strict=True):
                 self._offer(answers, missing[met], values[met])
 
     def _offer_branches(self, answers: Answers, rows: NDArray[np.intp], joints: Array) -> None:
@@ -289,7 +289,7 @@ class _PostureReduction:
         """Take joints (K, n) for the targets `rows`, each at most once, where they are nearer than before."""
         if not len(rows):
             return
-        joints = joints.T[:, None].copy()
+        joints = joints.T[:, None].copy()  # (n, 1, K)
         cost = self._cost(joints, rows)[0]
         index = self.postures.of(joints[:, 0].T)
         good = self._met(rows, joints[:, 0].T) & (index >= 0)

@@ -59,13 +59,13 @@ def solve(
     targets = target if isinstance(target, IkTarget) else pose_target(target)
     arm, flat = axis_geometry(robot), targets.flat()
     nearby = _near(robot, near, targets.batch)
-    stuck = flat.orientation in ("direction", "yaw", "pitch") and _is_stuck(robot, arm, flat)
+    unturned = flat.orientation in ("direction", "yaw", "pitch") and _is_unturned(robot, arm, flat)
     answers = _answers(robot, arm, flat, nearby, tolerance)
     singular, free = _resolve_suspects(robot, flat, answers, nearby, tolerance)
     # all are (n, branches, N); the closure (2, branches, N), flags (1, branches, N)
     by_joint = (answers.joints, answers.valid[None], answers.closure, singular[None], free)
     joints, valid, closure, is_singular, is_free = (_batch_first(array, targets.batch) for array in by_joint)
-    bounds, fixed = robot.limits.position, flat.tool_axis if stuck else None
+    bounds, fixed = robot.limits.position, flat.tool_axis if unturned else None
     return Solutions(
         answers.method, joints, valid[..., 0], closure, is_singular[..., 0], is_free, bounds, fixed
     )
@@ -131,7 +131,7 @@ def _near(robot: Robot, near: ArrayLike | None, batch: tuple[int, ...]) -> Array
     return np.broadcast_to(values, (*batch, values.shape[-1])).reshape(-1, values.shape[-1])
 
 
-def _is_stuck(robot: Robot, arm: AxisGeometry, target: IkTarget) -> bool:
+def _is_unturned(robot: Robot, arm: AxisGeometry, target: IkTarget) -> bool:
     """Return whether no joint turns the tool axis that a target means.
 
     Raises:
@@ -139,14 +139,14 @@ def _is_stuck(robot: Robot, arm: AxisGeometry, target: IkTarget) -> bool:
     """
     from trajcli.kinematics.inverse.tool_axis import always_vertical, fixed_axis
 
-    stuck = fixed_axis(arm, target.tool_axis)
-    if stuck and target.orientation == "yaw" and always_vertical(arm, target.tool_axis):
+    unturned = fixed_axis(arm, target.tool_axis)
+    if unturned and target.orientation == "yaw" and always_vertical(arm, target.tool_axis):
         others = " or ".join(axis for axis in AXES if axis != target.tool_axis)
         raise InputError(
             f"the {target.tool_axis} axis of the tool of {robot.name} is always vertical and has no yaw",
             hint=f"say which axis of the tool heads there, with `tool_axis: {others}`",
         )
-    return stuck
+    return unturned
 
 
 def _by_closed_form(
@@ -180,9 +180,10 @@ def _by_search(
     robot: Robot, method: IkMethod, target: IkTarget, near: Array | None, tolerance: float
 ) -> Answers:
     """Return the nearest answers of a search; of self-motion manifolds their nearest points."""
-    search_result, freedom = search(robot, target, near), freedom_of(robot, target)
-    joints = np.ascontiguousarray(np.moveaxis(search_result.joints, 0, -1).swapaxes(0, 1))
-    valid = search_result.met.T & (closures(robot, target, joints).max(axis=0) <= tolerance)
+    searched, freedom = search(robot, target, near), freedom_of(robot, target)
+    # from (N, seeds, n) to (n, seeds, N), and from (N, seeds) to (seeds, N)
+    joints = np.ascontiguousarray(np.moveaxis(searched.joints, 0, -1).swapaxes(0, 1))
+    valid = searched.met.T & (closures(robot, target, joints).max(axis=0) <= tolerance)
     choose_turns(robot, joints, None if near is None else near.T)
     aim = np.zeros((len(target.poses), len(joints))) if near is None else near
     within = SAME

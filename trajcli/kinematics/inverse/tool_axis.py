@@ -112,7 +112,7 @@ class ToolAxisModel:
         """Return which joints (K, n), at poses (K, 4, 4), have the shoulder "right", shape (K,)."""
         if self.shoulder is None:
             raise ValueError("the arm has no shoulder")
-        one, two = np.moveaxis(jacobian(robot, joints)[:, 3:, :2], 2, 0)
+        one, two = np.moveaxis(jacobian(robot, joints)[:, 3:, :2], 2, 0)  # directions (K, 3) of axes 1 and 2
         offset = (poses[:, :3, 3] - self.arm.base[:3, 3]) @ self.arm.base[:3, :3] - self.shoulder.point
         ahead = np.einsum("ki,ki->k", offset @ self.arm.base[:3, :3].T, np.cross(two, one))
         return np.asarray(forward_sign(self.shoulder, self.axis, self.arm.forward) * ahead < 0.0)
