@@ -251,7 +251,7 @@ def planar(elbow) -> SampledTool:
         )
 
     motion = dataclasses.replace(
-        RIGHT.motion, path=None, timed=timed, breaks=np.array([0.0, DURATION]), law=law()
+        RIGHT.motion, path=None, reference_at=timed, breaks=np.array([0.0, DURATION]), law=law()
     )
     return SampledTool(whole, Span(0, "line", 0.0, DURATION, 2), limited(robot), motion)
 
@@ -280,7 +280,7 @@ def test_a_wrist_that_passes_its_middle_changes_the_branch():
         return ToolReference(poses, zero, zero, WHOLE, "all", "z", zero[:, :0])
 
     motion = dataclasses.replace(
-        RIGHT.motion, path=None, timed=timed, breaks=np.array([0.0, DURATION]), law=law()
+        RIGHT.motion, path=None, reference_at=timed, breaks=np.array([0.0, DURATION]), law=law()
     )
     whole = trajectory_of(robot, curve)
     (found,) = judged(SampledTool(whole, whole.spans[0], limited(robot), motion))

@@ -3,12 +3,12 @@ from __future__ import annotations
 import numpy as np
 import oracle_robots as oracle
 import pytest
+from conventions import link_transforms
 
 from trajcli.errors import InputError
 from trajcli.geometry.rotation import rotation_defect
 from trajcli.kinematics.forward import forward, link_poses
 from trajcli.kinematics.robot import Joint, Robot, unlimited
-from trajcli.kinematics.serial_chain import link_transforms
 
 CASES = oracle.load("forward.yaml", "cases")
 ARMS = pytest.mark.parametrize("arm", oracle.robots(), ids=lambda arm: arm["id"])

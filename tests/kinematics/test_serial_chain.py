@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 import oracle_robots as oracle
 import pytest
+from conventions import in_convention
 
-from trajcli.kinematics.forward import forward
-from trajcli.kinematics.serial_chain import in_convention, link_transforms
+from trajcli.kinematics.forward import forward, link_poses
 
 ARMS = pytest.mark.parametrize("arm", oracle.robots(), ids=lambda arm: arm["id"])
 OTHER = {"standard": "modified", "modified": "standard"}
@@ -13,7 +13,7 @@ OTHER = {"standard": "modified", "modified": "standard"}
 
 def test_a_standard_row_by_the_book():
     row = {"type": "R", "theta": 0.3, "d": 0.2, "a": 0.5, "alpha": 0.7}
-    (transform,) = link_transforms(oracle.robot_of({"dh": [row], "convention": "std"}), [0.4])
+    _, transform, _ = link_poses(oracle.robot_of({"dh": [row], "convention": "std"}), [0.4])
     ct, st, ca, sa = np.cos(0.7), np.sin(0.7), np.cos(0.7), np.sin(0.7)
     book = [
         [ct, -st * ca, st * sa, 0.5 * ct],
@@ -26,7 +26,7 @@ def test_a_standard_row_by_the_book():
 
 def test_a_modified_row_by_the_book():
     row = {"type": "P", "theta": 0.3, "d": 0.2, "a": 0.5, "alpha": 0.7, "sign": -1}
-    (transform,) = link_transforms(oracle.robot_of({"dh": [row], "convention": "mdh"}), [0.4])
+    _, transform, _ = link_poses(oracle.robot_of({"dh": [row], "convention": "mdh"}), [0.4])
     ct, st, ca, sa, d = np.cos(0.3), np.sin(0.3), np.cos(0.7), np.sin(0.7), 0.2 - 0.4
     book = [[ct, -st, 0, 0.5], [st * ca, ct * ca, -sa, -sa * d], [st * sa, ct * sa, ca, ca * d], [0, 0, 0, 1]]
     np.testing.assert_allclose(transform, book, rtol=0, atol=1e-15)

@@ -46,8 +46,8 @@ def exponential(series: np.ndarray) -> np.ndarray:
 
 def bounds(name: str, coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     rising = growth(coefficients, np.array([LENGTH]), ORDER)
-    place, spin = majorants(load_robot(name), coefficients[-1], rising)
-    return place[:, 0], spin[:, 0]
+    position, spin = majorants(load_robot(name), coefficients[-1], rising)
+    return position[:, 0], spin[:, 0]
 
 
 def test_growth_bounds_every_derivative_everywhere() -> None:
@@ -67,12 +67,12 @@ def test_a_planar_arm_is_a_sum_of_exponentials() -> None:
     """p = 0.3 exp(i q1) + 0.2 exp(i (q1 + q2)); w = q1' + q2'."""
     for _ in range(5):
         coefficients = curve(2)
-        place, spin = bounds("planar2r", coefficients)
+        position, spin = bounds("planar2r", coefficients)
         lengths = [joint.a for joint in load_robot("planar2r").joints]
         for t in np.linspace(0, LENGTH, 31):
             q = shifted(coefficients, t)
             p = sum(a * exponential(sum_) for a, sum_ in zip(lengths, np.cumsum(q, axis=1).T, strict=True))
-            assert (np.abs(p[1:]) <= place[1:] * (1 + 1e-12)).all()
+            assert (np.abs(p[1:]) <= position[1:] * (1 + 1e-12)).all()
             w = np.abs(q.sum(axis=1)[1:] * np.arange(1, ORDER + 1))
             assert (w <= spin[:-1] * (1 + 1e-12)).all()
 
@@ -81,16 +81,16 @@ def test_a_steady_turn_is_bounded_tightly() -> None:
     """Of p = a exp(i r t) the bounds are the derivatives: a r^k / k!, and w = r."""
     coefficients = np.zeros((2, 1, 2))
     coefficients[0, 0, 0] = rate = 3.0
-    place, spin = bounds("planar2r", coefficients)
+    position, spin = bounds("planar2r", coefficients)
     reach = sum(joint.a for joint in load_robot("planar2r").joints)
     np.testing.assert_allclose(
-        place[1:], [reach * rate**k / factorial(k) for k in range(1, ORDER + 1)], rtol=1e-12
+        position[1:], [reach * rate**k / factorial(k) for k in range(1, ORDER + 1)], rtol=1e-12
     )
     np.testing.assert_allclose(spin, [rate, *[0.0] * ORDER], atol=1e-12)
 
 
 def test_a_tool_reaches_further() -> None:
-    """A tool of 1 m along the stretched arm: every derivative of the place grows by that of 1 m."""
+    """A tool of 1 m along the stretched arm: every derivative of the position grows by that of 1 m."""
     coefficients, robot = curve(2), load_robot("planar2r")
     tool = np.eye(4)
     tool[0, 3] = 1.0
@@ -113,15 +113,15 @@ def test_the_spin_of_one_joint_is_its_speed() -> None:
 
 @pytest.mark.parametrize("name", ["rpr", "rrp", "cylindrical", "cobra600", "ur5e", "panda", "stanford"])
 def test_arms_of_all_kinds_stay_within_their_bounds(name: str) -> None:
-    """Derivatives of the place from a Chebyshev series of forward kinematics."""
+    """Derivatives of the position from a Chebyshev series of forward kinematics."""
     robot = load_robot(name)
     coefficients = curve(len(robot.joints)) * 0.3
-    place, _ = bounds(name, coefficients)
+    position, _ = bounds(name, coefficients)
     t = (1 - np.cos(np.pi * (np.arange(40) + 0.5) / 40)) * LENGTH / 2
     q = np.stack([np.polyval(row, t) for row in coefficients[:, 0].T], axis=1)
     series = chebyshev.chebfit(2 * t / LENGTH - 1, forward(robot, q)[:, :3, 3], 30)
     for k in range(1, 7):
         derived = chebyshev.chebder(series, k) * (2 / LENGTH) ** k / factorial(k)
         values = np.linalg.norm(chebyshev.chebval(np.linspace(-1, 1, 101), derived), axis=0)
-        assert values.max() <= place[k] * (1 + 1e-6)
-        assert place[k] < 1e4 * values.max()  # and they say something
+        assert values.max() <= position[k] * (1 + 1e-6)
+        assert position[k] < 1e4 * values.max()  # and they say something

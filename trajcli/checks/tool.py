@@ -60,7 +60,7 @@ class SampledTool:
     @cached_property
     def target(self) -> IkTarget:
         """What the tool was told at these times."""
-        return self.motion.demand(self.times).target()
+        return self.motion.reference(self.times).target()
 
     @cached_property
     def linearised(self) -> tuple[Array, Array]:

@@ -1,1 +1,1 @@
-"""The robot as numbers. numpy only."""
+"""Kinematics of serial robots: model, forward, inverse and differential kinematics, following. numpy only."""

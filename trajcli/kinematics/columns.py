@@ -1,4 +1,4 @@
-"""Vectors in space for many configurations at once, one entry an array over the configurations.
+"""Vectors in space for many configurations at once: three entries, each an array over the configurations.
 
 An entry that is the same for all of them is a plain number. The zeros and ones of an arm's geometry (right
 angles between axes, a base at the origin) then cost nothing, and entries that must vanish are exactly zero.

@@ -1,8 +1,8 @@
-"""How well an arm can move its tool from where it stands: manipulability, condition, rank, lost directions.
+"""Dexterity of a configuration: manipulability, condition number, rank, singular directions.
 
-Metres and radians cannot be compared, so everything but the manipulability is found from the scaled
+Metres and radians cannot be compared, so everything but the manipulability is computed from the scaled
 Jacobian, whose linear rows are divided by a characteristic length: the total of the arm's lengths, so that a
-turn at full stretch counts as much in position as in orientation.
+turn of the outstretched arm counts as much in position as in orientation.
 """
 
 from __future__ import annotations

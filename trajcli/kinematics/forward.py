@@ -1,4 +1,4 @@
-"""Forward kinematics: where the links and the tool stand.
+"""Forward kinematics: poses of the links and of the tool.
 
 Angles that are whole quarter turns in the DH table enter with exact zeros and ones.
 """

@@ -1,4 +1,4 @@
-"""Velocity and acceleration of the tool: the geometric Jacobian, its time derivative, twists.
+"""Geometric Jacobian and its time derivative, twist and acceleration of the tool.
 
 Linear rows come first and belong to the tcp as the point of reference; angular rows follow.
 """
@@ -55,13 +55,13 @@ def jacobian(robot: Robot, q: ArrayLike, frame: ReferenceFrame = "world") -> Arr
         axes, tcp = travel(links, _start(robot, frame), robot.tool, block)
         for i, axis in enumerate(axes):
             linear, angular = _columns(axis, tcp.p)
-            _write(result[rows, :3, i], _seen(linear, tcp, frame))
-            _write(result[rows, 3:, i], _seen(angular, tcp, frame))
+            _write(result[rows, :3, i], _in_frame(linear, tcp, frame))
+            _write(result[rows, 3:, i], _in_frame(angular, tcp, frame))
     return result.reshape(*values.shape[:-1], 6, len(links))
 
 
 def linearisation(robot: Robot, q: ArrayLike) -> tuple[Array, Array]:
-    """Return T_world_tcp (*batch, 4, 4) and J in world (*batch, 6, n) on one way along the chain.
+    """Return T_world_tcp (*batch, 4, 4) and J in world (*batch, 6, n) in one pass along the chain.
 
     Raises:
         InputError: When the robot has no geometry, or q has not n finite values.
@@ -102,8 +102,8 @@ def jacobian_dot_qd(robot: Robot, q: ArrayLike, qd: ArrayLike, frame: ReferenceF
     for rows, (block, rate) in blocks(values, rates):
         axes, tcp = travel(links, _start(robot, frame), robot.tool, block)
         linear, angular = _bias(axes, tcp.p, rate)
-        _write(result[rows, :3], _seen(linear, tcp, frame))
-        _write(result[rows, 3:], _seen(angular, tcp, frame))
+        _write(result[rows, :3], _in_frame(linear, tcp, frame))
+        _write(result[rows, 3:], _in_frame(angular, tcp, frame))
     return result.reshape(*values.shape[:-1], 6)
 
 
@@ -150,25 +150,28 @@ def _columns(axis: JointAxis, p: VectorEntries) -> tuple[VectorEntries, VectorEn
 def _bias(
     axes: Sequence[JointAxis], p: VectorEntries, rate: Sequence[Array]
 ) -> tuple[VectorEntries, VectorEntries]:
+    """Return the linear and the angular acceleration of the point p without joint accelerations."""
     velocity = linear = angular = ZERO
     for axis, speed in zip(axes, rate, strict=True):
         velocity = advance(velocity, speed, _columns(axis, p)[0])
-    spin, speed_here, here = ZERO, ZERO, axes[0].point
+    spin, point_velocity, point = ZERO, ZERO, axes[0].point
     for axis, speed in zip(axes, rate, strict=True):
-        speed_here = plus(speed_here, cross(spin, minus(axis.point, here)))
-        here = axis.point
-        swing = cross(spin, axis.direction)
+        point_velocity = plus(point_velocity, cross(spin, minus(axis.point, point)))
+        point = axis.point
+        axis_rate = cross(spin, axis.direction)
         if axis.prismatic:
-            linear = advance(linear, speed, swing)
-            speed_here = advance(speed_here, speed, axis.direction)
+            linear = advance(linear, speed, axis_rate)
+            point_velocity = advance(point_velocity, speed, axis.direction)
             continue
-        change = plus(cross(swing, minus(p, here)), cross(axis.direction, minus(velocity, speed_here)))
-        linear, angular = advance(linear, speed, change), advance(angular, speed, swing)
+        change = plus(
+            cross(axis_rate, minus(p, point)), cross(axis.direction, minus(velocity, point_velocity))
+        )
+        linear, angular = advance(linear, speed, change), advance(angular, speed, axis_rate)
         spin = advance(spin, speed, axis.direction)
     return linear, angular
 
 
-def _seen(vector: VectorEntries, tcp: MovingFrame, frame: ReferenceFrame) -> VectorEntries:
+def _in_frame(vector: VectorEntries, tcp: MovingFrame, frame: ReferenceFrame) -> VectorEntries:
     return (dot(tcp.x, vector), dot(tcp.y, vector), dot(tcp.z, vector)) if frame == "tcp" else vector
 
 

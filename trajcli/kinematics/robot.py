@@ -1,4 +1,4 @@
-"""The robot as frozen values: joints by Denavit-Hartenberg row, limits, base and tool. No current state."""
+"""Robot model as frozen values: joints by Denavit-Hartenberg row, limits, base and tool. No current state."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""How fast the tool can move, and every derivative of that, while the joints move as they do: power series.
+"""Majorants of the tool: bounds of its position's and orientation's derivatives from those of the joints.
 
-Let u_i(r) bound what joint i does within r of any time of a stretch: its coefficients bound |q_i^(m)| / m!. A
+Let u_i(r) bound what joint i does within r of any time of a piece: its coefficients bound |q_i^(m)| / m!. A
 rotation about the axes of joints 1 to k is then bounded, coefficient by coefficient, by exp(u_1 + ... + u_k),
 because every factor of it is an exponential; and so is a link that is turned by them.
 
@@ -32,14 +32,14 @@ def growth(coefficients: Array, lengths: Array, order: int) -> Array:
     rising = np.abs(coefficients[::-1]) * lengths[:, None] ** np.arange(len(coefficients))[:, None, None]
     rising[0] = 0.0
     chosen = np.array([[comb(j, m) for j in range(len(rising))] for m in range(order + 1)], dtype=np.float64)
-    found = np.tensordot(chosen, rising, axes=1)
-    return np.asarray(found / lengths[:, None] ** np.arange(order + 1)[:, None, None])
+    bounds = np.tensordot(chosen, rising, axes=1)
+    return np.asarray(bounds / lengths[:, None] ** np.arange(order + 1)[:, None, None])
 
 
 def majorants(robot: Robot, start: Array, rising: Array) -> tuple[Array, Array]:
     """Return bounds of |p^(k)| / k! and |w^(k)| / k! of the tcp on whole pieces, each (order + 1, P).
 
-    p is the place, against that of the base; w the angular velocity, whose last entry is left 0.
+    p is the position, against that of the base; w the angular velocity, whose last entry is left 0.
 
     Args:
         robot: The arm.
@@ -47,22 +47,22 @@ def majorants(robot: Robot, start: Array, rising: Array) -> tuple[Array, Array]:
         rising: From `growth`, (order + 1, P, n).
     """
     links = np.linalg.norm(np.diff(link_poses(robot, start)[..., :3, 3], axis=1), axis=2)
-    place, spin = np.zeros(rising.shape[:2]), np.zeros(rising.shape[:2])
+    position, spin = np.zeros(rising.shape[:2]), np.zeros(rising.shape[:2])
     angle = np.zeros(rising.shape[:2])
-    turned = _exponential(angle)
+    rotation = _exponential(angle)
     orders = np.arange(1.0, len(rising))[:, None]
     for i, joint in enumerate(robot.joints):
-        own = rising[:, :, i]
-        arm = np.zeros(own.shape)
-        arm[0] = links[:, i]
+        joint_growth = rising[:, :, i]
+        lever = np.zeros(joint_growth.shape)
+        lever[0] = links[:, i]
         if joint.type == "prismatic":
-            arm += own
+            lever += joint_growth
         else:
-            spin[:-1] += _product(own[1:] * orders, turned[:-1])
-            angle[1:] += own[1:]
-            turned = _exponential(angle)
-        place += _product(arm, turned)
-    return place + links[:, -1] * turned, spin
+            spin[:-1] += _product(joint_growth[1:] * orders, rotation[:-1])
+            angle[1:] += joint_growth[1:]
+            rotation = _exponential(angle)
+        position += _product(lever, rotation)
+    return position + links[:, -1] * rotation, spin
 
 
 def _product(one: Array, other: Array) -> Array:

@@ -32,18 +32,18 @@ class Case:
 def case(
     name, start, orientation="all", tool_axis="z", *, free=0, bent=False, turn=(0.2, -0.3, 0.4), move=None
 ) -> Case:
-    """Return a line or an arc from where the arm stands, with a rotation that its targets see or not."""
+    """Return a line or an arc from where the arm is, with a rotation that its targets see or not."""
     robot, q = load_robot(name), np.array(start, dtype=float)
     pose = forward(robot, q)
     if name == "planar3r":
         move, turn = (-0.05, 0.04, 0.0), (0, 0, 0.3)
     end = pose[:3, 3] + np.array(move or (0.06, 0.05, -0.04))
-    place = Line(pose[:3, 3], end)
+    position = Line(pose[:3, 3], end)
     if bent:
-        place = Arc.through(pose[:3, 3], (pose[:3, 3] + end) / 2 + [0.01, 0.0, 0.02], end)
+        position = Arc.through(pose[:3, 3], (pose[:3, 3] + end) / 2 + [0.01, 0.0, 0.02], end)
     last = Rotation.from_rotvec(turn).as_matrix() @ pose[:3, :3]
-    turning = AxisAngleOrientation(np.stack([pose[:3, :3], last]), SegmentProgress.even(place.length))
-    poses = PoseCurve(place, turning)
+    turning = AxisAngleOrientation(np.stack([pose[:3, :3], last]), SegmentProgress.even(position.length))
+    poses = PoseCurve(position, turning)
     fixed = (True, True, True)
     turns = (0.35,) if orientation in ("yaw", "pitch") else ()
     return Case(robot, q, ToolPath(poses, fixed, orientation, tool_axis, turns), free)
@@ -72,43 +72,43 @@ CASES = {
 }
 
 
-def off(case_, place, joints):
+def off(case_, s, joints):
     """Return what is between the tcp of joints (N, n) and its path, (N, m); angles of it, not rates of them."""
     path = case_.path
-    wanted, poses = path.poses.evaluate(np.array([place]))[0][0], forward(case_.robot, joints)
+    wanted, poses = path.poses.evaluate(np.array([s]))[0][0], forward(case_.robot, joints)
     parts = [poses[:, :3, 3] - wanted[:3, 3]]
     k = XYZ.index(path.tool_axis)
     axis, aim = poses[:, :3, k], wanted[:3, k]
     begins = path.poses.evaluate(np.zeros(1))[0][0][:3, k]
-    part = place / path.length
+    part = s / path.length
     match path.orientation:
         case "all":
             parts.append(Rotation.from_matrix(poses[:, :3, :3] @ wanted[:3, :3].T).as_rotvec())
         case "direction":
             parts.append(axis - aim)
         case "yaw":
-            angle = np.arctan2(begins[1], begins[0]) + part * path.turns[0]
+            angle = np.arctan2(begins[1], begins[0]) + part * path.angle_changes[0]
             parts.append((np.cos(angle) * axis[:, 1] - np.sin(angle) * axis[:, 0])[:, None])
         case "pitch":
-            parts.append((axis[:, 2] - np.sin(np.arcsin(begins[2]) + part * path.turns[0]))[:, None])
+            parts.append((axis[:, 2] - np.sin(np.arcsin(begins[2]) + part * path.angle_changes[0]))[:, None])
     return np.concatenate(parts, axis=1)
 
 
-def numeric_slopes(case_, place, q, step=1e-6):
+def numeric_slopes(case_, s, q, step=1e-6):
     """Return how joints (n,) change that, (m, n), by central differences."""
-    both = off(case_, place, q + step * np.concatenate([np.eye(q.size), -np.eye(q.size)]))
+    both = off(case_, s, q + step * np.concatenate([np.eye(q.size), -np.eye(q.size)]))
     return (both[: q.size] - both[q.size :]).T / (2 * step)
 
 
-def solved(case_, place, held, near):
+def solved(case_, s, held, near):
     """Return joint values (n,) on the path near others, components along `held` (f, n) as at the start."""
 
     def equations(q):
-        return np.concatenate([off(case_, place, q[None])[0], held @ (q - case_.start)])
+        return np.concatenate([off(case_, s, q[None])[0], held @ (q - case_.start)])
 
     q, missed = near, equations(near)
     for _ in range(12):
-        rows = np.concatenate([numeric_slopes(case_, place, q), held])
+        rows = np.concatenate([numeric_slopes(case_, s, q), held])
         q = q - np.linalg.lstsq(rows, missed, rcond=1e-8)[0]
         before, missed = np.abs(missed).max(), equations(q)
         if before < 1e-9:

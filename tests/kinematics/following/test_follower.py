@@ -14,7 +14,7 @@ from trajcli.kinematics.following.follower import LostError, follower
 from trajcli.kinematics.following.motion import motion_along
 from trajcli.kinematics.following.tolerance import Tolerance
 
-STEP = 0.012  # of the path, between the places of the differences
+STEP = 0.012  # of the path, between the points of the differences
 STENCILS = {  # central, of order 6
     1: np.array([-1, 9, -45, 0, 45, -9, 1]) / 60,
     2: np.array([2, -27, 270, -490, 270, -27, 2]) / 180,
@@ -23,25 +23,25 @@ NAMES = list(CASES)
 
 
 def followed(case_):
-    return follower(case_.robot, case_.path.by_place, case_.start, 0.0)
+    return follower(case_.robot, case_.path.at_s, case_.start, 0.0)
 
 
 def around(case_, held, middle, step):
-    """Return joints at seven places around a place, (7, n), each from the last."""
-    places = middle + step * np.arange(-3, 4)
+    """Return joints at seven values of s around one, (7, n), each from the last."""
+    s = middle + step * np.arange(-3, 4)
     rows, near = [], case_.start
-    for place in np.concatenate([np.linspace(0, places[0], 6)[1:-1], places]):
-        near = solved(case_, place, held, near)
+    for at in np.concatenate([np.linspace(0, s[0], 6)[1:-1], s]):
+        near = solved(case_, at, held, near)
         rows.append(near)
-    return places, np.array(rows[-7:])
+    return s, np.array(rows[-7:])
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_values_and_derivatives_by_place(name):
     made = CASES[name]
     arm, length = followed(made), made.path.length
-    places, peers = around(made, arm.held, 0.4 * length, STEP * length)
-    exact = arm.exact(places, "right", peers + 0.01 * np.random.default_rng(0).normal(size=peers.shape))
+    s, peers = around(made, arm.held, 0.4 * length, STEP * length)
+    exact = arm.exact(s, "right", peers + 0.01 * np.random.default_rng(0).normal(size=peers.shape))
     np.testing.assert_allclose(exact[0], peers, rtol=0, atol=1e-11)
     for order, stencil in STENCILS.items():
         difference = stencil @ peers / (STEP * length) ** order
@@ -63,7 +63,7 @@ def test_derivatives_by_time(name):
     for time in times:
         near = solved(made, law.evaluate(time)[0], arm.held, near)
         rows.append(near)
-    timed = type(arm)(arm.robot, motion.timed, arm.start, arm.held)
+    timed = type(arm)(arm.robot, motion.reference_at, arm.start, arm.held)
     exact = timed.exact(np.array([middle]), "right", np.array([rows[3]]))[:, 0]
     for order, stencil in STENCILS.items():
         difference = stencil @ np.array(rows) / step**order
@@ -84,14 +84,14 @@ def test_what_is_held_is_what_the_target_leaves_free(name):
 
 @pytest.mark.parametrize("name", [name for name in NAMES if CASES[name].free])
 def test_what_is_free_comes_back_with_the_tool(name):
-    """Held directions make joints a function of the place: to the end and back leads to the start."""
+    """Held directions make joints a function of s: to the end and back leads to the start."""
     made = CASES[name]
     arm = followed(made)
     there = np.linspace(0, made.path.length, 13)
     q = made.start
-    for place in np.concatenate([there, there[::-1]]):
-        q = arm.exact(np.array([place]), "right", q[None])[0, 0]
-        assert np.abs(off(made, place, q[None])).max() < 1e-9
+    for at in np.concatenate([there, there[::-1]]):
+        q = arm.exact(np.array([at]), "right", q[None])[0, 0]
+        assert np.abs(off(made, at, q[None])).max() < 1e-9
         assert np.abs(arm.held @ (q - made.start)).max(initial=0) < 1e-10
     np.testing.assert_allclose(q, made.start, rtol=0, atol=1e-9)
 
@@ -99,13 +99,13 @@ def test_what_is_free_comes_back_with_the_tool(name):
 def test_a_guess_on_no_branch_is_lost_with_its_place():
     made = CASES["ur5e, pose"]
     arm = followed(made)
-    places = np.array([0.03, 0.01, 0.02])
+    s = np.array([0.03, 0.01, 0.02])
     guess = np.tile(made.start, (3, 1))
     guess[0] += 2.0
     guess[2] -= 2.0
     with pytest.raises(LostError) as caught:
-        arm.exact(places, "right", guess)
-    np.testing.assert_array_equal(caught.value.places, [0.02, 0.03])
+        arm.exact(s, "right", guess)
+    np.testing.assert_array_equal(caught.value.s, [0.02, 0.03])
     assert caught.value.joints.shape == (6,)
 
 
@@ -114,12 +114,12 @@ def test_out_of_reach_is_lost_with_the_distance():
     far = case("planar3r", [0.3, 0.05, 0.02], "yaw", "x")
     assert made.path.length == pytest.approx(0.05)
     arm = followed(far)
-    beyond = arm.demands
+    beyond = arm.reference_at
 
-    def stretched(places, side):
-        demand = beyond(places, side)
-        demand.poses[:, :3, 3] *= 3.0
-        return demand
+    def stretched(s, side):
+        reference = beyond(s, side)
+        reference.poses[:, :3, 3] *= 3.0
+        return reference
 
     with pytest.raises(LostError) as caught:
         type(arm)(arm.robot, stretched, arm.start, arm.held).exact(np.array([0.01]), "right", far.start[None])
@@ -145,12 +145,12 @@ def test_the_other_branch_is_no_answer():
 def test_a_direction_has_a_hand_too(name):
     made = CASES[name]
     arm = followed(made)
-    assert abs(arm.hand.sign) == 1.0
-    other = replace(arm, hand=replace(arm.hand, sign=-arm.hand.sign))
+    assert abs(arm.aspect.sign) == 1.0
+    other = replace(arm, aspect=replace(arm.aspect, sign=-arm.aspect.sign))
     with pytest.raises(LostError):
         other.exact(np.zeros(1), "right", made.start[None])
 
 
 def test_a_singular_start_has_no_hand():
     made = case("puma560", [0.2, 0.7, -0.8, 0.4, 0.0, -0.3])
-    assert followed(made).hand.sign == 0.0
+    assert followed(made).aspect.sign == 0.0

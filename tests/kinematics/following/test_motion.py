@@ -1,4 +1,4 @@
-"""What a tool is told over time: on the right side of each corner, and the same way when it goes slower."""
+"""Reference of a tool over time: on the right side of each corner, and on the same path when it goes slower."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ CORNER = join([Line([0, 0, 0], [0.3, 0, 0]), Line([0.3, 0, 0], [0.3, 0.4, 0])])
 PATH = ToolPath(PoseCurve(CORNER, FixedOrientation(np.eye(3), CORNER.length)), (True, True, True), "all")
 
 
-def stopping(*places):
-    """Return a law through places, at rest in each, with an acceleration of zero, a second apart."""
-    states = np.zeros((3, len(places), 1))
-    states[0, :, 0] = places
-    return hermite_pieces(np.arange(len(places), dtype=float), states)
+def stopping(*s):
+    """Return a law through values of s, at rest in each, with an acceleration of zero, a second apart."""
+    states = np.zeros((3, len(s), 1))
+    states[0, :, 0] = s
+    return hermite_pieces(np.arange(len(s), dtype=float), states)
 
 
 @pytest.mark.parametrize("factor", [1.0, 3.0])
 @pytest.mark.parametrize("before", [1e-3, 1e-5, 1e-7])
 def test_beside_a_stop_the_tool_is_on_its_own_segment(factor, before):
-    """A quintic law is within 1e-18 m of the corner for some time, where its place does not tell the segment."""
+    """A quintic law is within 1e-18 m of the corner for some time, where s does not tell the segment."""
     law = stopping(0.0, 0.3, 0.7)
     motion = motion_along(PATH, law, law.breaks, Tolerance()).scaled(factor)
     np.testing.assert_allclose(motion.breaks, factor * np.arange(3), rtol=1e-15)
     times = factor * np.array([1 - before, 1 + before])
     for side in ("left", "right"):
-        demand = motion.demand(times, side)
-        assert np.abs(demand.second[0, 1:]).max() == 0  # along x, slowing down
-        assert demand.second[0, 0] < 0
-        assert np.abs(demand.second[1, [0, 2]]).max() == 0  # along y, speeding up
-        assert demand.second[1, 1] > 0
+        reference = motion.reference(times, side)
+        assert np.abs(reference.second[0, 1:]).max() == 0  # along x, slowing down
+        assert reference.second[0, 0] < 0
+        assert np.abs(reference.second[1, [0, 2]]).max() == 0  # along y, speeding up
+        assert reference.second[1, 1] > 0
 
 
 def test_at_a_stop_both_sides_are_told():
@@ -47,19 +47,19 @@ def test_at_a_stop_both_sides_are_told():
         np.arange(3.0), np.array([[0.0, 0.3, 0.7], [0, 0, 0]])[:, :, None]
     )  # cubic: it steps
     motion = motion_along(PATH, law, law.breaks, Tolerance())
-    left, right = (motion.demand(np.array([1.0]), side).second[0, :3] for side in ("left", "right"))
+    left, right = (motion.reference(np.array([1.0]), side).second[0, :3] for side in ("left", "right"))
     np.testing.assert_allclose(left, [-6 * 0.3, 0, 0], atol=1e-12)
     np.testing.assert_allclose(right, [0, 6 * 0.4, 0], atol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["ur5e, yaw of x", "ur5e, pitch of y", "ur5e, pose on an arc"])
 def test_the_same_way_in_more_time(name):
-    """Rates of the slower motion are finite differences of what it demands."""
+    """Rates of the slower motion are finite differences of its reference."""
     path = CASES[name].path
     law = stopping(0.0, path.length)
     motion = motion_along(path, law, law.breaks, Tolerance()).scaled(2.5)
     step, times = 1e-4, np.array([0.6, 1.3, 2.2])
-    before, here, after = (motion.demand(times + shift) for shift in (-step, 0, step))
+    before, here, after = (motion.reference(times + shift) for shift in (-step, 0, step))
     for order in (0, 1):
         if here.aims.shape[1]:
             slope = (after.aims[:, order] - before.aims[:, order]) / (2 * step)
@@ -68,7 +68,9 @@ def test_the_same_way_in_more_time(name):
     np.testing.assert_allclose(here.first[:, :3], moved, rtol=0, atol=1e-7)
     changed = (after.first - before.first) / (2 * step)
     np.testing.assert_allclose(here.second, changed, rtol=0, atol=1e-7)
-    np.testing.assert_allclose(motion.demand(np.array([2.5])).poses, motion.demand(np.array([9.0])).poses)
+    np.testing.assert_allclose(
+        motion.reference(np.array([2.5])).poses, motion.reference(np.array([9.0])).poses
+    )
 
 
 def test_breaks_of_path_and_law_that_are_one_are_one():
@@ -76,6 +78,6 @@ def test_breaks_of_path_and_law_that_are_one_are_one():
     motion = motion_along(PATH, law, law.breaks, Tolerance())
     assert motion.breaks.tolist() == [0.0, 1.0, 2.0]
     through = hermite_pieces(np.array([0.0, 2.0]), np.array([[0.0, 0.7], [0, 0], [0, 0]])[:, :, None])
-    passing = motion_along(PATH, through, through.breaks, Tolerance()).breaks
-    assert passing.size == 3
-    assert through.evaluate(passing[1])[0] == pytest.approx(0.3, abs=1e-15)
+    breaks = motion_along(PATH, through, through.breaks, Tolerance()).breaks
+    assert breaks.size == 3
+    assert through.evaluate(breaks[1])[0] == pytest.approx(0.3, abs=1e-15)

@@ -13,14 +13,14 @@ from trajcli.kinematics.forward import forward
 from trajcli.kinematics.jacobian import jacobian
 
 MADE = CASES["ur5e, pose on an arc"]
-ARM = follower(MADE.robot, MADE.path.by_place, MADE.start, 0.0)
+ARM = follower(MADE.robot, MADE.path.at_s, MADE.start, 0.0)
 COARSE = track_branch(ARM, MADE.path.breaks)
-PLACES = np.linspace(0.1, 0.9, 5) * MADE.path.length
-KNOWN = ARM.solved(PLACES, "right", COARSE.evaluate(PLACES))
+S = np.linspace(0.1, 0.9, 5) * MADE.path.length
+KNOWN = ARM.joint_state(S, "right", COARSE.evaluate(S))
 ROWS = np.array([3, 1])
 
 
-def misfit(**tolerance) -> ToleranceRatio:
+def ratio(**tolerance) -> ToleranceRatio:
     breaks = MADE.path.breaks
     return tolerance_ratio(ARM, Tolerance(**tolerance), breaks, COARSE.evaluate(probes(breaks)))
 
@@ -32,36 +32,36 @@ def changed(order, size):
 
 
 def test_what_is_exact_does_not_miss():
-    assert misfit(position=1e-6, angle=1e-6)(KNOWN, ROWS, KNOWN.values[:, ROWS]).max() < 1e-6
+    assert ratio(position=1e-6, angle=1e-6)(KNOWN, ROWS, KNOWN.values[:, ROWS]).max() < 1e-6
 
 
 def test_a_joint_that_is_off_moves_the_tool():
     fitted = changed(0, 1e-5)
-    places, poses = MADE.path.poses.evaluate(PLACES[ROWS])[0], forward(MADE.robot, fitted[0])
-    aside = np.linalg.norm(places[:, :3, 3] - poses[:, :3, 3], axis=1)
+    wanted, poses = MADE.path.poses.evaluate(S[ROWS])[0], forward(MADE.robot, fitted[0])
+    aside = np.linalg.norm(wanted[:, :3, 3] - poses[:, :3, 3], axis=1)
     assert aside.min() > 1e-6
-    np.testing.assert_allclose(misfit(position=1e-9, angle=1.0)(KNOWN, ROWS, fitted), aside / 1e-9, rtol=1e-6)
-    np.testing.assert_allclose(misfit(position=1.0, angle=1e-9)(KNOWN, ROWS, fitted), 1e4, rtol=1e-6)
+    np.testing.assert_allclose(ratio(position=1e-9, angle=1.0)(KNOWN, ROWS, fitted), aside / 1e-9, rtol=1e-6)
+    np.testing.assert_allclose(ratio(position=1.0, angle=1e-9)(KNOWN, ROWS, fitted), 1e4, rtol=1e-6)
 
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_a_rate_that_is_off_moves_the_tool_at_another_one(order):
-    judge = misfit(position=1e-9, angle=1e3)
+    measure = ratio(position=1e-9, angle=1e3)
     off = jacobian(MADE.robot, KNOWN.values[0, ROWS])[:, :3, 1] * 1e-4
     racing = 1e-8 * ARM.length * np.abs(KNOWN.values[order, ROWS]).max(axis=1)
-    allowed = 1e-9 * judge.tool_peaks[order - 1, 0] + racing
+    allowed = 1e-9 * measure.tool_peaks[order - 1, 0] + racing
     expected = np.linalg.norm(off, axis=1) / allowed
-    np.testing.assert_allclose(judge(KNOWN, ROWS, changed(order, 1e-4)), expected, rtol=1e-6)
+    np.testing.assert_allclose(measure(KNOWN, ROWS, changed(order, 1e-4)), expected, rtol=1e-6)
 
 
 def test_peaks_are_those_of_the_tool_and_of_any_joint():
-    judge, places = misfit(), np.linspace(0, MADE.path.length, 2001)
-    known = ARM.solved(places, "right", COARSE.evaluate(places))
-    _, first, second = MADE.path.poses.evaluate(places)
-    for rates, peaks in ((first, judge.tool_peaks[0]), (second, judge.tool_peaks[1])):
+    measure, s = ratio(), np.linspace(0, MADE.path.length, 2001)
+    known = ARM.joint_state(s, "right", COARSE.evaluate(s))
+    _, first, second = MADE.path.poses.evaluate(s)
+    for rates, peaks in ((first, measure.tool_peaks[0]), (second, measure.tool_peaks[1])):
         sizes = [np.linalg.norm(part, axis=1).max() for part in (rates[:, :3], rates[:, 3:])]
         for size, peak in zip(sizes, peaks, strict=True):
             assert peak == pytest.approx(size, rel=1e-2) or size < 0.11 * peaks.max()
     np.testing.assert_allclose(
-        judge.joint_peaks, np.abs(known.values[1:]).max(axis=(1, 2))[:, None].repeat(6, 1), rtol=2e-2
+        measure.joint_peaks, np.abs(known.values[1:]).max(axis=(1, 2))[:, None].repeat(6, 1), rtol=2e-2
     )

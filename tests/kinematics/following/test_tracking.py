@@ -31,7 +31,7 @@ NAMES = [
 
 
 def tracked(made):
-    arm = follower(made.robot, made.path.by_place, made.start, 0.0)
+    arm = follower(made.robot, made.path.at_s, made.start, 0.0)
     return arm, track_branch(arm, made.path.breaks)
 
 
@@ -41,9 +41,9 @@ def test_it_is_near_a_root_finders_joints_everywhere(name):
     arm, curve = tracked(made)
     assert (curve.start, curve.end) == (0.0, made.path.length)
     near = made.start
-    for place in np.linspace(0, made.path.length, 15):
-        near = solved(made, place, arm.held, near)
-        assert np.abs(curve.evaluate(place) - near).max() < 0.01
+    for s in np.linspace(0, made.path.length, 15):
+        near = solved(made, s, arm.held, near)
+        assert np.abs(curve.evaluate(s) - near).max() < 0.01
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -52,13 +52,13 @@ def test_the_fit_keeps_its_promise_of_joints_and_tool(name, tolerance):
     made = CASES[name]
     arm, coarse = tracked(made)
     breaks = made.path.breaks
-    misfit = tolerance_ratio(arm, Tolerance(tolerance, tolerance), breaks, coarse.evaluate(probes(breaks)))
-    curve = fit(arm.solved, misfit, breaks, coarse.evaluate)
-    places = np.linspace(0, made.path.length, 77)
-    exact = arm.exact(places, "right", coarse.evaluate(places))
-    fitted = curve.evaluate_orders(places, (0, 1, 2)).swapaxes(0, 1)
+    ratio = tolerance_ratio(arm, Tolerance(tolerance, tolerance), breaks, coarse.evaluate(probes(breaks)))
+    curve = fit(arm.joint_state, ratio, breaks, coarse.evaluate)
+    s = np.linspace(0, made.path.length, 77)
+    exact = arm.exact(s, "right", coarse.evaluate(s))
+    fitted = curve.evaluate_orders(s, (0, 1, 2)).swapaxes(0, 1)
     assert np.abs(fitted[0] - exact[0]).max() <= tolerance
-    aside = forward(made.robot, fitted[0])[:, :3, 3] - arm.demands(places, "right").poses[:, :3, 3]
+    aside = forward(made.robot, fitted[0])[:, :3, 3] - arm.reference_at(s, "right").poses[:, :3, 3]
     assert np.linalg.norm(aside, axis=1).max() <= tolerance
     for order in (1, 2):
         peak = np.abs(exact[order]).max()
@@ -68,14 +68,14 @@ def test_the_fit_keeps_its_promise_of_joints_and_tool(name, tolerance):
 
 
 def winding(radius, *, turning):
-    """Return a UR5e on short and shorter ways, their corners rounded or sharp, that end in an arc.
+    """Return a UR5e on short and shorter segments, their corners rounded or sharp, that end in an arc.
 
     The tool keeps its orientation, or with `turning` its attitude to the path.
     """
     begun = CASES["ur5e, pose"]
     start = begun.path.poses.evaluate(np.zeros(1))[0][0]
-    ways = np.tile([[0.03, 0.0, 0.0], [0.0, 0.002, 0.001], [-0.03, 0.01, 0.0]], (3, 1))
-    corners = start[:3, 3] + np.concatenate([np.zeros((1, 3)), np.cumsum(ways, axis=0)])
+    steps = np.tile([[0.03, 0.0, 0.0], [0.0, 0.002, 0.001], [-0.03, 0.01, 0.0]], (3, 1))
+    corners = start[:3, 3] + np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
     segments = [Line(*ends) for ends in pairwise(corners)]
     segments.append(Arc(corners[-1], corners[-1] + [0.0, -0.01, 0.02], [1, 0, 0], 2.0))
     chain = join(segments, radius)
@@ -88,27 +88,25 @@ def winding(radius, *, turning):
     ("radius", "turning", "questions"), [(0.0, False, 23), (0.001, False, 36), (0.001, True, 150)]
 )
 def test_short_ways_are_followed_in_few_steps(radius, turning, questions, monkeypatch):
-    """The step goes on from way to way; where the direction jumps, what was known before it is left."""
+    """The step goes on from segment to segment; where the direction jumps, what was known before it is left."""
     made, asked = winding(radius, turning=turning), []
-    arm = follower(made.robot, made.path.by_place, made.start, 0.0)
+    arm = follower(made.robot, made.path.at_s, made.start, 0.0)
     exact = type(arm).exact
-    monkeypatch.setattr(
-        type(arm), "exact", lambda self, places, *more: asked.append(places) or exact(self, places, *more)
-    )
+    monkeypatch.setattr(type(arm), "exact", lambda self, s, *more: asked.append(s) or exact(self, s, *more))
     curve = track_branch(arm, made.path.breaks)
     assert len(asked) <= questions
-    for place in np.linspace(0, made.path.length, 61):
-        near = curve.evaluate(place)
-        assert np.abs(solved(made, place, arm.held, near) - near).max() < 5e-3
+    for s in np.linspace(0, made.path.length, 61):
+        near = curve.evaluate(s)
+        assert np.abs(solved(made, s, arm.held, near) - near).max() < 5e-3
 
 
 L1, L2, HAND = 0.3, 0.2, 0.1  # the links of the planar arm, m
 PLANAR = CASES["planar3r, yaw of x"].robot
 
 
-def wrist_path(place):
-    """Return the path of a tool that heads along x, on a curve of its place."""
-    poses = PoseCurve(place, FixedOrientation(np.eye(3), place.length))
+def wrist_path(position):
+    """Return the path of a tool that heads along x, on a curve of its position."""
+    poses = PoseCurve(position, FixedOrientation(np.eye(3), position.length))
     return ToolPath(poses, (True, True, True), "yaw", "x", (0.0,))
 
 
@@ -117,8 +115,8 @@ def elbow_of(radius):
     return np.arccos((radius**2 - L1**2 - L2**2) / (2 * L1 * L2))
 
 
-def standing(wrist):
-    """Return joint values, elbow positive, with the wrist there (2,) and the hand along x."""
+def joints_at(wrist):
+    """Return joint values, elbow positive, with the wrist there (2,) and the last link along x."""
     q2 = elbow_of(np.hypot(*wrist))
     q1 = np.arctan2(wrist[1], wrist[0]) - np.arctan2(L2 * np.sin(q2), L1 + L2 * np.cos(q2))
     return np.array([q1, q2, -q1 - q2])
@@ -130,21 +128,21 @@ def test_it_is_stuck_where_the_reach_ends():
     begin = np.array([wrist[0] + HAND, wrist[1], 0.0])
     path = wrist_path(Line(begin, begin + np.array([0.0, 0.4, 0.0])))
     with pytest.raises(StuckError) as caught:
-        track_branch(follower(PLANAR, path.by_place, standing(wrist), 0.0), path.breaks)
+        track_branch(follower(PLANAR, path.at_s, joints_at(wrist), 0.0), path.breaks)
     edge = np.sqrt((L1 + L2) ** 2 - 0.35**2) - 0.05
-    assert edge - 1e-5 < caught.value.place < edge
+    assert edge - 1e-5 < caught.value.s < edge
     assert 0 < caught.value.joints[1] < 0.02
     assert np.abs(caught.value.rates).max() > 100
 
 
 @pytest.mark.parametrize("gap", [1e-3, 1e-5, 1e-7])
 def test_it_does_not_pass_from_one_elbow_to_the_other(gap):
-    """The wrist comes to within a gap of the reach, where the mirror image is as near, and goes back."""
+    """The wrist comes to within a gap of the workspace boundary, where the mirror image is as near, and goes back."""
     edge, near = L1 + L2, L1 + L2 - 0.02
     turn = np.array([np.cos(0.3), np.sin(0.3), 0.0])
     points = near * turn * [1, -1, 1], np.array([edge - gap, 0, 0]), near * turn
     path = wrist_path(Arc.through(*(point + np.array([HAND, 0, 0]) for point in points)))
-    curve = track_branch(follower(PLANAR, path.by_place, standing(points[0][:2]), 0.0), path.breaks)
+    curve = track_branch(follower(PLANAR, path.at_s, joints_at(points[0][:2]), 0.0), path.breaks)
     elbow = curve.evaluate(np.linspace(0, path.length, 2001))[:, 1]
     assert (elbow > 0).all()
     assert curve.evaluate(path.length / 2)[1] == pytest.approx(elbow_of(edge - gap), abs=0.02)
@@ -155,9 +153,9 @@ def test_a_tolerance_finer_than_rounding_is_met_as_far_as_rounding_lets_it():
     made = CASES["ur5e, pose on an arc"]
     arm, coarse = tracked(made)
     breaks = made.path.breaks
-    misfit = tolerance_ratio(arm, Tolerance(1e-13, 1e-13), breaks, coarse.evaluate(probes(breaks)))
-    curve = fit(arm.solved, misfit, breaks, coarse.evaluate)
-    places = np.linspace(0, made.path.length, 77)
-    exact = arm.exact(places, "right", coarse.evaluate(places))
-    assert np.abs(curve.evaluate(places) - exact[0]).max() < 1e-12
+    ratio = tolerance_ratio(arm, Tolerance(1e-13, 1e-13), breaks, coarse.evaluate(probes(breaks)))
+    curve = fit(arm.joint_state, ratio, breaks, coarse.evaluate)
+    s = np.linspace(0, made.path.length, 77)
+    exact = arm.exact(s, "right", coarse.evaluate(s))
+    assert np.abs(curve.evaluate(s) - exact[0]).max() < 1e-12
     assert curve.pieces < 1000

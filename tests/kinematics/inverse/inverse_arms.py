@@ -123,4 +123,4 @@ def gap(robot, a, b):
 def counts_by_search(robot, poses):
     """Return how many different answers the numeric solver finds."""
     found = search(robot, pose_target(poses), None)
-    return distinct(robot, found.joints, found.found).sum(axis=1)
+    return distinct(robot, found.joints, found.met).sum(axis=1)

@@ -99,15 +99,15 @@ def zeros(axis, function, degree):
         at, orders = 0.3 + 2 * np.pi * np.arange(count) / count, np.arange(-degree, degree + 1)
         found = roots(np.exp(-1j * np.outer(orders, at)) @ function(at[:, None]) / count)
         real, values = np.abs(np.abs(found) - 1) < 1e-3, np.angle(found)
-    rows, places = np.nonzero(real)
-    return rows, values[rows, places]
+    rows, columns = np.nonzero(real)
+    return rows, values[rows, columns]
 
 
 def square(vectors):
     return (vectors * vectors).sum(axis=-1)
 
 
-def place(axes, point, targets):
+def position(axes, point, targets):
     """Return the rows (M,) and values (M, n) of candidates that bring a point (3,) to targets (K, 3)."""
     one, last = axes[0], axes[-1]
     if all(axis.slides for axis in axes):
@@ -167,10 +167,10 @@ def _after_a_turn(axes, point, targets):
     left, right, _ = linear(q, targets[rows])
     cosine, sine = left[:, level].T
     with np.errstate(invalid="ignore"):
-        swing = np.arccos(right[:, level] / np.hypot(cosine, sine))
-    middle, keep = np.arctan2(sine, cosine), np.isfinite(swing)
+        half_angle = np.arccos(right[:, level] / np.hypot(cosine, sine))
+    middle, keep = np.arctan2(sine, cosine), np.isfinite(half_angle)
     rows, q = rows[keep], q[keep]
-    second = np.concatenate([(middle + swing)[keep], (middle - swing)[keep]])
+    second = np.concatenate([(middle + half_angle)[keep], (middle - half_angle)[keep]])
     return np.tile(rows, 2), second[:, None], np.tile(q, 2)
 
 
@@ -197,9 +197,9 @@ def _both_levels(three, linear, targets):
 
 
 def by_last_turn(axes, goals):
-    """A point on the last axis is brought to its place by the joints before; the last one turns the tool."""
+    """A point on the last axis is brought to its position by the joints before; the last one turns the tool."""
     last = axes[-1]
-    rows, q = place(axes[:-1], last.o, (goals @ np.append(last.o, 1.0))[:, :3])
+    rows, q = position(axes[:-1], last.o, (goals @ np.append(last.o, 1.0))[:, :3])
     rest = np.linalg.inv(displacement(axes[:-1], q)) @ goals[rows]
     side = np.cross(last.h, np.eye(3)[np.abs(last.h).argmin()])
     return rows, np.column_stack([q, last.angle(side, rest[:, :3, :3] @ side)])
@@ -229,10 +229,10 @@ def by_parallel_axes(axes, goals):
 
 
 def by_wrist(axes, goals):
-    """The last three axes meet in a point that the first three joints bring to its place."""
+    """The last three axes meet in a point that the first three joints bring to its position."""
     w = meeting(axes[3:])
     four, five, six = axes[3:]
-    rows, q = place(axes[:3], w, (goals @ np.append(w, 1.0))[:, :3])
+    rows, q = position(axes[:3], w, (goals @ np.append(w, 1.0))[:, :3])
     rest = np.linalg.inv(displacement(axes[:3], q))[:, :3, :3] @ goals[rows, :3, :3]
     more, fifth = zeros(five, lambda q: (five.turned(q, six.h) - rest @ six.h) @ four.h, 1)
     rows, q, rest = rows[more], q[more], rest[more]

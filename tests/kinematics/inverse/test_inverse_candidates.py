@@ -1,4 +1,4 @@
-"""The closed form as it runs: blocks and threads that no pose may learn of, and what judges its answers."""
+"""The closed form as it runs: blocks and threads that no pose may learn of, and the check of its residuals."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conventions import in_convention
 from inverse_arms import FAMILIES, arm, gap, random_joints, turning
 from scipy.spatial.transform import Rotation
 
@@ -18,7 +19,6 @@ from trajcli.kinematics.inverse.families.choose import method_for
 from trajcli.kinematics.inverse.families.screw_axes import axis_geometry
 from trajcli.kinematics.inverse.joint_turns import choose_turns
 from trajcli.kinematics.inverse.solve import solve
-from trajcli.kinematics.serial_chain import in_convention
 
 COUNT = 40_000  # six blocks and a part of one
 
@@ -83,10 +83,10 @@ def test_gaps_are_distances_and_bound_angles_also_where_a_pose_is_out_of_reach(n
     found = candidates(robot, axis_geometry(robot), method_for(robot), poses)
     assert np.abs(found.joints[turning(robot)]).max(initial=0.0) <= np.pi
     metres, radians = gaps_by_peer(robot, found.joints, poses)
-    assert found.gaps[0] == pytest.approx(metres, abs=1e-11)
+    assert found.residuals[0] == pytest.approx(metres, abs=1e-11)
     chord = 2.0 * np.sin(radians / 2.0)  # x and z are apart by between one and the root of two of these
-    assert (found.gaps[1] >= chord - 1e-7).all()
-    assert (found.gaps[1] <= np.sqrt(2.0) * chord + 1e-7).all()
+    assert (found.residuals[1] >= chord - 1e-7).all()
+    assert (found.residuals[1] <= np.sqrt(2.0) * chord + 1e-7).all()
 
 
 @pytest.mark.parametrize("signs", [False, True])
@@ -102,7 +102,7 @@ def test_an_aligned_wrist_is_met_by_the_closed_form_itself(signs):
     assert (same_base.sum(axis=0) == 2).all()
     metres, radians = gaps_by_peer(robot, found.joints, poses)
     assert np.maximum(metres, radians)[same_base].max() < 1e-6
-    assert found.watched.all()
+    assert found.degenerate.all()
 
 
 @pytest.mark.parametrize(("value", "bounds"), [(3.0, [-4.0, 2.0]), (-3.0, [-2.0, 4.0]), (4.0, [-9.0, 9.0])])

@@ -1,4 +1,4 @@
-"""The closed forms give the same answers as two other ways, no more and no fewer: sampled polynomials, and EAIK.
+"""The closed forms give the same answers as two other methods, no more and no fewer: sampled polynomials, and EAIK.
 
 Turns are left out and limits ignored. An answer counts for itself from 1e-6 rad or m on. Poses of which two answers
 are less than 1e-4 apart are left out, two in a thousand at most: rounding decides there whether both exist.
@@ -26,11 +26,11 @@ from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.solve import solve
 from trajcli.kinematics.inverse.target import partial_target
 
-CLOSES = 1e-7  # m and rad: what an answer of the other ways may miss its target by
+CLOSES = 1e-7  # m and rad: what an answer of the other methods may miss its target by
 SAME = 1e-6  # rad or m: nearer answers are one
 MERGING = 1e-4  # rad or m
-PLACING = ("positioning", "planar 2R", "planar RP")  # families that a place is enough for
-WAYS = {
+POSITIONED = ("positioning", "planar 2R", "planar RP")  # families that a position is enough for
+METHODS = {
     "planar 3R": polynomials.by_last_turn,
     "planar RPR": polynomials.by_last_turn,
     "SCARA": polynomials.by_last_turn,
@@ -39,9 +39,9 @@ WAYS = {
     "three parallel axes (UR)": polynomials.by_parallel_axes,
     "spherical wrist": polynomials.by_wrist,
 }
-PLACES = [name for name in FAMILIES if FAMILIES[name][2] in PLACING]
+BY_POSITION = [name for name in FAMILIES if FAMILIES[name][2] in POSITIONED]
 TURNING = [name for name in FAMILIES if all(row[0] == "R" for row in FAMILIES[name][0])]
-CASES = [*((name, "pose") for name in FAMILIES), *((name, "place") for name in PLACES)]
+CASES = [*((name, "pose") for name in FAMILIES), *((name, "position") for name in BY_POSITION)]
 PEER = """
 import io, sys
 import numpy as np
@@ -67,33 +67,35 @@ def random_poses(name, count):
 
 def by_polynomials(robot, name, axes, home, goals):
     family = FAMILIES[name][2]
-    if family in PLACING:
-        return polynomials.place(axes, home[:3, 3], (goals @ home)[:, :3, 3])
-    way = polynomials.by_shoulder if name == "spherical shoulder" else WAYS[family]
-    return way(axes, goals)
+    if family in POSITIONED:
+        return polynomials.position(axes, home[:3, 3], (goals @ home)[:, :3, 3])
+    method = polynomials.by_shoulder if name == "spherical shoulder" else METHODS[family]
+    return method(axes, goals)
 
 
 def by_eaik(python, axes, home, goals):
     directions = np.array([axis.h for axis in axes])
     signs = np.ones(len(axes))
-    for i, j in combinations(range(len(axes)), 2):  # EAIK wants axes that are parallel to point the same way
+    for i, j in combinations(
+        range(len(axes)), 2
+    ):  # EAIK wants axes that are parallel to point in the same direction
         if directions[i] @ directions[j] < 1e-12 - 1.0:
             directions[j], signs[j] = -directions[j], -signs[j]
-    places = np.array([np.zeros(3), *(axis.o for axis in axes), home[:3, 3]])
+    points = np.array([np.zeros(3), *(axis.o for axis in axes), home[:3, 3]])
     poses = goals.copy()
     poses[:, :3, 3] = (goals @ home)[:, :3, 3]
     question = io.BytesIO()
-    np.savez(question, directions=directions, steps=np.diff(places, axis=0), poses=poses)
+    np.savez(question, directions=directions, steps=np.diff(points, axis=0), poses=poses)
     command = [python, "-c", PEER]
     answer = subprocess.run(command, input=question.getvalue(), stdout=subprocess.PIPE, check=True).stdout
     found = np.load(io.BytesIO(answer))
     return found["rows"], found["q"] * signs
 
 
-def judged(robot, axes, home, goals, rows, q, kind):
+def checked(robot, axes, home, goals, rows, q, kind):
     """Return candidates that meet their goals as joints (N, most, n) and which of these are answers (N, most)."""
     reached, wanted = polynomials.displacement(axes, q) @ home, (goals @ home)[rows]
-    miss = np.abs(reached - wanted)[:, :3, 3 if kind == "place" else slice(None)]
+    miss = np.abs(reached - wanted)[:, :3, 3 if kind == "position" else slice(None)]
     good = miss.max(axis=tuple(range(1, miss.ndim)), initial=0.0) < CLOSES
     order = np.flatnonzero(good)[np.argsort(rows[good], kind="stable")]
     rows, q = rows[order], q[order]
@@ -115,18 +117,18 @@ def nearest_pair(robot, joints, valid):
     return result
 
 
-def both(robot, name, kind, poses, way):
-    """Return joints (N, branches, n) and which of them are answers (N, branches), ours and another way's."""
+def both(robot, name, kind, poses, method):
+    """Return joints (N, branches, n) and which of them are answers (N, branches), ours and another method's."""
     ours = solve(robot, poses if kind == "pose" else partial_target(poses[:, :3, 3]))
     axes, home = polynomials.arm_axes(robot)
     goals = np.linalg.inv(robot.base) @ poses @ np.linalg.inv(home)
-    theirs = judged(robot, axes, home, goals, *way(robot, name, axes, home, goals), kind)
+    theirs = checked(robot, axes, home, goals, *method(robot, name, axes, home, goals), kind)
     return (ours.joints, ours.valid), theirs
 
 
-def check(name, kind, count, way):
+def check(name, kind, count, method):
     robot, poses = random_poses(name, count)
-    (ours, ours_valid), (theirs, theirs_valid) = both(robot, name, kind, poses, way)
+    (ours, ours_valid), (theirs, theirs_valid) = both(robot, name, kind, poses, method)
     pair = nearest_pair(robot, ours, ours_valid)
     assert pair.min() > SAME
     clear = np.minimum(pair, nearest_pair(robot, theirs, theirs_valid)) > MERGING
@@ -177,12 +179,12 @@ def python_with_eaik():
 UR_SLANTED = ["R 0 .16 0 1", "R 0 0 -.42 0", "R 0 0 -.39 0", "R 0 .13 0 .8", "R 0 .1 0 -.8", "R 0 .1 0 0"]
 SLANTED = ["R 0 .4 .1 -1", "R 0 .05 .4 0", "R 0 .02 .05 1", "R 0 .4 0 -.8", "R 0 0 0 .8", "R 0 .1 .02 0"]
 STANFORD = FAMILIES["wrist over Stanford"][0]
-CLOSE = {  # rows, family, kind, joints, index of the one that brings a place or a direction to the axis of another
-    "folded 2R": (["R 0 0 .3 0", "R 0 0 .3 0"], "planar 2R", "place", [0.3, np.pi], 1),
+CLOSE = {  # rows, family, kind, joints, index of the one that brings a position or a direction to the axis of another
+    "folded 2R": (["R 0 0 .3 0", "R 0 0 .3 0"], "planar 2R", "position", [0.3, np.pi], 1),
     "folded elbow": (
         ["R 0 .5 0 1", "R 0 0 .3 0", "R 0 0 .3 0"],
         "positioning",
-        "place",
+        "position",
         [0.3, 0.5, np.pi],
         2,
     ),
@@ -193,7 +195,7 @@ CLOSE = {  # rows, family, kind, joints, index of the one that brings a place or
     "point above the shoulder": (
         ["R 0 .3 0 1", "R 0 .2 0 -.7", "R 0 .1 .4 0"],
         "positioning",
-        "place",
+        "position",
         [0.3, 4.076477399, 0.759480056],
         1,
     ),

@@ -4,12 +4,12 @@ import zlib
 
 import numpy as np
 import pytest
+from conventions import in_convention
 from inverse_arms import FAMILIES, arm, counts_by_search, gap, random_joints, turning
 
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.families.choose import method_for
 from trajcli.kinematics.inverse.solve import solve
-from trajcli.kinematics.serial_chain import in_convention
 
 NAMES = [pytest.param(name, id=name) for name in FAMILIES]
 

@@ -1,4 +1,4 @@
-"""Targets that leave joints free: one answer for each posture, the nearest of its family, inside the limits."""
+"""Targets that leave joints free: one answer for each posture, the nearest of its self-motion, inside the limits."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_each_posture_is_answered_once_and_as_near_as_can_be(name, kind, axis, f
     answers = found.joints[rows, branches]
     assert np.abs(residuals(target.rows(rows), forward(robot, answers))).max() < 1e-9
     best = np.take_along_axis(found.joints, found.nearest(near)[:, None, None], axis=1)[:, 0]
-    known = np.linalg.norm(joints - near, axis=1)  # the generating joints are a member too
+    known = np.linalg.norm(joints - near, axis=1)  # the generating joints are a point of it too
     assert (np.linalg.norm(best - near, axis=1) <= known + 1e-9).all()
     for row in range(12):
         repeated = target.rows(np.full(len(joints[0]), row))
@@ -154,13 +154,13 @@ def test_a_member_stops_at_the_limit_and_not_before():
 def test_a_joint_at_its_limit_is_held_while_others_go_on():
     robot = arm("elbow, pitch and roll", limits=[[-7, 7], [-7, 7], [-7, 7], [-7, 7], [0.5, 2.0]])
     joints = np.array([0.4, 0.7, -1.2, 0.5, 0.9])
-    place = forward(robot, joints)[:3, 3]
+    position = forward(robot, joints)[:3, 3]
     near = np.array([0.4, 0.6, -1.3, 0.7, -0.3])
-    found = solve(robot, partial_target(place), near)
+    found = solve(robot, partial_target(position), near)
     best = int(found.nearest(near))
     own = found.joints[best]
     assert own[4] == pytest.approx(0.5, abs=1e-9)
-    idle = idle_motions(robot, partial_target(np.tile(place, (5, 1))), own, 2)
+    idle = idle_motions(robot, partial_target(np.tile(position, (5, 1))), own, 2)
     along = idle.T @ np.linalg.svd(idle[:, 4:].T)[2][1]  # the motion that leaves joint 5 where it is
     assert abs(along[4]) < 1e-9
     assert abs(along @ (near - own)) < 1e-6
@@ -214,9 +214,9 @@ def test_a_fold_inside_a_family_is_not_singular():
     robot = arm("planar 3R")
     theta = [joint.theta for joint in robot.joints]
     near = np.array([0.4, np.pi, 0.0]) - theta  # all links in line, folded: the tcp could not move outwards
-    place = forward(robot, near)[:3, 3]
-    assert np.hypot(*place[:2]) == pytest.approx(0.1, abs=1e-12)
-    found = solve(robot, partial_target(place), near)
+    position = forward(robot, near)[:3, 3]
+    assert np.hypot(*position[:2]) == pytest.approx(0.1, abs=1e-12)
+    found = solve(robot, partial_target(position), near)
     best = int(found.nearest(near))
     assert found.joints[best] == pytest.approx(near, abs=1e-6)
     assert found.free[best].all()
@@ -233,18 +233,18 @@ def test_members_come_nearer_by_whole_turns_and_along_the_family_and_stay_inside
     low, high = joints.min(axis=0) - 0.01 * span, joints.max(axis=0) + 0.01 * span
     robot = replace(robot, limits=replace(robot.limits, position=np.stack([low, high], axis=1)))
     near = joints + rng.uniform(-1, 1, joints.shape) * span
-    members = nearest_on_self_motions(robot, target, joints, near)
-    assert np.abs(residuals(target, forward(robot, members))).max() < 1e-9
-    assert (members >= low).all()
-    assert (members <= high).all()
-    far, came = np.linalg.norm(joints - near, axis=1), np.linalg.norm(members - near, axis=1)
+    nearest = nearest_on_self_motions(robot, target, joints, near)
+    assert np.abs(residuals(target, forward(robot, nearest))).max() < 1e-9
+    assert (nearest >= low).all()
+    assert (nearest <= high).all()
+    far, came = np.linalg.norm(joints - near, axis=1), np.linalg.norm(nearest - near, axis=1)
     assert (came <= far + 1e-9).all()
     assert (came < far - 1e-3).mean() > 0.8
     if free == 1:
-        for row, member in enumerate(members):
-            (idle,) = idle_motions(robot, target.rows(np.full(len(low), row)), member, 1)
-            left = idle @ (near[row] - member)
-            blocked = np.where(idle * left > 0, high - member < 1e-8, member - low < 1e-8) & (
+        for row, point in enumerate(nearest):
+            (idle,) = idle_motions(robot, target.rows(np.full(len(low), row)), point, 1)
+            left = idle @ (near[row] - point)
+            blocked = np.where(idle * left > 0, high - point < 1e-8, point - low < 1e-8) & (
                 np.abs(idle) > 1e-6
             )
             assert abs(left) < 1e-5 or blocked.any()

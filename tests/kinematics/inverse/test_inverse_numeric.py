@@ -74,7 +74,7 @@ def test_any_chain_of_six_joints_is_solved(convention):
     while solved < 3:
         robot = random_arm(rng, 6, convention)
         joints = rng.uniform(-1, 1, (4, 6))
-        if dexterity(robot, joints).condition.max() > 1e3:  # too many slides: every pose has a family
+        if dexterity(robot, joints).condition.max() > 1e3:  # too many slides: every pose has a self-motion
             continue
         found = solve(robot, forward(robot, joints))
         there = np.where(found.valid, gap(robot, found.joints, joints[:, None]), np.inf).min(axis=1)

@@ -79,12 +79,12 @@ def test_an_aligned_wrist_gives_a_family_and_the_regular_pair(case):
     regular = found.joints[out & ~found.singular]
     assert same_set(robot, regular, expected["regular"], 1e-8)
     assert np.count_nonzero(out & found.singular) == 1
-    member = found.joints[out & found.singular][0]
+    point = found.joints[out & found.singular][0]
     family, (i, j) = expected["family"], expected["family"]["sum_of"]
     for index, value in family["fixed"].items():
-        assert member[int(index)] == pytest.approx(value, abs=1e-8)
-    assert np.cos(member[i] + member[j] - family["equals"]) == pytest.approx(1.0, abs=1e-14)
-    assert member[i] == pytest.approx(member[j], abs=1e-7)
+        assert point[int(index)] == pytest.approx(value, abs=1e-8)
+    assert np.cos(point[i] + point[j] - family["equals"]) == pytest.approx(1.0, abs=1e-14)
+    assert point[i] == pytest.approx(point[j], abs=1e-7)
     assert np.flatnonzero(found.free[out & found.singular][0]).tolist() == [i, j]
 
 

@@ -20,7 +20,7 @@ from trajcli.kinematics.inverse.target import partial_target
 from trajcli.kinematics.robot import Joint, Robot, unlimited
 
 H = np.pi / 2
-# arm, what is given, of which tool axis, whether base and tool stand anyhow; then the most answers
+# arm, what is given, of which tool axis, whether base and tool are arbitrary; then the most answers
 KINDS = [
     ("planar 3R", "yaw", "x", False, 2),
     ("planar 3R", "direction", "y", True, 2),
@@ -43,7 +43,7 @@ IDS = [f"{name}-{kind}-{axis}{'-anyhow' * anyhow}" for name, kind, axis, anyhow,
 
 
 def robot_of(name, rng):
-    """Return an arm; of five joints one whose tcp is on axis 5, wherever its base stands."""
+    """Return an arm; of five joints one whose tcp is on axis 5, wherever its base is."""
     if name != "scorbot":
         return arm(name, rng)
     rows = [(0, 0.36, 0.02, H), (0, 0, 0.22, 0), (0, 0, 0.22, 0), (0, 0, 0, H), (0, 0.15, 0, 0)]
@@ -73,12 +73,12 @@ def case(name, kind, axis, anyhow, count):
     return robot, joints, *part_of(forward(robot, joints), kind, axis)
 
 
-def missed(poses, place, part, kind, axis):
+def missed(poses, position, part, kind, axis):
     """Return by how much poses (N, branches, 4, 4) miss what was asked for: m, and rad or a sine."""
     reached, _ = part_of(poses, kind, axis)
     off = reached - part[:, None]
     turn = np.linalg.norm(off, axis=-1) if kind == "direction" else np.abs(np.angle(np.exp(1j * off)))
-    return np.linalg.norm(poses[..., :3, 3] - place[:, None], axis=-1), turn
+    return np.linalg.norm(poses[..., :3, 3] - position[:, None], axis=-1), turn
 
 
 @pytest.mark.parametrize(("name", "kind", "axis", "anyhow", "most"), KINDS, ids=IDS)
@@ -87,8 +87,8 @@ def test_the_closed_form_answers_what_is_fixed(name, kind, axis, anyhow, most):
     found = solve(robot, target, near=joints)
     assert found.method.family == method_for(robot).family
     assert len(found.names) == len(set(map(str, found.names))) == most
-    place, turn = missed(forward(robot, found.joints), target.poses[:, :3, 3], part, kind, axis)
-    assert max(place[found.valid].max(), turn[found.valid].max()) < 1e-9
+    position, turn = missed(forward(robot, found.joints), target.poses[:, :3, 3], part, kind, axis)
+    assert max(position[found.valid].max(), turn[found.valid].max()) < 1e-9
     there = np.where(found.valid, gap(robot, found.joints, joints[:, None]), np.inf).min(axis=1)
     assert there.max() < 1e-6
     assert found.singular.sum() == 0
@@ -99,9 +99,9 @@ def test_a_search_finds_as_many_answers(name, kind, axis, anyhow, most):
     robot, joints, _, target = case(name, kind, axis, anyhow, 4)
     found = solve(robot, target, near=joints)
     assert found.count.max() <= most
-    sought = search(robot, target, None)
+    searched = search(robot, target, None)
     fixed = ~found.free[found.valid].any(axis=0)
-    counted = distinct(robot, sought.joints * fixed, sought.found).sum(axis=1)
+    counted = distinct(robot, searched.joints * fixed, searched.met).sum(axis=1)
     assert found.count.tolist() == counted.tolist()
 
 
@@ -115,13 +115,13 @@ def test_answers_have_the_names_that_the_whole_pose_gives_them(name, kind, axis,
     gaps = np.where(whole.valid, gap(robot, whole.joints, answers[:, None]), np.inf)
     assert gaps.min(axis=1).max() < 1e-6
     for row, branch, own, same in zip(rows, branches, answers, gaps, strict=True):
-        name, told = whole.names[int(same.argmin())], found.names[branch]
-        assert name.elbow == told.elbow
+        name, named = whole.names[int(same.argmin())], found.names[branch]
+        assert name.elbow == named.elbow
         if len(joints[0]) == 4:
-            assert name.shoulder == told.shoulder
+            assert name.shoulder == named.shoulder
         if len(joints[0]) == 5:  # the whole pose goes by axis 5, a part of it by the tcp
             x, y, _ = np.linalg.solve(robot.base, [*target.poses[row, :3, 3], 1.0])[:3]
-            assert told.shoulder == ("left" if x * np.cos(own[0]) + y * np.sin(own[0]) > 0 else "right")
+            assert named.shoulder == ("left" if x * np.cos(own[0]) + y * np.sin(own[0]) > 0 else "right")
 
 
 def test_the_tool_of_no_flip_heads_to_the_side_of_the_first_link():
@@ -203,11 +203,11 @@ def test_arms_that_a_closed_form_does_not_solve_keep_the_names():
 def test_a_tool_axis_that_is_always_vertical_has_no_yaw():
     for name in ("planar 3R", "SCARA"):
         robot = arm(name)
-        place = forward(robot, random_joints(robot, np.random.default_rng(1), 1)[0])[:3, 3]
+        position = forward(robot, random_joints(robot, np.random.default_rng(1), 1)[0])[:3, 3]
         with pytest.raises(InputError, match=r"the z axis of the tool of .* is always vertical") as caught:
-            solve(robot, partial_target(place, yaw=0.0))
+            solve(robot, partial_target(position, yaw=0.0))
         assert "tool_axis: x or y" in str(caught.value.problems[0].hint)
-        found = solve(robot, partial_target(place, pitch=0.3))
+        found = solve(robot, partial_target(position, pitch=0.3))
         with pytest.raises(PlanningError) as refused:
             check_reachable(robot, found)
         assert "no joint turns the z axis of the tool" in str(refused.value.problems[0].hint)

@@ -74,20 +74,20 @@ def turning(line, angle):
 
 
 @pytest.mark.parametrize("same", [1.0, -1.0])
-@pytest.mark.parametrize("hand", [0.3, 3e-9])
-def test_two_parallel_turns_meet_their_aim_also_where_the_second_is_free(same, hand):
+@pytest.mark.parametrize("beyond_elbow", [0.3, 3e-9])
+def test_two_parallel_turns_meet_their_aim_also_where_the_second_is_free(same, beyond_elbow):
     rng = np.random.default_rng(9)
     two = ScrewAxis(prismatic=False, direction=(0.0, 0.6, 0.8), point=(0.1, 0.0, 0.2))
     three = ScrewAxis(prismatic=False, direction=(0.0, 0.6 * same, 0.8 * same), point=(0.5, 0.08, 0.14))
-    tip = np.append(three.point + hand * np.array([0.28, 0.768, -0.576]), 1.0)
+    tip = np.append(three.point + beyond_elbow * np.array([0.28, 0.768, -0.576]), 1.0)
     motions = [turning(two, rng.uniform(-3, 3)) @ turning(three, rng.uniform(-3, 3)) for _ in range(20)]
     aims = np.array([motion @ tip for motion in motions])
-    watch = DegeneracyFlags(20, 1.0)
-    turns = parallel_pair(two, three, tuple(tip[:3]), tuple(aims[:, :3].T), watch)
+    flags = DegeneracyFlags(20, 1.0)
+    turns = parallel_pair(two, three, tuple(tip[:3]), tuple(aims[:, :3].T), flags)
     assert all(np.hypot(*turn) == pytest.approx(1.0, abs=3e-15) for turn in turns)
     second, third = (np.arctan2(sine, cosine) for cosine, sine in turns)
     for answer in range(2):
         for i, aim in enumerate(aims):
             reached = turning(two, second[answer, i]) @ turning(three, third[answer, i]) @ tip
-            assert reached == pytest.approx(aim, abs=3e-15 if hand > 1e-8 else 3.0 * hand)
-    assert watch.rows.all() == (hand < 1e-8)
+            assert reached == pytest.approx(aim, abs=3e-15 if beyond_elbow > 1e-8 else 3.0 * beyond_elbow)
+    assert flags.rows.all() == (beyond_elbow < 1e-8)

@@ -23,13 +23,13 @@ RNG = np.random.default_rng(5)
 
 def kinds():
     rotations = Rotation.random(4, rng=RNG).as_matrix()
-    place = RNG.normal(size=(4, 3))
+    position = RNG.normal(size=(4, 3))
     return [
-        partial_target(place),
-        partial_target(place, fixed=(True, False, True)),
-        partial_target(place, rotation=rotations),
-        partial_target(place, direction=rotations[:, 0], tool_axis="x"),
-        partial_target(place, yaw=[0.1, 3.0, -2.0, 1.0], tool_axis="y"),
+        partial_target(position),
+        partial_target(position, fixed=(True, False, True)),
+        partial_target(position, rotation=rotations),
+        partial_target(position, direction=rotations[:, 0], tool_axis="x"),
+        partial_target(position, yaw=[0.1, 3.0, -2.0, 1.0], tool_axis="y"),
         partial_target(pitch=[0.1, 1.2, -1.0, 0.0]),
     ]
 
@@ -108,24 +108,24 @@ def test_a_pitch_is_enough_for_an_arm_of_four_joints_and_a_yaw_for_a_scara():
 def test_positions_use_the_closed_form_of_three_joints():
     robot = arm("elbow with offsets", np.random.default_rng(2))
     joints = random_joints(robot, RNG, 20)
-    place = forward(robot, joints)[:, :3, 3]
-    found = solve(robot, partial_target(place))
+    position = forward(robot, joints)[:, :3, 3]
+    found = solve(robot, partial_target(position))
     assert found.method.family == "positioning"
-    assert answered(robot, partial_target(place), joints).max() < 1e-6
+    assert answered(robot, partial_target(position), joints).max() < 1e-6
 
 
 def test_a_six_axis_arm_takes_the_answer_to_a_position_nearest_to_where_it_is():
     robot = arm("wrist over elbow")
     near = np.array([0.3, 0.5, 0.8, 0.4, 0.6, 0.2])
-    place = forward(robot, near)[:3, 3] + [0.01, 0.0, 0.0]
-    found = solve(robot, partial_target(place), near)
+    position = forward(robot, near)[:3, 3] + [0.01, 0.0, 0.0]
+    found = solve(robot, partial_target(position), near)
     best = found.joints[int(found.nearest(near))]
     assert found.method.family == "spherical wrist"
     assert not found.singular.any()
-    assert forward(robot, best)[:3, 3] == pytest.approx(place, abs=1e-9)
+    assert forward(robot, best)[:3, 3] == pytest.approx(position, abs=1e-9)
     linear = jacobian(robot, best)[:3]
     kernel = np.linalg.svd(linear)[2][3:]
-    assert np.abs(kernel @ (near - best)).max() < 1e-6  # what is left of the way is not in the family
+    assert np.abs(kernel @ (near - best)).max() < 1e-6  # what is left of the gap is no self-motion
 
 
 def test_malformed_targets_are_refused():

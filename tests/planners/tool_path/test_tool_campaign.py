@@ -89,7 +89,7 @@ def confirm_plan(plan: Plan, tracker: Tracker, robot: str) -> None:
     for place, row in zip(np.clip(np.maximum.accumulate(places), 0, tracker.path.length), q, strict=True):
         assert np.abs(tracker.go(place) - row).max() < 1e-5
     if robot in CLOSED and tracker.path.orientation == "all":
-        found = solve(tracker.robot, motion.demand(times, "left").poses, q)
+        found = solve(tracker.robot, motion.reference(times, "left").poses, q)
         away = np.where(found.valid, np.abs(found.joints - q[:, None]).max(axis=-1), np.inf)
         assert away.min(axis=1).max() < 1e-4
         assert len(set(away.argmin(axis=1))) == 1

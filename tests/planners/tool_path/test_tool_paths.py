@@ -133,7 +133,7 @@ def test_rates_of_overlapping_segments_are_finite_differences():
     made = plan("ur5e", START, path(corner="overlap", overlap=0.3, turning=True, **fields))
     motion, step = made.moves[0].planned.tool, 1e-4
     t = np.linspace(0.05, made.trajectory.duration - 0.05, 41)
-    before, here, after = (motion.demand(t + shift) for shift in (-step, 0, step))
+    before, here, after = (motion.reference(t + shift) for shift in (-step, 0, step))
     np.testing.assert_allclose(here.second, (after.first - before.first) / (2 * step), rtol=0, atol=1e-4)
     turned = Rotation.from_matrix(after.poses[:, :3, :3] @ np.swapaxes(before.poses[:, :3, :3], 1, 2))
     np.testing.assert_allclose(here.first[:, 3:], turned.as_rotvec() / (2 * step), rtol=0, atol=1e-6)

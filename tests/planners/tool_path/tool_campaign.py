@@ -165,7 +165,7 @@ class Tracker:
 
     def off(self, joints: np.ndarray, place: float) -> np.ndarray:
         """Return (N, m): what is between the tcp of joints (N, n) and the path."""
-        demand, poses = self.path.by_place(np.array([place]), "left"), forward(self.robot, joints)
+        demand, poses = self.path.at_s(np.array([place]), "left"), forward(self.robot, joints)
         parts = [poses[:, :3, 3] - demand.poses[0, :3, 3]]
         axis = poses[:, :3, "xyz".index(demand.tool_axis)]
         if demand.orientation == "all":
@@ -248,4 +248,4 @@ def way_of(task_: Task, loaded: Any) -> ToolPath:
 
 
 def demand_at(path: ToolPath, places: np.ndarray) -> ToolReference:
-    return path.by_place(places, "left")
+    return path.at_s(places, "left")

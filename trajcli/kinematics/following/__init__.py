@@ -1,1 +1,1 @@
-"""How the joints of an arm follow its tool: exact where they are asked for, joined within a tolerance."""
+"""Joint curves along tool paths: continuation of a branch, exact values, fit within a tolerance."""

@@ -1,16 +1,14 @@
-"""Joint values, velocities and accelerations of an arm whose tool is on a given path.
+"""Follower: joint values, velocities and accelerations of an arm whose tool is on a given path.
 
-At every place the joints solve the target's equations by Newton's method from a guess, then J q' = x' and
+At every s the joints solve the target's equations by Newton's method from a guess, then J q' = x' and
 J q'' = x'' - J' q'. What the target leaves free, a tool's roll or the elbow of a seven-joint arm, is held:
 the joint values keep their components along the directions that are free at the start. So q is a function of
-the place on the path alone, the same forwards and backwards.
+s alone, the same forwards and backwards. A branch ends where the arm would change its aspect, the side of the
+singular configurations on which it is.
 
 Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning and Control (2009), sections
-3.5 and 3.7; Baillieul, Kinematic programming alternatives for redundant manipulators (ICRA 1985).
-
-What is known of an arm at places of a path where its joints meet the demand.
-
-On which side of the singular configurations an arm is: a branch ends where it would change.
+3.5 and 3.7; Baillieul, Kinematic programming alternatives for redundant manipulators (ICRA 1985); for aspects
+Borrel and Liegeois, A study of multiple manipulator inverse kinematic solutions (ICRA 1986).
 """
 
 from __future__ import annotations
@@ -31,106 +29,6 @@ from trajcli.kinematics.inverse.target import IkTarget, residual_jacobian, resid
 from trajcli.kinematics.jacobian import linearisation
 from trajcli.kinematics.robot import Robot
 
-
-@frozen
-class JointState:
-    """Joints at N places, and what was computed to find them: judging a fit there asks for it again.
-
-    Attributes:
-        values: Joint values and their first and second derivative, shape (3, N, n).
-        demand: Of the tool there.
-        target: Of that demand.
-        columns: Jacobians in world, shape (N, 6, n).
-    """
-
-    values: Array
-    demand: ToolReference
-    target: IkTarget
-    columns: Array
-
-
-def acceleration_bias(columns: Array, rates: Array) -> Array:
-    """Return the part of the tcp's acceleration that does not come from qdd, shape (N, 6).
-
-    A joint turns the columns of those behind it, and moves the tcp under the axes of those before it: either
-    way the change of the linear column is the angular column of the joint nearer to the base times the linear
-    column of the other.
-
-    Args:
-        columns: Jacobians in world, shape (N, 6, n).
-        rates: Joint velocities, shape (N, n).
-
-    Source: Haviland and Corke, A systematic approach to computing the manipulator Jacobian and Hessian using
-    the elementary transform sequence (2020), section 4.
-    """
-    moved = columns * rates[:, None, :]
-    linear, angular = moved[:, :3], moved[:, 3:]
-    spin = np.cumsum(angular, axis=2)
-    before = np.zeros_like(spin)
-    before[:, :, 1:] = spin[:, :, :-1]
-    bias = np.cross(spin + before, linear, axis=1), np.cross(before, angular, axis=1)
-    return np.asarray(np.concatenate(bias, axis=1).sum(axis=2))
-
-
-_FLAT = 1e-12  # a determinant of scaled rows, which are of the size 1, that is none
-_OUTSIDE = 1e-9  # of a scaled row: what a basis of dependent rows may leave out
-
-
-@frozen
-class Aspect:
-    """The sign of the determinant of the rows that joint rates must meet.
-
-    Attributes:
-        sign: 1 or -1; 0 where it cannot be told, as in a singular configuration.
-        basis: Of the rows where they depend on each other, as those of a planar arm do, shape (n, m).
-    """
-
-    sign: float
-    basis: Array
-
-    def changed(self, demand: ToolReference, poses: Array, rows: Array) -> NDArray[np.bool_]:
-        """Return where it is the other one, (N,), at tcp poses (N, 4, 4) with scaled rows (N, m, n)."""
-        if self.sign == 0:
-            return np.zeros(len(rows), dtype=bool)
-        return np.asarray(self.sign * _signs(_completed(demand, poses, rows), self.basis) < 0)
-
-
-NO_HAND = Aspect(0.0, np.empty((0, 0)))
-
-
-def aspect_of(demand: ToolReference, poses: Array, rows: Array) -> Aspect:
-    """Return the hand of one configuration, a batch of one.
-
-    Args:
-        demand: Of the tool there.
-        poses: Of the tcp, shape (1, 4, 4).
-        rows: Scaled, shape (1, m, n).
-    """
-    completed = _completed(demand, poses, rows)
-    basis = np.linalg.svd(completed[0])[0][:, : completed.shape[2]].T
-    return Aspect(float(_signs(completed, basis)[0]), basis)
-
-
-def _signs(rows: Array, basis: Array) -> Array:
-    if rows.shape[1] > rows.shape[2]:
-        square = basis @ rows
-        if np.abs(rows - basis.T @ square).max() > _OUTSIDE:
-            return np.zeros(len(rows))  # the rows span another space here: their bases do not compare
-        rows = square
-    values = np.linalg.det(rows)
-    return np.asarray(np.where(np.abs(values) > _FLAT, np.sign(values), 0.0))
-
-
-def _completed(demand: ToolReference, poses: Array, rows: Array) -> Array:
-    """Return the rows; the three of a direction are two, a column of the axis makes up for the third."""
-    if demand.orientation != "direction":
-        return rows
-    column = np.zeros((*rows.shape[:2], 1))
-    split = sum(demand.position)
-    column[:, split : split + 3, 0] = poses[:, :3, AXES.index(demand.tool_axis)]
-    return np.concatenate([rows, column], axis=2)
-
-
 ReferenceAt = Callable[[Array, Side], ToolReference]
 
 _ITERATIONS = 12
@@ -140,108 +38,149 @@ _LONGEST = 0.5  # rad, or arm lengths, in one step
 _ELSEWHERE = 0.25  # rad or m: joint values this far from the guess are on another branch
 _RANK = 1e-6  # of the largest singular value: directions with less are free
 _AROUND, _SPREAD = 4, 0.1  # configurations, rad or m: an arm is regular almost everywhere
+_FLAT = 1e-12  # a determinant of scaled rows, which are of the size 1, that is none
+_OUTSIDE = 1e-9  # of a scaled row: what a basis of dependent rows may leave out
 
 
 class LostError(ValueError):
     """No joint values near the guess meet the target.
 
     Attributes:
-        places: All places where that is so, ascending.
-        joints: The nearest that was found at the first of them, shape (n,).
+        s: All values where that is so, ascending, shape (K,).
+        joints: The nearest ones at the first of them, shape (n,).
         missed: By how much it misses there: m, rad.
     """
 
-    def __init__(self, places: Array, joints: Array, missed: tuple[float, float]) -> None:
-        super().__init__(f"no joint values meet the target at {places[0]!r}")
-        self.places = places
+    def __init__(self, s: Array, joints: Array, missed: tuple[float, float]) -> None:
+        super().__init__(f"no joint values meet the target at {s[0]!r}")
+        self.s = s
         self.joints = joints
         self.missed = missed
 
 
 @frozen
+class Aspect:
+    """A singularity-free component of the configurations: the sign of the determinant of the scaled rows.
+
+    Attributes:
+        sign: 1 or -1; 0 where it cannot be told, as in a singular configuration.
+        basis: Of the rows where they depend on each other, as those of a planar arm do, shape (n, m).
+    """
+
+    sign: float
+    basis: Array
+
+    def changed(self, reference: ToolReference, poses: Array, rows: Array) -> NDArray[np.bool_]:
+        """Return where the aspect is another one, (N,), at tcp poses (N, 4, 4) with scaled rows (N, m, n)."""
+        if self.sign == 0:
+            return np.zeros(len(rows), dtype=bool)
+        return np.asarray(self.sign * _signs(_completed(reference, poses, rows), self.basis) < 0)
+
+
+NO_ASPECT = Aspect(0.0, np.empty((0, 0)))
+
+
+@frozen
+class JointState:
+    """Joints at N values of s, and what was computed for them: checking a fit there needs it again.
+
+    Attributes:
+        values: Joint values and their first and second derivative, shape (3, N, n).
+        reference: Of the tool there.
+        target: Of that reference.
+        jacobians: In world, shape (N, 6, n).
+    """
+
+    values: Array
+    reference: ToolReference
+    target: IkTarget
+    jacobians: Array
+
+
+@frozen
 class Follower:
-    """An arm that follows a demand.
+    """An arm that follows a reference.
 
     Attributes:
         robot: The arm.
-        demands: The tool at places (N,) of the path, from one side of breaks.
+        reference_at: The reference of the tool at s (N,), from one side of breaks.
         start: Joint values at the beginning of the path, shape (n,).
-        held: Unit directions of joint values that are kept, shape (f, n).
-        hand: On which side of singular configurations the arm starts, and stays.
+        held: Unit directions of joint values that are held, shape (f, n).
+        aspect: In which the arm starts, and stays.
     """
 
     robot: Robot
-    demands: ReferenceAt
+    reference_at: ReferenceAt
     start: Array
     held: Array
-    hand: Aspect = NO_HAND
+    aspect: Aspect = NO_ASPECT
 
     @cached_property
     def length(self) -> float:
         """Length of the arm, m, by which positions are divided."""
         return characteristic_length(self.robot)
 
-    def exact(self, places: Array, side: Side, guess: Array) -> Array:
+    def exact(self, s: Array, side: Side, guess: Array) -> Array:
         """Return joint values and their first and second derivative, shape (3, N, n).
 
         Args:
-            places: Shape (N,).
+            s: Shape (N,).
             side: Which side of a break is meant.
             guess: Joint values nearby, shape (N, n).
 
         Raises:
             LostError: When no joint values near the guess meet the target.
         """
-        return self.solved(places, side, guess).values
+        return self.joint_state(s, side, guess).values
 
-    def solved(self, places: Array, side: Side, guess: Array) -> JointState:
-        """Return these values with what is known of the arm there.
+    def joint_state(self, s: Array, side: Side, guess: Array) -> JointState:
+        """Return these values with what was computed for them.
 
         Raises:
             LostError: As `exact`.
         """
-        demand = self.demands(places, side)
-        target = demand.target()
-        q, poses, columns, slopes = self._met(target, guess, places)
-        other = self.hand.changed(demand, poses, slopes)
-        if other.any():
-            first_other = int(np.flatnonzero(other)[np.argmin(places[other])])
-            raise LostError(np.sort(places[other]), q[first_other], (0.0, 0.0))
-        first = self._divided(slopes, self._scaled(demand.rates(), target))
-        bias = acceleration_bias(columns, first)
-        twist = (columns @ first[..., None])[..., 0]
-        second = self._divided(slopes, self._scaled(demand.accelerations(poses, bias, twist), target))
-        return JointState(np.stack([q, first, second]), demand, target, columns)
+        reference = self.reference_at(s, side)
+        target = reference.target()
+        q, poses, jacobians, slopes = self._solve_target(target, guess, s)
+        left = self.aspect.changed(reference, poses, slopes)
+        if left.any():
+            first_left = int(np.flatnonzero(left)[np.argmin(s[left])])
+            raise LostError(np.sort(s[left]), q[first_left], (0.0, 0.0))
+        first = self._solve_rows(slopes, self._scaled(reference.rates(), target))
+        bias = acceleration_bias(jacobians, first)
+        twist = (jacobians @ first[..., None])[..., 0]
+        second = self._solve_rows(slopes, self._scaled(reference.accelerations(poses, bias, twist), target))
+        return JointState(np.stack([q, first, second]), reference, target, jacobians)
 
-    def _met(self, target: IkTarget, guess: Array, places: Array) -> tuple[Array, Array, Array, Array]:
+    def _solve_target(self, target: IkTarget, guess: Array, s: Array) -> tuple[Array, Array, Array, Array]:
         """Return joint values (N, n) that meet the target, and there poses, Jacobians and scaled rows."""
         q, short = guess, False
         for iteration in range(_ITERATIONS + 1):
-            poses, columns = linearisation(self.robot, q)
-            slopes = self._rows(target, poses, columns)
+            poses, jacobians = linearisation(self.robot, q)
+            slopes = self._rows(target, poses, jacobians)
             differences = residuals(target, poses)
             errors = self._scaled(differences, target, (self.start - q) @ self.held.T)
             if short or iteration == _ITERATIONS:
                 break
-            step = self._divided(slopes, errors)
+            step = self._solve_rows(slopes, errors)
             q = q + np.clip(step, -_LONGEST, _LONGEST)
             short = bool((np.abs(step) <= _NEAR).all())
         size = np.abs(errors).max(axis=1)
         lost = ~(size <= _GOOD) | (np.abs(q - guess).max(axis=1) > _ELSEWHERE)
         if lost.any():
-            first = int(np.flatnonzero(lost)[np.argmin(places[lost])])
+            first = int(np.flatnonzero(lost)[np.argmin(s[lost])])
             split = sum(target.position)
             parts = differences[first, :split], differences[first, split:]
             missed = float(np.linalg.norm(parts[0])), float(np.linalg.norm(parts[1]))
-            raise LostError(np.sort(places[lost]), q[first], missed)
-        return q, poses, columns, slopes
+            raise LostError(np.sort(s[lost]), q[first], missed)
+        return q, poses, jacobians, slopes
 
-    def rows(self, demand: ToolReference, poses: Array, columns: Array) -> Array:
+    def rows(self, reference: ToolReference, poses: Array, jacobians: Array) -> Array:
         """Return the scaled rows (N, m + f, n) of tcp poses (N, 4, 4) and Jacobians (N, 6, n) in world."""
-        return self._rows(demand.target(), poses, columns)
+        return self._rows(reference.target(), poses, jacobians)
 
-    def _rows(self, target: IkTarget, poses: Array, columns: Array) -> Array:
-        rows = residual_jacobian(target, poses, columns)
+    def _rows(self, target: IkTarget, poses: Array, jacobians: Array) -> Array:
+        rows = residual_jacobian(target, poses, jacobians)
         rows[:, : sum(target.position)] /= self.length
         if not len(self.held):
             return rows
@@ -257,7 +196,7 @@ class Follower:
         return scaled
 
     @staticmethod
-    def _divided(slopes: Array, rates: Array) -> Array:
+    def _solve_rows(slopes: Array, rates: Array) -> Array:
         """Return the joint rates (N, n) that have the given rates of the rows (N, m)."""
         if slopes.shape[1] == slopes.shape[2]:
             try:
@@ -267,24 +206,81 @@ class Follower:
         return np.asarray((np.linalg.pinv(slopes, rcond=1e-12) @ rates[..., None])[..., 0])
 
 
-def follower(robot: Robot, demands: ReferenceAt, start: Array, place: float) -> Follower:
-    """Return the follower that begins in joint values `start` (n,) at a place of the path.
+def follower(robot: Robot, reference_at: ReferenceAt, start: Array, s: float) -> Follower:
+    """Return the follower that begins in joint values `start` (n,) at an s of the path.
 
     Args:
         robot: The arm.
-        demands: The tool along the path.
-        start: Joint values there, which meet the demand.
-        place: The beginning of the path.
+        reference_at: The reference of the tool along the path.
+        start: Joint values at s, which meet the reference.
+        s: The beginning of the path.
     """
-    bare = Follower(robot, demands, start, np.empty((0, start.size)))
-    demand = demands(np.array([place]), "right")
+    bare = Follower(robot, reference_at, start, np.empty((0, start.size)))
+    reference = reference_at(np.array([s]), "right")
     here = linearisation(robot, start[None])
     # sines of whole numbers are as good as random ones, and need no generator to be loaded
     spread = np.sin(np.arange(1, _AROUND * start.size + 1)).reshape(_AROUND, start.size)
     around = start + _SPREAD * spread
-    nearby = bare.rows(demands(np.full(_AROUND, place), "right"), *linearisation(robot, around))
+    nearby = bare.rows(reference_at(np.full(_AROUND, s), "right"), *linearisation(robot, around))
     values = np.linalg.svd(nearby, compute_uv=False)
     rank = int((values > _RANK * values[:, :1]).sum(axis=1).max())
-    _, _, right = np.linalg.svd(bare.rows(demand, *here)[0])
-    held = Follower(robot, demands, start, right[rank:])
-    return replace(held, hand=aspect_of(demand, here[0], held.rows(demand, *here)))
+    _, _, right = np.linalg.svd(bare.rows(reference, *here)[0])
+    held = Follower(robot, reference_at, start, right[rank:])
+    return replace(held, aspect=aspect_of(reference, here[0], held.rows(reference, *here)))
+
+
+def aspect_of(reference: ToolReference, poses: Array, rows: Array) -> Aspect:
+    """Return the aspect of one configuration, a batch of one.
+
+    Args:
+        reference: Of the tool there.
+        poses: Of the tcp, shape (1, 4, 4).
+        rows: Scaled, shape (1, m, n).
+    """
+    completed = _completed(reference, poses, rows)
+    basis = np.linalg.svd(completed[0])[0][:, : completed.shape[2]].T
+    return Aspect(float(_signs(completed, basis)[0]), basis)
+
+
+def _signs(rows: Array, basis: Array) -> Array:
+    """Return the signs (N,) of the determinants of rows (N, m, n), 0 where they cannot be told."""
+    if rows.shape[1] > rows.shape[2]:
+        square = basis @ rows
+        if np.abs(rows - basis.T @ square).max() > _OUTSIDE:
+            return np.zeros(len(rows))  # the rows span another space here: their bases do not compare
+        rows = square
+    values = np.linalg.det(rows)
+    return np.asarray(np.where(np.abs(values) > _FLAT, np.sign(values), 0.0))
+
+
+def _completed(reference: ToolReference, poses: Array, rows: Array) -> Array:
+    """Return the rows; the three of a direction are two, a column of the axis makes up for the third."""
+    if reference.orientation != "direction":
+        return rows
+    column = np.zeros((*rows.shape[:2], 1))
+    split = sum(reference.position)
+    column[:, split : split + 3, 0] = poses[:, :3, AXES.index(reference.tool_axis)]
+    return np.concatenate([rows, column], axis=2)
+
+
+def acceleration_bias(jacobians: Array, rates: Array) -> Array:
+    """Return the part of the tcp's acceleration that does not come from qdd, shape (N, 6).
+
+    A joint turns the columns of those behind it, and moves the tcp under the axes of those before it: either
+    way the change of the linear column is the angular column of the joint nearer to the base times the linear
+    column of the other.
+
+    Args:
+        jacobians: In world, shape (N, 6, n).
+        rates: Joint velocities, shape (N, n).
+
+    Source: Haviland and Corke, A systematic approach to computing the manipulator Jacobian and Hessian using
+    the elementary transform sequence (2020), section 4.
+    """
+    moved = jacobians * rates[:, None, :]
+    linear, angular = moved[:, :3], moved[:, 3:]
+    spin = np.cumsum(angular, axis=2)
+    before = np.zeros_like(spin)
+    before[:, :, 1:] = spin[:, :, :-1]
+    bias = np.cross(spin + before, linear, axis=1), np.cross(before, angular, axis=1)
+    return np.asarray(np.concatenate(bias, axis=1).sum(axis=2))

@@ -1,4 +1,4 @@
-"""What a move along a path tells its tool to do: for the planner that follows it, and for those who judge."""
+"""Motion of the tool over the time of a move: its path, its law, and its reference at any time."""
 
 from __future__ import annotations
 
@@ -19,41 +19,43 @@ class ToolMotion:
     """The tool over the time of a move.
 
     Attributes:
-        path: Where it goes; where segments overlap it is only near, and time alone says where it is.
-        law: s(t) from t = 0, m, or rad where the tool turns in its place.
-        timed: The demand at times (N,), derivatives by t; from one side of breaks.
+        path: Where it goes; where segments overlap only near it, and time alone says where it is.
+        law: s(t) from t = 0, m, or rad where the tool turns in place.
+        reference_at: The reference at times (N,), derivatives by t; from one side of breaks.
         breaks: Times at which a second derivative may jump, the ends included.
         tolerance: How near the joints' curve promises to be.
         in_place: Whether s is an angle.
-        ruled_by: "translation" or "rotation", whichever limits say how fast; None where a duration does.
+        ruled_by: "translation" or "rotation", whose limits determine the speed; None where a duration does.
     """
 
     path: ToolPath | None
     law: PiecewisePolynomial
-    timed: ReferenceAt
+    reference_at: ReferenceAt
     breaks: Array
     tolerance: Tolerance
     in_place: bool = False
     ruled_by: str | None = None
 
-    def demand(self, times: Array, side: Side = "right") -> ToolReference:
-        """Return what the tool is told at times (N,) from the start of the move."""
-        return self.timed(np.clip(times, self.law.start, self.law.end), side)
+    def reference(self, times: Array, side: Side = "right") -> ToolReference:
+        """Return the reference of the tool at times (N,) from the start of the move."""
+        return self.reference_at(np.clip(times, self.law.start, self.law.end), side)
 
     def scaled(self, factor: float) -> ToolMotion:
-        """Return the same way in `factor` times the time."""
-        timed = self.timed
+        """Return the same motion in `factor` times the time."""
+        reference_at = self.reference_at
 
         def slower(times: Array, side: Side) -> ToolReference:
-            demand = timed(np.clip(times / factor, self.law.start, self.law.end), side)
-            aims = demand.aims.copy()
+            reference = reference_at(np.clip(times / factor, self.law.start, self.law.end), side)
+            aims = reference.aims.copy()
             if aims.shape[1]:
                 aims[:, 1] /= factor
                 aims[:, 2] /= factor**2
-            return replace(demand, first=demand.first / factor, second=demand.second / factor**2, aims=aims)
+            return replace(
+                reference, first=reference.first / factor, second=reference.second / factor**2, aims=aims
+            )
 
         law = scale_time(self.law, factor)
-        return replace(self, law=law, timed=slower, breaks=self.breaks * factor)
+        return replace(self, law=law, reference_at=slower, breaks=self.breaks * factor)
 
 
 def motion_along(
@@ -70,12 +72,12 @@ def motion_along(
         law: s(t).
         law_breaks: Where a derivative of it jumps, the ends included.
         tolerance: How near the joints' curve promises to be.
-        ruled_by: Which limits say how fast.
+        ruled_by: Which limits determine the speed.
     """
-    passed = path.passed(law, law_breaks)
+    crossings = path.crossings(law, law_breaks)
 
-    def timed(times: Array, side: Side) -> ToolReference:
-        return path.by_time(law, times, side, passed)
+    def reference_at(times: Array, side: Side) -> ToolReference:
+        return path.at_time(law, times, side, crossings)
 
-    breaks = distinct(np.concatenate([law_breaks, passed]))
-    return ToolMotion(path, law, timed, breaks, tolerance, path.poses.in_place, ruled_by)
+    breaks = distinct(np.concatenate([law_breaks, crossings]))
+    return ToolMotion(path, law, reference_at, breaks, tolerance, path.poses.in_place, ruled_by)

@@ -1,4 +1,4 @@
-"""How near the joints' curve must come to what the tool is told to do."""
+"""Tolerance of a joint curve: the ratio of its error, of the joints and at the tool, to what is allowed."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.following.follower import Follower, JointState
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.joint_turns import revolute
-from trajcli.kinematics.inverse.target import IkTarget, residuals
+from trajcli.kinematics.inverse.target import IkTarget, closure_of
 
-_PROBES = 33  # places between neighbouring breaks, all together, at which the peaks are looked for
+_PROBES = 33  # values of s between breaks, all together, at which the peaks are looked for
 _RACING = 1e-8  # of what the fastest joint does: near a singularity rounding leaves no less at the tool
 _ASIDE = 0.1  # of the speed with which a point of the arm's length would go
 
@@ -39,11 +39,11 @@ class ToleranceRatio:
     """By how many times the tolerance joint values and their derivatives are off.
 
     Attributes:
-        follower: Knows what is exact.
+        follower: Gives the exact values.
         tolerance: What is allowed.
         joint_peaks: Largest first and second derivative of any joint of the same kind, shape (2, n), as far
             as they are known; where joints race there may be larger ones.
-        tool_peaks: Largest first and second derivative of the tool's place and orientation, shape (2, 2).
+        tool_peaks: Largest first and second derivative of the tool's position and orientation, shape (2, 2).
     """
 
     follower: Follower
@@ -51,23 +51,23 @@ class ToleranceRatio:
     joint_peaks: Array
     tool_peaks: Array
 
-    def __call__(self, known: JointState, rows: RowIndices, fitted: Array) -> Array:
-        """Return the misfit (K,) of fitted (3, K, n) from the exact values at some rows of what is known."""
-        exact, columns = known.values[:, rows], known.columns[rows]
-        off = fitted - exact
-        size = np.abs(off)
-        worst = np.maximum(
+    def __call__(self, state: JointState, rows: RowIndices, fitted: Array) -> Array:
+        """Return the ratio (K,) of fitted values and derivatives (3, K, n) at some rows of exact ones."""
+        exact, jacobians = state.values[:, rows], state.jacobians[rows]
+        error = fitted - exact
+        size = np.abs(error)
+        ratio = np.maximum(
             (size[0] / self._joint).max(axis=1),
-            (self._beside(known.target.rows(rows), fitted[0]) / self._tool).max(axis=1),
+            (self._tool_deviations(state.target.rows(rows), fitted[0]) / self._tool).max(axis=1),
         )
         for order in (1, 2):
             peaks = np.maximum(self.joint_peaks[order - 1], _by_kind(exact[order], self._turning))
-            worst = np.maximum(worst, (size[order] / (self._joint * peaks)).max(axis=1))
-            moved = (columns @ off[order][..., None])[..., 0]
+            ratio = np.maximum(ratio, (size[order] / (self._joint * peaks)).max(axis=1))
+            moved = (jacobians @ error[order][..., None])[..., 0]
             racing = np.abs(exact[order]).max(axis=1, keepdims=True) * self._racing
             allowed = self._tool * self.tool_peaks[order - 1] + racing
-            worst = np.maximum(worst, (_sizes(moved) / allowed).max(axis=1))
-        return np.asarray(worst)
+            ratio = np.maximum(ratio, (_sizes(moved) / allowed).max(axis=1))
+        return np.asarray(ratio)
 
     @cached_property
     def _turning(self) -> Flags:
@@ -85,29 +85,26 @@ class ToleranceRatio:
     def _racing(self) -> Array:
         return _RACING * np.array([self.follower.length, 1.0])
 
-    def _beside(self, target: IkTarget, joints: Array) -> Array:
+    def _tool_deviations(self, target: IkTarget, joints: Array) -> Array:
         """Return how far the tool is from its path, (K, 2), m and rad."""
-        off = residuals(target, forward(self.follower.robot, joints))
-        split = sum(target.position)
-        sizes = [np.linalg.norm(off[:, :split], axis=1), np.linalg.norm(off[:, split:], axis=1)]
-        return np.stack(sizes, axis=1)
+        return closure_of(target, forward(self.follower.robot, joints))
 
 
 def tolerance_ratio(follower: Follower, tolerance: Tolerance, breaks: Array, guess: Array) -> ToleranceRatio:
-    """Return the misfit, its peaks looked for between breaks.
+    """Return the tolerance ratio of an arm, its peaks looked for between breaks.
 
     Args:
-        follower: Knows what is exact.
+        follower: Gives the exact values.
         tolerance: What is allowed.
         breaks: Shape (m,), increasing.
-        guess: Joint values near the exact ones at the places `probes(breaks)`, shape (N, n).
+        guess: Joint values near the exact ones at `probes(breaks)`, shape (N, n).
     """
-    known = follower.solved(probes(breaks), "right", guess)
-    exact, turning = known.values, revolute(follower.robot)
+    state = follower.joint_state(probes(breaks), "right", guess)
+    exact, turning = state.values, revolute(follower.robot)
     duration = float(breaks[-1] - breaks[0])
     joint_peaks = np.stack([_by_kind(exact[order], turning) for order in (1, 2)])
-    rates = (known.columns @ exact[1][..., None])[..., 0]
-    tool_peaks = np.array([_sizes(part).max(axis=0) for part in (rates, known.demand.second)])
+    rates = (state.jacobians @ exact[1][..., None])[..., 0]
+    tool_peaks = np.array([_sizes(part).max(axis=0) for part in (rates, state.reference.second)])
     for row in tool_peaks:  # what the tool does not do is measured by what it does
         row[:] = (
             max(row[0], _ASIDE * row[1] * follower.length),
@@ -131,7 +128,7 @@ def _by_kind(rates: Array, turning: Flags) -> Array:
 
 
 def probes(breaks: Array) -> Array:
-    """Return places between breaks, shape (N,)."""
+    """Return values of s between breaks, shape (N,)."""
     each = max(3, -(-_PROBES // (breaks.size - 1)))
     inner = (np.arange(each) + 0.5) / each
     return np.asarray((breaks[:-1, None] + np.diff(breaks)[:, None] * inner).reshape(-1))

@@ -1,7 +1,4 @@
-"""The way of the tool, and what it demands of the joints at every place and at every time.
-
-What a moving tool demands of the joints: where it is, how fast, and how that changes.
-"""
+"""Tool path, and the reference that it gives the tool: pose, twist and acceleration at any s or time."""
 
 from __future__ import annotations
 
@@ -15,19 +12,23 @@ from trajcli.geometry.paths.pose import PosePath
 from trajcli.geometry.rotation import AXES, AxisName
 from trajcli.kinematics.inverse.target import IkTarget, OrientationConstraint
 
+_AT_BREAK = 1e-12  # of the length: an s this near to a break is at it
+_BESIDE = 1e-13  # of the length: how far before or after a break the tool is that is not at it
+_SAME_TIME = 1e-12  # of the duration: a time this close to a break's is that time
+_MERGED = 1e-9  # of the duration: breaks this close to each other are one
 _LEVEL = 1e-12  # of a unit vector, squared: the heading of a vertical axis is not defined
 
 
 @frozen
 class ToolReference:
-    """The tool at N places of its path: what it fixes, and the first and second derivative of that.
+    """The tool at N values of s or of the time: what is fixed of it, and the first two derivatives of that.
 
     Attributes:
         poses: Shape (N, 4, 4), T_world_tcp; what is not fixed does not matter.
         first: Shape (N, 6), (v, w) at the tcp in world; m and rad per unit of the parameter.
         second: Shape (N, 6), its derivative.
         position: Which of x, y and z in world are fixed.
-        orientation: What is fixed of the orientation, as in `Target`.
+        orientation: What is fixed of the orientation, as in `IkTarget`.
         tool_axis: Which axis of the tcp is meant by direction, yaw and pitch.
         aims: Yaw or pitch with two derivatives, shape (N, 3), rad; (N, 0) otherwise.
     """
@@ -64,22 +65,22 @@ class ToolReference:
             return self._joined(linear, self.second[:, 3:] - bias[:, 3:])
         spin = twist[:, 3:]
         axis = poses[:, :3, AXES.index(self.tool_axis)]
-        swing = np.cross(spin, axis)
-        drift = np.cross(bias[:, 3:], axis) + np.cross(spin, swing)  # of the axis' second derivative
+        axis_rate = np.cross(spin, axis)
+        drift = np.cross(bias[:, 3:], axis) + np.cross(spin, axis_rate)  # of the axis' second derivative
         if self.orientation == "direction":
             wanted = self._axis_acceleration()
             return self._joined(linear, np.cross(axis, wanted - drift))
-        return self._joined(linear, self._angle_acceleration(axis, swing, drift)[:, None])
+        return self._joined(linear, self._angle_acceleration(axis, axis_rate, drift)[:, None])
 
-    def _angle_acceleration(self, axis: Array, swing: Array, drift: Array) -> Array:
+    def _angle_acceleration(self, axis: Array, axis_rate: Array, drift: Array) -> Array:
         """Return what is left of the second derivative of yaw or pitch, shape (N,)."""
         level = np.maximum(np.square(axis[:, :2]).sum(axis=1), _LEVEL)
-        level_rate = 2 * (axis[:, :2] * swing[:, :2]).sum(axis=1)
+        level_rate = 2 * (axis[:, :2] * axis_rate[:, :2]).sum(axis=1)
         if self.orientation == "yaw":
             drifted = (axis[:, 0] * drift[:, 1] - axis[:, 1] * drift[:, 0]) / level
             return np.asarray(self.aims[:, 2] - drifted + self.aims[:, 1] * level_rate / level)
         root = np.sqrt(level)
-        steeper = swing[:, 2] * level_rate / (2 * level * root)
+        steeper = axis_rate[:, 2] * level_rate / (2 * level * root)
         return np.asarray(self.aims[:, 2] - drift[:, 2] / root + steeper)
 
     def _turning_rates(self) -> Array:
@@ -100,12 +101,6 @@ class ToolReference:
         return np.concatenate(parts if self.orientation == "none" else [*parts, turning], axis=1)
 
 
-_AT_BREAK = 1e-12  # of the length: a place this near to a break is at it
-_BESIDE = 1e-13  # of the length: how far before or after a break the tool is that is not at it
-_THEN = 1e-12  # of the duration: a time this close to a break's is that time
-_ONE_TIME = 1e-9  # of the duration: breaks this close to each other are one
-
-
 @frozen
 class ToolPath:
     """Poses along a path, and which of their coordinates count.
@@ -115,7 +110,7 @@ class ToolPath:
         position: Which of x, y and z in world are fixed.
         orientation: What is fixed of the orientation.
         tool_axis: Which axis of the tcp is meant by direction, yaw and pitch.
-        turns: Changes of yaw or pitch over the segments of the path, rad; empty for other kinds.
+        angle_changes: Of yaw or pitch over the segments of the path, rad; empty for other kinds.
         progress: How far each of these segments is done; None for a single one.
     """
 
@@ -123,38 +118,38 @@ class ToolPath:
     position: tuple[bool, bool, bool]
     orientation: OrientationConstraint
     tool_axis: AxisName = "z"
-    turns: tuple[float, ...] = ()
+    angle_changes: tuple[float, ...] = ()
     progress: SegmentProgress | None = None
 
     @property
     def length(self) -> float:
-        """How far s goes, m, or rad where the place rests."""
+        """End of s, m, or rad where the position rests."""
         return self.poses.length
 
     @property
     def breaks(self) -> Array:
-        """Places where a second derivative may jump, the ends included."""
+        """Values of s where a second derivative may jump, the ends included."""
         return np.concatenate([[0.0], self.poses.breaks, [self.length]])
 
-    def by_place(self, places: Array, side: Side) -> ToolReference:
-        """Return the demand at places (N,), derivatives by s."""
-        places = self._onto_breaks(np.asarray(places))
-        return self._demand(places, side, np.ones(places.size), np.zeros(places.size))
+    def at_s(self, s: Array, side: Side) -> ToolReference:
+        """Return the reference at s (N,), derivatives by s."""
+        s = self._onto_breaks(np.asarray(s))
+        return self._reference(s, side, np.ones(s.size), np.zeros(s.size))
 
-    def by_time(self, law: PiecewisePolynomial, times: Array, side: Side, passed: Array) -> ToolReference:
-        """Return the demand at times (N,) of a law s(t), derivatives by t.
+    def at_time(self, law: PiecewisePolynomial, times: Array, side: Side, crossings: Array) -> ToolReference:
+        """Return the reference at times (N,) of a law s(t), derivatives by t.
 
         Args:
             law: s(t).
             times: Within the law's.
             side: Which side of a break is meant.
-            passed: Shape (k,): when the law passes the inner breaks of the path.
+            crossings: Shape (k,): when the law passes the inner breaks of the path.
         """
         rates = law.evaluate_orders(np.asarray(times), (0, 1, 2), side=side)[:, :, 0]
-        places = self._passing(rates[:, 0], times, passed, _THEN * law.duration)
-        return self._demand(places, side, rates[:, 1], rates[:, 2])
+        s = self._keep_sides(rates[:, 0], times, crossings, _SAME_TIME * law.duration)
+        return self._reference(s, side, rates[:, 1], rates[:, 2])
 
-    def passed(self, law: PiecewisePolynomial, breaks: Array) -> Array:
+    def crossings(self, law: PiecewisePolynomial, breaks: Array) -> Array:
         """Return when a law s(t) passes the inner breaks of the path, (k,): at a break of its own if it can.
 
         Args:
@@ -164,35 +159,35 @@ class ToolPath:
         inner = self.poses.breaks
         if not inner.size:
             return inner
-        places, times = law.evaluate(breaks)[:, 0], times_at(law, inner)
-        away = np.abs(inner[:, None] - places)
+        s, times = law.evaluate(breaks)[:, 0], times_at(law, inner)
+        away = np.abs(inner[:, None] - s)
         own = breaks[away.argmin(axis=1)]
         late = np.abs(times - own)
-        same = (late <= _ONE_TIME * law.duration) | (away.min(axis=1) <= _AT_BREAK * self.length)
+        same = (late <= _MERGED * law.duration) | (away.min(axis=1) <= _AT_BREAK * self.length)
         return np.where(same, own, times)
 
-    def _onto_breaks(self, places: Array) -> Array:
-        places = np.clip(places, 0.0, self.length)
+    def _onto_breaks(self, s: Array) -> Array:
+        s = np.clip(s, 0.0, self.length)
         inner = self.poses.breaks
         if not inner.size:
-            return places
-        nearest = inner[np.abs(places[:, None] - inner).argmin(axis=1)]
-        return np.where(np.abs(places - nearest) <= _AT_BREAK * self.length, nearest, places)
+            return s
+        nearest = inner[np.abs(s[:, None] - inner).argmin(axis=1)]
+        return np.where(np.abs(s - nearest) <= _AT_BREAK * self.length, nearest, s)
 
-    def _passing(self, places: Array, times: Array, passed: Array, same: float) -> Array:
-        """Return places (N,) on the side of each break on which their times are.
+    def _keep_sides(self, s: Array, times: Array, crossings: Array, same: float) -> Array:
+        """Return s (N,) on the side of each break on which their times are.
 
         A law that stops at a break is so near to it for some time that rounding would mix up the sides.
         """
         edges = np.concatenate([[-np.inf], self.poses.breaks, [np.inf]])
         gap = _BESIDE * self.length
-        before, after = (np.searchsorted(passed + shift, times, "right") for shift in (same, -same))
+        before, after = (np.searchsorted(crossings + shift, times, "right") for shift in (same, -same))
         low = np.where(before < after, edges[after], edges[before] + gap)
         high = np.where(before < after, edges[after], edges[before + 1] - gap)
-        return np.clip(np.clip(places, low, high), 0.0, self.length)
+        return np.clip(np.clip(s, low, high), 0.0, self.length)
 
-    def _demand(self, places: Array, side: Side, speed: Array, acceleration: Array) -> ToolReference:
-        poses, first, second = self.poses.evaluate(places, side)
+    def _reference(self, s: Array, side: Side, speed: Array, acceleration: Array) -> ToolReference:
+        poses, first, second = self.poses.evaluate(s, side)
         rate, change = speed[:, None], acceleration[:, None]
         return ToolReference(
             poses,
@@ -201,23 +196,25 @@ class ToolPath:
             self.position,
             self.orientation,
             self.tool_axis,
-            self._aims(places, side, speed, acceleration),
+            self._aims(s, side, speed, acceleration),
         )
 
-    def _aims(self, places: Array, side: Side, speed: Array, acceleration: Array) -> Array:
+    def _aims(self, s: Array, side: Side, speed: Array, acceleration: Array) -> Array:
         if self.orientation not in ("yaw", "pitch"):
-            return np.zeros((places.size, 0))
-        begins = self.begins(self.poses.evaluate(np.zeros(1))[0][0], self.orientation, self.tool_axis)
-        done = (self.progress or SegmentProgress.even(self.length)).at(places, side)
-        turns = np.append(self.turns, 0.0)
-        before = np.concatenate([[0.0], np.cumsum(self.turns)])[done.segment]
-        both = turns[np.stack([done.segment, done.segment + 1])]
+            return np.zeros((s.size, 0))
+        initial_angle = self.angle_of(
+            self.poses.evaluate(np.zeros(1))[0][0], self.orientation, self.tool_axis
+        )
+        done = (self.progress or SegmentProgress.even(self.length)).at(s, side)
+        angle_changes = np.append(self.angle_changes, 0.0)
+        before = np.concatenate([[0.0], np.cumsum(self.angle_changes)])[done.segment]
+        both = angle_changes[np.stack([done.segment, done.segment + 1])]
         value, slope, bend = ((rows * both).sum(axis=0) for rows in (done.value, done.slope, done.bend))
         second = bend * speed**2 + slope * acceleration
-        return np.stack([begins + before + value, slope * speed, second], axis=1)
+        return np.stack([initial_angle + before + value, slope * speed, second], axis=1)
 
     @staticmethod
-    def begins(pose: Array, orientation: OrientationConstraint, tool_axis: AxisName) -> float:
+    def angle_of(pose: Array, orientation: OrientationConstraint, tool_axis: AxisName) -> float:
         """Return the yaw or the pitch of a pose (4, 4), rad."""
         axis = pose[:3, AXES.index(tool_axis)]
         if orientation == "yaw":

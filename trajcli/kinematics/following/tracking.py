@@ -1,4 +1,8 @@
-"""The first, coarse joint curve along a path: from place to place, each predicted from the last."""
+"""Branch tracking by continuation: the first, coarse joint curve along a path.
+
+Every step predicts the joint values from the derivatives at its beginning and corrects them by Newton's
+method; its length follows from how far off the prediction was.
+"""
 
 from __future__ import annotations
 
@@ -9,16 +13,16 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, horner
 from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.following.follower import Follower, LostError
 
-_FIRST = 1 / 8  # of the first stretch between breaks
-_LOOKS = np.array([0.2, 0.5, 0.8])  # of a stretch: where it is asked how fast the tool moves
-_STILL = 1e-9  # lengths of the arm and rad: a stretch with less is done at once
+_FIRST = 1 / 8  # of the first interval between breaks
+_PROBES = np.array([0.2, 0.5, 0.8])  # of an interval: where the speed of the tool is looked at
+_STILL = 1e-9  # lengths of the arm and rad: an interval with less is one step
 _SAME = 1e-6  # of the largest: a derivative with less does not jump at a break
 _SIDES: tuple[Side, Side] = ("left", "right")
-_REST = 0.7  # of what is left of a stretch: with a longer step it is done at once
-_SURE = 0.15  # rad or m: a prediction that is off by more may have led to another branch
-_BULGE = 10.0  # times that a curve through both ends of a step is to be nearer than a prediction from one
+_WHOLE = 0.7  # of what is left of an interval: a longer step takes all of it
+_JUMPED = 0.15  # rad or m: a prediction that is off by more may have led to another branch
+_BULGE = 10.0  # how many times nearer a curve through both ends of a step shall be than a prediction
 _AIM = 0.05  # rad or m by which predictions may be off
-_SHORTEST = 1e-6  # of the path: where so little a step is not sure, the joints race
+_SHORTEST = 1e-6  # of the path: where so short a step fails, the joints race
 _ORDER = 3  # of the error of the prediction, in the step
 
 
@@ -26,15 +30,15 @@ class StuckError(ValueError):
     """The joints cannot be followed any further.
 
     Attributes:
-        place: How far the path could be followed.
+        s: How far the path could be followed.
         joints: Joint values there, shape (n,).
         rates: Their derivative along the path there, shape (n,).
         lost: Why the next step failed, where no joint values met the target; None where they jumped.
     """
 
-    def __init__(self, place: float, joints: Array, rates: Array, lost: LostError | None) -> None:
-        super().__init__(f"the joints cannot be followed beyond {place!r}")
-        self.place = place
+    def __init__(self, s: float, joints: Array, rates: Array, lost: LostError | None) -> None:
+        super().__init__(f"the joints cannot be followed beyond {s!r}")
+        self.s = s
         self.joints = joints
         self.rates = rates
         self.lost = lost
@@ -51,51 +55,51 @@ def track_branch(follower: Follower, breaks: Array) -> PiecewisePolynomial:
         StuckError: When the joints cannot be followed to the end.
     """
     shortest = _SHORTEST * float(breaks[-1] - breaks[0])
-    nodes, pieces, paces = [float(breaks[0])], [], _paces(follower, breaks)
-    motion = float(breaks[1] - breaks[0]) * _FIRST * float(paces[0])
+    nodes, pieces, speeds = [float(breaks[0])], [], _speeds(follower, breaks)
+    travel = float(breaks[1] - breaks[0]) * _FIRST * float(speeds[0])
     state = _exact(follower, breaks[:1], "right", follower.start[None])[:, 0]
-    turns = _turns(follower, breaks)
-    for end, pace, turned in zip(breaks[1:].tolist(), paces.tolist(), turns.tolist(), strict=True):
-        place = nodes[-1]
-        if turned:
-            state = _exact(follower, np.array([place]), "right", state[:1])[:, 0]
-        while place < end:
-            step = end - place if motion > _REST * (end - place) * pace else motion / pace
+    jumps = _jumps(follower, breaks)
+    for end, speed, jump in zip(breaks[1:].tolist(), speeds.tolist(), jumps.tolist(), strict=True):
+        s = nodes[-1]
+        if jump:
+            state = _exact(follower, np.array([s]), "right", state[:1])[:, 0]
+        while s < end:
+            step = end - s if travel > _WHOLE * (end - s) * speed else travel / speed
             try:
-                reached, off = _tried(follower, place, step, state)
+                exact, deviation = _attempt(follower, s, step, state)
                 lost = None
             except LostError as error:
-                off, lost = np.inf, error
-            if off > _SURE:
-                motion = 0.3 * step * pace
+                deviation, lost = np.inf, error
+            if deviation > _JUMPED:
+                travel = 0.3 * step * speed
                 if 0.3 * step < shortest:
-                    raise StuckError(place, state[0], state[1], lost)
+                    raise StuckError(s, state[0], state[1], lost)
                 continue
-            middle, last = reached[:, 0], reached[:, 1]
+            middle, last = exact[:, 0], exact[:, 1]
             pieces += [
                 hermite_coefficients(*ends, np.array(0.5 * step))
                 for ends in ((state, middle), (middle, last))
             ]
-            half = place + 0.5 * step
-            place = end if step == end - place else place + step
-            nodes += [half, place]
+            half = s + 0.5 * step
+            s = end if step == end - s else s + step
+            nodes += [half, s]
             state = last
-            most = max(3.0, motion / (step * pace))
-            motion = step * pace * float(np.clip((_AIM / max(off, 1e-12)) ** (1 / _ORDER), 0.5, most))
+            most = max(3.0, travel / (step * speed))
+            travel = step * speed * float(np.clip((_AIM / max(deviation, 1e-12)) ** (1 / _ORDER), 0.5, most))
     return PiecewisePolynomial(np.array(nodes), np.stack(pieces, axis=1))
 
 
-def _paces(follower: Follower, breaks: Array) -> Array:
-    """Return how fast the tool moves and turns in each stretch (m - 1,), in lengths of the arm and rad."""
-    inner = (breaks[:-1, None] + np.diff(breaks)[:, None] * _LOOKS).reshape(-1)
-    rates = follower.demands(inner, "right").first / np.repeat([follower.length, 1.0], 3)
-    paces = np.abs(rates).sum(axis=1).reshape(-1, _LOOKS.size).max(axis=1)
-    return np.asarray(np.maximum(paces, _STILL / np.diff(breaks)))
+def _speeds(follower: Follower, breaks: Array) -> Array:
+    """Return how fast the tool moves and turns in each interval (m - 1,), in lengths of the arm and rad."""
+    inner = (breaks[:-1, None] + np.diff(breaks)[:, None] * _PROBES).reshape(-1)
+    rates = follower.reference_at(inner, "right").first / np.repeat([follower.length, 1.0], 3)
+    speeds = np.abs(rates).sum(axis=1).reshape(-1, _PROBES.size).max(axis=1)
+    return np.asarray(np.maximum(speeds, _STILL / np.diff(breaks)))
 
 
-def _turns(follower: Follower, breaks: Array) -> Flags:
-    """Return for each stretch (m - 1,) whether a derivative of the demand jumps where it begins."""
-    left, right = (follower.demands(breaks[1:-1], side) for side in _SIDES)
+def _jumps(follower: Follower, breaks: Array) -> Flags:
+    """Return for each interval (m - 1,) whether a derivative of the reference jumps where it begins."""
+    left, right = (follower.reference_at(breaks[1:-1], side) for side in _SIDES)
     jumps = np.zeros(breaks.size - 2, dtype=bool)
     for name in ("first", "second", "aims"):
         one, other = getattr(left, name), getattr(right, name)
@@ -103,23 +107,23 @@ def _turns(follower: Follower, breaks: Array) -> Flags:
     return np.append(False, jumps)
 
 
-def _tried(follower: Follower, place: float, step: float, state: Array) -> tuple[Array, float]:
-    """Return what is exact half a step and a step further, (3, 2, n), and how far off the guesses of it were.
+def _attempt(follower: Follower, s: float, step: float, state: Array) -> tuple[Array, float]:
+    """Return what is exact half a step and a step further, (3, 2, n), and the deviation of the predictions.
 
-    Half a step further the curve between the ends of the step is a guess too: the joints may race there.
+    Half a step further the curve between the ends of the step is a prediction too: the joints may race there.
     """
     further = step * np.array([[0.5], [1.0]])
     predicted = state[0] + further * (state[1] + 0.5 * further * state[2])
-    reached = _exact(follower, place + further[:, 0], "left", predicted)
-    between = horner(hermite_coefficients(state, reached[:, 1], np.array(step)), np.array(0.5 * step))
-    off = float(np.abs(reached[0] - predicted).max())
-    return reached, max(off, _BULGE * float(np.abs(between - reached[0, 0]).max()))
+    exact = _exact(follower, s + further[:, 0], "left", predicted)
+    between = horner(hermite_coefficients(state, exact[:, 1], np.array(step)), np.array(0.5 * step))
+    deviation = float(np.abs(exact[0] - predicted).max())
+    return exact, max(deviation, _BULGE * float(np.abs(between - exact[0, 0]).max()))
 
 
-def _exact(follower: Follower, places: Array, side: Side, guess: Array) -> Array:
+def _exact(follower: Follower, s: Array, side: Side, guess: Array) -> Array:
     """Return joint values and two derivatives (3, N, n)."""
-    values = follower.exact(places, side, guess)
+    values = follower.exact(s, side, guess)
     broken = ~np.isfinite(values).all(axis=(0, 2))
     if broken.any():
-        raise LostError(places[broken], guess[broken][0], (0.0, 0.0))
+        raise LostError(s[broken], guess[broken][0], (0.0, 0.0))
     return values

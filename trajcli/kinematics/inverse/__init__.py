@@ -1,1 +1,1 @@
-"""Inverse kinematics: one file a closed-form family, one numeric solver, one list of them. numpy only."""
+"""Inverse kinematics: closed forms by family, a numeric solver, partial targets, self-motions. numpy only."""

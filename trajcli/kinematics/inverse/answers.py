@@ -1,4 +1,4 @@
-"""Answers of a flat batch while they are worked on, and how well they meet their targets."""
+"""Candidates of a flat batch on their way to solutions: their residuals, their names, Newton refinement."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ _NEAR = 1e-5  # m and rad: further off, a branch does not exist and is left wher
 
 @dataclass(eq=False)
 class Answers:
-    """Answers; joints come first, poses last.
+    """Answers. One row is one joint for all poses, as the closed forms give it: the poses are the last axis.
 
     Attributes:
-        method: How they were found.
+        method: How they were computed.
         joints: Shape (n, branches, N), with the turns chosen where nothing is suspect.
         closure: Shape (2, branches, N), m and rad.
         valid: Shape (branches, N).
         suspect: Shape (N,): poses whose answers may be singular or repeat each other.
-        free: Shape (n,): joints that are free in every answer, whatever its family; the rest is to be found.
-        freedom: How many motions of the joints the targets leave free where the arm is not singular.
-        closed: Whether a closed form found them.
+        free: Shape (n,): joints that are free in every answer; others are found where a pose is suspect.
+        freedom: How many self-motions the targets leave where the arm is not singular.
+        closed_form: Whether a closed form computed them.
     """
 
     method: IkMethod
@@ -43,11 +43,11 @@ class Answers:
     suspect: Flags
     free: Flags
     freedom: int
-    closed: bool
+    closed_form: bool
 
 
 def joined(parts: Sequence[Answers]) -> Answers:
-    """Return answers of several blocks, found in one way, as those of one batch."""
+    """Return answers of several blocks by one method as those of one batch."""
     joints, closure, valid, suspect = (
         np.concatenate([getattr(part, name) for part in parts], axis=-1)
         for name in ("joints", "closure", "valid", "suspect")
@@ -55,27 +55,27 @@ def joined(parts: Sequence[Answers]) -> Answers:
     return replace(parts[0], joints=joints, closure=closure, valid=valid, suspect=suspect)
 
 
-def by_name(found: Answers, own: NDArray[np.intp], names: Sequence[Branch]) -> Answers:
+def by_name(answers: Answers, name_of: NDArray[np.intp], names: Sequence[Branch]) -> Answers:
     """Return answers in columns by name, at least one for each.
 
     Args:
-        found: Answers in any order.
-        own: Shape (branches, N): which name each valid answer has; -1 for the others.
+        answers: In any order.
+        name_of: Shape (branches, N): index of the name of each valid answer; -1 for the others.
         names: What they are called.
     """
     columns, taken = [], []
     for index in range(len(names)):
-        mine = own == index
+        mine = name_of == index
         most = max(1, int(np.count_nonzero(mine, axis=0).max(initial=0)))
         order = np.argsort(~mine, axis=0, kind="stable")[:most]
         taken.append((order, np.take_along_axis(mine, order, axis=0)))
         columns += [index] * len(order)
     order = np.concatenate([some for some, _ in taken])
     valid: Flags = np.concatenate([some for _, some in taken])
-    joints: Array = np.take_along_axis(found.joints, order[None], axis=1)
-    closure: Array = np.take_along_axis(found.closure, order[None], axis=1)
-    method = replace(found.method, labels=tuple(names[index] for index in columns))
-    return replace(found, method=method, joints=joints, closure=closure, valid=valid)
+    joints: Array = np.take_along_axis(answers.joints, order[None], axis=1)
+    closure: Array = np.take_along_axis(answers.closure, order[None], axis=1)
+    method = replace(answers.method, labels=tuple(names[index] for index in columns))
+    return replace(answers, method=method, joints=joints, closure=closure, valid=valid)
 
 
 def closures(robot: Robot, target: IkTarget, joints: Array) -> Array:
@@ -87,31 +87,31 @@ def closures(robot: Robot, target: IkTarget, joints: Array) -> Array:
 
 
 def rough(miss: Array) -> Flags:
-    """Return which answers rounding keeps from their targets, by how far they are away, m or rad."""
+    """Return which answers only rounding keeps from their targets, by how far they are away, m or rad."""
     return np.asarray((miss > _ROUNDED) & (miss < _NEAR))
 
 
 def polish(
-    robot: Robot, target: IkTarget, joints: Array, closure: Array, watched: Flags, rows: NDArray[np.intp]
+    robot: Robot, target: IkTarget, joints: Array, closure: Array, degenerate: Flags, rows: NDArray[np.intp]
 ) -> None:
     """Take rounding away from joints (n, branches, N) and closure (2, branches, N), in place.
 
     Args:
         robot: The arm.
         target: A flat batch of N.
-        joints: What a closed form found.
-        closure: How far it is from the targets.
-        watched: Shape (N,): poses where two branches fall together, and are taken further.
-        rows: The poses that have a `rough` answer, or are watched.
+        joints: Of a closed form.
+        closure: How far they are from the targets.
+        degenerate: Shape (N,): poses where two branches coincide, and are refined further.
+        rows: The poses that have a `rough` answer, or are degenerate.
     """
     near = closure[:, :, rows]
     miss = np.maximum(near[0], near[1])
-    poor = rough(miss) | (watched[rows] & (near[0] < _NEAR) & (miss > _EXACT))
-    branches, places = np.nonzero(poor)
-    if len(places):
-        poses = rows[places]
+    poor = rough(miss) | (degenerate[rows] & (near[0] < _NEAR) & (miss > _EXACT))
+    branches, columns = np.nonzero(poor)
+    if len(columns):
+        poses = rows[columns]
         some = target.rows(poses)
         better = refine(robot, some, joints[:, branches, poses].T)
         joints[:, branches, poses] = better.T
-        watched[poses] = True  # it may have moved onto its neighbour
+        degenerate[poses] = True  # it may have moved onto its neighbour
         closure[:, branches, poses] = closure_of(some, forward(robot, better)).T

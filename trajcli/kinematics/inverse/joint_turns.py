@@ -1,4 +1,4 @@
-"""Which turn of a joint is meant: angles are found modulo a full turn, limits and neighbours decide.
+"""Angle wrapping: the choice between full turns of a joint by its limits and by the nearest configuration.
 
 A value counts as inside while it is within `limit * (1 + 1e-9) + 1e-12`, as everywhere.
 """
@@ -40,9 +40,9 @@ def choose_turns(robot: Robot, joints: Array, near: Array | None, within: float 
 
     Args:
         robot: The arm.
-        joints: What is moved.
+        joints: What is moved; one row is one joint.
         near: Joint values.
-        within: How far from zero no revolute joint is, rad: a joint with wide limits is not even looked at.
+        within: Bound of the revolute joints' absolute values, rad: spares those with wider limits the search.
     """
     wide = widened(robot.limits.position)
     for i in np.flatnonzero(revolute(robot)):
@@ -54,10 +54,11 @@ def choose_turns(robot: Robot, joints: Array, near: Array | None, within: float 
         outside |= values > np.minimum(high, aim + np.pi)
         if outside.any():
             aims = np.broadcast_to(aim, values.shape)[outside]
-            values[outside] = _turned(values[outside], aims, low, high)
+            values[outside] = _wrapped(values[outside], aims, low, high)
 
 
-def _turned(values: Array, aims: Array, low: float, high: float) -> Array:
+def _wrapped(values: Array, aims: Array, low: float, high: float) -> Array:
+    """Return values (K,) in the turn nearest to their aims inside the limits, or with the smallest excess."""
     first, last = np.ceil((low - values) / FULL), np.floor((high - values) / FULL)
     wanted = np.round((aims - values) / FULL)
     inside = np.minimum(np.maximum(wanted, first), last)

@@ -1,23 +1,22 @@
-"""Inverse kinematics of any chain: damped Newton steps from many seeds, all seeds of all targets at once.
+"""Numeric inverse kinematics of any chain: damped Newton steps from many seeds of all targets at once.
 
 Every step solves (J^T J + m I) dq = J^T e for all running rows together, with the damping m = |e|^2 / 2: it
 vanishes with the error, so that the end is quadratic, and keeps steps short where the arm is singular. With
-more joints than coordinates the same step is J^T (J J^T + m I)^-1 e, which turns no joint in vain. Lengths
-are divided by the arm's characteristic length.
+more joints than coordinates the same step is J^T (J J^T + m I)^-1 e, the shortest one. Lengths are divided by
+the arm's characteristic length.
 
-An arm with as many joints as coordinates has finitely many answers: limits do not enter the search, and
-every answer that some seed finds is kept. Nothing proves that none is missing: an xArm 6 lacked one in about
-one pose of a hundred with 64 seeds, hence 192. An arm with more joints has a family of answers: each joint is
-held inside its limits while searching, and the answers nearest to the given configuration are kept.
+An arm with as many joints as coordinates has finitely many solutions: limits do not enter the search, and
+every solution that some seed leads to is kept. Nothing proves that none is missing: an xArm 6 lacked one in
+about one pose of a hundred with 64 seeds, hence 192. An arm with more joints has self-motion manifolds: each
+joint is held inside its limits while searching.
+
+At a singular pose a closed form takes one point of the manifold before it knows whether the joints that come
+after can follow: a UR with its wrist aligned may reach the pose with some turns of joint 6 and not with
+others. Solutions lost so are recovered by search, from the given configuration; where no branch is valid,
+from all seeds.
 
 Source: Sugihara, Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method, IEEE Trans.
 Robotics 27 (2011).
-
-Answers that a closed form misses where it is singular, found by search and put in free places.
-
-At a singular pose a closed form takes one member of the family before it knows whether the joints that come
-after can follow: a UR with its wrist aligned may reach the pose with some turns of joint 6 and not with
-others. The search starts from the given configuration; where no branch is valid, from all seeds.
 """
 
 from __future__ import annotations
@@ -34,28 +33,29 @@ from trajcli.kinematics.inverse.target import IkTarget, residual_jacobian, resid
 from trajcli.kinematics.jacobian import linearisation
 from trajcli.kinematics.robot import Robot
 
-SEEDS = 64  # where any answer of a family will do
-SEEDS_OF_ALL = 192  # where all answers are wanted: with 64 one pose in a hundred lacks one
-ROUNDS = 3  # of seeds, for targets that found nothing; the last one disregards limits
+SEEDS = 64  # where any point of a manifold will do
+SEEDS_OF_ALL = 192  # where all solutions are wanted: with 64 one pose in a hundred lacks one
+ROUNDS = 3  # of seeds, for targets that no seed met; the last one disregards limits
 _BLOCK = 128  # targets at a time, so that memory does not grow with their number
 ITERATIONS = 60
 DONE = 1e-13  # of the scaled error: a few roundings
 _FLOOR = 1e-13  # damping that keeps an exactly singular system solvable
 _LONGEST = 1.0  # rad, or arm lengths, a joint goes in one step
-SAME = 1e-6  # rad or m, within which two answers are one
+SAME = 1e-6  # rad or m, within which two solutions are one
+_TAKEN = 1e6  # rad or m: branches that are not valid come before those that are
 
 
 @frozen
 class SearchResult:
-    """What the search found for a flat batch.
+    """Where the seeds of a flat batch have led to.
 
     Attributes:
         joints: Shape (N, seeds, n), turns not chosen yet.
-        found: Shape (N, seeds), whether a row met its target.
+        met: Shape (N, seeds), whether a row met its target.
     """
 
     joints: Array
-    found: Flags
+    met: Flags
 
 
 def linearised(robot: Robot, target: IkTarget, q: Array) -> tuple[Array, Array]:
@@ -110,14 +110,14 @@ def descend(robot: Robot, target: IkTarget, q: Array, bounds: Array | None) -> t
         q: The seeds.
         bounds: Limits (n, 2) that hold the joints while searching; None for none.
     """
-    result, found = q.copy(), np.zeros(len(q), dtype=bool)
+    result, met = q.copy(), np.zeros(len(q), dtype=bool)
     running = np.arange(len(q))
     for _ in range(ITERATIONS):
         values = result[running]
         errors, slopes = linearised(robot, target.rows(running), values)
         square = np.square(errors).sum(axis=1)
         done = square <= DONE**2
-        found[running[done]] = True
+        met[running[done]] = True
         running, values = running[~done], values[~done]
         if not len(running):
             break
@@ -125,27 +125,27 @@ def descend(robot: Robot, target: IkTarget, q: Array, bounds: Array | None) -> t
         longest = np.abs(step).max(axis=1, keepdims=True)
         values = values + step * np.minimum(1.0, _LONGEST / np.maximum(longest, _LONGEST))
         result[running] = values if bounds is None else np.clip(values, bounds[:, 0], bounds[:, 1])
-    return result, found
+    return result, met
 
 
 def search(robot: Robot, target: IkTarget, near: Array | None) -> SearchResult:
-    """Return what all seeds find for flat targets (N); `near` (N, n) is the first seed where given."""
+    """Return where all seeds lead to for flat targets (N); `near` (N, n) is the first seed where given."""
     count, joints = target.poses.shape[0], len(robot.joints)
     seeds = SEEDS if joints > target.coordinates else SEEDS_OF_ALL
-    result, found = np.zeros((count, seeds, joints)), np.zeros((count, seeds), dtype=bool)
+    result, met = np.zeros((count, seeds, joints)), np.zeros((count, seeds), dtype=bool)
     for low in range(0, count, _BLOCK):
         block = np.arange(low, min(low + _BLOCK, count))
         some = _search_block(robot, target.rows(block), None if near is None else near[block], seeds)
-        result[block], found[block] = some.joints, some.found
-    return SearchResult(result, found)
+        result[block], met[block] = some.joints, some.met
+    return SearchResult(result, met)
 
 
 def _search_block(robot: Robot, target: IkTarget, near: Array | None, seeds: int) -> SearchResult:
     count, joints = target.poses.shape[0], len(robot.joints)
     bounds = robot.limits.position if joints > target.coordinates else None
-    result, found = np.zeros((count, seeds, joints)), np.zeros((count, seeds), dtype=bool)
+    result, met = np.zeros((count, seeds, joints)), np.zeros((count, seeds), dtype=bool)
     for attempt in range(ROUNDS):
-        missing = np.flatnonzero(~found.any(axis=1))
+        missing = np.flatnonzero(~met.any(axis=1))
         if not len(missing):
             break
         if attempt == ROUNDS - 1:
@@ -154,10 +154,10 @@ def _search_block(robot: Robot, target: IkTarget, near: Array | None, seeds: int
         if near is not None:
             starts[:, 0] = near[missing]
         pairs = np.repeat(missing, seeds)
-        values, met = descend(robot, target.rows(pairs), starts.reshape(-1, joints), bounds)
+        values, hits = descend(robot, target.rows(pairs), starts.reshape(-1, joints), bounds)
         result[missing] = values.reshape(-1, seeds, joints)
-        found[missing] = met.reshape(-1, seeds)
-    return SearchResult(result, found)
+        met[missing] = hits.reshape(-1, seeds)
+    return SearchResult(result, met)
 
 
 def starting_points(robot: Robot, seeds: int, attempt: int) -> Array:
@@ -166,9 +166,9 @@ def starting_points(robot: Robot, seeds: int, attempt: int) -> Array:
     A joint without limits is spread over a full turn, a slide over the arm's length.
     """
     turning = revolute(robot)
-    reach = np.where(turning, np.pi, characteristic_length(robot))
+    unlimited = np.where(turning, np.pi, characteristic_length(robot))
     low, high = robot.limits.position.T
-    low, high = np.where(np.isfinite(low), low, -reach), np.where(np.isfinite(high), high, reach)
+    low, high = np.where(np.isfinite(low), low, -unlimited), np.where(np.isfinite(high), high, unlimited)
     wide = turning & (high - low > FULL)
     low, high = np.where(wide, -np.pi, low), np.where(wide, np.pi, high)
     generator = np.random.default_rng(attempt)
@@ -195,23 +195,20 @@ def distinct(robot: Robot, joints: Array, usable: Flags, within: float = SAME) -
     return keep
 
 
-_LAST = 1e6  # rad or m: free places come before taken ones
-
-
 def recover_lost_solutions(
     robot: Robot, target: IkTarget, joints: Array, valid: Flags, singular: Flags, near: Array | None
 ) -> bool:
-    """Put answers that are missing into `joints` (N, branches, n) and mark them in `valid`, both in place.
+    """Put solutions that are missing into `joints` (N, branches, n) and mark them in `valid`, both in place.
 
-    An answer takes the place of the branch that is not valid and comes nearest to it, so that it keeps that
-    branch's name; where all are valid, of the nearest other member of a family.
+    A solution replaces the nearest branch that is not valid, and has its name; where all are valid, the
+    nearest one that is singular, and so stands for another point of a self-motion manifold.
 
     Args:
         robot: The arm.
         target: A flat batch of N, the suspect poses.
         joints: Shape (N, branches, n).
         valid: Shape (N, branches).
-        singular: Shape (N, branches): which valid ones belong to a family.
+        singular: Shape (N, branches): which valid ones have a self-motion.
         near: Shape (N, n); None for none.
 
     Returns:
@@ -219,26 +216,27 @@ def recover_lost_solutions(
     """
     changed = False
     if near is not None:
-        answers, met = descend(robot, target, near, None)
-        changed |= _place(robot, joints, valid, singular, (np.flatnonzero(met), answers[met]))
+        values, met = descend(robot, target, near, None)
+        changed |= _insert(robot, joints, valid, singular, (np.flatnonzero(met), values[met]))
     rows = np.flatnonzero(~valid.any(axis=1))
     if len(rows):
-        found = search(robot, target.rows(rows), None)
-        for answer in range(found.joints.shape[1]):
-            some = found.found[:, answer]
-            changed |= _place(robot, joints, valid, singular, (rows[some], found.joints[some, answer]))
+        result = search(robot, target.rows(rows), None)
+        for seed in range(result.joints.shape[1]):
+            some = result.met[:, seed]
+            changed |= _insert(robot, joints, valid, singular, (rows[some], result.joints[some, seed]))
     return changed
 
 
-def _place(
-    robot: Robot, joints: Array, valid: Flags, singular: Flags, answers: tuple[NDArray[np.intp], Array]
+def _insert(
+    robot: Robot, joints: Array, valid: Flags, singular: Flags, solutions: tuple[NDArray[np.intp], Array]
 ) -> bool:
-    rows, values = answers
+    """Put solutions (rows (K,), joints (K, n)) in, in place; return whether any was new."""
+    rows, values = solutions
     gap = joints[rows] - values[:, None]
     gap = np.abs(np.where(revolute(robot), gap - FULL * np.round(gap / FULL), gap)).max(axis=-1)
     known = (valid[rows] & (gap <= SAME)).any(axis=1)
     fixed = valid[rows] & ~singular[rows]
-    cost = np.where(fixed, np.inf, gap + np.where(valid[rows], _LAST, 0.0))
+    cost = np.where(fixed, np.inf, gap + np.where(valid[rows], _TAKEN, 0.0))
     branch = np.argmin(cost, axis=1)
     new = ~known & ~fixed.all(axis=1)
     joints[rows[new], branch[new]] = values[new]

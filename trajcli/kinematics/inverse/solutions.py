@@ -1,6 +1,6 @@
-"""All answers of inverse kinematics over a batch of targets.
+"""Solutions of inverse kinematics over a batch of targets, and the feasibility of a target.
 
-What stands in the way of a target: out of reach, by how much, or in reach only outside the limits.
+A target is infeasible where it is out of reach, by some distance, or in reach only outside the limits.
 """
 
 from __future__ import annotations
@@ -22,16 +22,17 @@ class Solutions:
     """Every branch of every target.
 
     Attributes:
-        method: How they were found.
+        method: How they were computed.
         joints: Shape (*batch, branches, n), rad or m. Where a branch is not valid, the configuration that
             comes near the target on that branch.
         valid: Shape (*batch, branches): the tcp meets the target within the tolerance, and no earlier branch
             is the same configuration. Limits do not enter.
         closure: Shape (*batch, branches, 2): how far forward kinematics is from the target, m and rad.
-        singular: Shape (*batch, branches): the arm can move there in more ways than the target leaves free
+        singular: Shape (*batch, branches): the arm has more self-motions there than the target leaves
             elsewhere.
-        free: Shape (*batch, branches, n): the joints that are free together, because the arm is singular or
-            because the target leaves them free. The member nearest to the given configuration is in `joints`.
+        free: Shape (*batch, branches, n): the joints that take part in self-motions, because the arm is
+            singular or because the target leaves them free. `joints` is the point of the self-motion manifold
+            nearest to the given configuration.
         bounds: Position limits, shape (n, 2).
         fixed_axis: The axis of the tool that the targets mean, if no joint turns it.
     """
@@ -69,7 +70,7 @@ class Solutions:
     def shortfall(self) -> Array:
         """How far the nearest branch stays away, shape (*batch, 2), m and rad; zero where one is valid.
 
-        The wrist of a closed form then stands where it can come nearest to its aim, with the orientation met.
+        A closed form then brings the wrist as near to its aim as it can, with the orientation met.
         """
         size = np.where(np.isfinite(self.closure), self.closure, np.inf).sum(axis=-1)
         best = np.asarray(np.argmin(size, axis=-1))[..., None, None]
@@ -116,17 +117,17 @@ class OutsideLimits:
     value: float
 
 
-def least_violation(found: Solutions, index: tuple[int, ...] = ()) -> OutsideLimits | None:
+def least_violation(solutions: Solutions, index: tuple[int, ...] = ()) -> OutsideLimits | None:
     """Return the valid branch of one target whose worst joint is the least outside; None where one is inside.
 
     Args:
-        found: Of any batch.
+        solutions: Of any batch.
         index: Which target of the batch.
 
     Raises:
         ValueError: When no branch of the target is valid.
     """
-    valid, excess = found.valid[index], found.excess[index]
+    valid, excess = solutions.valid[index], solutions.excess[index]
     if not valid.any():
         raise ValueError("the target has no valid branch")
     worst = np.where(valid, np.abs(excess).max(axis=-1), np.inf)
@@ -134,50 +135,53 @@ def least_violation(found: Solutions, index: tuple[int, ...] = ()) -> OutsideLim
     if worst[branch] == 0.0:
         return None
     joint = int(np.argmax(np.abs(excess[branch])))
-    value = float(found.joints[(*index, branch, joint)])
+    value = float(solutions.joints[(*index, branch, joint)])
     return OutsideLimits(branch, joint, float(excess[branch, joint]), value)
 
 
-def check_reachable(robot: Robot, found: Solutions) -> None:
+def check_reachable(robot: Robot, solutions: Solutions) -> None:
     """Do nothing when every target of a batch has a branch within the limits.
 
     Raises:
         PlanningError: For the first target that has none: by how much it is out of reach, or which joint is
             outside its limits, and by how much.
     """
-    missing = np.argwhere(~found.within_limits.any(axis=-1))
+    missing = np.argwhere(~solutions.within_limits.any(axis=-1))
     if not len(missing):
         return
     index = tuple(int(i) for i in missing[0])
     which = f" (number {', '.join(map(str, index))} of the batch, from 0)" if index else ""
-    if not found.valid[index].any():
-        metres, radians = found.shortfall[index].tolist()
+    if not solutions.valid[index].any():
+        metres, radians = solutions.shortfall[index].tolist()
         raise PlanningError(
             f"{robot.name} cannot reach the pose{which}: "
             f"it comes within {metres:.6g} m and {round(radians, 12):.6g} rad",
-            hint=_way_out(found),
+            hint=_hint_for(solutions),
         )
-    raise PlanningError(_problem(robot, found, index, which))
+    raise PlanningError(_problem(robot, solutions, index, which))
 
 
-def _way_out(found: Solutions) -> str:
+def _hint_for(solutions: Solutions) -> str:
     """Return what would make a pose reachable."""
-    if found.fixed_axis is not None:
-        return f"no joint turns the {found.fixed_axis} axis of the tool: mean another one, with `tool_axis`"
+    if solutions.fixed_axis is not None:
+        return (
+            f"no joint turns the {solutions.fixed_axis} axis of the tool: mean another one, with `tool_axis`"
+        )
     return "move the target, or leave coordinates of its orientation free"
 
 
-def _problem(robot: Robot, found: Solutions, index: tuple[int, ...], which: str) -> Problem:
-    nearest = least_violation(found, index)
+def _problem(robot: Robot, solutions: Solutions, index: tuple[int, ...], which: str) -> Problem:
+    """Return what keeps a target that is met only outside the limits from being met inside."""
+    nearest = least_violation(solutions, index)
     if nearest is None:
         raise ValueError("the target has a branch within the limits")
-    low, high = found.bounds[nearest.joint].tolist()
+    low, high = solutions.bounds[nearest.joint].tolist()
     limit = high if nearest.excess > 0.0 else low
     name = robot.joint_names[nearest.joint]
     amounts = {"value": nearest.value, "limit": limit, "excess": abs(nearest.excess)}
     return Problem(
         f"{robot.name} reaches the pose{which} only outside the limits: "
-        f"the nearest of {int(found.count[index])} answers "
+        f"the nearest of {int(solutions.count[index])} answers "
         f"has {name} at {{value}}, its limit is {{limit}}, {{excess}} too far",
         hint="move the target, or choose another tool or base",
         joint=name,

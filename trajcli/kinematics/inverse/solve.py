@@ -1,4 +1,4 @@
-"""Every answer of inverse kinematics: the way from a robot and its targets to `Solutions`."""
+"""Inverse kinematics: every solution of a robot for its targets, by closed form or by search."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from trajcli.kinematics.inverse.numeric import SAME, distinct, recover_lost_solu
 from trajcli.kinematics.inverse.self_motion import (
     freedom_of,
     nearest_on_self_motions,
-    one_of_each,
+    one_per_self_motion,
     self_motions,
 )
 from trajcli.kinematics.inverse.solutions import Solutions
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 TOLERANCE = 1e-9  # m and rad: what a branch may miss its target by
 _LAST = 1e6  # rad or m: sorts answers outside the limits behind all others
 _KEPT = 16  # answers of a numeric search that are kept, the nearest
-_SAME_MEMBER = 1e-3  # rad or m: nearest members of families that are no further apart are one
+_SAME_POINT = 1e-3  # rad or m: nearest points of self-motion manifolds that are no further apart are one
 
 
 def solve(
@@ -45,9 +45,9 @@ def solve(
 
     Args:
         robot: Its base, tool and limits count.
-        target: Poses T_world_tcp (*batch, 4, 4), or a `Target` that fixes fewer coordinates.
-        near: Joint values (*batch, n) or (n,), which decide between full turns of a joint, between members of
-            a family, and between the answers of a redundant arm; zero if absent.
+        target: Poses T_world_tcp (*batch, 4, 4), or an `IkTarget` that fixes fewer coordinates.
+        near: Joint values (*batch, n) or (n,), which decide between full turns of a joint, between points of
+            a self-motion manifold, and between the solutions of a redundant arm; zero if absent.
         tolerance: What a valid branch may miss its target by, m and rad.
 
     Raises:
@@ -56,44 +56,49 @@ def solve(
     """
     if not tolerance > 0.0:
         raise InputError(f"the tolerance must be positive, it is {tolerance:.6g}")
-    wanted = target if isinstance(target, IkTarget) else pose_target(target)
-    arm, flat = axis_geometry(robot), wanted.flat()
-    close_to = _near(robot, near, wanted.batch)
-    stuck = flat.orientation in ("direction", "yaw", "pitch") and _is_stuck(robot, arm, flat)
-    found = _find(robot, arm, flat, close_to, tolerance)
-    singular, free = _resolve(robot, flat, found, close_to, tolerance)
-    arrays = (found.joints, found.closure, free, found.valid[None], singular[None])
-    joints, closure, freed, valid, lost = (_batch_first(array, wanted.batch) for array in arrays)
-    bounds, fixed = robot.limits.position, flat.tool_axis if stuck else None
-    return Solutions(found.method, joints, valid[..., 0], closure, lost[..., 0], freed, bounds, fixed)
+    targets = target if isinstance(target, IkTarget) else pose_target(target)
+    arm, flat = axis_geometry(robot), targets.flat()
+    nearby = _near(robot, near, targets.batch)
+    unturned = flat.orientation in ("direction", "yaw", "pitch") and _is_unturned(robot, arm, flat)
+    answers = _answers(robot, arm, flat, nearby, tolerance)
+    singular, free = _resolve_suspects(robot, flat, answers, nearby, tolerance)
+    # all are (n, branches, N); the closure (2, branches, N), flags (1, branches, N)
+    by_joint = (answers.joints, answers.valid[None], answers.closure, singular[None], free)
+    joints, valid, closure, is_singular, is_free = (_batch_first(array, targets.batch) for array in by_joint)
+    bounds, fixed = robot.limits.position, flat.tool_axis if unturned else None
+    return Solutions(
+        answers.method, joints, valid[..., 0], closure, is_singular[..., 0], is_free, bounds, fixed
+    )
 
 
-def _find(robot: Robot, arm: AxisGeometry, target: IkTarget, near: Array | None, tolerance: float) -> Answers:
+def _answers(
+    robot: Robot, arm: AxisGeometry, target: IkTarget, near: Array | None, tolerance: float
+) -> Answers:
     """Return the answers of the method that fits the arm and the targets."""
     method = method_for(robot)
     if method.solve is None:
-        return _searched(robot, method, target, near, tolerance)
+        return _by_search(robot, method, target, near, tolerance)
     if fits(method, target, robot.base):
-        return _closed(robot, arm, method, target, near, tolerance)
+        return _by_closed_form(robot, arm, method, target, near, tolerance)
     from trajcli.kinematics.inverse.partial_targets import Postures, by_postures
 
     if method.needs == "pose":
-        start = np.zeros((len(target.poses), len(arm.lines))) if near is None else near
-        found = by_postures(robot, arm, method, target, start, tolerance)
-        if found is not None:
-            return found
-    found = _searched(robot, numeric_instead(method, target), target, near, tolerance)
-    return _named(found, Postures(robot, arm, method, 1, target.tool_axis))
+        start = np.zeros((len(target.poses), len(arm.axes))) if near is None else near
+        answers = by_postures(robot, arm, method, target, start, tolerance)
+        if answers is not None:
+            return answers
+    answers = _by_search(robot, numeric_instead(method, target), target, near, tolerance)
+    return _with_names(answers, Postures(robot, arm, method, 1, target.tool_axis))
 
 
-def _named(found: Answers, postures: Postures) -> Answers:
-    """Return the answers of a search by the branches that the closed form knows for their whole poses."""
-    columns, rows = np.nonzero(found.valid)
-    own = np.full(found.valid.shape, -1)
+def _with_names(answers: Answers, postures: Postures) -> Answers:
+    """Return the answers of a search sorted by the branches of the closed form for their whole poses."""
+    columns, rows = np.nonzero(answers.valid)
+    branch = np.full(answers.valid.shape, -1)
     if len(rows):
-        answers = found.joints[:, columns, rows].T
-        own[columns, rows] = postures.branch(answers, forward(postures.robot, answers))[0]
-    return by_name(found, own, postures.method.branches)
+        joints = answers.joints[:, columns, rows].T
+        branch[columns, rows] = postures.branch(joints, forward(postures.robot, joints))[0]
+    return by_name(answers, branch, postures.method.branches)
 
 
 def _batch_first(array: NDArray[Any], batch: tuple[int, ...]) -> NDArray[Any]:
@@ -126,68 +131,72 @@ def _near(robot: Robot, near: ArrayLike | None, batch: tuple[int, ...]) -> Array
     return np.broadcast_to(values, (*batch, values.shape[-1])).reshape(-1, values.shape[-1])
 
 
-def _is_stuck(robot: Robot, arm: AxisGeometry, target: IkTarget) -> bool:
+def _is_unturned(robot: Robot, arm: AxisGeometry, target: IkTarget) -> bool:
     """Return whether no joint turns the tool axis that a target means.
 
     Raises:
         InputError: When its yaw is asked for, and it is always vertical.
     """
-    from trajcli.kinematics.inverse.tool_axis import fixed_axis, never_heads
+    from trajcli.kinematics.inverse.tool_axis import always_vertical, fixed_axis
 
-    stuck = fixed_axis(arm, target.tool_axis)
-    if stuck and target.orientation == "yaw" and never_heads(arm, target.tool_axis):
+    unturned = fixed_axis(arm, target.tool_axis)
+    if unturned and target.orientation == "yaw" and always_vertical(arm, target.tool_axis):
         others = " or ".join(axis for axis in AXES if axis != target.tool_axis)
         raise InputError(
             f"the {target.tool_axis} axis of the tool of {robot.name} is always vertical and has no yaw",
             hint=f"say which axis of the tool heads there, with `tool_axis: {others}`",
         )
-    return stuck
+    return unturned
 
 
-def _closed(
+def _by_closed_form(
     robot: Robot, arm: AxisGeometry, method: IkMethod, target: IkTarget, near: Array | None, tolerance: float
 ) -> Answers:
     count = len(target.poses)
     valid, poor = np.zeros((len(method.branches), count), dtype=bool), np.zeros(count, dtype=bool)
 
-    def settle(rows: slice, joints: Array, closure: Array) -> None:
+    def on_block(rows: slice, joints: Array, closure: Array) -> None:
         if not target.whole:
             closure[:] = closures(robot, target.rows(rows), joints)
         miss = np.maximum(closure[0], closure[1])
         valid[:, rows], poor[rows] = miss <= tolerance, rough(miss).any(axis=0)
         choose_turns(robot, joints, None if near is None else near[rows].T, np.pi)
 
-    raw = candidates(robot, arm, method, target.poses, settle)
-    joints, closure, watched = raw.joints, raw.gaps, raw.watched
-    rows = np.flatnonzero(poor | watched)
+    raw = candidates(robot, arm, method, target.poses, on_block)
+    joints, closure, degenerate = raw.joints, raw.residuals, raw.degenerate
+    rows = np.flatnonzero(poor | degenerate)
     if len(rows):
-        polish(robot, target, joints, closure, watched, rows)
+        polish(robot, target, joints, closure, degenerate, rows)
         valid[:, rows] = closure[:, :, rows].max(axis=0) <= tolerance
     missed = np.flatnonzero(~valid.any(axis=0))
     if len(missed):
         closure[..., missed] = closures(robot, target.rows(missed), joints[..., missed])
-    return Answers(method, joints, closure, valid, watched, np.zeros(len(joints), dtype=bool), 0, closed=True)
+    return Answers(
+        method, joints, closure, valid, degenerate, np.zeros(len(joints), dtype=bool), 0, closed_form=True
+    )
 
 
-def _searched(
+def _by_search(
     robot: Robot, method: IkMethod, target: IkTarget, near: Array | None, tolerance: float
 ) -> Answers:
-    """Return the nearest answers that a search finds; of families their nearest members."""
-    search_result, freedom = search(robot, target, near), freedom_of(robot, target)
-    joints = np.ascontiguousarray(np.moveaxis(search_result.joints, 0, -1).swapaxes(0, 1))
-    valid = search_result.found.T & (closures(robot, target, joints).max(axis=0) <= tolerance)
+    """Return the nearest answers of a search; of self-motion manifolds their nearest points."""
+    searched, freedom = search(robot, target, near), freedom_of(robot, target)
+    # from (N, seeds, n) to (n, seeds, N), and from (N, seeds) to (seeds, N)
+    joints = np.ascontiguousarray(np.moveaxis(searched.joints, 0, -1).swapaxes(0, 1))
+    valid = searched.met.T & (closures(robot, target, joints).max(axis=0) <= tolerance)
     choose_turns(robot, joints, None if near is None else near.T)
     aim = np.zeros((len(target.poses), len(joints))) if near is None else near
     within = SAME
     if freedom:
         seeds, rows = np.nonzero(valid)
-        members = nearest_on_self_motions(robot, target.rows(rows), joints[:, seeds, rows].T, aim[rows])
-        joints[:, seeds, rows], within = members.T, _SAME_MEMBER
+        moved = nearest_on_self_motions(robot, target.rows(rows), joints[:, seeds, rows].T, aim[rows])
+        joints[:, seeds, rows], within = moved.T, _SAME_POINT
     closure = closures(robot, target, joints)
     valid &= closure.max(axis=0) <= tolerance
     outside = (beyond(joints.T, robot.limits.position) != 0.0).any(axis=-1).T
-    way = np.abs(joints - aim.T[:, None])
-    cost = (np.square(way).sum(axis=0) if freedom else way.max(axis=0)) + np.where(outside, _LAST, 0.0)
+    distance = np.abs(joints - aim.T[:, None])
+    cost = np.square(distance).sum(axis=0) if freedom else distance.max(axis=0)
+    cost = cost + np.where(outside, _LAST, 0.0)
     order = np.argsort(np.where(valid, cost, 2 * _LAST + closure.sum(axis=0)), axis=0, kind="stable")
     joints, valid = _ordered(joints, order), _ordered(valid, order)
     valid = distinct(robot, joints.transpose(2, 1, 0), valid.T, within).T
@@ -198,8 +207,8 @@ def _searched(
         _ordered(_ordered(closure, order), last),
         _ordered(valid, last),
     )
-    every, free = np.ones(valid.shape[1], dtype=bool), np.zeros(len(joints), dtype=bool)
-    return Answers(method, joints, closure, valid, every, free, freedom, closed=False)
+    suspect, free = np.ones(valid.shape[1], dtype=bool), np.zeros(len(joints), dtype=bool)
+    return Answers(method, joints, closure, valid, suspect, free, freedom, closed_form=False)
 
 
 def _ordered(array: NDArray[Any], order: NDArray[np.intp]) -> NDArray[Any]:
@@ -207,58 +216,61 @@ def _ordered(array: NDArray[Any], order: NDArray[np.intp]) -> NDArray[Any]:
     return np.take_along_axis(array, order.reshape(*(1,) * (array.ndim - 2), *order.shape), axis=-2)
 
 
-def _resolve(
-    robot: Robot, target: IkTarget, found: Answers, near: Array | None, tolerance: float
+def _resolve_suspects(
+    robot: Robot, target: IkTarget, answers: Answers, near: Array | None, tolerance: float
 ) -> tuple[Flags, Flags]:
-    """Find the families of suspect poses, move to their nearest members, drop repetitions, choose turns.
+    """Find the self-motions of suspect poses, move along them, drop repetitions, choose turns; in place.
 
-    Where the targets leave some freedom the members are the nearest ones already.
+    Where the targets leave some freedom the answers are the nearest points already. Return what is singular
+    (branches, N) and which joints are free (n, branches, N).
     """
-    singular, free = np.zeros(found.valid.shape, dtype=bool), np.zeros(found.joints.shape, dtype=bool)
-    if found.free.any():
-        free[:] = found.free[:, None, None] & found.valid
-    suspects = np.flatnonzero(found.suspect)
+    singular, free = np.zeros(answers.valid.shape, dtype=bool), np.zeros(answers.joints.shape, dtype=bool)
+    if answers.free.any():
+        free[:] = answers.free[:, None, None] & answers.valid
+    suspects = np.flatnonzero(answers.suspect)
     if not len(suspects):
         return singular, free
-    some, close_to = target.rows(suspects), None if near is None else near[suspects]
-    before = found.joints[:, :, suspects].transpose(2, 1, 0)
-    joints, valid = before.copy(), found.valid[:, suspects].T.copy()
-    lost, freed = _families(robot, some, joints, valid, found.freedom, close_to)
+    some, nearby = target.rows(suspects), None if near is None else near[suspects]
+    # from here (suspects, branches, n) and (suspects, branches): poses first, joints last
+    before = answers.joints[:, :, suspects].transpose(2, 1, 0)
+    joints, valid = before.copy(), answers.valid[:, suspects].T.copy()
+    some_singular, some_free = _self_motions_of(robot, some, joints, valid, answers.freedom, nearby)
     valid = distinct(robot, joints, valid)
     if (
-        found.closed
-        and not found.freedom
-        and recover_lost_solutions(robot, some, joints, valid, lost, close_to)
+        answers.closed_form
+        and not answers.freedom
+        and recover_lost_solutions(robot, some, joints, valid, some_singular, nearby)
     ):
-        lost, freed = _families(robot, some, joints, valid, 0, close_to)
+        some_singular, some_free = _self_motions_of(robot, some, joints, valid, 0, nearby)
     if (joints != before).any():
         closure = closures(robot, some, joints.transpose(2, 1, 0))
         valid = distinct(robot, joints, valid & (closure.max(axis=0) <= tolerance).T)
-        found.closure[:, :, suspects] = closure
-    if found.closed:
-        valid = one_of_each(robot, joints, valid, freed, close_to)
-    choose_turns(robot, joints.transpose(2, 1, 0), None if close_to is None else close_to.T)
-    found.joints[:, :, suspects], found.valid[:, suspects] = joints.transpose(2, 1, 0), valid.T
-    singular[:, suspects], free[:, :, suspects] = (lost & valid).T, freed.transpose(2, 1, 0)
+        answers.closure[:, :, suspects] = closure
+    if answers.closed_form:
+        valid = one_per_self_motion(robot, joints, valid, some_free, nearby)
+    choose_turns(robot, joints.transpose(2, 1, 0), None if nearby is None else nearby.T)
+    answers.joints[:, :, suspects], answers.valid[:, suspects] = joints.transpose(2, 1, 0), valid.T
+    singular[:, suspects], free[:, :, suspects] = (some_singular & valid).T, some_free.transpose(2, 1, 0)
     return singular, free
 
 
-def _families(
+def _self_motions_of(
     robot: Robot, target: IkTarget, joints: Array, valid: Flags, freedom: int, near: Array | None
 ) -> tuple[Flags, Flags]:
-    """Return what is singular (N, branches) of valid joints (N, branches, n), and what is free.
+    """Return what is singular (N, branches) of valid joints (N, branches, n), and which joints are free.
 
-    Singular ones of targets that leave no freedom elsewhere are moved, in place, to their nearest members.
+    Singular ones of targets that leave no freedom elsewhere are moved, in place, to the nearest points of
+    their manifolds.
     """
-    lost, freed = np.zeros(valid.shape, dtype=bool), np.zeros(joints.shape, dtype=bool)
-    rows, places = np.nonzero(valid)
+    singular, free = np.zeros(valid.shape, dtype=bool), np.zeros(joints.shape, dtype=bool)
+    rows, branches = np.nonzero(valid)
     if not len(rows):
-        return lost, freed
-    known = self_motions(robot, target.rows(rows), joints[rows, places], freedom)
-    lost[rows, places], freed[rows, places] = known.singular, known.free
+        return singular, free
+    known = self_motions(robot, target.rows(rows), joints[rows, branches], freedom)
+    singular[rows, branches], free[rows, branches] = known.singular, known.free
     if near is not None and not freedom and known.singular.any():
-        rows, places = rows[known.singular], places[known.singular]
-        joints[rows, places] = nearest_on_self_motions(
-            robot, target.rows(rows), joints[rows, places], near[rows]
+        rows, branches = rows[known.singular], branches[known.singular]
+        joints[rows, branches] = nearest_on_self_motions(
+            robot, target.rows(rows), joints[rows, branches], near[rows]
         )
-    return lost, freed
+    return singular, free

@@ -1,4 +1,4 @@
-"""What the tcp shall reach: a whole pose, or fewer than six of its coordinates.
+"""Targets of inverse kinematics: whole poses, or fewer than six of their coordinates, and their residuals.
 
 A target is met where its residuals vanish. They are the differences from the tcp's pose to the target in
 world: of the fixed coordinates of the position, m, and of what is fixed of the orientation, rad.
@@ -113,17 +113,17 @@ def partial_target(
     named = {name: np.asarray(value, dtype=np.float64) for name, value in given.items() if value is not None}
     if len(named) > 1:
         raise InputError(f"a target has one kind of orientation, not {' and '.join(named)}")
-    place = None if position is None else np.asarray(position, dtype=np.float64)
-    _check(place, named)
+    xyz = None if position is None else np.asarray(position, dtype=np.float64)
+    _check(xyz, named)
     kind, value = next(iter(named.items()), ("none", np.empty(0)))
     tail = {"rotation": 2, "direction": 1}.get(kind, 0)
-    shapes = [] if place is None else [place.shape[:-1]]
+    shapes = [] if xyz is None else [xyz.shape[:-1]]
     shapes += [value.shape[: value.ndim - tail]] if named else []
     batch = np.broadcast_shapes(*shapes)
     poses = np.broadcast_to(np.eye(4), (*batch, 4, 4)).copy()
-    if place is not None:
-        poses[..., :3, 3] = place
-    counts = fixed if place is not None else (False, False, False)
+    if xyz is not None:
+        poses[..., :3, 3] = xyz
+    counts = fixed if xyz is not None else (False, False, False)
     if kind == "rotation":
         poses[..., :3, :3] = value
         return IkTarget(poses, counts, "all", tool_axis, np.empty((*batch, 0)))
@@ -176,7 +176,7 @@ def closure_of(target: IkTarget, poses: Array) -> Array:
 
 
 def meeting(target: IkTarget, poses: Array) -> Array:
-    """Return poses (N, 4, 4), T_world_tcp, moved and turned the shortest way so that they meet flat targets.
+    """Return poses (N, 4, 4), T_world_tcp, with the smallest translation and rotation that meet flat targets.
 
     Args:
         target: A flat batch of N.
@@ -205,7 +205,7 @@ def _turning_axis(target: IkTarget, poses: Array) -> Array:
 
 
 def _turn_between(axis: Array, aim: Array) -> Array:
-    """Return the rotation vectors (K, 3) that turn unit vectors to their aims the shorter way."""
+    """Return the shortest rotation vectors (K, 3) that turn unit vectors to their aims."""
     normal = np.cross(axis, aim)
     sine = np.linalg.norm(normal, axis=1, keepdims=True)
     cosine = np.einsum("ki,ki->k", axis, aim)[:, None]
@@ -229,15 +229,15 @@ def _aims(kind: str, value: Array) -> Array:
     return value if kind == "none" else np.asarray(value[..., None])
 
 
-def _check(place: Array | None, named: dict[str, Array]) -> None:
-    if place is None and not named:
+def _check(xyz: Array | None, named: dict[str, Array]) -> None:
+    if xyz is None and not named:
         raise InputError("the target fixes nothing", hint="give a position, an orientation or both")
-    arrays = {**named} if place is None else {"position": place, **named}
+    arrays = {**named} if xyz is None else {"position": xyz, **named}
     for name, array in arrays.items():
         if not np.isfinite(array).all():
             raise InputError(f"the {name} of the target is not finite")
-    if place is not None and place.shape[-1:] != (3,):
-        raise InputError(f"a position has 3 coordinates, this array has shape {place.shape}")
+    if xyz is not None and xyz.shape[-1:] != (3,):
+        raise InputError(f"a position has 3 coordinates, this array has shape {xyz.shape}")
     direction, pitch = named.get("direction"), named.get("pitch")
     if direction is not None and not np.linalg.norm(direction, axis=-1).all():
         raise InputError("the direction of the target has length zero")

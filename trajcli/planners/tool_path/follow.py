@@ -57,8 +57,8 @@ class FollowingDiagnosis:
 
     def stuck(self, error: StuckError) -> PlanningError:
         """Return the error of an arm that could not be followed beyond a place."""
-        lost = self._unreachable(error.place)
-        return lost or self._singular(error.place, error.joints, error.rates, stuck=True)
+        lost = self._unreachable(error.s)
+        return lost or self._singular(error.s, error.joints, error.rates, stuck=True)
 
     def unfit(self, at: float, guess: Callable[[Array], Array]) -> PlanningError:
         """Return the error of joints that no curve of the allowed pieces follows around a place."""
@@ -223,7 +223,7 @@ class FollowedPath:
         Raises:
             PlanningError: As `by_place`.
         """
-        timed = replace(self.follower, demands=motion.timed)
+        timed = replace(self.follower, reference_at=motion.reference_at)
 
         def guess(times: Array) -> Array:
             places = motion.law.evaluate(times)[:, 0]
@@ -236,7 +236,7 @@ class FollowedPath:
 
 def diagnosis_on_path(robot: Robot, path: ToolPath, exact: Follower) -> FollowingDiagnosis:
     """Return who explains what goes wrong along a path."""
-    return FollowingDiagnosis(robot, path.by_place, path.length, None, path.poses.in_place, len(exact.held))
+    return FollowingDiagnosis(robot, path.at_s, path.length, None, path.poses.in_place, len(exact.held))
 
 
 def diagnosis_of_motion(
@@ -244,7 +244,7 @@ def diagnosis_of_motion(
 ) -> FollowingDiagnosis:
     """Return who explains what goes wrong on a motion."""
     free = 0 if exact is None else len(exact.held)
-    return FollowingDiagnosis(robot, motion.timed, motion.law.end, motion.law, motion.in_place, free)
+    return FollowingDiagnosis(robot, motion.reference_at, motion.law.end, motion.law, motion.in_place, free)
 
 
 def followed(robot: Robot, path: ToolPath, start: Array) -> FollowedPath:
@@ -253,7 +253,7 @@ def followed(robot: Robot, path: ToolPath, start: Array) -> FollowedPath:
     Raises:
         PlanningError: Where the arm cannot follow, and why.
     """
-    exact = follower(robot, path.by_place, start, 0.0)
+    exact = follower(robot, path.at_s, start, 0.0)
     try:
         return FollowedPath(robot, path, exact, track_branch(exact, path.breaks))
     except StuckError as error:
@@ -267,8 +267,8 @@ def followed_in_time(robot: Robot, motion: ToolMotion, start: Array) -> Piecewis
         PlanningError: Where the arm cannot follow, and why.
     """
     middle = np.array([0.5 * motion.law.end])
-    known = follower(robot, lambda _, side: motion.timed(middle, side), start, 0.0)
-    exact = replace(known, demands=motion.timed)
+    known = follower(robot, lambda _, side: motion.reference_at(middle, side), start, 0.0)
+    exact = replace(known, reference_at=motion.reference_at)
     trouble = diagnosis_of_motion(robot, motion, exact)
     try:
         coarse = track_branch(exact, motion.breaks)
@@ -286,7 +286,7 @@ def _fitted(
 ) -> PiecewisePolynomial:
     try:
         misfit = tolerance_ratio(exact, tolerance, breaks, guess(probes(breaks)))
-        return fit(exact.solved, misfit, breaks, guess)
+        return fit(exact.joint_state, misfit, breaks, guess)
     except (LostError, FitError) as error:
-        at = float(error.places[0]) if isinstance(error, LostError) else error.place
+        at = float(error.s[0]) if isinstance(error, LostError) else error.place
         raise trouble.unfit(at, guess) from None

@@ -189,7 +189,7 @@ def check_arrival(way: PlannedPath, end: Array, robot: Robot) -> None:
         return
     from trajcli.kinematics.inverse.solve import solve
 
-    target = way.path.by_place(np.array([way.path.length]), "left").target()
+    target = way.path.at_s(np.array([way.path.length]), "left").target()
     found = solve(robot, target, end[None])
     apart = np.where(found.valid[0], np.abs(found.joints[0] - end).max(axis=-1), np.inf)
     names = found.names[int(apart.argmin())]

@@ -182,7 +182,7 @@ class Overlapped:
         if target.orientation not in ("yaw", "pitch"):
             aims = aims[:, :0]
         else:
-            aims[:, 0] += ToolPath.begins(self.before, target.orientation, target.tool_axis)
+            aims[:, 0] += ToolPath.angle_of(self.before, target.orientation, target.tool_axis)
         return ToolReference(
             poses, first, second, target.position, target.orientation, target.tool_axis, aims
         )

@@ -71,8 +71,8 @@ def _left_over(path: ToolPath, law: PiecewisePolynomial, limits: ToolLimits) -> 
     """Return how many times longer the law must last to keep the tool's limits between the places."""
     part = np.linspace(0.0, 1.0, _BETWEEN)
     times = (law.breaks[:-1, None] + law.lengths[:, None] * part).reshape(-1)
-    passed = path.passed(law, law.breaks)
-    demand = path.by_time(law, np.clip(times, law.start, law.end), "right", passed)
+    passed = path.crossings(law, law.breaks)
+    demand = path.at_time(law, np.clip(times, law.start, law.end), "right", passed)
     shares = []
     for order, rows in ((1, demand.first), (2, demand.second)):
         for name, some in (("", rows[:, :3]), ("angular_", rows[:, 3:])):

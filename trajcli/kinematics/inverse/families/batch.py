@@ -1,18 +1,13 @@
-"""Runs a closed form over blocks of poses and judges every answer by forward kinematics.
+"""Batches of poses solved by a closed form, and the residuals of all candidates by forward kinematics.
 
-Of two mirrored answers (joints 4 and 6 half a turn further, joint 5 bent the other way) the first is judged:
-the hand's rotation is the same product in both.
+Blocks do not know of each other, so that the solutions are the same whatever the number of threads. What else
+is to be done with every candidate is handed in, and done while the block is in the processor's cache.
 
-Blocks do not know of each other, so that the answers are the same whatever the number of threads. What else
-is to be done with every answer is handed in, and done while the block is in the processor's cache.
-
-How far the answers of a closed form are from their goals, by forward kinematics.
-
-Forward kinematics takes the cosines and sines of the closed form, which saves most of its time: the angles
-are their arc tangents to the last bit, and a pair that had not length 1 would show as a gap.
-
-Everything is seen from the first link, where the others start from exact zeros and ones: the goal is carried
-there through the first joint, which has the fewest answers.
+The residual check takes the cosines and sines of the closed form, which saves most of its time: the angles
+are their arc tangents to the last bit, and a pair that had not length 1 would show as a residual. Everything
+is seen from the first link, where the others start from exact zeros and ones: the goal is carried there
+through the first joint, which has the fewest values. Of two mirrored solutions (joints 4 and 6 half a turn
+further, joint 5 bent the other way) the first is checked: the wrist's rotation is the same product in both.
 """
 
 from __future__ import annotations
@@ -58,10 +53,133 @@ _X: Floats = (1.0, 0.0, 0.0)
 _Y: Floats = (0.0, 1.0, 0.0)
 _Z: Floats = (0.0, 0.0, 1.0)
 _NO_TURN: Turn = (1.0, 0.0)
+_BLOCK = 6250  # poses at a time: in the processor's cache, and long enough to hide the cost of a call
+_EACH = 3  # blocks for each thread at least: with fewer, threads cost more than they gain
+_WORKSPACE = 1 << 21  # numbers: more than the temporary arrays of a block
+_ORDER: tuple[Choice, ...] = ("shoulder", "elbow", "wrist")
+BlockHook = Callable[[slice, Array, Array], None]
+
+
+@frozen
+class Candidates:
+    """Every branch of a flat batch of N poses, also where the pose is out of reach.
+
+    One row is one joint for all poses, as the closed forms compute it: the poses are the last array axis.
+
+    Attributes:
+        joints: Shape (n, branches, N).
+        residuals: Shape (2, branches, N): m, and an upper bound of the angle in rad, at most 1.5 times too
+            large.
+        degenerate: Shape (N,): an angle is free, or two branches coincide.
+    """
+
+    joints: Array
+    residuals: Array
+    degenerate: Flags
+
+
+def candidates(
+    robot: Robot, arm: AxisGeometry, method: IkMethod, poses: Array, on_block: BlockHook | None = None
+) -> Candidates:
+    """Return all branches of poses (N, 4, 4) by a method that has a closed form.
+
+    Args:
+        robot: The arm.
+        arm: Its screw axes.
+        method: Its closed form.
+        poses: T_world_tcp.
+        on_block: (which poses, their joints, their residuals) for each block, in any thread; may change them.
+
+    Raises:
+        ValueError: When the method has none.
+    """
+    if method.solve is None:
+        raise ValueError(f"the method {method.name} has no closed form")
+    # freed at once: the allocator then keeps blocks of this size instead of returning them
+    np.empty(_WORKSPACE)
+    count, twos = len(poses), (2,) * len(method.choices)
+    joints, residuals = np.empty((len(robot.joints), *twos, count)), np.empty((2, *twos, count))
+    degenerate = np.zeros(count, dtype=bool)
+    order, check, solve = _order(method), ResidualCheck(robot), method.solve
+    # the same memory with the choices in the order of the solver: (n or 2, last choice, ..., first choice, N)
+    solved, missed, flat = joints.transpose(order), residuals.transpose(order), poses.reshape(-1, 16)
+    branches = 2 ** len(twos)
+    result = Candidates(
+        joints.reshape(len(joints), branches, count), residuals.reshape(2, branches, count), degenerate
+    )
+
+    def fill(block: slice) -> None:
+        rows = np.ascontiguousarray(flat[block, :12].T)
+        goal, flags = Displacement(arm, rows), DegeneracyFlags(rows.shape[1], arm.length)
+        values = solve(goal, flags)
+        for value, out in zip(values, solved[..., block], strict=True):
+            _write(value, out)
+        missed[0, ..., block], missed[1, ..., block] = check.residuals(_checked(values, len(twos)), goal)
+        degenerate[block] = flags.rows
+        if on_block is not None:
+            on_block(block, result.joints[..., block], result.residuals[..., block])
+
+    _each(fill, [slice(low, low + _BLOCK) for low in range(0, count, _BLOCK)])
+    return result
+
+
+def _each(work: Callable[[slice], None], blocks: Sequence[slice]) -> None:
+    """Work on all blocks, in threads where there are many: numpy computes without the interpreter's lock."""
+    threads = min(os.cpu_count() or 1, len(blocks) // _EACH)
+    if threads < 2:
+        for block in blocks:
+            work(block)
+        return
+    from concurrent.futures import ThreadPoolExecutor
+
+    with ThreadPoolExecutor(threads) as pool:
+        for _ in pool.map(work, blocks):
+            pass
+
+
+def _order(method: IkMethod) -> list[int]:
+    """Return the axes of results (k, *branches, N) in the order of the solver's values, last choice first."""
+    present = [choice for choice in _ORDER if choice in method.choices]
+    return [0, *(1 + present.index(choice) for choice in reversed(method.choices)), 1 + len(present)]
+
+
+def _write(value: Value, out: Array) -> None:
+    """Write angles or slides into (2, ..., 2, B); what is the same for several branches is computed once."""
+    if not isinstance(value, tuple | Mirrored | Opposed):
+        out[...] = value
+        return
+    pair, last_choice = (value, ()) if isinstance(value, tuple) else (value.turn, (2,))
+    shape = (*last_choice, *np.broadcast(*pair).shape)
+    target = out if shape == out.shape else np.empty(shape)
+    if isinstance(value, tuple):
+        angle(value, target)
+    else:
+        value.write(target)
+    if target is not out:
+        out[...] = target
+
+
+def _checked(values: Sequence[Value], choices: int) -> list[Turn | Entry]:
+    """Return turns and slides; of a mirrored wrist (two joints half a turn further) the first solution's."""
+    if sum(isinstance(value, Mirrored) for value in values) < 2:
+        return [value.both() if isinstance(value, Mirrored | Opposed) else value for value in values]
+    return [_first_of(value, choices) for value in values]
+
+
+def _first_of(value: Value, choices: int) -> Turn | Entry:
+    if isinstance(value, Mirrored | Opposed):
+        return value.turn
+    if isinstance(value, tuple):
+        return _without_last_choice(value[0], choices), _without_last_choice(value[1], choices)
+    return _without_last_choice(value, choices)
+
+
+def _without_last_choice(entry: Entry, choices: int) -> Entry:
+    return entry[0] if isinstance(entry, np.ndarray) and entry.ndim > choices else entry
 
 
 class ResidualCheck:
-    """Forward kinematics of one robot, to be compared with goals."""
+    """Forward kinematics of one robot, compared with goals."""
 
     def __init__(self, robot: Robot) -> None:
         """Take the robot's links and tool.
@@ -75,8 +193,8 @@ class ResidualCheck:
         self._tool_rows = robot.tool[:3, :3].tolist()
         self._tool_tip = robot.tool[:3, 3].tolist()
 
-    def gaps(self, values: Sequence[Turn | Entry], goal: Displacement) -> tuple[Array, Array]:
-        """Return how far forward kinematics is from the goal, m and rad.
+    def residuals(self, values: Sequence[Turn | Entry], goal: Displacement) -> tuple[Array, Array]:
+        """Return how far forward kinematics is from the goal, m and rad, each (..., B).
 
         |dx|^2 + |dz|^2 of two axes of the flange is at least the square of a small angle, and at most twice
         that.
@@ -93,31 +211,31 @@ class ResidualCheck:
             frame.screw(*link.after)
         frame.slide(*self._tool_tip)
         first, axes = values[0], (goal.x, goal.y, goal.z)
-        x, z = (self._seen(_weighted(self._tool_rows[i], axes), first) for i in (0, 2))
+        x, z = (self._from_first_link(_weighted(self._tool_rows[i], axes), first) for i in (0, 2))
         turned = _square(frame.x, x) + _square(frame.z, scaled(frame.flip_z, z))
-        return np.sqrt(_square(frame.p, self._seen_place(goal.p, first))), np.sqrt(turned)
+        return np.sqrt(_square(frame.p, self._point_from_first_link(goal.p, first))), np.sqrt(turned)
 
-    def _seen(self, vector: VectorEntries, value: Turn | Entry) -> VectorEntries:
+    def _from_first_link(self, vector: VectorEntries, value: Turn | Entry) -> VectorEntries:
         """Return a direction in the base as the first link sees it behind its joint."""
         link = self._links[0]
         turn, _ = _motion(link, self._offsets[0], value)
         return turned_back(turned_back(vector, _X, link.before[1:]), _Z, turn)
 
-    def _seen_place(self, place: VectorEntries, value: Turn | Entry) -> VectorEntries:
-        """Return a place in the base as the first link sees it behind its joint."""
+    def _point_from_first_link(self, point: VectorEntries, value: Turn | Entry) -> VectorEntries:
+        """Return a point in the base as the first link sees it behind its joint."""
         link = self._links[0]
         a, *twist = link.before
         turn, distance = _motion(link, self._offsets[0], value)
-        local = advance(place, -a, _X)
+        local = advance(point, -a, _X)
         local = turned_back(local, _X, (twist[0], twist[1]))
         return turned_back(minus(local, scaled(distance, _Z)), _Z, turn)
 
 
 class _Frame:
-    """A frame that moves along the chain, with axes x, y and z, of which x and y have yet to turn.
+    """A frame that moves along the chain, with axes x, y and z; turns of x and y about z are pending.
 
-    A right angle between neighbouring axes only renames them: signs stand aside, so that nothing is negated,
-    and turns about the same direction are added before anything turns.
+    A right angle between neighbouring axes only renames them: signs are kept apart, so that nothing is
+    negated, and turns about the same direction are added before anything turns.
 
     Attributes:
         z: The axis, but for its sign.
@@ -189,127 +307,7 @@ def _weighted(weights: Sequence[float], axes: Sequence[VectorEntries]) -> Vector
 def _square(a: VectorEntries, b: VectorEntries) -> Array:
     """Return |a - b|^2."""
     first, second, third = (np.asarray(x - y) for x, y in zip(a, b, strict=True))
-    for gap in (first, second, third):
-        np.square(gap, out=gap)
+    for entry in (first, second, third):
+        np.square(entry, out=entry)
     full = first if first.shape == np.broadcast(first, second, third).shape else None
     return np.asarray(np.add(np.add(first, second, out=full), third, out=full))
-
-
-_BLOCK = 6250  # poses at a time: in the processor's cache, and long enough to hide the cost of a call
-_EACH = 3  # blocks for each thread at least: with fewer, threads cost more than they gain
-_WORKSPACE = 1 << 21  # numbers: more than the temporary arrays of a block
-_ORDER: tuple[Choice, ...] = ("shoulder", "elbow", "wrist")
-Settle = Callable[[slice, Array, Array], None]
-
-
-@frozen
-class Candidates:
-    """Every branch of a flat batch of N poses, also where the pose is out of reach. Joints come first.
-
-    Attributes:
-        joints: Shape (n, branches, N).
-        gaps: Shape (2, branches, N): m, and an upper bound of the angle in rad, at most 1.5 times too large.
-        watched: Shape (N,): an angle is free, or two branches fall together.
-    """
-
-    joints: Array
-    gaps: Array
-    watched: Flags
-
-
-def candidates(
-    robot: Robot, arm: AxisGeometry, method: IkMethod, poses: Array, settle: Settle | None = None
-) -> Candidates:
-    """Return all branches of poses (N, 4, 4) by a method that has a closed form.
-
-    Args:
-        robot: The arm.
-        arm: Its lines.
-        method: Its closed form.
-        poses: T_world_tcp.
-        settle: (which poses, their joints, their gaps) for each block, in any thread; may change them.
-
-    Raises:
-        ValueError: When the method has none.
-    """
-    if method.solve is None:
-        raise ValueError(f"the method {method.name} has no closed form")
-    # freed at once: the allocator then keeps blocks of this size instead of returning them
-    np.empty(_WORKSPACE)
-    count, twos = len(poses), (2,) * len(method.choices)
-    joints, gaps = np.empty((len(robot.joints), *twos, count)), np.empty((2, *twos, count))
-    watched = np.zeros(count, dtype=bool)
-    order, judge, solve = _order(method), ResidualCheck(robot), method.solve
-    places, misses, flat = joints.transpose(order), gaps.transpose(order), poses.reshape(-1, 16)
-    found = Candidates(
-        joints.reshape(len(joints), 2 ** len(twos), count), gaps.reshape(2, 2 ** len(twos), count), watched
-    )
-
-    def fill(block: slice) -> None:
-        rows = np.ascontiguousarray(flat[block, :12].T)
-        goal, watch = Displacement(arm, rows), DegeneracyFlags(rows.shape[1], arm.length)
-        values = solve(goal, watch)
-        for value, place in zip(values, places[..., block], strict=True):
-            _write(value, place)
-        misses[0, ..., block], misses[1, ..., block] = judge.gaps(_judged(values, len(twos)), goal)
-        watched[block] = watch.rows
-        if settle is not None:
-            settle(block, found.joints[..., block], found.gaps[..., block])
-
-    _each(fill, [slice(low, low + _BLOCK) for low in range(0, count, _BLOCK)])
-    return found
-
-
-def _each(work: Callable[[slice], None], blocks: Sequence[slice]) -> None:
-    """Work on all blocks, in threads where there are many: numpy computes without the interpreter's lock."""
-    threads = min(os.cpu_count() or 1, len(blocks) // _EACH)
-    if threads < 2:
-        for block in blocks:
-            work(block)
-        return
-    from concurrent.futures import ThreadPoolExecutor
-
-    with ThreadPoolExecutor(threads) as pool:
-        for _ in pool.map(work, blocks):
-            pass
-
-
-def _order(method: IkMethod) -> list[int]:
-    """Return the axes of results (k, *branches, N) in the order of the solver's values, last choice first."""
-    present = [choice for choice in _ORDER if choice in method.choices]
-    return [0, *(1 + present.index(choice) for choice in reversed(method.choices)), 1 + len(present)]
-
-
-def _write(value: Value, out: Array) -> None:
-    """Write angles or slides into (2, ..., 2, B); what is the same for several branches is computed once."""
-    if not isinstance(value, tuple | Mirrored | Opposed):
-        out[...] = value
-        return
-    pair, answers = (value, ()) if isinstance(value, tuple) else (value.turn, (2,))
-    shape = (*answers, *np.broadcast(*pair).shape)
-    place = out if shape == out.shape else np.empty(shape)
-    if isinstance(value, tuple):
-        angle(value, place)
-    else:
-        value.write(place)
-    if place is not out:
-        out[...] = place
-
-
-def _judged(values: Sequence[Value], choices: int) -> list[Turn | Entry]:
-    """Return turns and slides; of a mirrored hand (two joints half a turn further) the first answer's."""
-    if sum(isinstance(value, Mirrored) for value in values) < 2:
-        return [value.both() if isinstance(value, Mirrored | Opposed) else value for value in values]
-    return [_first_of(value, choices) for value in values]
-
-
-def _first_of(value: Value, choices: int) -> Turn | Entry:
-    if isinstance(value, Mirrored | Opposed):
-        return value.turn
-    if isinstance(value, tuple):
-        return _without_last_choice(value[0], choices), _without_last_choice(value[1], choices)
-    return _without_last_choice(value, choices)
-
-
-def _without_last_choice(entry: Entry, choices: int) -> Entry:
-    return entry[0] if isinstance(entry, np.ndarray) and entry.ndim > choices else entry

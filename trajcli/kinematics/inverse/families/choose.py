@@ -1,4 +1,4 @@
-"""The list of families, and which one an arm belongs to: seen from the lines of its DH table alone."""
+"""Choice of the inverse kinematics of an arm: the list of families, and the one that its screw axes fit."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from trajcli.kinematics.jacobian import jacobian
 from trajcli.kinematics.robot import Robot
 
 FAMILIES = (planar.match, spherical_wrist.match, three_parallel.match, positioning.match)
-_PLACES = 3  # configurations: an arm that is singular in all of them is so everywhere
+_CONFIGURATIONS = 3  # configurations: an arm that is singular in all of them is so everywhere
 
 
 @lru_cache(maxsize=16)
 def method_for(robot: Robot) -> IkMethod:
-    """Return how the inverse kinematics of a robot is found: the first family that fits, else numerically.
+    """Return the inverse kinematics of a robot: the closed form of the first family that fits, else numeric.
 
-    A family fits only where every joint counts: of a wrist by itself, or where two axes are one, no closed
-    form of lengths tells the joints.
+    A family fits only where every joint counts: the lengths do not determine the joints of a wrist by itself,
+    nor of an arm two of whose axes are one.
 
     Axes count as parallel when the sine of their angle is at most 1e-9, and as meeting when their distance is
     at most 1e-9 of the arm's length.
@@ -39,10 +39,12 @@ def method_for(robot: Robot) -> IkMethod:
 
 
 def _every_joint_counts(robot: Robot, method: IkMethod) -> bool:
-    """Return whether the joints move what the method needs, place or pose, in as many ways as they are."""
+    """Return whether the Jacobian of what the method needs, position or pose, has full column rank."""
     count = len(robot.joints)
-    places = np.cos(np.square(np.arange(1.0, _PLACES * count + 1.0))).reshape(_PLACES, count)
-    moved = jacobian(robot, places)[:, : 3 if method.needs == "position" else 6]
+    configurations = np.cos(np.square(np.arange(1.0, _CONFIGURATIONS * count + 1.0))).reshape(
+        _CONFIGURATIONS, count
+    )
+    moved = jacobian(robot, configurations)[:, : 3 if method.needs == "position" else 6]
     moved[:, :3] /= characteristic_length(robot)
     values = np.linalg.svd(moved, compute_uv=False)
     least = RANK_TOLERANCE * np.maximum(values[:, :1], 1.0)  # all of them may be rounding
@@ -51,7 +53,7 @@ def _every_joint_counts(robot: Robot, method: IkMethod) -> bool:
 
 def numeric_method(arm: AxisGeometry) -> IkMethod:
     """Return the method for arms that no closed form fits."""
-    count = len(arm.lines)
+    count = len(arm.axes)
     if count > 6:
         reason = f"{count} joints are more than the six coordinates of a pose: the answers are a family"
     else:

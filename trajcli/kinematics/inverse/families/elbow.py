@@ -1,15 +1,15 @@
-"""Two turns about parallel axes in their plane, and the elbow arm that stands on them.
+"""Elbow arm and the pair of parallel axes in it.
 
-The pair: R2 (l + R3 v) = w with l from axis 2 to axis 3, v from axis 3 to the point, all at right angles to
-the axes. Lengths give l . R3 v = (|w|^2 - |l|^2 - |v|^2) / 2 = x, two answers for the third angle, mirror
-images of each other in the line of w. Along l and across it l + R3 v is then (|l|^2 + x, +-y) / |l|, and the
-second angle leads from there to the direction of w.
+The pair: R2 (l + R3 v) = w with l from axis 2 to axis 3, v from axis 3 to the point (beyond the elbow), all
+at right angles to the axes. Lengths give l . R3 v = (|w|^2 - |l|^2 - |v|^2) / 2 = x, two solutions for the
+third angle, mirror images of each other in the line of w. Along l and across it l + R3 v is then
+(|l|^2 + x, +-y) / |l|, and the second angle leads from there to the direction of w.
 
 The elbow arm (axes 2 and 3 parallel, axis 1 not): turns about axes 2 and 3 do not change the component along
-them, so that h2 . R1^-1 t = h2 . p holds with the shoulder's offset and a1 in it. It has two answers for the
-first angle, the shoulder reaching forward or backward over itself; with the pair's two there are four.
+them, so that h2 . R1^-1 t = h2 . p holds with the shoulder's offset and a1 in it. It has two solutions for
+the first angle, the shoulder facing the target or turned away from it; with the pair's two there are four.
 
-"Left" reaches to the side of the first link's x axis, which is forward where the table is drawn with positive
+"Left" faces the side of the first link's x axis, which is forward where the table is drawn with positive
 lengths; "up" has the elbow above the line from shoulder to point, seen along axis 1.
 
 Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning and Control (2009), section
@@ -43,8 +43,8 @@ from trajcli.kinematics.inverse.families.subproblems import (
 )
 
 
-def same_way(a: ScrewAxis, b: ScrewAxis) -> float:
-    """Return 1 or -1 for parallel lines of the same or the opposite direction."""
+def same_direction(a: ScrewAxis, b: ScrewAxis) -> float:
+    """Return 1 or -1 for parallel axes of the same or the opposite direction."""
     return float(np.sign(dot(a.direction, b.direction)))
 
 
@@ -53,29 +53,31 @@ def parallel_pair(
     three: ScrewAxis,
     point: VectorEntries,
     aim: VectorEntries,
-    watch: DegeneracyFlags,
+    flags: DegeneracyFlags,
     up: Floats | None = None,
 ) -> tuple[Turn, Turn]:
-    """Return the turns about two parallel lines that bring `point` to `aim`, both (2, ..., B).
+    """Return the turns about two parallel axes that bring `point` to `aim`, both (2, ..., B).
 
-    The first answer has the elbow on the side of h2 x w if `up` is None, else on the side where w . up counts
-    it as up: up is axis 1 x axis 2.
+    The first solution has the elbow on the side of h2 x w if `up` is None, else on the side where w . up
+    counts it as up: up is axis 1 x axis 2.
     """
     axis = two.direction
     link = across(minus(three.point, two.point), axis)
-    hand = across(minus(point, three.point), axis)
-    way = across(minus(aim, two.point), axis)
-    level = product(0.5, difference(difference(dot(way, way), dot(hand, hand)), dot(link, link)))
-    same = same_way(two, three)
-    sign = -same if up is None else product(-same, dot(way, up))
-    third, (x, y) = levels(three.direction, hand, link, level, watch, watch.length**2, sign)
+    beyond_elbow = across(minus(point, three.point), axis)
+    to_aim = across(minus(aim, two.point), axis)
+    level = product(
+        0.5, difference(difference(dot(to_aim, to_aim), dot(beyond_elbow, beyond_elbow)), dot(link, link))
+    )
+    same = same_direction(two, three)
+    sign = -same if up is None else product(-same, dot(to_aim, up))
+    third, (x, y) = levels(three.direction, beyond_elbow, link, level, flags, flags.length**2, sign)
     square = float(dot(link, link))
-    scale = watch.length * float(np.sqrt(square))
-    along, aside = unit((total(square, x), product(same, y)), watch, scale)
-    cosine, sine = unit(onto(axis, link, way), watch, scale)
+    scale = flags.length * float(np.sqrt(square))
+    along, aside = unit((total(square, x), product(same, y)), flags, scale)
+    cosine, sine = unit(onto(axis, link, to_aim), flags, scale)
     middle = product(cosine, along), product(sine, along)
     apart = product(sine, aside), product(difference(0.0, cosine), aside)
-    return watch.fork_again(middle, apart), third
+    return flags.fork_last(middle, apart), third
 
 
 def shoulder_turn(
@@ -83,40 +85,40 @@ def shoulder_turn(
     normal: VectorEntries,
     point: VectorEntries,
     target: VectorEntries,
-    watch: DegeneracyFlags,
+    flags: DegeneracyFlags,
     sign: float,
 ) -> Turn:
-    """Return the turns (2, ..., B) about line one that give normal . R1^-1 (t - o) the value of the point."""
+    """Return the turns (2, ..., B) about axis 1 that give normal . R1^-1 (t - o) the value of the point."""
     level = dot(normal, minus(point, one.point))
     direction = one.opposite.direction
-    return levels(direction, minus(target, one.point), normal, level, watch, watch.length, sign)[0]
+    return levels(direction, minus(target, one.point), normal, level, flags, flags.length, sign)[0]
 
 
-def before(one: ScrewAxis, target: VectorEntries, turn: Turn) -> VectorEntries:
-    """Return where a point was before the turn about a line."""
+def before_turn(one: ScrewAxis, target: VectorEntries, turn: Turn) -> VectorEntries:
+    """Return where a point was before the turn about an axis."""
     return plus(turned_back(minus(target, one.point), one.direction, turn), one.point)
 
 
 def forward_sign(one: ScrewAxis, two: ScrewAxis, forward: Floats) -> float:
-    """Return the sign with which the first answer of `shoulder_turn` reaches along `forward`."""
+    """Return the sign with which the first solution of `shoulder_turn` faces `forward`."""
     return float(np.copysign(1.0, dot(forward, across_floats(two.direction, one.direction))))
 
 
 def elbow(
-    lines: Sequence[ScrewAxis],
+    axes: Sequence[ScrewAxis],
     point: VectorEntries,
     target: VectorEntries,
-    watch: DegeneracyFlags,
+    flags: DegeneracyFlags,
     forward: Floats,
 ) -> tuple[Turn, Turn, Turn]:
     """Return the turns that bring `point` (at zero) to `target`: choices shoulder, then elbow."""
-    one, two, three = lines
-    first = shoulder_turn(one, two.direction, point, target, watch, forward_sign(one, two, forward))
+    one, two, three = axes
+    first = shoulder_turn(one, two.direction, point, target, flags, forward_sign(one, two, forward))
     up = across_floats(one.direction, two.direction)
-    second, third = parallel_pair(two, three, point, before(one, target, first), watch, up)
+    second, third = parallel_pair(two, three, point, before_turn(one, target, first), flags, up)
     return first, second, third
 
 
-def is_elbow(lines: Sequence[ScrewAxis]) -> bool:
+def is_elbow(axes: Sequence[ScrewAxis]) -> bool:
     """Return whether `elbow` fits."""
-    return parallel(lines[1], lines[2]) and not parallel(lines[0], lines[1])
+    return parallel(axes[1], axes[2]) and not parallel(axes[0], axes[1])

@@ -1,4 +1,4 @@
-"""What a family of arms answers for one arm: how it solves, its branches and what they are called."""
+"""Closed form of one arm: its solver, the choices between its solutions, and the names of its branches."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ class IkMethod:
     Attributes:
         name: For people, as "spherical wrist over elbow".
         family: Name of the closed form, or "numeric".
-        choices: Which choices there are, in the order in which the solver finds them.
+        choices: Which choices there are, in the order in which the solver makes them.
         reason: Why it was chosen, one sentence.
-        solve: Values of all joints for a block of goals, each of a shape that broadcasts to (2, ..., 2, B)
-            with one axis for each choice, the last choice first. None for the numeric method.
+        solve: Values of all joints for a block of B goals, each of a shape that broadcasts to (2, ..., 2, B):
+            one array axis for each choice, the last choice first, poses last. None for the numeric method.
         needs: Whether the closed form uses the whole pose or the position alone.
         idle: A direction in the base along which the position does not matter to the closed form; None
             where all of it does.
-        labels: Names of the answers where one name may have several.
+        labels: Names of the solutions where one name may have several.
     """
 
     name: str

@@ -1,11 +1,11 @@
-"""Arms that turn about parallel axes, in their plane and along it: planar 2R, 3R, RP and RPR, SCARA.
+"""Planar arms and SCARA: all turns are about parallel axes (2R, 3R, RP and RPR, and 3R with a slide).
 
-Seen along the axes k the arm is planar; slides along k commute with all of it, wherever they stand in the
+Seen along the axes k the arm is planar; slides along k commute with all of it, wherever they are in the
 chain. The angle of the tool about k is the sum of the turns.
 
-* 2R and RP: the tcp's place in the plane, two solutions each.
-* 3R (and a slide: RRPR, RRRP, PRRR, RPRR): the place of the third axis is that of a point of the tool, joints
-  1 and 2 bring it there, two solutions; joint 3 is what lacks to the angle of the tool, the slide is the
+* 2R and RP: the tcp's position in the plane, two solutions each.
+* 3R (and a slide: RRPR, RRRP, PRRR, RPRR): the position of the third axis is that of a point of the tool,
+  joints 1 and 2 bring it there, two solutions; joint 3 completes the angle of the tool, the slide is the
   difference in height.
 * RPR: the same with a turn and a slide in the plane: two solutions.
 
@@ -22,7 +22,7 @@ from collections.abc import Sequence
 
 from trajcli.frozen import frozen
 from trajcli.kinematics.columns import dot, minus, product
-from trajcli.kinematics.inverse.families.elbow import parallel_pair, same_way
+from trajcli.kinematics.inverse.families.elbow import parallel_pair, same_direction
 from trajcli.kinematics.inverse.families.method import IkMethod
 from trajcli.kinematics.inverse.families.positioning import turn_and_slide
 from trajcli.kinematics.inverse.families.screw_axes import (
@@ -52,62 +52,62 @@ class Planar:
 
     Attributes:
         plane: The joints that move in the plane: RR, RP, RRR or RPR.
-        places: Where they stand in the chain.
+        indices: Of these joints in the chain.
         rise: Index of the slide along k; None where there is none.
-        lines: All joints.
+        axes: All joints.
         tip: The tcp at zero.
     """
 
     plane: tuple[ScrewAxis, ...]
-    places: tuple[int, ...]
+    indices: tuple[int, ...]
     rise: int | None
-    lines: tuple[ScrewAxis, ...]
+    axes: tuple[ScrewAxis, ...]
     tip: Floats
 
-    def __call__(self, goal: Displacement, watch: DegeneracyFlags) -> Sequence[Value]:
+    def __call__(self, goal: Displacement, flags: DegeneracyFlags) -> Sequence[Value]:
         """Return the joints: choice elbow."""
         one, two, *rest = self.plane
         point = rest[0].point if rest else self.tip
         aim = goal.point(point)
         first: Turn
-        values: list[Value] = [0.0] * len(self.lines)
+        values: list[Value] = [0.0] * len(self.axes)
         if two.prismatic:
-            first, slide = turn_and_slide(one, two, point, aim, watch)
-            total, values[self.places[1]] = first, slide
+            first, slide = turn_and_slide(one, two, point, aim, flags)
+            total, values[self.indices[1]] = first, slide
         else:
-            first, second = parallel_pair(one, two, point, aim, watch)
-            total = added(first, second, same_way(one, two))
-            values[self.places[1]] = second
-        values[self.places[0]] = first
+            first, second = parallel_pair(one, two, point, aim, flags)
+            total = added(first, second, same_direction(one, two))
+            values[self.indices[1]] = second
+        values[self.indices[0]] = first
         if rest:
-            lacking = added(_angle_of_tool(one, goal, watch), total, -1.0)
-            values[self.places[2]] = lacking[0], product(same_way(one, rest[0]), lacking[1])
+            lacking = added(_angle_of_tool(one, goal, flags), total, -1.0)
+            values[self.indices[2]] = lacking[0], product(same_direction(one, rest[0]), lacking[1])
         if self.rise is not None:
-            slide_axis = self.lines[self.rise].direction
+            slide_axis = self.axes[self.rise].direction
             values[self.rise] = dot(slide_axis, minus(aim, point))
         return values
 
 
-def _angle_of_tool(one: ScrewAxis, goal: Displacement, watch: DegeneracyFlags) -> Turn:
+def _angle_of_tool(one: ScrewAxis, goal: Displacement, flags: DegeneracyFlags) -> Turn:
     marker = aside(one.direction)
-    return unit(onto(one.direction, marker, goal.direction(marker)), watch)
+    return unit(onto(one.direction, marker, goal.direction(marker)), flags)
 
 
 def match(arm: AxisGeometry) -> IkMethod | None:
-    """Return the method where all turns are about parallel axes and the slides stand as in the list above."""
-    turns = [line for line in arm.lines if not line.prismatic]
+    """Return the method where all turns are about parallel axes and the slides are as in the list above."""
+    turns = [axis for axis in arm.axes if not axis.prismatic]
     if not turns or not parallel(*turns):
         return None
-    rises = [i for i, line in enumerate(arm.lines) if line.prismatic and parallel(line, turns[0])]
-    places = tuple(i for i in range(len(arm.lines)) if i not in rises)
-    plane = tuple(arm.lines[i] for i in places)
-    kinds = "".join("RP"[line.prismatic] for line in plane)
+    rises = [i for i, axis in enumerate(arm.axes) if axis.prismatic and parallel(axis, turns[0])]
+    indices = tuple(i for i in range(len(arm.axes)) if i not in rises)
+    plane = tuple(arm.axes[i] for i in indices)
+    kinds = "".join("RP"[axis.prismatic] for axis in plane)
     if kinds not in _NAMES or len(rises) > (1 if kinds == "RRR" else 0):
         return None
     if "P" in kinds and not perpendicular(plane[0], plane[1]):
         return None
     tip = (float(arm.home[0, 3]), float(arm.home[1, 3]), float(arm.home[2, 3]))
-    solver = Planar(plane, places, rises[0] if rises else None, arm.lines, tip)
+    solver = Planar(plane, indices, rises[0] if rises else None, arm.axes, tip)
     name = "SCARA" if rises else _NAMES[kinds]
     reason = "all turns are about parallel axes" + (", and the slide runs along them" if rises else "")
     if len(plane) == 3:

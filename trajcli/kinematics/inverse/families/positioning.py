@@ -1,36 +1,31 @@
-"""Arms of three joints that bring the tcp to a place in space: the bases of `bases` by themselves.
+"""Positioning structures: three joints that bring a point to a position, alone or under a spherical wrist.
 
-The number of solutions is that of the base: four for the elbow (with or without offsets of the shoulder), RRP
-two or four, RPP two, PPP one. The orientation follows; a target that fixes it is met only if it agrees.
-
-Three joints that bring a point to a place: the arms of three axes, and what carries a spherical wrist.
-
-| joints | condition | way | solutions |
+| joints | condition | solver | solutions |
 |---|---|---|---|
 | RRR | 2 parallel 3 | `elbow` | 4 |
-| RRR | 1 meets 2 | the distance from where they meet gives joint 3, then two turns | 4 |
-| RRP | 3 at right angles to 2 | as the elbow; the length of the arm in its plane gives the slide | 4 |
-| RRP | 1 meets 2 | the distance gives the slide, then two turns | 4 |
-| RRP | 1 parallel 2 | the height gives the slide, then a pair of parallel turns (SCARA) | 2 |
-| RPP | any | the normal of both slides gives joint 1, the rest is linear (cylindrical) | 2 |
-| PPP | independent | linear (Cartesian) | 1 |
+| RRR | 1 meets 2 | `ball`: the distance from where they meet gives joint 3, then two turns | 4 |
+| RRP | 3 at right angles to 2 | `stanford`: as the elbow; the length in its plane gives the slide | 4 |
+| RRP | 1 meets 2 | `ball`: the distance gives the slide, then two turns | 4 |
+| RRP | 1 parallel 2 | `scara`: the height gives the slide, then a pair of parallel turns | 2 |
+| RPP | any | `cylindrical`: the normal of both slides gives joint 1, the rest is linear | 2 |
+| PPP | independent | `cartesian`: linear | 1 |
 
-Every row is also tried from the tool backwards (the inverse motion is that of the opposite lines), and with
+Every row is also tried from the tool backwards (the inverse motion is that of the opposite axes), and with
 neighbours exchanged where a slide runs along the axis of a turn beside it: such motions commute.
 
-Bases with slides, and those whose first two axes meet: the rows of the table in `bases` beside the elbow.
+Every solver takes the three axes, a point p at zero and its target t, and returns the values of the joints,
+turns as (cosine, sine). Two solutions come along a new first axis.
 
-Every function takes the three lines, a point at zero and the place it shall reach, and returns the values of
-the joints, turns as (cosine, sine). Two answers come along a new first axis.
+* `cartesian`: t - p = D q with the directions as columns of D.
+* `cylindrical`: slides do not move a point along their common normal n, so n . R1^-1 t = n . p: two angles.
+  "Left" is the solution with the last slide the further out.
+* `stanford`: (d + b)^2 = |w|^2 - |p|^2 + b^2 in the plane, b = p . h3, for the slide d. "Up" is the longer
+  slide.
+* `ball`: axes 1 and 2 meet in o, so |joint 3 (p) - o| = |t - o|: two solutions, each with two for joints 1
+  and 2.
 
-* `cartesian`: t - p = D q with the directions as columns of D. One solution.
-* `cylindrical`: slides do not move a point along their common normal n, so n . R1^-1 t = n . p: two angles,
-  and the rest is linear. "Left" is the answer with the last slide the further out.
-* `stanford`: as the elbow, with (d + b)^2 = |w|^2 - |p|^2 + b^2 in the plane, b = p . h3, for the slide d.
-  "Up" is the longer slide. Four solutions.
-* `scara`: the height gives the slide, then a pair of parallel turns. Two solutions.
-* `ball`: axes 1 and 2 meet in o, so |joint 3 (p) - o| = |t - o|: two answers, each with two
-  for joints 1 and 2.
+An arm of three joints has the solutions of its structure; its orientation follows, and a target that fixes it
+is met only if it agrees.
 
 Source: Spong, Hutchinson and Vidyasagar, Robot Modeling and Control (2006), section 3.3; Pieper, The
 Kinematics of Manipulators under Computer Control (1968).
@@ -57,7 +52,7 @@ from trajcli.kinematics.columns import (
     product,
 )
 from trajcli.kinematics.inverse.families.elbow import (
-    before,
+    before_turn,
     elbow,
     forward_sign,
     is_elbow,
@@ -88,110 +83,107 @@ from trajcli.kinematics.inverse.families.subproblems import (
     unit,
 )
 
+PositionSolver = Callable[[VectorEntries, VectorEntries, DegeneracyFlags], Sequence[Value]]
+StructureMatch = tuple[str, tuple[Choice, ...], PositionSolver]
 INDEPENDENT = 1e-6  # volume of three unit directions: below, an arm hardly moves in one direction
 
 
-def ahead_of(one: ScrewAxis, two: ScrewAxis) -> Floats:
-    """Return a direction at right angles to two axes, for arms that are read in another order."""
-    return across_floats(two.direction, one.direction)
-
-
 def cartesian(
-    lines: Sequence[ScrewAxis], point: VectorEntries, target: VectorEntries, watch: DegeneracyFlags
+    axes: Sequence[ScrewAxis], point: VectorEntries, target: VectorEntries, flags: DegeneracyFlags
 ) -> tuple[Entry, ...]:
     """Return the slides of three independent prismatic joints."""
-    way = minus(target, point)
-    return tuple(dot(row, way) for row in _rows([line.direction for line in lines]))
+    displacement = minus(target, point)
+    return tuple(dot(row, displacement) for row in _rows([axis.direction for axis in axes]))
 
 
 def cylindrical(
-    lines: Sequence[ScrewAxis], point: VectorEntries, target: VectorEntries, watch: DegeneracyFlags
+    axes: Sequence[ScrewAxis], point: VectorEntries, target: VectorEntries, flags: DegeneracyFlags
 ) -> tuple[Turn, Entry, Entry]:
     """Return a turn and two slides."""
-    one, two, three = lines
+    one, two, three = axes
     normal = across_floats(two.direction, three.direction)
-    first = shoulder_turn(one, normal, point, target, watch, 1.0)
-    way = minus(before(one, target, first), point)
+    first = shoulder_turn(one, normal, point, target, flags, 1.0)
+    displacement = minus(before_turn(one, target, first), point)
     rows = _rows([two.direction, three.direction, normal])
-    return first, dot(rows[0], way), dot(rows[1], way)
+    return first, dot(rows[0], displacement), dot(rows[1], displacement)
 
 
 def stanford(
-    lines: Sequence[ScrewAxis],
+    axes: Sequence[ScrewAxis],
     point: VectorEntries,
     target: VectorEntries,
-    watch: DegeneracyFlags,
+    flags: DegeneracyFlags,
     forward: Floats,
 ) -> tuple[Turn, Turn, Entry]:
     """Return two turns and a slide at right angles to the second."""
-    one, two, three = lines
-    first = shoulder_turn(one, two.direction, point, target, watch, forward_sign(one, two, forward))
-    second, slide = turn_and_slide(two, three, point, before(one, target, first), watch)
+    one, two, three = axes
+    first = shoulder_turn(one, two.direction, point, target, flags, forward_sign(one, two, forward))
+    second, slide = turn_and_slide(two, three, point, before_turn(one, target, first), flags)
     return first, second, slide
 
 
 def turn_and_slide(
-    turn: ScrewAxis, slide: ScrewAxis, point: VectorEntries, aim: VectorEntries, watch: DegeneracyFlags
+    turn: ScrewAxis, slide: ScrewAxis, point: VectorEntries, aim: VectorEntries, flags: DegeneracyFlags
 ) -> tuple[Turn, Array]:
     """Return the turns and slides (2, ..., B) in one plane that bring `point` to `aim`."""
-    hand, way = (
+    arm, to_aim = (
         across(minus(point, turn.point), turn.direction),
         across(minus(aim, turn.point), turn.direction),
     )
-    ahead = dot(hand, slide.direction)
-    rest = plus_square(difference(dot(way, way), dot(hand, hand)), ahead)
-    distance = difference(_lengths(rest, watch), ahead)
-    reached = advance(hand, distance, slide.direction)
-    return unit(onto(turn.direction, reached, way), watch, FREE * watch.length**2), np.asarray(distance)
+    ahead = dot(arm, slide.direction)
+    rest = _plus_square(difference(dot(to_aim, to_aim), dot(arm, arm)), ahead)
+    distance = difference(_lengths(rest, flags), ahead)
+    reached = advance(arm, distance, slide.direction)
+    return unit(onto(turn.direction, reached, to_aim), flags, FREE * flags.length**2), np.asarray(distance)
 
 
 def scara(
-    lines: Sequence[ScrewAxis], point: VectorEntries, target: VectorEntries, watch: DegeneracyFlags
+    axes: Sequence[ScrewAxis], point: VectorEntries, target: VectorEntries, flags: DegeneracyFlags
 ) -> tuple[Turn, Turn, Entry]:
     """Return two turns about parallel axes and a slide that is not at right angles to them."""
-    one, two, three = lines
+    one, two, three = axes
     height = dot(one.direction, minus(target, point))
     slide = product(1.0 / float(dot(one.direction, three.direction)), height)
-    first, second = parallel_pair(one, two, advance(point, slide, three.direction), target, watch)
+    first, second = parallel_pair(one, two, advance(point, slide, three.direction), target, flags)
     return first, second, slide
 
 
 def ball(
-    lines: Sequence[ScrewAxis],
+    axes: Sequence[ScrewAxis],
     center: Floats,
     point: VectorEntries,
     target: VectorEntries,
-    watch: DegeneracyFlags,
+    flags: DegeneracyFlags,
 ) -> tuple[Turn, Turn, Turn | Entry]:
     """Return two turns about axes that meet in `center` after a turn or slide of the third joint."""
-    one, two, three = lines
-    way = minus(target, center)
+    one, two, three = axes
+    to_aim = minus(target, center)
     third: Turn | Entry
     if three.prismatic:
-        hand = minus(point, center)
-        ahead = dot(hand, three.direction)
-        rest = plus_square(difference(dot(way, way), dot(hand, hand)), ahead)
-        third = difference(_lengths(rest, watch), ahead)
-        hand = advance(hand, third, three.direction)
+        arm = minus(point, center)
+        ahead = dot(arm, three.direction)
+        rest = _plus_square(difference(dot(to_aim, to_aim), dot(arm, arm)), ahead)
+        third = difference(_lengths(rest, flags), ahead)
+        arm = advance(arm, third, three.direction)
     else:
-        link, hand = minus(three.point, center), minus(point, three.point)
-        level = product(0.5, difference(difference(dot(way, way), dot(hand, hand)), dot(link, link)))
-        third, _ = levels(three.direction, hand, link, level, watch, watch.length**2)
-        hand = plus(link, turned(hand, three.direction, third))
-    second, _ = levels(two.direction, hand, one.direction, dot(one.direction, way), watch, watch.length)
-    first = onto(one.direction, turned(hand, two.direction, second), way)
-    return unit(first, watch, FREE * watch.length**2), second, third
+        link, arm = minus(three.point, center), minus(point, three.point)
+        level = product(0.5, difference(difference(dot(to_aim, to_aim), dot(arm, arm)), dot(link, link)))
+        third, _ = levels(three.direction, arm, link, level, flags, flags.length**2)
+        arm = plus(link, turned(arm, three.direction, third))
+    second, _ = levels(two.direction, arm, one.direction, dot(one.direction, to_aim), flags, flags.length)
+    first = onto(one.direction, turned(arm, two.direction, second), to_aim)
+    return unit(first, flags, FREE * flags.length**2), second, third
 
 
-def plus_square(value: Entry, root: Entry) -> Array:
+def _plus_square(value: Entry, root: Entry) -> Array:
     """Return value + root^2."""
     return np.asarray(value + np.square(root))
 
 
-def _lengths(square: Array, watch: DegeneracyFlags) -> Array:
+def _lengths(square: Array, flags: DegeneracyFlags) -> Array:
     """Return plus and minus the root along a new first axis, zero where the square is negative."""
-    watch.note(np.abs(square) <= (TANGENT * watch.length) ** 2)
-    return watch.both(np.sqrt(np.maximum(square, 0.0)))
+    flags.note(np.abs(square) <= (TANGENT * flags.length) ** 2)
+    return flags.both(np.sqrt(np.maximum(square, 0.0)))
 
 
 def _rows(columns: Sequence[Floats]) -> list[Floats]:
@@ -205,128 +197,129 @@ def _rows(columns: Sequence[Floats]) -> list[Floats]:
     return rows
 
 
-PositionSolver = Callable[[VectorEntries, VectorEntries, DegeneracyFlags], Sequence[Value]]
-StructureMatch = tuple[str, tuple[Choice, ...], PositionSolver]
-
-
 @frozen
 class PositioningStructure:
-    """Three joints that bring a point to a place.
+    """Three joints that bring a point to a position.
 
     Attributes:
         name: As "elbow".
-        choices: In the order of their axes.
-        reach: (point at zero, target, watch) -> the three values: turns of length 1, or slides.
-        lines: The three joints.
+        choices: In the order in which the solver makes them.
+        solve: (point at zero, target, flags) -> the three values: turns of length 1, or slides.
+        axes: The three joints.
     """
 
     name: str
     choices: tuple[Choice, ...]
-    reach: PositionSolver
-    lines: tuple[ScrewAxis, ...]
+    solve: PositionSolver
+    axes: tuple[ScrewAxis, ...]
 
 
 def positioning_structure(arm: AxisGeometry) -> PositioningStructure | None:
-    """Return how the first three joints of an arm reach a point; None where no row of the table fits."""
-    lines = arm.lines[:3]
-    for order, ordered in _orders(lines):
+    """Return the structure of the first three joints of an arm; None where no row of the table fits."""
+    axes = arm.axes[:3]
+    for order, ordered in _orders(axes):
         for backwards in (False, True):
-            chain = tuple(line.opposite for line in reversed(ordered)) if backwards else ordered
+            chain = tuple(axis.opposite for axis in reversed(ordered)) if backwards else ordered
             given = not backwards and order == (0, 1, 2)
-            found = _match(chain, arm.length, arm.forward if given else None)
-            if found is not None:
-                name, choices, reach = found
-                return PositioningStructure(name, choices, partial(_restored, reach, order, backwards), lines)
+            matched = _match(chain, arm.length, arm.forward if given else None)
+            if matched is not None:
+                name, choices, solve = matched
+                return PositioningStructure(name, choices, partial(_restored, solve, order, backwards), axes)
     return None
 
 
 def _restored(
-    reach: PositionSolver,
+    solve: PositionSolver,
     order: tuple[int, ...],
     backwards: bool,
     point: VectorEntries,
     target: VectorEntries,
-    watch: DegeneracyFlags,
+    flags: DegeneracyFlags,
 ) -> list[Value]:
-    values = list(reach(target, point, watch))[::-1] if backwards else reach(point, target, watch)
+    """Return the values in the order of the chain, of a solver that was matched in another order."""
+    values = list(solve(target, point, flags))[::-1] if backwards else solve(point, target, flags)
     result: list[Value] = [0.0, 0.0, 0.0]
-    for place, value in zip(order, values, strict=True):
-        result[place] = value
+    for index, value in zip(order, values, strict=True):
+        result[index] = value
     return result
 
 
-def _orders(lines: Sequence[ScrewAxis]) -> Iterator[tuple[tuple[int, ...], tuple[ScrewAxis, ...]]]:
-    yield (0, 1, 2), tuple(lines)
+def _orders(axes: Sequence[ScrewAxis]) -> Iterator[tuple[tuple[int, ...], tuple[ScrewAxis, ...]]]:
+    """Yield the chain as it is, and with neighbours exchanged that commute."""
+    yield (0, 1, 2), tuple(axes)
     for order, (i, j) in (((1, 0, 2), (0, 1)), ((0, 2, 1), (1, 2))):
-        if lines[i].prismatic != lines[j].prismatic and parallel(lines[i], lines[j]):
-            yield order, tuple(lines[k] for k in order)
+        if axes[i].prismatic != axes[j].prismatic and parallel(axes[i], axes[j]):
+            yield order, tuple(axes[k] for k in order)
 
 
-def _match(lines: tuple[ScrewAxis, ...], length: float, forward: Floats | None) -> StructureMatch | None:
-    kinds = "".join("P" if line.prismatic else "R" for line in lines)
+def _match(axes: tuple[ScrewAxis, ...], length: float, forward: Floats | None) -> StructureMatch | None:
+    kinds = "".join("P" if axis.prismatic else "R" for axis in axes)
     match kinds:
         case "RRR":
-            return _match_turns(lines, length, forward)
+            return _match_turns(axes, length, forward)
         case "RRP":
-            return _match_turns_and_slide(lines, length, forward)
+            return _match_turns_and_slide(axes, length, forward)
         case "RPP":
-            normal = np.cross(lines[1].direction, lines[2].direction)
-            fits = np.linalg.norm(np.cross(normal, lines[0].direction)) > INDEPENDENT
-            return ("cylindrical base", ("shoulder",), partial(cylindrical, lines)) if fits else None
+            normal = np.cross(axes[1].direction, axes[2].direction)
+            fits = np.linalg.norm(np.cross(normal, axes[0].direction)) > INDEPENDENT
+            return ("cylindrical base", ("shoulder",), partial(cylindrical, axes)) if fits else None
         case "PPP":
-            independent = abs(np.linalg.det([line.direction for line in lines])) > INDEPENDENT
-            return ("Cartesian base", (), partial(cartesian, lines)) if independent else None
+            independent = abs(np.linalg.det([axis.direction for axis in axes])) > INDEPENDENT
+            return ("Cartesian base", (), partial(cartesian, axes)) if independent else None
     return None
 
 
-def _match_turns(
-    lines: tuple[ScrewAxis, ...], length: float, forward: Floats | None
-) -> StructureMatch | None:
-    one, two, three = lines
-    if is_elbow(lines):
-        ahead = forward or ahead_of(one, two)
-        return "elbow", ("shoulder", "elbow"), partial(elbow, lines, forward=ahead)
+def _normal_of(one: ScrewAxis, two: ScrewAxis) -> Floats:
+    """Return a direction at right angles to two axes: forward for arms that are read in another order."""
+    return across_floats(two.direction, one.direction)
+
+
+def _match_turns(axes: tuple[ScrewAxis, ...], length: float, forward: Floats | None) -> StructureMatch | None:
+    one, two, three = axes
+    if is_elbow(axes):
+        ahead = forward or _normal_of(one, two)
+        return "elbow", ("shoulder", "elbow"), partial(elbow, axes, forward=ahead)
     center = meeting_point(one, two, length)
     if center is not None and not parallel(two, three):
-        return "two axes that meet", ("elbow", "shoulder"), partial(ball, lines, center)
+        return "two axes that meet", ("elbow", "shoulder"), partial(ball, axes, center)
     return None
 
 
 def _match_turns_and_slide(
-    lines: tuple[ScrewAxis, ...], length: float, forward: Floats | None
+    axes: tuple[ScrewAxis, ...], length: float, forward: Floats | None
 ) -> StructureMatch | None:
-    one, two, three = lines
+    one, two, three = axes
     if parallel(one, two):
         if perpendicular(one, three):
             return None
-        return "SCARA base", ("elbow",), partial(scara, lines)
+        return "SCARA base", ("elbow",), partial(scara, axes)
     if perpendicular(two, three):
-        ahead = forward or ahead_of(one, two)
-        return "Stanford base", ("shoulder", "elbow"), partial(stanford, lines, forward=ahead)
+        ahead = forward or _normal_of(one, two)
+        return "Stanford base", ("shoulder", "elbow"), partial(stanford, axes, forward=ahead)
     center = meeting_point(one, two, length)
     if center is None or parallel(two, three):
         return None
-    return "Stanford base", ("elbow", "shoulder"), partial(ball, lines, center)
+    return "Stanford base", ("elbow", "shoulder"), partial(ball, axes, center)
 
 
 @frozen
 class Positioning:
     """The solver of one arm."""
 
-    base: PositioningStructure
+    structure: PositioningStructure
     tip: Floats
 
-    def __call__(self, goal: Displacement, watch: DegeneracyFlags) -> Sequence[Value]:
-        """Return the joints, with the choices of the base."""
-        return self.base.reach(self.tip, goal.point(self.tip), watch)
+    def __call__(self, goal: Displacement, flags: DegeneracyFlags) -> Sequence[Value]:
+        """Return the joints, with the choices of the structure."""
+        return self.structure.solve(self.tip, goal.point(self.tip), flags)
 
 
 def match(arm: AxisGeometry) -> IkMethod | None:
-    """Return the method where the arm has three joints that `bases` knows."""
-    base = positioning_structure(arm) if len(arm.lines) == 3 else None
-    if base is None:
+    """Return the method where the arm is a positioning structure by itself."""
+    structure = positioning_structure(arm) if len(arm.axes) == 3 else None
+    if structure is None:
         return None
     tip = (float(arm.home[0, 3]), float(arm.home[1, 3]), float(arm.home[2, 3]))
-    name = f"{base.name} ({arm.kinds})"
-    reason = f"three joints ({arm.kinds}) that place the tcp: {base.name}"
-    return IkMethod(name, "positioning", base.choices, reason, Positioning(base, tip), "position")
+    name = f"{structure.name} ({arm.kinds})"
+    reason = f"three joints ({arm.kinds}) that place the tcp: {structure.name}"
+    return IkMethod(name, "positioning", structure.choices, reason, Positioning(structure, tip), "position")

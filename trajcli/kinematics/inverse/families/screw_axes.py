@@ -1,8 +1,8 @@
-"""An arm as lines in space: the axes of its joints where every joint stands at zero.
+"""Screw axes of an arm: the axes of its joints where every joint is at zero, and how they lie in space.
 
 exp(S1 q1) ... exp(Sn qn) H is the pose of the tcp, H the pose at zero and S_i the screw of joint i there.
-Conventions, offsets and signs of the DH table are all in the lines, so that what is parallel or meets is seen
-alike in every table of the same arm.
+Conventions, offsets and signs of the DH table are all in the axes, so that what is parallel or meets is the
+same in every table of the same arm.
 
 Source: Murray, Li and Sastry, A Mathematical Introduction to Robotic Manipulation (1994), section 3.2.
 """
@@ -50,24 +50,24 @@ class ScrewAxis:
 
     @property
     def opposite(self) -> ScrewAxis:
-        """The same line for the joint read backwards: its motion is undone by the same value."""
+        """The axis of the joint read backwards: its motion is undone by the same value."""
         x, y, z = self.direction
         return ScrewAxis(self.prismatic, (-x + 0.0, -y + 0.0, -z + 0.0), self.point)
 
 
 @frozen
 class AxisGeometry:
-    """The lines of all joints, the tcp's pose at zero in the base, and lengths to judge by.
+    """The screw axes of all joints, the tcp's pose at zero in the base, and the length of the arm.
 
     Attributes:
-        lines: One for each joint, in the frame of the base.
+        axes: One for each joint, in the frame of the base.
         home: T_base_tcp at zero, shape (4, 4).
         base: T_world_base, shape (4, 4).
         forward: Direction of the first link's x axis at zero: where the arm reaches with the shoulder left.
         length: The arm's characteristic length, m.
     """
 
-    lines: tuple[ScrewAxis, ...]
+    axes: tuple[ScrewAxis, ...]
     home: Array
     base: Array
     forward: Floats
@@ -76,28 +76,28 @@ class AxisGeometry:
     @property
     def kinds(self) -> str:
         """Joint types from the base on: R or P for each."""
-        return "".join("P" if line.prismatic else "R" for line in self.lines)
+        return "".join("P" if axis.prismatic else "R" for axis in self.axes)
 
 
 @lru_cache(maxsize=16)
 def axis_geometry(robot: Robot) -> AxisGeometry:
-    """Return the lines of a robot.
+    """Return the screw axes of a robot.
 
     Raises:
         InputError: When the robot has no geometry.
     """
     links = links_of(robot)
-    axes, tcp = travel(links, np.eye(4), robot.tool, cast("Sequence[Array]", [0.0] * len(links)))
-    lines = tuple(ScrewAxis(axis.prismatic, _clean(axis.direction), _clean(axis.point)) for axis in axes)
+    at_zero, tcp = travel(links, np.eye(4), robot.tool, cast("Sequence[Array]", [0.0] * len(links)))
+    axes = tuple(ScrewAxis(axis.prismatic, _clean(axis.direction), _clean(axis.point)) for axis in at_zero)
     home = np.eye(4)
     home[:3] = np.array([_clean(column) for column in (tcp.x, tcp.y, tcp.z, tcp.p)]).T
-    turn = links[0].theta
-    forward = _clean((float(np.cos(turn)), float(np.sin(turn)), 0.0))
-    return AxisGeometry(lines, home, robot.base, forward, characteristic_length(robot))
+    angle = links[0].theta
+    forward = _clean((float(np.cos(angle)), float(np.sin(angle)), 0.0))
+    return AxisGeometry(axes, home, robot.base, forward, characteristic_length(robot))
 
 
 class Displacement:
-    """One block of target poses as the displacement from zero: G with G H = T, whatever base and tool.
+    """One block of B target poses T as displacements from zero: G with G H = T, whatever base and tool.
 
     Attributes:
         x, y, z, p: Columns of the targets in the base, each entry an array (B,).
@@ -150,9 +150,9 @@ class InverseDisplacement(Displacement):
         return self.direction(minus(point, self._origin))
 
 
-def parallel(*lines: ScrewAxis) -> bool:
-    """Return whether all lines have one direction, or the opposite one."""
-    crossed = (cross(lines[0].direction, line.direction) for line in lines[1:])
+def parallel(*axes: ScrewAxis) -> bool:
+    """Return whether all axes have one direction, or the opposite one."""
+    crossed = (cross(axes[0].direction, axis.direction) for axis in axes[1:])
     return all(hypot(*map(float, normal)) <= PARALLEL for normal in crossed)
 
 
@@ -162,10 +162,10 @@ def perpendicular(a: ScrewAxis, b: ScrewAxis) -> bool:
 
 
 def meeting_point(a: ScrewAxis, b: ScrewAxis, length: float) -> Floats | None:
-    """Return the point where two lines that are not parallel meet within 1e-9 of `length`; None elsewhere."""
+    """Return the point where two axes that are not parallel meet within 1e-9 of `length`; None elsewhere."""
     if parallel(a, b):
         return None
-    (ua, pa), (ub, pb) = ((np.array(line.direction), np.array(line.point)) for line in (a, b))
+    (ua, pa), (ub, pb) = ((np.array(axis.direction), np.array(axis.point)) for axis in (a, b))
     normal = np.cross(ua, ub)
     between = pb - pa
     if abs(float(between @ normal)) > MEETING * length * float(np.linalg.norm(normal)):
@@ -174,16 +174,16 @@ def meeting_point(a: ScrewAxis, b: ScrewAxis, length: float) -> Floats | None:
     return _clean(tuple(pa + along * ua))
 
 
-def contains(line: ScrewAxis, point: Floats, length: float) -> bool:
-    """Return whether a point lies on a line within 1e-9 of `length`."""
-    offset = np.cross(np.subtract(point, line.point), line.direction)
+def contains(axis: ScrewAxis, point: Floats, length: float) -> bool:
+    """Return whether a point lies on an axis within 1e-9 of `length`."""
+    offset = np.cross(np.subtract(point, axis.point), axis.direction)
     return float(np.linalg.norm(offset)) <= MEETING * length
 
 
-def common_point(lines: Sequence[ScrewAxis], length: float) -> Floats | None:
-    """Return the point in which three lines meet, neighbours not parallel; None where they do not."""
-    point = meeting_point(lines[0], lines[1], length)
-    if point is None or parallel(lines[1], lines[2]) or not contains(lines[2], point, length):
+def common_point(axes: Sequence[ScrewAxis], length: float) -> Floats | None:
+    """Return the point in which three axes meet, neighbours not parallel; None where they do not."""
+    point = meeting_point(axes[0], axes[1], length)
+    if point is None or parallel(axes[1], axes[2]) or not contains(axes[2], point, length):
         return None
     return point
 

@@ -1,9 +1,9 @@
-"""The few problems of turning a vector about an axis that every closed form is made of.
+"""Subproblems of closed forms: rotations of a vector about one axis, or two, with given results.
 
 Angles are carried as pairs (cosine, sine) until the end, so that no accuracy is lost near 0 and pi and no
-trigonometric function is called. Where a problem has two answers they come along a new first axis of length
-two; everything after it broadcasts. An aim out of reach is replaced by the nearest one that can be reached:
-forward kinematics then says by how much the target is missed.
+trigonometric function is called. Where a subproblem has two solutions they come along a new first axis of
+length two; everything after it broadcasts. An aim out of reach is replaced by the nearest one that can be
+reached: forward kinematics then says by how much the target is missed.
 
 Source: Paden, Kinematics and Control of Robot Manipulators (1986); Murray, Li and Sastry, A Mathematical
 Introduction to Robotic Manipulation (1994), section 3.3.2.
@@ -33,17 +33,61 @@ from trajcli.kinematics.columns import (
 from trajcli.kinematics.inverse.families.screw_axes import PARALLEL, Floats, across_floats
 
 Turn = tuple[Entry, Entry]
-FREE = 1e-8  # of the length at hand: closer to its axis a point does not tell its angle
-TANGENT = 1e-6  # rad, within which two answers are one: the square root of rounding, and room
+FREE = 1e-8  # of the length in question: closer to its axis a point does not determine its angle
+TANGENT = 1e-6  # rad, within which two solutions are one: the square root of rounding, with a margin
+
+
+@frozen
+class Mirrored:
+    """Turns of two solutions half a turn apart: of a choice whose second solution mirrors the first.
+
+    Attributes:
+        turn: The turns of the first solution, of length 1, with axes for the choices before.
+    """
+
+    turn: tuple[Array, Array]
+
+    def write(self, out: Array) -> None:
+        """Write both solutions' angles into (2, ..., B)."""
+        half_turn_more(angle(self.turn, out[0]), out[1])
+
+    def both(self) -> Turn:
+        """Return both solutions as turns (2, ..., B)."""
+        cosine, sine = self.turn
+        return np.stack([cosine, -cosine]), np.stack([sine, -sine])
+
+
+@frozen
+class Opposed:
+    """Turns of two solutions by the same angle in opposite directions.
+
+    Attributes:
+        turn: The turns of the first solution, of length 1, with axes for the choices before.
+    """
+
+    turn: tuple[Array, Array]
+
+    def write(self, out: Array) -> None:
+        """Write both solutions' angles into (2, ..., B)."""
+        np.negative(angle(self.turn, out[0]), out=out[1])
+
+    def both(self) -> Turn:
+        """Return both solutions as turns (2, ..., B)."""
+        cosine, sine = self.turn
+        return cosine[None], np.stack([sine, -sine])
+
+
+Value = Turn | Entry | Mirrored | Opposed
 
 
 class DegeneracyFlags:
-    """Notes in which poses of a block an angle is free, or two answers fall together.
+    """Which poses of a block leave an angle free or have a double solution, and how many choices were made.
 
     Attributes:
         rows: Shape (B,), True where something was noted.
         length: The arm's length, m, that lengths are compared with.
-        choices: How many choices were met so far: every value has at most that many axes before the poses.
+        choices: How many choices were made so far: every value has at most that many axes before the poses,
+            the last choice first.
     """
 
     def __init__(self, count: int, length: float) -> None:
@@ -59,9 +103,9 @@ class DegeneracyFlags:
     def fork(self, middle: Turn, aside: Turn) -> Turn:
         """Return middle + aside, and middle - aside, along the new first axis of one more choice."""
         self.choices += 1
-        return self.fork_again(middle, aside)
+        return self.fork_last(middle, aside)
 
-    def fork_again(self, middle: Turn, aside: Turn) -> Turn:
+    def fork_last(self, middle: Turn, aside: Turn) -> Turn:
         """Return middle + aside, and middle - aside, along the axis of the last choice."""
         return self._either(middle[0], aside[0]), self._either(middle[1], aside[1])
 
@@ -73,7 +117,7 @@ class DegeneracyFlags:
         return result
 
     def mirrored(self, turn: Turn) -> Mirrored:
-        """Return a turn (..., B) as the first answer of the last choice, with axes for the choices before."""
+        """Return a turn (..., B) as the first solution of the last choice, with axes for those before."""
         cosine, sine = (np.asarray(entry) for entry in turn)
         shapes = [(1,) * (self.choices - entry.ndim) + entry.shape for entry in (cosine, sine)]
         return Mirrored((cosine.reshape(shapes[0]), sine.reshape(shapes[1])))
@@ -106,8 +150,8 @@ def turned(vector: VectorEntries, axis: Floats, turn: Turn) -> VectorEntries:
     """Return a vector turned about a unit axis."""
     plane = _plane(axis)
     if plane is None:
-        swung = combine(turn[0], across(vector, axis), turn[1], cross(axis, vector))
-        return plus(along(vector, axis), swung)
+        rotated = combine(turn[0], across(vector, axis), turn[1], cross(axis, vector))
+        return plus(along(vector, axis), rotated)
     i, j = plane
     result = list(vector)
     result[i], result[j] = added((vector[i], vector[j]), turn)
@@ -120,7 +164,7 @@ def turned_back(vector: VectorEntries, axis: Floats, turn: Turn) -> VectorEntrie
 
 
 def _plane(axis: Floats) -> tuple[int, int] | None:
-    """Return the places of the two coordinates that a turn about a coordinate axis mixes, first to second."""
+    """Return the two coordinates that a turn about a coordinate axis mixes, first to second."""
     for i in range(3):
         if abs(axis[i]) == 1.0:
             j, k = (i + 1) % 3, (i + 2) % 3
@@ -150,7 +194,7 @@ def half_turn_more(angles: Array, out: Array) -> None:
 def onto(axis: Floats, vector: VectorEntries, aim: VectorEntries) -> Turn:
     """Return the turn about `axis` that brings `vector` into the half-plane of `aim`; its length is not 1.
 
-    One answer. Both vectors' parts along the axis do not matter; it is the nearest where they differ.
+    One solution. Both vectors' parts along the axis do not matter; it is the nearest where they differ.
     """
     plane = _plane(axis)
     if plane is None:
@@ -159,9 +203,9 @@ def onto(axis: Floats, vector: VectorEntries, aim: VectorEntries) -> Turn:
     return added((aim[i], aim[j]), (vector[i], vector[j]), -1.0)
 
 
-def unit(turn: Turn, watch: DegeneracyFlags, scale: float = 1.0) -> Turn:
+def unit(turn: Turn, flags: DegeneracyFlags, scale: float = 1.0) -> Turn:
     """Return a turn of length 1; where it has none (1e-8 `scale`) the angle is free, zero is taken."""
-    return _divided(turn, length(turn), watch, scale)
+    return _divided(turn, length(turn), flags, scale)
 
 
 def length(turn: Turn) -> Array:
@@ -170,10 +214,10 @@ def length(turn: Turn) -> Array:
     return np.asarray(np.sqrt(square, out=square if square.ndim else None))
 
 
-def _divided(turn: Turn, size: Array, watch: DegeneracyFlags, scale: float = 1.0) -> Turn:
+def _divided(turn: Turn, size: Array, flags: DegeneracyFlags, scale: float = 1.0) -> Turn:
     free = np.asarray(size < FREE * scale)
     if free.any():
-        watch.note(free)
+        flags.note(free)
         size = np.where(free, 1.0, size)
         return np.where(free, 1.0, turn[0] / size), np.where(free, 0.0, turn[1] / size)
     return turn[0] / size, turn[1] / size
@@ -184,16 +228,16 @@ def levels(
     vector: VectorEntries,
     normal: VectorEntries,
     level: Entry,
-    watch: DegeneracyFlags,
+    flags: DegeneracyFlags,
     scale: float = 1.0,
     sign: Entry = 1.0,
 ) -> tuple[Turn, Turn]:
     """Return the two turns about `axis` after which normal . vector is `level` (or comes nearest to it).
 
-    normal . R(t) vector = A cos t + B sin t + C. With x = level - C and r^2 = A^2 + B^2 the answers are
+    normal . R(t) vector = A cos t + B sin t + C. With x = level - C and r^2 = A^2 + B^2 the solutions are
     cos t = (A x - B y) / r^2, sin t = (B x + A y) / r^2 for y = +-sqrt(r^2 - x^2).
 
-    (x, y) of the first answer come second: where all is at right angles to the axis, they are the parts of
+    (x, y) of the first solution come second: where all is at right angles to the axis, they are the parts of
     R(t) vector along normal and axis x normal, times the length of normal.
 
     Args:
@@ -201,15 +245,15 @@ def levels(
         vector: What is turned.
         normal: What it is measured along.
         level: The aim.
-        watch: Is told where r vanishes (the angle is free) and where the answers fall together.
+        flags: Note where r vanishes (the angle is free) and where the solutions coincide.
         scale: The size that r is compared with.
-        sign: Of y in the first answer, by pose if it is an array.
+        sign: Of y in the first solution, by pose if it is an array.
     """
     a, b = onto(axis, vector, normal)
     x = difference(level, product(dot(axis, vector), dot(axis, normal)))
     square = np.asarray(np.square(a) + np.square(b))
     rest = np.asarray(minus_product(square, x, x))
-    watch.note(np.abs(rest) <= TANGENT**2 * square)
+    flags.note(np.abs(rest) <= TANGENT**2 * square)
     out = rest < 0.0
     if out.any():
         x = np.where(out, np.copysign(np.sqrt(square), x), x)
@@ -220,71 +264,31 @@ def levels(
     some = bool(free.any())
     if some:
         square = np.where(free, 1.0, square)
-        watch.note(np.asarray(free & np.ones_like(rest, dtype=bool)))
+        flags.note(np.asarray(free & np.ones_like(rest, dtype=bool)))
     a, b = a / square, b / square
-    cosine, sine = watch.fork((product(a, x), product(b, x)), (product(difference(0.0, b), y), product(a, y)))
+    cosine, sine = flags.fork((product(a, x), product(b, x)), (product(difference(0.0, b), y), product(a, y)))
     return (np.where(free, 1.0, cosine), np.where(free, 0.0, sine)) if some else (cosine, sine), (x, y)
 
 
-@frozen
-class Mirrored:
-    """Turns of two answers half a turn apart: of a choice whose second answer mirrors the first.
-
-    Attributes:
-        turn: The turns of the first answer, of length 1, with axes for the choices before.
-    """
-
-    turn: tuple[Array, Array]
-
-    def write(self, out: Array) -> None:
-        """Write both answers' angles into (2, ..., B)."""
-        half_turn_more(angle(self.turn, out[0]), out[1])
-
-    def both(self) -> Turn:
-        """Return both answers as turns (2, ..., B)."""
-        cosine, sine = self.turn
-        return np.stack([cosine, -cosine]), np.stack([sine, -sine])
-
-
-@frozen
-class Opposed:
-    """Turns of two answers by the same angle in opposite directions.
-
-    Attributes:
-        turn: The turns of the first answer, of length 1, with axes for the choices before.
-    """
-
-    turn: tuple[Array, Array]
-
-    def write(self, out: Array) -> None:
-        """Write both answers' angles into (2, ..., B)."""
-        np.negative(angle(self.turn, out[0]), out=out[1])
-
-    def both(self) -> Turn:
-        """Return both answers as turns (2, ..., B)."""
-        cosine, sine = self.turn
-        return cosine[None], np.stack([sine, -sine])
-
-
 def two_turns(
-    first: Floats, second: Floats, vector: Floats, aim: VectorEntries, watch: DegeneracyFlags
+    first: Floats, second: Floats, vector: Floats, aim: VectorEntries, flags: DegeneracyFlags
 ) -> tuple[Turn | Mirrored, Turn | Opposed]:
     """Return the turns about `first`, and those about `second` before, that bring `vector` to `aim`.
 
-    Two answers; all are unit vectors. In the first one `vector` stands on the positive side of the plane of
+    Two solutions; all are unit vectors. In the first one `vector` stands on the positive side of the plane of
     both axes: second . (first x vector) >= 0. Where the axes are at right angles, and the vector to the
     second one, the sine is found from the aim's distance to the first axis and keeps all its digits near 0
     and pi.
     """
     if not square_wrist(first, second, vector):
-        turn, _ = levels(second, vector, first, dot(first, aim), watch)
-        return unit(onto(first, turned(vector, second, turn), aim), watch, FREE), turn
+        turn, _ = levels(second, vector, first, dot(first, aim), flags)
+        return unit(onto(first, turned(vector, second, turn), aim), flags, FREE), turn
     side = across_floats(second, first)
     turn = dot(side, aim), dot(second, aim)
     sine = length(turn)
-    watch.choices += 1
-    around = watch.mirrored(_divided(turn, sine, watch))
-    bend = Opposed(watch.mirrored((dot(first, aim), sine)).turn)
+    flags.choices += 1
+    around = flags.mirrored(_divided(turn, sine, flags))
+    bend = Opposed(flags.mirrored((dot(first, aim), sine)).turn)
     if dot(vector, side) == 0.0 and dot(vector, first) == 1.0:
         return around, bend
     return around, added(bend.both(), (dot(vector, first), dot(vector, side)), -1.0)
@@ -293,6 +297,3 @@ def two_turns(
 def square_wrist(first: Floats, second: Floats, vector: Floats) -> bool:
     """Return whether `second` is at right angles to both others."""
     return max(abs(float(dot(first, second))), abs(float(dot(second, vector)))) <= PARALLEL
-
-
-Value = Turn | Entry | Mirrored | Opposed
