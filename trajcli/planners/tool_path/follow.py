@@ -288,5 +288,5 @@ def _fitted(
         misfit = tolerance_ratio(exact, tolerance, breaks, guess(probes(breaks)))
         return fit(exact.solved, misfit, breaks, guess)
     except (LostError, FitError) as error:
-        at = float(error.places[0]) if isinstance(error, LostError) else error.place
+        at = float(error.places[0]) if isinstance(error, LostError) else error.at
         raise trouble.unfit(at, guess) from None
