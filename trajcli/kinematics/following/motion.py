@@ -78,4 +78,4 @@ def motion_along(
         return path.by_time(law, times, side, passed)
 
     breaks = distinct(np.concatenate([law_breaks, passed]))
-    return ToolMotion(path, law, timed, breaks, tolerance, path.poses.in_place, ruled_by)
+    return ToolMotion(path, law, timed, breaks, tolerance, path.poses.pure_rotation, ruled_by)

@@ -236,7 +236,9 @@ class FollowedPath:
 
 def diagnosis_on_path(robot: Robot, path: ToolPath, exact: Follower) -> FollowingDiagnosis:
     """Return who explains what goes wrong along a path."""
-    return FollowingDiagnosis(robot, path.by_place, path.length, None, path.poses.in_place, len(exact.held))
+    return FollowingDiagnosis(
+        robot, path.by_place, path.length, None, path.poses.pure_rotation, len(exact.held)
+    )
 
 
 def diagnosis_of_motion(
