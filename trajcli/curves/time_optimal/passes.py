@@ -62,42 +62,6 @@ class UnlimitedSpeedError(ValueError):
 
 
 @frozen
-class Controllable:
-    """The sets [lower, upper] of x from which the end can be reached, each of shape (N + 1,).
-
-    Attributes:
-        lower: Zero unless the end is passed at a speed.
-        upper: At most the maximum velocity curve.
-        mvc: Maximum velocity curve: the largest x at each grid point that its two intervals have room for.
-    """
-
-    lower: Array
-    upper: Array
-    mvc: Array
-
-
-def controllable(
-    intervals: CollocationRows, end_velocity: float = 0.0, mvc: Array | None = None
-) -> Controllable:
-    """Return the controllable sets.
-
-    Args:
-        intervals: N of them.
-        end_velocity: sd at the end, not negative; infinite for any.
-        mvc: As from `maximum_velocity_curve`, where it is known.
-    """
-    P, R, C = intervals.P[:, ::-1], intervals.R[:, ::-1], intervals.C[:, ::-1]
-    mvc = maximum_velocity_curve(intervals) if mvc is None else mvc
-    limits = mvc[::-1].copy()
-    limits[0] = min(limits[0], end_velocity**2)
-    upper = solve_recurrence(R, P, C, (P > 0) & (R < 0), limits)[::-1]
-    lower = np.zeros_like(upper)
-    if np.isfinite(end_velocity):
-        lower[-1] = end_velocity**2
-    return Controllable(_lower(intervals, lower, upper) if lower[-1] > 0 else lower, upper, mvc)
-
-
-@frozen
 class Speeds:
     """The fastest motion over a grid of N intervals, each of shape (N + 1,).
 
@@ -142,6 +106,64 @@ def solve(
     return Speeds(x, sets.upper, sets.mvc)
 
 
+def solve_locally(
+    intervals: CollocationRows, before: Speeds, changed: NDArray[np.bool_], mvc: Array
+) -> Speeds | None:
+    """Return the fastest motion where few rows changed, or None where it changes far away, too.
+
+    Args:
+        intervals: N of them.
+        before: The motion without the changes.
+        changed: Which intervals have lower limits than before, shape (N,).
+        mvc: As from `maximum_velocity_curve`.
+    """
+    speeds = Speeds(before.x.copy(), before.upper.copy(), mvc)
+    for radius in _RADII:
+        around = _Neighbourhoods(intervals, changed, radius)
+        if around.points.size > _MOST * changed.size:
+            break
+        around.solve(before, speeds)
+        if around.unchanged_at_border(before, speeds):
+            return speeds
+    return None
+
+
+@frozen
+class Controllable:
+    """The sets [lower, upper] of x from which the end can be reached, each of shape (N + 1,).
+
+    Attributes:
+        lower: Zero unless the end is passed at a speed.
+        upper: At most the maximum velocity curve.
+        mvc: Maximum velocity curve: the largest x at each grid point that its two intervals have room for.
+    """
+
+    lower: Array
+    upper: Array
+    mvc: Array
+
+
+def controllable(
+    intervals: CollocationRows, end_velocity: float = 0.0, mvc: Array | None = None
+) -> Controllable:
+    """Return the controllable sets.
+
+    Args:
+        intervals: N of them.
+        end_velocity: sd at the end, not negative; infinite for any.
+        mvc: As from `maximum_velocity_curve`, where it is known.
+    """
+    P, R, C = intervals.P[:, ::-1], intervals.R[:, ::-1], intervals.C[:, ::-1]
+    mvc = maximum_velocity_curve(intervals) if mvc is None else mvc
+    limits = mvc[::-1].copy()
+    limits[0] = min(limits[0], end_velocity**2)
+    upper = solve_recurrence(R, P, C, (P > 0) & (R < 0), limits)[::-1]
+    lower = np.zeros_like(upper)
+    if np.isfinite(end_velocity):
+        lower[-1] = end_velocity**2
+    return Controllable(_lower(intervals, lower, upper) if lower[-1] > 0 else lower, upper, mvc)
+
+
 def _forward(intervals: CollocationRows, first: float, upper: Array) -> Array:
     limits = upper.copy()
     limits[0] = first
@@ -165,28 +187,6 @@ def _lower(intervals: CollocationRows, lower: Array, upper: Array) -> Array:
         if y == 0.0:
             break
     return lower
-
-
-def solve_locally(
-    intervals: CollocationRows, before: Speeds, changed: NDArray[np.bool_], mvc: Array
-) -> Speeds | None:
-    """Return the fastest motion where few rows changed, or None where it changes far away, too.
-
-    Args:
-        intervals: N of them.
-        before: The motion without the changes.
-        changed: Which intervals have lower limits than before, shape (N,).
-        mvc: As from `maximum_velocity_curve`.
-    """
-    speeds = Speeds(before.x.copy(), before.upper.copy(), mvc)
-    for radius in _RADII:
-        around = _Neighbourhoods(intervals, changed, radius)
-        if around.points.size > _MOST * changed.size:
-            break
-        around.solve(before, speeds)
-        if around.unchanged_at_border(before, speeds):
-            return speeds
-    return None
 
 
 class _Neighbourhoods:
