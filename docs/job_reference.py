@@ -120,7 +120,7 @@ _MEANINGS: dict[Group, str] = {
     "pose": "`x y z qw qx qy qz`: position and unit quaternion of the tcp in world",
     "twist": "`vx vy vz wx wy wz`: velocity at the tcp and angular velocity, in world",
     "twistd": "`ax ay az ex ey ez`: time derivative of the twist",
-    "path": "`s sd sdd`: arc length of the tcp along the path of its move and two derivatives; 0 without a path",
+    "path": "`s sd sdd`: arc length of the tcp along its path and two derivatives; 0 without a path",
     "move": "index of the move, from 0; at the border of two moves, that of the later one",
 }
 

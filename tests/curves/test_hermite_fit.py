@@ -153,7 +153,7 @@ def test_a_function_that_no_quintics_follow_is_named_with_its_place():
 
     with pytest.raises(FitError) as caught:
         fit(known(root), within(1e-6), ENDS, lambda t: np.zeros((t.size, 1)))
-    assert caught.value.place == pytest.approx(np.sqrt(2), abs=1e-3)
+    assert caught.value.at == pytest.approx(np.sqrt(2), abs=1e-3)
     assert caught.value.misfit > 1
     assert "times the tolerance" in str(caught.value)
 

@@ -1,4 +1,4 @@
-"""The cycloidal law s(u) = u - sin(2 pi u) / (2 pi), whose acceleration is a sine: zero at both ends.
+"""Cycloidal law s(u) = u - sin(2 pi u) / (2 pi), whose acceleration is a sine: zero at both ends.
 
 It is no polynomial: pieces of the ninth degree follow it, each the law's own Taylor series at its start.
 Over a piece of width h the series is off by s^(10) h^10 / 10!, which at 64 pieces is 4e-18 of the

@@ -1,9 +1,7 @@
-"""Extremes of a curve and its derivatives, for all t and not at samples.
+"""Extremes of curves and their derivatives for all t, and critical points of polynomials.
 
 The largest and smallest values of p^(m) on a piece lie at its ends or at roots of p^(m+1). A candidate is
 always a point on the curve: one too many does no harm.
-
-Where the derivatives of polynomials vanish, by the chain of derivatives.
 
 The roots of p^(j+1) cut a piece into intervals on which p^(j) is monotone, so an interval holds a root of
 p^(j) exactly when the signs at its ends differ. One pass from the highest derivative down gives the critical
@@ -26,128 +24,8 @@ from trajcli.frozen import frozen
 
 _STEP = 2.0**-53  # of a piece: a shorter step of the root finder changes nothing
 _STEPS = 120  # twice what bisection alone needs, because at most every second step is not a bisection
-
-
-def critical_points(coefficients: Array, lengths: Array, orders: Sequence[int]) -> list[Array]:
-    """Return for each order all roots of the derivative after it, (k, w, n), ascending, in local time.
-
-    Where there are fewer roots than the degree allows, other points of the piece stand in.
-
-    Args:
-        coefficients: Shape (degree + 1, w, n), highest power first.
-        lengths: Shape (w,), none negative.
-        orders: Derivative orders, 0 for the value.
-    """
-    roots = _chain(_normalised(coefficients, lengths), min(orders, default=0) + 1)
-    nowhere = np.empty((0, *coefficients.shape[1:]))
-    return [roots.get(order + 1, nowhere) * lengths[:, None] for order in orders]
-
-
-def _normalised(coefficients: Array, lengths: Array) -> Array:
-    """Return the polynomials in u = t / length, scaled: the largest coefficient from u^1 up becomes 1."""
-    powers = lengths ** np.arange(coefficients.shape[0] - 1, -1, -1)[:, None]
-    scaled = coefficients * powers[:, :, None]
-    scaled[-1] = 0.0  # has no say in where derivatives vanish, and may be too large for the others' scale
-    size = np.abs(scaled).max(axis=0)
-    return scaled / np.where(size > 0, size, 1.0)
-
-
-def _chain(coefficients: Array, lowest: int) -> dict[int, Array]:
-    """Return for each j points (degree - j, w, n) in [0, 1], ascending: all roots of derivative j and more.
-
-    Args:
-        coefficients: Shape (degree + 1, w, n).
-        lowest: The smallest j that is asked for.
-    """
-    degree = coefficients.shape[0] - 1
-    roots: dict[int, Array] = {}
-    for order in range(degree - 1, lowest - 1, -1):
-        polynomial = derivative_coefficients(coefficients, order)
-        closed = _linear if order == degree - 1 else _quadratic
-        roots[order] = closed(polynomial) if order >= degree - 2 else _between(polynomial, roots[order + 1])
-    return roots
-
-
-def _linear(coefficients: Array) -> Array:
-    slope, offset = coefficients
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        return _within_piece((-offset / slope)[None])
-
-
-def _quadratic(coefficients: Array) -> Array:
-    """Return both roots without cancellation; without real roots two points that are as good as any.
-
-    Source: Press et al., Numerical Recipes (3rd ed.), section 5.6.
-    """
-    a, b, c = coefficients
-    root = np.sqrt(np.maximum(b * b - 4.0 * a * c, 0.0))
-    q = -0.5 * (b + np.copysign(root, b))
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        return np.sort(_within_piece(np.stack([q / a, c / q])), axis=0)
-
-
-def _within_piece(points: Array) -> Array:
-    return np.clip(np.where(np.isnan(points), 0.0, points), 0.0, 1.0)
-
-
-def _between(coefficients: Array, turns: Array) -> Array:
-    """Return one point for each interval between the ends and `turns`: its root, or else its first end."""
-    ends = np.zeros((1, *turns.shape[1:]))
-    knots = np.concatenate([ends, turns, ends + 1.0])
-    values = horner(coefficients, knots)
-    signs = np.sign(values)
-    slot, piece, joint = np.nonzero(signs[:-1] * signs[1:] < 0)
-    roots = knots[:-1].copy()
-    if slot.size:
-        rising = signs[slot + 1, piece, joint]
-        roots[slot, piece, joint] = _bracketed(
-            coefficients[:, piece, joint] * rising,
-            (knots[slot, piece, joint], knots[slot + 1, piece, joint]),
-            (values[slot, piece, joint] * rising, values[slot + 1, piece, joint] * rising),
-        )
-    return roots
-
-
-def _bracketed(coefficients: Array, ends: tuple[Array, Array], values: tuple[Array, Array]) -> Array:
-    """Return the root of each polynomial (degree + 1, m) that rises through zero between its `ends`.
-
-    Newton's step is taken where it stays inside the bracket and is at most half the step before it, else
-    the bracket is halved. A polynomial is done when it is zero up to rounding, or the step is.
-    """
-    low, high = ends
-    x = low + (high - low) * (values[0] / (values[0] - values[1]))
-    step, found, live = high - low, np.empty_like(x), np.arange(x.size)
-    for _ in range(_STEPS):
-        value, slope = _with_slope(coefficients, x)
-        below = value < 0
-        low, high = np.where(below, x, low), np.where(below, high, x)
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            newton = x - value / slope
-        fast = (newton >= low) & (newton <= high) & (np.abs(newton - x) <= 0.5 * np.abs(step))
-        x, before = np.where(fast, newton, 0.5 * (low + high)), x
-        step = x - before
-        zero = np.abs(value) <= _STEP * np.abs(coefficients).sum(axis=0)
-        found[live] = np.where(zero, before, x)
-        going = ~zero & (np.abs(step) > _STEP)
-        if not going.any():
-            break
-        if not going.all():
-            coefficients, live = coefficients[:, going], live[going]
-            low, high, x, step = low[going], high[going], x[going], step[going]
-    return found
-
-
-def _with_slope(coefficients: Array, x: Array) -> tuple[Array, Array]:
-    """Return value and derivative of the polynomials (degree + 1, m) at `x` (m,)."""
-    value, slope = coefficients[0], np.zeros_like(x)
-    for row in coefficients[1:]:
-        slope = slope * x + value
-        value = value * x + row
-    return value, slope
-
-
-_BLOCK = 2048  # stretches looked at together: what is computed of them stays in the processor's cache
-_MANY = 64  # stretches from which on it pays to look for roots only where control points leave room
+_BLOCK = 2048  # parts of pieces looked at together: what is computed of them stays in the processor's cache
+_MANY = 64  # parts of pieces from which on it pays to look for roots only where control points leave room
 _SAME = 1e-12  # of the largest value: peaks closer than this are one peak, and the earliest is named
 
 
@@ -157,9 +35,9 @@ class Peaks:
 
     Attributes:
         low: Smallest value by component, both sides of every break counted.
-        low_time: The earliest place of it, on the curve's own time.
+        low_time: The earliest time of it, on the curve's own time.
         high: Largest value by component.
-        high_time: The earliest place of it.
+        high_time: The earliest time of it.
     """
 
     low: Array
@@ -213,15 +91,15 @@ def peaks_between(
     """
     windows = _windows(curve, np.asarray(intervals, dtype=np.float64).reshape(-1, 2))
     ends, worth = _surveyed(curve, windows, orders)
-    place = np.nonzero(worth)
-    chosen, lengths = curve.coefficients[:, windows.piece[place[0]], place[1]], windows.length[place[0]]
+    pairs = np.nonzero(worth)
+    chosen, lengths = curve.coefficients[:, windows.piece[pairs[0]], pairs[1]], windows.length[pairs[0]]
     critical = critical_points(chosen[:, :, None], lengths, orders)
-    found = [
-        _extremes(at_ends, _within(derivative_coefficients(chosen, order), place, inside, windows), windows)
+    extremes = [
+        _extremes(at_ends, _within(derivative_coefficients(chosen, order), pairs, inside, windows), windows)
         for order, at_ends, inside in zip(orders, ends, critical, strict=True)
     ]
     return [
-        tuple(Peaks(*(values[k] for values in of_order)) for of_order in found)
+        tuple(Peaks(*(values[k] for values in of_order)) for of_order in extremes)
         for k in range(windows.first.size)
     ]
 
@@ -240,25 +118,145 @@ def piece_extremes(
         For each order the smallest and the largest value, each of shape (w, n).
     """
     start, end = np.zeros((lengths.size, 1)), lengths[:, None]
-    found = []
+    extremes = []
     for order, inside in zip(orders, critical_points(coefficients, lengths, orders), strict=True):
         values = horner(derivative_coefficients(coefficients, order), _candidates(inside, start, end))
-        found.append((values.min(axis=0), values.max(axis=0)))
-    return found
+        extremes.append((values.min(axis=0), values.max(axis=0)))
+    return extremes
+
+
+def critical_points(coefficients: Array, lengths: Array, orders: Sequence[int]) -> list[Array]:
+    """Return for each order all roots of the derivative after it, (k, w, n), ascending, in local time.
+
+    Where there are fewer roots than the degree allows, other points of the piece stand in.
+
+    Args:
+        coefficients: Shape (degree + 1, w, n), highest power first.
+        lengths: Shape (w,), none negative.
+        orders: Derivative orders, 0 for the value.
+    """
+    roots = _chain(_normalised(coefficients, lengths), min(orders, default=0) + 1)
+    nowhere = np.empty((0, *coefficients.shape[1:]))
+    return [roots.get(order + 1, nowhere) * lengths[:, None] for order in orders]
+
+
+def _normalised(coefficients: Array, lengths: Array) -> Array:
+    """Return the polynomials in u = t / length, scaled: the largest coefficient from u^1 up becomes 1."""
+    powers = lengths ** np.arange(coefficients.shape[0] - 1, -1, -1)[:, None]
+    scaled = coefficients * powers[:, :, None]
+    scaled[-1] = 0.0  # has no say in where derivatives vanish, and may be too large for the others' scale
+    size = np.abs(scaled).max(axis=0)
+    return scaled / np.where(size > 0, size, 1.0)
+
+
+def _chain(coefficients: Array, lowest: int) -> dict[int, Array]:
+    """Return for each j points (degree - j, w, n) in [0, 1], ascending: all roots of derivative j and more.
+
+    Args:
+        coefficients: Shape (degree + 1, w, n).
+        lowest: The smallest j that is asked for.
+    """
+    degree = coefficients.shape[0] - 1
+    roots: dict[int, Array] = {}
+    for order in range(degree - 1, lowest - 1, -1):
+        polynomial = derivative_coefficients(coefficients, order)
+        closed = _linear if order == degree - 1 else _quadratic
+        roots[order] = closed(polynomial) if order >= degree - 2 else _between(polynomial, roots[order + 1])
+    return roots
+
+
+def _linear(coefficients: Array) -> Array:
+    """Return the roots (1, w, n) of polynomials of degree one, or the nearest points of their pieces."""
+    slope, offset = coefficients
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        return _within_piece((-offset / slope)[None])
+
+
+def _quadratic(coefficients: Array) -> Array:
+    """Return both roots without cancellation; without real roots two points that are as good as any.
+
+    Source: Press et al., Numerical Recipes (3rd ed.), section 5.6.
+    """
+    a, b, c = coefficients
+    root = np.sqrt(np.maximum(b * b - 4.0 * a * c, 0.0))
+    q = -0.5 * (b + np.copysign(root, b))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        return np.sort(_within_piece(np.stack([q / a, c / q])), axis=0)
+
+
+def _within_piece(points: Array) -> Array:
+    """Return the points within [0, 1]; what is no number becomes 0."""
+    return np.clip(np.where(np.isnan(points), 0.0, points), 0.0, 1.0)
+
+
+def _between(coefficients: Array, turns: Array) -> Array:
+    """Return one point for each interval between the ends and `turns`: its root, or else its first end."""
+    ends = np.zeros((1, *turns.shape[1:]))
+    knots = np.concatenate([ends, turns, ends + 1.0])
+    values = horner(coefficients, knots)
+    signs = np.sign(values)
+    slot, piece, joint = np.nonzero(signs[:-1] * signs[1:] < 0)
+    roots = knots[:-1].copy()
+    if slot.size:
+        rising = signs[slot + 1, piece, joint]
+        roots[slot, piece, joint] = _bracketed(
+            coefficients[:, piece, joint] * rising,
+            (knots[slot, piece, joint], knots[slot + 1, piece, joint]),
+            (values[slot, piece, joint] * rising, values[slot + 1, piece, joint] * rising),
+        )
+    return roots
+
+
+def _bracketed(coefficients: Array, ends: tuple[Array, Array], values: tuple[Array, Array]) -> Array:
+    """Return the root of each polynomial (degree + 1, m) that rises through zero between its `ends`.
+
+    Newton's step is taken where it stays inside the bracket and is at most half the step before it, else
+    the bracket is halved. A polynomial is done when it is zero up to rounding, or the step is.
+    """
+    low, high = ends
+    x = low + (high - low) * (values[0] / (values[0] - values[1]))
+    step, roots, live = high - low, np.empty_like(x), np.arange(x.size)
+    for _ in range(_STEPS):
+        value, slope = _with_slope(coefficients, x)
+        below = value < 0
+        low, high = np.where(below, x, low), np.where(below, high, x)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            newton = x - value / slope
+        fast = (newton >= low) & (newton <= high) & (np.abs(newton - x) <= 0.5 * np.abs(step))
+        x, before = np.where(fast, newton, 0.5 * (low + high)), x
+        step = x - before
+        zero = np.abs(value) <= _STEP * np.abs(coefficients).sum(axis=0)
+        roots[live] = np.where(zero, before, x)
+        going = ~zero & (np.abs(step) > _STEP)
+        if not going.any():
+            break
+        if not going.all():
+            coefficients, live = coefficients[:, going], live[going]
+            low, high, x, step = low[going], high[going], x[going], step[going]
+    return roots
+
+
+def _with_slope(coefficients: Array, x: Array) -> tuple[Array, Array]:
+    """Return value and derivative of the polynomials (degree + 1, m) at `x` (m,)."""
+    value, slope = coefficients[0], np.zeros_like(x)
+    for row in coefficients[1:]:
+        slope = slope * x + value
+        value = value * x + row
+    return value, slope
 
 
 @frozen
 class _Windows:
-    """The stretches of pieces that make up the intervals; w of them in all, m intervals.
+    """The parts of pieces that make up the intervals; w of them in all, m intervals.
 
     Attributes:
         piece: Index of the piece, shape (w,).
         origin: Its first break, shape (w,).
         length: Of the whole piece, shape (w,).
-        start: Where the stretch begins, absolute, shape (w,).
+        start: Where the part begins, absolute, shape (w,).
         end: Where it ends, shape (w,).
-        first: Index of the first stretch of each interval, shape (m,).
-        interval: Index of the interval of each stretch, shape (w,).
+        first: Index of the first part of each interval, shape (m,).
+        interval: Index of the interval of each part, shape (w,).
     """
 
     piece: NDArray[np.intp]
@@ -271,6 +269,7 @@ class _Windows:
 
 
 def _windows(curve: PiecewisePolynomial, intervals: Array) -> _Windows:
+    """Return the parts of pieces that make up intervals (m, 2)."""
     start, end = intervals.T
     if not ((start >= curve.start) & (start <= end) & (end <= curve.end)).all():
         raise ValueError(f"interval outside the curve's domain [{curve.start!r}, {curve.end!r}]")
@@ -289,7 +288,7 @@ def _windows(curve: PiecewisePolynomial, intervals: Array) -> _Windows:
 def _surveyed(
     curve: PiecewisePolynomial, windows: _Windows, orders: Sequence[int]
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Return what stands at both ends of all stretches, and where a peak may lie between them.
+    """Return what stands at both ends of all parts, and where a peak may lie between them.
 
     Returns:
         Values of each order, shape (orders, 2, w, n), and whether control points leave room for more than
@@ -325,38 +324,38 @@ def _leaves_room(hull: Array, at_ends: Array, windows: _Windows) -> NDArray[np.b
 
 @frozen
 class _Within:
-    """Candidates inside stretches; c pairs of a stretch and a component have some.
+    """Candidates inside parts of pieces; c pairs of a part and a component have some.
 
     Attributes:
-        place: Indices of stretch and component, each of shape (c,); no pair stands there twice.
+        pairs: Indices of part and component, each of shape (c,); no pair stands there twice.
         times: Absolute, shape (k, c).
         values: Shape (k, c).
     """
 
-    place: tuple[NDArray[np.intp], ...]
+    pairs: tuple[NDArray[np.intp], ...]
     times: Array
     values: Array
 
 
 def _within(
-    coefficients: Array, place: tuple[NDArray[np.intp], ...], inside: Array, windows: _Windows
+    coefficients: Array, pairs: tuple[NDArray[np.intp], ...], inside: Array, windows: _Windows
 ) -> _Within:
-    """Return the candidates at places from polynomials (degree + 1, c) and critical points (k, c, 1)."""
-    start, end, origin = (values[place[0]] for values in (windows.start, windows.end, windows.origin))
+    """Return the candidates of pairs from polynomials (degree + 1, c) and critical points (k, c, 1)."""
+    start, end, origin = (values[pairs[0]] for values in (windows.start, windows.end, windows.origin))
     local = np.clip(inside[:, :, 0], start - origin, end - origin)
-    return _Within(place, np.minimum(local + origin, end), horner(coefficients, local))
+    return _Within(pairs, np.minimum(local + origin, end), horner(coefficients, local))
 
 
 def _extremes(ends: Array, within: _Within, windows: _Windows) -> tuple[Array, Array, Array, Array]:
     """Return low, its time, high, its time, each (m, n), from values at ends (2, w, n) and within."""
-    place, least, most = within.place, ends.min(axis=0), ends.max(axis=0)
-    least[place] = np.minimum(least[place], within.values.min(axis=0, initial=np.inf))
-    most[place] = np.maximum(most[place], within.values.max(axis=0, initial=-np.inf))
+    pairs, least, most = within.pairs, ends.min(axis=0), ends.max(axis=0)
+    least[pairs] = np.minimum(least[pairs], within.values.min(axis=0, initial=np.inf))
+    most[pairs] = np.maximum(most[pairs], within.values.max(axis=0, initial=-np.inf))
     low, high = np.minimum.reduceat(least, windows.first), np.maximum.reduceat(most, windows.first)
     same = _SAME * np.maximum(np.abs(low), np.abs(high))
     below, above = (low + same)[windows.interval], (high - same)[windows.interval]
-    low_time = _earliest(ends <= below, within.values <= below[place], within, windows)
-    high_time = _earliest(ends >= above, within.values >= above[place], within, windows)
+    low_time = _earliest(ends <= below, within.values <= below[pairs], within, windows)
+    high_time = _earliest(ends >= above, within.values >= above[pairs], within, windows)
     return low, low_time, high, high_time
 
 
@@ -367,7 +366,7 @@ def _earliest(
     times = np.where(at_ends[1], windows.end[:, None], np.inf)
     times[at_ends[0]] = np.broadcast_to(windows.start[:, None], times.shape)[at_ends[0]]
     first = np.where(inside, within.times, np.inf).min(axis=0, initial=np.inf)
-    times[within.place] = np.minimum(times[within.place], first)
+    times[within.pairs] = np.minimum(times[within.pairs], first)
     return np.minimum.reduceat(times, windows.first)
 
 

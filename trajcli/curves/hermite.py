@@ -1,4 +1,4 @@
-"""Hermite polynomials: the polynomial of degree 2k - 1 that has k given derivatives at both ends.
+"""Hermite polynomials: those of degree 2k - 1 with k given derivatives at both ends.
 
 k = 2, 3, 4, 5 are the cubic, quintic, septic and nonic of the textbooks. In normalised time u = t / T, with
 Taylor coefficients a_i at u = 0 and e_i at u = 1, the polynomial is

@@ -1,9 +1,9 @@
-"""Any smooth function whose derivatives can be asked for, as quintic pieces within a stated tolerance.
+"""Adaptive quintic Hermite fit of a smooth function within a stated tolerance.
 
 A piece takes value, first and second derivative from the function at its two ends; between them the error is
 of order 6 in its length (4 in the second derivative), so intervals are divided until the error is small
-enough where it is largest. All intervals of a round are asked for at once. Where the function is found by a
-search, a coarse curve says where to begin: the pieces of the first rounds are too far off for that.
+enough where it is largest. All intervals of a round are asked for at once. Where the function is the result
+of a search, a coarse curve says where to begin: the pieces of the first rounds are too far off for that.
 
 Source: Birkhoff and Priver, Hermite interpolation errors for derivatives, J. Math. Phys. 46 (1967).
 """
@@ -23,10 +23,21 @@ from trajcli.frozen import frozen
 
 MOST_PIECES = 4096
 RowIndices = NDArray[np.intp]
+Guess = Callable[[Array], Array]
+"""Values (N, n) near the function's at points (N,)."""
+# where the error of a quintic piece is largest: of the value and its curvature, and of the slope
+_PROBES = np.array([0.5 - 0.1 * sqrt(5.0), 0.5, 0.5 + 0.1 * sqrt(5.0)])
+_ORDER = 4  # with which the error of the second derivative falls: the slowest
+_FILLED = 0.8  # of the tolerance: between the probes the error is a little larger
+_NOISE = 4.0  # units in the last place by which values that are exact may be off
+_MOST_PARTS = 8
+_AT_ONCE = 64  # of a few pieces that are off everywhere, together; others may only have a narrow peak
+_EXPLAINED = 100.0  # times its rounding by which a derivative may be off that rounding explains
+_ROUNDS = 60
 
 
 class Known(Protocol):
-    """What is known of a function at N places; what else a misfit needs may come with it.
+    """What is known of a function at N points; what else a misfit needs may come with it.
 
     Attributes:
         values: Value, first and second derivative, shape (3, N, n).
@@ -39,37 +50,64 @@ class Known(Protocol):
 
 
 K = TypeVar("K", bound=Known)
+
+
 ExactValues = Callable[[Array, Side, Array], K]
-"""What is known at places (N,) from one side of breaks, by guesses (N, n)."""
+"""What is known at points (N,) from one side of breaks, by guesses (N, n)."""
+
+
 ErrorMeasure = Callable[[K, RowIndices, Array], Array]
-"""By how many times its tolerance a fit (3, k, n) misses what is known at rows (k,) of the places: (k,)."""
-
-Guess = Callable[[Array], Array]
-"""Values (N, n) near the function's at places (N,)."""
-
-# where the error of a quintic piece is largest: of the value and its curvature, and of the slope
-_PROBES = np.array([0.5 - 0.1 * sqrt(5.0), 0.5, 0.5 + 0.1 * sqrt(5.0)])
-_ORDER = 4  # with which the error of the second derivative falls: the slowest
-_FILLED = 0.8  # of the tolerance: between the probes the error is a little larger
-_NOISE = 4.0  # units in the last place by which values that are exact may be off
-_MOST_PARTS = 8
-_AT_ONCE = 64  # of a few pieces that are off everywhere, together; others may only have a narrow peak
-_EXPLAINED = 100.0  # times its rounding by which a derivative may be off that rounding explains
-_ROUNDS = 60
+"""By how many times its tolerance a fit (3, k, n) misses what is known at rows (k,) of the points: (k,)."""
 
 
 class FitError(ValueError):
     """The function cannot be fitted within its tolerance.
 
     Attributes:
-        place: Where it is worst.
+        at: Where it is worst.
         misfit: By how many times the tolerance it is missed there.
     """
 
-    def __init__(self, place: float, misfit: float) -> None:
-        super().__init__(f"{misfit:.3g} times the tolerance is missed at {place!r}")
-        self.place = place
+    def __init__(self, at: float, misfit: float) -> None:
+        super().__init__(f"{misfit:.3g} times the tolerance is missed at {at!r}")
+        self.at = at
         self.misfit = misfit
+
+
+def fit(
+    exact: ExactValues[K], misfit: ErrorMeasure[K], breaks: Array, guess: Guess, *, most: int = MOST_PIECES
+) -> PiecewisePolynomial:
+    """Return quintic pieces through a function, each within tolerance where its error is largest.
+
+    What rounding explains is no error: pieces that are short for that reason would only make it larger.
+
+    Args:
+        exact: The function.
+        misfit: Its tolerance.
+        breaks: Shape (m,), increasing: where the second derivative may jump, and the ends.
+        guess: Values (N, n) near the function's at points (N,), to begin with.
+        most: Pieces.
+
+    Raises:
+        FitError: When more pieces would be needed.
+    """
+    pending = _whole(exact, breaks, guess)
+    done: list[_Pieces] = []
+    count = 0
+    for _ in range(_ROUNDS):
+        judged = _judged(exact, misfit, pending)
+        fine = judged.error <= _FILLED
+        done.append(judged.pieces.at(fine))
+        count += int(np.count_nonzero(fine))
+        if fine.all():
+            return _joined(done)
+        pieces = count + int(np.count_nonzero(~fine))
+        parts = _parts(judged.error[~fine], judged.least[~fine], _AT_ONCE // pieces)
+        if count + int(parts.sum()) > most:
+            break
+        pending = _divided(judged.pieces.at(~fine), parts, judged.nearer[~fine], guess)
+    worst = int(judged.error.argmax())
+    raise FitError(float(judged.worst[worst]), float(judged.error[worst]))
 
 
 @frozen
@@ -97,7 +135,7 @@ class _Pieces:
         return _Pieces(self.start[kept], self.end[kept], self.left[:, kept], self.right[:, kept])
 
     def probes(self) -> Array:
-        """Return the places (k * p,) between the ends at which a fit is judged."""
+        """Return the points (k * p,) between the ends at which a fit is judged."""
         return np.asarray(self.start[:, None] + (self.end - self.start)[:, None] * _PROBES).reshape(-1)
 
 
@@ -126,51 +164,15 @@ class _Judged:
         pieces: All ends known.
         error: Largest misfit of each, shape (k,).
         least: Smallest, shape (k,).
-        place: Where the largest is, shape (k,).
+        worst: Where the largest is, shape (k,).
         nearer: Whether the piece is nearer to the function than the guess was, shape (k,).
     """
 
     pieces: _Pieces
     error: Array
     least: Array
-    place: Array
+    worst: Array
     nearer: NDArray[np.bool_]
-
-
-def fit(
-    exact: ExactValues[K], misfit: ErrorMeasure[K], breaks: Array, guess: Guess, *, most: int = MOST_PIECES
-) -> PiecewisePolynomial:
-    """Return quintic pieces through a function, each within tolerance where its error is largest.
-
-    What rounding explains is no error: pieces that are short for that reason would only make it larger.
-
-    Args:
-        exact: The function.
-        misfit: Its tolerance.
-        breaks: Shape (m,), increasing: where the second derivative may jump, and the ends.
-        guess: Values (N, n) near the function's at places (N,), to begin with.
-        most: Pieces.
-
-    Raises:
-        FitError: When more pieces would be needed.
-    """
-    pending = _whole(exact, breaks, guess)
-    done: list[_Pieces] = []
-    count = 0
-    for _ in range(_ROUNDS):
-        judged = _judged(exact, misfit, pending)
-        fine = judged.error <= _FILLED
-        done.append(judged.pieces.at(fine))
-        count += int(np.count_nonzero(fine))
-        if fine.all():
-            return _joined(done)
-        pieces = count + int(np.count_nonzero(~fine))
-        parts = _parts(judged.error[~fine], judged.least[~fine], _AT_ONCE // pieces)
-        if count + int(parts.sum()) > most:
-            break
-        pending = _divided(judged.pieces.at(~fine), parts, judged.nearer[~fine], guess)
-    worst = int(judged.error.argmax())
-    raise FitError(float(judged.place[worst]), float(judged.error[worst]))
 
 
 def _whole(exact: ExactValues[K], breaks: Array, guess: Guess) -> _Pending:
@@ -225,7 +227,7 @@ def _rounding(values: Array, lengths: Array) -> Array:
 
 
 def _at(coefficients: Array, local: Array) -> Array:
-    """Return value, first and second derivative (3, k * p, n) of pieces at local places (k, p)."""
+    """Return value, first and second derivative (3, k * p, n) of pieces at local points (k, p)."""
     spread = [
         horner(derivative_coefficients(coefficients, order)[:, :, None, :], local[:, :, None])
         for order in range(3)
@@ -242,15 +244,16 @@ def _divided(pieces: _Pieces, parts: RowIndices, nearer: NDArray[np.bool_], gues
     end = np.where(last, pieces.end[owner], np.append(start[1:], 0.0))
     divided = _Pieces(start, end, pieces.left[:, owner], pieces.right[:, owner])
     lefts = np.flatnonzero(number > 0)
-    places = np.append(start[lefts], divided.probes())
-    near, whose = guess(places), np.append(owner[lefts], np.repeat(owner, _PROBES.size))
+    points = np.append(start[lefts], divided.probes())
+    near, whose = guess(points), np.append(owner[lefts], np.repeat(owner, _PROBES.size))
     own = nearer[whose]
-    local = (places - pieces.start[whose])[own]
+    local = (points - pieces.start[whose])[own]
     near[own] = horner(pieces.coefficients()[:, whose[own]], local[:, None])
     return _Pending(divided, lefts, lefts - 1, near)
 
 
 def _joined(pieces: list[_Pieces]) -> PiecewisePolynomial:
+    """Return all pieces in order as one curve."""
     start = np.concatenate([some.start for some in pieces])
     order = np.argsort(start)
     coefficients = np.concatenate([some.coefficients() for some in pieces], axis=1)[:, order]

@@ -1,8 +1,9 @@
-"""Tridiagonal systems in linear time, one matrix for many right sides.
+"""Tridiagonal systems, of numbers and of square blocks, in linear time.
 
 The splines of this package lead to rows whose diagonal is larger than the sum of its neighbours; elimination
 without exchanges is then stable, whatever the ratio of the lengths between waypoints. The precondition is
-checked, so that no matrix is ever solved inaccurately in silence.
+checked, so that no matrix is ever solved inaccurately in silence. Systems of blocks are symmetric and
+positive definite.
 
 Long systems are halved until they are short: every other unknown is eliminated at once, which leaves rows of
 the same kind, as dominated by their diagonal. The sweeps over a short one run over plain floats: for the few
@@ -11,8 +12,6 @@ on every machine.
 
 Source: Golub and Van Loan, Matrix Computations, 4th edition (2013), sections 4.1, 4.3 and 4.5 (cyclic
 reduction); Higham, Accuracy and Stability of Numerical Algorithms, 2nd edition (2002), section 9.6.
-
-Positive definite systems of square blocks on three diagonals, in linear time.
 """
 
 from __future__ import annotations
@@ -48,15 +47,29 @@ def solve_tridiagonal(lower: Array, diagonal: Array, upper: Array, right: Array)
             f"its neighbours together, {float(beside[k])!r}, or not positive"
         )
     columns = np.ascontiguousarray(right.T)
-    found = _cyclic_reduction(lower, diagonal, upper, columns)
-    if (
-        diagonal.size > _SHORT
-    ):  # halving loses a digit in rows of mixed sizes; what it left over gives it back
-        left = columns - diagonal * found
-        left[:, 1:] -= lower[1:] * found[:, :-1]
-        left[:, :-1] -= upper[:-1] * found[:, 1:]
-        found += _cyclic_reduction(lower, diagonal, upper, left)
-    return np.ascontiguousarray(found.T)
+    solution = _cyclic_reduction(lower, diagonal, upper, columns)
+    if diagonal.size > _SHORT:  # halving loses a digit in rows of mixed sizes: the residual gives it back
+        residual = columns - diagonal * solution
+        residual[:, 1:] -= lower[1:] * solution[:, :-1]
+        residual[:, :-1] -= upper[:-1] * solution[:, 1:]
+        solution += _cyclic_reduction(lower, diagonal, upper, residual)
+    return np.ascontiguousarray(solution.T)
+
+
+def solve_block_tridiagonal(diagonal: Array, right: Array, values: Array) -> Array:
+    """Return x, shape (m,), of the symmetric positive definite system A x = values.
+
+    Every other block is eliminated, which leaves a system of the same kind with half the blocks.
+
+    Args:
+        diagonal: Blocks A[i, i], shape (b, k, k).
+        right: Blocks A[i, i + 1], shape (b - 1, k, k).
+        values: Shape (m,), m <= b k; what is missing is zero.
+    """
+    blocks, size = diagonal.shape[:2]
+    known = np.zeros(blocks * size)
+    known[: values.size] = values
+    return _block_cyclic_reduction(diagonal, right, known.reshape(blocks, size, 1)).reshape(-1)[: values.size]
 
 
 def _cyclic_reduction(lower: Array, diagonal: Array, upper: Array, right: Array) -> Array:
@@ -79,12 +92,12 @@ def _cyclic_reduction(lower: Array, diagonal: Array, upper: Array, right: Array)
     beyond[:links] = -after[:links] * odd_upper[:links]
     back[1:] = -before * odd_lower[:links]
     even = _cyclic_reduction(back, kept, beyond, rest)
-    found = np.empty_like(right)
-    found[:, 0::2] = even
+    solution = np.empty_like(right)
+    solution[:, 0::2] = even
     odd_right -= odd_lower * even[:, :pairs]
     odd_right[:, :links] -= odd_upper[:links] * even[:, 1 : links + 1]
-    found[:, 1::2] = odd_right
-    return found
+    solution[:, 1::2] = odd_right
+    return solution
 
 
 def _factors(
@@ -104,6 +117,7 @@ def _factors(
 def _solution(
     factors: list[float], pivots: list[float], upper: list[float], right: list[float]
 ) -> list[float]:
+    """Return the solution of a factored system, in place of its right side."""
     x = right
     value = x[0]
     for k in range(1, len(x)):
@@ -115,24 +129,6 @@ def _solution(
         value = (x[k] - upper[k] * value) / pivots[k]
         x[k] = value
     return x
-
-
-def solve_block_tridiagonal(diagonal: Array, right: Array, values: Array) -> Array:
-    """Return x, shape (m,), of the symmetric positive definite system A x = values.
-
-    Every other block is eliminated, which leaves a system of the same kind with half the blocks.
-
-    Args:
-        diagonal: Blocks A[i, i], shape (b, k, k).
-        right: Blocks A[i, i + 1], shape (b - 1, k, k).
-        values: Shape (m,), m <= b k; what is missing is zero.
-
-    Source: Golub and Van Loan, Matrix Computations, 4th edition (2013), section 4.5 (cyclic reduction).
-    """
-    blocks, size = diagonal.shape[:2]
-    known = np.zeros(blocks * size)
-    known[: values.size] = values
-    return _block_cyclic_reduction(diagonal, right, known.reshape(blocks, size, 1)).reshape(-1)[: values.size]
 
 
 def _block_cyclic_reduction(diagonal: Array, right: Array, values: Array) -> Array:

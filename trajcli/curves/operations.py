@@ -1,7 +1,4 @@
-"""Curves out of curves: merged breaks, scaled and reversed time, a law laid on a line, a rest at the end.
-
-When an increasing function of time reaches given values.
-"""
+"""Operations on curves: merged breaks, scaled and reversed time, composition, extension, inverse of a law."""
 
 from __future__ import annotations
 
@@ -25,6 +22,7 @@ _ROUNDING = 4 * np.finfo(np.float64).eps  # of the largest time: what sums of ph
 _DEGREE = 10  # of a composition: beyond it rounding grows
 _NEAR = 1e6  # times rounding: a value of the law this near to a break may be one that it passes
 _REST = 1e-9  # of the peak velocity: less counts as standing still
+_STEPS = 60  # of bisection: a piece is divided to its last bit
 
 
 def merge_breaks(curves: Sequence[PiecewisePolynomial]) -> PiecewisePolynomial:
@@ -46,11 +44,11 @@ def merge_breaks(curves: Sequence[PiecewisePolynomial]) -> PiecewisePolynomial:
     owners = np.repeat(np.arange(len(curves)), [times.size for times in inner])
     times = np.concatenate(inner)
     order = np.lexsort((owners, times))
-    united, place = _united(times[order], owners[order], apart)
+    united, index_of = _united(times[order], owners[order], apart)
     breaks = np.concatenate([[start], united, [end]])
     split = []
-    for index, curve in enumerate(curves):
-        starts = np.concatenate([[0], 1 + place[owners[order] == index]])
+    for owner, curve in enumerate(curves):
+        starts = np.concatenate([[0], 1 + index_of[owners[order] == owner]])
         piece = np.searchsorted(starts, np.arange(breaks.size - 1), "right") - 1
         offset = breaks[:-1] - curve.breaks[piece]
         offset[0] = 0.0
@@ -59,17 +57,17 @@ def merge_breaks(curves: Sequence[PiecewisePolynomial]) -> PiecewisePolynomial:
 
 
 def _united(times: Array, owners: np.ndarray, apart: float) -> tuple[Array, np.ndarray]:
-    """Return the distinct times, and for each of `times` (sorted) the index of the one that stands for it."""
-    distinct: list[float] = []
-    place = np.empty(times.size, dtype=np.intp)
+    """Return the times that are kept, and for each of `times` (sorted) the index of its representative."""
+    kept: list[float] = []
+    index_of = np.empty(times.size, dtype=np.intp)
     members: set[int] = set()
     for k, (time, owner) in enumerate(zip(times.tolist(), owners.tolist(), strict=True)):
-        if not distinct or time - distinct[-1] > apart or owner in members:
-            distinct.append(time)
+        if not kept or time - kept[-1] > apart or owner in members:
+            kept.append(time)
             members = set()
         members.add(owner)
-        place[k] = len(distinct) - 1
-    return np.array(distinct), place
+        index_of[k] = len(kept) - 1
+    return np.array(kept), index_of
 
 
 def _stacked(coefficients: Sequence[Array]) -> Array:
@@ -209,7 +207,7 @@ def hold_until(curve: PiecewisePolynomial, end: float) -> PiecewisePolynomial:
 
 
 def coast_until(curve: PiecewisePolynomial, end: float) -> PiecewisePolynomial:
-    """Return the curve extended by a stretch in which its last velocity stays.
+    """Return the curve extended by an interval in which its last velocity stays.
 
     Args:
         curve: Any.
@@ -231,9 +229,6 @@ def _extended(curve: PiecewisePolynomial, end: float, last: Array) -> PiecewiseP
     breaks = np.array([curve.end, end])
     longer = concatenate([curve, PiecewisePolynomial(breaks, last[:, None, :])])
     return PiecewisePolynomial(np.append(longer.breaks[:-1], end), longer.coefficients)
-
-
-_STEPS = 60  # of bisection: a piece is divided to its last bit
 
 
 def times_at(law: PiecewisePolynomial, values: Array) -> Array:

@@ -1,6 +1,6 @@
-"""Motion of one variable in phases with one constant derivative each: jerk, acceleration or velocity.
+"""Phase chains: motion of one variable with constant jerk, acceleration or velocity in each phase.
 
-A solver hands its phases over with an error of its own. Newton's method on the durations lays the end of the
+A solver returns its phases with an error of its own. Newton's method on the durations lays the end of the
 motion exactly into its target: the least relative change of the durations that does it, so that phases of
 length zero stay away and long ones carry the correction. Where the durations alone cannot do it (a motion of
 given duration with few phases), the constants change too, a thousand times less willingly.
@@ -57,7 +57,7 @@ class PhaseChain:
 
     @cached_property
     def _walk(self) -> tuple[Array, Array]:
-        """The states (k + 1, order) before each phase and at the end, and what cruises found instead of 0."""
+        """The states (k + 1, order) before each phase and at the end, and what cruises had instead of 0."""
         state = self.initial.tolist()
         rows, leftover = [], []
         for k, (time, constant) in enumerate(
@@ -206,6 +206,7 @@ class PhaseChain:
         return best
 
     def _residual(self, scales: Array, duration: float | None) -> Array:
+        """Return by how much the end, the cruises and the duration miss what they should be."""
         states, leftover = self._walk
         miss = ((states[-1] - self.final) / scales)[~np.isnan(self.final)]
         total = [] if duration is None else [self.duration / duration - 1]

@@ -1,4 +1,4 @@
-"""The one curve type of trajcli: a vector-valued piecewise polynomial.
+"""Piecewise polynomials with values in R^n: the one curve type of trajcli.
 
 A joint path q(s), a time law s(t) and a trajectory q(t) are this type in three roles.
 """
@@ -217,6 +217,7 @@ def constant(value: ArrayLike, duration: float) -> PiecewisePolynomial:
 
 
 def _padded(coefficients: Array, degree: int) -> Array:
+    """Return the coefficients with zeros in front, up to a degree."""
     missing = degree + 1 - coefficients.shape[0]
     return (
         np.concatenate([np.zeros((missing, *coefficients.shape[1:])), coefficients])
@@ -235,6 +236,7 @@ def _piece_of(breaks: Array, t: Array, side: Side) -> NDArray[np.intp]:
 
 
 def _evaluate_block(breaks: Array, table: Array, t: Array, piece: NDArray[np.intp], out: Array) -> None:
+    """Write the polynomials of a table (degree + 1, pieces, m) at times (w,) into `out` (w, m)."""
     first, last = int(piece[0]), int(piece[-1])
     ordered = not (piece[1:] < piece[:-1]).any()
     local = t - (breaks[first] if ordered and first == last else breaks[piece])

@@ -1,4 +1,4 @@
-"""The smallest number that satisfies a bound, where those that do need not form one interval."""
+"""Smallest feasible factor: the least number that keeps a bound which is not monotone."""
 
 from __future__ import annotations
 
@@ -64,13 +64,13 @@ def _down_the_dip(excess: Excess, low: float, high: float, block: int) -> tuple[
     """
     for tried in range(_ROUNDS):
         inner = np.geomspace(low, high, block + 6)
-        found = excess(inner)
-        feasible = np.flatnonzero(found <= 0)
+        values = excess(inner)
+        feasible = np.flatnonzero(values <= 0)
         if feasible.size:
             return float(inner[max(feasible[0] - 1, 0)]), float(inner[feasible[0]])
-        best = int(found.argmin())
+        best = int(values.argmin())
         around = slice(max(best - 1, 0), best + 2)
-        if tried > 0 and 2 * found[best] > found[around].max():
+        if tried > 0 and 2 * values[best] > values[around].max():
             return None
         low, high = inner[around][0], inner[around][-1]
     return None

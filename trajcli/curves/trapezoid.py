@@ -4,11 +4,10 @@ Along the displacement, with boundary speeds w0, w1 >= 0, cruise speed V, and ra
 and d (slowing down), the motion covers D = V T - (V - w0)^2 / (2 a) - (V - w1)^2 / (2 d) in the time
 T = (V - w0)/a + (V - w1)/d + cruise. What runs away from the target at the start, or must run up from
 behind it at the end, is a ramp to or from rest before or after that.
+The velocity is linear between knots, and the position a chain of parabolas.
 
 Source: Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), sections 3.2
 and 3.2.7; Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.2.1.
-
-A velocity of one variable that is linear between knots; its position is a chain of parabolas.
 """
 
 from __future__ import annotations
@@ -22,6 +21,8 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial, increasing
 from trajcli.frozen import comparable
 
 _ROUNDING_OF_SPEED = 1e-14  # of the largest speed: speeds this close differ by rounding
+_ROUNDING = 1e-12  # relative: what a speed, a distance or a duration may miss its bound by
+_DOUBLE = 1e-15  # relative: a discriminant this small is zero, and both roots are one
 
 
 @comparable
@@ -45,7 +46,7 @@ class VelocityProfile:
 
     Attributes:
         initial: Velocity at the start.
-        knots: (duration of the stretch, velocity at its end) in order; without knots it has no length.
+        knots: (duration of the interval, velocity at its end) in order; without knots it has no length.
     """
 
     initial: float
@@ -77,7 +78,7 @@ class VelocityProfile:
         return VelocityProfile(self.initial / factor, tuple((t * factor, v / factor) for t, v in self.knots))
 
     def phases(self) -> list[tuple[str, float, float]]:
-        """Return (name, start, end) of each stretch: accelerate, cruise, decelerate or rest."""
+        """Return (name, start, end) of each interval: accelerate, cruise, decelerate or rest."""
         named, start, before = [], 0.0, self.initial
         for length, velocity in self.knots:
             change = abs(velocity) - abs(before)
@@ -111,7 +112,7 @@ class VelocityProfile:
         return PiecewisePolynomial(breaks, coefficients)
 
     def _lasting_knots(self) -> list[tuple[float, float]]:
-        """Return the knots without stretches of no length, and ramps between speeds equal but for rounding.
+        """Return the knots without intervals of no length, and ramps between speeds equal but for rounding.
 
         Such a ramp is shorter than the times of its ends are exact: its acceleration would be anything.
         """
@@ -125,10 +126,6 @@ class VelocityProfile:
                 kept.append((length, before if same else velocity))
                 before = kept[-1][1]
         return kept
-
-
-_ROUNDING = 1e-12  # relative: what a speed, a distance or a duration may miss its bound by
-_DOUBLE = 1e-15  # relative: a discriminant this small is zero, and both roots are one
 
 
 class InfeasibleProfileError(ValueError):
@@ -168,8 +165,8 @@ def fastest_profile(
     Raises:
         InfeasibleProfileError: When the boundary velocities do not let it end there without turning round.
     """
-    way = _way(distance, initial, final, forward, backward, overshoot=overshoot)
-    return way.with_middle(_fastest_middle(way))
+    motion = _motion_parts(distance, initial, final, forward, backward, overshoot=overshoot)
+    return motion.with_middle(_fastest_middle(motion))
 
 
 def profile_of_duration(
@@ -191,16 +188,16 @@ def profile_of_duration(
         InfeasibleProfileError: As `fastest_profile`; "acceleration" with the least one when from rest to rest
             equal ramps are too flat; else "duration" with the shortest and the longest.
     """
-    way = _way(distance, initial, final, forward, backward, overshoot=overshoot)
-    around = way.before.duration + way.after.duration
-    middle = _middle_of_duration(way, duration - around)
+    motion = _motion_parts(distance, initial, final, forward, backward, overshoot=overshoot)
+    around = motion.before.duration + motion.after.duration
+    middle = _middle_of_duration(motion, duration - around)
     if middle is not None:
-        return way.with_middle(middle)
-    equal = way.rates.acceleration == way.rates.deceleration
+        return motion.with_middle(middle)
+    equal = motion.rates.acceleration == motion.rates.deceleration
     if initial == 0 and final == 0 and equal:
         raise InfeasibleProfileError("acceleration", 4 * abs(distance) / duration**2)
-    shortest = way.with_middle(_fastest_middle(way)).duration
-    raise InfeasibleProfileError("duration", shortest, around + _slowest_middle(way))
+    shortest = motion.with_middle(_fastest_middle(motion)).duration
+    raise InfeasibleProfileError("duration", shortest, around + _slowest_middle(motion))
 
 
 def profile_of_speed(
@@ -274,7 +271,7 @@ class _ThreePartMotion:
     rates: MotionBounds
 
     def mirrored(self) -> _ThreePartMotion:
-        """Return the way in the opposite direction."""
+        """Return the motion in the opposite direction."""
         before, after = self.before.mirrored(), self.after.mirrored()
         return replace(self, before=before, after=after, direction=-self.direction)
 
@@ -284,7 +281,7 @@ class _ThreePartMotion:
         return self.before.then(signed).then(self.after)
 
 
-def _way(
+def _motion_parts(
     distance: float,
     initial: float,
     final: float,
@@ -293,8 +290,9 @@ def _way(
     *,
     overshoot: bool,
 ) -> _ThreePartMotion:
+    """Return the parts of a motion whose arguments are those of `fastest_profile`."""
     if distance < 0 or (distance == 0 and (initial < 0 or (initial == 0 and final < 0))):
-        return _way(-distance, -initial, -final, backward, forward, overshoot=overshoot).mirrored()
+        return _motion_parts(-distance, -initial, -final, backward, forward, overshoot=overshoot).mirrored()
     change = (initial - final) * (initial + final) / 2
     needed = change / forward.deceleration if change > 0 else -change / forward.acceleration
     fits = needed <= distance * (1 + _ROUNDING)
@@ -306,23 +304,25 @@ def _way(
         raise InfeasibleProfileError(reason, needed)
     if initial < 0 or (final >= 0 and change > 0):
         brake = _ramp(initial, 0.0, forward if initial > 0 else backward)
-        rest = _way(distance - brake.distance, 0.0, final, forward, backward, overshoot=overshoot)
+        rest = _motion_parts(distance - brake.distance, 0.0, final, forward, backward, overshoot=overshoot)
         return replace(rest, before=brake.then(rest.before))
     run_up = _ramp(0.0, final, forward if final > 0 else backward)
-    rest = _way(distance - run_up.distance, initial, 0.0, forward, backward, overshoot=overshoot)
+    rest = _motion_parts(distance - run_up.distance, initial, 0.0, forward, backward, overshoot=overshoot)
     return replace(rest, after=rest.after.then(run_up))
 
 
 def _ramp(initial: float, final: float, rates: MotionBounds) -> VelocityProfile:
+    """Return the profile from one velocity to another, of one sign."""
     faster = abs(final) > abs(initial)
     rate = rates.acceleration if faster else rates.deceleration
     return VelocityProfile(initial, ((abs(final - initial) / rate, final),))
 
 
-def _fastest_middle(way: _ThreePartMotion) -> VelocityProfile:
-    if way.distance == 0:
-        return VelocityProfile(way.initial)
-    distance, initial, final, rates = way.distance, way.initial, way.final, way.rates
+def _fastest_middle(motion: _ThreePartMotion) -> VelocityProfile:
+    """Return the middle that takes the least time."""
+    if motion.distance == 0:
+        return VelocityProfile(motion.initial)
+    distance, initial, final, rates = motion.distance, motion.initial, motion.final, motion.rates
     a, d = rates.acceleration, rates.deceleration
     square = (2 * a * d * distance + d * initial**2 + a * final**2) / (a + d)
     peak = max(math.sqrt(square), initial, final)
@@ -330,7 +330,7 @@ def _fastest_middle(way: _ThreePartMotion) -> VelocityProfile:
         return VelocityProfile(initial, (((peak - initial) / a, peak), ((peak - final) / d, final)))
     cruise = rates.speed
     if min(initial, final) > cruise:
-        cruise = max(cruise, _lowest_speed(way))
+        cruise = max(cruise, _lowest_speed(motion))
     rise = abs(cruise - initial) / (a if cruise >= initial else d)
     fall = abs(cruise - final) / (d if cruise >= final else a)
     covered = (initial + cruise) / 2 * rise + (cruise + final) / 2 * fall
@@ -338,18 +338,18 @@ def _fastest_middle(way: _ThreePartMotion) -> VelocityProfile:
     return VelocityProfile(initial, ((rise, cruise), (flat, cruise), (fall, final)))
 
 
-def _middle_of_duration(way: _ThreePartMotion, duration: float) -> VelocityProfile | None:
+def _middle_of_duration(motion: _ThreePartMotion, duration: float) -> VelocityProfile | None:
     """Return the middle that lasts `duration`, or None; a ramp may lead up to the cruise or down to it."""
-    if way.distance == 0:
-        return VelocityProfile(0.0, ((duration, 0.0),)) if way.initial == 0 and duration >= 0 else None
+    if motion.distance == 0:
+        return VelocityProfile(0.0, ((duration, 0.0),)) if motion.initial == 0 and duration >= 0 else None
     if duration <= 0:
         return None
-    a, d, initial, final = way.rates.acceleration, way.rates.deceleration, way.initial, way.final
+    a, d, initial, final = motion.rates.acceleration, motion.rates.deceleration, motion.initial, motion.final
     for first, second in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
         up, down = (a if first > 0 else d), (d if second > 0 else a)
         square = first / (2 * up) + second / (2 * down)
         linear = duration + first * initial / up + second * final / down
-        rest = way.distance + first * initial**2 / (2 * up) + second * final**2 / (2 * down)
+        rest = motion.distance + first * initial**2 / (2 * up) + second * final**2 / (2 * down)
         for cruise in _roots(square, -linear, rest):
             room = _ROUNDING * cruise
             rise, fall = abs(cruise - initial) / up, abs(cruise - final) / down
@@ -359,25 +359,26 @@ def _middle_of_duration(way: _ThreePartMotion, duration: float) -> VelocityProfi
     return None
 
 
-def _lowest_speed(way: _ThreePartMotion) -> float:
+def _lowest_speed(motion: _ThreePartMotion) -> float:
     """Return where slowing down at once meets speeding up at the end; 0 where there is time to stop."""
-    a, d = way.rates.acceleration, way.rates.deceleration
-    square = (way.initial**2 / d + way.final**2 / a - 2 * way.distance) * a * d / (a + d)
+    a, d = motion.rates.acceleration, motion.rates.deceleration
+    square = (motion.initial**2 / d + motion.final**2 / a - 2 * motion.distance) * a * d / (a + d)
     return math.sqrt(max(0.0, square))
 
 
-def _slowest_middle(way: _ThreePartMotion) -> float:
+def _slowest_middle(motion: _ThreePartMotion) -> float:
     """Return how long the middle can last: as long as wanted where it may stop, or nearly so."""
-    lowest = _lowest_speed(way)
+    lowest = _lowest_speed(motion)
     if lowest == 0:
         return math.inf
-    slowing, speeding = way.initial - lowest, way.final - lowest
-    return max(0.0, slowing / way.rates.deceleration + speeding / way.rates.acceleration)
+    slowing, speeding = motion.initial - lowest, motion.final - lowest
+    return max(0.0, slowing / motion.rates.deceleration + speeding / motion.rates.acceleration)
 
 
 def _three(
     initial: float, cruise: float, final: float, rise: float, fall: float, duration: float
 ) -> VelocityProfile:
+    """Return rise, cruise and fall within a duration; a cruise of rounding length is left out."""
     flat = duration - rise - fall
     if flat <= _ROUNDING * duration:
         rise, flat = duration - fall, 0.0

@@ -1,4 +1,4 @@
-"""Three angles about coordinate axes: the twelve Euler sequences on current or fixed axes, and rpy.
+"""Euler angles: the twelve sequences on current or fixed axes, and roll, pitch and yaw.
 
 With i, j, k the axes of a sequence on current axes, R = R_i(a) R_j(b) R_k(c). Row i of R depends on b and c
 alone, so c and b are read from it; a follows from R R_k(-c), whose column j is R_i(a) e_j. Reading a last
@@ -28,7 +28,7 @@ class EulerAngles:
 
     Attributes:
         angles: Shape (*batch, 3), rad. The middle angle is in [-pi/2, pi/2] for three different axes, in
-            [0, pi] where the first axis comes again.
+            [0, pi] where the first and the last axis are the same.
         alternative: Shape (*batch, 3), the other triple of the same rotation.
         lock: Shape (*batch,): 0 where all is regular; at gimbal lock 1 where only the sum of first and third
             angle is determined and -1 where only their difference is. At the lock itself the turn of `angles`
@@ -133,6 +133,7 @@ def _repeated(r: Array, i: int, j: int) -> tuple[Array, Array, Array, NDArray[np
 
 
 def _lock(distance: Array, sign: Array) -> NDArray[np.int8]:
+    """Return what is determined at a distance from the lock: 0 all, 1 the sum, -1 the difference."""
     return np.where(distance <= GIMBAL_LOCK, np.where(sign > 0.0, 1, -1), 0).astype(np.int8)
 
 

@@ -1,4 +1,4 @@
-"""SE(3): poses as 4x4 matrices T_a_b with p_a = T_a_b @ p_b, batches in front; twists, linear part first."""
+"""Poses, SE(3): 4x4 matrices T_a_b with p_a = T_a_b @ p_b, batches in front; twists, linear part first."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def log_pose(pose: Array) -> Array:
 
 
 def exp_pose(twist: ArrayLike) -> Array:
-    """Return the poses (*batch, 4, 4) that twists (*batch, 6) reach from the identity in unit time.
+    """Return the poses (*batch, 4, 4) to which twists (*batch, 6) lead from the identity in unit time.
 
     t = V v with V = I + ((1 - cos a) / a^2) K + ((a - sin a) / a^3) K^2, in the terms of `log_pose`.
     """
@@ -107,18 +107,18 @@ def twist_between(start: Array, end: Array) -> Array:
     return log_pose(invert(start) @ end)
 
 
-def interpolate(start: Array, end: Array, s: ArrayLike, way: PoseInterpolation = "line") -> Array:
-    """Return the poses (*batch, 4, 4) on the way from `start` (s = 0) to `end` (s = 1).
+def interpolate(start: Array, end: Array, s: ArrayLike, kind: PoseInterpolation = "line") -> Array:
+    """Return the poses (*batch, 4, 4) between `start` (s = 0) and `end` (s = 1).
 
     Args:
         start: Shape (*batch, 4, 4).
         end: Shape (*batch, 4, 4).
         s: Any shape that broadcasts with batch.
-        way: "line": the origin goes straight and the rotation about its fixed axis; "screw": the whole
+        kind: "line": the origin goes straight and the rotation about its fixed axis; "screw": the whole
             pose goes at constant twist.
     """
     fraction = np.asarray(s, dtype=np.float64)[..., None]
-    if way == "screw":
+    if kind == "screw":
         return start @ exp_pose(fraction * twist_between(start, end))
     here, there = start[..., :3, 3], end[..., :3, 3]
     rotation = slerp(start[..., :3, :3], end[..., :3, :3], fraction[..., 0])

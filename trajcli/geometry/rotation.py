@@ -1,13 +1,8 @@
-"""SO(3): rotations as 3x3 matrices, batches in front.
+"""Rotations, SO(3): matrices, unit quaternions, rotation vectors, axis and angle; batches in front.
 
-A matrix R_a_b has the axes of frame b, written in frame a, as its columns: p_a = R_a_b @ p_b. Other
-representations stand in `quaternion`, `axis_angle` and `euler`.
-
-Unit quaternions quat_wxyz, scalar first, batches in front: (*batch, 4).
-
-q and -q are the same rotation; the canonical one has w > 0, or its first non-zero component positive.
-
-Rotation vectors: exponential, logarithm, axis and angle, interpolation at constant angular velocity.
+A matrix R_a_b (*batch, 3, 3) has the axes of frame b, written in frame a, as its columns: p_a = R_a_b @ p_b.
+Quaternions quat_wxyz (*batch, 4) have the scalar first; q and -q are the same rotation, and the canonical one
+has w > 0, or its first non-zero component positive. Euler angles are in `euler`.
 """
 
 from __future__ import annotations
@@ -27,9 +22,14 @@ AxisName = Literal["x", "y", "z"]
 Frame = Literal["current", "fixed"]
 
 ROTATION_DEFECT = 1e-4  # entries rounded to four decimals are still taken, wrong ones are not
+QUATERNION_DEFECT = 1e-4  # of the length, as for matrices
+NO_ANGLE = 1e-12  # rad, below which rounding decides the axis
+HALF_TURN = 1e-9  # rad from pi, within which either sign of the axis describes the same rotation
 AXES = "xyz"
 _QUARTER = np.pi / 2
 _ROUNDING = 4 * np.finfo(np.float64).eps  # an angle given in degrees is within two of these
+_NOISE = 1e-12  # a component as small as this says nothing by its sign: it is rounding
+_FAR = -1.0  # twice the cosine of the angle, 120 deg, from which on the quaternion is used
 
 
 def cos_sin(angle: ArrayLike) -> tuple[Array, Array]:
@@ -82,7 +82,7 @@ def rotation_defect(matrix: Array) -> Array:
 def check_rotation(matrix: ArrayLike) -> float:
     """Return the defect of one 3x3 matrix, the largest entry of |R^T R - I|, if it can pass for a rotation.
 
-    A defect above rounding is for the caller to tell; `nearest_rotation` takes it away.
+    A defect above rounding is for the caller to report; `nearest_rotation` takes it away.
 
     Raises:
         InputError: When the matrix is not 3x3 and finite, mirrors space (negative determinant), or has a
@@ -122,14 +122,11 @@ def nearest_rotation(matrix: Array) -> Array:
 
 
 def _worst_columns(gram: Array, defects: Array) -> str:
+    """Return a sentence about the columns with the largest defect."""
     i, j = sorted(int(index) for index in np.unravel_index(np.nanargmax(defects), (3, 3)))
     if i == j:
         return f"column {i + 1} has length {np.sqrt(gram[i, i]):.6g} instead of 1"
     return f"columns {i + 1} and {j + 1} are not at right angles, their product is {gram[i, j]:.3g}"
-
-
-QUATERNION_DEFECT = 1e-4  # of the length, as for matrices
-_NOISE = 1e-12  # a component as small as this says nothing by its sign: rounding made it
 
 
 def check_quaternion(quaternion: ArrayLike) -> float:
@@ -170,12 +167,6 @@ def multiply(left: Array, right: Array) -> Array:
         ],
         axis=-1,
     )
-
-
-def conjugate(quaternion: Array) -> Array:
-    """Return the inverse rotations (*batch, 4) of unit quaternions."""
-    result: Array = quaternion * np.array([1.0, -1.0, -1.0, -1.0])
-    return result
 
 
 def matrix_from_quaternion(quaternion: ArrayLike) -> Array:
@@ -240,11 +231,6 @@ def without_jumps(quaternions: Array, last: Array | None) -> Array:
     # each sign is against the given neighbour; the product carries it on
     signs = np.cumprod(np.where(turned, -1.0, 1.0))
     return np.asarray(quaternions * signs[:, None])
-
-
-NO_ANGLE = 1e-12  # rad, below which rounding decides the axis
-_FAR = -1.0  # twice the cosine of the angle, 120 deg, from which on the quaternion is used
-HALF_TURN = 1e-9  # rad from pi, within which either sign of the axis describes the same rotation
 
 
 @frozen
@@ -313,6 +299,7 @@ def log(matrix: Array) -> Array:
 
 
 def _log_by_quaternion(matrix: Array) -> Array:
+    """Return the same from the quaternion, whose accuracy does not fall near pi."""
     quaternion = quaternion_from_matrix(matrix)
     sine = np.linalg.norm(quaternion[..., 1:], axis=-1)
     ratio = np.full_like(sine, 2.0)  # limit of angle / sin(angle / 2)
@@ -350,9 +337,9 @@ def axis_angle_from_matrix(matrix: Array) -> AxisAngle:
 
 
 def slerp(start: Array, end: Array, s: ArrayLike) -> Array:
-    """Return the rotations on the way from `start` (s = 0) to `end` (s = 1) at constant angular velocity.
+    """Return the rotations between `start` (s = 0) and `end` (s = 1) at constant angular velocity.
 
-    The way is the shorter one; half a turn apart there are two, and the one about log's axis is taken.
+    The rotation is the shorter one; half a turn apart there are two, and the one about log's axis is taken.
 
     Args:
         start: Shape (*batch, 3, 3).

@@ -158,14 +158,14 @@ def _drawing(
         return [], []
     if isinstance(path.poses, Screw):
         return [_screw(path.poses, units)], []
-    place = path.poses.place if isinstance(path.poses, PoseCurve) else None
+    place = path.poses.position if isinstance(path.poses, PoseCurve) else None
     if not isinstance(place, Chain):
         return ([] if place is None else [_segment(place, units)]), []
     length, angle = (factor(Quantity(kind), units) for kind in ("length", "angle"))
     corners = [
         {
             "kind": "overlap" if overlaps else corner.kind,
-            "place": corner.place / length,
+            "place": corner.s / length,
             "point": _plain(corner.point / length),
             "turn": corner.turn / angle,
             "radius": corner.used / length,

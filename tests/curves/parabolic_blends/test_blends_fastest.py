@@ -73,9 +73,9 @@ def test_brute_force_is_not_faster(m, n):
 
 @settings(max_examples=30, deadline=None)
 @given(st.floats(0.01, 10), st.floats(0.1, 10), st.floats(0.1, 10))
-def test_two_points_are_the_trapezoid(way, v, a):
-    segments, blends = fastest_blends([[1.0], [1.0 - way]], [[-v, 9 * v]], [[-a, a]])
-    best = way / v + v / a if v * v < a * way else 2 * np.sqrt(way / a)
+def test_two_points_are_the_trapezoid(distance, v, a):
+    segments, blends = fastest_blends([[1.0], [1.0 - distance]], [[-v, 9 * v]], [[-a, a]])
+    best = distance / v + v / a if v * v < a * distance else 2 * np.sqrt(distance / a)
     assert total(segments, blends) == pytest.approx(best, rel=1e-6)
 
 

@@ -35,9 +35,9 @@ def resting(q):
     """Return the family of cubics at rest at every point."""
 
     def family(h):
-        way, h = np.diff(q, axis=0), h[:, None]
+        distance, h = np.diff(q, axis=0), h[:, None]
         return PiecewisePolynomial(
-            times_of(h[:, 0]), np.stack([-2 * way / h**3, 3 * way / h**2, 0 * way, q[:-1]])
+            times_of(h[:, 0]), np.stack([-2 * distance / h**3, 3 * distance / h**2, 0 * distance, q[:-1]])
         )
 
     return family
@@ -68,10 +68,10 @@ def test_each_straight_piece_takes_the_time_of_its_slowest_joint(guess):
 
 @pytest.mark.parametrize("count", [30, 3000])
 def test_cubics_at_rest_have_a_closed_form(count):
-    """The way D takes max(3 D / 2 V, sqrt(6 D / A), cbrt(12 D / J))."""
+    """The distance D takes max(3 D / 2 V, sqrt(6 D / A), cbrt(12 D / J))."""
     q = points(2, count)
-    way = np.abs(np.diff(q, axis=0))[:, 0]
-    expected = np.maximum.reduce([1.5 * way, np.sqrt(6 * way / 2), np.cbrt(12 * way / 9)])
+    distance = np.abs(np.diff(q, axis=0))[:, 0]
+    expected = np.maximum.reduce([1.5 * distance, np.sqrt(6 * distance / 2), np.cbrt(12 * distance / 9)])
     found = fastest_durations(resting(q), np.full(count - 1, 1.0), bounds(1, 2, 9))
     assert found.sum() == pytest.approx(expected.sum(), rel=0.02)
     assert (found >= expected * (1 - 1e-9)).all()

@@ -1,4 +1,4 @@
-"""The two scans against linear programmes solved by scipy, and a table of another library."""
+"""The two passes against linear programmes solved by scipy, and a table of another library."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from topp_paths import random_bounds, spline, symmetric
 from trajcli.curves.hermite import hermite_pieces
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.time_optimal.collocation import collocation_rows
-from trajcli.curves.time_optimal.constraints import ConstraintRows, joint_constraint
+from trajcli.curves.time_optimal.constraints import ConstraintRows, JointConstraint
 from trajcli.curves.time_optimal.passes import UnreachableSpeedError, controllable, solve
 
 CASES = yaml.safe_load((Path(__file__).parents[2] / "oracles" / "time_optimal.yaml").read_text())["cases"]
@@ -76,7 +76,7 @@ def forward_by_programmes(path, grid, velocity, acceleration, upper, start):
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("moving", [False, True])
-def test_scans_solve_the_linear_programmes(seed, moving):
+def test_the_passes_solve_the_linear_programmes(seed, moving):
     rng = np.random.default_rng(seed)
     joints, count = int(rng.integers(1, 4)), 30
     path = spline(rng.uniform(-1, 1, (5, joints)))
@@ -84,7 +84,7 @@ def test_scans_solve_the_linear_programmes(seed, moving):
         path = hermite_pieces(path.breaks, rng.uniform(-2, 2, (2, 5, joints)))
     velocity, acceleration = random_bounds(rng, joints)
     grid = np.union1d(np.linspace(0, 1, count), path.breaks)
-    intervals = collocation_rows(grid, [joint_constraint(path, velocity, acceleration)], NOWHERE)
+    intervals = collocation_rows(grid, [JointConstraint(path, velocity, acceleration)], NOWHERE)
     top = controllable(intervals, np.inf).upper[-1]
     end = 0.3 * top if moving else 0.0
     lower, upper = sets_by_programmes(path, grid, velocity, acceleration, end)
@@ -95,14 +95,14 @@ def test_scans_solve_the_linear_programmes(seed, moving):
     speeds = solve(intervals, np.sqrt(start), np.sqrt(end))
     expected = forward_by_programmes(path, grid, velocity, acceleration, found.upper, start)
     np.testing.assert_allclose(speeds.x, expected, rtol=1e-5, atol=1e-7 * upper.max())
-    assert (speeds.x <= speeds.ceiling * (1 + 1e-12)).all()
+    assert (speeds.x <= speeds.mvc * (1 + 1e-12)).all()
 
 
 def test_an_end_that_is_too_fast_has_no_programme_either():
     path = spline(np.array([[0.0], [0.3], [0.1], [0.5]]))
     velocity, acceleration = symmetric(1.0), symmetric(1.0)
     grid = np.union1d(np.linspace(0, 1, 31), path.breaks)
-    intervals = collocation_rows(grid, [joint_constraint(path, velocity, acceleration)], NOWHERE)
+    intervals = collocation_rows(grid, [JointConstraint(path, velocity, acceleration)], NOWHERE)
     allowed = np.sqrt(solve(intervals, 0.0, np.inf).x[-1])
     assert solve(intervals, 0.0, allowed * (1 - 1e-9)).x[-1] == pytest.approx(allowed**2)
     with pytest.raises(UnreachableSpeedError, match="at the end") as caught:
@@ -120,7 +120,7 @@ def test_controllable_sets_of_another_library():
     given = case["inputs"]
     coefficients = np.array(given["coefficients_highest_first"], dtype=float).transpose(2, 0, 1)
     path = PiecewisePolynomial(given["breaks"], coefficients)
-    demand = joint_constraint(path, symmetric(*given["vmax"]), symmetric(*given["amax"]))
+    demand = JointConstraint(path, symmetric(*given["vmax"]), symmetric(*given["amax"]))
     grid = np.linspace(path.start, path.end, given["N"] + 1)
     both = collocation_rows(grid, [demand], NOWHERE)
     half = len(both.P) // 2  # the table is of the collocation scheme: rows at the near ends only
@@ -133,24 +133,24 @@ def test_rows_of_any_kind_join_in():
     path = spline(np.array([[0.0], [1.0]]), bc_type="natural")
     grid = np.linspace(0, 1, 11)
 
-    def braking(s, side):  # -u <= 1: brakes less than the joint could
-        ones = np.ones((s.size, 1))
-        return ConstraintRows(-ones, 0 * ones, ones, np.full(s.size, np.inf))
+    class Braking:  # -u <= 1: brakes less than the joint could
+        def rows(self, s, side):
+            ones = np.ones((s.size, 1))
+            return ConstraintRows(-ones, 0 * ones, ones, np.full(s.size, np.inf))
 
-    joints = joint_constraint(path, symmetric(10.0), symmetric(2.0))
-    found = controllable(collocation_rows(grid, [joints, braking], NOWHERE)).upper
+    joints = JointConstraint(path, symmetric(10.0), symmetric(2.0))
+    found = controllable(collocation_rows(grid, [joints, Braking()], NOWHERE)).upper
     np.testing.assert_allclose(found, 2.0 * (1.0 - grid), atol=1e-14)
 
 
 def test_of_two_caps_at_a_place_the_lower_one_counts():
-    def capped(s, side):
-        nothing = np.empty((s.size, 0))
-        return ConstraintRows(
-            nothing, nothing, nothing, np.where(s == 0.5, {"left": 0.2, "right": 0.3}[side], 9.0)
-        )
+    class Capped:
+        def rows(self, s, side):
+            nothing, beside = np.empty((s.size, 0)), {"left": 0.2, "right": 0.3}
+            return ConstraintRows(nothing, nothing, nothing, np.where(s == 0.5, beside[side], 9.0))
 
-    joints = joint_constraint(spline(np.array([[0.0], [1.0]])), symmetric(9.0), symmetric(9.0))
-    assert collocation_rows(np.array([0.0, 0.5, 1.0]), [joints, capped], NOWHERE).cap[1] == 0.2
+    joints = JointConstraint(spline(np.array([[0.0], [1.0]])), symmetric(9.0), symmetric(9.0))
+    assert collocation_rows(np.array([0.0, 0.5, 1.0]), [joints, Capped()], NOWHERE).cap[1] == 0.2
 
 
 @pytest.mark.parametrize("seed", [1, 139])
@@ -159,7 +159,7 @@ def test_a_joint_that_turns_next_to_a_place_does_no_harm(seed):
     rng = np.random.default_rng(seed)
     bend, limit = rng.uniform(0.3, 3), rng.uniform(0.5, 2)
     path = PiecewisePolynomial([-1.0, 1.0], np.array([[bend, 0], [-2 * bend, 1], [bend, 0]])[:, None, :])
-    demand = joint_constraint(path, symmetric(9.0, 9.0), symmetric(limit, 9.0))
+    demand = JointConstraint(path, symmetric(9.0, 9.0), symmetric(limit, 9.0))
     found = []
     for turn in (0.0, 1.4e-16, -1.4e-16, 1e-13):
         grid = np.linspace(-1, 1, 41)

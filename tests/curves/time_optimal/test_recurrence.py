@@ -1,4 +1,4 @@
-"""Scans against the recurrence written down, and a solution found again against the whole one."""
+"""Recurrences against their definition, and a local re-solve against the whole solution."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from topp_paths import random_bounds, spline
 
 from trajcli.curves.time_optimal import recurrence as recurrence_module
 from trajcli.curves.time_optimal.collocation import collocation_rows
-from trajcli.curves.time_optimal.constraints import joint_constraint
+from trajcli.curves.time_optimal.constraints import JointConstraint
 from trajcli.curves.time_optimal.maximum_velocity import maximum_velocity_curve
 from trajcli.curves.time_optimal.passes import solve, solve_locally
 
@@ -23,7 +23,7 @@ def recurrence(P, R, C, chosen, limits):
 
 @pytest.mark.parametrize("count", [1, 2, 50, 700])
 @pytest.mark.parametrize(("many", "block"), [(0, 8192), (1000, 8192), (0, 100), (1000, 33)])
-def test_scans_are_the_recurrence(monkeypatch, count, many, block):
+def test_both_ways_are_the_recurrence(monkeypatch, count, many, block):
     monkeypatch.setattr(recurrence_module, "_MANY", many)
     monkeypatch.setattr(recurrence_module, "_BLOCK", block)
     rng = np.random.default_rng(count)
@@ -39,8 +39,8 @@ def test_scans_are_the_recurrence(monkeypatch, count, many, block):
     )
 
 
-def again(rows, before, changed):
-    return solve_locally(rows, before, changed, maximum_velocity_curve(rows, before.ceiling, changed))
+def locally(rows, before, changed):
+    return solve_locally(rows, before, changed, maximum_velocity_curve(rows, before.mvc, changed))
 
 
 @pytest.mark.parametrize("end", [0.0, 0.05])
@@ -52,25 +52,25 @@ def test_a_few_lowered_limits_change_the_solution_around_them(seed, end):
         random_bounds(rng, 3),
     )
     grid = np.linspace(path.start, path.end, 39 * 20 + 1)
-    rows = collocation_rows(grid, [joint_constraint(path, velocity, acceleration)], np.empty(0))
+    rows = collocation_rows(grid, [JointConstraint(path, velocity, acceleration)], np.empty(0))
     before = solve(rows, 0.0, end)
     factors = np.ones((2, grid.size - 1))
     factors[:, rng.choice(grid.size - 1, 5)] = rng.uniform(1, 1.2, (2, 5))
     lowered, changed = rows.tightened(*factors), (factors != 1).any(axis=0)
-    whole, found = solve(lowered, 0.0, end), again(lowered, before, changed)
+    whole, found = solve(lowered, 0.0, end), locally(lowered, before, changed)
     assert found is not None
-    for name in ("x", "upper", "ceiling"):
+    for name in ("x", "upper", "mvc"):
         np.testing.assert_array_equal(getattr(found, name), getattr(whole, name))
     assert 0 < (whole.x != before.x).sum() < grid.size / 2
 
 
 @pytest.mark.parametrize(("bounds", "place"), [([-1.0, 50.0], 990), ([-50.0, 1.0], 10)])
-def test_what_is_felt_far_away_is_not_found_again(bounds, place):
+def test_what_is_felt_far_away_is_not_found_locally(bounds, place):
     """A joint that brakes, or speeds up, nearly all the way: what changes at one end is felt to the other."""
     path = spline(np.array([[0.0], [1.0]]))
-    demand = joint_constraint(path, np.array([[-9.0, 9.0]]), np.array([bounds]))
+    demand = JointConstraint(path, np.array([[-9.0, 9.0]]), np.array([bounds]))
     rows = collocation_rows(np.linspace(0, 1, 1001), [demand], np.empty(0))
     factors = np.ones((2, 1000))
     factors[1, place] = 1.5
     before = solve(rows, 0.0, 0.0)
-    assert again(rows.tightened(*factors), before, factors[1] != 1) is None
+    assert locally(rows.tightened(*factors), before, factors[1] != 1) is None

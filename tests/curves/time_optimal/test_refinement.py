@@ -10,7 +10,12 @@ from topp_paths import assert_motion, symmetric
 
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.time_optimal.parameterization import time_optimal
-from trajcli.curves.time_optimal.time_law import distances_at_mean_speed, durations, feasible_ramps, law_of
+from trajcli.curves.time_optimal.time_law import (
+    distances_at_mean_speed,
+    feasible_ramps,
+    interval_durations,
+    law_of,
+)
 
 
 def some_law(seed):
@@ -23,18 +28,18 @@ def some_law(seed):
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_law_passes_each_place_at_its_speed_and_never_turns_back(seed):
-    grid, x, swing = some_law(seed)
-    law = law_of(grid, x, swing)
+    grid, x, ramps = some_law(seed)
+    law = law_of(grid, x, ramps)
     np.testing.assert_allclose(law.evaluate(law.breaks)[:, 0], grid, rtol=1e-13)
     for side in ("left", "right"):
         np.testing.assert_allclose(law.evaluate(law.breaks, 1, side=side)[:, 0] ** 2, x, atol=1e-12)
     begins, ends = law.piece_ends(2)
-    np.testing.assert_allclose((ends - begins)[:, 0], 2 * swing, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose((ends - begins)[:, 0], 2 * ramps, rtol=1e-9, atol=1e-9)
     t = np.linspace(0, law.end, 20_001)
     assert law.evaluate(t, 1).min() >= -1e-12
-    np.testing.assert_allclose(durations(grid, x, swing), law.lengths, rtol=1e-12)
+    np.testing.assert_allclose(interval_durations(grid, x, ramps), law.lengths, rtol=1e-12)
     mean = (np.sqrt(x[1:]) + np.sqrt(x[:-1])) / 2
-    np.testing.assert_allclose(distances_at_mean_speed(grid, x, swing), mean * law.lengths, rtol=1e-12)
+    np.testing.assert_allclose(distances_at_mean_speed(grid, x, ramps), mean * law.lengths, rtol=1e-12)
 
 
 def test_no_more_swing_than_keeps_the_speed_positive():

@@ -11,10 +11,11 @@ from topp_paths import assert_motion, over, polyline, random_bounds, spline, sym
 from trajcli.curves.operations import reverse
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.time_optimal import parameterization as trajectory
-from trajcli.curves.time_optimal.collocation import collocation_rows, first_grid, refined
-from trajcli.curves.time_optimal.constraints import joint_constraint
+from trajcli.curves.time_optimal.collocation import collocation_rows
+from trajcli.curves.time_optimal.constraints import JointConstraint
 from trajcli.curves.time_optimal.parameterization import UnsettledSpeedError, time_optimal
 from trajcli.curves.time_optimal.passes import UnlimitedSpeedError, UnreachableSpeedError, controllable
+from trajcli.curves.time_optimal.refinement import first_grid, refined
 
 
 @pytest.mark.parametrize("scale", [1e4, 1e-4])
@@ -91,7 +92,7 @@ def test_a_speed_that_only_a_fine_grid_has_room_for():
     rng = np.random.default_rng(14)
     path, (velocity, acceleration) = spline(rng.uniform(-1, 1, (8, 3)), np.arange(8.0)), random_bounds(rng, 3)
     first = collocation_rows(
-        first_grid(path), [joint_constraint(path, 5 * velocity, acceleration)], np.empty(0)
+        first_grid(path), [JointConstraint(path, 5 * velocity, acceleration)], np.empty(0)
     )
     assert controllable(first).upper[0] < 1.46**2
     found = time_optimal(path, 5 * velocity, acceleration, start_velocity=1.463)

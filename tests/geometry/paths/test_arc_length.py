@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from trajcli.geometry.paths.corner import ArcLength
+from trajcli.geometry.paths.arc_length import ArcLength
 
 
 def parabola(width):

@@ -124,7 +124,7 @@ def test_a_rounded_chain_is_smooth_and_keeps_to_its_segments(segments, radius):
             assert corner.turn < 1e-9
             continue
         assert corner.kind == "rounded"
-        near = np.linspace(-1, 1, 2001) * chain.half_widths[i] + corner.place
+        near = np.linspace(-1, 1, 2001) * chain.half_widths[i] + corner.s
         distances = np.linalg.norm(chain.evaluate(np.clip(near, 0, chain.length))[0] - corner.point, axis=-1)
         assert corner.deviation == pytest.approx(distances.min(), rel=1e-3, abs=1e-9)
         np.testing.assert_allclose(distances[[0, -1]] <= corner.used * (1 + 1e-9), True)
@@ -159,10 +159,10 @@ def test_of_an_arc_a_radius_takes_at_most_a_quarter():
 def test_a_corner_passes_its_point_at_the_middle_of_the_blend():
     chain = join(SQUARE, [0.2, 0])
     corner = chain.corners[0]
-    place = chain.evaluate(np.array([corner.place]))[0][0]
+    place = chain.evaluate(np.array([corner.s]))[0][0]
     assert np.linalg.norm(place - [1, 0, 0]) == pytest.approx(corner.deviation, rel=1e-9)
-    assert chain.borders[1] == corner.place
-    np.testing.assert_allclose(chain.breaks[:2], corner.place + chain.half_widths[0] * np.array([-1, 1]))
+    assert chain.borders[1] == corner.s
+    np.testing.assert_allclose(chain.breaks[:2], corner.s + chain.half_widths[0] * np.array([-1, 1]))
     np.testing.assert_array_equal(chain.stops, [chain.borders[2]])
     assert chain.corners[1].used == chain.corners[1].deviation == 0
 

@@ -54,7 +54,7 @@ def test_a_screw_is_the_exponential_of_the_logarithm(seed):
     np.testing.assert_allclose(np.linalg.norm(first[:, :3], axis=-1), 1, rtol=0, atol=1e-13)
     np.testing.assert_allclose(first[:, 3:], np.tile(first[0, 3:], (5, 1)), rtol=0, atol=1e-12)
     np.testing.assert_array_equal(second[:, 3:], 0)
-    assert not screw.in_place
+    assert not screw.pure_rotation
     is_a_pose_path(screw, tolerance=1e-6 * (1 + np.abs(second).max()))
 
 
@@ -64,7 +64,7 @@ def test_screws_without_rotation_and_without_translation():
     assert straight.length == pytest.approx(5, rel=1e-15)
     np.testing.assert_allclose(straight.evaluate(np.array([2.5]))[1][0], [0.6, 0, 0.8, 0, 0, 0], atol=1e-14)
     turn = Screw(start, build(start[:3, :3] @ Rotation.from_rotvec([0, 1.2, 0]).as_matrix(), start[:3, 3]))
-    assert turn.in_place
+    assert turn.pure_rotation
     assert turn.length == pytest.approx(1.2, rel=1e-14)
     np.testing.assert_allclose(turn.evaluate(np.array([0.6]))[0][0, :3, 3], start[:3, 3], rtol=0, atol=1e-15)
     held = Screw(start, start)
@@ -117,7 +117,7 @@ def test_place_and_orientation_side_by_side(place):
         np.testing.assert_array_equal(
             np.hstack([first[:, 3:], second[:, 3:]]), np.hstack(orientation.evaluate(s)[1:])
         )
-        assert not curve.in_place
+        assert not curve.pure_rotation
         np.testing.assert_array_equal(curve.breaks, place.breaks)
 
 
@@ -150,7 +150,7 @@ def test_a_rotation_in_place():
     start, end = Rotation.random(2, random_state=9).as_matrix()
     orientation = AxisAngleOrientation.between(start, end)
     curve = PoseCurve(Pivot([1, 2, 3], [1, 2, 3], orientation.length), orientation)
-    assert curve.in_place
+    assert curve.pure_rotation
     poses, first, second = curve.evaluate(np.linspace(0, curve.length, 4))
     np.testing.assert_allclose(poses[:, :3, 3], np.tile([1, 2, 3], (4, 1)))
     np.testing.assert_array_equal(first[:, :3], 0)

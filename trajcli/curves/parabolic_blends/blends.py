@@ -111,18 +111,18 @@ def blended(
     Raises:
         ValueError: For times that do not increase, durations that are negative, or zero at a corner.
     """
-    way = CornerSpec.of(times, positions, start_velocity, end_velocity, ends, exactly=exactly)
-    asked = np.broadcast_to(np.asarray(durations, dtype=np.float64), (way.times.size,))[:, None]
+    spec = CornerSpec.of(times, positions, start_velocity, end_velocity, ends, exactly=exactly)
+    asked = np.broadcast_to(np.asarray(durations, dtype=np.float64), (spec.times.size,))[:, None]
     if not (np.isfinite(asked) & (asked >= 0)).all():
         raise ValueError(f"blend durations must be finite and not negative, got {asked.min():.9g} s")
-    used = scaled_to_fit(asked, np.diff(way.times)[:, None], *way.room())
-    knots = corners(way, OFFSET * used, used[way.points])
+    used = scaled_to_fit(asked, np.diff(spec.times)[:, None], *spec.room())
+    knots = corners(spec, OFFSET * used, used[spec.points])
     _refuse_jumps(knots)
     shrunk = tuple(
         Shrunk(k, None, float(asked[k, 0]), float(used[k, 0]))
         for k in np.flatnonzero(used[:, 0] < asked[:, 0] * (1 - _SHRUNK)).tolist()
     )
-    return _finished(way, knots, shrunk)
+    return _finished(spec, knots, shrunk)
 
 
 def blended_by_acceleration(
@@ -154,20 +154,20 @@ def blended_by_acceleration(
         BlendAccelerationError: When an acceleration is too small for an end segment with its blend inside.
         ValueError: For times that do not increase, or accelerations that are not positive and finite.
     """
-    way = CornerSpec.of(times, positions, start_velocity, end_velocity, ends, exactly=exactly)
-    a = np.broadcast_to(np.asarray(acceleration, dtype=np.float64), (way.positions.shape[1],))
+    spec = CornerSpec.of(times, positions, start_velocity, end_velocity, ends, exactly=exactly)
+    a = np.broadcast_to(np.asarray(acceleration, dtype=np.float64), (spec.positions.shape[1],))
     if not (np.isfinite(a) & (a > 0)).all():
         raise ValueError(f"blend accelerations must be positive and finite, got {a.min():.9g}")
-    offsets, asked = offsets_and_blends(way, a)
-    sharp = way.times[way.points, None] + way.side * offsets[way.points]
-    beside = np.where(way.side == 0, asked, 2 * offsets[way.points])  # else a blend reaches over its waypoint
-    used = scaled_to_fit(np.minimum(asked, beside), np.diff(sharp, axis=0), *way.corner_room())
-    knots = corners(way, offsets, used)
+    offsets, asked = offsets_and_blends(spec, a)
+    sharp = spec.times[spec.points, None] + spec.side * offsets[spec.points]
+    beside = np.where(spec.side == 0, asked, 2 * offsets[spec.points])  # not beyond its waypoint
+    used = scaled_to_fit(np.minimum(asked, beside), np.diff(sharp, axis=0), *spec.corner_room())
+    knots = corners(spec, offsets, used)
     shrunk = tuple(
-        Shrunk(int(way.points[k]), j, float(asked[k, j]), float(used[k, j]))
+        Shrunk(int(spec.points[k]), j, float(asked[k, j]), float(used[k, j]))
         for k, j in np.argwhere(used < asked * (1 - _SHRUNK)).tolist()
     )
-    return _finished(way, knots, shrunk)
+    return _finished(spec, knots, shrunk)
 
 
 def _refuse_jumps(knots: RoundedPolyline) -> None:
@@ -182,14 +182,14 @@ def _refuse_jumps(knots: RoundedPolyline) -> None:
         )
 
 
-def _finished(way: CornerSpec, knots: RoundedPolyline, shrunk: tuple[Shrunk, ...]) -> Blended:
+def _finished(spec: CornerSpec, knots: RoundedPolyline, shrunk: tuple[Shrunk, ...]) -> Blended:
     """Return the curve of `knots`, moved so that it starts at zero, and what is to be said about it."""
-    inside = way.ends == "inside"
-    start, end = (float(way.times[0]), float(way.times[-1])) if inside else (knots.start, knots.end)
+    inside = spec.ends == "inside"
+    start, end = (float(spec.times[0]), float(spec.times[-1])) if inside else (knots.start, knots.end)
     knots = replace(knots, times=knots.times - start)
     steps = np.abs(np.diff(knots.velocities, axis=0)) * knots.blends / 8
-    missed = np.zeros_like(way.positions)
-    if not way.exactly:
+    missed = np.zeros_like(spec.positions)
+    if not spec.exactly:
         missed[1:-1] = steps[1:-1]
     if not inside:
         missed[[0, -1]] = steps[[0, -1]]

@@ -1,4 +1,4 @@
-"""The shortest linear segments with parabolic blends that keep velocity and acceleration limits.
+"""Fastest linear segments with parabolic blends within limits of velocity and acceleration.
 
 With x = 1 / h for the duration h of a segment, its velocity dq x is linear in x, and so is what a blend of
 duration d asks for, (v_after - v_before) / d within the limits. What remains is that blends do not overlap:
@@ -49,19 +49,19 @@ def fastest_blends(
         positions: Shape (m, n), m >= 2. When all points are equal, all durations are zero.
         velocity: Lower and upper limits, shape (n, 2), negative and positive, may be infinite.
         acceleration: Likewise; finite for every joint that moves.
-        ends: How `blended` will be told to place the first and last blend.
+        ends: Where `blended` will lay the first and last blend.
 
     Raises:
         ValueError: When limits are not on both sides of zero, or a joint moves without one of acceleration.
     """
     q = np.asarray(positions, dtype=np.float64)
-    ways = np.diff(q, axis=0)
-    moving = (ways != 0).any(axis=0)
+    displacements = np.diff(q, axis=0)
+    moving = (displacements != 0).any(axis=0)
     v, a = np.asarray(velocity, dtype=np.float64), np.asarray(acceleration, dtype=np.float64)
     _refuse_bounds(v, a, moving)
     if not moving.any():
-        return np.zeros(ways.shape[0]), np.zeros(q.shape[0])
-    problem = _problem(ways[:, moving], v[moving], a[moving])
+        return np.zeros(displacements.shape[0]), np.zeros(q.shape[0])
+    problem = _problem(displacements[:, moving], v[moving], a[moving])
     d, x = _minimum(problem, *problem.start())
     segments = 1 / x
     blends = np.maximum(problem.asked(x).max(axis=1), 0.0) * (1 + _ROOM)
@@ -74,6 +74,7 @@ def fastest_blends(
 
 
 def _refuse_bounds(velocity: Array, acceleration: Array, moving: NDArray[np.bool_]) -> None:
+    """Raise ValueError where limits do not allow a fastest motion."""
     for name, bounds in (("velocity", velocity), ("acceleration", acceleration)):
         wrong = ~((bounds[:, 0] < 0) & (bounds[:, 1] > 0))
         if wrong.any():
@@ -98,8 +99,8 @@ class _Problem:
 
     Attributes:
         fastest: X, shape (m - 1,).
-        after: Way of the segment after each point over both limits of acceleration, shape (m, 2n); zero at
-            the last point.
+        after: Displacement of the segment after each point over both limits of acceleration, shape (m, 2n);
+            zero at the last point.
         before: The same of the segment before; zero at the first point.
     """
 
@@ -134,18 +135,18 @@ class _Problem:
         return 1.05 * blends + 0.02 * _shorter(segments), 1 / segments
 
 
-def _problem(ways: Array, velocity: Array, acceleration: Array) -> _Problem:
-    """Return the constraints for ways (m - 1, n) of joints that all move.
+def _problem(displacements: Array, velocity: Array, acceleration: Array) -> _Problem:
+    """Return the constraints for displacements (m - 1, n) of joints that all move.
 
     A joint without a limit of velocity gets the one that it cannot exceed between rest and rest.
     """
-    size, hardest = np.abs(ways), np.abs(acceleration).max(axis=1)
-    limit = np.where(ways > 0, velocity[:, 1], -velocity[:, 0])
+    size, hardest = np.abs(displacements), np.abs(acceleration).max(axis=1)
+    limit = np.where(displacements > 0, velocity[:, 1], -velocity[:, 0])
     limit = np.minimum(limit, np.sqrt(2 * hardest * size.sum(axis=0)))
     shortest = (size / limit).max(axis=1)
     least = _SHORTEST * np.sqrt(size / hardest).max(axis=1).mean()
     shortest = np.where(shortest > 0, shortest, least)
-    asked = np.concatenate([ways / acceleration[:, 1], ways / acceleration[:, 0]], axis=1)
+    asked = np.concatenate([displacements / acceleration[:, 1], displacements / acceleration[:, 0]], axis=1)
     none = np.zeros((1, asked.shape[1]))
     return _Problem(1 / shortest, np.concatenate([asked, none]), np.concatenate([none, asked]))
 
@@ -166,6 +167,7 @@ def _minimum(problem: _Problem, d: Array, x: Array) -> tuple[Array, Array]:
 
 
 def _total(d: Array, x: Array) -> float:
+    """Return the duration of the motion."""
     return float((1 / x).sum() + (d[0] + d[-1]) / 2)
 
 

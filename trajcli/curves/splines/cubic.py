@@ -3,10 +3,6 @@
 They differ in what happens at the ends: no acceleration (natural), a given velocity (clamped), or no break in
 the third derivative next to the end (not-a-knot).
 
-Source: de Boor, A Practical Guide to Splines, revised edition (2001), chapter IV.
-
-The equation by which cubics meet with continuous acceleration, in a form that all end conditions share.
-
 Between two knots the acceleration is linear. A cubic that lasts h with mean velocity d, and acceleration M at
 its own knot and M' at the other one, reaches its own knot with the velocity
 
@@ -33,88 +29,6 @@ from trajcli.curves.linear_systems import solve_tridiagonal
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.curves.splines.waypoints import Waypoints
 from trajcli.frozen import frozen
-
-
-@frozen
-class KnotEquations:
-    """How every knot is reached from one side: at velocity + stiffness M + coupling M' (writable arrays).
-
-    Attributes:
-        velocity: Shape (m, n), time counted towards the knot.
-        stiffness: Factor of the knot's own acceleration, shape (m,).
-        coupling: Factor of the acceleration of the neighbour on this side, shape (m,).
-    """
-
-    velocity: Array
-    stiffness: Array
-    coupling: Array
-
-    def backwards(self) -> KnotEquations:
-        """Return views in the reverse order: what is written there is written here."""
-        return KnotEquations(self.velocity[::-1], self.stiffness[::-1], self.coupling[::-1])
-
-
-def knot_equations(points: Waypoints) -> tuple[KnotEquations, KnotEquations]:
-    """Return how knots are reached from before and from after; at either end from a rest outside."""
-    return _equations_from_before(points.lengths, points.slopes), _equations_from_before(
-        points.lengths[::-1], -points.slopes[::-1]
-    ).backwards()
-
-
-def _equations_from_before(lengths: Array, slopes: Array) -> KnotEquations:
-    """Return how knots are reached from before; the first one with velocity zero."""
-    from_before = np.concatenate([[0.0], lengths])
-    return KnotEquations(
-        np.concatenate([np.zeros((1, slopes.shape[1])), slopes]), from_before / 3, from_before / 6
-    )
-
-
-def without_acceleration(outer: KnotEquations, inner: KnotEquations) -> None:
-    """Make the first knot's row say that its acceleration is zero.
-
-    Args:
-        outer: The side away from the curve.
-        inner: The other side.
-    """
-    outer.velocity[0] = inner.velocity[0] = 0.0
-    outer.stiffness[0], inner.stiffness[0], inner.coupling[0] = 1.0, 0.0, 0.0
-    outer.coupling[1] = 0.0  # it would multiply that zero
-
-
-def knot_accelerations(before: KnotEquations, after: KnotEquations) -> Array:
-    """Return the acceleration M at each knot, shape (m, n), with which both sides agree."""
-    return solve_tridiagonal(
-        before.coupling,
-        before.stiffness + after.stiffness,
-        after.coupling,
-        -(before.velocity + after.velocity),
-    )
-
-
-def starting_velocities(points: Waypoints, acceleration: Array) -> Array:
-    """Return the velocity at the start of each piece, shape (m - 1, n).
-
-    Args:
-        points: The knots.
-        acceleration: At each knot, shape (m, n).
-    """
-    return points.slopes - points.lengths[:, None] * (2 * acceleration[:-1] + acceleration[1:]) / 6
-
-
-def cubics(times: Array, positions: Array, velocities: Array, acceleration: Array) -> PiecewisePolynomial:
-    """Return the cubic pieces that start in given states, with linear acceleration between the knots.
-
-    Args:
-        times: Knots, shape (m,).
-        positions: At the start of each piece, shape (m - 1, n).
-        velocities: The same.
-        acceleration: At each knot, shape (m, n).
-    """
-    jerk = np.diff(acceleration, axis=0) / np.diff(times)[:, None]
-    return PiecewisePolynomial(times, np.stack([jerk / 6, acceleration[:-1] / 2, velocities, positions]))
-
-
-_End = Callable[[KnotEquations, KnotEquations, Array], None]
 
 
 def natural(
@@ -180,7 +94,90 @@ def not_a_knot(
     return _curve(points, outer, _not_a_knot_end)
 
 
+def cubics(times: Array, positions: Array, velocities: Array, acceleration: Array) -> PiecewisePolynomial:
+    """Return the cubic pieces that start in given states, with linear acceleration between the knots.
+
+    Args:
+        times: Knots, shape (m,).
+        positions: At the start of each piece, shape (m - 1, n).
+        velocities: The same.
+        acceleration: At each knot, shape (m, n).
+    """
+    jerk = np.diff(acceleration, axis=0) / np.diff(times)[:, None]
+    return PiecewisePolynomial(times, np.stack([jerk / 6, acceleration[:-1] / 2, velocities, positions]))
+
+
+@frozen
+class KnotEquations:
+    """How every knot is reached from one side: at velocity + stiffness M + coupling M' (writable arrays).
+
+    Attributes:
+        velocity: Shape (m, n), time counted towards the knot.
+        stiffness: Factor of the knot's own acceleration, shape (m,).
+        coupling: Factor of the acceleration of the neighbour on this side, shape (m,).
+    """
+
+    velocity: Array
+    stiffness: Array
+    coupling: Array
+
+    def backwards(self) -> KnotEquations:
+        """Return views in the reverse order: what is written there is written here."""
+        return KnotEquations(self.velocity[::-1], self.stiffness[::-1], self.coupling[::-1])
+
+
+def knot_equations(points: Waypoints) -> tuple[KnotEquations, KnotEquations]:
+    """Return how knots are reached from before and from after; at either end from a rest outside."""
+    return _equations_from_before(points.lengths, points.slopes), _equations_from_before(
+        points.lengths[::-1], -points.slopes[::-1]
+    ).backwards()
+
+
+def knot_accelerations(before: KnotEquations, after: KnotEquations) -> Array:
+    """Return the acceleration M at each knot, shape (m, n), with which both sides agree."""
+    return solve_tridiagonal(
+        before.coupling,
+        before.stiffness + after.stiffness,
+        after.coupling,
+        -(before.velocity + after.velocity),
+    )
+
+
+def without_acceleration(outer: KnotEquations, inner: KnotEquations) -> None:
+    """Make the first knot's row say that its acceleration is zero.
+
+    Args:
+        outer: The side away from the curve.
+        inner: The other side.
+    """
+    outer.velocity[0] = inner.velocity[0] = 0.0
+    outer.stiffness[0], inner.stiffness[0], inner.coupling[0] = 1.0, 0.0, 0.0
+    outer.coupling[1] = 0.0  # it would multiply that zero
+
+
+def starting_velocities(points: Waypoints, acceleration: Array) -> Array:
+    """Return the velocity at the start of each piece, shape (m - 1, n).
+
+    Args:
+        points: The knots.
+        acceleration: At each knot, shape (m, n).
+    """
+    return points.slopes - points.lengths[:, None] * (2 * acceleration[:-1] + acceleration[1:]) / 6
+
+
+_End = Callable[[KnotEquations, KnotEquations, Array], None]
+
+
+def _equations_from_before(lengths: Array, slopes: Array) -> KnotEquations:
+    """Return how knots are reached from before; the first one with velocity zero."""
+    from_before = np.concatenate([[0.0], lengths])
+    return KnotEquations(
+        np.concatenate([np.zeros((1, slopes.shape[1])), slopes]), from_before / 3, from_before / 6
+    )
+
+
 def _velocity(points: Waypoints, velocity: ArrayLike | None, name: str) -> Array | None:
+    """Return a velocity (n,) that may be given."""
     return None if velocity is None else points.row(velocity, f"{name} velocity")
 
 
@@ -206,6 +203,7 @@ def _curve(points: Waypoints, outer: tuple[Array | None, Array | None], end: _En
 
 
 def _natural_end(outer: KnotEquations, inner: KnotEquations, _lengths: Array) -> None:
+    """Let the acceleration at the end be zero."""
     without_acceleration(outer, inner)
 
 
@@ -237,6 +235,7 @@ def _beyond(outer: KnotEquations, inner: KnotEquations, lengths: Array, accelera
 
 
 def _parabola(points: Waypoints) -> PiecewisePolynomial:
+    """Return the parabola through three points, in two pieces."""
     slopes, lengths = points.slopes, points.lengths
     acceleration = np.tile(2 * (slopes[1] - slopes[0]) / (lengths[0] + lengths[1]), (3, 1))
     starting = starting_velocities(points, acceleration)

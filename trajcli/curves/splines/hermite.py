@@ -1,4 +1,4 @@
-"""Curves through waypoints whose derivatives are known at every waypoint, and rules that find them.
+"""Hermite splines: curves through waypoints with known derivatives there, and rules that choose these.
 
 Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning and Control (2009), section
 4.2.1; for the bound of three slopes de Boor and Swartz, Piecewise monotone interpolation, J. Approx. Theory
@@ -80,7 +80,7 @@ def parabola_velocities(times: ArrayLike, positions: ArrayLike, first: ArrayLike
     Zero where the slopes beside a point differ in sign or one is flat, and at most three times the smaller of
     the two. Where the points are evenly spaced this is the mean of `computed_velocities`, unless the bound is
     reached. Where they are not, the parabola is exact to one order more, and the bound keeps a short steep
-    stretch from throwing the long one beside it off its way.
+    interval from deflecting the long one beside it.
 
     Args:
         times: Shape (m,), strictly increasing, m >= 2.
@@ -105,7 +105,7 @@ def computed_accelerations(
 ) -> Array:
     """Return accelerations (m, n) for quintics: the rule of `parabola_velocities`, for the velocities.
 
-    So a stretch at rest stays at rest, one of constant velocity stays straight, and where the velocity is
+    So an interval at rest stays at rest, one of constant velocity stays straight, and where the velocity is
     largest there is no acceleration. With the velocities of `parabola_velocities` too, a quintic between
     two inner points that are dq apart leaves the box of the two by at most 0.0128 dq.
 
@@ -150,5 +150,6 @@ def _same_direction(points: Waypoints) -> NDArray[np.bool_]:
 
 
 def _between(points: Waypoints, inner: Array, first: ArrayLike, last: ArrayLike) -> Array:
+    """Return values (m, n) from those of inner points and of both ends."""
     ends = points.row(first, "the value at the first point"), points.row(last, "the value at the last point")
     return np.concatenate([ends[0][None], inner, ends[1][None]])

@@ -1,4 +1,4 @@
-"""Monotone curves: between two waypoints the curve never leaves their box, and never turns back.
+"""Shape-preserving splines: between two waypoints the curve never leaves their box, and never turns back.
 
 Source: Fritsch and Carlson, Monotone piecewise cubic interpolation, SIAM J. Numer. Anal. 17 (1980), for the
 velocities that keep a cubic monotone; Fritsch and Butland, A method for constructing local monotone piecewise

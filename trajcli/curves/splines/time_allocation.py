@@ -1,4 +1,4 @@
-"""When to pass the points of a spline so that it is over soonest: durations of its pieces from its limits.
+"""Time allocation: durations of the pieces of a spline with which it is fastest within its limits.
 
 The durations h minimise their sum while every piece keeps its limits. With y = log h, and c_i(y) the
 logarithm of what a piece uses of a limit, the minimiser of
@@ -26,27 +26,46 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.curves.smallest_feasible import smallest_feasible
 from trajcli.frozen import frozen
 
-CurveFamily = Callable[[Array], PiecewisePolynomial]
-
-_REACH = 4  # durations to either side that matter to a piece: in a C2 cubic each further one counts a quarter
-_WINDOW = 2 * _REACH + 1
+_NEAR = 4  # durations to either side that matter to a piece: in a C2 cubic each further one counts a quarter
+_WINDOW = 2 * _NEAR + 1
 _BAND = _WINDOW - 1
 _VARIED = 1e-6  # of a duration
 _ROOM = 1e-10  # relative; a tenth of the tolerance with which limits are verified
 _HIDDEN = -3.0  # log of a share of 5 %: limits of which less is used do not steer
 _INSIDE = 1.03  # times the feasible start, to begin inside
-_BARRIERS = (
-    (0.04, 1e-2),
-    (0.004, 3e-3),
-    (0.0008, 3e-4),
-)  # mu, of the mean duration; and the gain, of the sum of
-# durations, below which a step ends the round
+# mu, of the mean duration; and the gain, of the sum of durations, below which a step ends the round
+_BARRIERS = ((0.04, 1e-2), (0.004, 3e-3), (0.0008, 3e-4))
 _STEPS = 12  # of Newton for each barrier
 _HALVINGS = 12
 _LONGEST = 0.7  # of log h in one step
-_NEARER = 0.6  # of the way to the limits in one step, by the slopes
-_FAR = 0.2  # of log h: slopes from further away are found anew
+_NEARER = 0.6  # of the distance to the limits in one step, by the slopes
+_FAR = 0.2  # of log h: slopes from further away are computed anew
 _AMPLE = 1e4
+
+
+CurveFamily = Callable[[Array], PiecewisePolynomial]
+
+
+def fastest_durations(family: CurveFamily, guess: Array, bounds: Array) -> Array | None:
+    """Return the durations (m,) of the pieces of the fastest curve of a family that keeps its limits.
+
+    The optimum is a local one. None where the guess keeps the limits with no factor of time.
+
+    Args:
+        family: The curve from 0 whose pieces, or runs of pieces, last as long as asked, shape (m,).
+        guess: Positive, shape (m,).
+        bounds: Lower and upper limits of velocity, acceleration and jerk, shape (3, n, 2), infinite if none.
+    """
+    start = _stretched(family, guess, bounds)
+    if start is None or guess.size == 1:
+        return start
+    problem, y = _Problem(family, bounds), np.log(start * _INSIDE)
+    uses = problem.uses(y)
+    point = _Point(y, uses, y, problem.slopes(y, uses))
+    for cost, enough in _BARRIERS:
+        point = _centred(problem, point, cost * float(start.mean()), enough)
+    best = _stretched(family, np.exp(point.y), bounds)
+    return best if best is not None and best.sum() < start.sum() else start
 
 
 @frozen
@@ -54,7 +73,7 @@ class _Problem:
     """What is solved.
 
     Attributes:
-        family: The curve from 0 whose pieces, or runs of pieces, last as long as it is told.
+        family: The curve from 0 whose pieces, or runs of pieces, last as long as asked.
         bounds: Shape (3, n, 2).
     """
 
@@ -66,16 +85,16 @@ class _Problem:
         return np.maximum(_all_uses(self.family, np.exp(y), self.bounds), _HIDDEN)
 
     def slopes(self, y: Array, uses: Array) -> Array:
-        """Return d c / d y, shape (m, r, window): entry w of piece k is about duration k - reach + w."""
-        places = np.arange(y.size)
+        """Return d c / d y, shape (m, r, window): entry w of piece k is about duration k - near + w."""
+        pieces = np.arange(y.size)
         slopes = np.zeros((*uses.shape, _WINDOW))
         for colour in range(min(_WINDOW, y.size)):
-            varied = y + _VARIED * (places % _WINDOW == colour)
+            varied = y + _VARIED * (pieces % _WINDOW == colour)
             change = (self.uses(varied) - uses) / _VARIED
-            entry = (colour - places + _REACH) % _WINDOW
-            owner = places - _REACH + entry
+            entry = (colour - pieces + _NEAR) % _WINDOW
+            owner = pieces - _NEAR + entry
             inside = (owner >= 0) & (owner < y.size)
-            slopes[places[inside], :, entry[inside]] = change[inside]
+            slopes[pieces[inside], :, entry[inside]] = change[inside]
         return slopes
 
 
@@ -113,67 +132,46 @@ class _Point:
         return np.asarray(step * _windows(_NEARER / np.maximum(nearer, _NEARER), 1.0).min(axis=1))
 
 
-def fastest_durations(family: CurveFamily, guess: Array, bounds: Array) -> Array | None:
-    """Return the durations (m,) of the pieces of the fastest curve of a family that keeps its limits.
-
-    The optimum is a local one. None where no stretch of the guess keeps the limits.
-
-    Args:
-        family: The curve from 0 whose pieces, or runs of pieces, last as long as it is told, shape (m,).
-        guess: Positive, shape (m,).
-        bounds: Lower and upper limits of velocity, acceleration and jerk, shape (3, n, 2), infinite if none.
-    """
-    start = _stretched(family, guess, bounds)
-    if start is None or guess.size == 1:
-        return start
-    problem, y = _Problem(family, bounds), np.log(start * _INSIDE)
-    uses = problem.uses(y)
-    found = _Point(y, uses, y, problem.slopes(y, uses))
-    for cost, enough in _BARRIERS:
-        found = _centred(problem, found, cost * float(start.mean()), enough)
-    best = _stretched(family, np.exp(found.y), bounds)
-    return best if best is not None and best.sum() < start.sum() else start
-
-
-def _centred(problem: _Problem, found: _Point, weight: float, enough: float) -> _Point:
+def _centred(problem: _Problem, point: _Point, weight: float, enough: float) -> _Point:
     """Return the minimiser of a barrier from a start inside the limits; a start outside comes back.
 
     Args:
         problem: What is solved.
-        found: The start.
+        point: The start.
         weight: mu, s.
         enough: The gain below which a step is the last one, of the sum of durations.
     """
     for _ in range(_STEPS):
-        if np.abs(found.y - found.origin).max() > _FAR:
-            found = _renewed(problem, found)
-        exact, better, gain = found.origin is found.y, _improved(problem, found, weight), 0.0
+        if np.abs(point.y - point.origin).max() > _FAR:
+            point = _renewed(problem, point)
+        exact, better, gain = point.origin is point.y, _improved(problem, point, weight), 0.0
         if better is not None:
-            gain = float((found.values(weight) - better.values(weight)).sum() / np.exp(found.y).sum())
-            found = better
+            gain = float((point.values(weight) - better.values(weight)).sum() / np.exp(point.y).sum())
+            point = better
         if gain < enough and exact:
             break
         if gain < enough:  # by slopes from far away
-            found = _renewed(problem, found)
-    return found
+            point = _renewed(problem, point)
+    return point
 
 
-def _renewed(problem: _Problem, found: _Point) -> _Point:
-    return _Point(found.y, found.uses, found.y, problem.slopes(found.y, found.uses))
+def _renewed(problem: _Problem, point: _Point) -> _Point:
+    """Return the point with slopes of its own."""
+    return _Point(point.y, point.uses, point.y, problem.slopes(point.y, point.uses))
 
 
-def _improved(problem: _Problem, found: _Point, weight: float) -> _Point | None:
+def _improved(problem: _Problem, point: _Point, weight: float) -> _Point | None:
     """Return a point with a smaller value in about the direction of Newton's step, or None if there is none.
 
     The step is halved around those pieces where it makes things worse.
     """
-    values = found.values(weight)
+    values = point.values(weight)
     if not np.isfinite(values).all():
         return None
-    step = found.step(weight)
+    step = point.step(weight)
     for _ in range(_HALVINGS):
-        y = found.y + step
-        better = _Point(y, problem.uses(y), found.origin, found.slopes)
+        y = point.y + step
+        better = _Point(y, problem.uses(y), point.origin, point.slopes)
         gains = better.values(weight) - values
         if gains.sum() < 0:
             return better
@@ -193,11 +191,12 @@ def _stretched(family: CurveFamily, durations: Array, bounds: Array) -> Array | 
     def excess(factors: Array) -> Array:
         return np.array([_excess(family, durations * f, bounds) for f in factors.tolist()]) - _ROOM
 
-    found = smallest_feasible(excess, factor / 10, factor * _AMPLE, block=1)
-    return None if found is None else durations * found
+    least = smallest_feasible(excess, factor / 10, factor * _AMPLE, block=1)
+    return None if least is None else durations * least
 
 
 def _excess(family: CurveFamily, durations: Array, bounds: Array) -> float:
+    """Return the log of the largest share of a limit that is used."""
     return float(_all_uses(family, durations, bounds).max())
 
 
@@ -223,15 +222,15 @@ def _all_uses(family: CurveFamily, durations: Array, bounds: Array) -> Array:
 
 def _windows(values: Array, filling: float) -> Array:
     """Return what stands around each of the values (m,), shape (m, window)."""
-    return np.lib.stride_tricks.sliding_window_view(np.pad(values, _REACH, constant_values=filling), _WINDOW)
+    return np.lib.stride_tricks.sliding_window_view(np.pad(values, _NEAR, constant_values=filling), _WINDOW)
 
 
 def _scattered(values: Array, size: int) -> Array:
     """Return the sums over all windows, shape (size,), of values (m, window)."""
-    total = np.zeros(size + 2 * _REACH)
+    total = np.zeros(size + 2 * _NEAR)
     for entry in range(_WINDOW):
         total[entry : entry + size] += values[:, entry]
-    return total[_REACH : _REACH + size]
+    return total[_NEAR : _NEAR + size]
 
 
 def _blocks(curvature: Array, diagonal: Array) -> tuple[Array, Array]:
@@ -243,17 +242,17 @@ def _blocks(curvature: Array, diagonal: Array) -> tuple[Array, Array]:
     """
     m = diagonal.size
     count = -(-m // _BAND)
-    band = np.zeros((_BAND + 1, m + 2 * _REACH))
+    band = np.zeros((_BAND + 1, m + 2 * _NEAR))
     for v in range(_WINDOW):
         for w in range(v, _WINDOW):
             band[w - v, v : v + m] += curvature[:, v, w]
-    band = np.pad(band[:, _REACH : _REACH + m], ((0, 0), (0, (count + 1) * _BAND - m)))
+    band = np.pad(band[:, _NEAR : _NEAR + m], ((0, 0), (0, (count + 1) * _BAND - m)))
     band[0, :m] += diagonal
     band[0, m:] = 1.0
     rows = np.arange(count)[:, None, None] * _BAND + np.arange(_BAND)[:, None]
     ahead = np.arange(_BAND) - np.arange(_BAND)[:, None]
     upper = np.where(ahead >= 0, band[np.clip(ahead, 0, _BAND), rows], 0.0)
     inner = upper + np.swapaxes(np.where(ahead > 0, upper, 0.0), 1, 2)
-    reach = ahead + _BAND
-    right = np.where(reach <= _BAND, band[np.clip(reach, 0, _BAND), rows], 0.0)
+    beyond = ahead + _BAND
+    right = np.where(beyond <= _BAND, band[np.clip(beyond, 0, _BAND), rows], 0.0)
     return inner, right[:-1]

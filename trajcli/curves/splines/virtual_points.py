@@ -1,4 +1,4 @@
-"""Cubics with continuous acceleration whose end velocities and end accelerations are both imposed.
+"""Virtual points: cubic splines whose end velocities and end accelerations are both imposed.
 
 Waypoints alone leave no freedom for that; one virtual point in each end interval gives it. A virtual point
 has a time but no position: that follows from the solution.
@@ -62,13 +62,14 @@ def continuous_acceleration(
 
 def virtual_points(curve: PiecewisePolynomial) -> tuple[Array, Array]:
     """Return times (2,) and positions (2, n) of the two virtual points of `continuous_acceleration`."""
-    places = [1, -1]
-    times: Array = curve.breaks[:-1][places]
-    positions: Array = curve.coefficients[-1][places]
+    ends = [1, -1]
+    times: Array = curve.breaks[:-1][ends]
+    positions: Array = curve.coefficients[-1][ends]
     return times, positions
 
 
 def _two(values: ArrayLike) -> Array:
+    """Return one row for each of the two ends."""
     array = np.asarray(values, dtype=np.float64)
     if array.ndim != 2 or array.shape[0] != 2:
         raise ValueError(f"expected one row for each of the two ends, got shape {array.shape}")
@@ -76,6 +77,7 @@ def _two(values: ArrayLike) -> Array:
 
 
 def _virtual_times(times: Array, given: ArrayLike | None) -> Array:
+    """Return the times (2,) of the virtual points: those given, or the middles of the end intervals."""
     if given is None and times.size == 2:
         virtual: Array = times[0] + (times[1] - times[0]) * np.array([1.0, 2.0]) / 3
     elif given is None:
@@ -108,8 +110,8 @@ class _EndState:
     def after(self, time: float, acceleration: Array) -> _EndState:
         """Return the state to which a linear change to `acceleration` leads."""
         mean = (self.acceleration + acceleration) / 2
-        way = time * (self.velocity + time * (2 * self.acceleration + acceleration) / 6)
-        return _EndState(self.position + way, self.velocity + time * mean, acceleration)
+        displacement = time * (self.velocity + time * (2 * self.acceleration + acceleration) / 6)
+        return _EndState(self.position + displacement, self.velocity + time * mean, acceleration)
 
 
 @frozen
@@ -135,8 +137,8 @@ class _EndInterval:
         left: Array = 6 * straight - start.acceleration * early * (2 * early + 3 * late)
         return left
 
-    def reach(self, outer: KnotEquations, inner: KnotEquations) -> None:
-        """Write how the next waypoint is reached, with M eliminated, into the rows of the first two knots."""
+    def eliminate(self, outer: KnotEquations, inner: KnotEquations) -> None:
+        """Write the velocity at the next waypoint, without M, into the rows of the first two knots."""
         early, late, start = self.to_virtual, self.to_real, self.start
         without_acceleration(outer, inner)
         outer.stiffness[1] = late * (early + late) / (2 * (early + 2 * late))
@@ -152,12 +154,13 @@ class _EndInterval:
 
 
 def _many_pieces(points: Waypoints, virtual: Array, first: _EndState, last: _EndState) -> PiecewisePolynomial:
+    """Return the curve through three points or more."""
     times, positions = points.times, points.positions
     head = _EndInterval(first, virtual[0] - times[0], times[1] - virtual[0], positions[1])
     tail = _EndInterval(last.backwards(), times[-1] - virtual[1], virtual[1] - times[-2], positions[-2])
     before, after = knot_equations(points)
-    head.reach(before, after)
-    tail.reach(after.backwards(), before.backwards())
+    head.eliminate(before, after)
+    tail.eliminate(after.backwards(), before.backwards())
     solved = knot_accelerations(before, after)
     states = head.virtual_state(solved[1]), tail.virtual_state(solved[-2]).backwards()
     inner = slice(1, -1)

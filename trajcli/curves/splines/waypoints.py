@@ -1,4 +1,4 @@
-"""Waypoints as a spline sees them: times, values, and the lengths and slopes between neighbours."""
+"""Waypoints of a spline: times, values, and the lengths and slopes between neighbours."""
 
 from __future__ import annotations
 

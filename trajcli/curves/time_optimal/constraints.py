@@ -1,27 +1,35 @@
-"""What limits the motion along a path: rows a u + b x <= c and caps on x, where x = sd^2 and u = sdd.
+"""Constraints on the motion along a path: rows a u + b x <= c and caps on x, where x = sd^2 and u = sdd.
 
 With q(s) and s(t) the chain rule gives qd = q' sd and qdd = q' u + q'' x: bounds on acceleration are rows,
 bounds on velocity are caps. Every c is positive: standing still is always allowed.
 
-Source: Pham and Pham (2018), sections II and III.
+Rows hold at grid points. What a law uses of a limit between them is the excess of the constraint there, a
+multiple of the limit. For joints it comes from the control points of q(s(t)): they bound a polynomial, and
+lie above its largest value by no more than a sixth of what lies above the chord.
+
+Source: Pham and Pham (2018), sections II and III, for the rows.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 
-from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side
+from trajcli.curves.bernstein import control_points
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, derivative_coefficients, horner
+from trajcli.curves.time_optimal.time_law import LawPieces, blocks
 from trajcli.frozen import frozen
 
 _KINK = 1e-9  # of the largest derivative of a joint: a jump above it is a corner
 _ROUNDING = 1e-13  # of the largest derivative of all joints: the same, where one hardly moves
+_SAMPLES = 9  # of a speed limit within an interval, both ends included
 
 
 @frozen
 class ConstraintRows:
-    """Rows a u + b x <= c and caps x <= cap at p places of a path.
+    """Rows a u + b x <= c and caps x <= cap at p points of a path.
 
     Attributes:
         a: Shape (p, k).
@@ -36,14 +44,35 @@ class ConstraintRows:
     cap: Array
 
 
-PathConstraint = Callable[[Array, Side], ConstraintRows]
-"""Rows at the places (p,) of the path, seen from their left or their right side; k is always the same."""
+class PathConstraint(Protocol):
+    """What limits the motion along a path: how fast it may be, and by how much a law is too fast.
+
+    A solution obeys the rows at the points of its grid. Between them it is judged by the excess: in an
+    interval where that is above one, cap and c are lowered and the problem is solved again.
+    """
+
+    def rows(self, s: Array, side: Side) -> ConstraintRows:
+        """Return the rows at the points (p,) of the path, seen from one side; k is always the same."""
+        ...
+
+    def excess(self, law: LawPieces) -> Array:
+        """Return the largest multiples of its limits that each piece of a law reaches, shape (2, N).
+
+        The first row is of what grows with sd, and met by dividing the caps by its square; the second of
+        what grows with sd^2 and sdd, and met by dividing every c by it. Zero where there is no such limit;
+        above one never less than what is reached, up to the resolution that the constraint names.
+
+        Args:
+            law: N pieces, one for each interval, each within one piece of the path.
+        """
+        ...
 
 
-def joint_constraint(path: PiecewisePolynomial, velocity: Array, acceleration: Array) -> PathConstraint:
-    """Return the demand of joint limits.
+@frozen
+class JointConstraint:
+    """Limits of the velocity and the acceleration of joints; an excess above one is a bound for all t.
 
-    Args:
+    Attributes:
         path: q(s) with n joints.
         velocity: Lower and upper bounds, shape (n, 2), lower < 0 < upper, infinite for none.
         acceleration: The same of acceleration.
@@ -51,52 +80,103 @@ def joint_constraint(path: PiecewisePolynomial, velocity: Array, acceleration: A
     Raises:
         ValueError: When bounds have another shape or sign.
     """
-    for name, bounds in (("velocity", velocity), ("acceleration", acceleration)):
-        if bounds.shape != (path.dimension, 2) or not ((bounds[:, 0] < 0) & (bounds[:, 1] > 0)).all():
-            raise ValueError(f"{name} bounds must be {path.dimension} pairs with lower < 0 < upper")
-    upper, lower = np.isfinite(acceleration[:, 1]), np.isfinite(acceleration[:, 0])
-    limits = np.concatenate([acceleration[upper, 1], -acceleration[lower, 0]])
 
-    def rows(s: Array, side: Side) -> ConstraintRows:
-        first, second = path.evaluate_orders(s, (1, 2), side=side).transpose(1, 0, 2)
+    path: PiecewisePolynomial
+    velocity: Array
+    acceleration: Array
+
+    def __post_init__(self) -> None:
+        n = self.path.dimension
+        for name, bounds in (("velocity", self.velocity), ("acceleration", self.acceleration)):
+            if bounds.shape != (n, 2) or not ((bounds[:, 0] < 0) & (bounds[:, 1] > 0)).all():
+                raise ValueError(f"{name} bounds must be {n} pairs with lower < 0 < upper")
+
+    def rows(self, s: Array, side: Side) -> ConstraintRows:
+        """Return the rows at points (p,), one for each finite bound of acceleration."""
+        upper, lower = np.isfinite(self.acceleration[:, 1]), np.isfinite(self.acceleration[:, 0])
+        limits = np.concatenate([self.acceleration[upper, 1], -self.acceleration[lower, 0]])
+        first, second = self.path.evaluate_orders(s, (1, 2), side=side).transpose(1, 0, 2)
         a = np.concatenate([first[:, upper], -first[:, lower]], axis=1)
         b = np.concatenate([second[:, upper], -second[:, lower]], axis=1)
-        rate = np.maximum(first / velocity[:, 1], first / velocity[:, 0]).max(axis=1)
+        rate = np.maximum(first / self.velocity[:, 1], first / self.velocity[:, 0]).max(axis=1)
         with np.errstate(divide="ignore", over="ignore"):
             return ConstraintRows(a, b, np.broadcast_to(limits, a.shape), rate**-2.0)
 
-    return rows
+    def excess(self, law: LawPieces) -> Array:
+        """Return bounds of what is used of velocity and acceleration in each piece, shape (2, N)."""
+        excess = np.empty((2, law.durations.size))
+        for block in blocks(law.durations.size):
+            pieces = law.chosen(block)
+            excess[:, block] = self._excess(pieces.along(self.path), pieces.durations)
+        return excess
+
+    def _excess(self, q: Array, durations: Array) -> Array:
+        """Return the excess (2, w) of polynomials q(t) (d + 1, n, w) that last (w,)."""
+        acceleration = _used(control_points(derivative_coefficients(q, 2), durations), self.acceleration)
+        qd = derivative_coefficients(q, 1)
+        velocity = _used(np.stack([qd[-1], horner(qd, durations)]), self.velocity)
+        slowest = np.abs(self.velocity).min(axis=1)
+        with np.errstate(invalid="ignore"):
+            steepest = np.abs(self.acceleration).max(axis=1) / slowest
+            steepest = np.where(np.isfinite(slowest), steepest, 0.0).max()
+            most = velocity + 0.5 * acceleration * steepest * durations
+        fast = np.flatnonzero(~(most <= 1.0))  # elsewhere the ends and the acceleration bound the velocity
+        velocity[fast] = _used(control_points(qd[:, :, fast], durations[fast]), self.velocity)
+        return np.stack([velocity, acceleration])
 
 
-def speed_constraint(limit: Callable[[Array], Array]) -> PathConstraint:
-    """Return the demand of a bound on sd.
+@frozen
+class SpeedConstraint:
+    """A limit of sd itself; between grid points it is sampled, and where sd is largest.
 
-    Args:
-        limit: From places (p,) to the largest sd there, (p,), positive or infinite.
+    Attributes:
+        limit: From points (p,) of the path to the largest sd there, (p,), positive or infinite; where it
+            jumps, a grid point must stand, with the lower value.
     """
 
-    def rows(s: Array, side: Side) -> ConstraintRows:
-        nothing = np.empty((s.size, 0))
-        return ConstraintRows(nothing, nothing, nothing, limit(s) ** 2)
+    limit: Callable[[Array], Array]
 
-    return rows
+    def rows(self, s: Array, side: Side) -> ConstraintRows:
+        """Return no rows, and the limit as cap, at points (p,)."""
+        del side
+        nothing = np.empty((s.size, 0))
+        return ConstraintRows(nothing, nothing, nothing, self.limit(s) ** 2)
+
+    def excess(self, law: LawPieces) -> Array:
+        """Return what is used of the limit at samples of each piece, and zeros for acceleration, (2, N)."""
+        samples = np.linspace(0.0, 1.0, _SAMPLES)[:, None] * law.durations
+        sdd = derivative_coefficients(law.coefficients, 2)
+        if len(sdd) == 2:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                turning = np.nan_to_num(-sdd[1] / sdd[0])  # where sdd is zero, sd is largest or smallest
+            samples = np.concatenate([samples, [np.clip(turning, 0.0, law.durations)]])
+        sd = horner(derivative_coefficients(law.coefficients, 1), samples)
+        limits = self.limit(horner(law.coefficients, samples).reshape(-1)).reshape(sd.shape)
+        used = (sd / limits).max(axis=0)
+        return np.stack([used, np.zeros_like(used)])
 
 
 def is_at_rest(path: PiecewisePolynomial) -> tuple[bool, bool]:
     """Return whether q' vanishes at the start and at the end, so that any sd is rest there."""
     begins, ends = path.piece_ends(1)
-    nothing = _nothing(begins, ends)
-    return bool((np.abs(begins[0]) <= nothing).all()), bool((np.abs(ends[-1]) <= nothing).all())
+    negligible = _negligible(begins, ends)
+    return bool((np.abs(begins[0]) <= negligible).all()), bool((np.abs(ends[-1]) <= negligible).all())
 
 
 def corners(path: PiecewisePolynomial) -> Array:
     """Return the breaks at which q' jumps, so that the motion must stop there."""
     begins, ends = path.piece_ends(1)
-    jumps = np.abs(begins[1:] - ends[:-1]) > _nothing(begins, ends)
+    jumps = np.abs(begins[1:] - ends[:-1]) > _negligible(begins, ends)
     return np.asarray(path.breaks[1:-1][jumps.any(axis=1)])
 
 
-def _nothing(begins: Array, ends: Array) -> Array:
+def _negligible(begins: Array, ends: Array) -> Array:
     """Return what counts as no derivative of each joint, shape (n,), from those at the ends of pieces."""
     largest = np.maximum(np.abs(begins), np.abs(ends)).max(axis=0)
     return np.asarray(np.maximum(_KINK * largest, _ROUNDING * largest.max()))
+
+
+def _used(values: Array, bounds: Array) -> Array:
+    """Return how much of the bounds (n, 2) values (k, n, w) use at most, shape (w,)."""
+    high, low = values.max(axis=0) / bounds[:, 1, None], values.min(axis=0) / bounds[:, 0, None]
+    return np.asarray(np.maximum(high, low).max(axis=0))

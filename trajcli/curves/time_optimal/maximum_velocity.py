@@ -1,4 +1,4 @@
-"""The largest sd^2 at each place that the rows of an interval have room for, the maximum velocity curve."""
+"""Maximum velocity curve: the largest sd^2 at each grid point that its intervals have room for."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
-from trajcli.curves.time_optimal.collocation import CollocationRows, blocks
+from trajcli.curves.time_optimal.collocation import CollocationRows
 from trajcli.curves.time_optimal.recurrence import HUGE
+from trajcli.curves.time_optimal.time_law import blocks
 
 _STEPS = 100  # of Newton
 _SAME = 1e-12
@@ -16,7 +17,7 @@ _SAME = 1e-12
 def maximum_velocity_curve(
     intervals: CollocationRows, known: Array | None = None, changed: NDArray[np.bool_] | None = None
 ) -> Array:
-    """Return the largest x at each place that its two intervals have room for, shape (N + 1,).
+    """Return the largest x at each grid point that its two intervals have room for, shape (N + 1,).
 
     Args:
         intervals: N of them.
@@ -24,13 +25,13 @@ def maximum_velocity_curve(
         changed: Shape (N,).
     """
     P, R, C, cap = intervals.P, intervals.R, intervals.C, intervals.cap
-    last = _ceiling(R[:, -1:], P[:, -1:], C[:, -1:], cap[-1:])
+    last = _largest(R[:, -1:], P[:, -1:], C[:, -1:], cap[-1:])
     if known is None or changed is None:
         return np.append(largest_in_intervals(P, R, C, cap[:-1]), last)
-    found = np.append(np.minimum(known[:-1], cap[:-1]), last)
+    curve = np.append(np.minimum(known[:-1], cap[:-1]), last)
     rows = np.flatnonzero(changed)
-    found[rows] = largest_in_intervals(P[:, rows], R[:, rows], C[:, rows], cap[rows])
-    return found
+    curve[rows] = largest_in_intervals(P[:, rows], R[:, rows], C[:, rows], cap[rows])
+    return curve
 
 
 def largest_in_intervals(P: Array, R: Array, C: Array, cap: Array) -> Array:
@@ -42,13 +43,13 @@ def largest_in_intervals(P: Array, R: Array, C: Array, cap: Array) -> Array:
         C: Shape (m, N).
         cap: Shape (N,).
     """
-    found = np.empty(cap.size)
+    largest = np.empty(cap.size)
     for block in blocks(cap.size):
-        found[block] = _ceiling(P[:, block], R[:, block], C[:, block], cap[block])
-    return found
+        largest[block] = _largest(P[:, block], R[:, block], C[:, block], cap[block])
+    return largest
 
 
-def _ceiling(P: Array, R: Array, C: Array, cap: Array) -> Array:
+def _largest(P: Array, R: Array, C: Array, cap: Array) -> Array:
     """Return the same for so few intervals that their rows stay in the processor's cache.
 
     The room for y, the smallest upper bound less the largest lower one, is concave in x and positive at zero,

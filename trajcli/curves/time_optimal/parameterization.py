@@ -1,11 +1,13 @@
-"""The time-optimal motion along a path: grid, solution, law, trajectory, and what was done to get there.
+"""Time-optimal motion along a path: the fastest law s(t) within limits, solved on a grid that is refined.
 
-A path with its limits, and a solution sd^2 on a grid: its law, what it uses of limits, what it loses.
+The problem is solved on a grid by the two passes. Where the estimate says that time is lost, the grid is cut
+finer. Where a constraint says that the law exceeds it between grid points, its limits are lowered there, and
+the problem is solved again. What is left after that is taken away by slowing down the motion as a whole.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 
 import numpy as np
@@ -14,17 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from trajcli.curves.extrema import peaks
 from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.curves.time_optimal.collocation import (
-    CollocatedConstraints,
-    CollocationRows,
-    collocated,
-    first_grid,
-    halved,
-    most_intervals,
-    parts_for,
-    refined,
-)
-from trajcli.curves.time_optimal.constraints import PathConstraint, corners, is_at_rest, joint_constraint
+from trajcli.curves.time_optimal.collocation import CollocatedConstraints, CollocationRows, collocated
+from trajcli.curves.time_optimal.constraints import JointConstraint, PathConstraint, corners, is_at_rest
 from trajcli.curves.time_optimal.maximum_velocity import maximum_velocity_curve
 from trajcli.curves.time_optimal.passes import (
     Speeds,
@@ -34,182 +27,45 @@ from trajcli.curves.time_optimal.passes import (
     solve_locally,
 )
 from trajcli.curves.time_optimal.refinement import (
-    excess,
+    first_grid,
+    halved,
     interpolated_ramps,
-    law_and_trajectory,
+    most_intervals,
+    parts_for,
+    refined,
     time_lost,
     wanted_ramps,
 )
-from trajcli.curves.time_optimal.time_law import distances_at_mean_speed, feasible_ramps, pieces_of
+from trajcli.curves.time_optimal.time_law import (
+    LawPieces,
+    distances_at_mean_speed,
+    feasible_ramps,
+    law_and_trajectory,
+    law_pieces,
+)
 from trajcli.frozen import frozen
 
 _FEW_CHANGED = 0.01  # of the intervals: if no more of them change, most of the solution stays
-_WILD = 1.02  # of a limit: where more is used, there shall be no swing
-_LARGEST_DEGREE = 3  # of a path: with swings the degree of the trajectory is three times as high
-
-
-@frozen
-class PathProblem:
-    """A path and its limits.
-
-    Attributes:
-        path: q(s) with n joints.
-        bounds: Of velocity and acceleration, each of shape (n, 2).
-        demands: Of all that limits the motion.
-        stops: Places where the motion must stop, shape (k,).
-        ends: sd at the start and at the end; infinite for any.
-    """
-
-    path: PiecewisePolynomial
-    bounds: tuple[Array, Array]
-    demands: Sequence[PathConstraint]
-    stops: Array
-    ends: tuple[float, float]
-
-    @property
-    def rests(self) -> bool:
-        """Whether it starts and ends at rest, so that it may be stretched."""
-        return all(end in (0.0, np.inf) for end in self.ends)
-
-    @property
-    def swings(self) -> bool:
-        """Whether sdd may swing within an interval."""
-        return self.path.degree <= _LARGEST_DEGREE
-
-
-@frozen
-class GridSolution:
-    """A solution on a grid of N intervals.
-
-    Attributes:
-        problem: What it solves.
-        limited: The demands at its places.
-        intervals: The rows that it obeys.
-        speeds: sd^2 at its places.
-        law: Durations (N,) and coefficients (d + 1, N) of the pieces of s(t).
-        over: Bounds of what is used of the limits of velocity and acceleration in each interval, (2, N).
-    """
-
-    problem: PathProblem
-    limited: CollocatedConstraints
-    intervals: CollocationRows
-    speeds: Speeds
-    law: tuple[Array, Array]
-    over: Array
-
-    @property
-    def grid(self) -> Array:
-        """Its places, shape (N + 1,)."""
-        return self.intervals.grid
-
-    @property
-    def x(self) -> Array:
-        """sd^2 at its places, shape (N + 1,)."""
-        return self.speeds.x
-
-    @property
-    def lost(self) -> Array:
-        """Estimate of the time lost in each interval, where limits are passed also by keeping them, (N,)."""
-        lasting, over = self.law[0], np.clip(self.over - 1.0, 0.0, 1.0)
-        lost = time_lost(self.intervals, self.x, self.speeds.ceiling, lasting)
-        return np.asarray(lost + lasting * np.maximum(over[0], 0.5 * over[1]))
-
-    def tightened(self, factors: Array, *, swing: bool) -> GridSolution:
-        """Return the solution with limits divided by factors.
-
-        Args:
-            factors: Of velocity and acceleration in each interval, shape (2, N).
-            swing: Whether to find the swings anew.
-
-        Raises:
-            UnreachableSpeedError: When the speeds at the ends are too high for these limits.
-        """
-        problem, demands, grid = self.problem, self.limited, self.grid
-        if swing and problem.swings:
-            calm = self.over.max(axis=0) <= _WILD  # elsewhere sdd swings by more than the limits follow
-            wanted = np.where(calm, wanted_ramps(self.intervals, self.x), 0.0)
-            rows = demands.intervals(wanted, distances_at_mean_speed(grid, self.x, wanted))
-            rows = rows.tightened(*np.where(calm, factors, 1.0))
-            with suppress(UnreachableSpeedError):  # then there may be one with the swings as they are
-                return _judged(problem, demands, rows, solve(rows, *problem.ends))
-        rows, changed = self.intervals.tightened(*factors), (factors != 1.0).any(axis=0)
-        ceiling = maximum_velocity_curve(rows, self.speeds.ceiling, changed)
-        few = changed.mean() < _FEW_CHANGED
-        speeds = solve_locally(rows, self.speeds, changed, ceiling) if few else None
-        return _judged(problem, demands, rows, speeds or solve(rows, *problem.ends, ceiling), self)
-
-
-def _judged(
-    problem: PathProblem,
-    demands: CollocatedConstraints,
-    rows: CollocationRows,
-    speeds: Speeds,
-    before: GridSolution | None = None,
-) -> GridSolution:
-    """Return the solution with its law and what that uses of the limits.
-
-    Args:
-        problem: What it solves.
-        demands: At its places.
-        rows: That it obeys.
-        speeds: sd^2 at its places.
-        before: A solution with the same swings.
-    """
-    law = pieces_of(rows.grid, speeds.x, feasible_ramps(rows.grid, speeds.x, rows.swing))
-    over, differs = np.empty((2, rows.way.size)), np.ones(speeds.x.size, dtype=bool)
-    if before is not None:
-        over, differs = before.over.copy(), before.x != speeds.x
-    chosen = np.flatnonzero(differs[:-1] | differs[1:])
-    over[:, chosen] = excess(problem.path, law, problem.bounds, chosen)
-    return GridSolution(problem, demands, rows, speeds, law, over)
-
-
-def solution_on_grid(problem: PathProblem, grid: Array, swing: Array, way: Array) -> GridSolution:
-    """Return the solution on a grid.
-
-    Args:
-        problem: What to solve.
-        grid: Places, shape (N + 1,).
-        swing: Swings to begin with, shape (N,).
-        way: How far the mean of both speeds leads in each interval, shape (N,).
-
-    Raises:
-        UnreachableSpeedError: When there is no motion with the speeds at the ends.
-        UnlimitedSpeedError: When nothing limits the motion somewhere.
-    """
-    demands = collocated(grid, problem.demands, problem.stops)
-    rows = demands.intervals(swing, way)
-    speeds = solve(rows, *problem.ends)
-    if problem.swings:
-        wanted = wanted_ramps(rows, speeds.x)
-        rows = demands.intervals(wanted, distances_at_mean_speed(grid, speeds.x, wanted))
-        try:
-            speeds = solve(rows, *problem.ends)
-        except UnreachableSpeedError:  # with so much swing there is none
-            rows = demands.intervals(swing, way)
-    return _judged(problem, demands, rows, speeds)
-
-
+_WILD = 1.02  # of a limit: where more is used, there shall be no sdd ramp
+_LARGEST_DEGREE = 3  # of a path: with sdd ramps the degree of the trajectory is three times as high
 _LOST = 2.5e-3  # of the duration, by estimate: a finer grid would not gain more
 _AIM = 1.2e-3  # of the duration: the estimate that a finer grid is made for
-_SWITCHING = (
-    1e-8  # of an interval of a straight line: more is lost only where a switching place is to be found
-)
-_SETTLED = 0.01  # of what is lost elsewhere: then switching places still move by more than they are off
+_SWITCHING = 1e-8  # of an interval of a straight line: more is lost only where a switching point is missing
+_SETTLED = 0.01  # of what is lost elsewhere: then switching points still move by more than they are off
 _FEW_NEW = 0.1  # of the intervals: for fewer new ones the whole solution is not worth finding again
 _ROUNDS = 8  # of refinement
 _TRIES = 4  # of halving the grid before a speed at an end is called too high
 _TIGHTENINGS, _MOST_TIGHTENINGS = 8, 40  # where the rest is stretched away, and where it must not be
-_LOWERED = (1.1, 1.3, 2.0, 4.0, 16.0, 64.0)  # times the excess that limits are lowered by, turn by turn
-_EXACT = 1e-10  # a limit passed by less is kept
+_LOWERED = (1.1, 1.3, 2.0, 4.0, 16.0, 64.0)  # times the excess that limits are lowered by, round by round
+_EXACT = 1e-10  # a limit exceeded by less is kept
 
 
 class UnsettledSpeedError(ValueError):
-    """The limits could not be kept between the places of the grid with the path velocities asked for.
+    """The limits could not be kept between grid points with the path velocities asked for.
 
     Attributes:
-        s: Place on the path.
-        over: By what factor a limit is passed there.
+        s: Path parameter.
+        over: By what factor a limit is exceeded there.
     """
 
     def __init__(self, s: float, over: float) -> None:
@@ -225,14 +81,14 @@ class TimeOptimalMotion:
 
     Attributes:
         trajectory: q(t) from t = 0 on.
-        law: s(t), quadratic pieces.
+        law: s(t), quadratic or cubic pieces.
         stretch: By what factor the solution was slowed down as a whole to keep the limits everywhere.
         tightened: Number of intervals in which the limits were lowered to be kept between their ends.
         refinements: How often the grid was refined.
-        grid: Its places, shape (N + 1,).
+        grid: Grid points, shape (N + 1,).
         lost: Estimate of the share of the duration that a finer grid would save.
-        stops: Places of the corners of the path, where the motion stops, shape (k,).
-        stop_times: When it does, s, shape (k,).
+        stops: s at the corners of the path, where the motion stops, shape (k,).
+        stop_times: When it does, in seconds, shape (k,).
     """
 
     trajectory: PiecewisePolynomial
@@ -266,12 +122,12 @@ def time_optimal(
         acceleration: The same, per second squared; not all infinite.
         start_velocity: sd at the start, not negative.
         end_velocity: sd at the end, not negative.
-        further: Other demands on u and x; kept at the places of the grid.
+        further: Other constraints; kept as far as their excess tells.
 
     Raises:
         UnlimitedSpeedError: When nothing limits the motion somewhere.
         UnreachableSpeedError: When the velocities at the ends are too high.
-        UnsettledSpeedError: When they leave no room to keep the limits between the places of the grid.
+        UnsettledSpeedError: When they leave no room to keep the limits between grid points.
         ValueError: When bounds have another shape or sign, or a velocity is negative.
     """
     if not (0.0 <= start_velocity < np.inf and 0.0 <= end_velocity < np.inf):
@@ -279,101 +135,268 @@ def time_optimal(
             f"path velocities {start_velocity!r} and {end_velocity!r} must be finite, not negative"
         )
     bounds = np.asarray(velocity, dtype=np.float64), np.asarray(acceleration, dtype=np.float64)
-    demands = [joint_constraint(path, *bounds), *further]
+    joints = JointConstraint(path, *bounds)
     ends = tuple(
         np.inf if resting and speed == 0 else speed
         for speed, resting in zip((start_velocity, end_velocity), is_at_rest(path), strict=True)
     )
     if not np.isfinite(bounds[1]).any() or path.duration == 0:
         raise UnlimitedSpeedError(path.start)
-    problem = PathProblem(path, bounds, demands, corners(path), (ends[0], ends[1]))
-    found, rounds, lost = _refined_solution(problem)
-    found, tightened = _tightened_solution(found)
-    grid, pieces, over = found.grid, found.law, float(found.over.max())
-    del found  # the rows of a long path are large
-    law, trajectory, stretch = _stretched(problem, law_and_trajectory(path, *pieces), over)
+    problem = PathProblem(joints, tuple(further), corners(path), (ends[0], ends[1]))
+    solution, rounds, lost = _refined_solution(problem)
+    solution, tightened = _tightened_solution(solution)
+    grid, pieces, excess = solution.grid, solution.pieces, float(solution.excess.max())
+    del solution  # the rows of a long path are large
+    law, trajectory, stretch = _stretched(problem, pieces, excess)
     stops = problem.stops
     stop_times = law.breaks[np.searchsorted(grid, stops)]
     return TimeOptimalMotion(trajectory, law, stretch, tightened, rounds, grid, lost, stops, stop_times)
 
 
+@frozen
+class PathProblem:
+    """A path and its limits.
+
+    Attributes:
+        joints: The path, and the limits of the joints.
+        further: Other constraints.
+        stops: Where the motion must stop, s, shape (k,).
+        ends: sd at the start and at the end; infinite for any.
+    """
+
+    joints: JointConstraint
+    further: tuple[PathConstraint, ...]
+    stops: Array
+    ends: tuple[float, float]
+
+    @property
+    def constraints(self) -> tuple[PathConstraint, ...]:
+        """All that limits the motion."""
+        return (self.joints, *self.further)
+
+    @property
+    def rests(self) -> bool:
+        """Whether it starts and ends at rest, so that it may be stretched."""
+        return all(end in (0.0, np.inf) for end in self.ends)
+
+    @property
+    def with_ramps(self) -> bool:
+        """Whether sdd may change within an interval."""
+        return self.joints.path.degree <= _LARGEST_DEGREE
+
+    def excess(self, pieces: LawPieces) -> Array:
+        """Return the largest excess over all constraints in each piece of a law, shape (2, N)."""
+        return np.asarray(np.maximum.reduce([each.excess(pieces) for each in self.constraints]))
+
+
+@frozen
+class GridSolution:
+    """A solution on a grid of N intervals.
+
+    Attributes:
+        problem: What it solves.
+        collocated: The constraints at its grid points.
+        intervals: The rows that it obeys.
+        speeds: sd^2 at its grid points.
+        pieces: Of its law s(t).
+        excess: Of the constraints in each interval, shape (2, N).
+    """
+
+    problem: PathProblem
+    collocated: CollocatedConstraints
+    intervals: CollocationRows
+    speeds: Speeds
+    pieces: LawPieces
+    excess: Array
+
+    @property
+    def grid(self) -> Array:
+        """Its grid points, shape (N + 1,)."""
+        return self.intervals.grid
+
+    @property
+    def x(self) -> Array:
+        """sd^2 at its grid points, shape (N + 1,)."""
+        return self.speeds.x
+
+    @property
+    def lost(self) -> Array:
+        """Estimate of the time lost in each interval, the time to keep exceeded limits included, (N,)."""
+        durations, over = self.pieces.durations, np.clip(self.excess - 1.0, 0.0, 1.0)
+        lost = time_lost(self.intervals, self.x, self.speeds.mvc, durations)
+        return np.asarray(lost + durations * np.maximum(over[0], 0.5 * over[1]))
+
+    def tightened(self, factors: Array, *, new_ramps: bool) -> GridSolution:
+        """Return the solution with limits divided by factors.
+
+        Args:
+            factors: Of velocity and acceleration in each interval, shape (2, N).
+            new_ramps: Whether to find the sdd ramps anew.
+
+        Raises:
+            UnreachableSpeedError: When the speeds at the ends are too high for these limits.
+        """
+        problem, constraints, grid = self.problem, self.collocated, self.grid
+        if new_ramps and problem.with_ramps:
+            calm = self.excess.max(axis=0) <= _WILD  # elsewhere sdd changes by more than the limits follow
+            wanted = np.where(calm, wanted_ramps(self.intervals, self.x), 0.0)
+            rows = constraints.intervals(wanted, distances_at_mean_speed(grid, self.x, wanted))
+            rows = rows.tightened(*np.where(calm, factors, 1.0))
+            with suppress(UnreachableSpeedError):  # then there may be one with the ramps as they are
+                return _judged(problem, constraints, rows, solve(rows, *problem.ends))
+        rows, changed = self.intervals.tightened(*factors), (factors != 1.0).any(axis=0)
+        mvc = maximum_velocity_curve(rows, self.speeds.mvc, changed)
+        few = changed.mean() < _FEW_CHANGED
+        speeds = solve_locally(rows, self.speeds, changed, mvc) if few else None
+        return _judged(problem, constraints, rows, speeds or solve(rows, *problem.ends, mvc), self)
+
+
+def _judged(
+    problem: PathProblem,
+    constraints: CollocatedConstraints,
+    rows: CollocationRows,
+    speeds: Speeds,
+    before: GridSolution | None = None,
+) -> GridSolution:
+    """Return the solution with its law and the excess of that.
+
+    Args:
+        problem: What it solves.
+        constraints: At its grid points.
+        rows: That it obeys.
+        speeds: sd^2 at its grid points.
+        before: A solution with the same sdd ramps.
+    """
+    pieces = law_pieces(rows.grid, speeds.x, feasible_ramps(rows.grid, speeds.x, rows.ramps))
+    if before is None:
+        excess = problem.excess(pieces)
+    else:
+        excess, differs = before.excess.copy(), before.x != speeds.x
+        chosen = np.flatnonzero(differs[:-1] | differs[1:])
+        excess[:, chosen] = problem.excess(pieces.chosen(chosen))
+    return GridSolution(problem, constraints, rows, speeds, pieces, excess)
+
+
+def _solution_on_grid(problem: PathProblem, grid: Array, ramps: Array, distances: Array) -> GridSolution:
+    """Return the solution on a grid.
+
+    Args:
+        problem: What to solve.
+        grid: Grid points, shape (N + 1,).
+        ramps: sdd ramps to begin with, shape (N,).
+        distances: How far the mean of both speeds leads in each interval, shape (N,).
+
+    Raises:
+        UnreachableSpeedError: When there is no motion with the speeds at the ends.
+        UnlimitedSpeedError: When nothing limits the motion somewhere.
+    """
+    constraints = collocated(grid, problem.constraints, problem.stops)
+    rows = constraints.intervals(ramps, distances)
+    speeds = solve(rows, *problem.ends)
+    if problem.with_ramps:
+        wanted = wanted_ramps(rows, speeds.x)
+        rows = constraints.intervals(wanted, distances_at_mean_speed(grid, speeds.x, wanted))
+        try:
+            speeds = solve(rows, *problem.ends)
+        except UnreachableSpeedError:  # with such ramps there is none
+            rows = constraints.intervals(ramps, distances)
+    return _judged(problem, constraints, rows, speeds)
+
+
 def _refined_solution(problem: PathProblem) -> tuple[GridSolution, int, float]:
     """Return the solution on a fine enough grid, how often it was refined, and what is lost."""
-    grid, most = first_grid(problem.path), most_intervals(problem.path)
-    swing, way = np.zeros(grid.size - 1), np.diff(grid)
+    path = problem.joints.path
+    grid, most = first_grid(path), most_intervals(path)
+    ramps, distances = np.zeros(grid.size - 1), np.diff(grid)
     for rounds in range(_ROUNDS + 1):
         try:
-            found = solution_on_grid(problem, grid, swing, way)
+            solution = _solution_on_grid(problem, grid, ramps, distances)
         except UnreachableSpeedError:  # a finer grid has room for a little more
             if rounds >= _TRIES or 2 * grid.size > most:
                 raise
             grid = halved(grid)
-            swing, way = np.zeros(grid.size - 1), np.diff(grid)
+            ramps, distances = np.zeros(grid.size - 1), np.diff(grid)
             continue
-        parts, share = _parts(found, most - grid.size + 1)
+        parts, share = _parts(solution, most - grid.size + 1)
         if rounds == _ROUNDS or (parts == 1).all():
             break
-        finer = refined(grid, found.x, parts)
-        swing, way = interpolated_ramps(grid, finer, found.intervals.swing, found.intervals.way)
-        grid = finer
-    return found, rounds, share
+        grid = refined(grid, solution.x, parts)
+        ramps, distances = interpolated_ramps(solution.intervals, grid)
+    return solution, rounds, share
 
 
-def _parts(found: GridSolution, room: int) -> tuple[NDArray[np.intp], float]:
+def _parts(solution: GridSolution, room: int) -> tuple[NDArray[np.intp], float]:
     """Return into how many parts to cut each interval, and the share of the duration that is lost."""
-    lost, lasting, straight = found.lost, found.law[0], found.intervals.straight
-    duration, bent = float(lasting.sum()), np.where(straight, 0.0, lost)
+    lost, durations, straight = solution.lost, solution.pieces.durations, solution.intervals.straight
+    duration, bent = float(durations.sum()), np.where(straight, 0.0, lost)
     share = float(lost.sum()) / duration
     parts = np.ones(lost.size, dtype=np.intp)
     if share > _LOST and room > _FEW_NEW * lost.size:
         parts = parts_for(bent, _AIM * duration, room)
-    switching = straight & (lost > _SWITCHING * lasting)
+    switching = straight & (lost > _SWITCHING * durations)
     settled = lost[switching].sum() <= _SETTLED * bent.sum()
     if not settled and (parts - 1).sum() + switching.sum() <= room:
         parts[switching] = 2
     return parts, share
 
 
-def _tightened_solution(found: GridSolution) -> tuple[GridSolution, int]:
-    """Return the solution with limits lowered in intervals that pass them, and in how many.
+def _tightened_solution(solution: GridSolution) -> tuple[GridSolution, int]:
+    """Return the solution with limits lowered in intervals that exceed them, and in how many.
 
     A little more than the excess is taken off the limits in such an interval. The solution around it then
-    moves, so that it takes a few turns, in which more and more is taken off the last ones; where the motion
+    moves, so that it takes a few rounds, in which more and more is taken off the last ones; where the motion
     may be stretched, what is left after these is left to that.
     """
-    tightened = np.zeros(found.x.size - 1, dtype=bool)
-    for turn in range(_TIGHTENINGS if found.problem.rests else _MOST_TIGHTENINGS):
-        passed = found.over > 1.0 + _EXACT
-        if not passed.any():
+    tightened = np.zeros(solution.x.size - 1, dtype=bool)
+    for turn in range(_TIGHTENINGS if solution.problem.rests else _MOST_TIGHTENINGS):
+        exceeded = solution.excess > 1.0 + _EXACT
+        if not exceeded.any():
             break
-        tightened |= passed.any(axis=0)
+        tightened |= exceeded.any(axis=0)
         lowered = _LOWERED[min(turn, len(_LOWERED) - 1)]
-        factors = 1.0 + lowered * np.where(passed, found.over - 1.0, 0.0)
-        found = found.tightened(factors, swing=turn == 0)
-    return found, int(tightened.sum())
+        factors = 1.0 + lowered * np.where(exceeded, solution.excess - 1.0, 0.0)
+        solution = solution.tightened(factors, new_ramps=turn == 0)
+    return solution, int(tightened.sum())
 
 
 def _stretched(
-    problem: PathProblem, curves: tuple[PiecewisePolynomial, PiecewisePolynomial], over: float
+    problem: PathProblem, pieces: LawPieces, excess: float
 ) -> tuple[PiecewisePolynomial, PiecewisePolynomial, float]:
-    """Return law and trajectory, as much slower as the exact peaks ask for, and by what factor.
+    """Return law and trajectory, as much slower as the peaks ask for, and by what factor.
 
     Args:
         problem: What was solved.
-        curves: Law and trajectory.
-        over: A bound of what they use of the limits.
+        pieces: Of the law.
+        excess: A bound of what they use of the limits.
     """
-    law, trajectory = curves
-    if over <= 1.0 + _EXACT:
+    law, trajectory = law_and_trajectory(problem.joints.path, pieces)
+    if excess <= 1.0 + _EXACT:
         return law, trajectory, 1.0
-    factors = []
-    for peak, bounds, root in zip(peaks(trajectory, (1, 2)), problem.bounds, (1.0, 0.5), strict=True):
-        used = np.maximum(peak.high / bounds[:, 1], peak.low / bounds[:, 0])
-        times = np.where(peak.high / bounds[:, 1] > peak.low / bounds[:, 0], peak.high_time, peak.low_time)
-        factors.append((float(used.max()) ** root, float(used.max()), float(times[used.argmax()])))
-    stretch, worst, time = max(factors)
+    worst = [*_exact_peaks(problem.joints, trajectory), *_sampled_peaks(problem.further, pieces, law)]
+    stretch, used, time = max(worst)
     if stretch <= 1.0 + _EXACT:
         return law, trajectory, 1.0
     if not problem.rests:
-        raise UnsettledSpeedError(float(law.evaluate(time)[0]), worst)
+        raise UnsettledSpeedError(float(law.evaluate(time)[0]), used)
     return scale_time(law, stretch), scale_time(trajectory, stretch), stretch
+
+
+def _exact_peaks(
+    joints: JointConstraint, trajectory: PiecewisePolynomial
+) -> Iterator[tuple[float, float, float]]:
+    """Yield for velocity and acceleration (factor of time to keep them, share of the limit, when)."""
+    bounds = joints.velocity, joints.acceleration
+    for peak, limits, root in zip(peaks(trajectory, (1, 2)), bounds, (1.0, 0.5), strict=True):
+        high, low = peak.high / limits[:, 1], peak.low / limits[:, 0]
+        used, times = np.maximum(high, low), np.where(high > low, peak.high_time, peak.low_time)
+        yield float(used.max()) ** root, float(used.max()), float(times[used.argmax()])
+
+
+def _sampled_peaks(
+    constraints: Sequence[PathConstraint], pieces: LawPieces, law: PiecewisePolynomial
+) -> Iterator[tuple[float, float, float]]:
+    """Yield the same from the excess of constraints, each at the middle of an interval."""
+    for constraint in constraints:
+        for used, root in zip(constraint.excess(pieces), (1.0, 0.5), strict=True):
+            k = int(used.argmax())
+            yield float(used[k]) ** root, float(used[k]), float(law.breaks[k : k + 2].mean())

@@ -1,17 +1,17 @@
-"""The largest sd^2 at every place of a grid: one scan backward for what is controllable, one forward.
+"""Backward and forward pass over a grid: the controllable sets of sd^2, and the fastest motion within them.
 
 The states (x, y) at both ends of an interval that its rows P x + R y <= C allow form a convex polygon that
 holds (0, 0), so from x one can get to rest exactly when x <= beta, for some beta. Rows with P > 0 > R bound x
-by something that grows with y; the others matter only through the polygon's largest x, the ceiling. Hence
+by something that grows with y; the others matter only through the polygon's largest x, which makes the
+maximum velocity curve (mvc). Hence
 
-    beta_i = min(ceiling_i, min over rows with P > 0 > R of (C - R beta_{i+1}) / P)
+    beta_i = min(mvc_i, min over rows with P > 0 > R of (C - R beta_{i+1}) / P)
 
-and forward y = min(beta_{i+1}, min over rows with R > 0 of (C - P x) / R): all but the two scans is done for
-all intervals at once.
+and forward y = min(beta_{i+1}, min over rows with R > 0 of (C - P x) / R): all but these two recurrences
+is done for all intervals at once. Where few intervals got lower limits, they are solved again around these
+only.
 
-Source: Pham and Pham (2018), algorithm 1; the affine form of the scans is our own.
-
-A solution found again where few intervals got lower limits: the scans are repeated around these only.
+Source: Pham and Pham (2018), algorithm 1; the affine form of the recurrences is our own.
 """
 
 from __future__ import annotations
@@ -26,13 +26,15 @@ from trajcli.curves.time_optimal.recurrence import solve_recurrence
 from trajcli.frozen import frozen
 
 _SAME = 1e-12
+_RADII = (32, 128)  # intervals to either side of changed ones that are solved again with them
+_MOST = 0.5  # of all intervals: more are not worth being solved apart
 
 
 class UnreachableSpeedError(ValueError):
     """A path velocity at an end is more than the limits allow.
 
     Attributes:
-        s: Place on the path.
+        s: Path parameter.
         speed: The path velocity asked for.
         allowed: The largest one that there is a motion for.
     """
@@ -49,7 +51,7 @@ class UnlimitedSpeedError(ValueError):
     """Nothing limits the motion somewhere, so that no motion is the fastest.
 
     Attributes:
-        s: Place on the path.
+        s: Path parameter.
     """
 
     def __init__(self, s: float) -> None:
@@ -60,58 +62,22 @@ class UnlimitedSpeedError(ValueError):
 
 
 @frozen
-class Controllable:
-    """The sets [lower, upper] of x from which the end can be reached, each of shape (N + 1,).
-
-    Attributes:
-        lower: Zero unless the end is passed at a speed.
-        upper: At most the ceiling.
-        ceiling: Largest x at each place that its two intervals have room for, the maximum velocity curve.
-    """
-
-    lower: Array
-    upper: Array
-    ceiling: Array
-
-
-def controllable(
-    intervals: CollocationRows, end_velocity: float = 0.0, ceiling: Array | None = None
-) -> Controllable:
-    """Return the controllable sets.
-
-    Args:
-        intervals: N of them.
-        end_velocity: sd at the end, not negative; infinite for any.
-        ceiling: As from `ceilings`, where it is known.
-    """
-    P, R, C = intervals.P[:, ::-1], intervals.R[:, ::-1], intervals.C[:, ::-1]
-    ceiling = maximum_velocity_curve(intervals) if ceiling is None else ceiling
-    limits = ceiling[::-1].copy()
-    limits[0] = min(limits[0], end_velocity**2)
-    upper = solve_recurrence(R, P, C, (P > 0) & (R < 0), limits)[::-1]
-    lower = np.zeros_like(upper)
-    if np.isfinite(end_velocity):
-        lower[-1] = end_velocity**2
-    return Controllable(_lower(intervals, lower, upper) if lower[-1] > 0 else lower, upper, ceiling)
-
-
-@frozen
 class Speeds:
     """The fastest motion over a grid of N intervals, each of shape (N + 1,).
 
     Attributes:
-        x: sd^2 at each place.
+        x: sd^2 at each grid point.
         upper: The largest x from which the end can be reached.
-        ceiling: The largest x that its two intervals have room for.
+        mvc: The largest x that its two intervals have room for.
     """
 
     x: Array
     upper: Array
-    ceiling: Array
+    mvc: Array
 
 
 def solve(
-    intervals: CollocationRows, start_velocity: float, end_velocity: float, ceiling: Array | None = None
+    intervals: CollocationRows, start_velocity: float, end_velocity: float, mvc: Array | None = None
 ) -> Speeds:
     """Return the fastest motion.
 
@@ -119,13 +85,13 @@ def solve(
         intervals: N of them.
         start_velocity: sd at the start, not negative; infinite for the largest possible.
         end_velocity: sd at the end likewise.
-        ceiling: As from `ceilings`, where it is known.
+        mvc: As from `maximum_velocity_curve`, where it is known.
 
     Raises:
         UnreachableSpeedError: When there is no motion with these velocities.
         UnlimitedSpeedError: When some x is not bounded.
     """
-    sets = controllable(intervals, end_velocity, ceiling)
+    sets = controllable(intervals, end_velocity, mvc)
     first = min(start_velocity**2, float(sets.upper[0]))
     grid = intervals.grid
     if np.isfinite(start_velocity) and first < start_velocity**2 * (1.0 - _SAME):
@@ -134,10 +100,68 @@ def solve(
     if not np.isfinite(x).all():
         raise UnlimitedSpeedError(float(grid[int(np.argmin(np.isfinite(x)))]))
     if first < sets.lower[0] * (1.0 - _SAME):
-        free = controllable(intervals, np.inf, sets.ceiling)
+        free = controllable(intervals, np.inf, sets.mvc)
         allowed = float(np.sqrt(_forward(intervals, first, free.upper)[-1]))
         raise UnreachableSpeedError("end", float(grid[-1]), end_velocity, allowed)
-    return Speeds(x, sets.upper, sets.ceiling)
+    return Speeds(x, sets.upper, sets.mvc)
+
+
+def solve_locally(
+    intervals: CollocationRows, before: Speeds, changed: NDArray[np.bool_], mvc: Array
+) -> Speeds | None:
+    """Return the fastest motion where few rows changed, or None where it changes far away, too.
+
+    Args:
+        intervals: N of them.
+        before: The motion without the changes.
+        changed: Which intervals have lower limits than before, shape (N,).
+        mvc: As from `maximum_velocity_curve`.
+    """
+    speeds = Speeds(before.x.copy(), before.upper.copy(), mvc)
+    for radius in _RADII:
+        around = _Neighbourhoods(intervals, changed, radius)
+        if around.points.size > _MOST * changed.size:
+            break
+        around.solve(before, speeds)
+        if around.unchanged_at_border(before, speeds):
+            return speeds
+    return None
+
+
+@frozen
+class Controllable:
+    """The sets [lower, upper] of x from which the end can be reached, each of shape (N + 1,).
+
+    Attributes:
+        lower: Zero unless the end is passed at a speed.
+        upper: At most the maximum velocity curve.
+        mvc: Maximum velocity curve: the largest x at each grid point that its two intervals have room for.
+    """
+
+    lower: Array
+    upper: Array
+    mvc: Array
+
+
+def controllable(
+    intervals: CollocationRows, end_velocity: float = 0.0, mvc: Array | None = None
+) -> Controllable:
+    """Return the controllable sets.
+
+    Args:
+        intervals: N of them.
+        end_velocity: sd at the end, not negative; infinite for any.
+        mvc: As from `maximum_velocity_curve`, where it is known.
+    """
+    P, R, C = intervals.P[:, ::-1], intervals.R[:, ::-1], intervals.C[:, ::-1]
+    mvc = maximum_velocity_curve(intervals) if mvc is None else mvc
+    limits = mvc[::-1].copy()
+    limits[0] = min(limits[0], end_velocity**2)
+    upper = solve_recurrence(R, P, C, (P > 0) & (R < 0), limits)[::-1]
+    lower = np.zeros_like(upper)
+    if np.isfinite(end_velocity):
+        lower[-1] = end_velocity**2
+    return Controllable(_lower(intervals, lower, upper) if lower[-1] > 0 else lower, upper, mvc)
 
 
 def _forward(intervals: CollocationRows, first: float, upper: Array) -> Array:
@@ -147,7 +171,7 @@ def _forward(intervals: CollocationRows, first: float, upper: Array) -> Array:
 
 
 def _lower(intervals: CollocationRows, lower: Array, upper: Array) -> Array:
-    """Return the lower ends of the controllable sets; infinite before the place where there is none left."""
+    """Return the lower ends of the controllable sets; infinite before the grid point where none is left."""
     P, R, C = intervals.P.T, intervals.R.T, intervals.C.T
     fastest = np.minimum(
         largest_in_intervals(intervals.R, intervals.P, intervals.C, intervals.cap[1:]), upper[1:]
@@ -165,65 +189,36 @@ def _lower(intervals: CollocationRows, lower: Array, upper: Array) -> Array:
     return lower
 
 
-_REACHES = (32, 128)  # intervals to either side of changed ones that are solved again with them
-_MOST = 0.5  # of all intervals: more are not worth being told apart
-
-
-def solve_locally(
-    intervals: CollocationRows, before: Speeds, changed: NDArray[np.bool_], ceiling: Array
-) -> Speeds | None:
-    """Return the fastest motion where few rows are others than before, or None where that is felt far away.
-
-    Args:
-        intervals: N of them.
-        before: The motion without the changes.
-        changed: Which intervals have lower limits than before, shape (N,).
-        ceiling: As from `ceilings`.
-    """
-    found = Speeds(before.x.copy(), before.upper.copy(), ceiling)
-    for reach in _REACHES:
-        around = _Neighbourhoods(intervals, changed, reach)
-        if around.places.size > _MOST * changed.size:
-            break
-        around.solve(before, found)
-        if around.meets(before, found):
-            return found
-    return None
-
-
 class _Neighbourhoods:
     """The surroundings of changed intervals, one after the other, with a gap between them."""
 
-    def __init__(self, intervals: CollocationRows, changed: NDArray[np.bool_], reach: int) -> None:
+    def __init__(self, intervals: CollocationRows, changed: NDArray[np.bool_], radius: int) -> None:
         rows = np.flatnonzero(changed)
         steps = np.zeros(changed.size + 1, dtype=np.intp)
-        np.add.at(steps, np.maximum(rows - reach, 0), 1)
-        np.add.at(steps, np.minimum(rows + reach + 1, changed.size), -1)
+        np.add.at(steps, np.maximum(rows - radius, 0), 1)
+        np.add.at(steps, np.minimum(rows + radius + 1, changed.size), -1)
         inside = np.cumsum(steps) > 0  # the last one, after the last interval, is not
-        self.places = np.flatnonzero(inside | np.append(False, inside[:-1]))
-        self.within = inside[self.places[:-1]]
+        self.points = np.flatnonzero(inside | np.append(False, inside[:-1]))
+        self.within = inside[self.points[:-1]]
         self.begins = np.append(True, ~self.within)
         self.ends = np.append(~self.within, True)
-        chosen = self.places[:-1]
+        chosen = self.points[:-1]
         self.P, self.R, self.C = (rows[:, chosen] for rows in (intervals.P, intervals.R, intervals.C))
 
-    def solve(self, before: Speeds, found: Speeds) -> None:
-        """Write into `found` what `before` becomes here, if it stays the same at the border."""
-        P, R, C, places, within = self.P, self.R, self.C, self.places, self.within
-        limits = np.where(
-            self.ends, np.minimum(before.upper[places], found.ceiling[places]), found.ceiling[places]
-        )
+    def solve(self, before: Speeds, speeds: Speeds) -> None:
+        """Write into `speeds` what `before` becomes here, if it stays the same at the border."""
+        P, R, C, points, within = self.P, self.R, self.C, self.points, self.within
+        limits = np.where(self.ends, np.minimum(before.upper[points], speeds.mvc[points]), speeds.mvc[points])
         chosen = (P > 0) & (R < 0) & within
         upper = solve_recurrence(R[:, ::-1], P[:, ::-1], C[:, ::-1], chosen[:, ::-1], limits[::-1])[::-1]
-        found.upper[places] = upper
-        limits = np.where(self.begins, np.minimum(before.x[places], upper), upper)
-        found.x[places] = solve_recurrence(P, R, C, (R > 0) & within, limits)
+        speeds.upper[points] = upper
+        limits = np.where(self.begins, np.minimum(before.x[points], upper), upper)
+        speeds.x[points] = solve_recurrence(P, R, C, (R > 0) & within, limits)
 
-    def meets(self, before: Speeds, found: Speeds) -> bool:
+    def unchanged_at_border(self, before: Speeds, speeds: Speeds) -> bool:
         """Return whether nothing changes at the border."""
-        begins, ends = self.places[self.begins], self.places[self.ends]
-        same = np.array_equal(found.x[ends], before.x[ends]) and np.array_equal(
-            found.x[begins], before.x[begins]
-        )
+        begins, ends = self.points[self.begins], self.points[self.ends]
+        same = np.array_equal(speeds.x[ends], before.x[ends])
+        same = same and np.array_equal(speeds.x[begins], before.x[begins])
         begins = begins[begins > 0]
-        return same and np.array_equal(found.upper[begins], before.upper[begins])
+        return same and np.array_equal(speeds.upper[begins], before.upper[begins])

@@ -1,8 +1,8 @@
-"""z_{i+1} = min(limit_{i+1}, the least of some lines at z_i), from one end of a grid to the other.
+"""Recurrence z_{i+1} = min(limit_{i+1}, least of some lines at z_i), from one end of a grid to the other.
 
 Few intervals are followed one by one, with the lines that may be lowest. Many are cut into chunks that
 advance abreast, each from a guess of its first z; where a guess was wrong they advance once more, until they
-meet what was found before. Both do the same arithmetic, and agree to the last bit.
+meet the values of the time before. Both do the same arithmetic, and agree to the last bit.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def solve_recurrence(P: Array, R: Array, C: Array, chosen: NDArray[np.bool_], li
 
 def _one_by_one(slopes: Array, offsets: Array, limits: Array, z: float) -> list[float]:
     """Return what z becomes in each interval: the least of its limit and of offset - slope z."""
-    slopes, offsets, found = slopes.T, offsets.T, []
+    slopes, offsets, values = slopes.T, offsets.T, []
     main, further = _lowest_lines(offsets, offsets - slopes * np.minimum(limits[:-1, None], HUGE))
     rows = np.arange(main.size)
     lines = zip(slopes[further].tolist(), offsets[further].tolist(), strict=True)
@@ -62,8 +62,8 @@ def _one_by_one(slopes: Array, offsets: Array, limits: Array, z: float) -> list[
             if value < lowest:
                 lowest = value
         z = lowest if lowest > 0.0 else 0.0  # zero is always allowed: what is below is rounding
-        found.append(z)
-    return found
+        values.append(z)
+    return values
 
 
 def _lowest_lines(first: Array, last: Array) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
@@ -88,12 +88,12 @@ def _abreast(slopes: Array, offsets: Array, limits: Array, z: float) -> Array:
     slopes, offsets = _side_by_side(slopes, length, 0.0), _side_by_side(offsets, length, np.inf)
     tops = _side_by_side(limits[None, 1:], length, np.inf)[:, 0]
     begins = np.append(z, tops[-1, :-1])
-    found = np.full_like(tops, np.nan)
+    values = np.full_like(tops, np.nan)
     while True:
-        _advance(slopes, offsets, tops, found, begins)
-        if np.array_equal(begins[1:], found[-1, :-1]):
-            return found.T.reshape(-1)[:count]
-        begins[1:] = found[-1, :-1]
+        _advance(slopes, offsets, tops, values, begins)
+        if np.array_equal(begins[1:], values[-1, :-1]):
+            return values.T.reshape(-1)[:count]
+        begins[1:] = values[-1, :-1]
 
 
 def _side_by_side(values: Array, length: int, filling: float) -> Array:
@@ -105,13 +105,13 @@ def _side_by_side(values: Array, length: int, filling: float) -> Array:
     return np.ascontiguousarray(filled.reshape(m, chunks, length).transpose(2, 0, 1))
 
 
-def _advance(slopes: Array, offsets: Array, tops: Array, found: Array, begins: Array) -> None:
-    """Write into `found` (length, chunks) what z becomes, until all chunks meet what stands there."""
+def _advance(slopes: Array, offsets: Array, tops: Array, values: Array, begins: Array) -> None:
+    """Write into `values` (length, chunks) what z becomes, until all chunks meet what stands there."""
     z = begins
     with np.errstate(invalid="ignore"):  # of an unlimited z a line without slope says nothing
-        for step in range(len(found)):
+        for step in range(len(values)):
             lowest = np.fmin.reduce(offsets[step] - slopes[step] * z, axis=0)
             z = np.maximum(np.fmin(lowest, tops[step]), 0.0)
-            if (z == found[step]).all():
+            if (z == values[step]).all():
                 return
-            found[step] = z
+            values[step] = z

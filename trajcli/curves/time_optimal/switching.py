@@ -1,4 +1,4 @@
-"""The switching structure of a motion: which limit of which joint binds when."""
+"""Switching structure of a time-optimal motion: which limit of which joint binds when."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _STAYS = 0.01  # by which another limit must be nearer before it takes over
 
 @comparable
 class Binding:
-    """A stretch of time in which one limit binds.
+    """An interval of time in which one limit binds.
 
     Attributes:
         start: s.
@@ -37,7 +37,7 @@ class Binding:
 def switching_structure(
     trajectory: PiecewisePolynomial, velocity: ArrayLike, acceleration: ArrayLike
 ) -> list[Binding]:
-    """Return the stretches in which a limit binds, in order; where none is named, the motion switches.
+    """Return the intervals of time in which a limit binds; where none is named, the motion switches.
 
     Of several limits that bind the one that already did is named, else the one that is nearest.
 
@@ -48,13 +48,13 @@ def switching_structure(
     """
     used = np.concatenate([_used(trajectory, 1, velocity), _used(trajectory, 2, acceleration)], axis=1)
     labels = _labels(used)
-    found, times, n = [], trajectory.breaks, trajectory.dimension
+    bindings, times, n = [], trajectory.breaks, trajectory.dimension
     for label, group in groupby(range(trajectory.pieces), labels.__getitem__):
         pieces = list(group)
         if label < 0:
             continue
         side, joint = divmod(label, n)
-        found.append(
+        bindings.append(
             Binding(
                 float(times[pieces[0]]),
                 float(times[pieces[-1] + 1]),
@@ -63,7 +63,7 @@ def switching_structure(
                 1 if side % 2 == 0 else -1,
             )
         )
-    return found
+    return bindings
 
 
 def _used(trajectory: PiecewisePolynomial, order: int, bounds: ArrayLike) -> Array:

@@ -1,4 +1,4 @@
-"""Circular arcs and helices by arc length, found from what a user knows about them.
+"""Circular arcs and helices by arc length, from three points, or from center, axis and angle.
 
 p(f) = start - r (1 - cos f) x + r sin f y + (pitch / 2 pi) f z, with z the axis, x from the center to the
 start, y = z cross x and f the angle. One radian is sqrt(r^2 + (pitch / 2 pi)^2) of arc length.
@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from trajcli.errors import Amount, InputError, PlanningError, Problem
 from trajcli.frozen import frozen
 from trajcli.geometry.paths.position import (
-    SAME_PLACE,
+    SAME_POINT,
     Side,
     Smooth,
     Triple,
@@ -46,7 +46,7 @@ class Arc(Smooth):
         center: Shape (3,), m, in the plane of the start that the axis is perpendicular to.
         axis: Unit vector (3,).
         angle: Rad, right-handed about the axis, of either sign.
-        pitch: Way along the axis for a whole turn of positive angle, m, of either sign.
+        pitch: Distance along the axis for a whole turn of positive angle, m, of either sign.
         moved: How far the center that was given has been moved to fit, m.
 
     Raises:
@@ -67,7 +67,7 @@ class Arc(Smooth):
         axis = direction(self.axis)
         along = float((start - center) @ axis)
         radius = float(np.linalg.norm(start - center - along * axis))
-        if radius <= SAME_PLACE:
+        if radius <= SAME_POINT:
             text = "an arc needs a radius: the start lies {radius} from the axis through {center}"
             raise InputError(
                 Problem(text, amounts={"radius": shown_length(radius), "center": shown_position(center)})
@@ -76,7 +76,7 @@ class Arc(Smooth):
             raise _oblique_axis(start, center, axis, along)
         if not (np.isfinite(self.angle) and np.isfinite(self.pitch)):
             raise InputError(f"angle and pitch of an arc must be finite: {self.angle}, {self.pitch}")
-        if abs(self.angle) * radius <= SAME_PLACE:
+        if abs(self.angle) * radius <= SAME_POINT:
             amounts = {"angle": Amount(float(self.angle), 0, None, "angle")}
             raise InputError(Problem("an arc by an angle of {angle} has no length", amounts=amounts))
         for name, value in {
@@ -101,7 +101,7 @@ class Arc(Smooth):
             ("via and target", b, c),
             ("start and target", a, c),
         ):
-            if np.linalg.norm(one - other) <= SAME_PLACE:
+            if np.linalg.norm(one - other) <= SAME_POINT:
                 raise _coincident(name, one)
         normal = np.cross(b - a, c - b)
         sine = float(np.linalg.norm(normal) / (np.linalg.norm(b - a) * np.linalg.norm(c - b)))
@@ -118,14 +118,14 @@ class Arc(Smooth):
     ) -> Arc:
         """Return the arc about `center` from `start` to `target`, each (3,), m.
 
-        A center that typed digits put out of place is moved to the nearest one that fits; `moved` says how
-        far.
+        A center that typed digits put beside its line is moved to the nearest one that fits; `moved` says
+        how far.
 
         Args:
             start: Where it starts.
             center: As far from the start as from the target.
             target: Where it ends.
-            axis: The arc goes right-handed about it, by less than a turn; without it the shorter way.
+            axis: The arc goes right-handed about it, by less than a turn; without it the shorter one.
 
         Raises:
             InputError: When points coincide, or at half a turn without an axis.
@@ -135,16 +135,16 @@ class Arc(Smooth):
         chord = b - a
         distance = float(np.linalg.norm(chord))
         for name, one, other in (("start and center", a, c), ("center and target", c, b)):
-            if np.linalg.norm(one - other) <= SAME_PLACE:
+            if np.linalg.norm(one - other) <= SAME_POINT:
                 raise _coincident(name, one)
-        if distance <= SAME_PLACE:
+        if distance <= SAME_POINT:
             raise _coincident("start and target", a)
         unit = chord / distance
         aside = float((c - (a + b) / 2.0) @ unit)
         middle = c - aside * unit
         if abs(aside) > LOOSE * np.linalg.norm(a - middle):
             raise _not_equidistant(a, c, b, middle)
-        z = _shorter_way(a - middle, b - middle) if axis is None else _across(axis, unit, distance)
+        z = _shorter_axis(a - middle, b - middle) if axis is None else _across(axis, unit, distance)
         foot = middle + ((a - middle) @ z) * z  # where the constructor, too, will move the center
         return cls(a, middle, z, _turned(a - foot, b - foot, z), moved=abs(aside))
 
@@ -170,6 +170,7 @@ class Arc(Smooth):
 
     @cached_property
     def _frame(self) -> tuple[Array, Array]:
+        """Unit vectors x and y in the plane, x towards the start."""
         x = (self.start - self.center) / self.radius
         return x, np.cross(self.axis, x)
 
@@ -179,19 +180,19 @@ class Arc(Smooth):
         return float(np.copysign(1.0 / self._metres, self.angle))
 
     def evaluate(self, s: Array, side: Side = "right") -> Triple:
-        """Return p, p', p'' as `PlaceCurve` says; both sides are the same."""
+        """Return p, p', p'' as `PositionCurve` says; both sides are the same."""
         x, y = self._frame
         f = self._rate * inside(s, self.length)[:, None]
         cosine, sine = np.cos(f), np.sin(f)
         versine = 2.0 * np.sin(f / 2.0) ** 2  # 1 - cos f would lose the digits of a flat arc
         climb = self.pitch / _TURN * self.axis
-        places = self.start + self.radius * (sine * y - versine * x) + f * climb
+        positions = self.start + self.radius * (sine * y - versine * x) + f * climb
         first = self._rate * (self.radius * (cosine * y - sine * x) + climb)
         second = -(self._rate**2) * self.radius * (cosine * x + sine * y)
-        return places, first, second
+        return positions, first, second
 
     def transport(self, s: Array, side: Side = "right") -> Triple:
-        """Return Q, w', w'' as `PlaceCurve` says: a rotation about the axis, of a helix too."""
+        """Return Q, w', w'' as `PositionCurve` says: a rotation about the axis, of a helix too."""
         values = inside(s, self.length)
         rate = self._rate * self.axis
         return exp(values[:, None] * rate), np.tile(rate, (values.size, 1)), np.zeros((values.size, 3))
@@ -215,7 +216,8 @@ def _turned(first: Array, last: Array, axis: Array) -> float:
     return float(np.arctan2(axis @ np.cross(first, last), first @ last) % _TURN)
 
 
-def _shorter_way(first: Array, last: Array) -> Array:
+def _shorter_axis(first: Array, last: Array) -> Array:
+    """Return the axis of the shorter arc from one radius to the other."""
     normal = np.cross(first, last)
     if np.arctan2(np.linalg.norm(normal), first @ last) >= np.pi - HALF_TURN:
         raise InputError(
@@ -227,7 +229,7 @@ def _shorter_way(first: Array, last: Array) -> Array:
 
 
 def _across(axis: ArrayLike, chord: Array, distance: float) -> Array:
-    """Return the axis made perpendicular to the unit `chord`, if it nearly is."""
+    """Return the axis perpendicular to the unit `chord`, if it nearly is."""
     given = direction(axis)
     slope = float(given @ chord)
     if abs(slope) > LOOSE:
@@ -278,6 +280,6 @@ def _not_equidistant(start: Array, center: Array, target: Array, right: Array) -
         f"circle about it (it may be {LOOSE:g} of the radius out of place, it is {{off}})"
     )
     ends = {"near": start, "far": target, "off": right}
-    amounts = {name: shown_length(float(np.linalg.norm(place - center))) for name, place in ends.items()}
+    amounts = {name: shown_length(float(np.linalg.norm(end - center))) for name, end in ends.items()}
     amounts |= {"center": shown_position(center), "right": shown_position(right)}
     return PlanningError(Problem(text, "the nearest center that fits is {right}", amounts=amounts))

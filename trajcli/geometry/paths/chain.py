@@ -1,4 +1,4 @@
-"""Several curves joined to one of one arc length, their corners stopped at or rounded."""
+"""Composite paths: curves joined to one of one arc length, their corners stopped at or rounded."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from trajcli.geometry.paths.corner import (
 )
 from trajcli.geometry.paths.orientation import SegmentProgress
 from trajcli.geometry.paths.position import (
-    SAME_PLACE,
+    SAME_POINT,
     PartOfCurve,
     PositionCurve,
     Side,
@@ -42,12 +42,12 @@ _NOTHING = 1e-12  # of a segment, which is rounding where two blends meet
 
 @frozen
 class Corner:
-    """What became of the corner between two segments.
+    """A corner between two segments, as it is in the path.
 
     Attributes:
         kind: "smooth": direction and curvature go on, nothing to do; "bend": the direction goes on and the
             curvature jumps; "stop": the direction jumps, a law must stop there; "rounded".
-        place: Arc length of the chain, m; of a rounded corner the middle of the blend.
+        s: Arc length of the chain, m; of a rounded corner the middle of the blend.
         point: Shape (3,), m, where the two segments meet.
         turn: Rad.
         asked: Radius, m.
@@ -57,7 +57,7 @@ class Corner:
     """
 
     kind: CornerKind
-    place: float
+    s: float
     point: Array
     turn: float
     asked: float
@@ -71,8 +71,8 @@ class Chain:
 
     Attributes:
         segments: As they were given, k of them.
-        corners: What became of the corners between them, k - 1.
-        parts: What the chain consists of: stretches of the segments, and blends.
+        corners: Between them, k - 1.
+        parts: What the chain consists of: parts of the segments, and blends.
         borders: Shape (k + 1,), m: where segments begin and end, in the middle of a blend where there is one.
         half_widths: Shape (k - 1,), m: half the length of each blend; the used radius of smooth corners; else
             0.
@@ -102,7 +102,7 @@ class Chain:
     @property
     def stops(self) -> Array:
         """Arc lengths of the corners at which a law must stop, m."""
-        return np.array([corner.place for corner in self.corners if corner.kind == "stop"])
+        return np.array([corner.s for corner in self.corners if corner.kind == "stop"])
 
     @property
     def progress(self) -> SegmentProgress:
@@ -110,11 +110,11 @@ class Chain:
         return SegmentProgress(self.borders, self.half_widths)
 
     def evaluate(self, s: Array, side: Side = "right") -> Triple:
-        """Return p, p', p'' as `PlaceCurve` says."""
-        return self._by_part(s, side, lambda k, places: self.parts[k].evaluate(places, side))
+        """Return p, p', p'' as `PositionCurve` says."""
+        return self._by_part(s, side, lambda k, local: self.parts[k].evaluate(local, side))
 
     def transport(self, s: Array, side: Side = "right") -> Triple:
-        """Return Q, w', w'' as `PlaceCurve` says.
+        """Return Q, w', w'' as `PositionCurve` says.
 
         In a corner that is not rounded Q jumps by the shortest rotation.
 
@@ -122,8 +122,8 @@ class Chain:
             PlanningError: When the path turns back in such a corner: then no rotation is the shortest.
         """
 
-        def turned(k: int, places: Array) -> Triple:
-            rotation, rate, change = self.parts[k].transport(places, side)
+        def turned(k: int, local: Array) -> Triple:
+            rotation, rate, change = self.parts[k].transport(local, side)
             before = self._turned_before[k]
             # the rate in world axes is that of the part: its turning starts from the attitude there
             return rotation @ before, rate, change
@@ -141,38 +141,41 @@ class Chain:
         return result
 
     def _shortest(self, k: int, first: Array, last: Array) -> Array:
+        """Return the shortest rotation from one direction to another, after part k."""
         angle = angle_between(first, last)
         if angle > np.pi - REVERSAL:
             text = (
-                f"at s = {{place}} the path turns back by {np.degrees(angle):.6g} deg: "
+                f"at s = {{s}} the path turns back by {np.degrees(angle):.6g} deg: "
                 "about which axis a tool that keeps its attitude to the path should follow is not determined"
             )
             hint = "orientation: axis_angle or fixed; or a path without a reversal"
-            raise PlanningError(Problem(text, hint, amounts={"place": shown_length(self.offsets[k + 1])}))
+            raise PlanningError(Problem(text, hint, amounts={"s": shown_length(self.offsets[k + 1])}))
         axis = np.cross(first, last)
         sine = float(np.linalg.norm(axis))
         return exp(axis * (angle / sine)) if sine > 0.0 else np.eye(3)
 
     def _by_part(self, s: Array, side: Side, values: Callable[[int, Array], Triple]) -> Triple:
-        places = inside(s, self.length)
-        part = np.searchsorted(self.breaks, places, side)
+        """Return the values at s (N,), asked of each part by its index and its own arc lengths."""
+        s = inside(s, self.length)
+        part = np.searchsorted(self.breaks, s, side)
         here = np.flatnonzero(np.bincount(part)) if part.size else part
         if here.size <= 1:
             only = int(here[0]) if here.size else 0
-            return values(only, self._local(only, places))
+            return values(only, self._local(only, s))
         order = np.argsort(part, kind="stable")
         ends = np.cumsum(np.bincount(part))[here]
-        found = []
+        by_part = []
         for k, rows in zip(here.tolist(), np.split(order, ends[:-1]), strict=True):
-            found.append((rows, values(k, self._local(k, places[rows]))))
-        result = tuple(np.empty((places.size, *row.shape[1:])) for row in found[0][1])
-        for rows, triple in found:
+            by_part.append((rows, values(k, self._local(k, s[rows]))))
+        result = tuple(np.empty((s.size, *row.shape[1:])) for row in by_part[0][1])
+        for rows, triple in by_part:
             for column, row in zip(result, triple, strict=True):
                 column[rows] = row
         return result[0], result[1], result[2]
 
-    def _local(self, part: int, places: Array) -> Array:
-        local: Array = np.clip(places - self.offsets[part], 0.0, self.parts[part].length)
+    def _local(self, part: int, s: Array) -> Array:
+        """Return the arc lengths of a part."""
+        local: Array = np.clip(s - self.offsets[part], 0.0, self.parts[part].length)
         return local
 
 
@@ -212,16 +215,17 @@ def join(segments: Sequence[PositionCurve], radii: ArrayLike = 0.0) -> Chain:
         [blend.length / 2.0 if blend else fade for blend, fade in zip(blends, faded, strict=True)]
     )
     offsets = _offsets(parts)
-    places = offsets[joints] + np.where(np.array(cut) > 0.0, half, 0.0)
+    middles = offsets[joints] + np.where(np.array(cut) > 0.0, half, 0.0)
     corners = [
-        _corner(pair, blends[i], kinds[i], float(places[i]), asked[i], cut[i] + faded[i])
+        _corner(pair, blends[i], kinds[i], float(middles[i]), asked[i], cut[i] + faded[i])
         for i, pair in enumerate(pairwise(segments))
     ]
-    borders = np.concatenate([[0.0], places, offsets[-1:]])
+    borders = np.concatenate([[0.0], middles, offsets[-1:]])
     return Chain(tuple(segments), tuple(corners), tuple(parts), borders, half)
 
 
 def _offsets(parts: Sequence[PositionCurve]) -> Array:
+    """Return where each part begins, and the end, m."""
     return np.concatenate([[0.0], np.cumsum([part.length for part in parts])])
 
 
@@ -229,17 +233,19 @@ def _corner(
     pair: tuple[PositionCurve, PositionCurve],
     blend: Blend | None,
     kind: CornerKind,
-    place: float,
+    s: float,
     asked: float,
     used: float,
 ) -> Corner:
+    """Return the corner of a pair of segments."""
     where, turn = pair[1].evaluate(np.zeros(1))[0][0], turn_between(*pair)
     if blend is None:
-        return Corner(kind, place, where, turn, asked, used, 0.0)
-    return Corner("rounded", place, where, turn, asked, used, blend.distance(where))
+        return Corner(kind, s, where, turn, asked, used, 0.0)
+    return Corner("rounded", s, where, turn, asked, used, blend.distance(where))
 
 
 def _blend(index: int, before: PositionCurve, after: PositionCurve, radius: float) -> Blend | None:
+    """Return the blend in a corner; none for the radius 0."""
     if radius == 0.0:
         return None
     try:
@@ -252,11 +258,12 @@ def _blend(index: int, before: PositionCurve, after: PositionCurve, radius: floa
 
 
 def _check_joints(segments: Sequence[PositionCurve]) -> None:
+    """Raise InputError where a segment does not start where the one before ends."""
     for i, (before, after) in enumerate(pairwise(segments)):
         end = before.evaluate(np.array([before.length]), "left")[0][0]
         start = after.evaluate(np.zeros(1))[0][0]
         gap = float(np.linalg.norm(start - end))
-        if gap > SAME_PLACE:
+        if gap > SAME_POINT:
             text = (
                 f"segment {i + 2} of the path starts at {{start}}, {{gap}} from {{end}}, "
                 f"where segment {i + 1} ends (allowed is {{most}})"
@@ -265,6 +272,6 @@ def _check_joints(segments: Sequence[PositionCurve]) -> None:
                 "start": shown_position(start),
                 "gap": shown_length(gap),
                 "end": shown_position(end),
-                "most": shown_length(SAME_PLACE),
+                "most": shown_length(SAME_POINT),
             }
             raise InputError(Problem(text, amounts=amounts))

@@ -1,4 +1,4 @@
-"""Rounding the corner between two curves: a blend that is continuous in position, direction and curvature.
+"""Rounding of corners between curves: blends with continuous curvature, and the radii that there is room for.
 
 The blend is the quintic r(u), u from 0 to 1, with r' = v T and r'' = v^2 K at both ends, T the direction and
 K the curvature vector of the neighbour. Every speed v > 0 gives the same tangent and curvature there; the one
@@ -6,16 +6,12 @@ is taken whose largest curvature is smallest, so that the blend can be gone thro
 curvature is then at most 1.2 times that of the circular arc with the same ends.
 
 Source: Farin, Curves and Surfaces for CAGD (2002), chapter 11 (geometric continuity).
-
-Corner radii: where there is something to round, and what fits into the segments between corners.
-
-Arc length of a polynomial curve: a table by Gauss quadrature, and its inverse by Newton's method.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache, cached_property
+from functools import cached_property
 from itertools import pairwise
 from typing import Literal
 
@@ -24,9 +20,9 @@ from numpy.typing import ArrayLike
 
 from trajcli.errors import InputError, PlanningError, Problem
 from trajcli.frozen import frozen
-from trajcli.geometry.paths.frame_transport import FrameTransport
+from trajcli.geometry.paths.arc_length import ArcLength, FrameTransport, derivative, values
 from trajcli.geometry.paths.position import (
-    SAME_PLACE,
+    SAME_POINT,
     PositionCurve,
     Side,
     Smooth,
@@ -37,107 +33,6 @@ from trajcli.geometry.paths.position import (
 )
 from trajcli.geometry.rotation import Array
 
-_NODES = 8  # of Gauss on each panel
-_PANELS = 8  # to begin with
-_EXACT = 1e-15  # of the length, to which a panel must agree with its halves
-_NEAR = 1e-8  # a Newton step as short as this leaves its square, which is rounding
-_NEWTON_STEPS = 40  # halvings or Newton steps, far more than any curve with r' != 0 takes
-
-
-def derivative(coefficients: Array) -> Array:
-    """Return the coefficients (degree, 3) of the derivative, highest power first."""
-    degree = coefficients.shape[0] - 1
-    return coefficients[:-1] * np.arange(degree, 0, -1.0)[:, None]
-
-
-def values(coefficients: Array, u: Array) -> Array:
-    """Return the polynomial (*u.shape, 3) with the coefficients (degree + 1, 3), highest power first."""
-    result = np.empty((*u.shape, coefficients.shape[1]))
-    for i, column in enumerate(coefficients.T):
-        result[..., i] = _value(column, u)
-    return result
-
-
-def _value(coefficients: Array, u: Array) -> Array:
-    """Return the polynomial (*u.shape,) with the coefficients (degree + 1,), highest power first."""
-    result = np.full(u.shape, coefficients[0])
-    for value in coefficients[1:]:
-        result *= u
-        result += value
-    return result
-
-
-@cache
-def _gauss() -> tuple[Array, Array]:
-    """Return nodes and weights on [0, 1]."""
-    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
-    return (nodes + 1.0) / 2.0, weights / 2.0
-
-
-@frozen
-class ArcLength:
-    """Arc length of a polynomial curve r(u), u from 0 to 1, with r' nowhere zero.
-
-    Attributes:
-        coefficients: Of r, shape (degree + 1, 3), m, highest power first.
-    """
-
-    coefficients: Array
-
-    @cached_property
-    def _slope(self) -> Array:
-        return derivative(self.coefficients)
-
-    @cached_property
-    def knots(self) -> Array:
-        """Ends of panels (k + 1,) in u, each so short that the quadrature is exact to rounding."""
-        knots = np.linspace(0.0, 1.0, _PANELS + 1)
-        for _ in range(_NEWTON_STEPS):
-            low, high = knots[:-1], knots[1:]
-            middle = (low + high) / 2.0
-            whole = self._between(low, high)
-            rough = np.abs(whole - self._between(low, middle) - self._between(middle, high))
-            if not (rough > _EXACT * whole.sum()).any():
-                break
-            knots = np.sort(np.concatenate([knots, middle[rough > _EXACT * whole.sum()]]))
-        return knots
-
-    @cached_property
-    def lengths(self) -> Array:
-        """Arc length (k + 1,), m, from the start to each knot."""
-        return np.concatenate([[0.0], np.cumsum(self._between(self.knots[:-1], self.knots[1:]))])
-
-    def parameter(self, s: Array) -> Array:
-        """Return u (N,) at the arc lengths s (N,), m."""
-        panel = np.clip(np.searchsorted(self.lengths, s, "right") - 1, 0, self.knots.size - 2)
-        low, high = self.knots[panel], self.knots[panel + 1]
-        way, whole = s - self.lengths[panel], self.lengths[panel + 1] - self.lengths[panel]
-        # begin with the cubic that has the slopes du/ds of both ends of the panel
-        part = way / whole
-        first, last = (whole / self._speeds[k] for k in (panel, panel + 1))
-        u = low + part * first
-        u += part**2 * (3.0 * (high - low) - 2.0 * first - last + part * (first + last - 2.0 * (high - low)))
-        for _ in range(_NEWTON_STEPS):
-            step = (self._between(low, u) - way) / self._speed(u)
-            u = np.clip(u - step, low, high)
-            if not (np.abs(step) > _NEAR).any():
-                break
-        return u
-
-    @cached_property
-    def _speeds(self) -> Array:
-        return self._speed(self.knots)
-
-    def _speed(self, u: Array) -> Array:
-        square = sum(_value(column, u) ** 2 for column in self._slope.T)
-        return np.asarray(np.sqrt(square))
-
-    def _between(self, low: Array, high: Array) -> Array:
-        nodes, weights = _gauss()
-        width = (high - low)[..., None]
-        return np.asarray((self._speed(low[..., None] + width * nodes) * width) @ weights)
-
-
 SAME_DIRECTION = 1e-10  # rad, a turn below which the step in joint velocity is rounding
 SAME_CURVATURE = 1e-9  # of the larger of two curvatures
 REVERSAL = np.radians(1.0)  # from half a turn, nearer to which a blend would be a spike
@@ -147,6 +42,9 @@ _SPEEDS, _ROUNDS = 24, 3  # tried in each round, the next one between the neighb
 _TRIED = np.linspace(0.0, 1.0, 97)
 _TIE = 1e-9  # relative, so that rounding does not choose between two speeds
 _FINER = 16  # steps of the parallel transport on each panel of the arc length: exact to 1e-13 rad
+
+
+CornerKind = Literal["smooth", "bend", "stop", "rounded"]
 
 
 @frozen
@@ -169,7 +67,7 @@ class Blend(Smooth):
         return float(self._arc.lengths[-1])
 
     def evaluate(self, s: Array, side: Side = "right") -> Triple:
-        """Return p, p', p'' as `PlaceCurve` says; both sides are the same."""
+        """Return p, p', p'' as `PositionCurve` says; both sides are the same."""
         u = self._arc.parameter(inside(s, self.length))
         slope, bend = self._derivatives(u)[:2]
         speed = np.linalg.norm(slope, axis=-1, keepdims=True)
@@ -178,7 +76,7 @@ class Blend(Smooth):
         return values(self.coefficients, u), first, across / speed**2
 
     def transport(self, s: Array, side: Side = "right") -> Triple:
-        """Return Q, w', w'' as `PlaceCurve` says: w' = p' x p'', the rate that does not roll about p'."""
+        """Return Q, w', w'' as `PositionCurve` says: w' = p' x p'', the rate that does not roll about p'."""
         u = self._arc.parameter(inside(s, self.length))
         slope, bend, third = self._derivatives(u)
         square = np.einsum("ni,ni->n", slope, slope)[:, None]
@@ -208,16 +106,90 @@ class Blend(Smooth):
         first, second, third = (values(row, u) for row in self._slopes)
         return first, second, third
 
-    def distance(self, place: Array) -> float:
+    def distance(self, point: Array) -> float:
         """Return how near the curve comes to a point (3,), m."""
         apart, slope = self.coefficients.copy(), self._slopes[0]
-        apart[-1] -= place
-        # of the squared distance, the roots of half its derivative (r - place) . r'
+        apart[-1] -= point
+        # of the squared distance, the roots of half its derivative (r - point) . r'
         condition = sum(np.convolve(apart[:, i], slope[:, i]) for i in range(3))
         roots = np.roots(np.asarray(condition))
         inner = roots.real[np.abs(roots.imag) <= _TIE]
         candidates = np.concatenate([[0.0, 1.0], np.clip(inner, 0.0, 1.0)])
         return float(np.linalg.norm(values(apart, candidates), axis=-1).min())
+
+
+def round_corner(before: PositionCurve, after: PositionCurve, radius: float) -> Blend:
+    """Return the blend from `radius` before the corner of two curves to `radius` after it.
+
+    Args:
+        before: Ends in the corner.
+        after: Starts there.
+        radius: m of arc length, on each side.
+
+    Raises:
+        InputError: When the radius is not positive or too large for the curves.
+        PlanningError: When the path turns back.
+    """
+    room = room_for_radius(before, after)
+    if not 0.0 < radius <= room:
+        raise InputError(f"a corner radius of {radius:.6g} m does not fit: it must be in (0, {room:.6g}] m")
+    turn = turn_between(before, after)
+    if turn > np.pi - REVERSAL:
+        raise PlanningError(
+            f"the path turns back by {np.degrees(turn):.6g} deg: such a corner cannot be rounded (the "
+            f"largest is {np.degrees(np.pi - REVERSAL):.6g} deg)",
+            hint="stop there instead: `corner: stop`",
+        )
+    first = before.evaluate(np.array([before.length - radius]), "right")
+    last = after.evaluate(np.array([radius]), "left")
+    return Blend(_gentlest([row[0] for row in first], [row[0] for row in last], radius))
+
+
+def sharp_kind(before: PositionCurve, after: PositionCurve) -> CornerKind:
+    """Return what a corner is as long as nothing is rounded."""
+    if turn_between(before, after) > SAME_DIRECTION:
+        return "stop"
+    return "bend" if curvature_jumps(before, after) else "smooth"
+
+
+def asked_radii(radii: ArrayLike, corners: int) -> list[float]:
+    """Return a radius for each corner, m.
+
+    Raises:
+        InputError: When the number is wrong, or one is neither 0 nor positive.
+    """
+    given = np.asarray(radii, dtype=np.float64)
+    if given.ndim and given.shape != (corners,):
+        raise InputError(f"the path has {corners} corners, there are {given.size} radii", hint="one for each")
+    wrong = given[~(np.isfinite(given) & ((given == 0.0) | (given > SAME_POINT)))]
+    if wrong.size:
+        text = "a corner radius must be 0 (stop there) or more than {least}, it is {given}"
+        amounts = {"least": shown_length(SAME_POINT), "given": shown_length(wrong[0])}
+        raise InputError(Problem(text, amounts=amounts))
+    return [float(radius) for radius in np.broadcast_to(given, (corners,))]
+
+
+def fitting_radii(
+    segments: Sequence[PositionCurve], kinds: Sequence[CornerKind], asked: Sequence[float]
+) -> tuple[list[float], list[float]]:
+    """Return the radii, m, that fit where there is something to round, and those that fit where there is not.
+
+    Neighbours share a segment that is too short, one that needs less than half leaves the rest to the other;
+    a corner that goes on smoothly, over which only a rotation is to fade into the next one, gets what is
+    left.
+
+    Args:
+        segments: k of them.
+        kinds: Of the k - 1 corners.
+        asked: Their radii, m.
+    """
+    wanted = [
+        0.0 if kind == "smooth" or radius == 0.0 else min(radius, room_for_radius(*pair))
+        for radius, kind, pair in zip(asked, kinds, pairwise(segments), strict=True)
+    ]
+    cut = _fitting(segments, wanted, [0.0] * len(asked))
+    rest = [radius if kind == "smooth" else 0.0 for radius, kind in zip(asked, kinds, strict=True)]
+    return cut, _fitting(segments, rest, cut)
 
 
 def room_for_radius(before: PositionCurve, after: PositionCurve) -> float:
@@ -251,33 +223,6 @@ def curvature_jumps(before: PositionCurve, after: PositionCurve) -> bool:
     return float(np.linalg.norm(one - other)) > SAME_CURVATURE * larger
 
 
-def round_corner(before: PositionCurve, after: PositionCurve, radius: float) -> Blend:
-    """Return the blend from `radius` before the corner of two curves to `radius` after it.
-
-    Args:
-        before: Ends in the corner.
-        after: Starts there.
-        radius: m of arc length, on each side.
-
-    Raises:
-        InputError: When the radius is not positive or too large for the curves.
-        PlanningError: When the path turns back.
-    """
-    room = room_for_radius(before, after)
-    if not 0.0 < radius <= room:
-        raise InputError(f"a corner radius of {radius:.6g} m does not fit: it must be in (0, {room:.6g}] m")
-    turn = turn_between(before, after)
-    if turn > np.pi - REVERSAL:
-        raise PlanningError(
-            f"the path turns back by {np.degrees(turn):.6g} deg: such a corner cannot be rounded (the "
-            f"largest is {np.degrees(np.pi - REVERSAL):.6g} deg)",
-            hint="stop there instead: `corner: stop`",
-        )
-    first = before.evaluate(np.array([before.length - radius]), "right")
-    last = after.evaluate(np.array([radius]), "left")
-    return Blend(_gentlest([row[0] for row in first], [row[0] for row in last], radius))
-
-
 def _gentlest(first: list[Array], last: list[Array], radius: float) -> Array:
     """Return the coefficients (6, 3) of the quintic whose largest curvature is smallest."""
     low, high = _SLOWEST, _FASTEST
@@ -291,10 +236,10 @@ def _gentlest(first: list[Array], last: list[Array], radius: float) -> Array:
 
 
 def _quintics(first: list[Array], last: list[Array], speed: Array) -> Array:
-    """Return the coefficients (6, k, 3) for place, direction and curvature at both ends and k end speeds."""
+    """Return the coefficients (6, k, 3) for position, direction, curvature at both ends and k end speeds."""
     v = speed[:, None]
     start, slope, bend = np.broadcast_to(first[0], (v.size, 3)), v * first[1], v**2 * first[2]
-    place, end_slope, end_bend = (
+    across, end_slope, end_bend = (
         last[0] - start - slope - bend / 2.0,
         v * last[1] - slope - bend,
         v**2 * last[2],
@@ -302,9 +247,9 @@ def _quintics(first: list[Array], last: list[Array], speed: Array) -> Array:
     end_bend = end_bend - bend
     return np.array(
         [
-            6.0 * place - 3.0 * end_slope + end_bend / 2.0,
-            -15.0 * place + 7.0 * end_slope - end_bend,
-            10.0 * place - 4.0 * end_slope + end_bend / 2.0,
+            6.0 * across - 3.0 * end_slope + end_bend / 2.0,
+            -15.0 * across + 7.0 * end_slope - end_bend,
+            10.0 * across - 4.0 * end_slope + end_bend / 2.0,
             bend / 2.0,
             slope,
             start,
@@ -313,7 +258,7 @@ def _quintics(first: list[Array], last: list[Array], speed: Array) -> Array:
 
 
 def _largest_curvature(rows: Array) -> Array:
-    """Return the largest curvature (k,), 1/m, of curves with coefficients (6, k, 3), at 97 places."""
+    """Return the largest curvature (k,), 1/m, of curves with coefficients (6, k, 3), at 97 points."""
     powers = _TRIED[:, None] ** np.arange(5.0, -1.0, -1.0)
     slope = np.einsum("up,pki->uki", powers[:, 1:] * np.arange(5.0, 0.0, -1.0), rows[:-1])
     bend = np.einsum("up,pki->uki", powers[:, 2:] * np.array([20.0, 12.0, 6.0, 2.0]), rows[:-2])
@@ -322,56 +267,6 @@ def _largest_curvature(rows: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         curvature: Array = np.where(speed > 0.0, across / speed**3, np.inf)
     return np.asarray(curvature.max(axis=0))
-
-
-CornerKind = Literal["smooth", "bend", "stop", "rounded"]
-
-
-def sharp_kind(before: PositionCurve, after: PositionCurve) -> CornerKind:
-    """Return what a corner is as long as nothing is rounded."""
-    if turn_between(before, after) > SAME_DIRECTION:
-        return "stop"
-    return "bend" if curvature_jumps(before, after) else "smooth"
-
-
-def asked_radii(radii: ArrayLike, corners: int) -> list[float]:
-    """Return a radius for each corner, m.
-
-    Raises:
-        InputError: When the number is wrong, or one is neither 0 nor positive.
-    """
-    given = np.asarray(radii, dtype=np.float64)
-    if given.ndim and given.shape != (corners,):
-        raise InputError(f"the path has {corners} corners, there are {given.size} radii", hint="one for each")
-    wrong = given[~(np.isfinite(given) & ((given == 0.0) | (given > SAME_PLACE)))]
-    if wrong.size:
-        text = "a corner radius must be 0 (stop there) or more than {least}, it is {given}"
-        amounts = {"least": shown_length(SAME_PLACE), "given": shown_length(wrong[0])}
-        raise InputError(Problem(text, amounts=amounts))
-    return [float(radius) for radius in np.broadcast_to(given, (corners,))]
-
-
-def fitting_radii(
-    segments: Sequence[PositionCurve], kinds: Sequence[CornerKind], asked: Sequence[float]
-) -> tuple[list[float], list[float]]:
-    """Return the radii, m, that fit where there is something to round, and those that fit where there is not.
-
-    Neighbours share a segment that is too short, one that needs less than half leaves the rest to the other;
-    a corner that goes on smoothly, over which only a rotation is to fade into the next one, gets what is
-    left.
-
-    Args:
-        segments: k of them.
-        kinds: Of the k - 1 corners.
-        asked: Their radii, m.
-    """
-    wanted = [
-        0.0 if kind == "smooth" or radius == 0.0 else min(radius, room_for_radius(*pair))
-        for radius, kind, pair in zip(asked, kinds, pairwise(segments), strict=True)
-    ]
-    cut = _fitting(segments, wanted, [0.0] * len(asked))
-    rest = [radius if kind == "smooth" else 0.0 for radius, kind in zip(asked, kinds, strict=True)]
-    return cut, _fitting(segments, rest, cut)
 
 
 def _fitting(
@@ -386,5 +281,5 @@ def _fitting(
             for segment, other in ((segments[i], i), (segments[i + 1], i + 2))
         ]
         fits = min(radius, *free)
-        result.append(fits if fits > SAME_PLACE else 0.0)
+        result.append(fits if fits > SAME_POINT else 0.0)
     return result

@@ -1,4 +1,4 @@
-"""Orientation whose three angles change evenly: component by component, not the shortest rotation.
+"""Interpolation of Euler angles: each angle changes evenly, which is not the shortest rotation.
 
 Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning and Control (2009), section
 4.3.3.
@@ -30,8 +30,8 @@ class EulerInterpolation:
     Through a rounded corner of a chain the rates fade from those of one segment into those of the next one.
 
     Attributes:
-        angles: Shape (k + 1, 3), rad, at the borders of the k segments; whole turns between neighbours are
-            made.
+        angles: Shape (k + 1, 3), rad, at the borders of the k segments; the path makes whole turns
+            between neighbours.
         progress: How far each segment is done.
         sequence: Such as "ZYZ".
         frame: Whether the axes move along.
@@ -60,7 +60,7 @@ class EulerInterpolation:
         frame: Frame = "current",
         length: float | None = None,
     ) -> EulerInterpolation:
-        """Return the way from one triple (3,), rad, to another.
+        """Return the interpolation from one triple (3,), rad, to another.
 
         Args:
             start: At s = 0.
@@ -130,7 +130,7 @@ def euler_interpolation(
     frame: Frame = "current",
     typed: Sequence[ArrayLike | None] | None = None,
 ) -> EulerInterpolation:
-    """Return the way through orientations, the angles of those that were not typed read from their matrices.
+    """Return the interpolation of orientations, angles that were not typed read from their matrices.
 
     Each is read as the triple, with the whole turns, that is nearest to its neighbour's, beginning at the
     last typed one, or at the last of all, nearest to zero. At gimbal lock the first angle (on fixed axes the

@@ -1,11 +1,9 @@
-"""Orientation along a path, as a function of the path's arc length.
+"""Orientation along a path by its arc length: fixed, about fixed axes, or with the tangent.
 
-How far each segment of a path is done, by the path's arc length: smoothly through rounded corners.
-
-Segment i goes from border i to border i+1, and its fraction from 0 to 1 with slope 1/length. Through a
-rounded corner, from h before its border to h after it, the slope of the segment behind falls to zero as 1 - S
-and that of the one ahead rises as S, with S = 3x^2 - 2x^3: the fractions are twice continuously
-differentiable there.
+A rotation along a segment follows the fraction of the segment that is done. Segment i goes from border i to
+border i+1, and its fraction from 0 to 1 with slope 1/length. Through a rounded corner, from h before its
+border to h after it, the slope of the segment behind falls to zero as 1 - S and that of the one ahead rises
+as S, with S = 3x^2 - 2x^3: the fractions are twice continuously differentiable there.
 """
 
 from __future__ import annotations
@@ -22,98 +20,6 @@ from trajcli.geometry.paths.position import PositionCurve, Side, Smooth, Triple,
 from trajcli.geometry.rotation import Array, Flags, axis_angle_from_matrix, check_rotation, exp
 
 _ROUNDING = 1e-12  # of the length, by which two blends that meet may be apart
-
-
-class SegmentFractions(NamedTuple):
-    """The two neighbouring segments that are under way at each place.
-
-    Attributes:
-        segment: Index (N,) of the first one; those before it are done, those after the second not begun.
-        value: Shape (2, N).
-        slope: Shape (2, N), 1/m.
-        bend: Shape (2, N), 1/m^2.
-    """
-
-    segment: NDArray[np.intp]
-    value: Array
-    slope: Array
-    bend: Array
-
-
-@frozen
-class SegmentProgress:
-    """The fractions done of the k segments of a path.
-
-    Attributes:
-        borders: Shape (k + 1,), m, from 0 to the path's length.
-        half_widths: Shape (k - 1,), m: half the length of the blend at each inner border, 0 where there is
-            none.
-    """
-
-    borders: Array
-    half_widths: Array
-
-    @classmethod
-    def even(cls, length: float) -> SegmentProgress:
-        """Return the progress of one segment from 0 to `length`."""
-        return cls(np.array([0.0, length]), np.empty(0))
-
-    @property
-    def length(self) -> float:
-        """Length of the path."""
-        return float(self.borders[-1])
-
-    @property
-    def segments(self) -> int:
-        """Number k of segments."""
-        return self.borders.size - 1
-
-    @property
-    def breaks(self) -> Array:
-        """Inner places, increasing, where a derivative of a fraction jumps."""
-        inner, room = self.borders[1:-1], _ROUNDING * self.length
-        places = np.sort(np.concatenate([inner - self.half_widths, inner, inner + self.half_widths]))
-        places = places[(places > room) & (places < self.length - room)]  # a blend may begin at an end
-        return np.asarray(places[np.diff(places, prepend=-np.inf) > room])
-
-    def at(self, s: Array, side: Side = "right") -> SegmentFractions:
-        """Return the fractions at s (N,).
-
-        Raises:
-            ValueError: When a place lies outside the path.
-        """
-        places = inside(s, self.length)
-        inner, widths = self.borders[1:-1], self.half_widths
-        # within a segment, from which place on its end is the border to look at
-        turns = (inner[:-1] + widths[:-1] + inner[1:] - widths[1:]) / 2.0
-        lengths = np.where(
-            np.diff(self.borders) > 0.0, np.diff(self.borders), 1.0
-        )  # or it stays at its start
-        if self.segments == 1:  # a neighbour that never begins
-            inner, widths, lengths = np.array([np.inf]), np.zeros(1), np.append(lengths, 1.0)
-        segment = np.searchsorted(turns, places, side)
-        value, slope, bend = _ramp(places, inner[segment], widths[segment], side)
-        first, second = lengths[segment], lengths[segment + 1]
-        behind = (places - self.borders[segment] - value) / first
-        return SegmentFractions(
-            segment,
-            np.array([behind, value / second]),
-            np.array([(1.0 - slope) / first, slope / second]),
-            np.array([-bend / first, bend / second]),
-        )
-
-
-def _ramp(s: Array, border: Array, width: Array, side: Side) -> tuple[Array, Array, Array]:
-    """Return a function of slope 0 before border - width and 1 after border + width, and two derivatives."""
-    after = s > border if side == "left" else s >= border
-    sharp = width == 0.0
-    whole = np.where(sharp, 1.0, 2.0 * width)
-    x = np.clip((s - np.where(sharp, 0.0, border - width)) / whole, 0.0, 1.0)
-    value = np.where(sharp | (x >= 1.0), np.maximum(s - border, 0.0), whole * x**3 * (1.0 - x / 2.0))
-    slope = np.where(sharp, after, x * x * (3.0 - 2.0 * x))
-    return value, slope, np.where(sharp, 0.0, 6.0 * x * (1.0 - x) / whole)
-
-
 _RATE_JUMP = 1e-9  # of the larger of two rates
 _RATE_NOISE = 1e-10  # rad/m, what remains of the difference of two orientations that are meant to be the same
 _NOISE = 1e-9  # a component of an axis as small as this says nothing by its sign
@@ -123,8 +29,8 @@ class OrientationCurve(Protocol):
     """A rotation R(s), s from 0 to `length`.
 
     Attributes:
-        length: How far s goes: m, or rad where the place rests.
-        breaks: Inner places (k,), increasing, where a derivative may jump.
+        length: How far s goes: m, or rad where the position is fixed.
+        breaks: Inner s (k,), increasing, where a derivative may jump.
         stops: Those of them where the rate w' jumps, or R: a law must stop there.
         jumps: Those of them where R jumps: the tool must turn there, or the path be refused.
     """
@@ -189,8 +95,8 @@ class AxisAngleOrientation:
 
     Over a chain the rotation goes evenly along each segment; through a rounded corner one rotation fades into
     the next one: R = R_i exp(g v) exp(h w), with v and w the rotation vectors of the two segments and g and h
-    their fractions done. Half a turn has two shortest ways; the one is taken whose axis has its first
-    component positive that is not zero.
+    their fractions done. Of the two shortest rotations for half a turn that one is taken whose axis has its
+    first component positive that is not zero.
 
     Attributes:
         rotations: Shape (k + 1, 3, 3), at the borders of the k segments.
@@ -210,7 +116,7 @@ class AxisAngleOrientation:
 
     @classmethod
     def between(cls, start: Array, end: Array, length: float | None = None) -> AxisAngleOrientation:
-        """Return the way from one orientation to another, each (3, 3).
+        """Return the rotation from one orientation to another, each (3, 3).
 
         Args:
             start: At s = 0.
@@ -251,12 +157,6 @@ class AxisAngleOrientation:
         """Angles (k,), rad."""
         return np.asarray(np.linalg.norm(self.vectors, axis=-1))
 
-    @property
-    def half_turns(self) -> Flags:
-        """Segments (k,) of half a turn, for which the opposite axis would do as well."""
-        read = axis_angle_from_matrix(np.swapaxes(self.rotations[:-1], -1, -2) @ self.rotations[1:])
-        return read.sign_free
-
     def evaluate(self, s: Array, side: Side = "right") -> Triple:
         """Return R, w', w'' as `OrientationCurve` says."""
         if self.progress.segments == 1:
@@ -288,11 +188,11 @@ class TangentOrientation:
     direction and does not roll about it.
 
     Attributes:
-        place: The path.
+        path: The position curve.
         start: Orientation (3, 3) at its start.
     """
 
-    place: PositionCurve
+    path: PositionCurve
     start: Array
 
     def __post_init__(self) -> None:
@@ -301,31 +201,121 @@ class TangentOrientation:
     @property
     def length(self) -> float:
         """Length of the path, m."""
-        return self.place.length
+        return self.path.length
 
     @property
     def breaks(self) -> Array:
         """Breaks of the path."""
-        return self.place.breaks
+        return self.path.breaks
 
     @property
     def stops(self) -> Array:
         """Where the direction jumps, or the curvature, with which the rate jumps."""
-        places = self.place.breaks
-        if not places.size:
-            return places
-        left, right = self.place.transport(places, "left")[1], self.place.transport(places, "right")[1]
-        return np.array(sorted({*places[_differ(left, right)].tolist(), *self.jumps.tolist()}))
+        breaks = self.path.breaks
+        if not breaks.size:
+            return breaks
+        left, right = self.path.transport(breaks, "left")[1], self.path.transport(breaks, "right")[1]
+        return np.array(sorted({*breaks[_differ(left, right)].tolist(), *self.jumps.tolist()}))
 
     @property
     def jumps(self) -> Array:
         """Corners of the path: there the tool would have to turn by the corner's angle in no time."""
-        return self.place.stops
+        return self.path.stops
 
     def evaluate(self, s: Array, side: Side = "right") -> Triple:
         """Return R, w', w'' as `OrientationCurve` says."""
-        rotation, rate, change = self.place.transport(s, side)
+        rotation, rate, change = self.path.transport(s, side)
         return rotation @ self.start, rate, change
+
+
+class SegmentFractions(NamedTuple):
+    """Fractions of the two neighbouring segments that matter at each s.
+
+    Attributes:
+        segment: Index (N,) of the first one; those before it are done, those after the second not begun.
+        value: Shape (2, N).
+        slope: Shape (2, N), 1/m.
+        bend: Shape (2, N), 1/m^2.
+    """
+
+    segment: NDArray[np.intp]
+    value: Array
+    slope: Array
+    bend: Array
+
+
+@frozen
+class SegmentProgress:
+    """The fractions done of the k segments of a path.
+
+    Attributes:
+        borders: Shape (k + 1,), m, from 0 to the path's length.
+        half_widths: Shape (k - 1,), m: half the length of the blend at each inner border, 0 where there is
+            none.
+    """
+
+    borders: Array
+    half_widths: Array
+
+    @classmethod
+    def even(cls, length: float) -> SegmentProgress:
+        """Return the progress of one segment from 0 to `length`."""
+        return cls(np.array([0.0, length]), np.empty(0))
+
+    @property
+    def length(self) -> float:
+        """Length of the path."""
+        return float(self.borders[-1])
+
+    @property
+    def segments(self) -> int:
+        """Number k of segments."""
+        return self.borders.size - 1
+
+    @property
+    def breaks(self) -> Array:
+        """Inner s, increasing, where a derivative of a fraction jumps."""
+        inner, room = self.borders[1:-1], _ROUNDING * self.length
+        breaks = np.sort(np.concatenate([inner - self.half_widths, inner, inner + self.half_widths]))
+        breaks = breaks[(breaks > room) & (breaks < self.length - room)]  # a blend may begin at an end
+        return np.asarray(breaks[np.diff(breaks, prepend=-np.inf) > room])
+
+    def at(self, s: Array, side: Side = "right") -> SegmentFractions:
+        """Return the fractions at s (N,).
+
+        Raises:
+            ValueError: When s lies outside the path.
+        """
+        s = inside(s, self.length)
+        inner, widths = self.borders[1:-1], self.half_widths
+        # within a segment, from which s on its end is the border to look at
+        turns = (inner[:-1] + widths[:-1] + inner[1:] - widths[1:]) / 2.0
+        lengths = np.where(
+            np.diff(self.borders) > 0.0, np.diff(self.borders), 1.0
+        )  # or it stays at its start
+        if self.segments == 1:  # a neighbour that never begins
+            inner, widths, lengths = np.array([np.inf]), np.zeros(1), np.append(lengths, 1.0)
+        segment = np.searchsorted(turns, s, side)
+        value, slope, bend = _ramp(s, inner[segment], widths[segment], side)
+        first, second = lengths[segment], lengths[segment + 1]
+        behind = (s - self.borders[segment] - value) / first
+        return SegmentFractions(
+            segment,
+            np.array([behind, value / second]),
+            np.array([(1.0 - slope) / first, slope / second]),
+            np.array([-bend / first, bend / second]),
+        )
+
+
+def _ramp(s: Array, border: Array, width: Array, side: Side) -> tuple[Array, Array, Array]:
+    """Return a function of slope 0 before border - width and 1 after border + width, and two derivatives."""
+    after = s > border if side == "left" else s >= border
+    sharp = width == 0.0
+    whole = np.where(sharp, 1.0, 2.0 * width)
+    x = np.clip((s - np.where(sharp, 0.0, border - width)) / whole, 0.0, 1.0)
+    value = np.where(sharp | (x >= 1.0), np.maximum(s - border, 0.0), whole * x**3 * (1.0 - x / 2.0))
+    slope = np.where(sharp, after, x * x * (3.0 - 2.0 * x))
+    return value, slope, np.where(sharp, 0.0, 6.0 * x * (1.0 - x) / whole)
 
 
 def turn_vectors(start: Array, end: Array) -> Array:
@@ -362,6 +352,7 @@ def rate_jumps(curve: OrientationCurve, progress: SegmentProgress) -> Array:
 
 
 def _differ(left: Array, right: Array) -> Flags:
+    """Return where rates (*batch, 3) differ by more than rounding."""
     larger = np.maximum(np.linalg.norm(left, axis=-1), np.linalg.norm(right, axis=-1))
     differ: Flags = np.linalg.norm(left - right, axis=-1) > _RATE_JUMP * larger + _RATE_NOISE
     return differ

@@ -1,6 +1,7 @@
-"""Poses along a path: a curve of the place and a curve of the orientation with the same s.
+"""Pose curves X(s): a position curve and an orientation by the same s, or a screw motion.
 
-The motion at constant twist from one pose to another: the tool goes along a helix by its arc length.
+A screw is the motion at constant twist from one pose to another: the tool goes along a helix by its arc
+length.
 
 Source: Murray, Li and Sastry, A Mathematical Introduction to Robotic Manipulation (1994), section 2.3.
 """
@@ -15,7 +16,7 @@ import numpy as np
 from trajcli.frozen import frozen
 from trajcli.geometry.paths.orientation import OrientationCurve, turn_vectors
 from trajcli.geometry.paths.position import (
-    SAME_PLACE,
+    SAME_POINT,
     Pivot,
     PositionCurve,
     Side,
@@ -33,9 +34,9 @@ class PosePath(Protocol):
     """A pose X(s), s from 0 to `length`; with a law s(t), v = X' sd and a = X'' sd^2 + X' sdd.
 
     Attributes:
-        length: m of arc length, or rad where the place rests; zero for no motion.
-        in_place: Whether the place rests and s is an angle.
-        breaks: Inner places (k,), increasing, where a derivative may jump.
+        length: m of arc length, or rad where the position is fixed; zero for no motion.
+        pure_rotation: Whether the position is fixed and s is an angle.
+        breaks: Inner s (k,), increasing, where a derivative may jump.
         stops: Those of them where X' jumps, or X: a law must stop there.
         jumps: Those of them where the orientation jumps.
     """
@@ -46,8 +47,8 @@ class PosePath(Protocol):
         ...
 
     @property
-    def in_place(self) -> bool:
-        """Whether the place rests."""
+    def pure_rotation(self) -> bool:
+        """Whether the position is fixed."""
         ...
 
     @property
@@ -80,42 +81,40 @@ class PosePath(Protocol):
 
 @frozen
 class PoseCurve:
-    """Place and orientation side by side.
+    """Position and orientation side by side.
 
     Attributes:
-        place: p(s), of some length, or a `Pivot`.
+        position: p(s), of some length, or a `Pivot`.
         orientation: R(s), as long.
     """
 
-    place: PositionCurve
+    position: PositionCurve
     orientation: OrientationCurve
 
     def __post_init__(self) -> None:
-        difference = abs(self.place.length - self.orientation.length)
-        if difference > _SAME * self.place.length:
-            raise ValueError(
-                f"place and orientation differ in length: {self.place.length!r}, {self.orientation.length!r}"
-            )
+        lengths = self.position.length, self.orientation.length
+        if abs(lengths[0] - lengths[1]) > _SAME * lengths[0]:
+            raise ValueError(f"position and orientation differ in length: {lengths[0]!r}, {lengths[1]!r}")
 
     @property
     def length(self) -> float:
-        """Length of the place's curve, m, or of the rotation alone, rad."""
-        return self.place.length
+        """Length of the position curve, m, or of the rotation alone, rad."""
+        return self.position.length
 
     @property
-    def in_place(self) -> bool:
-        """Whether the place rests and s is an angle."""
-        return isinstance(self.place, Pivot)
+    def pure_rotation(self) -> bool:
+        """Whether the position is fixed and s is an angle."""
+        return isinstance(self.position, Pivot)
 
     @property
     def breaks(self) -> Array:
         """Where a derivative may jump."""
-        return self._united(self.place.breaks, self.orientation.breaks)
+        return self._united(self.position.breaks, self.orientation.breaks)
 
     @property
     def stops(self) -> Array:
         """Where a law must stop."""
-        return self._united(self.place.stops, self.orientation.stops)
+        return self._united(self.position.stops, self.orientation.stops)
 
     @property
     def jumps(self) -> Array:
@@ -124,13 +123,13 @@ class PoseCurve:
 
     def evaluate(self, s: Array, side: Side = "right") -> Triple:
         """Return X, X', X'' as `PosePath` says."""
-        places, velocity, bend = self.place.evaluate(s, side)
+        positions, velocity, bend = self.position.evaluate(s, side)
         rotations, rate, change = self.orientation.evaluate(s, side)
         first, second = np.concatenate([velocity, rate], axis=-1), np.concatenate([bend, change], axis=-1)
-        return build(rotations, places), first, second
+        return build(rotations, positions), first, second
 
     def _united(self, first: Array, second: Array) -> Array:
-        """Return the places of both, those of the second that are beside one of the first left out."""
+        """Return s of both, those of the second that are beside one of the first left out."""
         if not first.size:
             return second
         near = np.abs(second[:, None] - first).min(axis=-1) <= _SAME * self.length
@@ -141,7 +140,7 @@ class PoseCurve:
 class Screw(Smooth):
     """Poses X(s) = start exp(s twist), the twist constant in the tool's axes.
 
-    Half a turn has two ways; the rotation is the one that `AboutAxes` takes.
+    For half a turn there are two; the rotation is the one that `AxisAngleOrientation` takes.
 
     Attributes:
         start: Shape (4, 4).
@@ -168,13 +167,13 @@ class Screw(Smooth):
     @cached_property
     def length(self) -> float:
         """Arc length of the tool's helix, m, or the angle, rad, where the tool does not go anywhere."""
-        way, angle = np.linalg.norm(self.twist[:3]), np.linalg.norm(self.twist[3:])
-        return float(angle if way <= SAME_PLACE else way)
+        distance, angle = np.linalg.norm(self.twist[:3]), np.linalg.norm(self.twist[3:])
+        return float(angle if distance <= SAME_POINT else distance)
 
     @property
-    def in_place(self) -> bool:
+    def pure_rotation(self) -> bool:
         """Whether the tool only turns and s is an angle."""
-        return bool(np.linalg.norm(self.twist[:3]) <= SAME_PLACE)
+        return bool(np.linalg.norm(self.twist[:3]) <= SAME_POINT)
 
     def evaluate(self, s: Array, side: Side = "right") -> Triple:
         """Return X, X', X'' as `PosePath` says; both sides are the same."""

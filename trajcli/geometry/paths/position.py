@@ -1,7 +1,4 @@
-"""Curves in space by arc length: what they have in common, a stretch of one, and staying in one place.
-
-The straight line between two points.
-"""
+"""Position curves p(s) by arc length: lines, parts of curves, and a fixed position."""
 
 from __future__ import annotations
 
@@ -16,8 +13,7 @@ from trajcli.geometry.rotation import Array
 
 Side = Literal["left", "right"]
 Triple = tuple[Array, Array, Array]
-
-SAME_PLACE = 1e-9  # m, below which two points are one: no robot is that exact, and rounding is far below
+SAME_POINT = 1e-9  # m, below which two points are one: no robot is that exact, and rounding is far below
 _ROUNDING = 1e-9  # of the length, by which laws end beside it
 
 
@@ -58,7 +54,7 @@ class PositionCurve(Protocol):
         ...
 
     def transport(self, s: Array, side: Side = "right") -> Triple:
-        """Return how a body that keeps its attitude to the curve has turned since its start.
+        """Return how a tool that keeps its attitude to the curve has turned since its start.
 
         Args:
             s: Arc lengths, shape (N,), m.
@@ -71,54 +67,8 @@ class PositionCurve(Protocol):
         ...
 
 
-def point(values: ArrayLike, name: str) -> Array:
-    """Return three finite numbers as an array (3,) that cannot be written to.
-
-    Raises:
-        InputError: When they are not three, or not finite.
-    """
-    result = np.array(values, dtype=np.float64)
-    if result.shape != (3,) or not np.isfinite(result).all():
-        raise InputError(f"the {name} must be three finite numbers, it is {values!r}")
-    result.flags.writeable = False
-    return result
-
-
-def shown_vector(vector: Array) -> str:
-    """Return a vector for a message."""
-    return "[" + ", ".join(f"{value:.6g}" for value in (vector + 0.0).tolist()) + "]"
-
-
-def shown_position(vector: Array) -> Amount:
-    """Return a place (3,), m, as a message says it."""
-    return Amount(tuple(vector.tolist()), 0, None, "length")
-
-
-def shown_length(length: float) -> Amount:
-    """Return a length, m, as a message says it."""
-    return Amount(float(length), 0, None, "length")
-
-
-def inside(s: Array, length: float) -> Array:
-    """Return arc lengths (N,) within [0, length], those beside it by no more than rounding moved inside.
-
-    Raises:
-        ValueError: When one lies outside.
-    """
-    values = np.asarray(s, dtype=np.float64)
-    slack = _ROUNDING * length
-    if values.size and not (values.min() >= -slack and values.max() <= length + slack):
-        raise ValueError(f"s from {values.min()!r} to {values.max()!r} leaves the curve's [0, {length!r}]")
-    return np.clip(values, 0.0, length)
-
-
-def angle_between(first: Array, second: Array) -> float:
-    """Return the angle, rad, between two unit vectors (3,), accurate near 0 and near pi."""
-    return float(2.0 * np.arctan2(np.linalg.norm(first - second), np.linalg.norm(first + second)))
-
-
 class Smooth:
-    """What a curve without breaks says of them."""
+    """Curves without breaks."""
 
     @property
     def breaks(self) -> Array:
@@ -134,6 +84,56 @@ class Smooth:
     def jumps(self) -> Array:
         """None."""
         return np.empty(0)
+
+
+@frozen
+class Line(Smooth):
+    """A straight line.
+
+    Attributes:
+        start: Shape (3,), m.
+        end: Shape (3,), m.
+
+    Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning and Control (2009), eq.
+    4.34.
+    """
+
+    start: Array
+    end: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "start", point(self.start, "start"))
+        object.__setattr__(self, "end", point(self.end, "end"))
+        if self.length <= SAME_POINT:
+            text = "a line from {start} that is {length} long has no direction (it needs more than {least})"
+            hint = "leave it out; to turn in place, use one `line` for the rotation alone"
+            amounts = {
+                "start": shown_position(self.start),
+                "length": shown_length(self.length),
+                "least": shown_length(SAME_POINT),
+            }
+            raise InputError(Problem(text, hint, amounts=amounts))
+
+    @property
+    def length(self) -> float:
+        """Distance of the ends, m."""
+        return float(np.linalg.norm(self.end - self.start))
+
+    @property
+    def direction(self) -> Array:
+        """Unit vector (3,) of travel."""
+        return np.asarray((self.end - self.start) / self.length)
+
+    def evaluate(self, s: Array, side: Side = "right") -> Triple:
+        """Return p, p', p'' as `PositionCurve` says; both sides are the same."""
+        fraction = inside(s, self.length)[:, None] / self.length
+        positions = (1.0 - fraction) * self.start + fraction * self.end  # exact at both ends
+        return positions, np.tile(self.direction, (fraction.size, 1)), np.zeros((fraction.size, 3))
+
+    def transport(self, s: Array, side: Side = "right") -> Triple:
+        """Return Q, w', w'' as `PositionCurve` says: nothing turns."""
+        count = inside(s, self.length).size
+        return np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3)), np.zeros((count, 3))
 
 
 @frozen
@@ -166,28 +166,29 @@ class PartOfCurve:
         return self._own(self.curve.stops)
 
     def evaluate(self, s: Array, side: Side = "right") -> Triple:
-        """Return p, p', p'' as `PlaceCurve` says."""
+        """Return p, p', p'' as `PositionCurve` says."""
         return self.curve.evaluate(inside(s, self.length) + self.first, side)
 
     def transport(self, s: Array, side: Side = "right") -> Triple:
-        """Return Q, w', w'' as `PlaceCurve` says."""
+        """Return Q, w', w'' as `PositionCurve` says."""
         before, _, _ = self.curve.transport(np.array([self.first]))
         rotation, rate, change = self.curve.transport(inside(s, self.length) + self.first, side)
         return rotation @ before[0].T, rate, change
 
-    def _own(self, places: Array) -> Array:
-        return places[(places > self.first) & (places < self.last)] - self.first
+    def _own(self, s: Array) -> Array:
+        """Return those of s (k,) of the whole that are inside the part, by its own arc length."""
+        return s[(s > self.first) & (s < self.last)] - self.first
 
 
 @frozen
 class Pivot(Smooth):
-    """No motion of the place, for a rotation alone: s is then an angle, and p' is zero, not a unit vector.
+    """A fixed position, for a rotation alone: s is then an angle, and p' is zero, not a unit vector.
 
-    Start and end may be apart by rounding; the place goes evenly from one to the other.
+    Start and end may be apart by rounding; the position goes evenly from one to the other.
 
     Attributes:
         start: Shape (3,), m.
-        end: Shape (3,), m, at most `SAME_PLACE` away.
+        end: Shape (3,), m, at most `SAME_POINT` away.
         length: How far s goes: what the orientation needs, rad; zero for no motion at all.
     """
 
@@ -199,7 +200,7 @@ class Pivot(Smooth):
         object.__setattr__(self, "start", point(self.start, "start"))
         object.__setattr__(self, "end", point(self.end, "end"))
         distance = float(np.linalg.norm(self.end - self.start))
-        if distance > SAME_PLACE:
+        if distance > SAME_POINT:
             raise InputError(f"start and end are {distance:.6g} m apart: this is no rotation in place")
         if not (np.isfinite(self.length) and self.length >= 0.0):
             raise InputError(f"the length of a rotation must be a finite angle, it is {self.length}")
@@ -208,8 +209,8 @@ class Pivot(Smooth):
         """Return p, p', p'' at s (N,), rad; both sides are the same."""
         values = inside(s, self.length)
         rate = (self.end - self.start) / (self.length or 1.0)
-        places = self.start + values[:, None] * rate
-        return places, np.tile(rate, (values.size, 1)), np.zeros((values.size, 3))
+        positions = self.start + values[:, None] * rate
+        return positions, np.tile(rate, (values.size, 1)), np.zeros((values.size, 3))
 
     def transport(self, s: Array, side: Side = "right") -> Triple:
         """Refuse: there is no direction to keep an attitude to."""
@@ -220,51 +221,47 @@ class Pivot(Smooth):
         )
 
 
-@frozen
-class Line(Smooth):
-    """A straight line.
+def point(values: ArrayLike, name: str) -> Array:
+    """Return three finite numbers as an array (3,) that cannot be written to.
 
-    Attributes:
-        start: Shape (3,), m.
-        end: Shape (3,), m.
-
-    Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning and Control (2009), eq.
-    4.34.
+    Raises:
+        InputError: When they are not three, or not finite.
     """
+    result = np.array(values, dtype=np.float64)
+    if result.shape != (3,) or not np.isfinite(result).all():
+        raise InputError(f"the {name} must be three finite numbers, it is {values!r}")
+    result.flags.writeable = False
+    return result
 
-    start: Array
-    end: Array
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "start", point(self.start, "start"))
-        object.__setattr__(self, "end", point(self.end, "end"))
-        if self.length <= SAME_PLACE:
-            text = "a line from {start} that is {length} long has no direction (it needs more than {least})"
-            hint = "leave it out; to turn in place, use one `line` for the rotation alone"
-            amounts = {
-                "start": shown_position(self.start),
-                "length": shown_length(self.length),
-                "least": shown_length(SAME_PLACE),
-            }
-            raise InputError(Problem(text, hint, amounts=amounts))
+def shown_vector(vector: Array) -> str:
+    """Return a vector for a message."""
+    return "[" + ", ".join(f"{value:.6g}" for value in (vector + 0.0).tolist()) + "]"
 
-    @property
-    def length(self) -> float:
-        """Distance of the ends, m."""
-        return float(np.linalg.norm(self.end - self.start))
 
-    @property
-    def direction(self) -> Array:
-        """Unit vector (3,) of travel."""
-        return np.asarray((self.end - self.start) / self.length)
+def shown_position(vector: Array) -> Amount:
+    """Return a position (3,), m, as a message says it."""
+    return Amount(tuple(vector.tolist()), 0, None, "length")
 
-    def evaluate(self, s: Array, side: Side = "right") -> Triple:
-        """Return p, p', p'' as `PlaceCurve` says; both sides are the same."""
-        fraction = inside(s, self.length)[:, None] / self.length
-        places = (1.0 - fraction) * self.start + fraction * self.end  # exact at both ends
-        return places, np.tile(self.direction, (fraction.size, 1)), np.zeros((fraction.size, 3))
 
-    def transport(self, s: Array, side: Side = "right") -> Triple:
-        """Return Q, w', w'' as `PlaceCurve` says: nothing turns."""
-        count = inside(s, self.length).size
-        return np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3)), np.zeros((count, 3))
+def shown_length(length: float) -> Amount:
+    """Return a length, m, as a message says it."""
+    return Amount(float(length), 0, None, "length")
+
+
+def inside(s: Array, length: float) -> Array:
+    """Return arc lengths (N,) within [0, length], those beside it by no more than rounding moved inside.
+
+    Raises:
+        ValueError: When one lies outside.
+    """
+    values = np.asarray(s, dtype=np.float64)
+    slack = _ROUNDING * length
+    if values.size and not (values.min() >= -slack and values.max() <= length + slack):
+        raise ValueError(f"s from {values.min()!r} to {values.max()!r} leaves the curve's [0, {length!r}]")
+    return np.clip(values, 0.0, length)
+
+
+def angle_between(first: Array, second: Array) -> float:
+    """Return the angle, rad, between two unit vectors (3,), accurate near 0 and near pi."""
+    return float(2.0 * np.arctan2(np.linalg.norm(first - second), np.linalg.norm(first + second)))

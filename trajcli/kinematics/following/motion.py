@@ -80,4 +80,4 @@ def motion_along(
         return path.at_time(law, times, side, crossings)
 
     breaks = distinct(np.concatenate([law_breaks, crossings]))
-    return ToolMotion(path, law, reference_at, breaks, tolerance, path.poses.in_place, ruled_by)
+    return ToolMotion(path, law, reference_at, breaks, tolerance, path.poses.pure_rotation, ruled_by)

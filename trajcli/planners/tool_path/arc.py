@@ -17,7 +17,7 @@ from pydantic import Field, model_validator
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount
 from trajcli.geometry.paths.arc import Arc
-from trajcli.geometry.paths.position import SAME_PLACE, PositionCurve
+from trajcli.geometry.paths.position import SAME_POINT, PositionCurve
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import Flaw, Model, Number, refuse
@@ -130,5 +130,5 @@ def notes_of(places: Iterable[PositionCurve]) -> tuple[Event, ...]:
     return tuple(
         Event("moved_center", text, amounts={"by": Amount(place.moved, 0, None, "length")})
         for place in places
-        if isinstance(place, Arc) and place.moved > SAME_PLACE
+        if isinstance(place, Arc) and place.moved > SAME_POINT
     )

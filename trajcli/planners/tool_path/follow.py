@@ -236,7 +236,7 @@ class FollowedPath:
 
 def diagnosis_on_path(robot: Robot, path: ToolPath, exact: Follower) -> FollowingDiagnosis:
     """Return who explains what goes wrong along a path."""
-    return FollowingDiagnosis(robot, path.at_s, path.length, None, path.poses.in_place, len(exact.held))
+    return FollowingDiagnosis(robot, path.at_s, path.length, None, path.poses.pure_rotation, len(exact.held))
 
 
 def diagnosis_of_motion(
@@ -288,5 +288,5 @@ def _fitted(
         misfit = tolerance_ratio(exact, tolerance, breaks, guess(probes(breaks)))
         return fit(exact.joint_state, misfit, breaks, guess)
     except (LostError, FitError) as error:
-        at = float(error.s[0]) if isinstance(error, LostError) else error.place
+        at = float(error.s[0]) if isinstance(error, LostError) else error.at
         raise trouble.unfit(at, guess) from None

@@ -60,7 +60,7 @@ def path_derivatives(path: ToolPath) -> PathDerivatives:
     places = distinct(np.concatenate([np.linspace(0.0, path.length, _SAMPLES), path.breaks]))
     sides = [path.poses.evaluate(places, side) for side in ("left", "right")]
     first, second = (np.stack([side[k] for side in sides]) for k in (1, 2))
-    way = 0.0 if path.poses.in_place else 1.0
+    way = 0.0 if path.poses.pure_rotation else 1.0
     turn, twist = (_largest(rows[..., 3:]) for rows in (first, second))
     return PathDerivatives(way, _largest(second[..., :3]), turn, twist)
 

@@ -16,7 +16,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.geometry.paths.orientation import FixedOrientation, SegmentProgress
 from trajcli.geometry.paths.pose import PoseCurve
-from trajcli.geometry.paths.position import SAME_PLACE, Line, Pivot, PositionCurve
+from trajcli.geometry.paths.position import SAME_POINT, Line, Pivot, PositionCurve
 from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import refuse
@@ -84,7 +84,7 @@ def line_path(before: Array, to: Target, orientation: Orientation, robot: Robot)
     """Return the straight way from a pose (4, 4) to a target, or the rotation in place."""
     target = tool_target(to, before, robot)
     start, end = before[:3, 3], target.pose[:3, 3]
-    if np.linalg.norm(end - start) > SAME_PLACE:
+    if np.linalg.norm(end - start) > SAME_POINT:
         return planned_path(Line(start, end), before, target, orientation, to)
     turning = orientation_along(orientation, before[:3, :3], [target], None, None)
     if turning.length <= _SAME_ANGLE:
@@ -102,7 +102,7 @@ def screw_path(before: Array, to: Target, robot: Robot) -> PlannedPath:
         message = "a screw needs the whole orientation of its target"
         raise InputError(message, hint="give `rpy`, `quat_wxyz`, `matrix`, `axis_angle` or `euler`")
     screw = Screw(before, target.pose)
-    if screw.in_place and screw.length <= _SAME_ANGLE:
+    if screw.pure_rotation and screw.length <= _SAME_ANGLE:
         return _no_way(before, target, to)
     return PlannedPath(_tool_path(screw, target), target.joints, to.configuration)
 

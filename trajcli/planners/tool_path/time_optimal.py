@@ -7,10 +7,12 @@ import math
 import numpy as np
 
 from trajcli.curves.operations import scale_time
-from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side
-from trajcli.curves.time_optimal.constraints import ConstraintRows, PathConstraint
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, derivative_coefficients, horner
+from trajcli.curves.time_optimal.constraints import ConstraintRows
 from trajcli.curves.time_optimal.parameterization import time_optimal
 from trajcli.curves.time_optimal.switching import switching_structure
+from trajcli.curves.time_optimal.time_law import LawPieces
+from trajcli.frozen import frozen
 from trajcli.kinematics.following.motion import motion_along
 from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.kinematics.following.tool_path import ToolPath
@@ -24,6 +26,7 @@ _FINER = 0.5  # of the tolerance, for q(s): what the law multiplies it with must
 _CORNERS = 16  # of the polygon inside the circle of accelerations
 _BETWEEN = 6  # places of a piece at which the limits of the tool are looked at, its ends included
 _STRETCHED = 1e-9
+_BESIDE = 1e-13  # of the length: so far before its end the last sample of an interval is
 _NOTED = 1e-6  # relative: a smaller stretch is not worth an event
 
 
@@ -45,7 +48,7 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
     _require_acceleration(curve, robot, planner)
     tcp = _limits(spec, robot.limits.tcp)
     solved = time_optimal(
-        curve, robot.limits.velocity, robot.limits.acceleration, further=[tool_constraint(path, tcp)]
+        curve, robot.limits.velocity, robot.limits.acceleration, further=[ToolConstraint(path, tcp)]
     )
     left = _left_over(path, solved.law, tcp)
     least = spec.minimum_duration or 0.0
@@ -68,17 +71,13 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
 
 
 def _left_over(path: ToolPath, law: PiecewisePolynomial, limits: ToolLimits) -> float:
-    """Return how many times longer the law must last to keep the tool's limits between the places."""
+    """Return how many times longer the law must last to keep the tool's limits, as the whole law has them."""
     part = np.linspace(0.0, 1.0, _BETWEEN)
     times = (law.breaks[:-1, None] + law.lengths[:, None] * part).reshape(-1)
     passed = path.crossings(law, law.breaks)
     demand = path.at_time(law, np.clip(times, law.start, law.end), "right", passed)
-    shares = []
-    for order, rows in ((1, demand.first), (2, demand.second)):
-        for name, some in (("", rows[:, :3]), ("angular_", rows[:, 3:])):
-            limit = getattr(limits, name + ("speed", "acceleration")[order - 1])
-            shares.append((float(np.linalg.norm(some, axis=1).max()) / limit) ** (1 / order))
-    worst = max(shares)
+    speed, acceleration = _used(demand.first, demand.second, limits).max(axis=1).tolist()
+    worst: float = max(speed, acceleration**0.5)
     return worst * (1 + _STRETCHED) if worst > 1 else 1.0
 
 
@@ -95,15 +94,27 @@ def _require_acceleration(curve: PiecewisePolynomial, robot: Robot, planner: str
         raise missing_limit(planner, "acceleration", lacking.tolist(), robot, why, "use another law `shape`")
 
 
-def tool_constraint(path: ToolPath, limits: ToolLimits) -> PathConstraint:
-    """Return what the limits of the tool demand of sd and sdd along a path.
+@frozen
+class ToolConstraint:
+    """Limits of the tool along a path.
 
-    An acceleration is the sum of one along the path and one across it: the circle of those that are allowed
-    is replaced by a polygon inside it, at most 2 % smaller. Across its axis a rotation gets 0.8, along 0.6.
+    Attributes:
+        path: Of the tool.
+        limits: Of its speed and acceleration, linear and angular.
     """
 
-    def rows(places: Array, side: Side) -> ConstraintRows:
-        _, first, second = path.poses.evaluate(np.clip(places, 0.0, path.length), side)
+    path: ToolPath
+    limits: ToolLimits
+
+    def rows(self, s: Array, side: Side) -> ConstraintRows:
+        """Return rows and caps at points (p,) of the path.
+
+        An acceleration is the sum of one along the path and one across it: the circle of those that are
+        allowed is replaced by a polygon inside it, at most 2 % smaller. Across its axis a rotation gets 0.8,
+        along 0.6.
+        """
+        limits = self.limits
+        _, first, second = self.path.poses.evaluate(np.clip(s, 0.0, self.path.length), side)
         way, turn = (np.linalg.norm(first[:, part], axis=1) for part in (slice(0, 3), slice(3, 6)))
         bend = np.linalg.norm(second[:, :3], axis=1)
         a, b, c = _translation_rows(way, bend, limits.acceleration)
@@ -114,7 +125,28 @@ def tool_constraint(path: ToolPath, limits: ToolLimits) -> PathConstraint:
         joined = [np.concatenate(pair, axis=1) for pair in zip((a, b, c), more[:3], strict=True)]
         return ConstraintRows(joined[0], joined[1], joined[2], cap)
 
-    return rows
+    def excess(self, law: LawPieces) -> Array:
+        """Return the shares of speed and acceleration used at samples of each piece, shape (2, N)."""
+        times = np.linspace(0.0, 1.0, _BETWEEN)[:, None] * law.durations
+        s, sd, sdd = (horner(derivative_coefficients(law.coefficients, order), times) for order in range(3))
+        length = self.path.length
+        s = np.clip(np.maximum(np.minimum(s, s[-1] - _BESIDE * length), s[0]), 0.0, length)
+        _, first, second = self.path.poses.evaluate(s.reshape(-1), "right")
+        rate, change = sd.reshape(-1, 1), sdd.reshape(-1, 1)
+        used = _used(first * rate, second * rate**2 + first * change, self.limits)
+        return np.asarray(used.reshape(2, _BETWEEN, -1).max(axis=1))
+
+
+def _used(velocity: Array, acceleration: Array, limits: ToolLimits) -> Array:
+    """Return the shares of speed and acceleration (2, N) that twists and their derivatives (N, 6) use."""
+    shares = []
+    for rows, linear, angular in (
+        (velocity, limits.speed, limits.angular_speed),
+        (acceleration, limits.acceleration, limits.angular_acceleration),
+    ):
+        lengths = np.linalg.norm(rows.reshape(-1, 2, 3), axis=2)
+        shares.append((lengths / [linear, angular]).max(axis=1))
+    return np.stack(shares)
 
 
 def _translation_rows(way: Array, bend: Array, limit: float) -> tuple[Array, Array, Array]:
