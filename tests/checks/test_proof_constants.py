@@ -68,3 +68,19 @@ def test_a_peak_that_no_row_shows_is_within_the_bound(quantity, name, order, siz
     found = tool_bounds(robot, np.array([0.0, length]), coefficients)[quantity]
     # Isaacson and Keller bound the product by 8!/4 (h/8)^9, about twice what it is
     assert found.most - size <= 2.1 * (true - size)
+
+
+@pytest.mark.parametrize("size", [1e-3, 2e-3])
+def test_a_slow_tool_is_known_as_well(size):
+    """From a millimetre a second on a bound is a millionth above what is found: where rows hide more, pieces are halved."""
+    shown, _ = hidden_peak()
+    joint = np.polyint((shown - np.eye(1, shown.size, shown.size - 1)[0]) * 10 * size)
+    joint[-2] += size
+    robot = load_robot("cartesian")
+    coefficients = np.zeros((joint.size, 1, 3))
+    coefficients[:, 0, 0] = joint
+    true = np.polyval(np.polyder(joint), np.linspace(0.0, 1.0, 20_001)).max()
+    assert true == pytest.approx(size * (1 + 10 * HIDDEN), rel=1e-9)
+    found = tool_bounds(robot, np.array([0.0, 1.0]), coefficients)[SPEED]
+    assert found.most >= true * (1 - 1e-12)
+    assert found.most <= found.value * (1 + 1e-6)
