@@ -84,3 +84,14 @@ def test_a_slow_tool_is_known_as_well(size):
     found = tool_bounds(robot, np.array([0.0, 1.0]), coefficients)[SPEED]
     assert found.most >= true * (1 - 1e-12)
     assert found.most <= found.value * (1 + 1e-6)
+
+
+def test_many_equal_peaks_are_all_known_well():
+    """Eight thousand equal steps, each of which is fastest in its middle: 3 / 2 of its mean speed."""
+    count, duration, step = 8000, 0.01, 0.002
+    coefficients = np.zeros((4, count, 3))
+    coefficients[:, :, 0] = np.array([-2 * step / duration**3, 3 * step / duration**2, 0.0, 0.0])[:, None]
+    coefficients[-1, :, 0] = step * np.arange(count)
+    found = tool_bounds(load_robot("cartesian"), duration * np.arange(count + 1), coefficients)[SPEED]
+    true = 1.5 * step / duration
+    assert true * (1 - 1e-9) <= found.most <= true * (1 + 1e-6)
