@@ -6,7 +6,7 @@ from math import sqrt
 
 import numpy as np
 import pytest
-from topp_paths import polyline, symmetric
+from topp_paths import polyline, spline, symmetric
 
 from trajcli.checks.tolerances import JUMP_ABSOLUTE
 from trajcli.curves.time_optimal.parameterization import time_optimal
@@ -31,3 +31,13 @@ def test_a_speed_at_the_start_may_be_too_high_by_rounding(velocity, length):
     assert found.law.evaluate(0.0, 1)[0] == pytest.approx(limit, rel=1e-12)
     with pytest.raises(UnreachableSpeedError):
         time_optimal(path, *bounds, start_velocity=limit * (1 + 3e-12))
+
+
+@pytest.mark.parametrize("scale", [1e-20, 1e-9, 1e9, 1e20])
+def test_however_large_the_parameter_is_the_motion_is_the_same(scale):
+    """Four places, two joints without limits of velocity: sd is as large as the parameter, and stands for itself."""
+    points = np.array([[0.0, 0.0], [1.0, 0.3], [0.4, 0.8], [1.2, 1.1]])
+    bounds = symmetric(np.inf, 2.0), symmetric(3.0, 4.0)
+    plain = time_optimal(spline(points), *bounds).trajectory
+    scaled = time_optimal(spline(points, np.linspace(0.0, scale, 4)), *bounds).trajectory
+    assert scaled.duration == pytest.approx(plain.duration, rel=1e-9)
