@@ -1,0 +1,65 @@
+"""The finest rate of rows: times far from zero are coarse, and rows must still be told apart."""
+
+from __future__ import annotations
+
+from itertools import islice
+
+import numpy as np
+import pytest
+
+from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.errors import InputError
+from trajcli.samples import UniformGrid, sample
+from trajcli.trajectory import Span, State, Trajectory
+
+UNIX = 1.7e9  # s: now, since 1970
+
+
+def finest_rate(duration: float, start: float) -> float:
+    """Return the highest rate that is accepted, found by halving."""
+    low, high = 1.0, 1e12
+    while high > low * (1 + 1e-9):
+        rate = (low * high) ** 0.5
+        try:
+            UniformGrid(duration, rate, start)
+        except InputError:
+            high = rate
+        else:
+            low = rate
+    return low
+
+
+@pytest.mark.parametrize("start", [UNIX, -UNIX, 2.0**31, 3.3e12])
+@pytest.mark.parametrize("part", [1.0, 0.7, 0.51])
+def test_rows_at_the_finest_rate_are_evenly_spaced(start, part):
+    """Times are rounded to float64: of no two neighbours does that take or add a fifth of the period."""
+    duration = 2000 * float(np.spacing(abs(start)))
+    grid = UniformGrid(duration, finest_rate(duration, start) * part, start)
+    times = np.concatenate([block[0] for block in grid.blocks()])
+    assert times.size > 3
+    gaps = np.diff(times)[:-1] * grid.rate
+    assert gaps.min() >= 0.8
+    assert gaps.max() <= 1.2
+
+
+def test_a_rate_is_not_refused_where_times_are_fine():
+    """Periods of 16 or 17 of what float64 resolves: 2 microseconds at 1e9 s, 8 ms at 2e12 s."""
+    for start, period in ((2.0**30 * 0.9, 2e-6), (2.0**41, 16 * 2.0**-11)):
+        times = np.concatenate([block[0] for block in UniformGrid(100 * period, 1 / period, start).blocks()])
+        assert np.unique(times).size == 101
+
+
+def test_neighbouring_rows_before_a_break_are_two():
+    """Rows that rounding put just before a break are laid onto it: of a steady motion no two rows are the same."""
+    duration = 2.0**33  # s, of which neighbours are 2e-6 s apart
+    breaks = np.array([0.0, 1e-3, duration])
+    curve = PiecewisePolynomial(breaks, np.array([[1.0, 1.0], [0.0, 1e-3]])[:, :, None])
+    rest = State(np.zeros(1), np.ones(1), np.zeros(1))
+    end = State(np.array([duration]), np.ones(1), np.zeros(1))
+    spans = (Span(0, "quintic", 0.0, duration, 1),)
+    trajectory = Trajectory(
+        curve=curve, joint_names=("j1",), joint_types=("revolute",), spans=spans, start=rest, end=end
+    )
+    rate = finest_rate(duration, 0.0)
+    (rows,) = islice(sample(trajectory, UniformGrid(duration, rate), ["t", "q"]), 1)
+    assert (np.diff(rows, axis=0) > 0).all()
