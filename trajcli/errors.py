@@ -6,6 +6,7 @@ the numbers in it, the place it stands in (if it stands in a file), and what wou
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import field, replace
 from typing import Literal
@@ -54,9 +55,18 @@ class Amount:
         return f"{scale(self.value):.9g}"
 
 
+Amounts = Mapping[str, Amount | str]
+"""What stands for each `{name}` in a message: a number, or a text of the user's, such as a joint's name."""
+
+_FIELD = re.compile(r"\{(\w+)\}")
+
+
 @comparable
 class Problem:
     """One thing that is wrong.
+
+    A message with amounts is a template. What the user wrote, such as the name of a joint, is an amount of it
+    and no part of its text, so that a joint named `{limit}` is just a name.
 
     Attributes:
         message: What is wrong, with the number and the bound, in the user's units.
@@ -67,7 +77,7 @@ class Problem:
         time: Seconds from the start of the move.
         value: The offending number, SI.
         limit: The bound it breaks, SI.
-        amounts: Numbers that the message holds as `{name}`.
+        amounts: Numbers and names that the message holds as `{name}`.
     """
 
     message: str
@@ -78,7 +88,7 @@ class Problem:
     time: float | None = None
     value: float | None = None
     limit: float | None = None
-    amounts: Mapping[str, Amount] = field(default_factory=dict)
+    amounts: Amounts = field(default_factory=dict)
 
     def text(self, say: Callable[[Amount], str] = str) -> str:
         """Return the message with its amounts said by `say`."""
@@ -88,12 +98,25 @@ class Problem:
         """Return the hint with its amounts said by `say`."""
         return None if self.hint is None else said(self.hint, self.amounts, say)
 
+    def within(self, context: str) -> Problem:
+        """Return the problem with `context: ` in front of its message."""
+        if not self.amounts:
+            return replace(self, message=f"{context}: {self.message}")
+        name = f"context{len(self.amounts)}"
+        return replace(self, message=f"{{{name}}}: {self.message}", amounts={**self.amounts, name: context})
 
-def said(message: str, amounts: Mapping[str, Amount], say: Callable[[Amount], str] = str) -> str:
-    """Return a message with its amounts, which stand in it as `{name}`, said by `say`."""
-    for name, amount in amounts.items():
-        message = message.replace("{" + name + "}", say(amount))
-    return message
+
+def said(message: str, amounts: Amounts, say: Callable[[Amount], str] = str) -> str:
+    """Return a message with its amounts, which stand in it as `{name}`, said by `say`.
+
+    It is filled in one pass: braces inside of what is filled in are text.
+    """
+
+    def fill(match: re.Match[str]) -> str:
+        amount = amounts.get(match[1], match[0])
+        return amount if isinstance(amount, str) else say(amount)
+
+    return _FIELD.sub(fill, message) if amounts else message
 
 
 class TrajcliError(Exception):
@@ -123,8 +146,9 @@ class TrajcliError(Exception):
 
     def said_by(self, say: Callable[[Amount], str]) -> TrajcliError:
         """Return the same error with the amounts of its messages said by `say`."""
-        told = (replace(p, message=p.text(say), hint=p.advice(say), amounts={}) for p in self.problems)
-        return type(self)(*told)
+        return type(self)(
+            *(replace(p, message=p.text(say), hint=p.advice(say), amounts={}) for p in self.problems)
+        )
 
 
 class VerificationError(TrajcliError):

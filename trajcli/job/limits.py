@@ -29,7 +29,7 @@ class Looser(NamedTuple):
 
     quantity: str
     joint: int
-    amounts: dict[str, Amount]
+    amounts: dict[str, Amount | str]
 
 
 def with_job_limits(robot: Robot, spec: LimitsSpec | None) -> tuple[Robot, list[Event]]:
@@ -38,9 +38,9 @@ def with_job_limits(robot: Robot, spec: LimitsSpec | None) -> tuple[Robot, list[
         return robot, []
     events = []
     for quantity, joint, amounts in looser_bounds(robot, spec):
-        whose = f"the job's {quantity} limit of {robot.joint_names[joint]}"
-        message = whose + " is looser than the robot's: {after} instead of {before}"
-        events.append(Event("looser_limit", message, amounts=amounts))
+        message = f"the job's {quantity} limit of {{joint}} is looser than the robot's: "
+        amounts |= {"joint": robot.joint_names[joint]}
+        events.append(Event("looser_limit", message + "{after} instead of {before}", amounts=amounts))
     return _with_limits(robot, spec), events
 
 
@@ -75,8 +75,11 @@ def looser_problem(robot: Robot, looser: Looser, move: int) -> Problem:
     """Return what is wrong with a bound that a move loosens."""
     quantity, joint, amounts = looser
     name = robot.joint_names[joint]
-    message = f"a move can only tighten limits: the {quantity} limit of {name} is {{before}}, got {{after}}"
-    return Problem(message, "raise it under the job's `limits`", move=move, joint=name, amounts=amounts)
+    message = (
+        f"a move can only tighten limits: the {quantity} limit of {{joint}} is {{before}}, got {{after}}"
+    )
+    hint = "raise it under the job's `limits`"
+    return Problem(message, hint, move=move, joint=name, amounts={"joint": name, **amounts})
 
 
 def _with_limits(robot: Robot, spec: LimitsSpec) -> Robot:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -154,8 +153,7 @@ def _of_row(
     """Return the error with the row's number and time said in front."""
     when = "" if wanted.time is None else f" (t = {block[row, wanted.time]:.9g} s)"
     problems = error.said_by(arm.say).problems
-    first = replace(problems[0], message=f"row {done + row}{when}: {problems[0].message}")
-    return PlanningError(first, *problems[1:])
+    return PlanningError(problems[0].within(f"row {done + row}{when}"), *problems[1:])
 
 
 def _targets(block: Array, wanted: _PoseColumns, done: int, file: str) -> IkTarget:
