@@ -13,7 +13,8 @@ from trajcli.frozen import comparable
 from trajcli.kinematics.forward import forward, link_poses
 from trajcli.queries.arm import ArmInUnits, LimitWatch, open_arm
 from trajcli.queries.pose import pose_view
-from trajcli.streams.csv import Digits, write_csv
+from trajcli.streams.csv import write_csv
+from trajcli.streams.decimals import Digits
 from trajcli.streams.whole_file import standard_output
 
 
@@ -72,9 +73,9 @@ def _stream(arm: ArmInUnits, options: FkOptions) -> int:
         if given:
             raise InputError(f"{name} is for one configuration, rows from standard input become a CSV")
     watch = LimitWatch(arm.robot)
-    names, blocks = poses_of(arm, open_rows("-"), watch)
+    columns, blocks = poses_of(arm, open_rows("-"), watch)
     with standard_output() as out:
-        write_csv(blocks, names, out, options.digits)
+        write_csv(blocks, columns, out, options.digits)
     _remark(arm, watch, rows=True)
     return 0
 

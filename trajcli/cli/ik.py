@@ -16,7 +16,7 @@ from trajcli.kinematics.inverse.solutions import Solutions
 from trajcli.language.targets import ik_target
 from trajcli.queries.arm import ArmInUnits, open_arm
 from trajcli.queries.inverse import answers, find_answers, require_answer
-from trajcli.streams.csv import Digits
+from trajcli.streams.decimals import Digits
 
 
 @comparable
@@ -97,7 +97,7 @@ def _stream(arm: ArmInUnits, near: Array | None, options: IkOptions) -> int:
     from trajcli.streams.table import open_rows
     from trajcli.streams.whole_file import standard_output
 
-    names, blocks = joints_of(arm, open_rows("-"), near, options.tolerance)
+    columns, blocks = joints_of(arm, open_rows("-"), near, options.tolerance)
     with standard_output() as out:
-        write_csv(blocks, names, out, options.digits)
+        write_csv(blocks, columns, out, options.digits)
     return 0

@@ -84,7 +84,7 @@ def _stream(arm: ArmInUnits, options: JacobianOptions) -> int:
     for name, given in (("--json", options.as_json), ("--qd", options.rates is not None)):
         if given:
             raise InputError(f"{name} is for one configuration, rows from standard input become a CSV")
-    names, blocks = jacobians_of(arm, open_rows("-"), options.frame)
+    columns, blocks = jacobians_of(arm, open_rows("-"), options.frame)
     with standard_output() as out:
-        write_csv(blocks, names, out)
+        write_csv(blocks, columns, out)
     return 0

@@ -66,10 +66,10 @@ def pair_columns(a: Table, b: Table) -> tuple[tuple[Pair, ...], tuple[tuple[str,
     """
     left = {name: place for place, name in enumerate(b.names)}
     partners = {name: name for name in a.names if name in left}
-    by_quantity = {parse_column(name).quantity: name for name in left if name not in partners}
+    rest = {_without_unit(name): name for name in left if name not in partners}
     for name in a.names:
-        if name not in partners and parse_column(name).quantity in by_quantity:
-            partners[name] = by_quantity.pop(parse_column(name).quantity)
+        if name not in partners and _without_unit(name) in rest:
+            partners[name] = rest.pop(_without_unit(name))
     pairs = tuple(
         Pair(parse_column(name), parse_column(partners[name]), place, left[partners[name]])
         for place, name in enumerate(a.names)
@@ -89,6 +89,12 @@ def pair_columns(a: Table, b: Table) -> tuple[tuple[Pair, ...], tuple[tuple[str,
     missing = [(name, 1) for name in a.names if name not in partners]
     missing += [(name, 0) for name in b.names if name not in in_b]
     return pairs, tuple(missing)
+
+
+def _without_unit(name: str) -> Column:
+    """Return what a column holds, the same for columns that differ in nothing but their unit."""
+    column = parse_column(name)
+    return Column(column.kind, column.joint)
 
 
 def time_pair(pairs: tuple[Pair, ...]) -> Pair | None:

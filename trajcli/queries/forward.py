@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.columns import Column, parse_column
+from trajcli.columns import Column, Group, columns_of, parse_column
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Place, Problem
 from trajcli.geometry.rotation import quaternion_from_matrix, without_jumps
@@ -28,11 +28,11 @@ class Stream(NamedTuple):
     """Rows that are computed while they are taken.
 
     Attributes:
-        names: The m columns' names.
+        columns: The m columns.
         blocks: Each of shape (N, m).
     """
 
-    names: list[str]
+    columns: tuple[Column, ...]
     blocks: Iterator[Array]
 
 
@@ -68,9 +68,9 @@ def poses_of(arm: ArmInUnits, rows: TableBlocks, watch: LimitWatch | None = None
         InputError: When a joint has no column, or one of another unit; when taken, if a row is wrong.
     """
     wanted = _wanted(arm.robot, rows)
-    unit = "mm" if arm.units.length == "mm" else None
-    names = [*_time_name(wanted), *(Column(axis, None, unit).name for axis in "xyz"), "qw", "qx", "qy", "qz"]
-    return Stream(names, _poses(arm, rows, wanted, watch))
+    groups: tuple[Group, ...] = ("pose",) if wanted.time is None else ("t", "pose")
+    columns = columns_of(groups, arm.robot.joint_types, arm.units)
+    return Stream(columns, _poses(arm, rows, wanted, watch))
 
 
 def _poses(
@@ -99,8 +99,9 @@ def jacobians_of(arm: ArmInUnits, rows: TableBlocks, frame: ReferenceFrame) -> S
     """
     wanted = _wanted(arm.robot, rows)
     entries = [f"J{i}{j}" for i in range(1, 7) for j in range(1, len(arm.robot.joints) + 1)]
-    names = [*_time_name(wanted), "manipulability", "inverse_condition", *entries]
-    return Stream(names, _jacobians(arm, rows, wanted, frame))
+    time = [] if wanted.time is None else ["t"]
+    columns = map(parse_column, [*time, "manipulability", "inverse_condition", *entries])
+    return Stream(tuple(columns), _jacobians(arm, rows, wanted, frame))
 
 
 def _jacobians(
@@ -112,10 +113,6 @@ def _jacobians(
         entries = jacobian(arm.robot, q, frame).reshape(len(q), -1)
         columns = np.stack([measures.manipulability, 1.0 / measures.condition], axis=1)
         yield np.hstack([wanted.times(block), columns, entries])
-
-
-def _time_name(wanted: _JointColumns) -> list[str]:
-    return [] if wanted.time is None else ["t"]
 
 
 def _wanted(robot: Robot, rows: TableBlocks) -> _JointColumns:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from trajcli.columns import Column, column_names, parse_column
+from trajcli.columns import Column, Group, columns_of, parse_column
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Place, PlanningError, Problem
 from trajcli.geometry.rotation import QUATERNION_DEFECT, Flags, matrix_from_quaternion
@@ -48,10 +48,9 @@ def joints_of(arm: ArmInUnits, rows: TableBlocks, near: Array | None, tolerance:
         PlanningError: When taken, if a row cannot be reached within the limits.
     """
     wanted = _wanted(rows)
-    names = column_names(("q",), arm.robot.joint_types, arm.units)
-    return Stream(
-        [*([] if wanted.time is None else ["t"]), *names], _follow(arm, rows, wanted, near, tolerance)
-    )
+    groups: tuple[Group, ...] = ("q",) if wanted.time is None else ("t", "q")
+    columns = columns_of(groups, arm.robot.joint_types, arm.units)
+    return Stream(columns, _follow(arm, rows, wanted, near, tolerance))
 
 
 def _follow(

@@ -15,7 +15,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.columns import whole_number_columns
+from trajcli.columns import parse_column, whole_number_columns
 from trajcli.curves.piecewise import Array
 from trajcli.errors import FileError, InputError, Place, Problem
 from trajcli.frozen import frozen
@@ -212,7 +212,7 @@ class _Reader:
         self._file = file
         self._names = names
         self._line = 2
-        self._whole_numbers = whole_number_columns(names)
+        self._whole_numbers = whole_number_columns(map(parse_column, names))
         self._fixed_decimals = np.full(len(names), DECIMALS)
         self._fixed_decimals[list(self._whole_numbers)] = 0
 
