@@ -1,7 +1,7 @@
-"""The error tree: one branch for each exit code of the command line.
+"""Error classes, one branch for each exit code of the command line, and the problems that they carry.
 
-Every error carries one or more problems. A problem is one sentence about one thing that is wrong, with
-the numbers in it, the place it stands in (if it stands in a file), and what would fix it.
+A problem is one sentence about one thing that is wrong, with the numbers in it, its place in a file (if it
+stands in one), and what would fix it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from trajcli.frozen import comparable
 
 @comparable
 class Place:
-    """A stretch of one line of a file. Lines and columns count from 1."""
+    """Part of one line of a file. Lines and columns count from 1."""
 
     file: str
     line: int
@@ -30,10 +30,10 @@ class Place:
 
 @comparable
 class Amount:
-    """A number inside a message, in SI, so that it can be said in the user's units.
+    """A number inside a message, in SI, which a reader may want in other units.
 
     Attributes:
-        value: SI; several are the coordinates of a place.
+        value: SI; several are coordinates of a position.
         order: 0 for a position, 1 to 3 for its time derivatives.
         joint: Index of the joint that says whether angle or length is meant.
         dimension: "length" or "angle" of the tool; with neither this nor a joint the number is a time.
@@ -70,7 +70,7 @@ class Problem:
 
     Attributes:
         message: What is wrong, with the number and the bound, in the user's units.
-        hint: What would fix it; its amounts are held as those of the message are.
+        hint: What would fix it; it holds amounts as the message does.
         place: Where it stands in the user's file.
         move: Index of the move, from 0.
         joint: Name of the joint.
@@ -91,11 +91,11 @@ class Problem:
     amounts: Amounts = field(default_factory=dict)
 
     def text(self, say: Callable[[Amount], str] = str) -> str:
-        """Return the message with its amounts said by `say`."""
+        """Return the message with its amounts as `say` writes them."""
         return said(self.message, self.amounts, say)
 
     def advice(self, say: Callable[[Amount], str] = str) -> str | None:
-        """Return the hint with its amounts said by `say`."""
+        """Return the hint with its amounts as `say` writes them."""
         return None if self.hint is None else said(self.hint, self.amounts, say)
 
     def within(self, context: str) -> Problem:
@@ -107,7 +107,7 @@ class Problem:
 
 
 def said(message: str, amounts: Amounts, say: Callable[[Amount], str] = str) -> str:
-    """Return a message with its amounts, which stand in it as `{name}`, said by `say`.
+    """Return a message with its amounts, which stand in it as `{name}`, as `say` writes them.
 
     It is filled in one pass: braces inside of what is filled in are text.
     """
@@ -145,7 +145,7 @@ class TrajcliError(Exception):
         return type(self)(*problems)
 
     def said_by(self, say: Callable[[Amount], str]) -> TrajcliError:
-        """Return the same error with the amounts of its messages said by `say`."""
+        """Return the same error with the amounts of its messages as `say` writes them."""
         return type(self)(
             *(replace(p, message=p.text(say), hint=p.advice(say), amounts={}) for p in self.problems)
         )

@@ -28,10 +28,10 @@ from trajcli.units import Units
 ROWS = 4096  # rows of a block: long enough to hide the cost of a call, short enough for the cache
 
 _NANOSECOND = 1e-9  # the last decimal of a time in a file: rows closer than this would show the same time
-_END = 1e-6  # of a period: an end this close to a grid time takes that row's place
+_END = 1e-6  # of a period: an end this close to a grid time replaces that row
 _BREAK = 1e-12  # s: a row this close before a break is at it; rounding decides no row's side
 
-_TOOL_ORDERS = {"pose": 0, "twist": 1, "twistd": 2}  # the highest derivative of q that each group is made of
+_TOOL_ORDERS = {"pose": 0, "twist": 1, "twistd": 2}  # the highest derivative of q that each group needs
 
 
 @comparable
@@ -182,7 +182,7 @@ def sample(
 
 
 def _orders(groups: Sequence[Group]) -> list[int]:
-    """Return the orders of derivatives that `groups` are made of, rising; at least one."""
+    """Return the orders of derivatives that `groups` need, rising; at least one."""
     orders = {JOINT_ORDERS[group] for group in groups if group in JOINT_ORDERS}
     for group in groups:
         orders |= set(range(_TOOL_ORDERS.get(group, -1) + 1))

@@ -1,4 +1,4 @@
-"""Units: what a file's numbers are measured in, and strings that carry their own unit.
+"""Units of measurement: of a file's plain numbers, and in strings that carry their own.
 
 Inside the house everything is SI. A number of a file is `value * factor(quantity, units)`; a string such as
 "120 deg/s" says its unit itself. The units that strings may use:
@@ -93,11 +93,6 @@ def unit_name(quantity: Quantity, units: Units) -> str:
     ]
 
 
-def to_si(value: float, quantity: Quantity, units: Units) -> float:
-    """Return a number in user units as SI."""
-    return value * factor(quantity, units)
-
-
 def to_user(si: float, quantity: Quantity, units: Units) -> float:
     """Return an SI number in user units."""
     return si / factor(quantity, units)
@@ -119,8 +114,8 @@ def parse_quantity(text: str, quantity: Quantity) -> float:
     number, unit = match.groups()
     if not unit:
         unitless = quantity.dimension == "ratio"
-        way = f"write {number} without quotes" + ("" if unitless else ", or give it a unit")
-        raise UnitError(f"{_expected(quantity, text)}: {way}")
+        remedy = f"write {number} without quotes" + ("" if unitless else ", or give it a unit")
+        raise UnitError(f"{_expected(quantity, text)}: {remedy}")
     scale = _scale(unit, quantity)
     if scale is None:
         raise UnitError(_expected(quantity, text) + _unknown(unit, quantity))

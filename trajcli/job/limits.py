@@ -1,4 +1,4 @@
-"""Which limits are in force: the robot's, replaced and scaled by the job, tightened by a move."""
+"""Limits in force: the robot's, replaced and scaled by the job, tightened by a move."""
 
 from __future__ import annotations
 
@@ -67,8 +67,8 @@ def looser_bounds(robot: Robot, spec: LimitsSpec) -> Iterator[Looser]:
         ends = (after[:, 0] < before[:, 0] - room[:, 0], after[:, 1] > before[:, 1] + room[:, 1])
         for joint in np.flatnonzero(ends[0] | ends[1]).tolist():
             end = 1 if ends[1][joint] else 0
-            said = {"before": float(before[joint, end]), "after": float(after[joint, end])}
-            yield Looser(quantity, joint, {key: Amount(v, order, joint) for key, v in said.items()})
+            bounds = {"before": float(before[joint, end]), "after": float(after[joint, end])}
+            yield Looser(quantity, joint, {key: Amount(v, order, joint) for key, v in bounds.items()})
 
 
 def looser_problem(robot: Robot, looser: Looser, move: int) -> Problem:

@@ -1,7 +1,4 @@
-"""A robot as it stands in a file, and the robot it describes.
-
-Where a job's robot comes from: the catalogue, a robot file, or the job itself.
-"""
+"""Robots of jobs: the model of a robot in a file, the catalogue, and the robot that a job names."""
 
 from __future__ import annotations
 
@@ -40,6 +37,8 @@ from trajcli.language.numbers import (
 from trajcli.language.poses import Pose
 from trajcli.suggest import did_you_mean, nearest, valid_names
 from trajcli.units import Dimension, Quantity, Units
+
+CATALOGUE = Path(__file__).parent.parent / "catalogue"
 
 _ANGLE, _LENGTH = Quantity("angle"), Quantity("length")
 _DH = {"theta": _ANGLE, "d": _LENGTH, "a": _LENGTH, "alpha": _ANGLE}
@@ -178,9 +177,6 @@ def _joint_as_mapping(robot: Robot, index: int, *, described: bool) -> dict[str,
     return {"name": joint.name, "type": joint.type, **row, "sign": joint.sign, **limits}
 
 
-CATALOGUE = Path(__file__).parent.parent / "catalogue"
-
-
 @frozen
 class RobotSheet:
     """A robot file: the robot, and what the file says beside it.
@@ -212,7 +208,7 @@ def find_robot(value: Any, document: Document, units: Units) -> Robot:  # noqa: 
 
     Args:
         value: A name, {file: PATH} (relative to the job's folder), or the robot itself.
-        document: The job's, for places.
+        document: The job's.
         units: The job's, in force for a robot that stands in the job.
 
     Raises:

@@ -1,7 +1,4 @@
-"""An arm as the kinematic commands use it: a robot with geometry, and the units its numbers are said in.
-
-Joint values outside the limits of a robot: how many rows, and the first of them.
-"""
+"""Arms with the units of their users: joint values in and out, and a watch on the limits of position."""
 
 from __future__ import annotations
 
@@ -150,7 +147,7 @@ class Outside:
         time: Of that row, s; None where it has none.
         joint: Name of the joint; of several in a row the one that is furthest outside.
         value: Of the joint.
-        limit: The bound that it passes.
+        limit: The bound that it exceeds.
         unit: Of both.
         others: How many more joints of the row are outside.
     """
@@ -165,10 +162,10 @@ class Outside:
 
 
 class LimitWatch:
-    """Looks at rows of joint values as they pass.
+    """Count of the rows of a stream that are outside the position limits.
 
     Attributes:
-        rows: How many have passed.
+        rows: How many were seen.
         outside: How many of them have a joint outside its limits.
         first: The first of these; None while there is none.
     """
@@ -187,7 +184,7 @@ class LimitWatch:
         times: Array | None = None,
         room: float = 0.0,
     ) -> None:
-        """Take note of the next rows.
+        """Count the next rows.
 
         Args:
             values: Shape (N, n), rad or m.

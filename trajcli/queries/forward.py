@@ -1,4 +1,4 @@
-"""Joint values from the columns of a CSV, in whatever units they say, and what is computed from them."""
+"""Forward kinematics of streams: poses and Jacobians for each row of joint values of a CSV."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _HALF = 0.5 * 10.0**-DECIMALS  # a joint that rests at its limit may be rounded 
 
 
 class Stream(NamedTuple):
-    """Rows that are computed while they are taken.
+    """Rows that are computed block by block, on demand.
 
     Attributes:
         columns: The m columns.
@@ -37,7 +37,7 @@ class Stream(NamedTuple):
 
 
 class _JointColumns(NamedTuple):
-    """Which columns hold what: the time's index, and index, SI per unit and unit of each joint's column."""
+    """Index of the time's column, and index, SI per unit and unit of each joint's column."""
 
     time: int | None
     joints: NDArray[np.intp]
@@ -116,7 +116,7 @@ def _jacobians(
 
 
 def _wanted(robot: Robot, rows: TableBlocks) -> _JointColumns:
-    found: dict[int, tuple[int, Column]] = {}
+    by_joint: dict[int, tuple[int, Column]] = {}
     time = None
     for index, name in enumerate(rows.names):
         column = parse_column(name)
@@ -124,19 +124,19 @@ def _wanted(robot: Robot, rows: TableBlocks) -> _JointColumns:
             time = index
         if column.kind != "q" or column.joint is None:
             continue
-        flaw = _flaw(robot, column, found)
+        flaw = _flaw(robot, column, by_joint)
         if flaw:
             start = len(",".join(rows.names[:index])) + (2 if index else 1)
             place = Place(rows.file, 1, start, ",".join(rows.names), len(name))
             raise InputError(Problem(*flaw, place))
-        found[column.joint] = index, column
-    missing = [f"q{i + 1}" for i in range(len(robot.joints)) if i not in found]
+        by_joint[column.joint] = index, column
+    missing = [f"q{i + 1}" for i in range(len(robot.joints)) if i not in by_joint]
     if missing:
         place = Place(rows.file, 1, 1, ",".join(rows.names))
         message = f"{robot.name} has {len(robot.joints)} joints, and there is no column {', '.join(missing)}"
         hint = "columns are called q1 in SI, q1_deg or q1_mm otherwise"
         raise InputError(Problem(message, hint, place))
-    columns = [found[i] for i in range(len(robot.joints))]
+    columns = [by_joint[i] for i in range(len(robot.joints))]
     indices = np.array([index for index, _ in columns])
     si = ["m" if kind == "prismatic" else "rad" for kind in robot.joint_types]
     units = [column.unit or plain for (_, column), plain in zip(columns, si, strict=True)]
@@ -144,14 +144,14 @@ def _wanted(robot: Robot, rows: TableBlocks) -> _JointColumns:
 
 
 def _flaw(
-    robot: Robot, column: Column, found: dict[int, tuple[int, Column]]
+    robot: Robot, column: Column, by_joint: dict[int, tuple[int, Column]]
 ) -> tuple[str, str | None] | None:
     joint = column.joint or 0
     count = len(robot.joints)
     if joint >= count:
         return f"{column.name} is the column of joint {joint + 1}, {robot.name} has {count} joints", None
-    if joint in found:
-        return f"{column.name} and {found[joint][1].name} are columns of the same joint", "leave one out"
+    if joint in by_joint:
+        return f"{column.name} and {by_joint[joint][1].name} are columns of the same joint", "leave one out"
     kind = robot.joint_types[joint]
     if column.unit is not None and _WHOSE[column.unit] != kind:
         unit = "mm" if kind == "prismatic" else "deg"

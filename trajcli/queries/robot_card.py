@@ -1,4 +1,4 @@
-"""What there is to say about a robot: its table, limits, reach, inverse kinematics and source."""
+"""Data sheet of a robot: its table, limits, reach, inverse kinematics and source."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class ReachRange:
     """How far the tcp gets from the origin of the base, m.
 
     Attributes:
-        sampled: The largest distance found by a search over the joint ranges; a little below the true one.
+        sampled: The largest distance that a search finds over the joint ranges; a little below the true one.
         bound: The lengths of all links added: no configuration gets further. Both are infinite where a slide
             has no limits.
     """
@@ -88,7 +88,7 @@ def robot_row(name: str, sheet: RobotSheet) -> dict[str, Any]:
 
 
 def robot_card(name: str, sheet: RobotSheet) -> dict[str, Any]:
-    """Return all there is to say about a robot, in the units of its file; what is not limited is null."""
+    """Return the data sheet of a robot, in the units of its file; what is not limited is null."""
     robot, units = sheet.robot, sheet.units
     reach, length = reach_of(robot), factor(Quantity("length"), units)
     return {

@@ -258,7 +258,7 @@ def _digits_between(buffer: NDArray[np.uint8], starts: _Indices, ends: _Indices)
     length = ends - starts
     if length.min(initial=1) < 1 or length.max(initial=1) > 8:
         raise NotFixedError
-    # Every place of the buffer seen as the start of a word.
+    # Every byte of the buffer seen as the start of a word.
     words = np.ndarray(buffer.size - 7, dtype="<u8", buffer=buffer, strides=(1,))
     word: _LongWords = words[ends - 8]
     word = word.astype(np.uint64, copy=False)
