@@ -67,25 +67,25 @@ def poses_of(arm: ArmInUnits, rows: TableBlocks, watch: LimitWatch | None = None
     Raises:
         InputError: When a joint has no column, or one of another unit; when taken, if a row is wrong.
     """
-    wanted = _wanted(arm.robot, rows)
-    groups: tuple[Group, ...] = ("pose",) if wanted.time is None else ("t", "pose")
+    inputs = _joint_columns(arm.robot, rows)
+    groups: tuple[Group, ...] = ("pose",) if inputs.time is None else ("t", "pose")
     columns = columns_of(groups, arm.robot.joint_types, arm.units)
-    return Stream(columns, _poses(arm, rows, wanted, watch))
+    return Stream(columns, _poses(arm, rows, inputs, watch))
 
 
 def _poses(
-    arm: ArmInUnits, rows: TableBlocks, wanted: _JointColumns, watch: LimitWatch | None
+    arm: ArmInUnits, rows: TableBlocks, inputs: _JointColumns, watch: LimitWatch | None
 ) -> Iterator[Array]:
     last = None
     for block in rows.blocks:
-        q = wanted.values(block)
+        q = inputs.values(block)
         if watch is not None:
-            times = None if wanted.time is None else block[:, wanted.time]
-            watch.see(q, wanted.factors, wanted.units, times, _HALF)
+            times = None if inputs.time is None else block[:, inputs.time]
+            watch.see(q, inputs.factors, inputs.units, times, _HALF)
         poses = forward(arm.robot, q)
         quaternions = without_jumps(quaternion_from_matrix(poses[:, :3, :3]), last)
         last = quaternions[-1]
-        yield np.hstack([wanted.times(block), poses[:, :3, 3] / arm.length_factor, quaternions])
+        yield np.hstack([inputs.times(block), poses[:, :3, 3] / arm.length_factor, quaternions])
 
 
 def jacobians_of(arm: ArmInUnits, rows: TableBlocks, frame: ReferenceFrame) -> Stream:
@@ -97,25 +97,25 @@ def jacobians_of(arm: ArmInUnits, rows: TableBlocks, frame: ReferenceFrame) -> S
     Raises:
         InputError: As `poses_of`.
     """
-    wanted = _wanted(arm.robot, rows)
+    inputs = _joint_columns(arm.robot, rows)
     entries = [f"J{i}{j}" for i in range(1, 7) for j in range(1, len(arm.robot.joints) + 1)]
-    time = [] if wanted.time is None else ["t"]
+    time = [] if inputs.time is None else ["t"]
     columns = map(parse_column, [*time, "manipulability", "inverse_condition", *entries])
-    return Stream(tuple(columns), _jacobians(arm, rows, wanted, frame))
+    return Stream(tuple(columns), _jacobians(arm, rows, inputs, frame))
 
 
 def _jacobians(
-    arm: ArmInUnits, rows: TableBlocks, wanted: _JointColumns, frame: ReferenceFrame
+    arm: ArmInUnits, rows: TableBlocks, inputs: _JointColumns, frame: ReferenceFrame
 ) -> Iterator[Array]:
     for block in rows.blocks:
-        q = wanted.values(block)
+        q = inputs.values(block)
         measures = dexterity(arm.robot, q)
         entries = jacobian(arm.robot, q, frame).reshape(len(q), -1)
         columns = np.stack([measures.manipulability, 1.0 / measures.condition], axis=1)
-        yield np.hstack([wanted.times(block), columns, entries])
+        yield np.hstack([inputs.times(block), columns, entries])
 
 
-def _wanted(robot: Robot, rows: TableBlocks) -> _JointColumns:
+def _joint_columns(robot: Robot, rows: TableBlocks) -> _JointColumns:
     by_joint: dict[int, tuple[int, Column]] = {}
     time = None
     for index, name in enumerate(rows.names):

@@ -47,30 +47,30 @@ def joints_of(arm: ArmInUnits, rows: TableBlocks, near: Array | None, tolerance:
         InputError: When a column is missing; when taken, if a row is wrong.
         PlanningError: When taken, if a row cannot be reached within the limits.
     """
-    wanted = _wanted(rows)
-    groups: tuple[Group, ...] = ("q",) if wanted.time is None else ("t", "q")
+    inputs = _pose_columns(rows)
+    groups: tuple[Group, ...] = ("q",) if inputs.time is None else ("t", "q")
     columns = columns_of(groups, arm.robot.joint_types, arm.units)
-    return Stream(columns, _follow(arm, rows, wanted, near, tolerance))
+    return Stream(columns, _follow(arm, rows, inputs, near, tolerance))
 
 
 def _follow(
-    arm: ArmInUnits, rows: TableBlocks, wanted: _PoseColumns, near: Array | None, tolerance: float
+    arm: ArmInUnits, rows: TableBlocks, inputs: _PoseColumns, near: Array | None, tolerance: float
 ) -> Iterator[Array]:
     last = np.zeros(len(arm.robot.joints)) if near is None else near
     done = 0
     for block in rows.blocks:
-        follower = _Follower(arm, _targets(block, wanted, done, rows.file), last, tolerance)
+        follower = _Follower(arm, _targets(block, inputs, done, rows.file), last, tolerance)
         joints = np.empty((len(block), len(last)))
         row = 0
         while row < len(block):
             try:
                 answers = follower.take(row, last)
             except PlanningError as error:
-                raise _of_row(arm, error, block, wanted, row, done) from None
+                raise _of_row(arm, error, block, inputs, row, done) from None
             joints[row : row + len(answers)] = answers
             row, last = row + len(answers), answers[-1]
         done += len(block)
-        times = block[:, :0] if wanted.time is None else block[:, [wanted.time]]
+        times = block[:, :0] if inputs.time is None else block[:, [inputs.time]]
         yield np.hstack([times, joints / arm.joint_factors])
 
 
@@ -147,19 +147,19 @@ class _Follower:
 
 
 def _of_row(
-    arm: ArmInUnits, error: PlanningError, block: Array, wanted: _PoseColumns, row: int, done: int
+    arm: ArmInUnits, error: PlanningError, block: Array, inputs: _PoseColumns, row: int, done: int
 ) -> PlanningError:
     """Return the error with the row's number and time in front."""
-    when = "" if wanted.time is None else f" (t = {block[row, wanted.time]:.9g} s)"
+    when = "" if inputs.time is None else f" (t = {block[row, inputs.time]:.9g} s)"
     problems = error.said_by(arm.say).problems
     return PlanningError(problems[0].within(f"row {done + row}{when}"), *problems[1:])
 
 
-def _targets(block: Array, wanted: _PoseColumns, done: int, file: str) -> IkTarget:
-    position = block[:, wanted.position] * wanted.factors
-    if not wanted.rotation:
+def _targets(block: Array, inputs: _PoseColumns, done: int, file: str) -> IkTarget:
+    position = block[:, inputs.position] * inputs.factors
+    if not inputs.rotation:
         return partial_target(position)
-    quaternions = block[:, wanted.rotation]
+    quaternions = block[:, inputs.rotation]
     length = np.linalg.norm(quaternions, axis=1)
     wrong = np.flatnonzero(np.abs(length - 1.0) > QUATERNION_DEFECT)
     if wrong.size:
@@ -171,7 +171,7 @@ def _targets(block: Array, wanted: _PoseColumns, done: int, file: str) -> IkTarg
     return partial_target(position, rotation=matrix_from_quaternion(quaternions))
 
 
-def _wanted(rows: TableBlocks) -> _PoseColumns:
+def _pose_columns(rows: TableBlocks) -> _PoseColumns:
     by_kind: dict[str, tuple[int, Column]] = {}
     for index, name in enumerate(rows.names):
         column = parse_column(name)
