@@ -17,7 +17,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import JointType
-from trajcli.units import Dimension, Quantity, Units, factor, unit_name
+from trajcli.units import Dimension, Quantity, Units, factor, joint_quantity, unit_name
 
 Group = Literal["t", "q", "qd", "qdd", "qddd", "pose", "twist", "twistd", "path", "move"]
 GROUPS: tuple[Group, ...] = ("t", "q", "qd", "qdd", "qddd", "pose", "twist", "twistd", "path", "move")
@@ -110,7 +110,7 @@ def columns_of(groups: Sequence[Group], joint_types: Sequence[JointType], units:
     for group in groups:
         if group in JOINT_ORDERS:
             for joint, kind in enumerate(joint_types):
-                quantity = Quantity(_dimension(kind), JOINT_ORDERS[group])
+                quantity = joint_quantity(kind, JOINT_ORDERS[group])
                 columns.append(Column(group, joint, _unit(quantity, units), quantity))
         else:
             measured = _COLUMNS[group].items()
@@ -136,7 +136,7 @@ def check_groups(groups: Sequence[str]) -> None:
 
 def joint_factors(joint_types: Sequence[JointType], units: Units) -> Array:
     """Return SI per user unit for each joint's position and its time derivatives, shape (n,)."""
-    return _factors((Quantity(_dimension(kind)) for kind in joint_types), units)
+    return _factors(map(joint_quantity, joint_types), units)
 
 
 def group_factors(group: str, units: Units) -> Array:
@@ -147,10 +147,6 @@ def group_factors(group: str, units: Units) -> Array:
 def whole_number_columns(columns: Iterable[Column]) -> tuple[int, ...]:
     """Return the indices of the columns that are written without decimals."""
     return tuple(index for index, column in enumerate(columns) if column.whole_numbers)
-
-
-def _dimension(joint_type: JointType) -> Dimension:
-    return "length" if joint_type == "prismatic" else "angle"
 
 
 def _factors(quantities: Iterable[Quantity], units: Units) -> Array:

@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 import typer
 import typer.core
 
-from trajcli.cli.options import Digits, Errors, Joints, Json, RobotName, Si, Tool
+from trajcli.cli.options import DigitsOption, Errors, Joints, Json, RobotName, Si, Tool
 from trajcli.cli.outcome import guarded
 
 _NUMBER_LIKE = re.compile(r"[-+]?(?:\.?[0-9][^=]*|\.?nan|\.?inf(?:inity)?)", re.IGNORECASE)
@@ -98,7 +98,7 @@ def fk(
     links: Annotated[bool, typer.Option("--links", help="Also the frame of each link.")] = False,
     si: Si = False,
     as_json: Json = False,
-    digits: Digits = "fixed",
+    digits: DigitsOption = "fixed",
     errors: Errors = "text",
 ) -> int:
     """Say where the tool is: its pose for given joint values, or for each row of a CSV.
@@ -136,7 +136,7 @@ def ik(
     tool: Tool = None,
     si: Si = False,
     as_json: Json = False,
-    digits: Digits = "fixed",
+    digits: DigitsOption = "fixed",
     errors: Errors = "text",
 ) -> int:
     """Find all joint values that bring the tool to a pose; of a CSV of poses, the way that stays nearest.

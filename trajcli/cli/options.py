@@ -31,7 +31,7 @@ Joints = Annotated[
         metavar="Q...", help="A value for each joint, in the units of the robot's file; - reads a CSV."
     ),
 ]
-Digits = Annotated[
+DigitsOption = Annotated[
     Literal["fixed", "full"],
     typer.Option("--digits", help="Of a CSV. fixed: nine decimals; full: every bit."),
 ]

@@ -18,7 +18,7 @@ _ROUNDING = 1e-12  # relative: a limit that differs by less was meant to be the 
 _TOOL_ORDERS = {"speed": 1, "acceleration": 2, "jerk": 3}
 
 
-class Looser(NamedTuple):
+class LooserBound(NamedTuple):
     """A bound that is looser than the one it replaces.
 
     Attributes:
@@ -58,7 +58,7 @@ def with_move_limits(robot: Robot, spec: LimitsSpec | None, move: int) -> Robot:
     return _with_limits(robot, spec)
 
 
-def looser_bounds(robot: Robot, spec: LimitsSpec) -> Iterator[Looser]:
+def looser_bounds(robot: Robot, spec: LimitsSpec) -> Iterator[LooserBound]:
     """Yield each bound that is looser than the robot's."""
     for order, quantity in enumerate(QUANTITIES):
         before = robot.limits.of_order(order)
@@ -68,10 +68,10 @@ def looser_bounds(robot: Robot, spec: LimitsSpec) -> Iterator[Looser]:
         for joint in np.flatnonzero(ends[0] | ends[1]).tolist():
             end = 1 if ends[1][joint] else 0
             bounds = {"before": float(before[joint, end]), "after": float(after[joint, end])}
-            yield Looser(quantity, joint, {key: Amount(v, order, joint) for key, v in bounds.items()})
+            yield LooserBound(quantity, joint, {key: Amount(v, order, joint) for key, v in bounds.items()})
 
 
-def looser_problem(robot: Robot, looser: Looser, move: int) -> Problem:
+def looser_problem(robot: Robot, looser: LooserBound, move: int) -> Problem:
     """Return what is wrong with a bound that a move loosens."""
     quantity, joint, amounts = looser
     name = robot.joint_names[joint]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -24,7 +23,7 @@ from trajcli.kinematics.robot import Robot, unlimited
 from trajcli.language.numbers import ReadingContext
 from trajcli.language.recorded import Recorded
 from trajcli.planners.planner import Event
-from trajcli.units import Quantity, Units, to_user, unit_name
+from trajcli.units import Units, amount_text
 
 _UNREAD = Robot("unread", (), unlimited(0), None, np.eye(4), np.eye(4))
 """Stands for a robot whose own flaws are known, while the rest of the job is read."""
@@ -55,16 +54,7 @@ class LoadedJob:
 
     def say(self, amount: Amount) -> str:
         """Return a number of a message in the job's units."""
-        if amount.value in (math.inf, -math.inf):
-            return "unlimited"
-        dimension = amount.dimension
-        if amount.joint is not None:
-            dimension = "length" if self.robot.joint_types[amount.joint] == "prismatic" else "angle"
-        if dimension is None:
-            return f"{amount.numbers()} s"
-        quantity = Quantity(dimension, amount.order)
-        numbers = amount.numbers(lambda value: to_user(value, quantity, self.units))
-        return f"{numbers} {unit_name(quantity, self.units)}"
+        return amount_text(amount, self.robot.joint_types, self.units)
 
     def place_of_move(self, index: int) -> Place:
         """Return where a move stands in the file."""

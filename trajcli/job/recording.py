@@ -17,7 +17,6 @@ from trajcli.language.recorded import Recorded
 from trajcli.streams.table import Table, read_csv
 
 _OF_TIME = re.compile(r"(t|time|timestamp|secs?|seconds)([ _\[(].*)?")
-_WHOSE = {"deg": "revolute", "mm": "prismatic"}
 
 
 def read_recording(path: str, document: Document, robot: Robot) -> Recorded:
@@ -88,20 +87,18 @@ def _refuse_other_times(table: Table) -> None:
 def _joint(table: Table, robot: Robot, joint: int) -> Array:
     """Return the values of a joint, rad or m."""
     name, kind = robot.joint_names[joint], robot.joint_types[joint]
+    unit = "mm" if kind == "prismatic" else "deg"
     candidates = [(n, c) for n in table.names if (c := _column(n, robot)) is not None and c.joint == joint]
     if not candidates:
-        unit = "_deg" if kind == "revolute" else "_mm"
-        raise InputError(
-            f"{table.file}: no column for {name}", hint=f"call it q{joint + 1} (SI) or q{joint + 1}{unit}"
-        )
+        hint = f"call it q{joint + 1} (SI) or q{joint + 1}_{unit}"
+        raise InputError(f"{table.file}: no column for {name}", hint=hint)
     if len(candidates) > 1:
         raise InputError(f"{table.file}: two columns for {name}: {candidates[0][0]} and {candidates[1][0]}")
     header, column = candidates[0]
-    if column.unit is not None and _WHOSE[column.unit] != kind:
-        right = "mm" if kind == "prismatic" else "deg"
+    if column.unit not in (None, unit):
         raise InputError(
             f"{table.file}: the column {header} is in {column.unit}, but {name} is {kind}",
-            hint=f"call it {header.removesuffix(f'_{column.unit}')} (SI) or ..._{right}",
+            hint=f"call it {header.removesuffix(f'_{column.unit}')} (SI) or ..._{unit}",
         )
     return np.asarray(table.column(header) * column.factor)
 

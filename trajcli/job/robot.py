@@ -36,7 +36,7 @@ from trajcli.language.numbers import (
 )
 from trajcli.language.poses import Pose
 from trajcli.suggest import did_you_mean, nearest, valid_names
-from trajcli.units import Dimension, Quantity, Units
+from trajcli.units import Quantity, Units, joint_quantity
 
 CATALOGUE = Path(__file__).parent.parent / "catalogue"
 
@@ -168,10 +168,9 @@ def robot_as_mapping(robot: Robot) -> dict[str, Any]:
 def _joint_as_mapping(robot: Robot, index: int, *, described: bool) -> dict[str, Any]:
     joint = robot.joints[index]
     row = {key: written_number(getattr(joint, key), _DH[key]) for key in _DH} if described else {}
-    dimension: Dimension = "length" if joint.type == "prismatic" else "angle"
     bounds = [robot.limits.of_order(order)[index].tolist() for order in range(len(QUANTITIES))]
     limits = {
-        quantity: written_bound((low, high), Quantity(dimension, order))
+        quantity: written_bound((low, high), joint_quantity(joint.type, order))
         for order, (quantity, (low, high)) in enumerate(zip(QUANTITIES, bounds, strict=True))
     }
     return {"name": joint.name, "type": joint.type, **row, "sign": joint.sign, **limits}

@@ -20,7 +20,6 @@ from trajcli.queries.arm import ArmInUnits, LimitWatch
 from trajcli.streams.decimals import DECIMALS
 from trajcli.streams.table import TableBlocks
 
-_WHOSE = {"deg": "revolute", "mm": "prismatic"}
 _HALF = 0.5 * 10.0**-DECIMALS  # a joint that rests at its limit may be rounded beyond it
 
 
@@ -153,8 +152,8 @@ def _flaw(
     if joint in by_joint:
         return f"{column.name} and {by_joint[joint][1].name} are columns of the same joint", "leave one out"
     kind = robot.joint_types[joint]
-    if column.unit is not None and _WHOSE[column.unit] != kind:
-        unit = "mm" if kind == "prismatic" else "deg"
+    unit = "mm" if kind == "prismatic" else "deg"
+    if column.unit not in (None, unit):
         message = f"{column.name} cannot be in {column.unit}: {robot.joint_names[joint]} is {kind}"
         return message, f"expected q{joint + 1} or q{joint + 1}_{unit}"
     return None

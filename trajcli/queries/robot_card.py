@@ -14,7 +14,7 @@ from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.families.choose import method_for
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.queries.pose import pose_view
-from trajcli.units import Quantity, factor, to_user
+from trajcli.units import Quantity, factor, joint_quantity, to_user
 
 # Measured: within 2e-4 of what ten times as many draws find, for every robot of the catalogue.
 _SEED, _ROUNDS, _DRAWN, _KEPT = 20, 8, 1024, 32
@@ -122,11 +122,10 @@ def _joint_card(sheet: RobotSheet, index: int) -> dict[str, Any]:
     joint, units = sheet.robot.joints[index], sheet.units
     angle, length = Quantity("angle"), Quantity("length")
     row = {"theta": angle, "d": length, "a": length, "alpha": angle}
-    own = "length" if joint.type == "prismatic" else "angle"
     table = {key: round(to_user(getattr(joint, key), quantity, units), 12) for key, quantity in row.items()}
     limits: dict[str, Any] = {}
     for order, quantity in enumerate(QUANTITIES):
-        scale = factor(Quantity(own, order), units)  # type: ignore[arg-type]
+        scale = factor(joint_quantity(joint.type, order), units)
         low, high = (sheet.robot.limits.of_order(order)[index] / scale).tolist()
         limits[quantity] = [_finite(low), _finite(high)] if np.isfinite([low, high]).any() else None
     described = table if sheet.robot.convention is not None else {}
