@@ -46,6 +46,7 @@ def test_other_units_stand_in_the_name_of_the_joints_they_are_of():
         ("q3_mm", Column("q", 2, "mm", LENGTH)),
         ("move", Column("move", None, None, RATIO)),
         ("x_mm", Column("x", None, "mm", LENGTH)),
+        ("x_deg", Column("x", None, "deg")),
         ("q0", Column("q0")),
         ("q01", Column("q01")),
         ("qdddd1", Column("qdddd1")),

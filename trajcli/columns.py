@@ -93,7 +93,9 @@ def parse_column(name: str) -> Column:
     stem, unit = (parts["stem"], parts["unit"]) if parts else (name, None)
     joint = _JOINT.fullmatch(stem)
     if joint is None:
-        return Column(stem, None, unit, _QUANTITIES.get(stem))
+        known = _QUANTITIES.get(stem)
+        contradicted = known is not None and unit is not None and known.dimension != _DIMENSIONS[unit]
+        return Column(stem, None, unit, None if contradicted else known)
     kind = joint["kind"]
     quantity = Quantity(_DIMENSIONS[unit], JOINT_ORDERS[kind]) if unit else None
     return Column(kind, int(joint["number"]) - 1, unit, quantity)
