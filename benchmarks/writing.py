@@ -17,19 +17,22 @@ NAMES = ["t", *(f"{kind}{joint}" for kind in ("q", "qd", "qdd") for joint in ran
 
 def writer():
     """Prepare the writer, on the blocks in which rows are sampled."""
+    from trajcli.columns import parse_column
     from trajcli.samples import ROWS as SIZE
     from trajcli.streams.csv import write_csv
+
+    columns = [parse_column(name) for name in NAMES]
 
     rows = _rows()
     blocks = [rows[low : low + SIZE] for low in range(0, ROWS, SIZE)]
 
     def run():
         with Path(os.devnull).open("wb") as out:
-            write_csv(blocks, NAMES, out)
+            write_csv(blocks, columns, out)
 
     def numbers(_):
         out = io.BytesIO()
-        write_csv([rows[:: ROWS // 4]], NAMES, out)
+        write_csv([rows[:: ROWS // 4]], columns, out)
         return _numbers_of(out)
 
     return run, numbers

@@ -5,38 +5,52 @@ import math
 import numpy as np
 import pytest
 
-from trajcli.columns import Column, column_names, joint_factors, parse_column, whole_number_columns
+from trajcli.columns import (
+    GROUPS,
+    TOOL_COLUMNS,
+    Column,
+    columns_of,
+    joint_factors,
+    parse_column,
+    whole_number_columns,
+)
 from trajcli.errors import InputError
-from trajcli.units import Units
+from trajcli.units import Quantity, Units, factor
 
 JOINTS = ("revolute", "revolute", "prismatic")
+ANGLE, LENGTH, TIME, RATIO = (Quantity(dimension) for dimension in ("angle", "length", "time", "ratio"))
+
+
+def names_of(groups, units):
+    return [column.name for column in columns_of(groups, JOINTS, units)]
 
 
 def test_si_columns_have_plain_names():
-    assert column_names(("t", "q", "qd", "move"), JOINTS, Units()) == [
+    assert names_of(("t", "q", "qd", "move"), Units()) == [
         "t", "q1", "q2", "q3", "qd1", "qd2", "qd3", "move",
     ]  # fmt: skip
 
 
 def test_other_units_stand_in_the_name_of_the_joints_they_are_of():
-    names = column_names(("qdd", "t", "q"), JOINTS, Units("deg", "mm"))
+    names = names_of(("qdd", "t", "q"), Units("deg", "mm"))
     assert names == ["qdd1_deg", "qdd2_deg", "qdd3_mm", "t", "q1_deg", "q2_deg", "q3_mm"]
-    assert column_names(("q",), JOINTS, Units("deg", "m")) == ["q1_deg", "q2_deg", "q3"]
+    assert names_of(("q",), Units("deg", "m")) == ["q1_deg", "q2_deg", "q3"]
 
 
 @pytest.mark.parametrize(
     ("name", "column"),
     [
-        ("t", Column("t")),
+        ("t", Column("t", None, None, TIME)),
         ("q1", Column("q", 0)),
-        ("qddd12_deg", Column("qddd", 11, "deg")),
-        ("q3_mm", Column("q", 2, "mm")),
-        ("move", Column("move")),
-        ("x_mm", Column("x", None, "mm")),
+        ("qddd12_deg", Column("qddd", 11, "deg", Quantity("angle", 3))),
+        ("q3_mm", Column("q", 2, "mm", LENGTH)),
+        ("move", Column("move", None, None, RATIO)),
+        ("x_mm", Column("x", None, "mm", LENGTH)),
+        ("x_deg", Column("x", None, "deg")),
         ("q0", Column("q0")),
         ("q01", Column("q01")),
         ("qdddd1", Column("qdddd1")),
-        ("qw", Column("qw")),
+        ("qw", Column("qw", None, None, RATIO)),
         ("_deg", Column("_deg")),
         ("weight\n_kg", Column("weight\n_kg")),
     ],
@@ -48,9 +62,27 @@ def test_a_name_says_its_column_and_comes_back(name, column):
 
 def test_what_is_named_is_what_is_parsed():
     for units in (Units(), Units("deg", "mm")):
-        for name in column_names(("t", "q", "qd", "qdd", "qddd", "move"), JOINTS, units):
-            assert parse_column(name).name == name
-            assert parse_column(name).unit in (None, "deg", "mm")
+        for column in columns_of(GROUPS, JOINTS, units):
+            parsed = parse_column(column.name)
+            assert (parsed.kind, parsed.joint, parsed.unit) == (column.kind, column.joint, column.unit)
+            assert parsed.factor == column.factor
+            assert parsed.quantity in (column.quantity, None)
+            assert (parsed.quantity is None) == (column.joint is not None and column.unit is None)
+
+
+def test_a_column_says_what_it_measures():
+    columns = columns_of(GROUPS, JOINTS, Units("deg", "mm"))
+    by_name = {column.name: column for column in columns}
+    assert by_name["t"].quantity == TIME
+    assert by_name["q2_deg"] == Column("q", 1, "deg", ANGLE)
+    assert by_name["qddd3_mm"] == Column("qddd", 2, "mm", Quantity("length", 3))
+    assert by_name["x_mm"].quantity == by_name["s_mm"].quantity == LENGTH
+    assert by_name["wz_deg"].quantity == Quantity("angle", 1)
+    assert by_name["ax_mm"].quantity == by_name["sdd_mm"].quantity == Quantity("length", 2)
+    assert by_name["qw"].quantity == by_name["move"].quantity == RATIO
+    for column in columns:
+        assert column.factor == factor(column.quantity, Units("deg", "mm"))
+    assert {kind for group in TOOL_COLUMNS.values() for kind in group} <= {c.kind for c in columns}
 
 
 def test_factors():
@@ -61,7 +93,7 @@ def test_factors():
 
 
 def test_only_move_is_written_without_decimals():
-    assert whole_number_columns(["t", "move", "q1"]) == (1,)
+    assert whole_number_columns(map(parse_column, ["t", "move", "q1"])) == (1,)
 
 
 @pytest.mark.parametrize(
@@ -70,4 +102,4 @@ def test_only_move_is_written_without_decimals():
 )
 def test_a_choice_that_cannot_be_written_is_refused(groups, message):
     with pytest.raises(InputError, match=message):
-        column_names(groups, JOINTS, Units())
+        columns_of(groups, JOINTS, Units())

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import PPoly
 
-from trajcli.columns import column_names
+from trajcli.columns import columns_of
 from trajcli.curves.piecewise import PiecewisePolynomial, constant
 from trajcli.errors import InputError
 from trajcli.samples import ListedGrid, UniformGrid, sample
@@ -143,9 +143,12 @@ def test_columns_come_in_the_order_asked_for():
     curve = random_curve(3)
     trajectory, grid = trajectory_of(curve), UniformGrid(curve.duration, 50.0)
     everything = rows_of(trajectory, grid, ALL)
-    names = column_names(ALL, trajectory.joint_types, Units())
+    names = [column.name for column in columns_of(ALL, trajectory.joint_types, Units())]
     for groups in (("qdd", "t", "q"), ("move",), ("t",), ("qddd", "move", "qd")):
-        places = [names.index(name) for name in column_names(groups, trajectory.joint_types, Units())]
+        places = [
+            names.index(name)
+            for name in [column.name for column in columns_of(groups, trajectory.joint_types, Units())]
+        ]
         np.testing.assert_allclose(
             rows_of(trajectory, grid, groups), everything[:, places], rtol=1e-12, atol=1e-12
         )

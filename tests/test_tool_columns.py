@@ -11,7 +11,7 @@ from kinematics import oracle_robots as oracle
 from scipy.spatial.transform import Rotation
 from test_samples import random_curve, rows_of, trajectory_of
 
-from trajcli.columns import column_names
+from trajcli.columns import columns_of
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.errors import InputError
 from trajcli.geometry.rotation import without_jumps
@@ -160,7 +160,7 @@ def test_units_are_of_lengths_and_angles_but_not_of_quaternions():
     metres, radians = [1e3] * 3, [180 / np.pi] * 3
     factors = [*metres, 1, 1, 1, 1, *metres, *radians, *metres, *radians]
     np.testing.assert_allclose(other, plain * factors, rtol=1e-12, atol=1e-9)
-    assert column_names(TOOL, arm.joint_types, units) == [
+    assert [column.name for column in columns_of(TOOL, arm.joint_types, units)] == [
         "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz",
         "vx_mm", "vy_mm", "vz_mm", "wx_deg", "wy_deg", "wz_deg",
         "ax_mm", "ay_mm", "az_mm", "ex_deg", "ey_deg", "ez_deg",
@@ -172,9 +172,14 @@ def test_columns_about_the_tool_stand_where_they_are_asked_for():
     trajectory = motion_of(arm)
     grid = UniformGrid(trajectory.duration, 10.0)
     everything = rows_of(trajectory, grid, ("t", "q", "qddd", *TOOL, "move"), robot=arm)
-    names = column_names(("t", "q", "qddd", *TOOL, "move"), arm.joint_types, Units())
+    names = [
+        column.name for column in columns_of(("t", "q", "qddd", *TOOL, "move"), arm.joint_types, Units())
+    ]
     for groups in (("twistd", "q"), ("move", "pose", "t"), ("twist",), ("qddd", "twist", "pose")):
-        places = [names.index(name) for name in column_names(groups, arm.joint_types, Units())]
+        places = [
+            names.index(name)
+            for name in [column.name for column in columns_of(groups, arm.joint_types, Units())]
+        ]
         found = rows_of(trajectory, grid, groups, robot=arm)
         np.testing.assert_allclose(found, everything[:, places], rtol=1e-12, atol=1e-12)
 

@@ -1,4 +1,4 @@
-"""What the columns of a sample stream are called, and what a column's name says.
+"""Columns of a sample stream: their names and the quantities they hold.
 
 A column in SI has its plain name (`q1`, `qd1`, `x`), any other carries its unit (`q1_deg`, `qd1_deg`,
 `q3_mm`). What is about the tool is said in world: its pose T_world_tcp, its velocity at the tcp, and the
@@ -8,7 +8,7 @@ time derivative of that.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
@@ -17,20 +17,34 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import JointType
-from trajcli.units import Dimension, Quantity, Units, factor, unit_name
+from trajcli.units import Dimension, Quantity, Units, factor, joint_quantity, unit_name
 
 Group = Literal["t", "q", "qd", "qdd", "qddd", "pose", "twist", "twistd", "path", "move"]
-JOINT_ORDERS = {"q": 0, "qd": 1, "qdd": 2, "qddd": 3}
-TOOL_COLUMNS: dict[str, dict[str, Dimension]] = {
-    "pose": {**dict.fromkeys(("x", "y", "z"), "length"), **dict.fromkeys(("qw", "qx", "qy", "qz"), "ratio")},
-    "twist": {**dict.fromkeys(("vx", "vy", "vz"), "length"), **dict.fromkeys(("wx", "wy", "wz"), "angle")},
-    "twistd": {**dict.fromkeys(("ax", "ay", "az"), "length"), **dict.fromkeys(("ex", "ey", "ez"), "angle")},
-}
-"""What the columns of a group about the tool are called, and of what dimension each is, times apart."""
-PATH_COLUMNS = ("s", "sd", "sdd")
-"""The way of the tool along its path in a move, and its derivatives; zero where there is none."""
 GROUPS: tuple[Group, ...] = ("t", "q", "qd", "qdd", "qddd", "pose", "twist", "twistd", "path", "move")
+JOINT_ORDERS = {"q": 0, "qd": 1, "qdd": 2, "qddd": 3}
 
+
+def _tool(linear: Sequence[str], angular: Sequence[str], order: int) -> dict[str, Quantity]:
+    lengths, angles = Quantity("length", order), Quantity("angle", order)
+    return {**dict.fromkeys(linear, lengths), **dict.fromkeys(angular, angles)}
+
+
+TOOL_COLUMNS: Mapping[str, Mapping[str, Quantity]] = {
+    "pose": {**_tool("xyz", (), 0), **dict.fromkeys(("qw", "qx", "qy", "qz"), Quantity("ratio"))},
+    "twist": _tool(("vx", "vy", "vz"), ("wx", "wy", "wz"), 1),
+    "twistd": _tool(("ax", "ay", "az"), ("ex", "ey", "ez"), 2),
+}
+"""What the columns of a group about the tool are called, and what each measures."""
+_COLUMNS: Mapping[str, Mapping[str, Quantity]] = {
+    "t": {"t": Quantity("time")},
+    **TOOL_COLUMNS,
+    # Arc length of the tool along its path in a move, and its derivatives; zero where there is no path.
+    "path": {"s": Quantity("length"), "sd": Quantity("length", 1), "sdd": Quantity("length", 2)},
+    "move": {"move": Quantity("ratio")},
+}
+_QUANTITIES = {kind: quantity for group in _COLUMNS.values() for kind, quantity in group.items()}
+
+_DIMENSIONS: dict[str, Dimension] = {"deg": "angle", "mm": "length"}
 _UNIT_FACTORS = {
     "deg": factor(Quantity("angle"), Units(angle="deg")),
     "mm": factor(Quantity("length"), Units(length="mm")),
@@ -47,22 +61,20 @@ class Column:
         kind: "t", "q", "qd", "qdd", "qddd", "move", or the plain name of any other column, such as "x".
         joint: Index of the joint, from 0; None where the column is not about one joint.
         unit: "deg" or "mm"; None for SI.
+        quantity: What its numbers measure; None where nothing says it, as in a file the name `q1` of a joint
+            of any type.
     """
 
     kind: str
     joint: int | None = None
     unit: str | None = None
+    quantity: Quantity | None = None
 
     @property
     def name(self) -> str:
         """The column's name in a file."""
         number = "" if self.joint is None else str(self.joint + 1)
         return f"{self.kind}{number}" + (f"_{self.unit}" if self.unit else "")
-
-    @property
-    def quantity(self) -> tuple[str, int | None]:
-        """Kind and joint: the same for columns that differ in nothing but their unit."""
-        return self.kind, self.joint
 
     @property
     def factor(self) -> float:
@@ -80,31 +92,32 @@ def parse_column(name: str) -> Column:
     parts = _NAME.fullmatch(name)
     stem, unit = (parts["stem"], parts["unit"]) if parts else (name, None)
     joint = _JOINT.fullmatch(stem)
-    if joint:
-        return Column(joint["kind"], int(joint["number"]) - 1, unit)
-    return Column(stem, None, unit)
+    if joint is None:
+        known = _QUANTITIES.get(stem)
+        contradicted = known is not None and unit is not None and known.dimension != _DIMENSIONS[unit]
+        return Column(stem, None, unit, None if contradicted else known)
+    kind = joint["kind"]
+    quantity = Quantity(_DIMENSIONS[unit], JOINT_ORDERS[kind]) if unit else None
+    return Column(kind, int(joint["number"]) - 1, unit, quantity)
 
 
-def column_names(groups: Sequence[Group], joint_types: Sequence[JointType], units: Units) -> list[str]:
-    """Return the name of every column of `groups`, in the order of the groups, joints from the base on.
+def columns_of(groups: Sequence[Group], joint_types: Sequence[JointType], units: Units) -> tuple[Column, ...]:
+    """Return every column of `groups`, in the order of the groups, joints from the base on.
 
     Raises:
         InputError: When `groups` is empty, or holds an unknown group or one twice.
     """
     check_groups(groups)
-    names: list[str] = []
+    columns: list[Column] = []
     for group in groups:
         if group in JOINT_ORDERS:
-            suffixes = [_suffix(_dimension(kind), units) for kind in joint_types]
-            names += [Column(group, k, suffix).name for k, suffix in enumerate(suffixes)]
-        elif group in TOOL_COLUMNS:
-            measured = TOOL_COLUMNS[group].items()
-            names += [Column(kind, None, _suffix(dimension, units)).name for kind, dimension in measured]
-        elif group == "path":
-            names += [Column(name, None, _suffix("length", units)).name for name in PATH_COLUMNS]
+            for joint, kind in enumerate(joint_types):
+                quantity = joint_quantity(kind, JOINT_ORDERS[group])
+                columns.append(Column(group, joint, _unit(quantity, units), quantity))
         else:
-            names.append(group)
-    return names
+            measured = _COLUMNS[group].items()
+            columns += [Column(kind, None, _unit(quantity, units), quantity) for kind, quantity in measured]
+    return tuple(columns)
 
 
 def check_groups(groups: Sequence[str]) -> None:
@@ -116,36 +129,32 @@ def check_groups(groups: Sequence[str]) -> None:
     hint = f"the columns are {', '.join(GROUPS)}"
     if not groups:
         raise InputError("no columns are asked for", hint=hint)
-    for place, group in enumerate(groups):
+    for index, group in enumerate(groups):
         if group not in GROUPS:
             raise InputError(f"there are no columns '{group}'", hint=hint)
-        if group in groups[:place]:
+        if group in groups[:index]:
             raise InputError(f"the columns '{group}' are asked for twice", hint="name them once")
 
 
 def joint_factors(joint_types: Sequence[JointType], units: Units) -> Array:
     """Return SI per user unit for each joint's position and its time derivatives, shape (n,)."""
-    return _factors((_dimension(kind) for kind in joint_types), units)
+    return _factors(map(joint_quantity, joint_types), units)
 
 
-def tool_factors(group: str, units: Units) -> Array:
-    """Return SI per user unit for each column of a group of `TOOL_COLUMNS`, shape (columns,)."""
-    return _factors(TOOL_COLUMNS[group].values(), units)
+def group_factors(group: str, units: Units) -> Array:
+    """Return SI per user unit for each column of a group that is not about joints, shape (columns,)."""
+    return _factors(_COLUMNS[group].values(), units)
 
 
-def whole_number_columns(names: Sequence[str]) -> tuple[int, ...]:
-    """Return the places of the columns that are written without decimals."""
-    return tuple(place for place, name in enumerate(names) if parse_column(name).whole_numbers)
+def whole_number_columns(columns: Iterable[Column]) -> tuple[int, ...]:
+    """Return the indices of the columns that are written without decimals."""
+    return tuple(index for index, column in enumerate(columns) if column.whole_numbers)
 
 
-def _dimension(joint_type: JointType) -> Dimension:
-    return "length" if joint_type == "prismatic" else "angle"
+def _factors(quantities: Iterable[Quantity], units: Units) -> Array:
+    return np.array([factor(quantity, units) for quantity in quantities], dtype=np.float64)
 
 
-def _factors(dimensions: Iterable[Dimension], units: Units) -> Array:
-    return np.array([factor(Quantity(dimension), units) for dimension in dimensions], dtype=np.float64)
-
-
-def _suffix(dimension: Dimension, units: Units) -> str | None:
-    unit = unit_name(Quantity(dimension), units)
+def _unit(quantity: Quantity, units: Units) -> str | None:
+    unit = unit_name(Quantity(quantity.dimension), units)
     return unit if unit in _UNIT_FACTORS else None

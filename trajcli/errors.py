@@ -1,11 +1,12 @@
-"""The error tree: one branch for each exit code of the command line.
+"""Error classes, one branch for each exit code of the command line, and the problems that they carry.
 
-Every error carries one or more problems. A problem is one sentence about one thing that is wrong, with
-the numbers in it, the place it stands in (if it stands in a file), and what would fix it.
+A problem is one sentence about one thing that is wrong, with the numbers in it, its place in a file (if it
+stands in one), and what would fix it.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import field, replace
 from typing import Literal
@@ -15,7 +16,7 @@ from trajcli.frozen import comparable
 
 @comparable
 class Place:
-    """A stretch of one line of a file. Lines and columns count from 1."""
+    """Part of one line of a file. Lines and columns count from 1."""
 
     file: str
     line: int
@@ -29,10 +30,10 @@ class Place:
 
 @comparable
 class Amount:
-    """A number inside a message, in SI, so that it can be said in the user's units.
+    """A number inside a message, in SI, which a reader may want in other units.
 
     Attributes:
-        value: SI; several are the coordinates of a place.
+        value: SI; several are coordinates of a position.
         order: 0 for a position, 1 to 3 for its time derivatives.
         joint: Index of the joint that says whether angle or length is meant.
         dimension: "length" or "angle" of the tool; with neither this nor a joint the number is a time.
@@ -54,20 +55,29 @@ class Amount:
         return f"{scale(self.value):.9g}"
 
 
+Amounts = Mapping[str, Amount | str]
+"""What stands for each `{name}` in a message: a number, or a text of the user's, such as a joint's name."""
+
+_FIELD = re.compile(r"\{(\w+)\}")
+
+
 @comparable
 class Problem:
     """One thing that is wrong.
 
+    A message with amounts is a template. What the user wrote, such as the name of a joint, is an amount of it
+    and no part of its text, so that a joint named `{limit}` is just a name.
+
     Attributes:
         message: What is wrong, with the number and the bound, in the user's units.
-        hint: What would fix it; its amounts are held as those of the message are.
+        hint: What would fix it; it holds amounts as the message does.
         place: Where it stands in the user's file.
         move: Index of the move, from 0.
         joint: Name of the joint.
         time: Seconds from the start of the move.
         value: The offending number, SI.
         limit: The bound it breaks, SI.
-        amounts: Numbers that the message holds as `{name}`.
+        amounts: Numbers and names that the message holds as `{name}`.
     """
 
     message: str
@@ -78,22 +88,35 @@ class Problem:
     time: float | None = None
     value: float | None = None
     limit: float | None = None
-    amounts: Mapping[str, Amount] = field(default_factory=dict)
+    amounts: Amounts = field(default_factory=dict)
 
     def text(self, say: Callable[[Amount], str] = str) -> str:
-        """Return the message with its amounts said by `say`."""
+        """Return the message with its amounts as `say` writes them."""
         return said(self.message, self.amounts, say)
 
     def advice(self, say: Callable[[Amount], str] = str) -> str | None:
-        """Return the hint with its amounts said by `say`."""
+        """Return the hint with its amounts as `say` writes them."""
         return None if self.hint is None else said(self.hint, self.amounts, say)
 
+    def within(self, context: str) -> Problem:
+        """Return the problem with `context: ` in front of its message."""
+        if not self.amounts:
+            return replace(self, message=f"{context}: {self.message}")
+        name = f"context{len(self.amounts)}"
+        return replace(self, message=f"{{{name}}}: {self.message}", amounts={**self.amounts, name: context})
 
-def said(message: str, amounts: Mapping[str, Amount], say: Callable[[Amount], str] = str) -> str:
-    """Return a message with its amounts, which stand in it as `{name}`, said by `say`."""
-    for name, amount in amounts.items():
-        message = message.replace("{" + name + "}", say(amount))
-    return message
+
+def said(message: str, amounts: Amounts, say: Callable[[Amount], str] = str) -> str:
+    """Return a message with its amounts, which stand in it as `{name}`, as `say` writes them.
+
+    It is filled in one pass: braces inside of what is filled in are text.
+    """
+
+    def fill(match: re.Match[str]) -> str:
+        amount = amounts.get(match[1], match[0])
+        return amount if isinstance(amount, str) else say(amount)
+
+    return _FIELD.sub(fill, message) if amounts else message
 
 
 class TrajcliError(Exception):
@@ -122,9 +145,10 @@ class TrajcliError(Exception):
         return type(self)(*problems)
 
     def said_by(self, say: Callable[[Amount], str]) -> TrajcliError:
-        """Return the same error with the amounts of its messages said by `say`."""
-        told = (replace(p, message=p.text(say), hint=p.advice(say), amounts={}) for p in self.problems)
-        return type(self)(*told)
+        """Return the same error with the amounts of its messages as `say` writes them."""
+        return type(self)(
+            *(replace(p, message=p.text(say), hint=p.advice(say), amounts={}) for p in self.problems)
+        )
 
 
 class VerificationError(TrajcliError):

@@ -1,6 +1,6 @@
-"""A trajectory as rows of numbers: where the rows stand, and what is in them.
+"""Sampling of a trajectory on a grid of times.
 
-Rows are made in blocks of bounded size, so that memory does not grow with their number.
+Rows are evaluated in blocks of bounded size, so that memory does not grow with their number.
 """
 
 from __future__ import annotations
@@ -15,23 +15,23 @@ from trajcli.columns import (
     TOOL_COLUMNS,
     Group,
     check_groups,
+    group_factors,
     joint_factors,
-    tool_factors,
 )
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, read_only
 from trajcli.errors import InputError
 from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Robot
 from trajcli.trajectory import Trajectory
-from trajcli.units import Quantity, Units, factor
+from trajcli.units import Units
 
 ROWS = 4096  # rows of a block: long enough to hide the cost of a call, short enough for the cache
 
 _NANOSECOND = 1e-9  # the last decimal of a time in a file: rows closer than this would show the same time
-_END = 1e-6  # of a period: an end this close to a grid time takes that row's place
+_END = 1e-6  # of a period: an end this close to a grid time replaces that row
 _BREAK = 1e-12  # s: a row this close before a break is at it; rounding decides no row's side
 
-_TOOL_ORDERS = {"pose": 0, "twist": 1, "twistd": 2}  # the highest derivative of q that each group is made of
+_TOOL_ORDERS = {"pose": 0, "twist": 1, "twistd": 2}  # the highest derivative of q that each group needs
 
 
 @comparable
@@ -149,7 +149,7 @@ def sample(
     Args:
         trajectory: What is sampled.
         grid: Where; of the trajectory's duration.
-        groups: Groups of columns in the order wanted, named by `column_names`.
+        groups: Groups of columns in the order wanted, as `columns_of` lists them.
         units: Units of the rows; SI if left out.
         robot: Whose tool it is, base and tool included; needed for the groups of `TOOL_COLUMNS` only.
         size: Most rows of a block.
@@ -173,16 +173,16 @@ def sample(
             elif group in TOOL_COLUMNS:
                 part = _of_tool(group, robot, motion * factors, last)
                 last = part[-1, 3:] if group == "pose" else last
-                parts.append(part / tool_factors(group, units))
+                parts.append(part / group_factors(group, units))
             elif group == "path":
-                parts.append(_ways(trajectory, local) / factor(Quantity("length"), units))
+                parts.append(_path_law(trajectory, local) / group_factors(group, units))
             else:
                 parts.append((times if group == "t" else _moves(trajectory, local))[:, None])
         yield np.concatenate(parts, axis=1)
 
 
 def _orders(groups: Sequence[Group]) -> list[int]:
-    """Return the orders of derivatives that `groups` are made of, rising; at least one."""
+    """Return the orders of derivatives that `groups` need, rising; at least one."""
     orders = {JOINT_ORDERS[group] for group in groups if group in JOINT_ORDERS}
     for group in groups:
         orders |= set(range(_TOOL_ORDERS.get(group, -1) + 1))
@@ -234,17 +234,17 @@ def _window(curve: PiecewisePolynomial, local: Array) -> PiecewisePolynomial:
     return PiecewisePolynomial(curve.breaks[first : last + 2], curve.coefficients[:, first : last + 1])
 
 
-def _ways(trajectory: Trajectory, local: Array) -> Array:
-    """Return the way along the path and two derivatives, shape (N, 3), SI; zero where a move has no path."""
-    ways = np.zeros((local.size, 3))
+def _path_law(trajectory: Trajectory, local: Array) -> Array:
+    """Return s along the path and two derivatives, shape (N, 3), SI; zero where a move has no path."""
+    values = np.zeros((local.size, 3))
     starts = np.array([span.start for span in trajectory.spans])
     owner = np.searchsorted(starts, local + _BREAK, "right") - 1
-    for place, (span, law) in enumerate(zip(trajectory.spans, trajectory.laws, strict=False)):
-        rows = np.flatnonzero(owner == place)
+    for index, (span, law) in enumerate(zip(trajectory.spans, trajectory.laws, strict=False)):
+        rows = np.flatnonzero(owner == index)
         if law is not None and rows.size:
             times = np.clip(local[rows] - span.start, law.start, law.end)
-            ways[rows] = law.evaluate_orders(_onto_breaks(times, law.breaks), (0, 1, 2))[:, :, 0]
-    return ways
+            values[rows] = law.evaluate_orders(_onto_breaks(times, law.breaks), (0, 1, 2))[:, :, 0]
+    return values
 
 
 def _moves(trajectory: Trajectory, local: Array) -> Array:
@@ -252,5 +252,5 @@ def _moves(trajectory: Trajectory, local: Array) -> Array:
     spans = [span for span in trajectory.spans if span.duration > 0] or list(trajectory.spans[:1])
     starts = np.array([span.start for span in spans])
     indices = np.array([span.index for span in spans], dtype=np.float64)
-    places = np.searchsorted(starts, local + _BREAK, "right") - 1
-    return indices[np.maximum(places, 0)]
+    owner = np.searchsorted(starts, local + _BREAK, "right") - 1
+    return indices[np.maximum(owner, 0)]

@@ -1,4 +1,4 @@
-"""Units: what a file's numbers are measured in, and strings that carry their own unit.
+"""Units of measurement: of a file's plain numbers, and in strings that carry their own.
 
 Inside the house everything is SI. A number of a file is `value * factor(quantity, units)`; a string such as
 "120 deg/s" says its unit itself. The units that strings may use:
@@ -17,8 +17,10 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from typing import Literal
 
+from trajcli.errors import Amount
 from trajcli.frozen import comparable
 
 Dimension = Literal["angle", "length", "time", "frequency", "ratio"]
@@ -88,19 +90,35 @@ def unit_name(quantity: Quantity, units: Units) -> str:
     """Return the user's unit as messages say it, such as "deg/s" or "mm/s^2"; empty for a ratio."""
     if quantity.dimension in ("time", "frequency", "ratio"):
         return {"time": "s", "frequency": "Hz", "ratio": ""}[quantity.dimension]
-    return (units.angle if quantity.dimension == "angle" else units.length) + ("", "/s", "/s^2", "/s^3")[
-        quantity.order
-    ]
+    return (units.angle if quantity.dimension == "angle" else units.length) + _RATES[quantity.order]
 
 
-def to_si(value: float, quantity: Quantity, units: Units) -> float:
-    """Return a number in user units as SI."""
-    return value * factor(quantity, units)
+def joint_quantity(joint_type: str, order: int = 0) -> Quantity:
+    """Return what the value of a joint measures, or its time derivative of the given order."""
+    return Quantity("length" if joint_type == "prismatic" else "angle", order)
 
 
 def to_user(si: float, quantity: Quantity, units: Units) -> float:
     """Return an SI number in user units."""
     return si / factor(quantity, units)
+
+
+def amount_text(amount: Amount, joint_types: Sequence[str], units: Units) -> str:
+    """Return a number of a message in user units.
+
+    Args:
+        amount: The number, SI.
+        joint_types: "revolute" or "prismatic" for each joint.
+        units: Of the user.
+    """
+    if amount.value in (math.inf, -math.inf):
+        return "unlimited"
+    if amount.joint is not None:
+        quantity = joint_quantity(joint_types[amount.joint], amount.order)
+    else:
+        quantity = Quantity(amount.dimension or "time", amount.order)
+    numbers = amount.numbers(lambda value: to_user(value, quantity, units))
+    return f"{numbers} {unit_name(quantity, units)}"
 
 
 def parse_quantity(text: str, quantity: Quantity) -> float:
@@ -119,8 +137,8 @@ def parse_quantity(text: str, quantity: Quantity) -> float:
     number, unit = match.groups()
     if not unit:
         unitless = quantity.dimension == "ratio"
-        way = f"write {number} without quotes" + ("" if unitless else ", or give it a unit")
-        raise UnitError(f"{_expected(quantity, text)}: {way}")
+        remedy = f"write {number} without quotes" + ("" if unitless else ", or give it a unit")
+        raise UnitError(f"{_expected(quantity, text)}: {remedy}")
     scale = _scale(unit, quantity)
     if scale is None:
         raise UnitError(_expected(quantity, text) + _unknown(unit, quantity))

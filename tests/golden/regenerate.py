@@ -16,7 +16,7 @@ def golden_file(example: Path) -> Path:
 
 def rows_of(example: Path) -> bytes:
     """Return what `trajcli plan EXAMPLE` writes to standard output."""
-    from trajcli.columns import column_names
+    from trajcli.columns import columns_of
     from trajcli.job.read import load_job
     from trajcli.output.write import grid_of
     from trajcli.planning.plan import plan_job
@@ -29,9 +29,9 @@ def rows_of(example: Path) -> bytes:
         raise SystemExit(f"{example} does not verify: {plan.verdict.findings}")
     groups = loaded.job.output.columns
     out = io.BytesIO()
-    names = column_names(groups, loaded.robot.joint_types, loaded.units)
+    columns = columns_of(groups, loaded.robot.joint_types, loaded.units)
     rows = sample(plan.trajectory, grid_of(plan), groups, loaded.units, robot=loaded.robot)
-    write_csv(rows, names, out)
+    write_csv(rows, columns, out)
     return out.getvalue()
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -15,13 +15,14 @@ from trajcli.cli.init import STARTER
 from trajcli.job.dump import dump_job
 from trajcli.job.read import job_from_text
 from trajcli.job.robot import CATALOGUE
-from trajcli.job.schema import KINDS, SchemaKind, schema_of, schema_text
+from trajcli.job.schema import SchemaKind, schema_of, schema_text
 from trajcli.job.yaml.load import read_document
 from trajcli.planners import PLANNERS
 
 ROOT = Path(__file__).parents[2]
 JOBS = [*sorted((ROOT / "examples").glob("*.yaml")), STARTER]
 ROBOTS = [*sorted(CATALOGUE.glob("*.yaml")), *sorted((ROOT / "examples/robots").glob("*.yaml"))]
+KINDS: tuple[SchemaKind, ...] = get_args(SchemaKind)
 VALIDATORS = {kind: Draft202012Validator(schema_of(kind)) for kind in KINDS}
 
 

@@ -7,10 +7,13 @@ import tracemalloc
 import numpy as np
 import pytest
 
+from trajcli.columns import parse_column
 from trajcli.errors import FileError, TrajcliError
-from trajcli.streams.csv import verify_written, write_csv, write_verified
+from trajcli.streams.csv import verify_csv, write_csv
+from trajcli.streams.formats import write_verified
 
 NAMES = ["t", *(f"q{k}" for k in range(1, 6)), "move"]
+COLUMNS = [parse_column(name) for name in NAMES]
 
 
 def table(count=3000, scale=3.0):
@@ -26,7 +29,7 @@ def blocks_of(rows, size=700):
 
 def written(rows, digits="fixed"):
     out = io.BytesIO()
-    write_csv(blocks_of(rows), NAMES, out, digits)
+    write_csv(blocks_of(rows), COLUMNS, out, digits)
     return out.getvalue()
 
 
@@ -43,7 +46,7 @@ def test_a_file_is_its_names_and_its_rows():
 def test_block_size_changes_no_byte():
     rows = table()
     whole = io.BytesIO()
-    write_csv([rows], NAMES, whole)
+    write_csv([rows], COLUMNS, whole)
     assert whole.getvalue() == written(rows)
 
 
@@ -54,7 +57,7 @@ def test_what_is_not_finite_is_never_written(bad, digits):
     rows[2001, 3] = bad
     out = io.BytesIO()
     with pytest.raises(TrajcliError, match=rf"q3 is {bad} in row 2001") as caught:
-        write_csv(blocks_of(rows), NAMES, out, digits)
+        write_csv(blocks_of(rows), COLUMNS, out, digits)
     assert caught.value.exit_code == 70
     assert b"nan" not in out.getvalue()
     assert b"inf" not in out.getvalue()
@@ -64,7 +67,7 @@ def test_what_is_not_finite_is_never_written(bad, digits):
 @pytest.mark.parametrize("scale", [1e-10, 3.0, 2e4, 1e8, 1e13])
 def test_what_was_written_is_read_back(digits, scale):
     rows = table(scale=scale)
-    verify_written(io.BytesIO(written(rows, digits)), blocks_of(rows, 997), NAMES, digits)
+    verify_csv(io.BytesIO(written(rows, digits)), blocks_of(rows, 997), COLUMNS, digits)
 
 
 def numbers(text):
@@ -85,7 +88,7 @@ def test_every_flipped_digit_is_found(digits):
             flipped[place] = text[place]
             continue
         with pytest.raises(TrajcliError, match="read back says"):
-            verify_written(io.BytesIO(bytes(flipped)), [rows], NAMES, digits)
+            verify_csv(io.BytesIO(bytes(flipped)), [rows], COLUMNS, digits)
         flipped[place] = text[place]
 
 
@@ -94,7 +97,7 @@ def test_one_unit_of_the_last_decimal_is_found_with_its_place():
     moved = rows.copy()
     moved[2345, 2] += 1e-9
     with pytest.raises(TrajcliError, match=r"in row 2345 of q2, where the curve is"):
-        verify_written(io.BytesIO(written(moved)), blocks_of(rows), NAMES)
+        verify_csv(io.BytesIO(written(moved)), blocks_of(rows), COLUMNS)
 
 
 MUTANTS = {
@@ -123,21 +126,21 @@ def test_every_damage_is_found(mutant, digits):
     damaged = MUTANTS[mutant](text)
     assert damaged != text
     with pytest.raises(TrajcliError, match="read back"):
-        verify_written(io.BytesIO(damaged), blocks_of(rows), NAMES, digits)
+        verify_csv(io.BytesIO(damaged), blocks_of(rows), COLUMNS, digits)
 
 
 def test_a_lost_negative_zero_is_found_where_digits_are_full():
     rows = np.zeros((1, len(NAMES)))
     text = written(rows, "full")
-    verify_written(io.BytesIO(text), [rows], NAMES, "full")
+    verify_csv(io.BytesIO(text), [rows], COLUMNS, "full")
     rows[0, 1] = -0.0
     with pytest.raises(TrajcliError, match="q1"):
-        verify_written(io.BytesIO(text), [rows], NAMES, "full")
+        verify_csv(io.BytesIO(text), [rows], COLUMNS, "full")
 
 
 def test_a_verified_file_appears_whole(tmp_path):
     rows = table()
-    write_verified(tmp_path / "out.csv", lambda: blocks_of(rows), NAMES)
+    write_verified(tmp_path / "out.csv", lambda: blocks_of(rows), COLUMNS)
     assert (tmp_path / "out.csv").read_bytes() == written(rows)
     assert [path.name for path in tmp_path.iterdir()] == ["out.csv"]
 
@@ -145,7 +148,7 @@ def test_a_verified_file_appears_whole(tmp_path):
 def test_a_file_that_fails_its_check_does_not_appear(tmp_path):
     calls = iter([table(), table() + 1e-8])
     with pytest.raises(TrajcliError, match="read back says"):
-        write_verified(tmp_path / "out.csv", lambda: blocks_of(next(calls)), NAMES)
+        write_verified(tmp_path / "out.csv", lambda: blocks_of(next(calls)), COLUMNS)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -154,14 +157,14 @@ def test_a_file_of_numbers_that_end_does_not_appear(tmp_path):
     rows[2500, 1] = np.nan
     (tmp_path / "out.csv").write_text("old")
     with pytest.raises(TrajcliError, match="q1 is nan"):
-        write_verified(tmp_path / "out.csv", lambda: blocks_of(rows), NAMES)
+        write_verified(tmp_path / "out.csv", lambda: blocks_of(rows), COLUMNS)
     assert (tmp_path / "out.csv").read_text() == "old"
     assert len(list(tmp_path.iterdir())) == 1
 
 
 def test_a_full_disk_is_an_error_of_the_file():
     with pytest.raises(FileError, match="cannot write /dev/full: No space left") as caught:
-        write_verified("/dev/full", lambda: blocks_of(table()), NAMES)
+        write_verified("/dev/full", lambda: blocks_of(table()), COLUMNS)
     assert caught.value.exit_code == 4
 
 
@@ -169,7 +172,7 @@ def test_a_closed_pipe_is_said_as_such():
     read, write = os.pipe()
     os.close(read)
     with pytest.raises(BrokenPipeError), os.fdopen(write, "wb", buffering=0) as out:
-        write_csv(blocks_of(table()), NAMES, out)
+        write_csv(blocks_of(table()), COLUMNS, out)
 
 
 def test_memory_is_the_same_for_many_rows(tmp_path):
@@ -179,7 +182,7 @@ def test_memory_is_the_same_for_many_rows(tmp_path):
 
     def peak(count):
         tracemalloc.start()
-        write_verified(tmp_path / "out.csv", lambda: rows(count), ["t", "q1", "q2"])
+        write_verified(tmp_path / "out.csv", lambda: rows(count), COLUMNS[:3])
         result = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         return result

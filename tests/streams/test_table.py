@@ -5,6 +5,7 @@ import io
 import numpy as np
 import pytest
 
+from trajcli.columns import parse_column
 from trajcli.errors import FileError, InputError
 from trajcli.streams import table
 from trajcli.streams.csv import write_csv
@@ -32,7 +33,8 @@ def test_what_is_written_is_read(tmp_path, digits):
     rows = np.random.default_rng(0).normal(size=(20000, 4)) * [1, 100, 1e4, 0]
     rows[:, 3] = np.arange(20000) // 100
     out = io.BytesIO()
-    write_csv([rows], ["t", "q1", "q2_deg", "move"], out, digits)
+    columns = [parse_column(name) for name in ("t", "q1", "q2_deg", "move")]
+    write_csv([rows], columns, out, digits)
     found = read(tmp_path, out.getvalue())
     assert found.names == ("t", "q1", "q2_deg", "move")
     if digits == "full":

@@ -1,4 +1,7 @@
-"""The commands of the command line. Only typer is imported here: `--help` must stay fast."""
+"""Commands about jobs and sample streams, and the application that holds all commands.
+
+Only typer is imported here: `--help` must stay fast.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ from typing import Annotated, Literal, get_type_hints
 import typer
 
 from trajcli.cli.arm_commands import register
+from trajcli.cli.options import Errors, JobFile, Json, Overrides
 from trajcli.cli.outcome import guarded
 
 app = typer.Typer(
@@ -21,17 +25,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-
-Errors = Annotated[
-    Literal["text", "json"], typer.Option("--errors", help="How errors are written to stderr.")
-]
-JobFile = Annotated[str, typer.Argument(metavar="JOB", help="The job file; - is standard input.")]
-Overrides = Annotated[
-    list[str],
-    typer.Option(
-        "--set", metavar="PATH=VALUE", help="Override a value of the job, such as moves.0.duration=3."
-    ),
-]
 
 
 @app.callback()
@@ -83,7 +76,7 @@ def plan(
 def explain(
     job: JobFile,
     override: Overrides = [],  # noqa: B006
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for programs.")] = False,
+    as_json: Json = False,
     errors: Errors = "text",
 ) -> int:
     """Say each move in words and formulas: polynomials, phases, peaks, branches, and how fast it could be."""

@@ -1,6 +1,6 @@
-"""The commands about arms and poses. Only typer is imported here: `--help` must stay fast.
+"""Commands about arms and poses, whose words may be numbers: negative ones are no options.
 
-A command whose words may be numbers: negative ones are no options, and an option may take several.
+Only typer is imported here: `--help` must stay fast.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import Annotated, Literal
 import typer
 import typer.core
 
+from trajcli.cli.options import DigitsOption, Errors, Joints, Json, RobotName, Si, Tool
 from trajcli.cli.outcome import guarded
 
 _NUMBER_LIKE = re.compile(r"[-+]?(?:\.?[0-9][^=]*|\.?nan|\.?inf(?:inity)?)", re.IGNORECASE)
@@ -75,30 +76,6 @@ def sorted_words(args: list[str], takes: Mapping[str, int]) -> list[str]:
         options += [word, *rest[:count]]
         rest = rest[count:]
     return [*options, "--", *others, *rest[1:]]
-
-
-Errors = Annotated[
-    Literal["text", "json"], typer.Option("--errors", help="How errors are written to stderr.")
-]
-RobotName = Annotated[
-    str, typer.Option("--robot", "-r", metavar="NAME|FILE", help="A robot of the catalogue, or a robot file.")
-]
-Tool = Annotated[
-    str | None,
-    typer.Option("--tool", metavar="POSE", help="T_flange_tcp as YAML or @FILE, instead of the robot's own."),
-]
-Si = Annotated[bool, typer.Option("--si", help="Numbers in rad and m, whatever units the robot's file has.")]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
-Joints = Annotated[
-    list[str],
-    typer.Argument(
-        metavar="Q...", help="A value for each joint, in the units of the robot's file; - reads a CSV."
-    ),
-]
-DigitsOption = Annotated[
-    Literal["fixed", "full"],
-    typer.Option("--digits", help="Of a CSV. fixed: nine decimals; full: every bit."),
-]
 
 
 def register(app: typer.Typer) -> None:

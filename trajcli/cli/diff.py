@@ -1,4 +1,4 @@
-"""`trajcli diff`."""
+"""Comparison of sample streams on the command line: `trajcli diff`."""
 
 from __future__ import annotations
 

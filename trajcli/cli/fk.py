@@ -1,4 +1,4 @@
-"""`trajcli fk`."""
+"""Forward kinematics on the command line: `trajcli fk`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from trajcli.frozen import comparable
 from trajcli.kinematics.forward import forward, link_poses
 from trajcli.queries.arm import ArmInUnits, LimitWatch, open_arm
 from trajcli.queries.pose import pose_view
-from trajcli.streams.csv import Digits, write_csv
+from trajcli.streams.csv import write_csv
+from trajcli.streams.decimals import Digits
 from trajcli.streams.whole_file import standard_output
 
 
@@ -40,26 +41,26 @@ def run_fk(robot: str, words: Sequence[str], options: FkOptions) -> int:
     if list(words) == ["-"]:
         return _stream(arm, options)
     q = arm.joint_values(words)
-    told: dict[str, Any] = pose_view(forward(arm.robot, q), arm.units)
+    report: dict[str, Any] = pose_view(forward(arm.robot, q), arm.units)
     if options.links:
         frames = link_poses(arm.robot, q)[1:-1]
         names = arm.robot.joint_names
-        told["links"] = [
+        report["links"] = [
             {"name": name, **pose_view(pose, arm.units)} for name, pose in zip(names, frames, strict=True)
         ]
     if options.as_json:
-        print_json(told)
+        print_json(report)
     else:
-        print_lines(_lines(arm, told, options.frame))
+        print_lines(_lines(arm, report, options.frame))
     watch = LimitWatch(arm.robot)
     watch.see(q[None], arm.joint_factors, [arm.joint_unit(i) for i in range(len(q))])
     _remark(arm, watch)
     return 0
 
 
-def _lines(arm: ArmInUnits, told: dict[str, Any], frame: str) -> list[str]:
-    lines = [f"pose of the tcp of {arm.robot.name} in {frame}:", *pose_lines(told, arm.units)]
-    for link in told.get("links", []):
+def _lines(arm: ArmInUnits, report: dict[str, Any], frame: str) -> list[str]:
+    lines = [f"pose of the tcp of {arm.robot.name} in {frame}:", *pose_lines(report, arm.units)]
+    for link in report.get("links", []):
         lines += ["", f"frame of link {link['name']} in {frame}:", *pose_lines(link, arm.units)]
     return lines
 
@@ -72,9 +73,9 @@ def _stream(arm: ArmInUnits, options: FkOptions) -> int:
         if given:
             raise InputError(f"{name} is for one configuration, rows from standard input become a CSV")
     watch = LimitWatch(arm.robot)
-    names, blocks = poses_of(arm, open_rows("-"), watch)
+    columns, blocks = poses_of(arm, open_rows("-"), watch)
     with standard_output() as out:
-        write_csv(blocks, names, out, options.digits)
+        write_csv(blocks, columns, out, options.digits)
     _remark(arm, watch, rows=True)
     return 0
 

@@ -1,4 +1,4 @@
-"""Problems as people read them, with the line and a caret below it, and as machines do.
+"""Rendering of problems: as text with the line of the file and a caret below it, and as JSON.
 
 Text of a file never reaches the terminal as control characters: they are shown as escapes.
 """
@@ -39,7 +39,7 @@ def render_problem(problem: Problem, *, color: bool) -> str:
     """Return a problem for people: place and message, then the line with a caret, then what would fix it.
 
     Args:
-        problem: Its amounts are said in SI unless they were said before.
+        problem: Amounts that are still in its message are written in SI.
         color: Whether to use the terminal's colors.
     """
     paint = _painted if color else _plain

@@ -1,4 +1,4 @@
-"""`trajcli ik`."""
+"""Inverse kinematics on the command line: `trajcli ik`."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from trajcli.job.inline import inline_target
 from trajcli.kinematics.inverse.solutions import Solutions
 from trajcli.language.targets import ik_target
 from trajcli.queries.arm import ArmInUnits, open_arm
-from trajcli.queries.inverse import answers, find_answers, require_answer
-from trajcli.streams.csv import Digits
+from trajcli.queries.inverse import answer_reports, find_answers, require_answer
+from trajcli.streams.decimals import Digits
 
 
 @comparable
@@ -49,13 +49,13 @@ def run_ik(robot: str, words: Sequence[str], options: IkOptions) -> int:
         return _stream(arm, near, options)
     asked = inline_target(options.pose, "--pose", arm.units)
     target = ik_target(asked)
-    found, chosen = find_answers(arm, target, asked.configuration, near, options.tolerance)
-    told = answers(arm, found, chosen, target, near, every=options.every, turns=options.turns)
+    solutions, chosen = find_answers(arm, target, asked.configuration, near, options.tolerance)
+    reports = answer_reports(arm, solutions, chosen, target, near, every=options.every, turns=options.turns)
     if options.as_json:
-        print_json(told)
-    elif told:
-        print_lines(_lines(arm, found, told))
-    require_answer(arm, found, chosen, asked.configuration)
+        print_json(reports)
+    elif reports:
+        print_lines(_lines(arm, solutions, reports))
+    require_answer(arm, solutions, chosen, asked.configuration)
     return 0
 
 
@@ -74,11 +74,11 @@ def _check(words: Sequence[str], options: IkOptions) -> None:
             raise InputError(f"{name} is for one pose, rows from standard input become a CSV")
 
 
-def _lines(arm: ArmInUnits, found: Solutions, told: Sequence[dict[str, Any]]) -> Iterator[str]:
+def _lines(arm: ArmInUnits, solutions: Solutions, reports: Sequence[dict[str, Any]]) -> Iterator[str]:
     units = dict.fromkeys(arm.joint_unit(i) for i in range(len(arm.robot.joints)))
-    count = f"{len(told)} answer{'s' * (len(told) != 1)}"
-    yield f"{count} for {arm.robot.name} ({', '.join(units)}), by {found.method.name}:"
-    for answer in told:
+    count = f"{len(reports)} answer{'s' * (len(reports) != 1)}"
+    yield f"{count} for {arm.robot.name} ({', '.join(units)}), by {solutions.method.name}:"
+    for answer in reports:
         names = " ".join(answer["branch"].values())
         notes = [names] if names else []
         notes += [] if answer["within_limits"] else ["outside the limits"]
@@ -87,7 +87,7 @@ def _lines(arm: ArmInUnits, found: Solutions, told: Sequence[dict[str, Any]]) ->
             notes.append(f"free along {numbers(answer['free_direction'])}")
         joints = numbers(answer["joints"])
         yield f"  {joints}" + (f"   ({', '.join(notes)})" if notes else "")
-    worst = max(answer["closure"] for answer in told)
+    worst = max(answer["closure"] for answer in reports)
     yield f"they miss the pose by at most {number(worst) if worst > 1e-12 else '1e-12'} (m, rad)"
 
 
@@ -97,7 +97,7 @@ def _stream(arm: ArmInUnits, near: Array | None, options: IkOptions) -> int:
     from trajcli.streams.table import open_rows
     from trajcli.streams.whole_file import standard_output
 
-    names, blocks = joints_of(arm, open_rows("-"), near, options.tolerance)
+    columns, blocks = joints_of(arm, open_rows("-"), near, options.tolerance)
     with standard_output() as out:
-        write_csv(blocks, names, out, options.digits)
+        write_csv(blocks, columns, out, options.digits)
     return 0

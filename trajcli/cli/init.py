@@ -1,4 +1,4 @@
-"""`trajcli init`."""
+"""Starter job on the command line: `trajcli init`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`trajcli jacobian`."""
+"""Jacobians on the command line: `trajcli jacobian`."""
 
 from __future__ import annotations
 
@@ -40,32 +40,32 @@ def run_jacobian(robot: str, words: Sequence[str], options: JacobianOptions) -> 
         return _stream(arm, options)
     q = arm.joint_values(words)
     qd = None if options.rates is None else arm.joint_values([options.rates], "--qd", 1)
-    told = jacobian_report(arm, q, options.frame, qd)
+    report = jacobian_report(arm, q, options.frame, qd)
     if options.as_json:
-        print_json(told)
+        print_json(report)
     else:
-        print_lines(_lines(arm, told, options.frame))
+        print_lines(_lines(arm, report, options.frame))
     return 0
 
 
-def _lines(arm: ArmInUnits, told: dict[str, Any], frame: str) -> Iterator[str]:
+def _lines(arm: ArmInUnits, report: dict[str, Any], frame: str) -> Iterator[str]:
     length, angle = arm.units.length, arm.units.angle
     rates = ", ".join(dict.fromkeys(arm.joint_unit(i, 1) for i in range(len(arm.robot.joints))))
     yield f"Jacobian of {arm.robot.name} in the axes of the {frame} frame"
     yield f"(rows vx vy vz in {length}/s, wx wy wz in {angle}/s; joint rates in {rates}):"
-    yield from matrix_lines(told["jacobian"])
-    yield f"manipulability: {number(told['manipulability'])} (in m and rad)"
-    condition = "infinite" if told["condition"] is None else number(told["condition"])
+    yield from matrix_lines(report["jacobian"])
+    yield f"manipulability: {number(report['manipulability'])} (in m and rad)"
+    condition = "infinite" if report["condition"] is None else number(report["condition"])
     yield f"condition number: {condition} (lengths divided by the length of the arm)"
-    yield f"rank: {told['rank']}"
-    for direction in told["singular_directions"]:
+    yield f"rank: {report['rank']}"
+    for direction in report["singular_directions"]:
         yield f"always zero: {_sum(direction, _COMPONENTS)} (in m/s and rad/s)"
-    for motion in told["idle_motions"]:
+    for motion in report["idle_motions"]:
         rate = _sum(motion, [f"d/dt {name}" for name in arm.robot.joint_names])
         yield f"moves nothing: {rate} (in rad/s and m/s)"
-    if "jdot_qd" in told:
+    if "jdot_qd" in report:
         units = f"{length}/s^2 and {angle}/s^2"
-        yield f"acceleration at constant joint rates ({units}): {numbers(told['jdot_qd'])}"
+        yield f"acceleration at constant joint rates ({units}): {numbers(report['jdot_qd'])}"
 
 
 def _sum(factors: Sequence[float], names: Sequence[str]) -> str:
@@ -84,7 +84,7 @@ def _stream(arm: ArmInUnits, options: JacobianOptions) -> int:
     for name, given in (("--json", options.as_json), ("--qd", options.rates is not None)):
         if given:
             raise InputError(f"{name} is for one configuration, rows from standard input become a CSV")
-    names, blocks = jacobians_of(arm, open_rows("-"), options.frame)
+    columns, blocks = jacobians_of(arm, open_rows("-"), options.frame)
     with standard_output() as out:
-        write_csv(blocks, names, out)
+        write_csv(blocks, columns, out)
     return 0

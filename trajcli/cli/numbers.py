@@ -1,4 +1,4 @@
-"""Numbers and matrices as people read them in a terminal."""
+"""Formatting of numbers, matrices and tables for a terminal."""
 
 from __future__ import annotations
 

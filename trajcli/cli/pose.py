@@ -1,4 +1,4 @@
-"""`trajcli pose`."""
+"""Pose calculations on the command line: `trajcli pose`."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from trajcli.queries.pose import (
 )
 from trajcli.units import Quantity, Units
 
-_ROUNDING = 1e-9  # of R^T R: above it is told, since it comes from rounded entries
+_ROUNDING = 1e-9  # of R^T R: above it is reported, since it comes from rounded entries
 
 
 @comparable
@@ -57,11 +57,11 @@ def run_pose(words: Sequence[str], options: PoseOptions) -> int:
     start = _start(words, options, units)
     if options.to is None:
         _require_target(options)
-        told = pose_report(start.pose, units, euler, point)
+        report = pose_report(start.pose, units, euler, point)
         if options.as_json:
-            print_json(told)
+            print_json(report)
         else:
-            print_lines(_lines(told, units, options, float(rotation_defect(start.pose[:3, :3]))))
+            print_lines(_lines(report, units, options, float(rotation_defect(start.pose[:3, :3]))))
         return 0
     target = read_end(options.to, "--to", units)
     s = parse_fractions("0,0.5,1" if options.s is None else options.s)
@@ -80,7 +80,7 @@ def run_pose(words: Sequence[str], options: PoseOptions) -> int:
     if options.as_json:
         print_json(reports)
     else:
-        print_lines(line for told in reports for line in _on_the_way(told, units, options))
+        print_lines(line for report in reports for line in _point_lines(report, units, options))
     return 0
 
 
@@ -108,23 +108,23 @@ def _require_target(options: PoseOptions) -> None:
             raise InputError(f"{name} is about the way to another pose", hint="name that pose with --to")
 
 
-def _lines(told: dict[str, Any], units: Units, options: PoseOptions, defect: float = 0.0) -> Iterator[str]:
-    yield from pose_lines(told, units, "")
-    about = told["axis_angle"]
+def _lines(report: dict[str, Any], units: Units, options: PoseOptions, defect: float = 0.0) -> Iterator[str]:
+    yield from pose_lines(report, units, "")
+    about = report["axis_angle"]
     yield f"axis_angle: axis {numbers(about['axis'])}, angle {number(about['angle'])} {units.angle}"
-    if "euler" in told:
-        first, second = map(numbers, told["euler"])
+    if "euler" in report:
+        first, second = map(numbers, report["euler"])
         yield f"euler {options.euler} ({units.angle}): {first}"
         yield f"  or: {second}"
-    yield f"determinant: {number(told['determinant'])}"
+    yield f"determinant: {number(report['determinant'])}"
     if defect > _ROUNDING:
         yield f"the matrix is off a rotation by {defect:.3g}: angles are read off its entries as they are"
-    if "point" in told:
-        yield f"point ({units.length}): {numbers(told['point'])}"
-    for name, text in told.get("singular", {}).items():
+    if "point" in report:
+        yield f"point ({units.length}): {numbers(report['point'])}"
+    for name, text in report.get("singular", {}).items():
         yield f"{name}: {text}"
 
 
-def _on_the_way(told: dict[str, Any], units: Units, options: PoseOptions) -> Iterator[str]:
-    yield f"s = {number(told['s'])}"
-    yield from ("  " + line for line in _lines(told, units, options))
+def _point_lines(report: dict[str, Any], units: Units, options: PoseOptions) -> Iterator[str]:
+    yield f"s = {number(report['s'])}"
+    yield from ("  " + line for line in _lines(report, units, options))

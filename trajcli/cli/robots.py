@@ -1,4 +1,4 @@
-"""`trajcli robots`."""
+"""Robot catalogue on the command line: `trajcli robots`."""
 
 from __future__ import annotations
 
@@ -87,8 +87,8 @@ def _card_lines(card: Mapping[str, Any]) -> Iterator[str]:
 
 def _dh_row(joint: Mapping[str, Any]) -> list[str]:
     cells = [number(joint[key]) for key in _DH]
-    place = 1 if joint["type"] == "prismatic" else 0
-    cells[place] = _with_q(cells[place], joint["sign"])
+    variable = 1 if joint["type"] == "prismatic" else 0
+    cells[variable] = _with_q(cells[variable], joint["sign"])
     return [joint["name"], joint["type"], *cells, str(joint["sign"])]
 
 
@@ -119,8 +119,8 @@ def _reach_lines(card: Mapping[str, Any], length: str) -> Iterator[str]:
     if reach["sampled"] is None:
         yield "reach: unlimited, as a slide has no limits"
         return
-    found, bound = number(round(reach["sampled"], 6)), number(round(reach["bound"], 6))
-    yield f"reach from the base to the tcp: {found} {length} (sampled), at most {bound} {length} (bound)"
+    sampled, bound = number(round(reach["sampled"], 6)), number(round(reach["bound"], 6))
+    yield f"reach from the base to the tcp: {sampled} {length} (sampled), at most {bound} {length} (bound)"
 
 
 def _inverse_lines(card: Mapping[str, Any] | None) -> Iterator[str]:

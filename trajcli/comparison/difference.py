@@ -1,9 +1,4 @@
-"""How two tables of numbers differ, as values and in words.
-
-The comparison of two tables, column by column: what `trajcli diff` does.
-
-Tolerances by column: what a user writes, and what holds for which column.
-"""
+"""Comparison of two tables, column by column and within tolerances: what `trajcli diff` does."""
 
 from __future__ import annotations
 
@@ -19,7 +14,10 @@ from trajcli.errors import InputError, Problem
 from trajcli.frozen import comparable
 from trajcli.streams.table import Table
 
-_SHOWN = 20  # columns told about by name
+ALL = "*"  # the key of a tolerance for every column
+
+_SHOWN = 20  # columns that are listed by name
+_TINY = 1e-290  # divides where the tolerance is zero: there, the largest difference counts
 
 
 @comparable
@@ -100,54 +98,63 @@ class Difference:
     @property
     def first(self) -> ValueDifference | None:
         """The difference in the earliest row that is not accepted; None when all are."""
-        found = [column.first for column in self.columns if column.first is not None]
-        return min(found, key=lambda deviation: deviation.row, default=None)
+        firsts = [column.first for column in self.columns if column.first is not None]
+        return min(firsts, key=lambda deviation: deviation.row, default=None)
 
 
-def describe(difference: Difference) -> str:
-    """Return lines for people, without a line feed at the end."""
-    a, b = difference.files
-    what = f"{_count(difference.rows, 'row')}, {_count(len(difference.columns), 'column')}"
-    lines = [
-        f"{'equal' if difference.equal else 'different'}: {a} and {b} ({what} compared)",
-        *difference.notes,
-    ]
-    lines += [f"{difference.files[index]} has no column {name}" for name, index in difference.missing]
-    if difference.ended is not None:
-        index, time = difference.ended
-        lines.append(
-            f"{difference.files[index]} ends at t = {time:.12g} s, before {difference.files[1 - index]}"
+def compare(
+    a: Table, b: Table, atol: Mapping[str, float], rtol: Mapping[str, float], *, resample: bool = False
+) -> Difference:
+    """Compare two tables by the names of their columns.
+
+    Two values are accepted when they differ by at most atol + rtol * (the larger magnitude). The second
+    table's are converted to the units of the first.
+
+    Args:
+        a: The first table.
+        b: The second table.
+        atol: Tolerances in the first table's units: by column (`q1_deg`), else by kind (`q`), else for `ALL`.
+        rtol: The same, relative.
+        resample: Interpolate the second table at the times of the first.
+
+    Raises:
+        InputError: When the tables have no column in common, or rows at different times (without
+            `resample`), or when a tolerance is for a column that they have not in common.
+    """
+    pairs, missing = pair_columns(a, b)
+    for tolerances in (atol, rtol):
+        require_known(tolerances, [pair.a for pair in pairs])
+    clock = time_pair(pairs)
+    slack = tolerance_of(atol, clock.a) if clock else 0.0
+    aligned = interpolate_rows(a, b, pairs) if resample else align_rows(a, b, pairs, slack)
+    times = a.columns[aligned.rows, clock.index_a] if clock else None
+    columns = []
+    for index, pair in enumerate(aligned.pairs):
+        values = a.columns[aligned.rows, pair.index_a], aligned.values_b[:, index]
+        larger = np.maximum(np.abs(values[0]), np.abs(values[1]))
+        allowed = tolerance_of(atol, pair.a) + tolerance_of(rtol, pair.a) * larger
+        columns.append(_compare_column(pair, values, allowed, times, aligned.rows.start))
+    rows = aligned.rows.stop - aligned.rows.start
+    return Difference((a.file, b.file), rows, tuple(columns), missing, aligned.ended, aligned.notes)
+
+
+def _compare_column(
+    pair: Pair, values: tuple[Array, Array], allowed: Array, times: Array | None, start: int
+) -> ColumnDifference:
+    difference = np.abs(values[1] - values[0])
+    wrong = np.flatnonzero(difference > allowed)
+    worst = int(np.argmax(difference / np.maximum(allowed, _TINY)))
+
+    def deviation(row: int) -> ValueDifference:
+        time = None if times is None else float(times[row])
+        a, b = float(values[0][row]), float(values[1][row])
+        return ValueDifference(
+            pair.a.name, start + row, time, a, b, float(difference[row]), float(allowed[row])
         )
-    if difference.first is not None:
-        lines.append("first: " + _say(difference.first))
-    if difference.worst.difference > 0:
-        lines.append("worst: " + _say(difference.worst))
-    return "\n".join(lines + _columns(difference))
 
-
-def _columns(difference: Difference) -> list[str]:
-    """Return a line for each column that differs, when there are several."""
-    differing = [column for column in difference.columns if column.count]
-    if len(differing) < 2:
-        return []
-    lines = [f"  {_count(column.count, 'row')} of {_say(column.worst)}" for column in differing[:_SHOWN]]
-    rest = len(differing) - len(lines)
-    return [f"{len(differing)} columns differ, each with its worst:", *lines] + [f"  and {rest} more"] * (
-        rest > 0
+    return ColumnDifference(
+        deviation(worst), deviation(int(wrong[0])) if wrong.size else None, int(wrong.size)
     )
-
-
-def _say(deviation: ValueDifference) -> str:
-    where = f"in row {deviation.row}" if deviation.time is None else f"at t = {deviation.time:.12g} s"
-    apart = f"{deviation.difference:.3g} apart (tolerance {deviation.tolerance:.3g})"
-    return f"{deviation.column} {where}: {deviation.a!r} against {deviation.b!r}, {apart}"
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}" + ("" if number == 1 else "s")
-
-
-ALL = "*"  # the key of a tolerance for every column
 
 
 def parse_tolerances(text: str) -> dict[str, float]:
@@ -211,59 +218,44 @@ def _flaw(entry: str, name: str, equals: str, number: str, known: Mapping[str, f
     return None
 
 
-_TINY = 1e-290  # divides where the tolerance is zero: there, the largest difference counts
-
-
-def compare(
-    a: Table, b: Table, atol: Mapping[str, float], rtol: Mapping[str, float], *, resample: bool = False
-) -> Difference:
-    """Compare two tables by the names of their columns.
-
-    Two values are accepted when they differ by at most atol + rtol * (the larger magnitude). The second
-    table's are converted to the units of the first.
-
-    Args:
-        a: The first table.
-        b: The second table.
-        atol: Tolerances in the first table's units: by column (`q1_deg`), else by kind (`q`), else for `ALL`.
-        rtol: The same, relative.
-        resample: Interpolate the second table at the times of the first.
-
-    Raises:
-        InputError: When the tables have no column in common, or rows at different times (without
-            `resample`), or when a tolerance is for a column that they have not in common.
-    """
-    pairs, missing = pair_columns(a, b)
-    for tolerances in (atol, rtol):
-        require_known(tolerances, [pair.a for pair in pairs])
-    clock = time_pair(pairs)
-    slack = tolerance_of(atol, clock.a) if clock else 0.0
-    aligned = interpolate_rows(a, b, pairs) if resample else align_rows(a, b, pairs, slack)
-    times = a.columns[aligned.rows, clock.place_a] if clock else None
-    columns = []
-    for place, pair in enumerate(aligned.pairs):
-        values = a.columns[aligned.rows, pair.place_a], aligned.values_b[:, place]
-        larger = np.maximum(np.abs(values[0]), np.abs(values[1]))
-        allowed = tolerance_of(atol, pair.a) + tolerance_of(rtol, pair.a) * larger
-        columns.append(_compare_column(pair, values, allowed, times, aligned.rows.start))
-    rows = aligned.rows.stop - aligned.rows.start
-    return Difference((a.file, b.file), rows, tuple(columns), missing, aligned.ended, aligned.notes)
-
-
-def _compare_column(
-    pair: Pair, values: tuple[Array, Array], allowed: Array, times: Array | None, start: int
-) -> ColumnDifference:
-    difference = np.abs(values[1] - values[0])
-    wrong = np.flatnonzero(difference > allowed)
-    worst = int(np.argmax(difference / np.maximum(allowed, _TINY)))
-
-    def deviation(row: int) -> ValueDifference:
-        time = None if times is None else float(times[row])
-        a, b = float(values[0][row]), float(values[1][row])
-        return ValueDifference(
-            pair.a.name, start + row, time, a, b, float(difference[row]), float(allowed[row])
+def describe(difference: Difference) -> str:
+    """Return lines for people, without a line feed at the end."""
+    a, b = difference.files
+    what = f"{_count(difference.rows, 'row')}, {_count(len(difference.columns), 'column')}"
+    lines = [
+        f"{'equal' if difference.equal else 'different'}: {a} and {b} ({what} compared)",
+        *difference.notes,
+    ]
+    lines += [f"{difference.files[index]} has no column {name}" for name, index in difference.missing]
+    if difference.ended is not None:
+        index, time = difference.ended
+        lines.append(
+            f"{difference.files[index]} ends at t = {time:.12g} s, before {difference.files[1 - index]}"
         )
+    if difference.first is not None:
+        lines.append("first: " + _text(difference.first))
+    if difference.worst.difference > 0:
+        lines.append("worst: " + _text(difference.worst))
+    return "\n".join(lines + _columns(difference))
 
-    return ColumnDifference(
-        deviation(worst), deviation(int(wrong[0])) if wrong.size else None, int(wrong.size)
+
+def _columns(difference: Difference) -> list[str]:
+    """Return a line for each column that differs, when there are several."""
+    differing = [column for column in difference.columns if column.count]
+    if len(differing) < 2:
+        return []
+    lines = [f"  {_count(column.count, 'row')} of {_text(column.worst)}" for column in differing[:_SHOWN]]
+    rest = len(differing) - len(lines)
+    return [f"{len(differing)} columns differ, each with its worst:", *lines] + [f"  and {rest} more"] * (
+        rest > 0
     )
+
+
+def _text(deviation: ValueDifference) -> str:
+    where = f"in row {deviation.row}" if deviation.time is None else f"at t = {deviation.time:.12g} s"
+    apart = f"{deviation.difference:.3g} apart (tolerance {deviation.tolerance:.3g})"
+    return f"{deviation.column} {where}: {deviation.a!r} against {deviation.b!r}, {apart}"
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" + ("" if number == 1 else "s")

@@ -1,7 +1,4 @@
-"""Which rows and columns of two tables belong together.
-
-One table's values at the times of another.
-"""
+"""Alignment of two tables: pairs of columns, and rows at the same times or interpolated there."""
 
 from __future__ import annotations
 
@@ -14,6 +11,10 @@ from trajcli.frozen import comparable, frozen
 from trajcli.streams.table import Table
 
 _SAME_ROW = 1e-6  # of a period: times this close are those of one row
+_DERIVATIVES = {"q": "qd", "qd": "qdd", "qdd": "qddd", "s": "sd", "sd": "sdd"}
+_DERIVATIVES |= {
+    kind + axis: rate + axis for kind, rate in (("", "v"), ("v", "a"), ("w", "e")) for axis in "xyz"
+}
 
 
 @comparable
@@ -23,14 +24,14 @@ class Pair:
     Attributes:
         a: What it is in the first table.
         b: What it is in the second table, perhaps in another unit.
-        place_a: Its index in the first table.
-        place_b: Its index in the second table.
+        index_a: Its index in the first table.
+        index_b: Its index in the second table.
     """
 
     a: Column
     b: Column
-    place_a: int
-    place_b: int
+    index_a: int
+    index_b: int
 
     def in_units_of_a(self, values: Array) -> Array:
         """Return values of the second table in the unit of the first."""
@@ -46,7 +47,7 @@ class Alignment:
         rows: Rows of the first table, N of them.
         values_b: Shape (N, m): the second table's values, in the units of the first.
         ended: Index of the table that ends early, and its last time, s; None when neither does.
-        notes: What was done, in sentences.
+        notes: Sentences about the interpolation.
     """
 
     pairs: tuple[Pair, ...]
@@ -64,15 +65,15 @@ def pair_columns(a: Table, b: Table) -> tuple[tuple[Pair, ...], tuple[tuple[str,
     Raises:
         InputError: When there is no column in common, or one is an angle here and a length there.
     """
-    left = {name: place for place, name in enumerate(b.names)}
+    left = {name: index for index, name in enumerate(b.names)}
     partners = {name: name for name in a.names if name in left}
-    by_quantity = {parse_column(name).quantity: name for name in left if name not in partners}
+    rest = {_without_unit(name): name for name in left if name not in partners}
     for name in a.names:
-        if name not in partners and parse_column(name).quantity in by_quantity:
-            partners[name] = by_quantity.pop(parse_column(name).quantity)
+        if name not in partners and _without_unit(name) in rest:
+            partners[name] = rest.pop(_without_unit(name))
     pairs = tuple(
-        Pair(parse_column(name), parse_column(partners[name]), place, left[partners[name]])
-        for place, name in enumerate(a.names)
+        Pair(parse_column(name), parse_column(partners[name]), index, left[partners[name]])
+        for index, name in enumerate(a.names)
         if name in partners
     )
     if not pairs:
@@ -89,6 +90,12 @@ def pair_columns(a: Table, b: Table) -> tuple[tuple[Pair, ...], tuple[tuple[str,
     missing = [(name, 1) for name in a.names if name not in partners]
     missing += [(name, 0) for name in b.names if name not in in_b]
     return pairs, tuple(missing)
+
+
+def _without_unit(name: str) -> Column:
+    """Return what a column holds, the same for columns that differ in nothing but their unit."""
+    column = parse_column(name)
+    return Column(column.kind, column.joint)
 
 
 def time_pair(pairs: tuple[Pair, ...]) -> Pair | None:
@@ -120,14 +127,14 @@ def align_rows(a: Table, b: Table, pairs: tuple[Pair, ...], slack: float = 0.0) 
                 hint="rows can only be told apart by a column t",
             )
     else:
-        times = a.columns[:, clock.place_a], b.columns[:, clock.place_b]
+        times = a.columns[:, clock.index_a], b.columns[:, clock.index_b]
         count = _common_row_count(a, b, times, slack)
         if longer:
             short = int(len(b.columns) < len(a.columns))
             ended = short, float(times[short][-1])
     values = np.empty((count, len(pairs)))
-    for place, pair in enumerate(pairs):
-        values[:, place] = pair.in_units_of_a(b.columns[:count, pair.place_b])
+    for index, pair in enumerate(pairs):
+        values[:, index] = pair.in_units_of_a(b.columns[:count, pair.index_b])
     return Alignment(pairs, slice(0, count), values, ended)
 
 
@@ -162,12 +169,6 @@ def _grid(file: str, times: Array) -> str:
     return f"{file} has one every {float(np.median(np.diff(times))):.6g} s from {times[0]:.12g} s on"
 
 
-_DERIVATIVES = {"q": "qd", "qd": "qdd", "qdd": "qddd", "s": "sd", "sd": "sdd"}
-_DERIVATIVES |= {
-    kind + axis: rate + axis for kind, rate in (("", "v"), ("v", "a"), ("w", "e")) for axis in "xyz"
-}
-
-
 def interpolate_rows(a: Table, b: Table, pairs: tuple[Pair, ...]) -> Alignment:
     """Return the first table's rows inside the common interval with the second's values interpolated there.
 
@@ -186,9 +187,9 @@ def interpolate_rows(a: Table, b: Table, pairs: tuple[Pair, ...]) -> Alignment:
     gaps = _Gaps(times_b, times_a[rows])
     values = np.empty((rows.stop - rows.start, len(rest)))
     methods: dict[str, list[str]] = {}
-    for place, pair in enumerate(rest):
+    for index, pair in enumerate(rest):
         method, at_times = _interpolate(b, pair, gaps)
-        values[:, place] = pair.in_units_of_a(at_times)
+        values[:, index] = pair.in_units_of_a(at_times)
         methods.setdefault(method, []).append(pair.b.kind)
     how = "; ".join(f"{method} for {', '.join(dict.fromkeys(kinds))}" for method, kinds in methods.items())
     note = f"{b.file} is interpolated from {times_a[rows][0]:.12g} s to {times_a[rows][-1]:.12g} s ({how}); "
@@ -200,7 +201,7 @@ def _times(a: Table, b: Table, pairs: tuple[Pair, ...]) -> tuple[Array, Array]:
     clock = time_pair(pairs)
     if clock is None:
         raise InputError(f"{a.file} and {b.file} do not both have a column t, so nothing can be interpolated")
-    times_a, times_b = a.columns[:, clock.place_a], b.columns[:, clock.place_b]
+    times_a, times_b = a.columns[:, clock.index_a], b.columns[:, clock.index_b]
     _require_increasing(a, times_a)
     _require_increasing(b, times_b)
     return times_a, times_b
@@ -238,7 +239,7 @@ class _Gaps:
 
 def _interpolate(b: Table, pair: Pair, gaps: _Gaps) -> tuple[str, Array]:
     """Return the method's name and the values (N,) of the second table's column, in its own unit."""
-    values = b.columns[:, pair.place_b]
+    values = b.columns[:, pair.index_b]
     start = values[gaps.before]
     if pair.b.whole_numbers:
         return "the earlier row", start
@@ -253,10 +254,10 @@ def _interpolate(b: Table, pair: Pair, gaps: _Gaps) -> tuple[str, Array]:
 
 def _derivative(b: Table, pair: Pair) -> Array | None:
     kind = _DERIVATIVES.get(pair.b.kind)
-    for place, name in enumerate(b.names):
+    for index, name in enumerate(b.names):
         column = parse_column(name)
         if column.kind == kind and column.joint == pair.b.joint and column.unit == pair.b.unit:
-            return b.columns[:, place]
+            return b.columns[:, index]
     return None
 
 

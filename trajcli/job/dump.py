@@ -1,4 +1,4 @@
-"""Write a job as it was understood: points in the place of their names, limits in force, numbers in SI.
+"""Resolved jobs as YAML: points instead of their names, limits in force, numbers in SI.
 
 Each number carries its SI unit with all its digits, so that reading the text gives the same job bit by bit.
 The job's own units are kept: they decide how rows are written.

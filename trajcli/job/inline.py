@@ -1,4 +1,4 @@
-"""Numbers and poses in words of the command line: YAML as in a job, or @FILE for the file that holds it."""
+"""Inline values on the command line: numbers and poses, as YAML or as @FILE for the file that holds it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which limits are in force: the robot's, replaced and scaled by the job, tightened by a move."""
+"""Limits in force: the robot's, replaced and scaled by the job, tightened by a move."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _ROUNDING = 1e-12  # relative: a limit that differs by less was meant to be the 
 _TOOL_ORDERS = {"speed": 1, "acceleration": 2, "jerk": 3}
 
 
-class Looser(NamedTuple):
+class LooserBound(NamedTuple):
     """A bound that is looser than the one it replaces.
 
     Attributes:
@@ -29,7 +29,7 @@ class Looser(NamedTuple):
 
     quantity: str
     joint: int
-    amounts: dict[str, Amount]
+    amounts: dict[str, Amount | str]
 
 
 def with_job_limits(robot: Robot, spec: LimitsSpec | None) -> tuple[Robot, list[Event]]:
@@ -38,9 +38,9 @@ def with_job_limits(robot: Robot, spec: LimitsSpec | None) -> tuple[Robot, list[
         return robot, []
     events = []
     for quantity, joint, amounts in looser_bounds(robot, spec):
-        whose = f"the job's {quantity} limit of {robot.joint_names[joint]}"
-        message = whose + " is looser than the robot's: {after} instead of {before}"
-        events.append(Event("looser_limit", message, amounts=amounts))
+        message = f"the job's {quantity} limit of {{joint}} is looser than the robot's: "
+        amounts |= {"joint": robot.joint_names[joint]}
+        events.append(Event("looser_limit", message + "{after} instead of {before}", amounts=amounts))
     return _with_limits(robot, spec), events
 
 
@@ -58,7 +58,7 @@ def with_move_limits(robot: Robot, spec: LimitsSpec | None, move: int) -> Robot:
     return _with_limits(robot, spec)
 
 
-def looser_bounds(robot: Robot, spec: LimitsSpec) -> Iterator[Looser]:
+def looser_bounds(robot: Robot, spec: LimitsSpec) -> Iterator[LooserBound]:
     """Yield each bound that is looser than the robot's."""
     for order, quantity in enumerate(QUANTITIES):
         before = robot.limits.of_order(order)
@@ -67,16 +67,19 @@ def looser_bounds(robot: Robot, spec: LimitsSpec) -> Iterator[Looser]:
         ends = (after[:, 0] < before[:, 0] - room[:, 0], after[:, 1] > before[:, 1] + room[:, 1])
         for joint in np.flatnonzero(ends[0] | ends[1]).tolist():
             end = 1 if ends[1][joint] else 0
-            said = {"before": float(before[joint, end]), "after": float(after[joint, end])}
-            yield Looser(quantity, joint, {key: Amount(v, order, joint) for key, v in said.items()})
+            bounds = {"before": float(before[joint, end]), "after": float(after[joint, end])}
+            yield LooserBound(quantity, joint, {key: Amount(v, order, joint) for key, v in bounds.items()})
 
 
-def looser_problem(robot: Robot, looser: Looser, move: int) -> Problem:
+def looser_problem(robot: Robot, looser: LooserBound, move: int) -> Problem:
     """Return what is wrong with a bound that a move loosens."""
     quantity, joint, amounts = looser
     name = robot.joint_names[joint]
-    message = f"a move can only tighten limits: the {quantity} limit of {name} is {{before}}, got {{after}}"
-    return Problem(message, "raise it under the job's `limits`", move=move, joint=name, amounts=amounts)
+    message = (
+        f"a move can only tighten limits: the {quantity} limit of {{joint}} is {{before}}, got {{after}}"
+    )
+    hint = "raise it under the job's `limits`"
+    return Problem(message, hint, move=move, joint=name, amounts={"joint": name, **amounts})
 
 
 def _with_limits(robot: Robot, spec: LimitsSpec) -> Robot:

@@ -1,4 +1,4 @@
-"""From pydantic's errors to problems that quote the file: place, what was expected, the nearest name."""
+"""Validation errors as problems that quote the file: place, what was expected, the nearest name."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def problems_of(
     """Return one problem for each flaw, at its place in the file, in the order of the file.
 
     Args:
-        error: What pydantic found.
+        error: Of pydantic.
         model: The model of the mapping at `prefix`.
         document: The file.
         prefix: Where in the file the validated mapping stands.
@@ -141,7 +141,7 @@ def _model_in(annotation: Any) -> Any:  # noqa: ANN401
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     for argument in getattr(annotation, "__args__", ()):
-        found = _model_in(argument)
-        if found is not None:
-            return found
+        model = _model_in(argument)
+        if model is not None:
+            return model
     return None

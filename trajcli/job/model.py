@@ -1,4 +1,7 @@
-"""The job file as a model. Values are SI; units, names and per-joint forms are resolved while it is read."""
+"""Job model: the job file as pydantic models, in SI.
+
+Units, names and per-joint forms are resolved while the file is read.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +42,7 @@ from trajcli.planners.planner import WhenOverLimit
 from trajcli.units import Quantity, Units
 
 ROBOT_DEFINITION = "a robot"
-"""Stands in a schema for the definition of a robot, which is made from another model."""
+"""Stands in a schema for the definition of a robot, which comes from another model."""
 
 
 class UnitsSpec(Model):
@@ -55,7 +58,7 @@ class UnitsSpec(Model):
 
 @comparable
 class RobotSource(FieldType):
-    """A robot, which the loader has put in the place of what names it."""
+    """A robot, with which the loader has replaced what names it."""
 
     description: str = "Name of a catalogue robot, {file: PATH}, or the robot itself."
 
@@ -171,7 +174,7 @@ class Job(Model):
         return value
 
     @model_validator(mode="after")
-    def _start_is_a_place(self) -> Job:
+    def _start_is_a_state(self) -> Job:
         if not self.start.is_place:
             raise refuse([(("start",), "the start needs `joints` or a pose", None)])
         first = self.moves[0]

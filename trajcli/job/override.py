@@ -1,4 +1,4 @@
-"""`--set moves.0.duration=3`: values that replace what the file says, or add to it, with their own place."""
+"""Overrides of a job: values such as `--set moves.0.duration=3` that replace the file's, or add to them."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ def parse_setting(text: str) -> Setting:
 
 @frozen
 class PatchedDocument(Document):
-    """A document in which parts stand for what an option said.
+    """A document in which options have replaced parts, or added some.
 
     Attributes:
-        patches: What was put in, by path.
+        patches: What the options say, by path.
     """
 
     patches: Mapping[_Steps, Document] = field(default_factory=dict)

@@ -1,10 +1,10 @@
-"""Read a job file: YAML with positions, then the robot, then everything else in SI."""
+"""Reading of job files: YAML with places, then the robot, then everything else in SI."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,14 +17,13 @@ from trajcli.frozen import frozen
 from trajcli.job.limits import looser_bounds, looser_problem, looser_tool_bounds, with_job_limits
 from trajcli.job.messages import problems_of
 from trajcli.job.model import Job, UnitsSpec
-from trajcli.job.override import Setting, overridden, parse_setting
-from trajcli.job.recording import reader_of
 from trajcli.job.robot import find_robot
 from trajcli.job.yaml.load import Document, parse_document, read_document
 from trajcli.kinematics.robot import Robot, unlimited
 from trajcli.language.numbers import ReadingContext
+from trajcli.language.recorded import Recorded
 from trajcli.planners.planner import Event
-from trajcli.units import Quantity, Units, to_user, unit_name
+from trajcli.units import Units, amount_text
 
 _UNREAD = Robot("unread", (), unlimited(0), None, np.eye(4), np.eye(4))
 """Stands for a robot whose own flaws are known, while the rest of the job is read."""
@@ -55,16 +54,7 @@ class LoadedJob:
 
     def say(self, amount: Amount) -> str:
         """Return a number of a message in the job's units."""
-        if amount.value in (math.inf, -math.inf):
-            return "unlimited"
-        dimension = amount.dimension
-        if amount.joint is not None:
-            dimension = "length" if self.robot.joint_types[amount.joint] == "prismatic" else "angle"
-        if dimension is None:
-            return f"{amount.numbers()} s"
-        quantity = Quantity(dimension, amount.order)
-        numbers = amount.numbers(lambda value: to_user(value, quantity, self.units))
-        return f"{numbers} {unit_name(quantity, self.units)}"
+        return amount_text(amount, self.robot.joint_types, self.units)
 
     def place_of_move(self, index: int) -> Place:
         """Return where a move stands in the file."""
@@ -83,6 +73,10 @@ def load_job(path: str | Path, overrides: Sequence[str] = (), *, rate: str | Non
         InputError: With every flaw of the file at once.
         FileError: When it cannot be read.
     """
+    if not overrides and rate is None:
+        return _load(read_document(str(path)))
+    from trajcli.job.override import Setting, overridden, parse_setting
+
     settings = [parse_setting(text) for text in overrides]
     if rate is not None:
         settings.append(Setting(f"--rate {rate}", ("output", "rate"), rate))
@@ -112,7 +106,7 @@ def _load(document: Document) -> LoadedJob:
     context = ReadingContext(units, points=_points(plain.get("points")))
     if robot is not None:
         context.joint_names, context.joint_types = robot.joint_names, robot.joint_types
-        context.read_points = reader_of(document, robot)
+        context.read_points = partial(_recorded, document, robot)
     try:
         job = Job.model_validate({**plain, **given}, context=context)
     except ValidationError as error:
@@ -127,6 +121,13 @@ def _load(document: Document) -> LoadedJob:
     if flaws:
         raise InputError(*sorted(flaws, key=_position))
     return loaded
+
+
+def _recorded(document: Document, robot: Robot, path: str) -> Recorded:
+    """Return the recording of a path; jobs without one do not pay for the import."""
+    from trajcli.job.recording import read_recording
+
+    return read_recording(path, document, robot)
 
 
 def _loosened_by_moves(loaded: LoadedJob) -> Iterator[Problem]:

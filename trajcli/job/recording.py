@@ -1,11 +1,9 @@
-"""Joint values from a CSV file that a job names, in whatever units its columns say."""
+"""Recordings: joint values from a CSV file that a job names, in whatever units its columns say."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,36 +14,31 @@ from trajcli.job.yaml.load import Document
 from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import FlawError
 from trajcli.language.recorded import Recorded
-
-if TYPE_CHECKING:
-    from trajcli.streams.table import Table
+from trajcli.streams.table import Table, read_csv
 
 _OF_TIME = re.compile(r"(t|time|timestamp|secs?|seconds)([ _\[(].*)?")
-_WHOSE = {"deg": "revolute", "mm": "prismatic"}
 
 
-def reader_of(document: Document, robot: Robot) -> Callable[[str], Recorded]:
-    """Return what reads the recordings of a job: their paths are relative to its folder.
+def read_recording(path: str, document: Document, robot: Robot) -> Recorded:
+    """Return the recording of a job.
 
     Args:
+        path: Relative to the job's folder.
         document: The job's.
         robot: Its joints say which columns are needed.
+
+    Raises:
+        FileError: When it cannot be read; with the place of its name in the job.
+        FlawError: When it is not as it should be.
     """
     folder = Path() if document.file.startswith(("<", "-")) else Path(document.file).parent
-
-    def read(path: str) -> Recorded:
-        from trajcli.streams.table import read_csv
-
-        try:
-            return _recorded(read_csv(folder / path), robot)
-        except FileError as error:
-            raise error.located(place=document.place(_named_at(document, path))) from None
-        except InputError as error:
-            raise FlawError(
-                "; ".join(map(_placed, error.problems)), "csv", hint=error.problems[0].hint
-            ) from None
-
-    return read
+    try:
+        return _recorded(read_csv(folder / path), robot)
+    except FileError as error:
+        raise error.located(place=document.place(_named_at(document, path))) from None
+    except InputError as error:
+        flaws = "; ".join(map(_placed, error.problems))
+        raise FlawError(flaws, "csv", hint=error.problems[0].hint) from None
 
 
 def _named_at(document: Document, path: str) -> tuple[str | int, ...]:
@@ -94,20 +87,18 @@ def _refuse_other_times(table: Table) -> None:
 def _joint(table: Table, robot: Robot, joint: int) -> Array:
     """Return the values of a joint, rad or m."""
     name, kind = robot.joint_names[joint], robot.joint_types[joint]
-    found = [(n, c) for n in table.names if (c := _column(n, robot)) is not None and c.joint == joint]
-    if not found:
-        unit = "_deg" if kind == "revolute" else "_mm"
-        raise InputError(
-            f"{table.file}: no column for {name}", hint=f"call it q{joint + 1} (SI) or q{joint + 1}{unit}"
-        )
-    if len(found) > 1:
-        raise InputError(f"{table.file}: two columns for {name}: {found[0][0]} and {found[1][0]}")
-    header, column = found[0]
-    if column.unit is not None and _WHOSE[column.unit] != kind:
-        right = "mm" if kind == "prismatic" else "deg"
+    unit = "mm" if kind == "prismatic" else "deg"
+    candidates = [(n, c) for n in table.names if (c := _column(n, robot)) is not None and c.joint == joint]
+    if not candidates:
+        hint = f"call it q{joint + 1} (SI) or q{joint + 1}_{unit}"
+        raise InputError(f"{table.file}: no column for {name}", hint=hint)
+    if len(candidates) > 1:
+        raise InputError(f"{table.file}: two columns for {name}: {candidates[0][0]} and {candidates[1][0]}")
+    header, column = candidates[0]
+    if column.unit not in (None, unit):
         raise InputError(
             f"{table.file}: the column {header} is in {column.unit}, but {name} is {kind}",
-            hint=f"call it {header.removesuffix(f'_{column.unit}')} (SI) or ..._{right}",
+            hint=f"call it {header.removesuffix(f'_{column.unit}')} (SI) or ..._{unit}",
         )
     return np.asarray(table.column(header) * column.factor)
 

@@ -1,7 +1,4 @@
-"""A robot as it stands in a file, and the robot it describes.
-
-Where a job's robot comes from: the catalogue, a robot file, or the job itself.
-"""
+"""Robots of jobs: the model of a robot in a file, the catalogue, and the robot that a job names."""
 
 from __future__ import annotations
 
@@ -39,7 +36,9 @@ from trajcli.language.numbers import (
 )
 from trajcli.language.poses import Pose
 from trajcli.suggest import did_you_mean, nearest, valid_names
-from trajcli.units import Dimension, Quantity, Units
+from trajcli.units import Quantity, Units, joint_quantity
+
+CATALOGUE = Path(__file__).parent.parent / "catalogue"
 
 _ANGLE, _LENGTH = Quantity("angle"), Quantity("length")
 _DH = {"theta": _ANGLE, "d": _LENGTH, "a": _LENGTH, "alpha": _ANGLE}
@@ -169,16 +168,12 @@ def robot_as_mapping(robot: Robot) -> dict[str, Any]:
 def _joint_as_mapping(robot: Robot, index: int, *, described: bool) -> dict[str, Any]:
     joint = robot.joints[index]
     row = {key: written_number(getattr(joint, key), _DH[key]) for key in _DH} if described else {}
-    dimension: Dimension = "length" if joint.type == "prismatic" else "angle"
     bounds = [robot.limits.of_order(order)[index].tolist() for order in range(len(QUANTITIES))]
     limits = {
-        quantity: written_bound((low, high), Quantity(dimension, order))
+        quantity: written_bound((low, high), joint_quantity(joint.type, order))
         for order, (quantity, (low, high)) in enumerate(zip(QUANTITIES, bounds, strict=True))
     }
     return {"name": joint.name, "type": joint.type, **row, "sign": joint.sign, **limits}
-
-
-CATALOGUE = Path(__file__).parent.parent / "catalogue"
 
 
 @frozen
@@ -212,7 +207,7 @@ def find_robot(value: Any, document: Document, units: Units) -> Robot:  # noqa: 
 
     Args:
         value: A name, {file: PATH} (relative to the job's folder), or the robot itself.
-        document: The job's, for places.
+        document: The job's.
         units: The job's, in force for a robot that stands in the job.
 
     Raises:

@@ -1,4 +1,4 @@
-"""The JSON Schemas of what trajcli reads and writes, generated from the models."""
+"""JSON Schemas of job, robot file and report, generated from their models."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import json
 from typing import Any, Literal
 
 SchemaKind = Literal["job", "robot", "report"]
-KINDS: tuple[SchemaKind, ...] = ("job", "robot", "report")
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _TITLES = {"job": "trajcli job, version 1", "robot": "trajcli robot", "report": "trajcli verification report"}
 

@@ -15,7 +15,7 @@ from trajcli.checks.finding import Finding
 from trajcli.checks.verify import Verdict
 from trajcli.columns import joint_factors
 from trajcli.curves.extrema import Peaks
-from trajcli.errors import Amount, Problem, VerificationError, said
+from trajcli.errors import Amount, Amounts, Problem, VerificationError, said
 from trajcli.job.report import (
     BindingReport,
     EventReport,
@@ -220,13 +220,17 @@ def _problem(plan: Plan, finding: Finding) -> Problem:
     )
 
 
-def _said(plan: Plan, finding: Finding) -> tuple[str, dict[str, Amount], str | None]:
+def _said(plan: Plan, finding: Finding) -> tuple[str, Amounts, str | None]:
     """Return what a finding says, with the amounts in it, and what would fix it."""
     if finding.joint is None:
         return tool_finding(finding, _remedy(plan, plan.moves[finding.move or 0], finding))
     joint = plan.trajectory.joint_names.index(finding.joint)
     order = _JUMPS.get(finding.kind, QUANTITIES.index(finding.kind) if finding.kind in QUANTITIES else 0)
-    amounts = {"value": Amount(finding.value, order, joint), "limit": Amount(finding.limit, order, joint)}
+    amounts: Amounts = {
+        "joint": finding.joint,
+        "value": Amount(finding.value, order, joint),
+        "limit": Amount(finding.limit, order, joint),
+    }
     quantity, move = QUANTITIES[order], plan.moves[finding.move or 0]
     if finding.kind == "waypoint":
         quantity, what, bound, hint = "path", "passes a waypoint at", ", it shall be {limit}", finding.hint
@@ -234,7 +238,7 @@ def _said(plan: Plan, finding: Finding) -> tuple[str, dict[str, Amount], str | N
         what, bound, hint = "jumps by", "", _jump_remedy(move, finding)
     else:
         what, bound, hint = "reaches", ", its limit is {limit}", _remedy(plan, move, finding)
-    text = f"the {quantity} of {finding.joint} {what} {{value}} at t = {finding.time:.9g} s{bound}"
+    text = f"the {quantity} of {{joint}} {what} {{value}} at t = {finding.time:.9g} s{bound}"
     return text, amounts, hint
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from trajcli.geometry.paths.pose import Screw
     from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.checks.finding import Finding
-from trajcli.errors import Amount
+from trajcli.errors import Amount, Amounts
 
 _HELD = 0.999  # of the wanted speed: that much counts as holding it
 _EACH = 16  # times of a piece of the law at which its speed is looked at
@@ -228,7 +228,7 @@ def _plain(vector: Array) -> list[float]:
 _ORDERS = {"speed": 1, "acceleration": 2, "jerk": 3}
 
 
-def tool_finding(finding: Finding, remedy: str) -> tuple[str, dict[str, Amount], str | None]:
+def tool_finding(finding: Finding, remedy: str) -> tuple[str, Amounts, str | None]:
     """Return what a finding about the tool says, with the amounts in it, and what would fix it."""
     at = f"at t = {finding.time:.9g} s"
     if finding.kind == "branch":

@@ -1,4 +1,4 @@
-"""Write the rows of a plan, and its report."""
+"""Output of a plan: its rows in a file or a stream."""
 
 from __future__ import annotations
 
@@ -6,15 +6,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from trajcli.columns import column_names
+from trajcli.columns import columns_of
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.planning.plan import Plan
 from trajcli.samples import Grid, ListedGrid, UniformGrid, sample
-from trajcli.streams.csv import Digits, write_csv, write_verified
+from trajcli.streams.decimals import Digits
+from trajcli.streams.formats import DEFAULT, format_of, write_verified
 from trajcli.streams.whole_file import standard_output, whole_file
-
-_OTHER_FORMATS = (".mcap", ".jsonl", ".json", ".yaml", ".yml", ".xlsx", ".parquet")
 
 
 def grid_of(plan: Plan) -> Grid:
@@ -34,14 +33,12 @@ def grid_of(plan: Plan) -> Grid:
 
 
 def check_output_name(path: str) -> None:
-    """Refuse the name of a file of another format.
+    """Refuse the name of a file of a format that is not written.
 
     Raises:
         InputError: When the ending is that of a format which is not written.
     """
-    wrong = next((ending for ending in _OTHER_FORMATS if path.lower().endswith(ending)), None)
-    if wrong:
-        raise InputError(f"rows are written as CSV, not as {wrong}", hint="name the file .csv")
+    format_of(path)
 
 
 def write_rows(plan: Plan, grid: Grid, path: str | None, digits: Digits) -> None:
@@ -59,16 +56,16 @@ def write_rows(plan: Plan, grid: Grid, path: str | None, digits: Digits) -> None
     """
     loaded = plan.loaded
     groups = loaded.job.output.columns
-    names = column_names(groups, loaded.robot.joint_types, loaded.units)
+    columns = columns_of(groups, loaded.robot.joint_types, loaded.units)
 
     def rows() -> Iterator[Array]:
         return sample(plan.trajectory, grid, groups, loaded.units, robot=loaded.robot)
 
     if path is not None and path != "-":
-        write_verified(path, rows, names, digits)
+        write_verified(path, rows, columns, digits)
         return
     with standard_output() as out:
-        write_csv(rows(), names, out, digits)
+        DEFAULT.write(rows(), columns, out, digits)
 
 
 def write_plan(plan: Plan, path: str | None = None, digits: Digits = "fixed") -> None:

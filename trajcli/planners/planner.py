@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import field
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
 from pydantic import Field
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.errors import Amount, PlanningError, said
+from trajcli.errors import Amount, Amounts, PlanningError, said
 from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Robot
 from trajcli.language.limits import LimitsSpec
@@ -51,13 +51,13 @@ class Event:
         kind: A stable word for programs, such as "slowed".
         message: One sentence for people, with the numbers.
         move: Index of the move; None when it is about the whole job.
-        amounts: Numbers that the message holds as `{name}`.
+        amounts: Numbers and names that the message holds as `{name}`.
     """
 
     kind: str
     message: str
     move: int | None = None
-    amounts: Mapping[str, Amount] = field(default_factory=dict)
+    amounts: Amounts = field(default_factory=dict)
 
     @property
     def concedes(self) -> bool:

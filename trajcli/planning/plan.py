@@ -10,7 +10,7 @@ import numpy as np
 
 from trajcli.checks.verify import Verdict, verify
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
-from trajcli.errors import Amount, Place, TrajcliError
+from trajcli.errors import Amount, Amounts, Place, TrajcliError
 from trajcli.frozen import frozen
 from trajcli.job.limits import with_move_limits
 from trajcli.job.read import LoadedJob
@@ -116,14 +116,14 @@ def _first_state(loaded: LoadedJob, first: PlannedMove, events: list[Event]) -> 
     name = first.robot.joint_names
     if given is None and begins.velocity.any():
         joint = int(np.abs(begins.velocity).argmax())
-        message = f"the trajectory begins in motion, {name[joint]} with {{velocity}}"
-        amounts = {"velocity": Amount(float(begins.velocity[joint]), 1, joint)}
+        message = "the trajectory begins in motion, {joint} with {velocity}"
+        amounts: Amounts = {"joint": name[joint], "velocity": Amount(float(begins.velocity[joint]), 1, joint)}
         events.append(Event("begins_moving", message, first.index, amounts))
     apart = begins.position - first.start.position
     if apart.any():
         joint = int(np.abs(apart).argmax())
-        message = f"the trajectory begins before its first point, {name[joint]} by {{distance}}"
-        amounts = {"distance": Amount(float(abs(apart[joint])), 0, joint)}
+        message = "the trajectory begins before its first point, {joint} by {distance}"
+        amounts = {"joint": name[joint], "distance": Amount(float(abs(apart[joint])), 0, joint)}
         events.append(Event("begins_before", message, first.index, amounts))
     return begins
 
@@ -153,8 +153,7 @@ def _errors_of(loaded: LoadedJob, index: int, planner: Planner) -> Iterator[None
             yield
     except TrajcliError as error:
         problems = (
-            replace(p, message=f"move {index} ({planner.tag}): {p.message}", move=index)
-            for p in error.problems
+            replace(problem.within(f"move {index} ({planner.tag})"), move=index) for problem in error.problems
         )
         raise type(error)(*problems) from None
 

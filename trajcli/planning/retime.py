@@ -13,7 +13,7 @@ from trajcli.checks.verify import Verdict, verify
 from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import Array
 from trajcli.curves.smallest_feasible import smallest_feasible
-from trajcli.errors import Amount, PlanningError
+from trajcli.errors import Amount, Amounts, PlanningError
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.planners.planner import Event, Planned, Planner
@@ -117,9 +117,13 @@ def slow_to_limits(move: PlannedMove) -> PlannedMove:
     worst = max(over, key=lambda finding: finding.factor or 0.0)
     message = (
         f"stretched {slower.stretch:.6g} times, from {{before}} to {{after}}, "
-        f"to keep the {worst.kind.removeprefix('tool_')} limit of {worst.joint or 'the tool'}"
+        f"to keep the {worst.kind.removeprefix('tool_')} limit of {{whose}}"
     )
-    amounts = {"before": Amount(move.duration), "after": Amount(slower.duration)}
+    amounts: Amounts = {
+        "before": Amount(move.duration),
+        "after": Amount(slower.duration),
+        "whose": worst.joint or "the tool",
+    }
     event = Event("slowed", message, move.index, amounts)
     return replace(slower, planned=replace(slower.planned, events=(event, *slower.planned.events)))
 

@@ -1,7 +1,4 @@
-"""An arm as the kinematic commands use it: a robot with geometry, and the units its numbers are said in.
-
-Joint values outside the limits of a robot: how many rows, and the first of them.
-"""
+"""Arms with the units of their users: joint values in and out, and a watch on the limits of position."""
 
 from __future__ import annotations
 
@@ -21,7 +18,7 @@ from trajcli.job.robot import RobotSheet, catalogue_names, load_sheet
 from trajcli.kinematics.inverse.joint_turns import beyond
 from trajcli.kinematics.robot import Robot
 from trajcli.kinematics.serial_chain import links_of
-from trajcli.units import Quantity, Units, factor, to_user, unit_name
+from trajcli.units import Quantity, Units, amount_text, factor, joint_quantity, unit_name
 
 
 @frozen
@@ -92,18 +89,10 @@ class ArmInUnits:
 
     def say(self, amount: Amount) -> str:
         """Return a number of a message in the arm's units."""
-        if amount.joint is not None:
-            quantity = self._quantity(amount.joint, amount.order)
-        elif amount.dimension is not None:
-            quantity = Quantity(amount.dimension, amount.order)
-        else:
-            return str(amount)
-        numbers = amount.numbers(lambda value: to_user(value, quantity, self.units))
-        return f"{numbers} {unit_name(quantity, self.units)}"
+        return amount_text(amount, self.robot.joint_types, self.units)
 
     def _quantity(self, joint: int, order: int) -> Quantity:
-        prismatic = self.robot.joint_types[joint] == "prismatic"
-        return Quantity("length" if prismatic else "angle", order)
+        return joint_quantity(self.robot.joint_types[joint], order)
 
 
 def open_sheet(name: str) -> RobotSheet:
@@ -142,7 +131,7 @@ def open_arm(
 
 
 @comparable
-class Outside:
+class JointOutsideLimits:
     """A joint value outside its limits, in the unit that it was given in.
 
     Attributes:
@@ -150,7 +139,7 @@ class Outside:
         time: Of that row, s; None where it has none.
         joint: Name of the joint; of several in a row the one that is furthest outside.
         value: Of the joint.
-        limit: The bound that it passes.
+        limit: The bound that it exceeds.
         unit: Of both.
         others: How many more joints of the row are outside.
     """
@@ -165,10 +154,10 @@ class Outside:
 
 
 class LimitWatch:
-    """Looks at rows of joint values as they pass.
+    """Count of the rows of a stream that are outside the position limits.
 
     Attributes:
-        rows: How many have passed.
+        rows: How many were seen.
         outside: How many of them have a joint outside its limits.
         first: The first of these; None while there is none.
     """
@@ -176,7 +165,7 @@ class LimitWatch:
     def __init__(self, robot: Robot) -> None:
         """Watch the position limits of a robot."""
         self.rows, self.outside = 0, 0
-        self.first: Outside | None = None
+        self.first: JointOutsideLimits | None = None
         self._robot = robot
 
     def see(
@@ -187,7 +176,7 @@ class LimitWatch:
         times: Array | None = None,
         room: float = 0.0,
     ) -> None:
-        """Take note of the next rows.
+        """Count the next rows.
 
         Args:
             values: Shape (N, n), rad or m.
@@ -203,7 +192,7 @@ class LimitWatch:
             row = int(rows[0])
             joint = int(np.abs(excess[row]).argmax())
             value = float(values[row, joint])
-            self.first = Outside(
+            self.first = JointOutsideLimits(
                 self.rows + row,
                 None if times is None else float(times[row]),
                 self._robot.joint_names[joint],

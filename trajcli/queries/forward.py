@@ -1,4 +1,4 @@
-"""Joint values from the columns of a CSV, in whatever units they say, and what is computed from them."""
+"""Forward kinematics of streams: poses and Jacobians for each row of joint values of a CSV."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.columns import Column, parse_column
+from trajcli.columns import Column, Group, columns_of, parse_column
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Place, Problem
 from trajcli.geometry.rotation import quaternion_from_matrix, without_jumps
@@ -20,24 +20,23 @@ from trajcli.queries.arm import ArmInUnits, LimitWatch
 from trajcli.streams.decimals import DECIMALS
 from trajcli.streams.table import TableBlocks
 
-_WHOSE = {"deg": "revolute", "mm": "prismatic"}
 _HALF = 0.5 * 10.0**-DECIMALS  # a joint that rests at its limit may be rounded beyond it
 
 
 class Stream(NamedTuple):
-    """Rows that are computed while they are taken.
+    """Rows that are computed block by block, on demand.
 
     Attributes:
-        names: The m columns' names.
+        columns: The m columns.
         blocks: Each of shape (N, m).
     """
 
-    names: list[str]
+    columns: tuple[Column, ...]
     blocks: Iterator[Array]
 
 
 class _JointColumns(NamedTuple):
-    """Which columns hold what: the time's index, and index, SI per unit and unit of each joint's column."""
+    """Index of the time's column, and index, SI per unit and unit of each joint's column."""
 
     time: int | None
     joints: NDArray[np.intp]
@@ -67,25 +66,25 @@ def poses_of(arm: ArmInUnits, rows: TableBlocks, watch: LimitWatch | None = None
     Raises:
         InputError: When a joint has no column, or one of another unit; when taken, if a row is wrong.
     """
-    wanted = _wanted(arm.robot, rows)
-    unit = "mm" if arm.units.length == "mm" else None
-    names = [*_time_name(wanted), *(Column(axis, None, unit).name for axis in "xyz"), "qw", "qx", "qy", "qz"]
-    return Stream(names, _poses(arm, rows, wanted, watch))
+    inputs = _joint_columns(arm.robot, rows)
+    groups: tuple[Group, ...] = ("pose",) if inputs.time is None else ("t", "pose")
+    columns = columns_of(groups, arm.robot.joint_types, arm.units)
+    return Stream(columns, _poses(arm, rows, inputs, watch))
 
 
 def _poses(
-    arm: ArmInUnits, rows: TableBlocks, wanted: _JointColumns, watch: LimitWatch | None
+    arm: ArmInUnits, rows: TableBlocks, inputs: _JointColumns, watch: LimitWatch | None
 ) -> Iterator[Array]:
     last = None
     for block in rows.blocks:
-        q = wanted.values(block)
+        q = inputs.values(block)
         if watch is not None:
-            times = None if wanted.time is None else block[:, wanted.time]
-            watch.see(q, wanted.factors, wanted.units, times, _HALF)
+            times = None if inputs.time is None else block[:, inputs.time]
+            watch.see(q, inputs.factors, inputs.units, times, _HALF)
         poses = forward(arm.robot, q)
         quaternions = without_jumps(quaternion_from_matrix(poses[:, :3, :3]), last)
         last = quaternions[-1]
-        yield np.hstack([wanted.times(block), poses[:, :3, 3] / arm.length_factor, quaternions])
+        yield np.hstack([inputs.times(block), poses[:, :3, 3] / arm.length_factor, quaternions])
 
 
 def jacobians_of(arm: ArmInUnits, rows: TableBlocks, frame: ReferenceFrame) -> Stream:
@@ -97,29 +96,26 @@ def jacobians_of(arm: ArmInUnits, rows: TableBlocks, frame: ReferenceFrame) -> S
     Raises:
         InputError: As `poses_of`.
     """
-    wanted = _wanted(arm.robot, rows)
+    inputs = _joint_columns(arm.robot, rows)
     entries = [f"J{i}{j}" for i in range(1, 7) for j in range(1, len(arm.robot.joints) + 1)]
-    names = [*_time_name(wanted), "manipulability", "inverse_condition", *entries]
-    return Stream(names, _jacobians(arm, rows, wanted, frame))
+    time = [] if inputs.time is None else ["t"]
+    columns = map(parse_column, [*time, "manipulability", "inverse_condition", *entries])
+    return Stream(tuple(columns), _jacobians(arm, rows, inputs, frame))
 
 
 def _jacobians(
-    arm: ArmInUnits, rows: TableBlocks, wanted: _JointColumns, frame: ReferenceFrame
+    arm: ArmInUnits, rows: TableBlocks, inputs: _JointColumns, frame: ReferenceFrame
 ) -> Iterator[Array]:
     for block in rows.blocks:
-        q = wanted.values(block)
+        q = inputs.values(block)
         measures = dexterity(arm.robot, q)
         entries = jacobian(arm.robot, q, frame).reshape(len(q), -1)
         columns = np.stack([measures.manipulability, 1.0 / measures.condition], axis=1)
-        yield np.hstack([wanted.times(block), columns, entries])
+        yield np.hstack([inputs.times(block), columns, entries])
 
 
-def _time_name(wanted: _JointColumns) -> list[str]:
-    return [] if wanted.time is None else ["t"]
-
-
-def _wanted(robot: Robot, rows: TableBlocks) -> _JointColumns:
-    found: dict[int, tuple[int, Column]] = {}
+def _joint_columns(robot: Robot, rows: TableBlocks) -> _JointColumns:
+    by_joint: dict[int, tuple[int, Column]] = {}
     time = None
     for index, name in enumerate(rows.names):
         column = parse_column(name)
@@ -127,19 +123,19 @@ def _wanted(robot: Robot, rows: TableBlocks) -> _JointColumns:
             time = index
         if column.kind != "q" or column.joint is None:
             continue
-        flaw = _flaw(robot, column, found)
+        flaw = _flaw(robot, column, by_joint)
         if flaw:
             start = len(",".join(rows.names[:index])) + (2 if index else 1)
             place = Place(rows.file, 1, start, ",".join(rows.names), len(name))
             raise InputError(Problem(*flaw, place))
-        found[column.joint] = index, column
-    missing = [f"q{i + 1}" for i in range(len(robot.joints)) if i not in found]
+        by_joint[column.joint] = index, column
+    missing = [f"q{i + 1}" for i in range(len(robot.joints)) if i not in by_joint]
     if missing:
         place = Place(rows.file, 1, 1, ",".join(rows.names))
         message = f"{robot.name} has {len(robot.joints)} joints, and there is no column {', '.join(missing)}"
         hint = "columns are called q1 in SI, q1_deg or q1_mm otherwise"
         raise InputError(Problem(message, hint, place))
-    columns = [found[i] for i in range(len(robot.joints))]
+    columns = [by_joint[i] for i in range(len(robot.joints))]
     indices = np.array([index for index, _ in columns])
     si = ["m" if kind == "prismatic" else "rad" for kind in robot.joint_types]
     units = [column.unit or plain for (_, column), plain in zip(columns, si, strict=True)]
@@ -147,17 +143,17 @@ def _wanted(robot: Robot, rows: TableBlocks) -> _JointColumns:
 
 
 def _flaw(
-    robot: Robot, column: Column, found: dict[int, tuple[int, Column]]
+    robot: Robot, column: Column, by_joint: dict[int, tuple[int, Column]]
 ) -> tuple[str, str | None] | None:
     joint = column.joint or 0
     count = len(robot.joints)
     if joint >= count:
         return f"{column.name} is the column of joint {joint + 1}, {robot.name} has {count} joints", None
-    if joint in found:
-        return f"{column.name} and {found[joint][1].name} are columns of the same joint", "leave one out"
+    if joint in by_joint:
+        return f"{column.name} and {by_joint[joint][1].name} are columns of the same joint", "leave one out"
     kind = robot.joint_types[joint]
-    if column.unit is not None and _WHOSE[column.unit] != kind:
-        unit = "mm" if kind == "prismatic" else "deg"
+    unit = "mm" if kind == "prismatic" else "deg"
+    if column.unit not in (None, unit):
         message = f"{column.name} cannot be in {column.unit}: {robot.joint_names[joint]} is {kind}"
         return message, f"expected q{joint + 1} or q{joint + 1}_{unit}"
     return None

@@ -1,4 +1,4 @@
-"""Every answer of inverse kinematics for one target, in the user's units."""
+"""Inverse kinematics of one target: every answer, in the user's units."""
 
 from __future__ import annotations
 
@@ -48,15 +48,15 @@ def find_answers(
     Raises:
         InputError: When a choice is asked for that the arm does not have for this target.
     """
-    found = solve(arm.robot, target, near, tolerance)
+    solutions = solve(arm.robot, target, near, tolerance)
     wanted = _named(configuration)
     for choice in wanted:
-        if getattr(found.names[0], choice) is None:
+        if getattr(solutions.names[0], choice) is None:
             raise InputError(
-                f"{arm.robot.name} has no choice of {choice} for this target: {found.method.reason}",
+                f"{arm.robot.name} has no choice of {choice} for this target: {solutions.method.reason}",
                 hint=f"leave {choice} out of `configuration`",
             )
-    return found, found.valid & found.named(**wanted)
+    return solutions, solutions.valid & solutions.named(**wanted)
 
 
 def _named(configuration: Configuration | None) -> dict[str, str]:
@@ -65,9 +65,9 @@ def _named(configuration: Configuration | None) -> dict[str, str]:
     return {choice: name for choice, name in given.items() if name is not None}
 
 
-def answers(
+def answer_reports(
     arm: ArmInUnits,
-    found: Solutions,
+    solutions: Solutions,
     chosen: Flags,
     target: IkTarget,
     near: Array | None = None,
@@ -84,65 +84,69 @@ def answers(
 
     Args:
         arm: The arm.
-        found: All branches.
+        solutions: All branches.
         chosen: Which of them to return, shape (branches,).
         target: What was asked for.
         near: Joint values (n,): the nearest answer comes first.
         every: Whether answers outside the limits count too.
         turns: Whether every full turn that the limits allow is an answer of its own.
     """
-    usable = np.flatnonzero(chosen if every else chosen & found.within_limits)
+    usable = np.flatnonzero(chosen if every else chosen & solutions.within_limits)
     if not len(usable):
         return []
-    here, nearby = ranks(arm.robot, found.joints[usable], target)
-    told = [
-        (joints, _answer(arm, found, branch, joints, target, lost))
+    here, nearby = ranks(arm.robot, solutions.joints[usable], target)
+    reports = [
+        (joints, _answer(arm, solutions, branch, joints, target, lost))
         for branch, lost in zip(usable.tolist(), (here < nearby).tolist(), strict=True)
-        for joints in (all_turns(arm.robot, found.joints[branch]) if turns else [found.joints[branch]])
+        for joints in (
+            all_turns(arm.robot, solutions.joints[branch]) if turns else [solutions.joints[branch]]
+        )
     ]
     if near is not None:
-        told.sort(key=lambda pair: float(np.abs(pair[0] - near).max()))
-    return [answer for _, answer in told]
+        reports.sort(key=lambda pair: float(np.abs(pair[0] - near).max()))
+    return [answer for _, answer in reports]
 
 
 def require_answer(
-    arm: ArmInUnits, found: Solutions, chosen: Flags, configuration: Configuration | None
+    arm: ArmInUnits, solutions: Solutions, chosen: Flags, configuration: Configuration | None
 ) -> None:
     """Do nothing when one of the chosen branches is within the limits.
 
     Raises:
         PlanningError: By how much the target is out of reach; or which joint is outside its limits.
     """
-    if (chosen & found.within_limits).any():
+    if (chosen & solutions.within_limits).any():
         return
     named = " ".join(_named(configuration).values())
-    if found.valid.any() and named:
-        others = [str(name) for name, fine in zip(found.names, found.within_limits, strict=True) if fine]
+    if solutions.valid.any() and named:
+        others = [
+            str(name) for name, fine in zip(solutions.names, solutions.within_limits, strict=True) if fine
+        ]
         only = "only outside the limits" if chosen.any() else "not at all"
         raise PlanningError(
             f"{arm.robot.name} reaches the pose with {named} {only}",
             hint=f"within the limits: {'; '.join(others)}" if others else "no other branch is inside either",
         )
     try:
-        check_reachable(arm.robot, found)
+        check_reachable(arm.robot, solutions)
     except PlanningError as error:
         raise error.said_by(arm.say) from None
 
 
 def _answer(
-    arm: ArmInUnits, found: Solutions, branch: int, joints: Array, target: IkTarget, singular: bool
+    arm: ArmInUnits, solutions: Solutions, branch: int, joints: Array, target: IkTarget, singular: bool
 ) -> dict[str, Any]:
-    names = {choice: name for choice, name in asdict(found.names[branch]).items() if name is not None}
-    told = {
+    names = {choice: name for choice, name in asdict(solutions.names[branch]).items() if name is not None}
+    report = {
         "joints": plain(joints / arm.joint_factors),
         "branch": names,
-        "within_limits": bool(found.within_limits[branch]),
-        "closure": float(found.closure[branch].max()),
+        "within_limits": bool(solutions.within_limits[branch]),
+        "closure": float(solutions.closure[branch].max()),
         "singular": singular,
     }
-    if found.free[branch].any():
-        told["free_direction"] = plain(next(free_directions(arm, joints, target)))
-    return told
+    if solutions.free[branch].any():
+        report["free_direction"] = plain(next(free_directions(arm, joints, target)))
+    return report
 
 
 def free_directions(arm: ArmInUnits, joints: Array, target: IkTarget) -> Iterator[Array]:
@@ -166,8 +170,8 @@ def ranks(robot: Robot, joints: Array, target: IkTarget) -> tuple[NDArray[np.int
     steps = _SPREAD * np.cos(np.square(np.arange(1.0, _AROUND * count + 1.0))).reshape(_AROUND, count)
     held = _held(robot, np.vstack([joints, joints[:1] + steps]), target)
     values = np.asarray(np.linalg.svd(held, compute_uv=False), dtype=np.float64)
-    found = _rank(values)
-    return found[: len(joints)], int(found.max())
+    counts = _rank(values)
+    return counts[: len(joints)], int(counts.max())
 
 
 def _held(robot: Robot, joints: Array, target: IkTarget) -> Array:

@@ -1,14 +1,13 @@
-"""Poses from the columns of a CSV, and the joint values that follow them without jumps."""
+"""Inverse kinematics of streams: joint values that follow the poses of a CSV without jumps."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from trajcli.columns import Column, column_names, parse_column
+from trajcli.columns import Column, Group, columns_of, parse_column
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Place, PlanningError, Problem
 from trajcli.geometry.rotation import QUATERNION_DEFECT, Flags, matrix_from_quaternion
@@ -23,7 +22,7 @@ from trajcli.queries.arm import ArmInUnits
 from trajcli.queries.forward import Stream
 from trajcli.streams.table import TableBlocks
 
-_STRETCH = 256  # rows that are looked at together
+_AHEAD = 256  # rows that are looked at together
 _CLOSE = 0.2  # rad or m: a larger step may have missed a nearer answer, so all are sought
 _AXES, _QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
 
@@ -48,31 +47,30 @@ def joints_of(arm: ArmInUnits, rows: TableBlocks, near: Array | None, tolerance:
         InputError: When a column is missing; when taken, if a row is wrong.
         PlanningError: When taken, if a row cannot be reached within the limits.
     """
-    wanted = _wanted(rows)
-    names = column_names(("q",), arm.robot.joint_types, arm.units)
-    return Stream(
-        [*([] if wanted.time is None else ["t"]), *names], _follow(arm, rows, wanted, near, tolerance)
-    )
+    inputs = _pose_columns(rows)
+    groups: tuple[Group, ...] = ("q",) if inputs.time is None else ("t", "q")
+    columns = columns_of(groups, arm.robot.joint_types, arm.units)
+    return Stream(columns, _follow(arm, rows, inputs, near, tolerance))
 
 
 def _follow(
-    arm: ArmInUnits, rows: TableBlocks, wanted: _PoseColumns, near: Array | None, tolerance: float
+    arm: ArmInUnits, rows: TableBlocks, inputs: _PoseColumns, near: Array | None, tolerance: float
 ) -> Iterator[Array]:
     last = np.zeros(len(arm.robot.joints)) if near is None else near
     done = 0
     for block in rows.blocks:
-        follower = _Follower(arm, _targets(block, wanted, done, rows.file), last, tolerance)
+        follower = _Follower(arm, _targets(block, inputs, done, rows.file), last, tolerance)
         joints = np.empty((len(block), len(last)))
         row = 0
         while row < len(block):
             try:
-                found = follower.take(row, last)
+                answers = follower.take(row, last)
             except PlanningError as error:
-                raise _of_row(arm, error, block, wanted, row, done) from None
-            joints[row : row + len(found)] = found
-            row, last = row + len(found), found[-1]
+                raise _of_row(arm, error, block, inputs, row, done) from None
+            joints[row : row + len(answers)] = answers
+            row, last = row + len(answers), answers[-1]
         done += len(block)
-        times = block[:, :0] if wanted.time is None else block[:, [wanted.time]]
+        times = block[:, :0] if inputs.time is None else block[:, [inputs.time]]
         yield np.hstack([times, joints / arm.joint_factors])
 
 
@@ -83,11 +81,11 @@ class _Follower:
         self._arm, self._target, self._tolerance = arm, target, tolerance
         self._turning = revolute(arm.robot)
         method = method_for(arm.robot)
-        self._found: Solutions | None = None
+        self._solutions: Solutions | None = None
         if method.solve is not None and fits(method, target, arm.robot.base):
-            self._found = solve(arm.robot, target, last, tolerance)
-            self._usable = self._found.within_limits
-            alone = self._found.singular.any(axis=-1) | ~self._usable.any(axis=-1)
+            self._solutions = solve(arm.robot, target, last, tolerance)
+            self._usable = self._solutions.within_limits
+            alone = self._solutions.singular.any(axis=-1) | ~self._usable.any(axis=-1)
             self._alone: Flags = np.asarray(alone)
 
     def take(self, row: int, last: Array) -> Array:
@@ -100,25 +98,25 @@ class _Follower:
         Raises:
             PlanningError: When the row has none within the limits.
         """
-        if self._found is None:
+        if self._solutions is None:
             continued = self._continued(row, last)
             return self._solved_alone(row, last)[None] if continued is None else continued
         if self._alone[row]:
             return self._solved_alone(row, last)[None]
-        stretch = self._on_one_branch(self._found, row, last)
-        return stretch if len(stretch) else self._nearest(self._found, row, last)[None]
+        answers = self._on_one_branch(self._solutions, row, last)
+        return answers if len(answers) else self._nearest(self._solutions, row, last)[None]
 
-    def _on_one_branch(self, found: Solutions, row: int, last: Array) -> Array:
+    def _on_one_branch(self, solutions: Solutions, row: int, last: Array) -> Array:
         """Return the answers while one branch stays the nearest and inside the limits; maybe none."""
-        rows = slice(row, row + _STRETCH)
-        joints, usable = found.joints[rows], self._usable[rows]
+        rows = slice(row, row + _AHEAD)
+        joints, usable = solutions.joints[rows], self._usable[rows]
         branch = int(self._apart(joints[0] - last, usable[0]).argmin())
         along = joints[:, branch]
         gaps = joints - np.concatenate([last[None], along[:-1]])[:, None]
         same = self._apart(gaps, usable).argmin(axis=1) == branch
         turns = np.where(self._turning, np.round(gaps[:, branch] / FULL), 0.0).cumsum(axis=0)
         values = along - FULL * turns
-        inside = (beyond(values, found.bounds) == 0.0).all(axis=1)
+        inside = (beyond(values, solutions.bounds) == 0.0).all(axis=1)
         ends = np.flatnonzero(~(same & inside & ~self._alone[rows]))
         return np.asarray(values[: ends[0]] if len(ends) else values)
 
@@ -127,8 +125,8 @@ class _Follower:
         wrapped = np.where(self._turning, gaps - FULL * np.round(gaps / FULL), gaps)
         return np.where(usable, np.abs(wrapped).max(axis=-1), np.inf)
 
-    def _nearest(self, found: Solutions, row: int, last: Array) -> Array:
-        turned = np.ascontiguousarray(found.joints[row][self._usable[row]].T)[..., None]
+    def _nearest(self, solutions: Solutions, row: int, last: Array) -> Array:
+        turned = np.ascontiguousarray(solutions.joints[row][self._usable[row]].T)[..., None]
         choose_turns(self._arm.robot, turned, last[:, None])
         best = int(np.abs(turned[..., 0] - last[:, None]).max(axis=0).argmin())
         return np.array(turned[:, best, 0])
@@ -136,33 +134,32 @@ class _Follower:
     def _continued(self, row: int, last: Array) -> Array | None:
         """Return the answer (1, n) that Newton's steps find near to the row before; None where they fail."""
         robot, target = self._arm.robot, self._target.rows([row])
-        joints, found = descend(robot, target, last[None], robot.limits.position)
+        joints, converged = descend(robot, target, last[None], robot.limits.position)
         close = np.abs(joints - last).max() <= _CLOSE
         inside = (beyond(joints, robot.limits.position) == 0.0).all()
-        met = found[0] and closure_of(target, forward(robot, joints)).max() <= self._tolerance
+        met = converged[0] and closure_of(target, forward(robot, joints)).max() <= self._tolerance
         return joints if close and inside and met else None
 
     def _solved_alone(self, row: int, last: Array) -> Array:
-        found = solve(self._arm.robot, self._target.rows(row), last, self._tolerance)
-        check_reachable(self._arm.robot, found)
-        return np.array(found.joints[int(found.nearest(last))])
+        solutions = solve(self._arm.robot, self._target.rows(row), last, self._tolerance)
+        check_reachable(self._arm.robot, solutions)
+        return np.array(solutions.joints[int(solutions.nearest(last))])
 
 
 def _of_row(
-    arm: ArmInUnits, error: PlanningError, block: Array, wanted: _PoseColumns, row: int, done: int
+    arm: ArmInUnits, error: PlanningError, block: Array, inputs: _PoseColumns, row: int, done: int
 ) -> PlanningError:
-    """Return the error with the row's number and time said in front."""
-    when = "" if wanted.time is None else f" (t = {block[row, wanted.time]:.9g} s)"
+    """Return the error with the row's number and time in front."""
+    when = "" if inputs.time is None else f" (t = {block[row, inputs.time]:.9g} s)"
     problems = error.said_by(arm.say).problems
-    first = replace(problems[0], message=f"row {done + row}{when}: {problems[0].message}")
-    return PlanningError(first, *problems[1:])
+    return PlanningError(problems[0].within(f"row {done + row}{when}"), *problems[1:])
 
 
-def _targets(block: Array, wanted: _PoseColumns, done: int, file: str) -> IkTarget:
-    position = block[:, wanted.position] * wanted.factors
-    if not wanted.rotation:
+def _targets(block: Array, inputs: _PoseColumns, done: int, file: str) -> IkTarget:
+    position = block[:, inputs.position] * inputs.factors
+    if not inputs.rotation:
         return partial_target(position)
-    quaternions = block[:, wanted.rotation]
+    quaternions = block[:, inputs.rotation]
     length = np.linalg.norm(quaternions, axis=1)
     wrong = np.flatnonzero(np.abs(length - 1.0) > QUATERNION_DEFECT)
     if wrong.size:
@@ -174,29 +171,29 @@ def _targets(block: Array, wanted: _PoseColumns, done: int, file: str) -> IkTarg
     return partial_target(position, rotation=matrix_from_quaternion(quaternions))
 
 
-def _wanted(rows: TableBlocks) -> _PoseColumns:
-    found: dict[str, tuple[int, Column]] = {}
+def _pose_columns(rows: TableBlocks) -> _PoseColumns:
+    by_kind: dict[str, tuple[int, Column]] = {}
     for index, name in enumerate(rows.names):
         column = parse_column(name)
         usual = column.unit is None or (column.unit == "mm" and column.kind in _AXES)
         if column.joint is None and column.kind in ("t", *_AXES, *_QUATERNION) and usual:
-            if column.kind in found:
+            if column.kind in by_kind:
                 raise _refused(
-                    rows, f"{found[column.kind][1].name} and {name} are columns of the same number"
+                    rows, f"{by_kind[column.kind][1].name} and {name} are columns of the same number"
                 )
-            found[column.kind] = index, column
-    missing = [name for name in _AXES if name not in found]
-    part = [name for name in _QUATERNION if name in found]
+            by_kind[column.kind] = index, column
+    missing = [name for name in _AXES if name not in by_kind]
+    part = [name for name in _QUATERNION if name in by_kind]
     if part and len(part) < len(_QUATERNION):
-        missing += [name for name in _QUATERNION if name not in found]
+        missing += [name for name in _QUATERNION if name not in by_kind]
     if missing:
         raise _refused(
             rows, f"a pose has x, y, z and qw, qx, qy, qz: there is no column {', '.join(missing)}"
         )
-    position = [found[name] for name in _AXES]
-    time = found["t"][0] if "t" in found else None
+    position = [by_kind[name] for name in _AXES]
+    time = by_kind["t"][0] if "t" in by_kind else None
     factors = np.array([column.factor for _, column in position])
-    return _PoseColumns(time, [index for index, _ in position], factors, [found[name][0] for name in part])
+    return _PoseColumns(time, [index for index, _ in position], factors, [by_kind[name][0] for name in part])
 
 
 def _refused(rows: TableBlocks, message: str) -> InputError:

@@ -1,4 +1,4 @@
-"""What the Jacobian of one configuration says, in the user's units."""
+"""Jacobian report of one configuration: matrix, dexterity and singular directions, in the user's units."""
 
 from __future__ import annotations
 
@@ -65,8 +65,8 @@ def simplest(rows: Array) -> Array:
     done: list[int] = []
     for _ in range(len(left)):
         free = [i for i in range(len(left)) if i not in done]
-        place = np.abs(left[free]).argmax()
-        row, column = free[int(place) // left.shape[1]], int(place) % left.shape[1]
+        largest = int(np.abs(left[free]).argmax())
+        row, column = free[largest // left.shape[1]], largest % left.shape[1]
         left[row] /= left[row, column]
         others = [i for i in range(len(left)) if i != row]
         left[others] -= np.outer(left[others, column], left[row])

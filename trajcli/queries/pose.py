@@ -1,10 +1,7 @@
-"""A chain of rotations and displacements about fixed and current axes, read as it stands and multiplied.
+"""Composition, interpolation and representations of poses, in the user's units.
 
-Poses on the way from one pose to another, for values of s from 0 to 1.
-
-A pose in every representation, and where a representation is not determined by it.
-
-A pose as numbers in the user's units, in every form that commands print.
+Composition multiplies steps about fixed or current axes, read as they stand; interpolation leads from one
+pose to another for s from 0 to 1; a report has every representation, and says what the pose leaves open.
 """
 
 from __future__ import annotations
@@ -39,7 +36,10 @@ from trajcli.language.poses import Pose, read_numbers
 from trajcli.suggest import did_you_mean
 from trajcli.units import AngleUnit, LengthUnit, Quantity, Units, factor
 
+OrientationInterpolation = Literal["axis_angle", "euler"]
+
 _OWN_KEYS = ("frame", "invert")
+_RPY: tuple[str, Frame] = ("XYZ", "fixed")
 
 
 @comparable
@@ -136,7 +136,7 @@ def _end(fields: Mapping[str, Any], context: ReadingContext) -> PoseStep:
 
 
 def _typed(fields: Mapping[str, Any], context: ReadingContext) -> TypedAngles | None:
-    """Return the angles of fields that were found to be a pose."""
+    """Return the angles of fields that are a pose."""
     if "rpy" in fields:
         sequence, frame, given = "XYZ", "fixed", fields["rpy"]
     elif "euler" in fields:
@@ -148,13 +148,9 @@ def _typed(fields: Mapping[str, Any], context: ReadingContext) -> TypedAngles | 
     return TypedAngles(sequence, cast("Frame", frame), (first, middle, last))
 
 
-OrientationInterpolation = Literal["axis_angle", "euler"]
-_RPY: tuple[str, Frame] = ("XYZ", "fixed")
-
-
 @frozen
 class PoseAtEnd:
-    """One end of the way.
+    """Start or end of an interpolation.
 
     Attributes:
         pose: Shape (4, 4).
@@ -189,7 +185,7 @@ def pose_path(
     start: PoseAtEnd,
     end: PoseAtEnd,
     s: Array,
-    way: PoseInterpolation = "line",
+    path: PoseInterpolation = "line",
     orientation: OrientationInterpolation = "axis_angle",
     euler: tuple[str, Frame] | None = None,
 ) -> Array:
@@ -199,7 +195,7 @@ def pose_path(
         start: At s = 0.
         end: At s = 1.
         s: From 0 to 1.
-        way: "line" for a straight line of the origin, "screw" for constant twist.
+        path: "line" for a straight line of the origin, "screw" for constant twist.
         orientation: On a line: about one fixed axis, or "euler" for angles that change evenly, in the
             sequence of the end; where the end was not typed as angles, in that of `euler`, else as rpy. Of
             angles that were not typed, the triple and the turns nearest to the other end's are taken.
@@ -209,10 +205,10 @@ def pose_path(
         InputError: When a screw is asked for with Euler angles.
     """
     ends = [build(nearest_rotation(pose[:3, :3]), pose[:3, 3]) for pose in (start.pose, end.pose)]
-    if way == "screw" and orientation == "euler":
+    if path == "screw" and orientation == "euler":
         message = "--orientation euler is for --path line: a screw turns about its own axis"
         raise InputError(message, hint="leave one of them out")
-    poses = interpolate(ends[0], ends[1], s, way)
+    poses = interpolate(ends[0], ends[1], s, path)
     if orientation == "euler":
         poses[:, :3, :3] = _even_angles(start, end, s, euler)
     return poses
@@ -238,10 +234,10 @@ def _own(side: PoseAtEnd, sequence: str, frame: Frame) -> Array | None:
 
 
 def _nearest(pose: Array, sequence: str, frame: Frame, aim: Array) -> Array:
-    found = euler_from_matrix(sequence, pose[:3, :3], frame)
+    euler = euler_from_matrix(sequence, pose[:3, :3], frame)
     turn = 2.0 * np.pi
     triples: Sequence[Array] = [
-        angles + turn * np.round((aim - angles) / turn) for angles in (found.angles, found.alternative)
+        angles + turn * np.round((aim - angles) / turn) for angles in (euler.angles, euler.alternative)
     ]
     return min(triples, key=lambda angles: float(np.abs(angles - aim).max()))
 
@@ -321,32 +317,32 @@ def pose_report(
     rotation = pose[:3, :3]
     angle, length = factor(Quantity("angle"), units), factor(Quantity("length"), units)
     about = axis_angle_from_matrix(rotation)
-    told = pose_view(pose, units)
-    told["axis_angle"] = {"axis": plain(about.axis), "angle": float(about.angle) / angle}
+    report = pose_view(pose, units)
+    report["axis_angle"] = {"axis": plain(about.axis), "angle": float(about.angle) / angle}
     singular = _at_lock("rpy", ("x", "z"), rpy_from_matrix(rotation), units)
     if euler is not None:
         sequence, frame = euler
-        found = euler_from_matrix(sequence, rotation, frame)
-        told["euler"] = [angles_view(found.angles, units), angles_view(found.alternative, units)]
-        singular |= _at_lock("euler", ("the first axis", "the third"), found, units)
+        triples = euler_from_matrix(sequence, rotation, frame)
+        report["euler"] = [angles_view(triples.angles, units), angles_view(triples.alternative, units)]
+        singular |= _at_lock("euler", ("the first axis", "the third"), triples, units)
     if about.axis_free:
         singular["axis_angle"] = "the angle is zero: any axis is right"
     elif about.sign_free:
         singular["axis_angle"] = "the angle is half a turn: the opposite axis is right too"
-    told["determinant"] = float(np.linalg.det(rotation))
+    report["determinant"] = float(np.linalg.det(rotation))
     if point is not None:
-        told["point"] = plain(transform_points(pose, point) / length)
+        report["point"] = plain(transform_points(pose, point) / length)
     if singular:
-        told["singular"] = singular
-    return told
+        report["singular"] = singular
+    return report
 
 
-def _at_lock(name: str, about: tuple[str, str], found: EulerAngles, units: Units) -> dict[str, str]:
+def _at_lock(name: str, about: tuple[str, str], triples: EulerAngles, units: Units) -> dict[str, str]:
     """Return what to say of angles at gimbal lock, under the name of the representation."""
-    if not found.singular:
+    if not triples.singular:
         return {}
-    lock = int(found.lock)
-    first, _, third = (found.angles / factor(Quantity("angle"), units)).tolist()
+    lock = int(triples.lock)
+    first, _, third = (triples.angles / factor(Quantity("angle"), units)).tolist()
     value = f"{round(first + lock * third, 12) + 0.0:.9g} {units.angle}"
     word, sign = ("sum", "plus") if lock > 0 else ("difference", "minus")
     text = f"gimbal lock: of the angles about {about[0]} and {about[1]} only the {word} is determined "

@@ -1,4 +1,4 @@
-"""What there is to say about a robot: its table, limits, reach, inverse kinematics and source."""
+"""Data sheet of a robot: its table, limits, reach, inverse kinematics and source."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.families.choose import method_for
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.queries.pose import pose_view
-from trajcli.units import Quantity, factor, to_user
+from trajcli.units import Quantity, factor, joint_quantity, to_user
 
 # Measured: within 2e-4 of what ten times as many draws find, for every robot of the catalogue.
 _SEED, _ROUNDS, _DRAWN, _KEPT = 20, 8, 1024, 32
@@ -25,7 +25,7 @@ class ReachRange:
     """How far the tcp gets from the origin of the base, m.
 
     Attributes:
-        sampled: The largest distance found by a search over the joint ranges; a little below the true one.
+        sampled: The largest distance that a search finds over the joint ranges; a little below the true one.
         bound: The lengths of all links added: no configuration gets further. Both are infinite where a slide
             has no limits.
     """
@@ -88,7 +88,7 @@ def robot_row(name: str, sheet: RobotSheet) -> dict[str, Any]:
 
 
 def robot_card(name: str, sheet: RobotSheet) -> dict[str, Any]:
-    """Return all there is to say about a robot, in the units of its file; what is not limited is null."""
+    """Return the data sheet of a robot, in the units of its file; what is not limited is null."""
     robot, units = sheet.robot, sheet.units
     reach, length = reach_of(robot), factor(Quantity("length"), units)
     return {
@@ -122,11 +122,10 @@ def _joint_card(sheet: RobotSheet, index: int) -> dict[str, Any]:
     joint, units = sheet.robot.joints[index], sheet.units
     angle, length = Quantity("angle"), Quantity("length")
     row = {"theta": angle, "d": length, "a": length, "alpha": angle}
-    own = "length" if joint.type == "prismatic" else "angle"
     table = {key: round(to_user(getattr(joint, key), quantity, units), 12) for key, quantity in row.items()}
     limits: dict[str, Any] = {}
     for order, quantity in enumerate(QUANTITIES):
-        scale = factor(Quantity(own, order), units)  # type: ignore[arg-type]
+        scale = factor(joint_quantity(joint.type, order), units)
         low, high = (sheet.robot.limits.of_order(order)[index] / scale).tolist()
         limits[quantity] = [_finite(low), _finite(high)] if np.isfinite([low, high]).any() else None
     described = table if sheet.robot.convention is not None else {}

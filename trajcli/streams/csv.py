@@ -1,31 +1,29 @@
-"""The sample stream as CSV: a line of names, then a line for each row."""
+"""Comma-separated values: a line of names, then a line for each row."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from pathlib import Path
-from typing import BinaryIO, Literal
+from collections.abc import Iterable, Iterator, Sequence
+from typing import BinaryIO
 
 import numpy as np
 
-from trajcli.columns import whole_number_columns
+from trajcli.columns import Column, whole_number_columns
 from trajcli.curves.piecewise import Array
 from trajcli.errors import TrajcliError
-from trajcli.streams.decimals import NotFixedError, encode_fixed, encode_full, scan_fixed
-from trajcli.streams.whole_file import whole_file
-
-Digits = Literal["fixed", "full"]
+from trajcli.streams.decimals import Digits, NotFixedError, encode_fixed, encode_full, scan_fixed
 
 _CHUNK = 1 << 18  # bytes read back at a time
 _HALF_UNIT = 0.5e-9 + 1e-12  # the last decimal's half, and the first of the two roundings
 
 
-def write_csv(rows: Iterable[Array], names: Sequence[str], out: BinaryIO, digits: Digits = "fixed") -> None:
-    """Write blocks of rows, each of shape (N, m), under their m names.
+def write_csv(
+    rows: Iterable[Array], columns: Sequence[Column], out: BinaryIO, digits: Digits = "fixed"
+) -> None:
+    """Write blocks of rows, each of shape (N, m), under the names of their m columns.
 
     Args:
         rows: Blocks; they are taken one by one, so that memory does not grow with their number.
-        names: The columns' names.
+        columns: What the rows hold, in the units that the columns say.
         out: Where to.
         digits: Nine decimals, or as many as restore each float64 bit by bit.
 
@@ -33,41 +31,25 @@ def write_csv(rows: Iterable[Array], names: Sequence[str], out: BinaryIO, digits
         TrajcliError: When a value is not finite; its row and what follows are not written.
     """
     encode = encode_fixed if digits == "fixed" else encode_full
-    whole_numbers = whole_number_columns(names)
-    out.write((",".join(names) + "\n").encode())
+    whole_numbers = whole_number_columns(columns)
+    out.write(_header(columns).encode())
     written = 0
     for block in rows:
-        _require_finite(block, names, written)
+        _require_finite(block, columns, written)
         out.write(encode(block, whole_numbers))
         written += len(block)
 
 
-def write_verified(
-    path: str | Path, rows: Callable[[], Iterable[Array]], names: Sequence[str], digits: Digits = "fixed"
-) -> None:
-    """Write a file that appears whole or not at all, and is read back before it does.
-
-    Args:
-        path: The file. A device or pipe is written to directly, and not read back.
-        rows: Called once to write and once to compare; returns the blocks of `write_csv`.
-        names: The columns' names.
-        digits: As in `write_csv`.
-
-    Raises:
-        FileError: When the file cannot be written.
-        BrokenPipeError: When the path is a pipe whose reader has closed it.
-        TrajcliError: When a value is not finite, or the file does not hold what was written.
-    """
-    with whole_file(path) as out:
-        write_csv(rows(), names, out, digits)
-        if out.readable():
-            verify_written(out, rows(), names, digits)
-
-
-def verify_written(
-    written: BinaryIO, rows: Iterable[Array], names: Sequence[str], digits: Digits = "fixed"
+def verify_csv(
+    written: BinaryIO, rows: Iterable[Array], columns: Sequence[Column], digits: Digits = "fixed"
 ) -> None:
     """Read a stream from its beginning and compare every number with the rows it was written from.
+
+    Args:
+        written: What `write_csv` wrote.
+        rows: The same blocks once more.
+        columns: As in `write_csv`.
+        digits: As in `write_csv`.
 
     Raises:
         TrajcliError: When a name, a number or the count of rows differs; a number by more than half a unit of
@@ -75,19 +57,22 @@ def verify_written(
     """
     written.seek(0)
     header = written.readline().decode(errors="replace")
-    if header != ",".join(names) + "\n":
+    if header != _header(columns):
         raise TrajcliError(f"the file read back begins with {header!r} instead of the columns' names")
-    whole_numbers = whole_number_columns(names)
-    texts = _Texts(written, len(names), whole_numbers)
-    place = 0
+    blocks = _RowsReadBack(written, len(columns), whole_number_columns(columns))
+    count = 0
     for block in rows:
-        _compare(texts.take(len(block), place), block, names, place, digits)
-        place += len(block)
-    texts.expect_end(place)
+        _compare(blocks.take(len(block), count), block, columns, count, digits)
+        count += len(block)
+    blocks.expect_end(count)
 
 
-class _Texts:
-    """The numbers of a stream, handed out as many rows at a time as are asked for."""
+def _header(columns: Sequence[Column]) -> str:
+    return ",".join(column.name for column in columns) + "\n"
+
+
+class _RowsReadBack:
+    """The rows of a stream, as many at a time as are asked for."""
 
     def __init__(self, stream: BinaryIO, width: int, whole_numbers: Sequence[int]) -> None:
         self._width = width
@@ -111,44 +96,44 @@ class _Texts:
         except ValueError as error:
             raise TrajcliError(f"the file read back holds what is not a number: {error}") from error
 
-    def take(self, count: int, place: int) -> Array:
-        """Return the next `count` rows; `place` is how many were taken before."""
-        parts, found = [self._left], len(self._left)
-        while found < count:
+    def take(self, count: int, before: int) -> Array:
+        """Return the next `count` rows; `before` is how many were taken before."""
+        parts, available = [self._left], len(self._left)
+        while available < count:
             block = next(self._blocks, None)
             if block is None:
                 raise TrajcliError(
-                    f"the file read back ends after {place + found} rows, but more were written"
+                    f"the file read back ends after {before + available} rows, but more were written"
                 )
             parts.append(block)
-            found += len(block)
-        held = np.concatenate(parts)
-        self._left = held[count:]
-        return held[:count]
+            available += len(block)
+        rows = np.concatenate(parts)
+        self._left = rows[count:]
+        return rows[:count]
 
-    def expect_end(self, place: int) -> None:
-        """Refuse rows after the first `place`."""
+    def expect_end(self, count: int) -> None:
+        """Refuse rows after the first `count`."""
         if len(self._left) or next(self._blocks, None) is not None:
-            raise TrajcliError(f"the file read back goes on after the {place} rows that were written")
+            raise TrajcliError(f"the file read back goes on after the {count} rows that were written")
 
 
-def _compare(read: Array, rows: Array, names: Sequence[str], place: int, digits: Digits) -> None:
+def _compare(read: Array, rows: Array, columns: Sequence[Column], before: int, digits: Digits) -> None:
     if digits == "full":
         wrong = read.view(np.int64) != np.ascontiguousarray(rows).view(np.int64)
     else:
         wrong = ~(np.abs(read - rows) <= _HALF_UNIT + np.spacing(np.abs(rows)))
     if wrong.any():
-        row, column = np.argwhere(wrong)[0]
+        row, index = np.argwhere(wrong)[0]
         raise TrajcliError(
-            f"the file read back says {read[row, column]!r} in row {place + row} of {names[column]}, "
-            f"where the curve is {rows[row, column]!r}"
+            f"the file read back says {read[row, index]!r} in row {before + row} of {columns[index].name}, "
+            f"where the curve is {rows[row, index]!r}"
         )
 
 
-def _require_finite(block: Array, names: Sequence[str], place: int) -> None:
+def _require_finite(block: Array, columns: Sequence[Column], before: int) -> None:
     finite = np.isfinite(block)
     if not finite.all():
-        row, column = np.argwhere(~finite)[0]
+        row, index = np.argwhere(~finite)[0]
         raise TrajcliError(
-            f"{names[column]} is {block[row, column]} in row {place + row}; nothing of it is written"
+            f"{columns[index].name} is {block[row, index]} in row {before + row}; nothing of it is written"
         )

@@ -1,15 +1,13 @@
-"""Numbers to text with nine fixed decimals: the same bytes on every processor, and fast.
+"""Decimal text of numbers with nine fixed decimals: the same bytes on every processor, written and read fast.
 
-A value is split into its whole and its fractional part, which is exact. The fraction is rounded to 1e-12
-first and from there to 1e-9, both on scaled integers and half to even: values that differ in their last bits
-only, because they were evaluated in another order, give the same digits even where they stand on a tie.
+Writing: a value is split into its whole and its fractional part, which is exact. The fraction is rounded to
+1e-12 first and from there to 1e-9, both on scaled integers and half to even: values that differ in their last
+bits only, because they were evaluated in another order, give the same digits even where they stand on a tie.
 
 Text is made of words of four bytes from tables: `-12`, `.345`, `6789`, `01,`. Shorter words are filled with
 NUL bytes, which are dropped from the whole block at once.
 
-Text with nine fixed decimals back to numbers, many at once.
-
-Eight digits are read as one 64-bit word and summed pair by pair: digits to numbers below 100, those to
+Reading: eight digits are one 64-bit word and are summed pair by pair: digits to numbers below 100, those to
 numbers below 10^4, those to one below 10^8. A cell is then a whole number of 1e-9 below 2^53, and its
 quotient by 10^9 is the float64 nearest to the text, as `float` would give it.
 
@@ -21,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from functools import cache
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,9 +27,13 @@ from numpy.typing import NDArray
 from trajcli.curves.piecewise import Array
 
 DECIMALS = 9
+Digits = Literal["fixed", "full"]
+"""Nine decimals, or the fewest digits from which each float64 can be restored bit by bit."""
 
-Words = NDArray[np.uint32]
-Bools = NDArray[np.bool_]
+_Words = NDArray[np.uint32]
+_LongWords = NDArray[np.uint64]
+_Indices = NDArray[np.intp]
+_Bools = NDArray[np.bool_]
 
 _VALUES = 16384  # values encoded at a time: their words stay in the processor's cache
 _NARROW = 1e3  # whole parts below this and their sign fit into one word
@@ -77,7 +80,7 @@ def _encode_block(rows: Array, whole_numbers: Sequence[int]) -> bytes:
     return words.tobytes().translate(None, b"\0")
 
 
-def _rounded(values: Array) -> tuple[Bools, Array, Array]:
+def _rounded(values: Array) -> tuple[_Bools, Array, Array]:
     """Return sign, whole part and fraction, in units of the last decimal, of the rounded values (N,).
 
     A value that is rounded to zero has no sign.
@@ -96,7 +99,7 @@ def _rounded(values: Array) -> tuple[Bools, Array, Array]:
     return (values < 0) & (whole + fraction > 0), whole, fraction
 
 
-def _put_wide(words: Words, negative: Bools, whole: Array) -> None:
+def _put_wide(words: _Words, negative: _Bools, whole: Array) -> None:
     """Write whole parts below 1e7 into the first two columns of `words` (N, 2 or more)."""
     high = np.floor(whole / 1e4)
     low = whole - 1e4 * high
@@ -107,7 +110,7 @@ def _put_wide(words: Words, negative: Bools, whole: Array) -> None:
     words[:, 1] = _trailing_words()[low.astype(np.intp)]
 
 
-def _put_fraction(words: Words, fraction: Array) -> None:
+def _put_fraction(words: _Words, fraction: Array) -> None:
     """Write point, nine digits and a comma into `words` (N, 3); `fraction` (N,) is used up."""
     # The quotients of whole numbers are off their next lower whole number by far less than the summand.
     first = np.floor(fraction * 1e-6 + 1e-7)
@@ -121,7 +124,7 @@ def _put_fraction(words: Words, fraction: Array) -> None:
 
 
 def _encode_huge(
-    negative: Bools, whole: Array, fraction: Array, width: int, whole_numbers: Sequence[int]
+    negative: _Bools, whole: Array, fraction: Array, width: int, whole_numbers: Sequence[int]
 ) -> bytes:
     """Return the text of a block that holds numbers of any size; whole parts are exact."""
     cells = [
@@ -135,31 +138,31 @@ def _encode_huge(
     return "".join(",".join(line) + "\n" for line in lines).encode()
 
 
-def _words(texts: Iterable[str]) -> Words:
+def _words(texts: Iterable[str]) -> _Words:
     """Return each text of at most four characters as a word, filled with NUL bytes in front."""
     return np.frombuffer("".join(text.rjust(4, "\0") for text in texts).encode(), dtype=np.uint32)
 
 
 @cache
-def _signed_words() -> Words:
+def _signed_words() -> _Words:
     """Return the words of 0 to 999, then those of -0 to -999."""
     return _words([f"{sign}{number}" for sign in ("", "-") for number in range(1000)])
 
 
 @cache
-def _leading_words() -> Words:
+def _leading_words() -> _Words:
     """Return the same words, without the digit of 0 and -0."""
     return _words([f"{sign}{number or ''}" for sign in ("", "-") for number in range(1000)])
 
 
 @cache
-def _trailing_words() -> Words:
+def _trailing_words() -> _Words:
     """Return the words of 0 to 9999, then the same of four digits each."""
     return _words([form.format(number) for form in ("{}", "{:04d}") for number in range(10000)])
 
 
 @cache
-def _fraction_tables() -> tuple[Words, Words, Words]:
+def _fraction_tables() -> tuple[_Words, _Words, _Words]:
     """Return the words of the first three decimals, of the next four, and of the last two with a comma."""
     first, last = _digits(1000, 4), _digits(100, 4)
     first[:, 0] = ord(".")
@@ -173,12 +176,9 @@ def _digits(count: int, width: int) -> NDArray[np.uint8]:
     return (np.arange(count)[:, None] // powers % 10 + ord("0")).astype(np.uint8)
 
 
-def _as_words(characters: NDArray[np.uint8]) -> Words:
+def _as_words(characters: NDArray[np.uint8]) -> _Words:
     return np.ascontiguousarray(characters).view(np.uint32)[:, 0]
 
-
-_Words = NDArray[np.uint64]
-_Places = NDArray[np.intp]
 
 _FRONT = b"0" * 24  # room for words that begin before the first cell
 _ZEROS = np.uint64(0x3030303030303030)
@@ -222,7 +222,7 @@ def scan_fixed(text: bytes, width: int, whole_numbers: Sequence[int] = ()) -> Ar
     return np.negative(rows, out=rows, where=negative.reshape(rows.shape))
 
 
-def _cell_ends(buffer: NDArray[np.uint8], width: int) -> _Places:
+def _cell_ends(buffer: NDArray[np.uint8], width: int) -> _Indices:
     """Return where each cell's comma or line feed stands, shape (N * width,)."""
     ends = np.flatnonzero(buffer < ord("-"))
     if ends.size == 0 or ends.size % width or ends[-1] != buffer.size - 1:
@@ -233,7 +233,7 @@ def _cell_ends(buffer: NDArray[np.uint8], width: int) -> _Places:
     return ends
 
 
-def _decimals(buffer: NDArray[np.uint8], starts: _Places, ends: _Places) -> Array:
+def _decimals(buffer: NDArray[np.uint8], starts: _Indices, ends: _Indices) -> Array:
     """Return the magnitudes (N,) of cells with nine decimals; `starts` is behind the sign."""
     point = ends - (DECIMALS + 1)
     first = buffer[point + 1] - np.uint8(ord("0"))
@@ -249,18 +249,18 @@ def _decimals(buffer: NDArray[np.uint8], starts: _Places, ends: _Places) -> Arra
     return units / 10.0**DECIMALS
 
 
-def _whole_numbers(buffer: NDArray[np.uint8], starts: _Places, ends: _Places) -> Array:
+def _whole_numbers(buffer: NDArray[np.uint8], starts: _Indices, ends: _Indices) -> Array:
     return _digits_between(buffer, starts, ends).astype(np.float64)
 
 
-def _digits_between(buffer: NDArray[np.uint8], starts: _Places, ends: _Places) -> _Words:
+def _digits_between(buffer: NDArray[np.uint8], starts: _Indices, ends: _Indices) -> _LongWords:
     """Return the whole numbers of 1 to 8 digits in buffer[start:end]."""
     length = ends - starts
     if length.min(initial=1) < 1 or length.max(initial=1) > 8:
         raise NotFixedError
-    # Every place of the buffer seen as the start of a word.
+    # Every byte of the buffer seen as the start of a word.
     words = np.ndarray(buffer.size - 7, dtype="<u8", buffer=buffer, strides=(1,))
-    word: _Words = words[ends - 8]
+    word: _LongWords = words[ends - 8]
     word = word.astype(np.uint64, copy=False)
     word ^= _ZEROS
     word &= _LAST[length]

@@ -1,4 +1,4 @@
-"""CSV files, also strangers', as a table of numbers."""
+"""Tables of numbers read from CSV files of any origin."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.columns import whole_number_columns
+from trajcli.columns import parse_column, whole_number_columns
 from trajcli.curves.piecewise import Array
 from trajcli.errors import FileError, InputError, Place, Problem
 from trajcli.frozen import frozen
@@ -190,7 +190,7 @@ def _flaw_of_names(names: Sequence[str]) -> tuple[int, str, str | None] | None:
 
 
 def _chunks(stream: BinaryIO) -> Iterator[bytes]:
-    """Yield stretches of whole lines, each ending in a line feed."""
+    """Yield chunks of whole lines, each ending in a line feed."""
     while text := stream.read(_CHUNK):
         text += stream.readline()
         if b"\r" in text:
@@ -199,7 +199,7 @@ def _chunks(stream: BinaryIO) -> Iterator[bytes]:
 
 
 class _Reader:
-    """Turns text into rows and remembers what it meets on the way.
+    """Parser of rows, which counts their decimals and collects problems.
 
     Attributes:
         decimals: The most decimals seen, by column.
@@ -212,7 +212,7 @@ class _Reader:
         self._file = file
         self._names = names
         self._line = 2
-        self._whole_numbers = whole_number_columns(names)
+        self._whole_numbers = whole_number_columns(map(parse_column, names))
         self._fixed_decimals = np.full(len(names), DECIMALS)
         self._fixed_decimals[list(self._whole_numbers)] = 0
 
@@ -227,7 +227,7 @@ class _Reader:
         return rows
 
     def _read_any(self, text: bytes) -> Array:
-        """Return the rows of lines whose numbers are written in any way."""
+        """Return the rows of lines whose numbers are written in any form."""
         width = len(self._names)
         lines = text.split(b"\n")
         cells = [line.split(b",") for line in lines if line.strip()]
@@ -269,8 +269,8 @@ class _Reader:
             text = cell.decode(errors="replace")
             if not (_is_number(cell) and isfinite(float(cell))):
                 place = Place(self._file, number, column, source, max(len(text), 1))
-                said = f"'{text.strip()}'" if text.strip() else "empty"
-                yield Problem(f"{name} is {said}, expected a finite number", place=place)
+                value = f"'{text.strip()}'" if text.strip() else "empty"
+                yield Problem(f"{name} is {value}, expected a finite number", place=place)
             column += len(text) + 1
 
 

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all."""
+"""Atomic writing of files: they appear whole or not at all."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _NUMBERS = {"stdout": 1, "stderr": 2}
 
 @contextmanager
 def whole_file(path: str | Path) -> Iterator[BinaryIO]:
-    """Open `path` for writing; the file takes its place when the block ends, and only if it ends well.
+    """Open `path` for writing; the file appears under its name when the block ends, and only if it ends well.
 
     The new file replaces an old one in one step and keeps its permissions; a symbolic link stays, and what it
     points to is replaced. A device, a pipe or an open descriptor such as /dev/stdout is written to

@@ -107,14 +107,6 @@ def test_nodes_keep_the_text_of_scalars_as_it_stands() -> None:
     assert document().node(("version", "x")) is None
 
 
-def test_below_keeps_the_places_of_the_file() -> None:
-    below = document().below(("points", "home"))
-    assert below.plain() == {"joints": [0, -90.5, 10.0, "3 deg"]}
-    assert below.place(("joints", 1)) == document().place(("points", "home", "joints", 1))
-    with pytest.raises(KeyError):
-        document().below(("points", "away"))
-
-
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
 def test_line_ends(end: str) -> None:
     read = parse_document(JOB.replace("\n", end).encode(), "job.yaml")

@@ -73,7 +73,7 @@ def test_end_that_can_only_be_reached_from_outside():
     (problem,) = refusal(state([1.0, 2.0], [0.9, 0.0], [-1.5, 0.0]))
     assert problem.value == pytest.approx(0.9 + 1.5**2 / (2 * 5.0), rel=1e-12)
     assert problem.limit == 1.0
-    assert "j1" in problem.message
+    assert "j1" in problem.text()
     just = 0.99 * np.sqrt(2 * 5.0 * 0.1)
     assert (
         move_to(state([1.0, 2.0], [0.9, 0.0], [-just, 0.0])).plan(state([0.0, 0.0]), ROBOT).curve.duration > 0

@@ -1,8 +1,7 @@
-"""A YAML file as a tree that knows where each part of it stands."""
+"""Syntax tree of a YAML file: values, and where each of them stands."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from trajcli.errors import Place
@@ -92,20 +91,9 @@ class Document:
         """Return the whole as new dicts, lists and scalars."""
         return self.root.plain()
 
-    def below(self, path: Sequence[str | int]) -> Document:
-        """Return the same file with the node at `path` as its root.
-
-        Raises:
-            KeyError: When there is no such node.
-        """
-        node = self.node(path)
-        if node is None:
-            raise KeyError(tuple(path))
-        return replace(self, root=node)
-
 
 def place(file: str, lines: Sequence[str], line: int, column: int, length: int = 1) -> Place:
-    """Return a stretch of a file as errors say it; what lies behind the last text is moved to its end."""
+    """Return a place in a file for errors; one behind the last text is moved to the end of that."""
     if line > len(lines) or (line == len(lines) and not lines[-1]):
         line = max((number for number, text in enumerate(lines, 1) if text.strip()), default=1)
         column, length = len(lines[line - 1].rstrip()) + 1, 1

@@ -1,10 +1,8 @@
-"""Read YAML strictly, with the place of everything: own walk over the parser's events.
+"""Strict reading of YAML 1.2, with the place of every value.
 
-Numbers follow YAML 1.2. Refused are what makes a file mean something else than it seems to say: duplicate
-keys, anchors, tags, merge keys, several documents, NaN and infinity; and what no job needs: deep nesting.
-All problems of a file are reported at once.
-
-What a plain scalar of YAML means, by the core schema of YAML 1.2.
+Refused is what makes a file mean something else than it seems to say: duplicate keys, anchors, tags, merge
+keys, several documents, NaN and infinity; and what no job needs: deep nesting. All problems of a file are
+reported at once. Plain scalars mean what the core schema of YAML 1.2 says.
 
 Source: YAML 1.2.2 specification, section 10.3.2 (tag resolution of the core schema).
 """
@@ -40,6 +38,14 @@ from trajcli.job.yaml.source import (
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+__all__ = ["MAX_DEPTH", "Document", "Node", "parse_document", "read_document"]
+
+MAX_DEPTH = 32
+
+_MARKER = re.compile(r"[&*!][^\s,\[\]{}]*")
+_REPEATED = "put what is used twice under `points`, and name it there"
+
+_START = Node(None, 1, 1, 1)
 
 Scalar = bool | int | float | str | None
 
@@ -56,73 +62,8 @@ _QUOTED = 40  # characters of a number that a message repeats
 _LARGEST = sys.float_info.max
 
 
-class ScalarError(ValueError):
-    """A plain scalar is a number that cannot be used; the message says why.
-
-    Attributes:
-        hint: What would fix it.
-    """
-
-    def __init__(self, message: str, hint: str | None = None) -> None:
-        super().__init__(message)
-        self.hint = hint
-
-
-def resolve(text: str) -> Scalar:
-    """Return the value of a plain scalar: null, a bool, an int, a float, or the text itself.
-
-    Raises:
-        ScalarError: When it is a number that is not finite, or that float64 cannot hold.
-    """
-    if not text or text[0] not in _FIRST_OF_NUMBERS:
-        return _WORDS.get(text, text)
-    if _is_decimal(text):
-        if "." in text and 0.0 < abs(value := float(text)) <= _LARGEST:
-            return value  # what nearly all numbers of a long file are
-        return _int(text, 10) if text.lstrip("+-").isdigit() else _float(text)
-    if _RADIX.fullmatch(text):
-        return _int(text[2:], 8 if text[1] == "o" else 16)
-    if _NOT_FINITE.fullmatch(text):
-        hint = "a bound that is not there is written null" if text[-1] in "fF" else None
-        raise ScalarError(f"expected a finite number, got {text}", hint)
-    return text
-
-
-def _float(text: str) -> float:
-    value = float(text)
-    if abs(value) > _LARGEST:
-        raise ScalarError(f"{_shown(text)} is too large: a number is at most 1.8e308")
-    if not value and text.lower().partition("e")[0].strip("+-0."):
-        raise ScalarError(f"{_shown(text)} is too small: it would be read as 0")
-    return value
-
-
-def _int(digits: str, radix: int) -> int:
-    try:
-        value = int(digits, radix)  # ValueError: more digits than Python reads
-        float(value)
-    except (ValueError, OverflowError):
-        raise ScalarError(f"{_shown(digits)} is too large: a number is at most 1.8e308") from None
-    return value
-
-
-def _shown(text: str) -> str:
-    return text if len(text) <= _QUOTED else f"{text[:_QUOTED]}... ({len(text)} characters)"
-
-
-__all__ = ["MAX_DEPTH", "Document", "Node", "parse_document", "read_document"]
-
-MAX_DEPTH = 32
-
-_MARKER = re.compile(r"[&*!][^\s,\[\]{}]*")
-_REPEATED = "put what is used twice under `points`, and name it there"
-
-
-_START = Node(None, 1, 1, 1)
-
-
 class _PureLoader(yaml.SafeLoader):
-    """The parser in Python, made to take tabs between tokens and to refuse escapes as libyaml does."""
+    """The parser in Python, which takes tabs between tokens and refuses escapes as libyaml does."""
 
     def scan_to_next_token(self) -> None:
         super().scan_to_next_token()
@@ -184,7 +125,7 @@ def _position(problem: Problem) -> tuple[int, int]:
 
 
 class _Walk:
-    """One pass over the events of a text: its nodes, and every problem on the way."""
+    """One pass over the events of a text: its nodes, and every problem."""
 
     def __init__(self, text: str, file: str, lines: tuple[str, ...]) -> None:
         self.text, self.file, self.lines = text, file, lines
@@ -339,3 +280,57 @@ class _Walk:
     def _report(self, message: str, at: Node, hint: str | None = None) -> None:
         there = place(self.file, self.lines, at.line, at.column, at.length)
         self.problems.append(Problem(message, hint, there))
+
+
+class ScalarError(ValueError):
+    """A plain scalar is a number that cannot be used; the message says why.
+
+    Attributes:
+        hint: What would fix it.
+    """
+
+    def __init__(self, message: str, hint: str | None = None) -> None:
+        super().__init__(message)
+        self.hint = hint
+
+
+def resolve(text: str) -> Scalar:
+    """Return the value of a plain scalar: null, a bool, an int, a float, or the text itself.
+
+    Raises:
+        ScalarError: When it is a number that is not finite, or that float64 cannot hold.
+    """
+    if not text or text[0] not in _FIRST_OF_NUMBERS:
+        return _WORDS.get(text, text)
+    if _is_decimal(text):
+        if "." in text and 0.0 < abs(value := float(text)) <= _LARGEST:
+            return value  # what nearly all numbers of a long file are
+        return _int(text, 10) if text.lstrip("+-").isdigit() else _float(text)
+    if _RADIX.fullmatch(text):
+        return _int(text[2:], 8 if text[1] == "o" else 16)
+    if _NOT_FINITE.fullmatch(text):
+        hint = "a bound that is not there is written null" if text[-1] in "fF" else None
+        raise ScalarError(f"expected a finite number, got {text}", hint)
+    return text
+
+
+def _float(text: str) -> float:
+    value = float(text)
+    if abs(value) > _LARGEST:
+        raise ScalarError(f"{_shown(text)} is too large: a number is at most 1.8e308")
+    if not value and text.lower().partition("e")[0].strip("+-0."):
+        raise ScalarError(f"{_shown(text)} is too small: it would be read as 0")
+    return value
+
+
+def _int(digits: str, radix: int) -> int:
+    try:
+        value = int(digits, radix)  # ValueError: more digits than Python reads
+        float(value)
+    except (ValueError, OverflowError):
+        raise ScalarError(f"{_shown(digits)} is too large: a number is at most 1.8e308") from None
+    return value
+
+
+def _shown(text: str) -> str:
+    return text if len(text) <= _QUOTED else f"{text[:_QUOTED]}... ({len(text)} characters)"

@@ -1,4 +1,4 @@
-"""The text of a file: read with a bound on its size, and refused where it is no clean UTF-8 text."""
+"""Source text of a file, of bounded size and in clean UTF-8."""
 
 from __future__ import annotations
 

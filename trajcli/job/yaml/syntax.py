@@ -1,6 +1,6 @@
-"""The YAML parser's complaints as sentences for people, at the place of the cause.
+"""Explanation of YAML syntax errors, at the place of their cause.
 
-libyaml and PyYAML's own parser stop at the same places with words that differ a little; both are read here.
+libyaml and PyYAML's own parser stop at the same characters, with words that differ a little.
 """
 
 from __future__ import annotations

@@ -178,14 +178,15 @@ def _problem(robot: Robot, solutions: Solutions, index: tuple[int, ...], which: 
     low, high = solutions.bounds[nearest.joint].tolist()
     limit = high if nearest.excess > 0.0 else low
     name = robot.joint_names[nearest.joint]
-    amounts = {"value": nearest.value, "limit": limit, "excess": abs(nearest.excess)}
+    numbers = {"value": nearest.value, "limit": limit, "excess": abs(nearest.excess)}
+    amounts = {key: Amount(value, 0, nearest.joint) for key, value in numbers.items()}
     return Problem(
-        f"{robot.name} reaches the pose{which} only outside the limits: "
+        f"{{robot}} reaches the pose{which} only outside the limits: "
         f"the nearest of {int(solutions.count[index])} answers "
-        f"has {name} at {{value}}, its limit is {{limit}}, {{excess}} too far",
+        "has {joint} at {value}, its limit is {limit}, {excess} too far",
         hint="move the target, or choose another tool or base",
         joint=name,
         value=nearest.value,
         limit=limit,
-        amounts={key: Amount(value, 0, nearest.joint) for key, value in amounts.items()},
+        amounts={"robot": robot.name, "joint": name, **amounts},
     )

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from trajcli.errors import Amount, MissingLimitError, PlanningError, Problem
+from trajcli.errors import Amount, Amounts, MissingLimitError, PlanningError, Problem
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.language.targets import MinimumDuration
 from trajcli.planners.planner import Planned
@@ -126,8 +126,12 @@ def _end_problems(task: BoundaryProblem, joint: int) -> list[Problem]:
         value, (low, high) = task.final[order], task.bounds[order - 1].tolist()
         if not low * (1 + _ROUNDING) <= value <= high * (1 + _ROUNDING):
             limit = low if value < 0 else high
-            message = f"{task.name} would end with {QUANTITIES[order]} {{value}}, beyond its limit {{limit}}"
-            amounts = {"value": Amount(value, order, joint), "limit": Amount(limit, order, joint)}
+            message = f"{{joint}} would end with {QUANTITIES[order]} {{value}}, beyond its limit {{limit}}"
+            amounts: Amounts = {
+                "joint": task.name,
+                "value": Amount(value, order, joint),
+                "limit": Amount(limit, order, joint),
+            }
             hint = f"lower the end {QUANTITIES[order]}, or raise the limit"
             return [Problem(message, hint, joint=task.name, value=value, limit=limit, amounts=amounts)]
     return [] if task.control == "velocity" or task.done else _approach_problems(task, joint)
@@ -142,10 +146,11 @@ def _approach_problems(task: BoundaryProblem, joint: int) -> list[Problem]:
         return []
     limit = low if before < 0 else high
     message = (
-        f"{task.name} would end with velocity {{velocity}} and acceleration {{acceleration}}: within its "
+        "{joint} would end with velocity {velocity} and acceleration {acceleration}: within its "
         "jerk limit it must have moved at {before} just before, beyond its velocity limit {limit}"
     )
-    amounts = {
+    amounts: Amounts = {
+        "joint": task.name,
         "velocity": Amount(velocity, 1, joint),
         "acceleration": Amount(acceleration, 2, joint),
         "before": Amount(before, 1, joint),
@@ -159,8 +164,8 @@ def leaves_line(value: float, order: int, joint: int, robot: Robot) -> PlanningE
     """Return the error of a boundary velocity or acceleration that points away from the straight line."""
     name = robot.joint_names[joint]
     message = "`synchronize: phase` keeps all joints on one straight line, "
-    message += f"but {QUANTITIES[order]} {{value}} of {name} leaves it"
-    amounts = {"value": Amount(value, order, joint)}
+    message += f"but {QUANTITIES[order]} {{value}} of {{joint}} leaves it"
+    amounts: Amounts = {"joint": name, "value": Amount(value, order, joint)}
     return PlanningError(
         Problem(message, "say `synchronize: time`", joint=name, value=value, amounts=amounts)
     )
@@ -168,10 +173,8 @@ def leaves_line(value: float, order: int, joint: int, robot: Robot) -> PlanningE
 
 def cannot_wait(task: BoundaryProblem, arrival: float, duration: float, joint: int) -> PlanningError:
     """Return the error of a joint that arrives first and moves in its end state."""
-    message = (
-        f"{task.name} arrives after {{arrival}}, moves on, and cannot wait for the others until {{duration}}"
-    )
-    amounts = {"arrival": Amount(arrival), "duration": Amount(duration)}
+    message = "{joint} arrives after {arrival}, moves on, and cannot wait for the others until {duration}"
+    amounts: Amounts = {"joint": task.name, "arrival": Amount(arrival), "duration": Amount(duration)}
     hint = "say `synchronize: time`, or let it end at rest"
     return PlanningError(Problem(message, hint, joint=task.name, amounts=amounts))
 

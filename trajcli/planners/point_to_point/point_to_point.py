@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from trajcli.curves.piecewise import Array, constant
-from trajcli.errors import Amount, MissingLimitError, PlanningError, Problem
+from trajcli.errors import Amount, Amounts, MissingLimitError, PlanningError, Problem
 from trajcli.kinematics.robot import QUANTITIES, Limits, Robot
 from trajcli.language.numbers import refuse
 from trajcli.language.targets import Duration, NamedTarget
@@ -81,9 +81,11 @@ def require_rest(planner: str, state: State, robot: Robot, *, where: str = "star
         if values.any():
             joint = int(np.flatnonzero(values)[0])
             name, quantity = robot.joint_names[joint], QUANTITIES[order]
-            message = f"{planner} {where}s at rest, but the {quantity} of {name} is {{value}} at its {where}"
+            message = (
+                f"{planner} {where}s at rest, but the {quantity} of {{joint}} is {{value}} at its {where}"
+            )
             hint = "let the move before end at rest, or use quintic or jerk_limited"
-            amounts = {"value": Amount(float(values[joint]), order, joint)}
+            amounts: Amounts = {"joint": name, "value": Amount(float(values[joint]), order, joint)}
             raise PlanningError(
                 Problem(message, hint, joint=name, value=float(values[joint]), amounts=amounts)
             )

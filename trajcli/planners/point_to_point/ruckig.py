@@ -23,7 +23,7 @@ import numpy as np
 
 from trajcli.curves.phases import PhaseChain
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.errors import Amount, PlanningError, Problem
+from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.frozen import frozen
 from trajcli.planners.planner import Phase
 
@@ -216,10 +216,10 @@ def _found(task: BoundaryProblem, duration: float | None) -> PhaseProfile:
             best, least = profile, miss
     if best is not None:
         return best
-    message = f"{task.name}: no motion within the velocity, acceleration and jerk limits could be found"
+    message = "{joint}: no motion within the velocity, acceleration and jerk limits could be found"
     message += " that lasts {duration}" if duration else ""
     hint = "change the end velocity or acceleration, or the duration, or raise the limits"
-    amounts = {"duration": Amount(duration)} if duration else {}
+    amounts: Amounts = {"joint": task.name, "duration": Amount(duration or 0.0)}
     raise PlanningError(Problem(message, hint, joint=task.name, amounts=amounts))
 
 

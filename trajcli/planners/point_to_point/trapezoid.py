@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from trajcli.errors import Amount, PlanningError, Problem
+from trajcli.errors import Amount, Amounts, PlanningError, Problem
 
 if TYPE_CHECKING:
     from trajcli.curves.trapezoid import InfeasibleProfileError
@@ -59,36 +59,35 @@ def explain_infeasible(
         robot: For the names.
     """
     name = robot.joint_names[joint]
-    amounts: dict[str, Amount] = {}
+    amounts: dict[str, Amount | str] = {"joint": name}
     if error.reason in ("speed", "acceleration"):
         order = 1 if error.reason == "speed" else 2
         given = (move.velocity or (0.0,) * 12)[joint] if order == 1 else _acceleration(move, robot, joint)
-        amounts = {
+        amounts |= {
             "low": Amount(error.low * size, order, joint),
             "high": Amount(error.high * size, order, joint),
             "given": Amount(given, order, joint),
             "duration": Amount(move.duration or 0.0),
         }
     elif error.reason == "duration":
-        amounts = {"low": Amount(error.low), "high": Amount(error.high)}
+        amounts |= {"low": Amount(error.low), "high": Amount(error.high)}
     elif error.reason in ("too_fast", "too_slow"):
-        amounts = {"needed": Amount(error.low * size, 0, joint)}
-    message = _message(error, name)
-    return PlanningError(Problem(message, _HINTS[error.reason], joint=name, amounts=amounts))
+        amounts["needed"] = Amount(error.low * size, 0, joint)
+    return PlanningError(Problem(_message(error), _HINTS[error.reason], joint=name, amounts=amounts))
 
 
-def _message(error: InfeasibleProfileError, name: str) -> str:
+def _message(error: InfeasibleProfileError) -> str:
     unbounded = error.high == float("inf")
     return {
-        "speed": f"no trapezoid of {{duration}}: the velocity of {name} must be above {{low}} "
+        "speed": "no trapezoid of {duration}: the velocity of {joint} must be above {low} "
         "and at most {high}, got {given}",
-        "acceleration": f"no trapezoid of {{duration}}: the acceleration of {name} must be at least {{low}}, "
+        "acceleration": "no trapezoid of {duration}: the acceleration of {joint} must be at least {low}, "
         "got {given}",
-        "duration": f"no trapezoid for {name}: its duration must be at least {{low}}"
+        "duration": "no trapezoid for {joint}: its duration must be at least {low}"
         + ("" if unbounded else " and at most {high}"),
-        "too_fast": f"{name} is too fast to end in the target: it needs {{needed}} to slow down",
-        "too_slow": f"{name} cannot reach its end velocity in time: it needs {{needed}} to speed up",
-        "turns": f"{name} would have to turn round to start and end with the given velocities",
+        "too_fast": "{joint} is too fast to end in the target: it needs {needed} to slow down",
+        "too_slow": "{joint} cannot reach its end velocity in time: it needs {needed} to speed up",
+        "turns": "{joint} would have to turn round to start and end with the given velocities",
     }[error.reason]
 
 
@@ -265,22 +264,19 @@ def _along(displacement: Array, velocity: Array, robot: Robot) -> float:
     off = np.abs(velocity - speed * displacement)
     if off.max() > _OFF * np.abs(velocity).max() + _STILL:
         joint = int(off.argmax())
-        message = (
-            "trapezoid moves all joints along one straight line, but {velocity} of "
-            + robot.joint_names[joint]
-        )
+        name = robot.joint_names[joint]
+        message = "trapezoid moves all joints along one straight line, but {velocity} of {joint} leaves it"
         hint = "say `synchronize: none`, or use jerk_limited or cubic"
-        amounts = {"velocity": Amount(float(velocity[joint]), 1, joint)}
-        raise PlanningError(
-            Problem(message + " leaves it", hint, joint=robot.joint_names[joint], amounts=amounts)
-        )
+        amounts: Amounts = {"joint": name, "velocity": Amount(float(velocity[joint]), 1, joint)}
+        raise PlanningError(Problem(message, hint, joint=name, amounts=amounts))
     return speed
 
 
 def _cannot_wait(joint: int, arrival: float, duration: float, end: State, robot: Robot) -> PlanningError:
     name = robot.joint_names[joint]
-    message = f"{name} arrives after {{arrival}} at {{velocity}} and cannot wait there until {{duration}}"
-    amounts = {
+    message = "{joint} arrives after {arrival} at {velocity} and cannot wait there until {duration}"
+    amounts: Amounts = {
+        "joint": name,
         "arrival": Amount(arrival),
         "velocity": Amount(float(end.velocity[joint]), 1, joint),
         "duration": Amount(duration),

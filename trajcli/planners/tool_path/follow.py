@@ -13,7 +13,7 @@ import numpy as np
 from trajcli.curves.extrema import peaks
 from trajcli.curves.hermite_fit import MOST_PIECES, FitError, fit
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.errors import Amount, PlanningError, Problem
+from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.frozen import frozen
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.following.follower import Follower, LostError, ReferenceAt, follower
@@ -85,12 +85,13 @@ class FollowingDiagnosis:
             (found.low, found.low_time, low) if below else (found.high, found.high_time, high)
         )
         name = self.robot.joint_names[joint]
-        amounts = {
+        amounts: Amounts = {
+            "joint": name,
             "value": Amount(float(value[joint]), 0, joint),
             "limit": Amount(float(limit[joint]), 0, joint),
             "place": self._place(float(time[joint])),
         }
-        message = f"{name} would be at {{value}} at s = {{place}} of the path, its limit is {{limit}}"
+        message = "{joint} would be at {value} at s = {place} of the path, its limit is {limit}"
         hint = "start in another configuration, or move the path"
         raise PlanningError(Problem(message, hint, joint=name, time=float(time[joint]), amounts=amounts))
 
@@ -114,13 +115,12 @@ class FollowingDiagnosis:
             last = self._last_reached(float(places[first - 1]), float(places[first]), known)
         missed = found.shortfall.max(axis=0)
         kind = int(missed[1] * characteristic_length(self.robot) > missed[0])
-        amounts = {
+        amounts: Amounts = {
+            "robot": self.robot.name,
             "place": self._place(last),
             "missed": Amount(float(missed[kind]), 0, None, ("length", "angle")[kind]),
         }
-        message = (
-            f"{self.robot.name} does not reach the path beyond s = {{place}}: it stays up to {{missed}} away"
-        )
+        message = "{robot} does not reach the path beyond s = {place}: it stays up to {missed} away"
         hint = "move the path nearer to the arm, or leave coordinates of the target free"
         return PlanningError(Problem(message, hint, amounts=amounts))
 
@@ -152,7 +152,7 @@ class FollowingDiagnosis:
         name = self.robot.joint_names[joint]
         unit = "rad" if self.robot.joint_types[joint] == "revolute" else "m"
         per = "s" if self.law is not None else "rad of the path" if self.in_place else "m of the path"
-        race = f"{name} would have to go {abs(float(rates[joint])):.4g} {unit} for each {per}"
+        race = f"{{joint}} would have to go {abs(float(rates[joint])):.4g} {unit} for each {per}"
         if self.law is None and abs(float(rates[joint])) < _SLOW / characteristic_length(self.robot):
             race = "branches of the arm meet, and it would pass from one to another"
         message = (
@@ -160,7 +160,8 @@ class FollowingDiagnosis:
             f"singular value {ratio:.2g})"
         )
         hint = "move the path, start in another configuration, or use a move in joint space there"
-        return PlanningError(Problem(message, hint, joint=name, amounts={"place": self._place(at)}))
+        amounts: Amounts = {"joint": name, "place": self._place(at)}
+        return PlanningError(Problem(message, hint, joint=name, amounts=amounts))
 
     def _regular(self, at: float, *, stuck: bool) -> PlanningError:
         """Return the error of a place where the tool could go on."""
@@ -168,11 +169,12 @@ class FollowingDiagnosis:
         hint = "choose a larger `tolerance`, or split the path"
         if stuck:
             message = (
-                f"what the target leaves free cannot be held beyond s = {{place}} of the path: "
-                f"{self.robot.name} would have to turn round in its place"
+                "what the target leaves free cannot be held beyond s = {place} of the path: "
+                "{robot} would have to turn round in its place"
             )
             hint = "start in another configuration, fix more of the target's orientation, or split the move"
-        return PlanningError(Problem(message, hint, amounts={"place": self._place(at)}))
+        amounts: Amounts = {"robot": self.robot.name, "place": self._place(at)}
+        return PlanningError(Problem(message, hint, amounts=amounts))
 
 
 @frozen

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from trajcli.kinematics.following.tool_path import ToolPath
 import numpy as np
 
-from trajcli.errors import Amount, PlanningError, Problem
+from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.kinematics.following.motion import motion_along
 from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.planners.tool_path.follow import JointMotion, diagnosis_of_motion, followed, followed_in_time
@@ -175,11 +175,10 @@ def check_arrival(way: PlannedPath, end: Array, robot: Robot) -> None:
     if way.arrival is not None and np.abs(end - way.arrival).max() > _ARRIVED:
         joint = int(np.abs(end - way.arrival).argmax())
         name = robot.joint_names[joint]
-        message = (
-            f"the tool arrives where the target says, but with {name} at {{value}} instead of {{wanted}}"
-        )
+        message = "the tool arrives where the target says, but with {joint} at {value} instead of {wanted}"
         hint = "on a path the arm keeps its branch: go there in joint space, or give the target as a pose"
-        amounts = {
+        amounts: Amounts = {
+            "joint": name,
             "value": Amount(float(end[joint]), 0, joint),
             "wanted": Amount(float(way.arrival[joint]), 0, joint),
         }

@@ -327,8 +327,7 @@ def _segments(before: Array, move: PathMove, robot: Robot) -> tuple[list[Positio
         try:
             place, target = _segment(segment, pose, robot)
         except TrajcliError as error:
-            problems = (replace(p, message=f"segment {index}: {p.message}") for p in error.problems)
-            raise type(error)(*problems) from None
+            raise type(error)(*(problem.within(f"segment {index}") for problem in error.problems)) from None
         if targets and (target.orientation, target.tool_axis) != (
             targets[-1].orientation,
             targets[-1].tool_axis,

@@ -18,7 +18,7 @@ from trajcli.curves.parabolic_blends.durations import BlendAccelerationError
 from trajcli.curves.parabolic_blends.fastest import fastest_blends
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.curves.splines.time_allocation import fastest_durations
-from trajcli.errors import Amount, PlanningError, Problem
+from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import (
@@ -331,23 +331,25 @@ def _shrunk(made: Blended, robot: Robot) -> tuple[Event, ...]:
     if not made.shrunk:
         return ()
     worst = min(made.shrunk, key=lambda one: one.used / one.asked)
-    whose = "" if worst.joint is None else f" of {robot.joint_names[worst.joint]}"
+    whose = "" if worst.joint is None else " of {joint}"
     more = f"; {len(made.shrunk) - 1} more likewise" if len(made.shrunk) > 1 else ""
     text = (
         f"the blend{whose} at point {worst.point} was shortened from {{asked}} to {{used}}, "
         f"for which the segments beside it have room{more}"
     )
-    return (Event("shrunk", text, amounts={"asked": Amount(worst.asked), "used": Amount(worst.used)}),)
+    name = "" if worst.joint is None else robot.joint_names[worst.joint]
+    amounts: Amounts = {"joint": name, "asked": Amount(worst.asked), "used": Amount(worst.used)}
+    return (Event("shrunk", text, amounts=amounts),)
 
 
 def _too_slow(error: BlendAccelerationError, points: PointTable, robot: Robot) -> PlanningError:
     name, last = robot.joint_names[error.joint], error.point == points.count - 1
     where = "last" if last else "first"
     message = (
-        f"the acceleration of {name}, {{given}}, is too small for the blend inside the {where} segment: "
+        f"the acceleration of {{joint}}, {{given}}, is too small for the blend inside the {where} segment: "
         "it takes {least}"
     )
     given, least = (Amount(value, 2, error.joint) for value in (error.acceleration, error.least))
     hint = "raise the acceleration, allow more time, or say `end_blends: centred`"
-    amounts = {"given": given, "least": least}
+    amounts: Amounts = {"joint": name, "given": given, "least": least}
     return PlanningError(Problem(message, hint, joint=name, amounts=amounts))

@@ -331,8 +331,8 @@ class Spline(ThroughPoints):
 
 def _not_monotone(error: ShapeError, robot: Robot, *, given: bool) -> PlanningError:
     name, joint = robot.joint_names[error.component], error.component
-    message = f"{{velocity}} of {name} at the {error.end} point keeps the curve from being monotone"
-    amounts = {"velocity": Amount(error.velocity, 1, joint)}
+    message = f"{{velocity}} of {{joint}} at the {error.end} point keeps the curve from being monotone"
+    amounts: dict[str, Amount | str] = {"joint": name, "velocity": Amount(error.velocity, 1, joint)}
     if given:
         message += ", {low} to {high} would not"
         amounts |= {"low": Amount(error.low, 1, joint), "high": Amount(error.high, 1, joint)}

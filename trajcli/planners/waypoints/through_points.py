@@ -256,7 +256,7 @@ def _at_times(points: tuple[Waypoint, ...] | Recorded, factor: float) -> tuple[W
 
 
 def _of_point(error: TrajcliError, name: str) -> TrajcliError:
-    return type(error)(*(replace(p, message=f"{name}: {p.message}") for p in error.problems))
+    return type(error)(*(problem.within(name) for problem in error.problems))
 
 
 def _at(point: Waypoint, factor: float) -> Waypoint:

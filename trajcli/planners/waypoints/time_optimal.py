@@ -20,7 +20,7 @@ from trajcli.curves.splines.shape_preserving import ShapeError
 from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion, UnsettledSpeedError, time_optimal
 from trajcli.curves.time_optimal.passes import UnreachableSpeedError
 from trajcli.curves.time_optimal.switching import switching_structure
-from trajcli.errors import Amount, PlanningError, Problem
+from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import (
@@ -148,9 +148,9 @@ def _along(slope: Array, velocity: Array, robot: Robot) -> float:
     if off.max() > _OFF * np.abs(velocity).max() or speed < 0:
         joint = int(off.argmax())
         name = robot.joint_names[joint]
-        message = f"a polyline is straight at its ends, but {{velocity}} of {name} leaves it"
+        message = "a polyline is straight at its ends, but {velocity} of {joint} leaves it"
         hint = "use `path: spline`, or let the move before end at rest"
-        amounts = {"velocity": Amount(float(velocity[joint]), 1, joint)}
+        amounts: Amounts = {"joint": name, "velocity": Amount(float(velocity[joint]), 1, joint)}
         raise PlanningError(Problem(message, hint, joint=name, amounts=amounts))
     return speed
 

@@ -1,0 +1,54 @@
+"""The table of formats: what a file's name promises, and that a format is one entry."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from trajcli.columns import columns_of
+from trajcli.errors import InputError
+from trajcli.streams import formats
+from trajcli.streams.formats import DEFAULT, FORMATS, StreamFormat, format_of, write_verified
+from trajcli.units import Units
+
+COLUMNS = columns_of(("t", "q"), ("revolute", "prismatic"), Units("deg", "mm"))
+ROWS = np.arange(6.0).reshape(2, 3)
+
+
+@pytest.mark.parametrize("path", ["out.csv", "OUT.CSV", "out", "out.txt", "/dev/stdout", "a.json/out"])
+def test_rows_are_csv_where_a_name_promises_nothing_else(path):
+    assert format_of(path) is FORMATS[".csv"] is DEFAULT
+
+
+@pytest.mark.parametrize("ending", [".mcap", ".jsonl", ".json", ".yaml", ".YML", ".xlsx", ".parquet"])
+def test_a_name_of_another_format_is_refused(ending, tmp_path):
+    with pytest.raises(InputError) as caught:
+        write_verified(tmp_path / f"out{ending}", lambda: [ROWS], COLUMNS)
+    (problem,) = caught.value.problems
+    assert problem.message == f"rows are written as CSV, not as {ending.lower()}"
+    assert problem.hint == "name the file .csv"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_format_is_one_entry(tmp_path, monkeypatch):
+    seen = []
+
+    def write(rows, columns, out, digits):
+        seen.append([(column.quantity, column.joint, column.factor) for column in columns])
+        out.write(repr([block.tolist() for block in rows]).encode())
+
+    def verify(written, rows, columns, digits):
+        written.seek(0)
+        assert written.read().decode() == repr([block.tolist() for block in rows])
+
+    monkeypatch.setattr(formats, "FORMATS", {**FORMATS, ".jsonl": StreamFormat("JSON lines", write, verify)})
+    write_verified(tmp_path / "out.jsonl", lambda: [ROWS], COLUMNS)
+    assert (tmp_path / "out.jsonl").read_text() == repr([ROWS.tolist()])
+    assert [(quantity.dimension, joint) for quantity, joint, _ in seen[0]] == [
+        ("time", None), ("angle", 0), ("length", 1),
+    ]  # fmt: skip
+    with pytest.raises(InputError) as caught:
+        format_of("out.mcap")
+    (problem,) = caught.value.problems
+    assert problem.message == "rows are written as CSV or JSON lines, not as .mcap"
+    assert problem.hint == "name the file .csv or .jsonl"

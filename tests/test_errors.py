@@ -1,0 +1,160 @@
+"""Messages: amounts are filled in once, and what the user wrote is text whatever it looks like.
+
+The oracle of a refusal is the same refusal of the same job with harmless names, and these replaced in its words.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from trajcli.cli.frames import problem_as_json, render_problem
+from trajcli.errors import Amount, Problem, TrajcliError, said
+from trajcli.job.read import job_from_text
+from trajcli.job.robot import load_robot, robot_as_mapping
+from trajcli.output.report import report_of, verification_error
+from trajcli.planning.plan import plan_job
+
+AWKWARD = ["{limit}", "{value}", "{{x}}", "%s", "{joint}", "{context3}", "{0}", "{", "\\1", r"\g<0>"]
+LIMITS = {"velocity": 1.0, "acceleration": 2.0, "jerk": 5.0}
+TCP = {"speed": 0.25, "acceleration": 2.0, "angular_speed": 1.5, "angular_acceleration": 12.0}
+DOWN = [3.0, 0, 0]
+START = {
+    "xyz": [0.4, 0.1, 0.05],
+    "rpy": DOWN,
+    "configuration": {"shoulder": "left", "elbow": "up", "wrist": "no_flip"},
+}
+FAR = {"xyz": [2.4, 0.3, 0.25], "rpy": DOWN}
+REST = {"joints": [0, 0]}
+TIMED = [{"joints": [1, 1], "time": 1}, {"joints": [0, 3], "time": 2}]
+
+
+def to(*joints: float, **fields: Any) -> dict[str, Any]:
+    return {"joints": list(joints), **fields}
+
+
+JOBS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+    "limit": (REST, {"planner": "quintic", "to": to(1, 2), "duration": 0.5}),
+    "jump": (REST, {"planner": "cubic", "to": to(1, 2), "duration": 9}),
+    "slowed": (
+        REST,
+        {"planner": "quintic", "to": to(1, 2), "duration": 0.5, "when_over_limit": "slow"},
+    ),
+    "looser": (REST, {"planner": "quintic", "to": to(1, 2), "duration": 9, "limits": {"velocity": 7}}),
+    "not at rest": (
+        to(0, 0, velocity=[0.5, 0]),
+        {"planner": "cycloidal", "to": to(1, 2), "duration": 5},
+    ),
+    "trapezoid": (REST, {"planner": "trapezoid", "to": to(1, 2), "duration": 1, "velocity": 0.5}),
+    "straight line": (to(0, 0, velocity=[0.5, 0]), {"planner": "trapezoid", "to": to(1, 2)}),
+    "waits": (
+        REST,
+        {"planner": "trapezoid", "to": to(0.1, 2, velocity=[0.1, 0]), "synchronize": "none"},
+    ),
+    "too fast at the end": (REST, {"planner": "jerk_limited", "to": to(1, 2, velocity=[1.5, 0])}),
+    "approach": (
+        REST,
+        {"planner": "jerk_limited", "to": to(1, 2, velocity=[0.9, 0], acceleration=[-1.5, 0])},
+    ),
+    "phase": (
+        REST,
+        {"planner": "jerk_limited", "to": to(1, 2, velocity=[0.5, 0]), "synchronize": "phase"},
+    ),
+    "monotone": (
+        REST,
+        {
+            "planner": "spline",
+            "rule": "shape_preserving",
+            "through": [TIMED[0], to(2, 4, time=2, velocity=[9, 0])],
+        },
+    ),
+    "polyline": (
+        REST,
+        {"planner": "time_optimal", "path": "polyline", "through": [to(1, 1), to(2, 4, velocity=0.1)]},
+    ),
+    "blend": (
+        REST,
+        {"planner": "blends", "through": TIMED, "acceleration": 0.1, "end_blends": "inside"},
+    ),
+    "shrunk": (REST, {"planner": "blends", "through": TIMED, "blend_durations": 5}),
+    "points": (START, {"planner": "spline", "through": ["PoInT", to(1, -1, 1, 0, 1, 0)]}),
+    "looser in the job": (REST, {"planner": "quintic", "to": to(1, 2), "duration": 9}),
+    "out of reach": (START, {"planner": "line", "to": {"xyz": [2.4, 0.3, 0.25]}}),
+    "singularity": (START, {"planner": "line", "to": {"xyz": [-0.4, -0.1, 0.05]}}),
+    "arrival": (START, {"planner": "line", "to": to(1, -1, 1, 0, 1, 0)}),
+    "pose": (START, {"planner": "quintic", "to": {"xyz": [0.9, 0.8, 0.25], "rpy": DOWN}, "duration": 4}),
+}
+
+
+PLAIN = {
+    "Jo0Nt": "{}",
+    "RoBot": "{}",
+    "PoInT": "{}",
+    **{f"Jo{joint}Nt": f"Jo{joint}Nt{{}}" for joint in range(1, 6)},
+}
+"""Harmless names, and how each is replaced: of awkward ones only the first can stand alone."""
+
+
+def renamed(text: str, awkward: str) -> str:
+    for plain, form in PLAIN.items():
+        text = text.replace(plain, form.replace("{}", awkward))
+    return text
+
+
+def job_of(case: str) -> str:
+    """Return the job of a case, with harmless names."""
+    start, move = JOBS[case]
+    if "xyz" in start:
+        robot = robot_as_mapping(load_robot("ur5e"))
+        for joint, entry in enumerate(robot["joints"]):
+            entry["name"] = f"Jo{joint}Nt"
+        limits: dict[str, Any] = {"velocity": 6.0, "acceleration": 100.0, "jerk": None, "tcp": TCP}
+    else:
+        robot = {"joints": [{"name": f"Jo{joint}Nt", **LIMITS} for joint in range(2)]}
+        limits = {"velocity": 3.0} if case == "looser in the job" else {}
+    job = {"version": 1, "robot": {**robot, "name": "RoBot"}, "start": start, "moves": [move]}
+    return json.dumps({**job, "limits": limits, "points": {"PoInT": FAR} if "xyz" in start else {}})
+
+
+def words_of(job: str) -> list[str]:
+    """Return all that a job makes the house say: of errors, events and findings, as text and as JSON."""
+    problems, events = [], []
+    try:
+        plan = plan_job(job_from_text(job))
+    except TrajcliError as error:
+        problems = [replace(problem, place=None) for problem in error.problems]
+    else:
+        events = [event.message for event in report_of(plan).events]
+        if not plan.verdict.passed:
+            problems = [replace(problem, place=None) for problem in verification_error(plan).problems]
+    assert problems or events
+    mappings = [problem_as_json(problem) for problem in problems]
+    texts = [text[key] or "" for text in mappings for key in ("message", "hint", "joint")]
+    return [*events, *(render_problem(problem, color=False) for problem in problems), *texts]
+
+
+@pytest.mark.parametrize("case", JOBS)
+@pytest.mark.parametrize("name", AWKWARD)
+def test_names_of_joints_and_robots_are_text(case: str, name: str) -> None:
+    expected = [renamed(text, name) for text in words_of(job_of(case))]
+    assert any(name in text for text in expected), expected
+    assert words_of(renamed(job_of(case), json.dumps(name)[1:-1])) == expected
+
+
+def test_amounts_are_filled_in_once() -> None:
+    amounts = {"joint": "{value}", "value": Amount(2.0, 1, 0), "limit": Amount(1.0, 1, 0)}
+    assert said("{joint} has {value}, at most {limit}; {other} {}", amounts) == (
+        "{value} has 2, at most 1; {other} {}"
+    )
+    assert said("{joint} has {value}", amounts, lambda amount: "{joint}") == "{value} has {joint}"
+    assert said("{value}", {}) == "{value}"
+
+
+def test_contexts_add_up_and_are_text() -> None:
+    literal = Problem("the point {value} is missing").within("{limit}")
+    assert literal.text() == "{limit}: the point {value} is missing"
+    template = Problem("{joint} has {value}", amounts={"joint": "{value}", "value": Amount(2.0)})
+    assert template.within("{value}").within("{joint}").text() == "{joint}: {value}: {value} has 2"

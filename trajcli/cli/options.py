@@ -1,0 +1,37 @@
+"""Arguments and options that several commands share. Only typer is imported here."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import typer
+
+JobFile = Annotated[str, typer.Argument(metavar="JOB", help="The job file; - is standard input.")]
+Overrides = Annotated[
+    list[str],
+    typer.Option(
+        "--set", metavar="PATH=VALUE", help="Override a value of the job, such as moves.0.duration=3."
+    ),
+]
+Errors = Annotated[
+    Literal["text", "json"], typer.Option("--errors", help="How errors are written to stderr.")
+]
+RobotName = Annotated[
+    str, typer.Option("--robot", "-r", metavar="NAME|FILE", help="A robot of the catalogue, or a robot file.")
+]
+Tool = Annotated[
+    str | None,
+    typer.Option("--tool", metavar="POSE", help="T_flange_tcp as YAML or @FILE, instead of the robot's own."),
+]
+Si = Annotated[bool, typer.Option("--si", help="Numbers in rad and m, whatever units the robot's file has.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
+Joints = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="Q...", help="A value for each joint, in the units of the robot's file; - reads a CSV."
+    ),
+]
+DigitsOption = Annotated[
+    Literal["fixed", "full"],
+    typer.Option("--digits", help="Of a CSV. fixed: nine decimals; full: every bit."),
+]

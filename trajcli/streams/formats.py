@@ -1,0 +1,89 @@
+"""Formats of sample streams: the writer that the ending of a file's name stands for.
+
+A format is a module of this folder and a line in `FORMATS`. Its functions get rows in blocks of shape (N, m),
+and the m columns, which say what is in them: quantity, joint and unit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import BinaryIO
+
+from trajcli.columns import Column
+from trajcli.curves.piecewise import Array
+from trajcli.errors import InputError
+from trajcli.frozen import frozen
+from trajcli.streams.csv import verify_csv, write_csv
+from trajcli.streams.decimals import Digits
+from trajcli.streams.whole_file import whole_file
+
+
+@frozen
+class StreamFormat:
+    """A format in which rows are written.
+
+    Attributes:
+        name: For messages.
+        write: Writes blocks of rows, one by one, to a stream.
+        verify: Reads a stream from its beginning, and raises TrajcliError where it does not hold these rows.
+    """
+
+    name: str
+    write: Callable[[Iterable[Array], Sequence[Column], BinaryIO, Digits], None]
+    verify: Callable[[BinaryIO, Iterable[Array], Sequence[Column], Digits], None]
+
+
+FORMATS: Mapping[str, StreamFormat] = {
+    ".csv": StreamFormat("CSV", write_csv, verify_csv),
+}
+DEFAULT = FORMATS[".csv"]
+"""The format of standard output, of devices, and of files whose names tell no other."""
+
+# Names that promise a content: where it is not in the table, a file of that name would deceive its readers.
+_PROMISING = (".mcap", ".jsonl", ".json", ".yaml", ".yml", ".xlsx", ".parquet")
+
+
+def format_of(path: str | Path) -> StreamFormat:
+    """Return the format that the name of a file stands for.
+
+    Raises:
+        InputError: When its ending is that of a format which is not written.
+    """
+    name = str(path).lower()
+    ending = next((known for known in (*FORMATS, *_PROMISING) if name.endswith(known)), None)
+    if ending is None:
+        return DEFAULT
+    if ending not in FORMATS:
+        written = " or ".join(known.name for known in FORMATS.values())
+        hint = f"name the file {' or '.join(FORMATS)}"
+        raise InputError(f"rows are written as {written}, not as {ending}", hint=hint)
+    return FORMATS[ending]
+
+
+def write_verified(
+    path: str | Path,
+    rows: Callable[[], Iterable[Array]],
+    columns: Sequence[Column],
+    digits: Digits = "fixed",
+) -> None:
+    """Write a file that appears whole or not at all, and is read back before it does.
+
+    Args:
+        path: The file; its ending names the format. A device or pipe is written to directly, and not read
+            back.
+        rows: Called once to write and once to compare; returns blocks of shape (N, m).
+        columns: What the rows hold, in the units that the columns say.
+        digits: Of numbers that are written as text: nine decimals, or as many as restore each bit.
+
+    Raises:
+        InputError: When the ending is that of a format which is not written.
+        FileError: When the file cannot be written.
+        BrokenPipeError: When the path is a pipe whose reader has closed it.
+        TrajcliError: When a value is not finite, or the file does not hold what was written.
+    """
+    stream_format = format_of(path)
+    with whole_file(path) as out:
+        stream_format.write(rows(), columns, out, digits)
+        if out.readable():
+            stream_format.verify(out, rows(), columns, digits)
