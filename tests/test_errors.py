@@ -18,7 +18,19 @@ from trajcli.job.robot import load_robot, robot_as_mapping
 from trajcli.output.report import report_of, verification_error
 from trajcli.planning.plan import plan_job
 
-AWKWARD = ["{limit}", "{value}", "{{x}}", "%s", "{joint}", "{context3}", "{0}", "{", "\\1", r"\g<0>"]
+AWKWARD = [
+    "{limit}",
+    "{value}",
+    "{before}",
+    "{{x}}",
+    "%s",
+    "{joint}",
+    "{context3}",
+    "{0}",
+    "{",
+    "\\1",
+    r"\g<0>",
+]
 LIMITS = {"velocity": 1.0, "acceleration": 2.0, "jerk": 5.0}
 TCP = {"speed": 0.25, "acceleration": 2.0, "angular_speed": 1.5, "angular_acceleration": 12.0}
 DOWN = [3.0, 0, 0]
@@ -154,7 +166,7 @@ def test_amounts_are_filled_in_once() -> None:
 
 
 def test_contexts_add_up_and_are_text() -> None:
-    literal = Problem("the point {value} is missing").within("{limit}")
-    assert literal.text() == "{limit}: the point {value} is missing"
+    literal = Problem("the point {context0} is missing").within("{limit}")
+    assert literal.text() == "{limit}: the point {context0} is missing"
     template = Problem("{joint} has {value}", amounts={"joint": "{value}", "value": Amount(2.0)})
     assert template.within("{value}").within("{joint}").text() == "{joint}: {value}: {value} has 2"
