@@ -16,19 +16,20 @@ from pydantic import Field
 from trajcli.errors import Amount, MissingLimitError, PlanningError, Problem
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.language.targets import MinimumDuration
+from trajcli.planners.boundary_states import missing_limit
 from trajcli.planners.planner import Planned
-from trajcli.planners.point_to_point.point_to_point import PointToPoint, missing_limit
+from trajcli.planners.point_to_point.point_to_point import PointToPoint
 from trajcli.trajectory import State
 
 if TYPE_CHECKING:
     from trajcli.kinematics.robot import Robot
-    from trajcli.planners.point_to_point.ruckig import BoundaryProblem
+    from trajcli.planners.ruckig import BoundaryProblem
 from trajcli.curves.operations import along_line, coast_until, hold_until, merge_breaks
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Limits, Robot
 from trajcli.planners.planner import Event, Phase
-from trajcli.planners.point_to_point.ruckig import (
+from trajcli.planners.ruckig import (
     BoundaryProblem,
     Control,
     PhaseProfile,

@@ -31,8 +31,9 @@ from trajcli.curves.trapezoid import (
 from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import refuse
 from trajcli.language.targets import Duration, JointAccelerationMagnitudes, JointSpeeds, MinimumDuration
+from trajcli.planners.boundary_states import missing_limit, same_state, standstill
 from trajcli.planners.planner import Phase, Planned
-from trajcli.planners.point_to_point.point_to_point import PointToPoint, missing_limit, same_state, standstill
+from trajcli.planners.point_to_point.point_to_point import PointToPoint
 from trajcli.trajectory import State
 
 _HINTS = {

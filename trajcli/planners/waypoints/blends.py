@@ -32,8 +32,8 @@ from trajcli.language.numbers import (
 from trajcli.language.per_joint import flawed
 from trajcli.language.recorded import Recorded
 from trajcli.language.targets import JointAccelerationMagnitudes
+from trajcli.planners.boundary_states import missing_limit, standstill, start_in_motion
 from trajcli.planners.planner import Event, Phase, Planned
-from trajcli.planners.point_to_point.point_to_point import missing_limit, require_rest, standstill
 from trajcli.planners.waypoints.through_points import PointTable, ThroughPoints
 from trajcli.trajectory import State, ViaPoints
 from trajcli.units import Quantity
@@ -227,8 +227,8 @@ class Blends(ThroughPoints):
             PlanningError: When the arm moves at the start, or an acceleration is too small for the times.
         """
         points = self.waypoints(start)
-        if points.times is None or start.acceleration.any():
-            require_rest(self.tag, start, robot)
+        if not start.at_rest and (points.times is None or start.acceleration.any()):
+            raise start_in_motion(self.tag, start, robot)
         if points.times is None and not np.ptp(points.positions, axis=0).any():
             return standstill(points.target, self.duration or 0.0)
         times, durations = self._asked(points, robot)

@@ -31,8 +31,8 @@ from trajcli.language.numbers import FieldPath, Flaw, refuse
 from trajcli.language.recorded import Recorded
 from trajcli.language.targets import Numbers
 from trajcli.language.waypoints import Waypoint
+from trajcli.planners.boundary_states import missing_limit, standstill
 from trajcli.planners.planner import Planned
-from trajcli.planners.point_to_point.point_to_point import missing_limit, standstill
 from trajcli.planners.waypoints.through_points import PointTable, ThroughPoints, via_points
 from trajcli.trajectory import State
 from trajcli.units import Quantity

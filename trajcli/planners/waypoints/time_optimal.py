@@ -34,8 +34,8 @@ from trajcli.language.numbers import (
 from trajcli.language.per_joint import JointDistance
 from trajcli.language.poses import read_numbers
 from trajcli.language.recorded import Recorded
+from trajcli.planners.boundary_states import missing_limit, standstill
 from trajcli.planners.planner import Event, Phase, Planned, stretched
-from trajcli.planners.point_to_point.point_to_point import missing_limit, standstill
 from trajcli.planners.waypoints.spline import Rule, curve_through
 from trajcli.planners.waypoints.through_points import PointTable, ThroughPoints
 from trajcli.trajectory import State, ViaPoints
