@@ -1,9 +1,4 @@
-"""The fields of a pose target: what it leaves out is free.
-
-Fields that several planners share: times, values by joint, targets.
-
-The coordinates of the tcp's pose that a target fixes.
-"""
+"""Targets of moves: joint states, and poses of which what is left out is free."""
 
 from __future__ import annotations
 
@@ -288,7 +283,7 @@ class Target(PoseFields, defer_build=False):  # made once, not for each planner 
         return self
 
     @property
-    def is_place(self) -> bool:
+    def gives_joints_or_pose(self) -> bool:
         """Whether it says where to be, and not only how fast."""
         return self.joints is not None or self.gives_pose
 

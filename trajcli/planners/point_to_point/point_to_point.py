@@ -34,7 +34,7 @@ class PointToPoint(Planner):
 
     @model_validator(mode="after")
     def _can_impose_target(self) -> PointToPoint:
-        if not self.to.is_place and not self.stops_anywhere:
+        if not self.to.gives_joints_or_pose and not self.stops_anywhere:
             raise refuse(
                 [
                     (

@@ -202,7 +202,7 @@ def check_arrival(planned: PlannedPath, end: Array, robot: Robot) -> None:
 
 def flaws_of_target(target: Target, path: FieldPath, planner: str) -> Iterator[Flaw]:
     """Yield what is wrong with the target of a move along a path: it is a position or a pose, and at rest."""
-    if not target.is_place:
+    if not target.gives_joints_or_pose:
         yield path, f"{planner} needs a pose or `joints` in its target", None
     for name in ("velocity", "acceleration"):
         if any(getattr(target, name) or ()):

@@ -1,8 +1,7 @@
-"""One smooth curve through all points: the slides' 2.2, and the splines that numerical analysis knows.
+"""Splines through waypoints: the curve of each rule, and times at the points that the limits allow.
 
-Which curve each rule of `spline` means, and what it lets its ends impose.
-
-When a spline passes its points, where only the limits say how fast it may be.
+Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.2.2; Biagiotti and
+Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), chapter 4.
 """
 
 from __future__ import annotations
