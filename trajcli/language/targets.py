@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
 _ANGLE, _LENGTH, _RATIO = Quantity("angle"), Quantity("length"), Quantity("ratio")
 _ROTATIONS = ("rpy", "quat_wxyz", "matrix", "axis_angle", "euler")
+_UPRIGHT = 1e-9  # rad: a pitch this close to a quarter turn is one
 _AIMS = ("yaw", "pitch", "direction")
 _NUMBER: JsonSchemaValue = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": "^[-+.0-9]"}]}
 
@@ -353,9 +354,6 @@ def _known(name: str, points: Mapping[str, Any]) -> str:
 
 
 NamedTarget = Annotated[Target, Named()]
-
-
-_UPRIGHT = 1e-9  # rad: a pitch this close to a quarter turn is one
 
 
 def ik_target(fields: PoseFields) -> IkTarget:

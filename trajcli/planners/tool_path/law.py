@@ -310,7 +310,7 @@ class LawSpec(Model):
     angular_acceleration: AngularAcceleration | None = None
 
     @property
-    def law(self) -> TimeLaw:
+    def time_law(self) -> TimeLaw:
         """The law of this shape."""
         return LAWS[self.shape]
 
@@ -319,16 +319,16 @@ class LawSpec(Model):
         flaws: list[Flaw] = []
         if self.duration is not None and self.minimum_duration is not None:
             flaws.append((("minimum_duration",), "duration and minimum_duration exclude each other", None))
-        if self.deceleration is not None and not self.law.has_ramps:
+        if self.deceleration is not None and not self.time_law.has_ramps:
             text = f"a {self.shape} law slows down as it speeds up"
             flaws.append((("deceleration",), text, "leave it out, or use shape trapezoid"))
-        if self.jerk is not None and not self.law.has_jerk:
+        if self.jerk is not None and not self.time_law.has_jerk:
             text = f"the acceleration of a {self.shape} law steps: its jerk cannot be limited"
             flaws.append((("jerk",), text, "use shape jerk_limited or quintic"))
-        if self.law.has_ramps and self.duration and self.speed and self.acceleration:
+        if self.time_law.has_ramps and self.duration and self.speed and self.acceleration:
             text = f"duration, speed and acceleration together ask too much of a {self.shape}"
             flaws.append((("acceleration",), text, "leave one of the three out"))
-        if self.duration is not None and not self.law.takes_duration:
+        if self.duration is not None and not self.time_law.takes_duration:
             text = f"a {self.shape} law is as short as its limits allow"
             flaws.append((("duration",), text, "say `minimum_duration`, or use another shape"))
         if flaws:
@@ -382,7 +382,7 @@ def law_bounds(
         _require(spec, bounds, derivatives, planner)
         return bounds, ruled_by
     named, _ = _bounds(spec, ToolLimits(), derivatives)
-    if not spec.law.has_ramps or math.isfinite(named.speed):
+    if not spec.time_law.has_ramps or math.isfinite(named.speed):
         return named, None
     named = named.with_each(bounds, lambda own, other: own if math.isfinite(own) else other)
     if math.isinf(named.by_order[1]):
@@ -431,7 +431,7 @@ def _or(value: float | None, other: float) -> float:
 def _require(spec: LawSpec, bounds: PathBounds, derivatives: PathDerivatives, planner: str) -> None:
     """Refuse bounds that lack one that the fastest law of this shape needs."""
     named = zip(("speed", "acceleration", "jerk"), bounds.by_order, strict=True)
-    lacking = [name for name, bound in named if name in spec.law.needs and math.isinf(bound)]
+    lacking = [name for name, bound in named if name in spec.time_law.needs and math.isinf(bound)]
     if not lacking and all(map(math.isinf, bounds.by_order)):
         lacking = ["speed"]
     if lacking:
@@ -445,7 +445,7 @@ def _missing(name: str, derivatives: PathDerivatives, planner: str, spec: LawSpe
         return MissingLimitError(Problem(message, "use shape quintic or cycloidal"))
     key = name if derivatives.moves else f"angular_{name}"
     message = f"{planner} with a {spec.shape} law needs the {key.replace('_', ' ')} of the tool"
-    more = " or a `duration`" if spec.law.takes_duration else ""
+    more = " or a `duration`" if spec.time_law.takes_duration else ""
     if spec.duration is not None:
         speed = "speed" if derivatives.moves else "angular_speed"
         message, more = f"{message}, or its {speed.replace('_', ' ')}", f" or `{speed}`"
@@ -470,7 +470,7 @@ def law_along(
     for low, high in pairwise(stops.tolist()):
         length = high - low
         share = None if spec.duration is None else spec.duration * length / path.length
-        segments.append(spec.law.segment(spec, length, bounds, share))
+        segments.append(spec.time_law.segment(spec, length, bounds, share))
     return _joined(lasting_at_least(spec.minimum_duration, segments), stops), ruled_by
 
 

@@ -112,7 +112,7 @@ class ToolPathMove(Planner):
     @property
     def joins(self) -> Literal[1, 2]:
         """Acceleration joins where the law begins and ends without any."""
-        return self.law.law.continuity
+        return self.law.time_law.continuity
 
     def path_from(self, before: Array, robot: Robot) -> PlannedPath:
         """Return the path of the tool from the pose `before` (4, 4).
@@ -158,7 +158,7 @@ class ToolPathMove(Planner):
         path, tolerance = planned.path, self.tolerance.tolerance
         if planned.overlap is not None:
             return JointMotion(followed_in_time(robot, planned.overlap, start), planned.overlap)
-        if self.law.law.uses_joint_limits:
+        if self.law.time_law.uses_joint_limits:
             from trajcli.planners.tool_path.time_optimal import fastest_along
 
             return fastest_along(followed(robot, path, start), self.law, tolerance, self.tag)

@@ -133,7 +133,7 @@ class PathMove(ToolPathMove):
     def _flaws_of_overlap(self) -> Iterator[Flaw]:
         if self.overlap is None:
             yield ("corner",), "corner: overlap needs the time `overlap`", None
-        if self.law.law.uses_joint_limits:
+        if self.law.time_law.uses_joint_limits:
             text = "segments that overlap have laws of their own"
             yield ("law",), text, "use another shape, or corner: round"
         if self.orientation in ("euler", "tangent"):
@@ -320,7 +320,7 @@ def _law_segments(
         derivatives = PathDerivatives(True, curvature, float(np.linalg.norm(vector)) / curve.length, 0.0)
         bounds, _ = law_bounds(spec, lower, derivatives, "path")
         share = None if spec.duration is None else (spec.duration + shared) * curve.length / total
-        segments.append(spec.law.segment(spec, curve.length, bounds, share))
+        segments.append(spec.time_law.segment(spec, curve.length, bounds, share))
     return lasting_at_least(spec.minimum_duration and spec.minimum_duration + shared, segments)
 
 

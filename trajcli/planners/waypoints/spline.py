@@ -58,6 +58,8 @@ IMPOSES: dict[Rule, int] = {
     "shape_preserving": 1,
 }
 """Highest derivative that the ends impose."""
+_INNER = {"imposed": 1, "quintic": 2}  # the same of the points between
+_LEAST = 1e-3  # of the mean duration: a piece between points that hardly differ begins with this much
 
 
 def curve_through(
@@ -112,9 +114,6 @@ def _quintic(points: PointTable, times: Array) -> PiecewisePolynomial:
     return quintic_through(times, points.positions, velocities, accelerations)
 
 
-_LEAST = 1e-3  # of the mean duration: a piece between points that hardly differ begins with this much
-
-
 def fastest_spline_times(rule: Rule, points: PointTable, robot: Robot) -> Array:
     """Return the times (m,) of the fastest curve of a rule that keeps the limits, the first zero.
 
@@ -150,9 +149,6 @@ def _guess(points: PointTable, bounds: Array) -> Array:
         least = np.abs(limits).min(axis=1)
         needed = np.maximum(needed, ((chords / least) ** (1 / order)).max(axis=1))
     return np.asarray(np.maximum(needed, _LEAST * needed.mean()))
-
-
-_INNER = {"imposed": 1, "quintic": 2}
 
 
 class Spline(ThroughPoints):

@@ -44,6 +44,9 @@ from trajcli.units import Quantity
 
 Parameter = Literal["chord", "centripetal", "uniform"] | tuple[float, ...]
 
+_NAMED = ("chord", "centripetal", "uniform")
+_MOST_STOPS = 10  # that an event lists
+_STRETCHED = 1e-9  # relative: a smaller stretch is rounding
 _OFF = 1e-9  # relative: a velocity this little off the path is on it
 _ROOM = 0.999  # of a segment that two blends may share: each keeps a straight piece between
 
@@ -166,11 +169,6 @@ def _shrunk(wanted: Array, used: Array) -> tuple[Event, ...]:
     part = f"{100 * share.min():.4g} % of the deviation asked for"
     text = f"the corner at point {worst + 1} is rounded by {part}: its segments are too short for more{more}"
     return (Event("shrunk", text),)
-
-
-_NAMED = ("chord", "centripetal", "uniform")
-_MOST_STOPS = 10  # that an event lists
-_STRETCHED = 1e-9  # relative: a smaller stretch is rounding
 
 
 @comparable
