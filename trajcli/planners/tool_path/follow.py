@@ -41,7 +41,7 @@ class FollowingDiagnosis:
         reference: What the tool shall do, by s or by time.
         end: Last s, or time.
         law: s(t); None where the tool is known by s.
-        in_place: Whether s is an angle.
+        angular: Whether s is an angle: the tcp rests.
         free: How many directions of the joint values the targets leave free.
     """
 
@@ -49,7 +49,7 @@ class FollowingDiagnosis:
     reference: ReferenceAt
     end: float
     law: PiecewisePolynomial | None
-    in_place: bool
+    angular: bool
     free: int = 0
 
     def stuck(self, error: StuckError) -> PlanningError:
@@ -93,7 +93,7 @@ class FollowingDiagnosis:
 
     def _s(self, at: float) -> Amount:
         s = at if self.law is None else float(self.law.evaluate(min(at, self.law.end))[0])
-        return Amount(s, 0, None, "angle" if self.in_place else "length")
+        return Amount(s, 0, None, "angle" if self.angular else "length")
 
     def _unreachable(self, at: float) -> PlanningError | None:
         """Return the error that the path leaves the arm's workspace, if it does so beyond `at`."""
@@ -148,7 +148,7 @@ class FollowingDiagnosis:
         joint = int(np.abs(rates).argmax())
         name = self.robot.joint_names[joint]
         unit = "rad" if self.robot.joint_types[joint] == "revolute" else "m"
-        per = "s" if self.law is not None else "rad of the path" if self.in_place else "m of the path"
+        per = "s" if self.law is not None else "rad of the path" if self.angular else "m of the path"
         symptom = f"{name} would have to go {abs(float(rates[joint])):.4g} {unit} for each {per}"
         if self.law is None and abs(float(rates[joint])) < _SLOW / characteristic_length(self.robot):
             symptom = "branches of the arm meet, and it would pass from one to another"

@@ -1,4 +1,4 @@
-"""Straight lines, rotations in place, and screw motions of the tool.
+"""Straight lines, pure rotations, and screw motions of the tool.
 
 Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.3; Lynch and Park,
 Modern Robotics (2017), section 9.2.1.
@@ -50,7 +50,7 @@ class LineMove(ToolPathMove):
         return self
 
     def path_from(self, before: Array, robot: Robot) -> PlannedPath:
-        """Return the line from the pose `before` (4, 4), or the rotation in place."""
+        """Return the line from the pose `before` (4, 4), or the rotation about the tcp."""
         target = tool_target(self.to, before, robot)
         start, end = before[:3, 3], target.pose[:3, 3]
         if np.linalg.norm(end - start) > SAME_PLACE:
