@@ -175,7 +175,7 @@ class Job(Model):
 
     @model_validator(mode="after")
     def _start_is_a_state(self) -> Job:
-        if not self.start.is_place:
+        if not self.start.gives_joints_or_pose:
             raise refuse([(("start",), "the start needs `joints` or a pose", None)])
         first = self.moves[0]
         if first.joins == 1 and any(self.start.acceleration or ()):

@@ -1,4 +1,4 @@
-"""Limits as they stand in a file: bounds by joint, and the factors that scale them."""
+"""Limits in job files: bounds by joint and of the tool, and the factors that scale them."""
 
 from __future__ import annotations
 

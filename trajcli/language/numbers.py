@@ -1,10 +1,8 @@
-"""How a value of a job file becomes SI: the field types that carry unit, bounds and description once.
+"""Numbers with units, as field types of pydantic models, and the base of these models.
 
 A field type is an annotation, such as `Annotated[float, Number(...)]`, that pydantic asks for a validator
-and for a JSON schema. The reading context says which units the file uses and which joints the robot has;
-without one (a planner built in Python) values are SI.
-
-The base of everything that a job file may hold.
+and for a JSON schema; it carries unit, bounds and description. The reading context says which units the file
+uses and which joints the robot has; without one (a planner built in Python) values are SI.
 """
 
 from __future__ import annotations
@@ -46,7 +44,7 @@ AT_KEY = "\0key"
 
 @dataclass
 class ReadingContext:
-    """What is known about the file while its values are read.
+    """Units, robot and points of the file whose values are read.
 
     Attributes:
         units: Units of plain numbers.

@@ -1,7 +1,4 @@
-"""Values by joint: one for all joints, a list, or a mapping by joint name.
-
-A distance in joint space: how far each joint may be from a point.
-"""
+"""Values by joint: one for all joints, a list, or a mapping by joint name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Poses as they stand in a file: a position and one of several forms of orientation."""
+"""Poses in job files: a position, and one of several forms of orientation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Points that a file holds, as numbers."""
+"""Recorded waypoints."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from trajcli.frozen import frozen
 
 @frozen
 class Recorded:
-    """Joint values that were recorded.
+    """Joint values recorded point by point.
 
     Attributes:
         positions: Shape (m, n), rad or m, m >= 1.
@@ -43,12 +43,13 @@ class Recorded:
         return self.positions.shape, self.positions.tobytes(), times, self.merge
 
     @property
-    def _reach(self) -> Array:
+    def _merge_distance(self) -> Array:
         return np.array(self.merge or (0.0,))
 
     def begins_at(self, start: Array) -> bool:
-        """Return whether the first point is where the arm stands, `start` (n,): then it is no further one."""
-        return len(self.positions) > 1 and bool((np.abs(self.positions[0] - start) <= self._reach).all())
+        """Return whether the first of several points is where the arm stands, `start` (n,)."""
+        near = bool((np.abs(self.positions[0] - start) <= self._merge_distance).all())
+        return near and len(self.positions) > 1
 
     def after(self, start: Array, target: Array | None = None) -> Recorded:
         """Return the points that come after `start`, and before `target` where the recording is not the end.
@@ -67,7 +68,7 @@ class Recorded:
             times = (times - times[0] if first else times)[first:]
         if times is None or any(self.merge):
             ends = positions if target is None else np.vstack([positions, target])
-            rows = _moved(start, ends, self._reach)
+            rows = _moved(start, ends, self._merge_distance)
             rows = rows if target is None else rows[:-1]
             positions, times = positions[rows], None if times is None else times[rows]
         return Recorded(positions, times, self.file, self.merge)

@@ -1,9 +1,4 @@
-"""The fields of a pose target: what it leaves out is free.
-
-Fields that several planners share: times, values by joint, targets.
-
-The coordinates of the tcp's pose that a target fixes.
-"""
+"""Targets of moves: joint states, and poses of which what is left out is free."""
 
 from __future__ import annotations
 
@@ -46,6 +41,7 @@ if TYPE_CHECKING:
 
 _ANGLE, _LENGTH, _RATIO = Quantity("angle"), Quantity("length"), Quantity("ratio")
 _ROTATIONS = ("rpy", "quat_wxyz", "matrix", "axis_angle", "euler")
+_UPRIGHT = 1e-9  # rad: a pitch this close to a quarter turn is one
 _AIMS = ("yaw", "pitch", "direction")
 _NUMBER: JsonSchemaValue = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": "^[-+.0-9]"}]}
 
@@ -288,7 +284,7 @@ class Target(PoseFields, defer_build=False):  # made once, not for each planner 
         return self
 
     @property
-    def is_place(self) -> bool:
+    def gives_joints_or_pose(self) -> bool:
         """Whether it says where to be, and not only how fast."""
         return self.joints is not None or self.gives_pose
 
@@ -358,9 +354,6 @@ def _known(name: str, points: Mapping[str, Any]) -> str:
 
 
 NamedTarget = Annotated[Target, Named()]
-
-
-_UPRIGHT = 1e-9  # rad: a pitch this close to a quarter turn is one
 
 
 def ik_target(fields: PoseFields) -> IkTarget:

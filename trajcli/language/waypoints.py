@@ -1,4 +1,4 @@
-"""The points that a move passes: listed one by one, or recorded in a file."""
+"""Waypoints in job files: listed one by one, as a table, or recorded in a file."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Waypoint(Target):
 
     @model_validator(mode="after")
     def _is_somewhere(self) -> Waypoint:
-        if not self.is_place:
+        if not self.gives_joints_or_pose:
             raise refuse([((), "a waypoint needs `joints` or a pose", None)])
         return self
 

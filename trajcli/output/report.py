@@ -186,7 +186,7 @@ def _peak(move: PlannedMove, joint: int, order: int, peaks: Peaks) -> PeakReport
 
 def reference_of(move: PlannedMove) -> ReferenceReport:
     """Return how a move compares with the shortest duration under its limits."""
-    if isinstance(move.planner, PointToPoint) and not move.planner.to.is_place:
+    if isinstance(move.planner, PointToPoint) and not move.planner.to.gives_joints_or_pose:
         # to where a velocity is reached fastest, another way may lead a little faster
         reason = "the move leaves its end position open"
         return ReferenceReport(duration=None, ratio=None, joint=move.robot.joint_names[0], reason=reason)

@@ -1,4 +1,4 @@
-"""Planners: one file each. The table below is their registration; schema, messages, tests, docs read it.
+"""Planners of moves, by their names in job files: the table that schema, messages, tests and docs read.
 
 A job loads the planners that it uses and no other: building all their models costs more than most plans.
 """
@@ -7,10 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from importlib import import_module
-from typing import Annotated, Union
+from typing import Annotated, Any
 
-from pydantic import Field, TypeAdapter
+from pydantic import Field, GetCoreSchemaHandler, TypeAdapter
+from pydantic_core import CoreSchema, core_schema
 
+from trajcli.frozen import frozen
 from trajcli.planners.planner import Planner
 
 _WHERE = {
@@ -53,14 +55,24 @@ class _Planners(Mapping[str, type[Planner]]):
 PLANNERS = _Planners()
 
 
-def moves_adapter(tags: Iterable[str]) -> TypeAdapter[list[Planner]]:
-    """Return what reads a list of at least one move, each planned by one of the planners named.
+@frozen
+class _ByName:
+    """A planner, chosen by its name: a tagged union, also where there is but one.
 
-    A union of one would not say in its errors which planner it is about: there are always two in it.
+    pydantic makes no union of one type, and its errors would not say which planner they are about.
     """
-    named = sorted({"hold", *({*tags} - {"hold"} or {"cubic"})})  # small ones
-    union = Annotated[Union[tuple(PLANNERS[tag] for tag in named)], Field(discriminator="planner")]  # type: ignore[valid-type]  # noqa: UP007
-    return TypeAdapter(Annotated[list[union], Field(min_length=1)])  # type: ignore[arg-type, valid-type]
+
+    tags: tuple[str, ...]
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
+        choices = {tag: handler.generate_schema(PLANNERS[tag]) for tag in self.tags}
+        return core_schema.tagged_union_schema(choices, discriminator="planner")
+
+
+def moves_adapter(tags: Iterable[str]) -> TypeAdapter[list[Planner]]:
+    """Return what reads a list of at least one move, each planned by one of the planners named."""
+    planner = _ByName(tuple(sorted(tags)))
+    return TypeAdapter(Annotated[list[Annotated[Planner, planner]], Field(min_length=1)])
 
 
 __all__ = ["PLANNERS", "Planner", "moves_adapter"]

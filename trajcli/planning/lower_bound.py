@@ -7,7 +7,7 @@ import numpy as np
 from trajcli.errors import PlanningError
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import QUANTITIES, Limits
-from trajcli.planners.point_to_point.ruckig import BoundaryProblem, fastest
+from trajcli.planners.ruckig import BoundaryProblem, fastest
 from trajcli.trajectory import State
 
 _ROUNDING = 1e-12

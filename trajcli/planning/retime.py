@@ -16,8 +16,8 @@ from trajcli.curves.smallest_feasible import smallest_feasible
 from trajcli.errors import Amount, Amounts, PlanningError
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import QUANTITIES, Robot
+from trajcli.planners.boundary_states import share_of_limits
 from trajcli.planners.planner import Event, Planned, Planner
-from trajcli.planners.point_to_point.point_to_point import share_of_limits
 from trajcli.trajectory import Promise, Span, State, Trajectory
 
 _LONGEST = 1e4  # times the planned duration: a move that needs more is not over its limit, it is wrong

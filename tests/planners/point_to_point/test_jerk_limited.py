@@ -22,7 +22,7 @@ from jerk_limited_moves import (
 )
 
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.planners.point_to_point.ruckig import BoundaryProblem, fastest
+from trajcli.planners.ruckig import BoundaryProblem, fastest
 
 SEEDS, JOINTS = st.integers(0, 2**32 - 1), st.integers(1, 12)
 

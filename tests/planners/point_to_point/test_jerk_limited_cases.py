@@ -7,7 +7,7 @@ import pytest
 from jerk_limited_moves import arm, excesses, misses, move_to, peaks, ruckigs_own, state, steps
 
 from trajcli.job.read import job_from_text
-from trajcli.planners.point_to_point.ruckig import BoundaryProblem, fastest, fastest_of
+from trajcli.planners.ruckig import BoundaryProblem, fastest, fastest_of
 from trajcli.planning.plan import plan_job
 
 

@@ -7,7 +7,7 @@ import pytest
 from jerk_limited_moves import arm, move_to, state
 
 from trajcli.errors import MissingLimitError, PlanningError
-from trajcli.planners.point_to_point.ruckig import BoundaryProblem, fastest, fastest_of, together
+from trajcli.planners.ruckig import BoundaryProblem, fastest, fastest_of, together
 
 ROBOT = arm([1.0, 2.0], [2.0, 3.0], [5.0, 6.0])
 

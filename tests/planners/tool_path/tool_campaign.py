@@ -244,7 +244,7 @@ class Tracker:
 def way_of(task_: Task, loaded: Any) -> ToolPath:
     """Return the path of a job's move."""
     before = forward(loaded.robot, np.array(task_.start))
-    return loaded.job.moves[0].way(before, loaded.robot).path
+    return loaded.job.moves[0].path_from(before, loaded.robot).path
 
 
 def demand_at(path: ToolPath, places: np.ndarray) -> ToolReference:

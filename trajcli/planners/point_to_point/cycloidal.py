@@ -8,17 +8,12 @@ import numpy as np
 
 from trajcli.curves.cycloid import PEAKS, cycloid_law
 from trajcli.curves.operations import along_line
+from trajcli.curves.piecewise import Array
 from trajcli.kinematics.robot import Robot
 from trajcli.language.targets import Duration
+from trajcli.planners.boundary_states import missing_limit, same_state, standstill, start_in_motion
 from trajcli.planners.planner import Planned
-from trajcli.planners.point_to_point.point_to_point import (
-    PointToPoint,
-    bound_along,
-    missing_limit,
-    require_rest,
-    same_state,
-    standstill,
-)
+from trajcli.planners.point_to_point.point_to_point import PointToPoint
 from trajcli.trajectory import State
 
 
@@ -42,7 +37,8 @@ class Cycloidal(PointToPoint):
             MissingLimitError: When the duration is left out and a moving joint has no limit.
             PlanningError: When the arm moves at the start.
         """
-        require_rest(self.tag, start, robot)
+        if not start.at_rest:
+            raise start_in_motion(self.tag, start, robot)
         end = self.to.as_state()
         if same_state(start, end):
             return standstill(end, self.duration or 0.0)
@@ -50,18 +46,20 @@ class Cycloidal(PointToPoint):
         law = cycloid_law(self.duration or self._fastest(displacement, robot))
         return Planned(along_line(start.position, displacement, law), end, law=law, closed_form="cycloid")
 
-    def _fastest(self, displacement: np.ndarray, robot: Robot) -> float:
-        sizes = []
+    def _fastest(self, displacement: Array, robot: Robot) -> float:
+        """Return the shortest duration (s) in which all joints keep their limits."""
+        durations = []
         for order in (1, 2, 3):
             bounds = robot.limits.of_order(order)
-            # acceleration and jerk reach their peak in both directions
-            bound = bound_along(bounds, displacement) if order == 1 else np.min(np.abs(bounds), axis=1)
-            sizes.append((PEAKS[order] * np.abs(displacement) / bound) ** (1 / order))
-        bounded = np.max(sizes, axis=0)
-        lacking = np.flatnonzero((displacement != 0) & (bounded == 0))
+            bound = np.min(np.abs(bounds), axis=1)  # acceleration and jerk peak in both directions
+            if order == 1:
+                bound = np.where(displacement < 0, -bounds[:, 0], bounds[:, 1])
+            durations.append((PEAKS[order] * np.abs(displacement) / bound) ** (1 / order))
+        longest = np.max(durations, axis=0)
+        lacking = np.flatnonzero((displacement != 0) & (longest == 0))
         if lacking.size:
             why = "to find its fastest duration"
             raise missing_limit(
                 self.tag, "velocity", lacking.tolist(), robot, why, "give the move a `duration`"
             )
-        return float(bounded.max())
+        return float(longest.max())

@@ -1,34 +1,27 @@
-"""Point to point under bounds on velocity, acceleration and jerk, from any state to any state.
+"""Jerk-limited motions of all joints: each by itself, all together in time, or all on one line.
 
-Jerk-limited motions of all joints: each by itself, all together in time, or all on one line.
-
-Why there is no jerk-limited motion, joint by joint.
+Source: Berscheid and Kroeger, Jerk-limited Real-time Trajectory Generation with Arbitrary Target States
+(RSS 2021).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
-from trajcli.errors import Amount, Amounts, MissingLimitError, PlanningError, Problem
-from trajcli.kinematics.robot import QUANTITIES, Robot
-from trajcli.language.targets import MinimumDuration
-from trajcli.planners.planner import Planned
-from trajcli.planners.point_to_point.point_to_point import PointToPoint, missing_limit
-from trajcli.trajectory import State
-
-if TYPE_CHECKING:
-    from trajcli.kinematics.robot import Robot
-    from trajcli.planners.point_to_point.ruckig import BoundaryProblem
 from trajcli.curves.operations import along_line, coast_until, hold_until, merge_breaks
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.errors import Amount, Amounts, MissingLimitError, PlanningError, Problem
 from trajcli.frozen import frozen
-from trajcli.kinematics.robot import Limits, Robot
-from trajcli.planners.planner import Event, Phase
-from trajcli.planners.point_to_point.ruckig import (
+from trajcli.kinematics.robot import QUANTITIES, Limits, Robot
+from trajcli.language.targets import MinimumDuration
+from trajcli.planners.boundary_states import missing_limit
+from trajcli.planners.planner import Event, Phase, Planned
+from trajcli.planners.point_to_point.point_to_point import PointToPoint
+from trajcli.planners.ruckig import (
     BoundaryProblem,
     Control,
     PhaseProfile,
@@ -36,6 +29,10 @@ from trajcli.planners.point_to_point.ruckig import (
     fastest_of,
     together,
 )
+from trajcli.trajectory import State
+
+_ROUNDING = 1e-12
+_PARALLEL = 1e-12  # relative; what leaves the line by more is no rounding error
 
 
 class JerkLimited(PointToPoint):
@@ -85,106 +82,9 @@ class JerkLimited(PointToPoint):
         )
 
 
-_ROUNDING = 1e-12
-
-
-def require_limits(planner: str, tasks: Sequence[BoundaryProblem], robot: Robot) -> None:
-    """Refuse moving joints without the limits that their motion follows from.
-
-    Raises:
-        MissingLimitError: With one problem for each quantity, naming the joints.
-    """
-    problems: list[Problem] = []
-    for order in (1, 2, 3):
-        lacking = [
-            joint
-            for joint, task in enumerate(tasks)
-            if not task.steady
-            and not np.isfinite(task.bounds[order - 1]).all()
-            and (order > 1 or task.control == "position")
-        ]
-        if lacking:
-            why, also = "to find its fastest motion", f"give the joint its own `{QUANTITIES[order]}`"
-            problems += missing_limit(planner, QUANTITIES[order], lacking, robot, why, also).problems
-    if problems:
-        raise MissingLimitError(*problems)
-
-
-def require_possible_end(tasks: Sequence[BoundaryProblem], robot: Robot) -> None:
-    """Refuse end states that lie outside the limits, or that can only be reached from outside.
-
-    Raises:
-        PlanningError: With one problem for each joint.
-    """
-    problems = [problem for joint, task in enumerate(tasks) for problem in _end_problems(task, joint)]
-    if problems:
-        raise PlanningError(*problems)
-
-
-def _end_problems(task: BoundaryProblem, joint: int) -> list[Problem]:
-    for order in (1, 2):
-        value, (low, high) = task.final[order], task.bounds[order - 1].tolist()
-        if not low * (1 + _ROUNDING) <= value <= high * (1 + _ROUNDING):
-            limit = low if value < 0 else high
-            message = f"{{joint}} would end with {QUANTITIES[order]} {{value}}, beyond its limit {{limit}}"
-            amounts: Amounts = {
-                "joint": task.name,
-                "value": Amount(value, order, joint),
-                "limit": Amount(limit, order, joint),
-            }
-            hint = f"lower the end {QUANTITIES[order]}, or raise the limit"
-            return [Problem(message, hint, joint=task.name, value=value, limit=limit, amounts=amounts)]
-    return [] if task.control == "velocity" or task.done else _approach_problems(task, joint)
-
-
-def _approach_problems(task: BoundaryProblem, joint: int) -> list[Problem]:
-    """The end acceleration a was built up from zero: before, the velocity was a |a| / (2 jerk) less."""
-    velocity, acceleration = task.final[1:]
-    before = velocity - acceleration * abs(acceleration) / (2 * float(np.abs(task.bounds[2]).min()))
-    low, high = task.bounds[0].tolist()
-    if low * (1 + _ROUNDING) <= before <= high * (1 + _ROUNDING):
-        return []
-    limit = low if before < 0 else high
-    message = (
-        "{joint} would end with velocity {velocity} and acceleration {acceleration}: within its "
-        "jerk limit it must have moved at {before} just before, beyond its velocity limit {limit}"
-    )
-    amounts: Amounts = {
-        "joint": task.name,
-        "velocity": Amount(velocity, 1, joint),
-        "acceleration": Amount(acceleration, 2, joint),
-        "before": Amount(before, 1, joint),
-        "limit": Amount(limit, 1, joint),
-    }
-    hint = "lower the end acceleration or velocity, or raise the velocity or jerk limit"
-    return [Problem(message, hint, joint=task.name, value=before, limit=limit, amounts=amounts)]
-
-
-def leaves_line(value: float, order: int, joint: int, robot: Robot) -> PlanningError:
-    """Return the error of a boundary velocity or acceleration that points away from the straight line."""
-    name = robot.joint_names[joint]
-    message = "`synchronize: phase` keeps all joints on one straight line, "
-    message += f"but {QUANTITIES[order]} {{value}} of {{joint}} leaves it"
-    amounts: Amounts = {"joint": name, "value": Amount(value, order, joint)}
-    return PlanningError(
-        Problem(message, "say `synchronize: time`", joint=name, value=value, amounts=amounts)
-    )
-
-
-def cannot_wait(task: BoundaryProblem, arrival: float, duration: float, joint: int) -> PlanningError:
-    """Return the error of a joint that arrives first and moves in its end state."""
-    message = "{joint} arrives after {arrival}, moves on, and cannot wait for the others until {duration}"
-    amounts: Amounts = {"joint": task.name, "arrival": Amount(arrival), "duration": Amount(duration)}
-    hint = "say `synchronize: time`, or let it end at rest"
-    return PlanningError(Problem(message, hint, joint=task.name, amounts=amounts))
-
-
-_PARALLEL = 1e-12  # relative; what leaves the line by more is no rounding error
-
-
 @frozen
 class Request:
-    """What is asked of the joints.
+    """Boundary states and synchronisation of a motion.
 
     Attributes:
         start: State at the start.
@@ -208,57 +108,57 @@ def plan_motion(request: Request, robot: Robot) -> Planned:
         MissingLimitError: When a moving joint lacks a limit on velocity, acceleration or jerk.
         PlanningError: When no such motion exists.
     """
-    tasks = _joint_tasks(request, robot)
-    require_limits("jerk_limited", tasks, robot)
-    require_possible_end(tasks, robot)
-    if request.synchronize == "phase" and not all(task.steady for task in tasks):
-        planned = _on_one_line(request, tasks, robot)
+    boundaries = _boundaries(request, robot)
+    _require_limits(boundaries, robot)
+    _require_possible_end(boundaries, robot)
+    if request.synchronize == "phase" and not all(boundary.steady for boundary in boundaries):
+        planned = _on_one_line(request, boundaries, robot)
     else:
-        planned = _each(request, tasks)
+        planned = _each(request, boundaries)
     if request.control == "position":
         return planned
     end = State(planned.curve.piece_ends()[1][-1], request.end.velocity, request.end.acceleration)
     return Planned(planned.curve, end, None, planned.phases, planned.events, planned.arrivals)
 
 
-def _each(request: Request, tasks: Sequence[BoundaryProblem]) -> Planned:
+def _each(request: Request, boundaries: Sequence[BoundaryProblem]) -> Planned:
     least = request.minimum_duration
-    alone = [fastest(task) for task in tasks]
-    profiles = together(tasks, alone, least) if request.synchronize == "time" else alone
+    alone = [fastest(boundary) for boundary in boundaries]
+    profiles = together(boundaries, alone, least) if request.synchronize == "time" else alone
     duration = max([least, *(profile.duration for profile in profiles)])
     curves, phases = [], []
-    for joint, (task, profile) in enumerate(zip(tasks, profiles, strict=True)):
+    for joint, (boundary, profile) in enumerate(zip(boundaries, profiles, strict=True)):
         phases += profile.phases(joint)
         if profile.duration == duration:
             curves.append(profile.curve())
             continue
-        curves.append(_waiting(task, profile, duration, joint))
-        phases.append(Phase("cruise" if task.final[1] else "rest", profile.duration, duration, joint))
+        curves.append(_waiting(boundary, profile, duration, joint))
+        phases.append(Phase("cruise" if boundary.final[1] else "rest", profile.duration, duration, joint))
     phases.sort(key=lambda phase: (phase.start, phase.joint or 0))
     arrivals = tuple(profile.duration for profile in alone)
-    events = (*_duration_events(least, duration, max(arrivals)), *_jerk_events(tasks))
+    events = (*_duration_events(least, duration, max(arrivals)), *_jerk_events(boundaries))
     return Planned(merge_breaks(curves), request.end, phases=tuple(phases), events=events, arrivals=arrivals)
 
 
-def _on_one_line(request: Request, tasks: Sequence[BoundaryProblem], robot: Robot) -> Planned:
+def _on_one_line(request: Request, boundaries: Sequence[BoundaryProblem], robot: Robot) -> Planned:
     start, end, least = request.start, request.end, request.minimum_duration
-    displacement = np.array([task.displacement for task in tasks])
+    displacement = np.array([boundary.displacement for boundary in boundaries])
     rates = [start.velocity, end.velocity, start.acceleration, end.acceleration]
     direction = next(values for values in (displacement, *rates) if values.any())
     on_line = [_along(direction, values, 1 + k // 2, robot) for k, values in enumerate(rates)]
     length = 1.0 if displacement.any() else 0.0
     initial, final = (0.0, on_line[0], on_line[2]), (length, on_line[1], on_line[3])
     bounds = _bounds_along(direction, robot.limits)
-    task = BoundaryProblem("the common law", initial, final, bounds, request.control)
-    alone = fastest(task)
-    profile = fastest_of(task, least) if alone.duration < least else alone
+    boundary = BoundaryProblem("the common law", initial, final, bounds, request.control)
+    alone = fastest(boundary)
+    profile = fastest_of(boundary, least) if alone.duration < least else alone
     law = profile.curve()
-    events = (*_duration_events(least, profile.duration, alone.duration), *_jerk_events(tasks))
+    events = (*_duration_events(least, profile.duration, alone.duration), *_jerk_events(boundaries))
     curve = along_line(start.position, direction, law)
     return Planned(curve, end, law if length else None, tuple(profile.phases(None)), events)
 
 
-def _joint_tasks(request: Request, robot: Robot) -> list[BoundaryProblem]:
+def _boundaries(request: Request, robot: Robot) -> list[BoundaryProblem]:
     bounds = np.stack([robot.limits.of_order(order) for order in (1, 2, 3)], axis=1)
     states = [
         np.stack([s.position, s.velocity, s.acceleration], axis=1).tolist()
@@ -272,20 +172,20 @@ def _joint_tasks(request: Request, robot: Robot) -> list[BoundaryProblem]:
 
 
 def _waiting(
-    task: BoundaryProblem, profile: PhaseProfile, duration: float, joint: int
+    boundary: BoundaryProblem, profile: PhaseProfile, duration: float, joint: int
 ) -> PiecewisePolynomial:
     """Return the curve of a joint that keeps its end state until the others have arrived.
 
     Raises:
         PlanningError: When it cannot, because it moves.
     """
-    if task.steady:
-        return fastest_of(task, duration).curve()
-    if not task.final[1] and not task.final[2]:
+    if boundary.steady:
+        return fastest_of(boundary, duration).curve()
+    if not boundary.final[1] and not boundary.final[2]:
         return hold_until(profile.curve(), duration)
-    if task.control == "velocity" and not task.final[2]:
+    if boundary.control == "velocity" and not boundary.final[2]:
         return coast_until(profile.curve(), duration)
-    raise cannot_wait(task, profile.duration, duration, joint)
+    raise _cannot_wait(boundary, profile.duration, duration, joint)
 
 
 def _along(direction: Array, values: Array, order: int, robot: Robot) -> float:
@@ -298,7 +198,7 @@ def _along(direction: Array, values: Array, order: int, robot: Robot) -> float:
     off = np.abs(values - rate * direction)
     joint = int(off.argmax())
     if off[joint] > _PARALLEL * np.abs(values).max():
-        raise leaves_line(float(values[joint]), order, joint, robot)
+        raise _leaves_line(float(values[joint]), order, joint, robot)
     return rate
 
 
@@ -315,7 +215,7 @@ def _bounds_along(direction: Array, limits: Limits) -> Array:
 
 
 def _duration_events(least: float, duration: float, alone: float) -> list[Event]:
-    """Return what to say when a minimum duration that would be long enough is exceeded."""
+    """Return the event of a minimum duration that would be long enough and is exceeded."""
     if duration <= least or alone > least or not least:
         return []
     message = (
@@ -326,12 +226,110 @@ def _duration_events(least: float, duration: float, alone: float) -> list[Event]
     ]
 
 
-def _jerk_events(tasks: Sequence[BoundaryProblem]) -> list[Event]:
-    """Return what to say of jerk limits that differ by direction."""
-    names = [task.name for task in tasks if not task.steady and task.bounds[2, 0] != -task.bounds[2, 1]]
+def _jerk_events(boundaries: Sequence[BoundaryProblem]) -> list[Event]:
+    """Return the event of jerk limits that differ by direction."""
+    names = [
+        boundary.name
+        for boundary in boundaries
+        if not boundary.steady and boundary.bounds[2, 0] != -boundary.bounds[2, 1]
+    ]
     if not names:
         return []
     message = (
         f"the jerk limit of {', '.join(names)} differs by direction: the smaller magnitude is kept both ways"
     )
     return [Event("jerk_limit_both_ways", message)]
+
+
+def _require_limits(boundaries: Sequence[BoundaryProblem], robot: Robot) -> None:
+    """Refuse moving joints without the limits that their motion follows from.
+
+    Raises:
+        MissingLimitError: With one problem for each quantity, naming the joints.
+    """
+    problems: list[Problem] = []
+    for order in (1, 2, 3):
+        lacking = [
+            joint
+            for joint, boundary in enumerate(boundaries)
+            if not boundary.steady
+            and not np.isfinite(boundary.bounds[order - 1]).all()
+            and (order > 1 or boundary.control == "position")
+        ]
+        if lacking:
+            why, also = "to find its fastest motion", f"give the joint its own `{QUANTITIES[order]}`"
+            problems += missing_limit("jerk_limited", QUANTITIES[order], lacking, robot, why, also).problems
+    if problems:
+        raise MissingLimitError(*problems)
+
+
+def _require_possible_end(boundaries: Sequence[BoundaryProblem], robot: Robot) -> None:
+    """Refuse end states that lie outside the limits, or that can only be reached from outside.
+
+    Raises:
+        PlanningError: With one problem for each joint.
+    """
+    problems = [
+        problem for joint, boundary in enumerate(boundaries) for problem in _end_problems(boundary, joint)
+    ]
+    if problems:
+        raise PlanningError(*problems)
+
+
+def _end_problems(boundary: BoundaryProblem, joint: int) -> list[Problem]:
+    for order in (1, 2):
+        value, (low, high) = boundary.final[order], boundary.bounds[order - 1].tolist()
+        if not low * (1 + _ROUNDING) <= value <= high * (1 + _ROUNDING):
+            limit = low if value < 0 else high
+            message = f"{{joint}} would end with {QUANTITIES[order]} {{value}}, beyond its limit {{limit}}"
+            amounts: Amounts = {
+                "joint": boundary.name,
+                "value": Amount(value, order, joint),
+                "limit": Amount(limit, order, joint),
+            }
+            hint = f"lower the end {QUANTITIES[order]}, or raise the limit"
+            return [Problem(message, hint, joint=boundary.name, value=value, limit=limit, amounts=amounts)]
+    return [] if boundary.control == "velocity" or boundary.done else _approach_problems(boundary, joint)
+
+
+def _approach_problems(boundary: BoundaryProblem, joint: int) -> list[Problem]:
+    """The end acceleration a was built up from zero: before, the velocity was a |a| / (2 jerk) less."""
+    velocity, acceleration = boundary.final[1:]
+    before = velocity - acceleration * abs(acceleration) / (2 * float(np.abs(boundary.bounds[2]).min()))
+    low, high = boundary.bounds[0].tolist()
+    if low * (1 + _ROUNDING) <= before <= high * (1 + _ROUNDING):
+        return []
+    limit = low if before < 0 else high
+    message = (
+        "{joint} would end with velocity {velocity} and acceleration {acceleration}: within its "
+        "jerk limit it must have moved at {before} just before, beyond its velocity limit {limit}"
+    )
+    amounts: Amounts = {
+        "joint": boundary.name,
+        "velocity": Amount(velocity, 1, joint),
+        "acceleration": Amount(acceleration, 2, joint),
+        "before": Amount(before, 1, joint),
+        "limit": Amount(limit, 1, joint),
+    }
+    hint = "lower the end acceleration or velocity, or raise the velocity or jerk limit"
+    return [Problem(message, hint, joint=boundary.name, value=before, limit=limit, amounts=amounts)]
+
+
+def _leaves_line(value: float, order: int, joint: int, robot: Robot) -> PlanningError:
+    """Return the error of a boundary velocity or acceleration that points away from the straight line."""
+    name = robot.joint_names[joint]
+    message = "`synchronize: phase` keeps all joints on one straight line, "
+    message += f"but {QUANTITIES[order]} {{value}} of {{joint}} leaves it"
+    amounts: Amounts = {"joint": name, "value": Amount(value, order, joint)}
+    return PlanningError(
+        Problem(message, "say `synchronize: time`", joint=name, value=value, amounts=amounts)
+    )
+
+
+def _cannot_wait(boundary: BoundaryProblem, arrival: float, duration: float, joint: int) -> PlanningError:
+    """Return the error of a joint that arrives first and moves in its end state."""
+    name = boundary.name
+    message = "{joint} arrives after {arrival}, moves on, and cannot wait for the others until {duration}"
+    amounts: Amounts = {"joint": name, "arrival": Amount(arrival), "duration": Amount(duration)}
+    hint = "say `synchronize: time`, or let it end at rest"
+    return PlanningError(Problem(message, hint, joint=name, amounts=amounts))

@@ -1,10 +1,7 @@
-"""The polynomial through two boundary states, and the shortest time it may take within limits.
+"""Cubic, quintic and septic polynomials between two boundary states, and their shortest duration.
 
-Polynomials of the third degree.
-
-Polynomials of the fifth degree.
-
-Polynomials of the seventh degree.
+Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.2.1; Biagiotti and
+Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), section 2.1.
 """
 
 from __future__ import annotations
@@ -21,14 +18,9 @@ from trajcli.curves.smallest_feasible import smallest_feasible
 from trajcli.errors import PlanningError, Problem
 from trajcli.kinematics.robot import Limits, Robot
 from trajcli.language.targets import Duration
+from trajcli.planners.boundary_states import missing_limit, same_state, share_of_limits, standstill
 from trajcli.planners.planner import Planned
-from trajcli.planners.point_to_point.point_to_point import (
-    PointToPoint,
-    missing_limit,
-    same_state,
-    share_of_limits,
-    standstill,
-)
+from trajcli.planners.point_to_point.point_to_point import PointToPoint
 from trajcli.trajectory import State
 
 _ROOM = 1e-10  # relative; a tenth of the tolerance with which limits are verified

@@ -1,17 +1,10 @@
-"""Trapezoidal velocity: the slides' 2-1-2, one law for all joints or one for each.
+"""Trapezoidal velocity: one law for all joints, or one for each.
 
-Why there is no such trapezoid, with the interval of what there is.
+Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.2.1.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from trajcli.errors import Amount, Amounts, PlanningError, Problem
-
-if TYPE_CHECKING:
-    from trajcli.curves.trapezoid import InfeasibleProfileError
-    from trajcli.kinematics.robot import Robot
 import math
 from typing import Annotated, ClassVar, Literal
 
@@ -28,13 +21,18 @@ from trajcli.curves.trapezoid import (
     profile_of_duration,
     profile_of_speed,
 )
+from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import refuse
 from trajcli.language.targets import Duration, JointAccelerationMagnitudes, JointSpeeds, MinimumDuration
+from trajcli.planners.boundary_states import missing_limit, same_state, standstill
 from trajcli.planners.planner import Phase, Planned
-from trajcli.planners.point_to_point.point_to_point import PointToPoint, missing_limit, same_state, standstill
+from trajcli.planners.point_to_point.point_to_point import PointToPoint
 from trajcli.trajectory import State
 
+_OFF = 1e-9  # relative: a velocity this little off the line is on it
+_SAME_TIME = 1e-12  # relative: joints that arrive this close to each other arrive together
+_STILL = 1e-15  # per s: a thousandth of what counts as a jump
 _HINTS = {
     "speed": "choose a velocity inside the interval, or change the duration",
     "acceleration": "raise the acceleration, or the duration",
@@ -44,62 +42,6 @@ _HINTS = {
     "turns": "say `overshoot: true` and at most one of duration and velocity, or let the arm start and end "
     "in the direction of the motion",
 }
-
-
-def explain_infeasible(
-    error: InfeasibleProfileError, joint: int, size: float, move: Trapezoid, robot: Robot
-) -> PlanningError:
-    """Return the error in terms of one joint.
-
-    Args:
-        error: What the profile said, in units of the law.
-        joint: The joint that rules.
-        size: Joint units per unit of the law.
-        move: What was asked for.
-        robot: For the names.
-    """
-    name = robot.joint_names[joint]
-    amounts: dict[str, Amount | str] = {"joint": name}
-    if error.reason in ("speed", "acceleration"):
-        order = 1 if error.reason == "speed" else 2
-        given = (move.velocity or (0.0,) * 12)[joint] if order == 1 else _acceleration(move, robot, joint)
-        amounts |= {
-            "low": Amount(error.low * size, order, joint),
-            "high": Amount(error.high * size, order, joint),
-            "given": Amount(given, order, joint),
-            "duration": Amount(move.duration or 0.0),
-        }
-    elif error.reason == "duration":
-        amounts |= {"low": Amount(error.low), "high": Amount(error.high)}
-    elif error.reason in ("too_fast", "too_slow"):
-        amounts["needed"] = Amount(error.low * size, 0, joint)
-    return PlanningError(Problem(_message(error), _HINTS[error.reason], joint=name, amounts=amounts))
-
-
-def _message(error: InfeasibleProfileError) -> str:
-    unbounded = error.high == float("inf")
-    return {
-        "speed": "no trapezoid of {duration}: the velocity of {joint} must be above {low} "
-        "and at most {high}, got {given}",
-        "acceleration": "no trapezoid of {duration}: the acceleration of {joint} must be at least {low}, "
-        "got {given}",
-        "duration": "no trapezoid for {joint}: its duration must be at least {low}"
-        + ("" if unbounded else " and at most {high}"),
-        "too_fast": "{joint} is too fast to end in the target: it needs {needed} to slow down",
-        "too_slow": "{joint} cannot reach its end velocity in time: it needs {needed} to speed up",
-        "turns": "{joint} would have to turn round to start and end with the given velocities",
-    }[error.reason]
-
-
-def _acceleration(move: Trapezoid, robot: Robot, joint: int) -> float:
-    if move.acceleration is not None:
-        return move.acceleration[joint]
-    return float(abs(robot.limits.acceleration[joint]).min())
-
-
-_OFF = 1e-9  # relative: a velocity this little off the line is on it
-_SAME_TIME = 1e-12  # relative: joints that arrive this close to each other arrive together
-_STILL = 1e-15  # per s: a thousandth of what counts as a jump
 
 
 class Trapezoid(PointToPoint):
@@ -170,7 +112,7 @@ class Trapezoid(PointToPoint):
             profile = self._profile(1.0, initial, final, law_rates[0], law_rates[1])
         except InfeasibleProfileError as error:
             joint = int(np.nanargmin(forward[0 if error.reason == "speed" else 1] / size))
-            raise explain_infeasible(error, joint, float(size[joint]), self, robot) from None
+            raise _infeasible(error, joint, float(size[joint]), self, robot) from None
         law = profile.curve(0.0, 1.0, self.duration)
         phases = tuple(Phase(*phase) for phase in profile.phases())
         return Planned(along_line(start.position, displacement, law), end, law=law, phases=phases)
@@ -186,7 +128,7 @@ class Trapezoid(PointToPoint):
             try:
                 profiles.append(self._profile(distance, *speeds, rates[0], rates[1]))
             except InfeasibleProfileError as error:
-                raise explain_infeasible(error, joint, 1.0, self, robot) from None
+                raise _infeasible(error, joint, 1.0, self, robot) from None
         duration = self.duration or max(profile.duration for profile in profiles)
         curves, arrivals = [], []
         for joint, profile in enumerate(profiles):
@@ -238,19 +180,19 @@ class Trapezoid(PointToPoint):
             None if v is None else np.array(v) for v in (self.velocity, self.acceleration, self.deceleration)
         ]
         slowing = given[2] if given[2] is not None else given[1]
-        ways = []
+        both = []
         for sign in (1, -1):
             back = (sign * displacement < 0)[:, None]
             speed, faster = (np.where(back, -b[:, ::-1], b)[:, 1] for b in (velocity, acceleration))
             slower = np.where(back, acceleration[:, ::-1], -acceleration)[:, 0]
             rows = zip((given[0], given[1], slowing), (speed, faster, slower), strict=True)
-            ways.append([limit if value is None else value for value, limit in rows])
+            both.append([limit if value is None else value for value, limit in rows])
         if self.duration is None or self.velocity is None:
-            self._require_acceleration(ways, displacement, robot)
-        return ways[0], ways[1]
+            self._require_acceleration(both, displacement, robot)
+        return both[0], both[1]
 
-    def _require_acceleration(self, ways: list[list[Array]], displacement: Array, robot: Robot) -> None:
-        unbounded = ~np.isfinite(ways[0][1:] + ways[1][1:]).all(axis=0) & (displacement != 0)
+    def _require_acceleration(self, both: list[list[Array]], displacement: Array, robot: Robot) -> None:
+        unbounded = ~np.isfinite(both[0][1:] + both[1][1:]).all(axis=0) & (displacement != 0)
         if unbounded.any():
             lacking = np.flatnonzero(unbounded).tolist()
             also = "give the move an `acceleration`, or `duration` and `velocity`"
@@ -283,3 +225,54 @@ def _cannot_wait(joint: int, arrival: float, duration: float, end: State, robot:
     }
     hint = "give the move a `duration`, end it at rest, or use jerk_limited"
     return PlanningError(Problem(message, hint, joint=name, amounts=amounts))
+
+
+def _infeasible(
+    error: InfeasibleProfileError, joint: int, size: float, move: Trapezoid, robot: Robot
+) -> PlanningError:
+    """Return the error in terms of one joint.
+
+    Args:
+        error: In units of the law.
+        joint: The joint that rules.
+        size: Joint units per unit of the law.
+        move: The move that has no such profile.
+        robot: For the names.
+    """
+    name = robot.joint_names[joint]
+    amounts: dict[str, Amount | str] = {"joint": name}
+    if error.reason in ("speed", "acceleration"):
+        order = 1 if error.reason == "speed" else 2
+        given = (move.velocity or (0.0,) * 12)[joint] if order == 1 else _acceleration(move, robot, joint)
+        amounts |= {
+            "low": Amount(error.low * size, order, joint),
+            "high": Amount(error.high * size, order, joint),
+            "given": Amount(given, order, joint),
+            "duration": Amount(move.duration or 0.0),
+        }
+    elif error.reason == "duration":
+        amounts |= {"low": Amount(error.low), "high": Amount(error.high)}
+    elif error.reason in ("too_fast", "too_slow"):
+        amounts["needed"] = Amount(error.low * size, 0, joint)
+    return PlanningError(Problem(_message(error), _HINTS[error.reason], joint=name, amounts=amounts))
+
+
+def _message(error: InfeasibleProfileError) -> str:
+    unbounded = error.high == float("inf")
+    return {
+        "speed": "no trapezoid of {duration}: the velocity of {joint} must be above {low} "
+        "and at most {high}, got {given}",
+        "acceleration": "no trapezoid of {duration}: the acceleration of {joint} must be at least {low}, "
+        "got {given}",
+        "duration": "no trapezoid for {joint}: its duration must be at least {low}"
+        + ("" if unbounded else " and at most {high}"),
+        "too_fast": "{joint} is too fast to end in the target: it needs {needed} to slow down",
+        "too_slow": "{joint} cannot reach its end velocity in time: it needs {needed} to speed up",
+        "turns": "{joint} would have to turn round to start and end with the given velocities",
+    }[error.reason]
+
+
+def _acceleration(move: Trapezoid, robot: Robot, joint: int) -> float:
+    if move.acceleration is not None:
+        return move.acceleration[joint]
+    return float(abs(robot.limits.acceleration[joint]).min())

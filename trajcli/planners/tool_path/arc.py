@@ -1,8 +1,6 @@
-"""A circular arc or a helix of the tool.
+"""Circular arcs and helices of the tool.
 
-Fields that give an arc of the tool.
-
-From the fields of a move to the way of its tool: an arc.
+Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.3.1.
 """
 
 from __future__ import annotations
@@ -23,9 +21,15 @@ from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import Flaw, Model, Number, refuse
 from trajcli.language.targets import Direction, NamedTarget, Numbers, Row
 from trajcli.planners.planner import Event
-from trajcli.planners.tool_path.line import planned_path
-from trajcli.planners.tool_path.move import PlannedPath, ToolPathMove
-from trajcli.planners.tool_path.target import Orientation, ToolTarget, flaws_of_target, tool_target
+from trajcli.planners.tool_path.move import (
+    PlannedPath,
+    ToolPathMove,
+    ToolTarget,
+    flaws_of_target,
+    kept_orientation,
+    path_to,
+    tool_target,
+)
 from trajcli.units import Quantity
 
 _LENGTH, _ANGLE = Quantity("length"), Quantity("angle")
@@ -80,30 +84,20 @@ class ArcMove(ToolPathMove, ArcFields):
 
     planner: Literal["arc"] = "arc"
 
-    def way(self, before: Array, robot: Robot) -> PlannedPath:
+    def path_from(self, before: Array, robot: Robot) -> PlannedPath:
         """Return the arc from the pose `before` (4, 4)."""
-        return arc_path(before, self, self.orientation, robot)
-
-
-_ALL_SIX = 6
-
-
-def arc_path(before: Array, fields: ArcFields, orientation: Orientation, robot: Robot) -> PlannedPath:
-    """Return the way along an arc from a pose (4, 4)."""
-    target = arc_target(fields, before, robot)
-    place = arc_of(fields, before, target, robot)
-    way = planned_path(place, before, target, orientation, fields.to)
-    return replace(way, events=notes_of([place]))
+        target = arc_target(self, before, robot)
+        arc = arc_of(self, before, target, robot)
+        return replace(path_to(arc, before, target, self.orientation, self.to), events=center_events([arc]))
 
 
 def arc_target(fields: ArcFields, before: Array, robot: Robot) -> ToolTarget:
     """Return where an arc ends; one that is given by its angle ends with the orientation it begins with."""
     if fields.to is not None:
         return tool_target(fields.to, before, robot)
-    place = _by_angle(fields, before)
     pose = before.copy()
-    pose[:3, 3] = place.end
-    return ToolTarget(pose, (True, True, True), "all" if len(robot.joints) >= _ALL_SIX else "none")
+    pose[:3, 3] = _by_angle(fields, before).end
+    return kept_orientation(pose, robot)
 
 
 def arc_of(fields: ArcFields, before: Array, target: ToolTarget, robot: Robot) -> Arc:
@@ -124,11 +118,11 @@ def _by_angle(fields: ArcFields, before: Array) -> Arc:
     )
 
 
-def notes_of(places: Iterable[PositionCurve]) -> tuple[Event, ...]:
+def center_events(segments: Iterable[PositionCurve]) -> tuple[Event, ...]:
     """Return an event for each arc whose center was moved."""
     text = "the center of the arc was moved by {by} to fit its ends"
     return tuple(
-        Event("moved_center", text, amounts={"by": Amount(place.moved, 0, None, "length")})
-        for place in places
-        if isinstance(place, Arc) and place.moved > SAME_POINT
+        Event("moved_center", text, amounts={"by": Amount(arc.moved, 0, None, "length")})
+        for arc in segments
+        if isinstance(arc, Arc) and arc.moved > SAME_POINT
     )

@@ -1,7 +1,4 @@
-"""From the motion of the tool to the joints' curve.
-
-Why an arm cannot follow its tool: out of reach, outside its limits, or through a singularity.
-"""
+"""Joint curves that follow the tool, and why an arm cannot: workspace, limits, singularities."""
 
 from __future__ import annotations
 
@@ -28,9 +25,9 @@ from trajcli.kinematics.robot import Robot
 from trajcli.planners.planner import Event, Phase
 
 _BISECTIONS = 20
-_LOOKS = 17  # places beyond the trouble at which the arm's reach is asked for
-_NEXT = 4e-6  # of the whole: how far beyond the trouble the first of them is
-_SLOW = 20.0  # rad for each length of the arm: a joint that goes less does not race
+_SAMPLES = 17  # of the rest of the path, at which it is asked whether the arm reaches it
+_NEXT = 4e-6  # of the whole: how far beyond the failure the first of them is
+_SLOW = 20.0  # rad for each length of the arm: a joint that goes less is not near a singularity
 _REGULAR = 1e-3  # of the largest singular value: with more there is no singularity nearby
 _SLOPE = 1e-5  # of the whole: step of the difference that says how fast a joint would have to go
 
@@ -41,27 +38,27 @@ class FollowingDiagnosis:
 
     Attributes:
         robot: The arm.
-        demands: The tool, by place or by time.
-        end: Last place, or time.
-        law: From time to place; None where the tool is known by place.
-        in_place: Whether places are angles.
+        reference: What the tool shall do, by s or by time.
+        end: Last s, or time.
+        law: s(t); None where the tool is known by s.
+        angular: Whether s is an angle: the tcp rests.
         free: How many directions of the joint values the targets leave free.
     """
 
     robot: Robot
-    demands: ReferenceAt
+    reference: ReferenceAt
     end: float
     law: PiecewisePolynomial | None
-    in_place: bool
+    angular: bool
     free: int = 0
 
     def stuck(self, error: StuckError) -> PlanningError:
-        """Return the error of an arm that could not be followed beyond a place."""
-        lost = self._unreachable(error.s)
-        return lost or self._singular(error.s, error.joints, error.rates, stuck=True)
+        """Return the error of an arm that could not be followed beyond some s."""
+        unreachable = self._unreachable(error.s)
+        return unreachable or self._singular(error.s, error.joints, error.rates, stuck=True)
 
     def unfit(self, at: float, guess: Callable[[Array], Array]) -> PlanningError:
-        """Return the error of joints that no curve of the allowed pieces follows around a place."""
+        """Return the error of joints that no curve of the allowed pieces follows around some s or time."""
         step = _SLOPE * self.end
         around = np.clip(np.array([at - step, at, at + step]), 0.0, self.end)
         before, here, after = guess(around)
@@ -74,50 +71,50 @@ class FollowingDiagnosis:
         Raises:
             PlanningError: Names the joint that is furthest beyond, where, and by how much.
         """
-        (found,) = peaks(curve, (0,))
+        (extremes,) = peaks(curve, (0,))
         low, high = self.robot.limits.position.T
-        beyond = np.maximum(low - found.low, found.high - high)
+        beyond = np.maximum(low - extremes.low, extremes.high - high)
         if not (beyond > room).any():
             return
         joint = int(beyond.argmax())
-        below = low[joint] - found.low[joint] > found.high[joint] - high[joint]
+        below = low[joint] - extremes.low[joint] > extremes.high[joint] - high[joint]
         value, time, limit = (
-            (found.low, found.low_time, low) if below else (found.high, found.high_time, high)
+            (extremes.low, extremes.low_time, low) if below else (extremes.high, extremes.high_time, high)
         )
         name = self.robot.joint_names[joint]
         amounts: Amounts = {
             "joint": name,
             "value": Amount(float(value[joint]), 0, joint),
             "limit": Amount(float(limit[joint]), 0, joint),
-            "place": self._place(float(time[joint])),
+            "place": self._s(float(time[joint])),
         }
         message = "{joint} would be at {value} at s = {place} of the path, its limit is {limit}"
         hint = "start in another configuration, or move the path"
         raise PlanningError(Problem(message, hint, joint=name, time=float(time[joint]), amounts=amounts))
 
-    def _place(self, at: float) -> Amount:
-        place = at if self.law is None else float(self.law.evaluate(min(at, self.law.end))[0])
-        return Amount(place, 0, None, "angle" if self.in_place else "length")
+    def _s(self, at: float) -> Amount:
+        s = at if self.law is None else float(self.law.evaluate(min(at, self.law.end))[0])
+        return Amount(s, 0, None, "angle" if self.angular else "length")
 
     def _unreachable(self, at: float) -> PlanningError | None:
-        """Return the error that the path leaves the arm's reach, if it does so beyond a place."""
+        """Return the error that the path leaves the arm's workspace, if it does so beyond `at`."""
         from trajcli.kinematics.inverse.solve import solve
 
-        places = np.linspace(at, self.end, _LOOKS)
-        places[0] = min(at + _NEXT * self.end, self.end)
-        found = solve(self.robot, self.demands(places, "left").target(), None)
-        valid = found.valid.any(axis=-1)
+        samples = np.linspace(at, self.end, _SAMPLES)
+        samples[0] = min(at + _NEXT * self.end, self.end)
+        answers = solve(self.robot, self.reference(samples, "left").target(), None)
+        valid = answers.valid.any(axis=-1)
         if valid.all():
             return None
         first, last = int(np.argmin(valid)), at
         if first:
-            known = found.joints[first - 1][found.valid[first - 1]]
-            last = self._last_reached(float(places[first - 1]), float(places[first]), known)
-        missed = found.shortfall.max(axis=0)
+            known = answers.joints[first - 1][answers.valid[first - 1]]
+            last = self._last_reached(float(samples[first - 1]), float(samples[first]), known)
+        missed = answers.shortfall.max(axis=0)
         kind = int(missed[1] * characteristic_length(self.robot) > missed[0])
         amounts: Amounts = {
             "robot": self.robot.name,
-            "place": self._place(last),
+            "place": self._s(last),
             "missed": Amount(float(missed[kind]), 0, None, ("length", "angle")[kind]),
         }
         message = "{robot} does not reach the path beyond s = {place}: it stays up to {missed} away"
@@ -130,7 +127,7 @@ class FollowingDiagnosis:
 
         for _ in range(_BISECTIONS):
             middle = 0.5 * (low + high)
-            target = self.demands(np.full(len(known), middle), "left").target()
+            target = self.reference(np.full(len(known), middle), "left").target()
             joints, met = descend(self.robot, target, known, None)
             if met.any():
                 low, known = middle, joints[met]
@@ -139,11 +136,11 @@ class FollowingDiagnosis:
         return low
 
     def _singular(self, at: float, joints: Array, rates: Array, *, stuck: bool) -> PlanningError:
-        """Return the error that names the singularity at a place, and the joint that would race."""
-        demand = self.demands(np.array([at]), "right")
-        poses, slopes = forward(self.robot, joints[None]), jacobian(self.robot, joints[None])
-        rows = residual_jacobian(demand.target(), poses, slopes)[0]
-        rows[: sum(demand.position)] /= characteristic_length(self.robot)
+        """Return the error that names the singularity at `at`, and the joint that goes fastest there."""
+        reference = self.reference(np.array([at]), "right")
+        poses, columns = forward(self.robot, joints[None]), jacobian(self.robot, joints[None])
+        rows = residual_jacobian(reference.target(), poses, columns)[0]
+        rows[: sum(reference.position)] /= characteristic_length(self.robot)
         values = np.linalg.svd(rows, compute_uv=False)
         ratio = float(values[len(joints) - self.free - 1] / values[0])
         if ratio > _REGULAR and (self.free or not stuck):
@@ -151,20 +148,20 @@ class FollowingDiagnosis:
         joint = int(np.abs(rates).argmax())
         name = self.robot.joint_names[joint]
         unit = "rad" if self.robot.joint_types[joint] == "revolute" else "m"
-        per = "s" if self.law is not None else "rad of the path" if self.in_place else "m of the path"
-        race = f"{{joint}} would have to go {abs(float(rates[joint])):.4g} {unit} for each {per}"
+        per = "s" if self.law is not None else "rad of the path" if self.angular else "m of the path"
+        symptom = f"{{joint}} would have to go {abs(float(rates[joint])):.4g} {unit} for each {per}"
         if self.law is None and abs(float(rates[joint])) < _SLOW / characteristic_length(self.robot):
-            race = "branches of the arm meet, and it would pass from one to another"
+            symptom = "branches of the arm meet, and it would pass from one to another"
         message = (
-            f"the path runs into a singularity at s = {{place}}: there {race} (smallest over largest "
+            f"the path runs into a singularity at s = {{place}}: there {symptom} (smallest over largest "
             f"singular value {ratio:.2g})"
         )
         hint = "move the path, start in another configuration, or use a move in joint space there"
-        amounts: Amounts = {"joint": name, "place": self._place(at)}
+        amounts: Amounts = {"joint": name, "place": self._s(at)}
         return PlanningError(Problem(message, hint, joint=name, amounts=amounts))
 
     def _regular(self, at: float, *, stuck: bool) -> PlanningError:
-        """Return the error of a place where the tool could go on."""
+        """Return the error of a regular configuration, in which the tool could go on."""
         message = f"{MOST_PIECES} pieces do not meet the tolerance on this path, worst around s = {{place}}"
         hint = "choose a larger `tolerance`, or split the path"
         if stuck:
@@ -173,7 +170,7 @@ class FollowingDiagnosis:
                 "{robot} would have to turn round in its place"
             )
             hint = "start in another configuration, fix more of the target's orientation, or split the move"
-        amounts: Amounts = {"robot": self.robot.name, "place": self._place(at)}
+        amounts: Amounts = {"robot": self.robot.name, "place": self._s(at)}
         return PlanningError(Problem(message, hint, amounts=amounts))
 
 
@@ -183,8 +180,8 @@ class JointMotion:
 
     Attributes:
         curve: q(t).
-        motion: What the tool was told.
-        phases: Named stretches of time.
+        motion: What the tool shall do.
+        phases: Named intervals of time.
         events: What was conceded.
     """
 
@@ -196,12 +193,12 @@ class JointMotion:
 
 @frozen
 class FollowedPath:
-    """Joints along a path, as a function of its parameter.
+    """Joints along a path, as a function of its parameter s.
 
     Attributes:
         robot: The arm.
         path: Of the tool.
-        follower: Gives the exact joints at a place.
+        follower: Gives the exact joints at any s.
         coarse: Joints near the exact ones, a curve over s.
     """
 
@@ -210,41 +207,40 @@ class FollowedPath:
     follower: Follower
     coarse: PiecewisePolynomial
 
-    def by_place(self, tolerance: Tolerance) -> PiecewisePolynomial:
+    def by_s(self, tolerance: Tolerance) -> PiecewisePolynomial:
         """Return q(s) within a tolerance.
 
         Raises:
             PlanningError: When no 4096 pieces are enough: names the singularity.
         """
-        trouble = diagnosis_on_path(self.robot, self.path, self.follower)
-        return _fitted(self.follower, self.path.breaks, self.coarse.evaluate, tolerance, trouble)
+        diagnosis = diagnosis_on_path(self.robot, self.path, self.follower)
+        return _fitted(self.follower, self.path.breaks, self.coarse.evaluate, tolerance, diagnosis)
 
     def by_time(self, motion: ToolMotion) -> PiecewisePolynomial:
         """Return q(t) within the motion's tolerance.
 
         Raises:
-            PlanningError: As `by_place`.
+            PlanningError: As `by_s`.
         """
         timed = replace(self.follower, reference_at=motion.reference_at)
 
         def guess(times: Array) -> Array:
-            places = motion.law.evaluate(times)[:, 0]
-            return self.coarse.evaluate(places.clip(self.coarse.start, self.coarse.end))
+            s = motion.law.evaluate(times)[:, 0]
+            return self.coarse.evaluate(s.clip(self.coarse.start, self.coarse.end))
 
-        return _fitted(
-            timed, motion.breaks, guess, motion.tolerance, diagnosis_of_motion(self.robot, motion, timed)
-        )
+        diagnosis = diagnosis_of_motion(self.robot, motion, timed)
+        return _fitted(timed, motion.breaks, guess, motion.tolerance, diagnosis)
 
 
 def diagnosis_on_path(robot: Robot, path: ToolPath, exact: Follower) -> FollowingDiagnosis:
-    """Return who explains what goes wrong along a path."""
+    """Return the diagnosis of an arm along a path."""
     return FollowingDiagnosis(robot, path.at_s, path.length, None, path.poses.pure_rotation, len(exact.held))
 
 
 def diagnosis_of_motion(
     robot: Robot, motion: ToolMotion, exact: Follower | None = None
 ) -> FollowingDiagnosis:
-    """Return who explains what goes wrong on a motion."""
+    """Return the diagnosis of an arm in a motion."""
     free = 0 if exact is None else len(exact.held)
     return FollowingDiagnosis(robot, motion.reference_at, motion.law.end, motion.law, motion.in_place, free)
 
@@ -271,12 +267,12 @@ def followed_in_time(robot: Robot, motion: ToolMotion, start: Array) -> Piecewis
     middle = np.array([0.5 * motion.law.end])
     known = follower(robot, lambda _, side: motion.reference_at(middle, side), start, 0.0)
     exact = replace(known, reference_at=motion.reference_at)
-    trouble = diagnosis_of_motion(robot, motion, exact)
+    diagnosis = diagnosis_of_motion(robot, motion, exact)
     try:
         coarse = track_branch(exact, motion.breaks)
     except StuckError as error:
-        raise trouble.stuck(error) from None
-    return _fitted(exact, motion.breaks, coarse.evaluate, motion.tolerance, trouble)
+        raise diagnosis.stuck(error) from None
+    return _fitted(exact, motion.breaks, coarse.evaluate, motion.tolerance, diagnosis)
 
 
 def _fitted(
@@ -284,11 +280,11 @@ def _fitted(
     breaks: Array,
     guess: Callable[[Array], Array],
     tolerance: Tolerance,
-    trouble: FollowingDiagnosis,
+    diagnosis: FollowingDiagnosis,
 ) -> PiecewisePolynomial:
     try:
-        misfit = tolerance_ratio(exact, tolerance, breaks, guess(probes(breaks)))
-        return fit(exact.joint_state, misfit, breaks, guess)
+        ratio = tolerance_ratio(exact, tolerance, breaks, guess(probes(breaks)))
+        return fit(exact.joint_state, ratio, breaks, guess)
     except (LostError, FitError) as error:
         at = float(error.s[0]) if isinstance(error, LostError) else error.at
-        raise trouble.unfit(at, guess) from None
+        raise diagnosis.unfit(at, guess) from None

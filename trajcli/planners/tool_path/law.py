@@ -1,12 +1,17 @@
-"""The law of a move along a path: how its parameter s grows with time.
+"""Time laws s(t) along a path of the tool: their shapes, and the bounds that the tool's limits set them.
 
-Laws s(t) over a stretch of a path, from rest to rest.
+A law goes from rest to rest over each segment of the path between two stops.
+
+Source: Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), chapters 2
+and 3.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
@@ -14,9 +19,10 @@ from pydantic import Field, model_validator
 
 from trajcli.curves.hermite import hermite_coefficients
 from trajcli.curves.operations import scale_time
-from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.errors import Amount, PlanningError, Problem
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate, distinct
+from trajcli.errors import Amount, MissingLimitError, PlanningError, Problem
 from trajcli.frozen import comparable, frozen
+from trajcli.kinematics.robot import ToolLimits
 from trajcli.language.limits import AngularAcceleration, AngularSpeed, ToolAcceleration, ToolJerk, ToolSpeed
 from trajcli.language.numbers import Flaw, Model, refuse
 from trajcli.language.targets import Duration, MinimumDuration
@@ -24,9 +30,263 @@ from trajcli.planners.planner import Phase
 
 if TYPE_CHECKING:
     from trajcli.curves.trapezoid import InfeasibleProfileError
+    from trajcli.kinematics.following.tool_path import ToolPath
+
+_ROUNDING = 1e-9  # relative
+_SAMPLES = 257  # values of s at which the largest derivatives of the path are looked for
+_ALONG, _ACROSS = 0.6, 0.8  # of an acceleration, where the path is bent: 0.6^2 + 0.8^2 = 1
 
 
-Shape = Literal["trapezoid", "cubic", "quintic", "cycloidal", "jerk_limited", "time_optimal"]
+@comparable
+class PathBounds:
+    """Bounds on the derivatives of s by time, per s, s^2, s^3; infinite where there is none.
+
+    Attributes:
+        speed: Largest sd.
+        acceleration: Largest sdd.
+        deceleration: Largest -sdd.
+        jerk: Largest magnitude of sddd.
+        unit: Whether s is a length or an angle.
+    """
+
+    speed: float
+    acceleration: float
+    deceleration: float
+    jerk: float
+    unit: Literal["length", "angle"] = "length"
+
+    @property
+    def by_order(self) -> tuple[float, float, float]:
+        """Bounds on the magnitudes of sd, sdd and sddd."""
+        return self.speed, min(self.acceleration, self.deceleration), self.jerk
+
+    def with_each(self, other: PathBounds, pick: Callable[[float, float], float]) -> PathBounds:
+        """Return what `pick` makes of each bound and the other one."""
+        names = ("speed", "acceleration", "deceleration", "jerk")
+        speed, acceleration, deceleration, jerk = (
+            pick(getattr(self, name), getattr(other, name)) for name in names
+        )
+        return PathBounds(speed, acceleration, deceleration, jerk, self.unit)
+
+
+@frozen
+class LawSegment:
+    """The law over a segment of a path, or over all of them.
+
+    Attributes:
+        law: s(t) from t = 0, of dimension 1, starting at s = 0.
+        breaks: Times at which a derivative of it jumps, ends included; pieces that only make up a smooth
+            function have none.
+        phases: Named intervals of time.
+    """
+
+    law: PiecewisePolynomial
+    breaks: Array
+    phases: tuple[Phase, ...] = ()
+
+    def scaled(self, factor: float) -> LawSegment:
+        """Return the law that takes `factor` times as long."""
+        phases = tuple(Phase(p.name, p.start * factor, p.end * factor) for p in self.phases)
+        return LawSegment(scale_time(self.law, factor), self.breaks * factor, phases)
+
+
+@frozen
+class TimeLaw:
+    """A shape of s(t) from rest to rest.
+
+    Attributes:
+        shape: Its name in job files.
+        continuity: Derivatives that join at rest without a jump: 1 (velocity) or 2 (acceleration).
+        needs: The bounds without which there is no fastest law: some of "speed", "acceleration", "jerk".
+        has_ramps: Whether it speeds up and slows down with constant accelerations of their own.
+        has_jerk: Whether its jerk can be limited.
+        takes_duration: Whether it can last a given time; else it is as short as its limits allow.
+        uses_joint_limits: Whether it follows from the limits of the joints, too: then it has no segments.
+    """
+
+    shape: str
+    continuity: Literal[1, 2]
+    needs: tuple[str, ...] = ()
+    has_ramps: bool = False
+    has_jerk: bool = True
+    takes_duration: bool = True
+    uses_joint_limits: bool = False
+
+    def segment(self, spec: LawSpec, length: float, bounds: PathBounds, duration: float | None) -> LawSegment:
+        """Return the law over one segment, in the given duration or as fast as the bounds let it.
+
+        Args:
+            spec: What the job says of the law.
+            length: Of the segment, m or rad, above zero.
+            bounds: At least those that the shape needs are finite.
+            duration: s; None for the fastest.
+
+        Raises:
+            PlanningError: When no such law exists; names the interval of what does.
+        """
+        raise TypeError(f"{type(self).__name__} has no segments")
+
+
+@frozen
+class TrapezoidLaw(TimeLaw):
+    """Trapezoidal velocity: speed up, cruise, slow down."""
+
+    shape: str = "trapezoid"
+    continuity: Literal[1, 2] = 1
+    needs: tuple[str, ...] = ("acceleration",)
+    has_ramps: bool = True
+    has_jerk: bool = False
+
+    def segment(self, spec: LawSpec, length: float, bounds: PathBounds, duration: float | None) -> LawSegment:
+        """Return the trapezoid."""
+        from trajcli.curves import trapezoid
+
+        both = trapezoid.MotionBounds(bounds.speed, bounds.acceleration, bounds.deceleration)
+        slowing = None if spec.deceleration is None else bounds.deceleration
+        try:
+            if duration is None:
+                profile = trapezoid.fastest_profile(length, 0.0, 0.0, both, both)
+            elif math.isfinite(bounds.speed):
+                profile = trapezoid.profile_of_speed(length, 0.0, 0.0, duration, bounds.speed, slowing)
+            else:
+                profile = trapezoid.profile_of_duration(length, 0.0, 0.0, duration, both, both)
+        except trapezoid.InfeasibleProfileError as error:
+            raise _no_trapezoid(error, length, bounds, duration or 0.0) from None
+        law = profile.curve(0.0, length, duration)
+        return LawSegment(law, law.breaks, tuple(Phase(*phase) for phase in profile.phases()))
+
+
+def _no_trapezoid(
+    error: InfeasibleProfileError, length: float, bounds: PathBounds, duration: float
+) -> PlanningError:
+    order = {"speed": 1, "acceleration": 2}.get(error.reason)
+    amounts = {"length": Amount(length, 0, None, bounds.unit), "duration": Amount(duration)}
+    if order is None:
+        message = "no trapezoid covers {length} in {duration}"
+        return PlanningError(Problem(message, "allow more time, or faster ramps", amounts=amounts))
+    given = bounds.speed if order == 1 else bounds.acceleration
+    for name, value in (("given", given), ("low", error.low), ("high", error.high)):
+        amounts[name] = Amount(value, order, None, bounds.unit)
+    allowed = "above {low} and at most {high}" if math.isfinite(error.high) else "at least {low}"
+    message = f"a trapezoid over {{length}} in {{duration}} cannot have {{given}}: it must be {allowed}"
+    hint = f"change the {error.reason}, or the duration"
+    return PlanningError(Problem(message, hint, amounts=amounts))
+
+
+@frozen
+class PolynomialLaw(TimeLaw):
+    """One polynomial, scaled to length and duration.
+
+    Attributes:
+        peaks: Largest speed, acceleration and jerk of the law over the length 1 in the time 1.
+    """
+
+    peaks: tuple[float, float, float] = (math.inf, math.inf, math.inf)
+
+    def segment(self, spec: LawSpec, length: float, bounds: PathBounds, duration: float | None) -> LawSegment:
+        """Return the law, no faster than the bounds let its peaks be."""
+        limited = list(enumerate(zip(self.peaks, bounds.by_order, strict=True), 1))
+        times = [(peak * length / limit) ** (1 / order) for order, (peak, limit) in limited]
+        fastest = float(max(times))
+        time = fastest if duration is None else duration
+        if time >= fastest * (1 - _ROUNDING):
+            return LawSegment(self._lasting(time, length), np.array([0.0, time]))
+        order, (peak, limit) = limited[times.index(fastest)]
+        amounts = {
+            "length": Amount(length, 0, None, bounds.unit),
+            "duration": Amount(time),
+            "reached": Amount(peak * length / time**order, order, None, bounds.unit),
+            "limit": Amount(limit, order, None, bounds.unit),
+            "fastest": Amount(fastest),
+        }
+        message = (
+            f"a {self.shape} law over {{length}} in {{duration}} reaches {{reached}}, "
+            "but the law says at most {limit}: that takes {fastest}"
+        )
+        raise PlanningError(Problem(message, "allow more time, or leave one of the two out", amounts=amounts))
+
+    def _lasting(self, time: float, length: float) -> PiecewisePolynomial:
+        """Return the polynomial whose derivatives up to the continuity are zero at both ends."""
+        start = np.zeros((1 + self.continuity, 1))
+        end = start.copy()
+        end[0] = length
+        coefficients = hermite_coefficients(start, end, np.array(time))[:, None, :]
+        return PiecewisePolynomial(np.array([0.0, time]), coefficients)
+
+
+@frozen
+class CubicLaw(PolynomialLaw):
+    """Third degree."""
+
+    shape: str = "cubic"
+    continuity: Literal[1, 2] = 1
+    peaks: tuple[float, float, float] = (1.5, 6.0, 12.0)
+
+
+@frozen
+class QuinticLaw(PolynomialLaw):
+    """Fifth degree."""
+
+    shape: str = "quintic"
+    continuity: Literal[1, 2] = 2
+    peaks: tuple[float, float, float] = (1.875, 10 / math.sqrt(3), 60.0)
+
+
+@frozen
+class CycloidalLaw(PolynomialLaw):
+    """A cycloid, in polynomial pieces: its acceleration is one period of a sine."""
+
+    shape: str = "cycloidal"
+    continuity: Literal[1, 2] = 2
+    peaks: tuple[float, float, float] = (2.0, 2 * math.pi, 4 * math.pi**2)
+
+    def _lasting(self, time: float, length: float) -> PiecewisePolynomial:
+        from trajcli.curves.cycloid import cycloid_law
+
+        law = cycloid_law(time)
+        return PiecewisePolynomial(law.breaks, law.coefficients * length)
+
+
+@frozen
+class JerkLimitedLaw(TimeLaw):
+    """The fastest law within speed, acceleration and jerk."""
+
+    shape: str = "jerk_limited"
+    continuity: Literal[1, 2] = 2
+    needs: tuple[str, ...] = ("speed", "acceleration", "jerk")
+    takes_duration: bool = False
+
+    def segment(self, spec: LawSpec, length: float, bounds: PathBounds, duration: float | None) -> LawSegment:
+        """Return the fastest law."""
+        from trajcli.planners.ruckig import BoundaryProblem, fastest
+
+        both = np.array(bounds.by_order)[:, None] * [-1.0, 1.0]
+        profile = fastest(BoundaryProblem("the path", (0.0, 0.0, 0.0), (length, 0.0, 0.0), both))
+        law = profile.curve()
+        return LawSegment(law, law.breaks, tuple(profile.phases(None)))
+
+
+@frozen
+class TimeOptimalLaw(TimeLaw):
+    """As fast as joints and tool can along the whole path."""
+
+    shape: str = "time_optimal"
+    continuity: Literal[1, 2] = 1
+    has_jerk: bool = False
+    takes_duration: bool = False
+    uses_joint_limits: bool = True
+
+
+LAWS: dict[str, TimeLaw] = {
+    law.shape: law
+    for law in (TrapezoidLaw(), CubicLaw(), QuinticLaw(), CycloidalLaw(), JerkLimitedLaw(), TimeOptimalLaw())
+}
+"""Every law by its shape: the job language has the same words."""
+
+if TYPE_CHECKING:
+    Shape = str
+else:
+    Shape = Literal[tuple(LAWS)]
 
 
 class LawSpec(Model):
@@ -49,21 +309,26 @@ class LawSpec(Model):
     angular_speed: AngularSpeed | None = None
     angular_acceleration: AngularAcceleration | None = None
 
+    @property
+    def time_law(self) -> TimeLaw:
+        """The law of this shape."""
+        return LAWS[self.shape]
+
     @model_validator(mode="after")
     def _fits_shape(self) -> LawSpec:
         flaws: list[Flaw] = []
         if self.duration is not None and self.minimum_duration is not None:
             flaws.append((("minimum_duration",), "duration and minimum_duration exclude each other", None))
-        if self.deceleration is not None and self.shape != "trapezoid":
+        if self.deceleration is not None and not self.time_law.has_ramps:
             text = f"a {self.shape} law slows down as it speeds up"
             flaws.append((("deceleration",), text, "leave it out, or use shape trapezoid"))
-        if self.jerk is not None and self.shape in ("trapezoid", "time_optimal"):
+        if self.jerk is not None and not self.time_law.has_jerk:
             text = f"the acceleration of a {self.shape} law steps: its jerk cannot be limited"
             flaws.append((("jerk",), text, "use shape jerk_limited or quintic"))
-        if self.shape == "trapezoid" and self.duration and self.speed and self.acceleration:
-            text = "duration, speed and acceleration together ask too much of a trapezoid"
+        if self.time_law.has_ramps and self.duration and self.speed and self.acceleration:
+            text = f"duration, speed and acceleration together ask too much of a {self.shape}"
             flaws.append((("acceleration",), text, "leave one of the three out"))
-        if self.shape in ("time_optimal", "jerk_limited") and self.duration is not None:
+        if self.duration is not None and not self.time_law.takes_duration:
             text = f"a {self.shape} law is as short as its limits allow"
             flaws.append((("duration",), text, "say `minimum_duration`, or use another shape"))
         if flaws:
@@ -71,174 +336,159 @@ class LawSpec(Model):
         return self
 
 
-_PEAKS = {"cubic": (1.5, 6.0, 12.0), "quintic": (1.875, 10 / math.sqrt(3), 60.0)}
-_PEAKS["cycloidal"] = (2.0, 2 * math.pi, 4 * math.pi**2)
-"""Largest speed, acceleration and jerk of a law over 1 in the time 1."""
-_CONDITIONS = {"cubic": 2, "quintic": 3}
-_ROUNDING = 1e-9  # relative
-
-
 @comparable
-class PathBounds:
-    """What the parameter of a path may do, per s, s^2, s^3; infinite for anything.
+class PathDerivatives:
+    """The largest derivatives of a path by its parameter s.
 
     Attributes:
-        speed: Largest sd.
-        acceleration: Largest sdd.
-        deceleration: Largest -sdd.
-        jerk: Largest magnitude of sddd.
-        unit: Whether the parameter is a length or an angle.
+        moves: Whether the tcp moves; else it only turns, and s is an angle.
+        curvature: Of the position, 1/m.
+        turning: First derivative of the orientation, rad per unit of s.
+        turning_change: Second derivative of the orientation, rad per unit squared.
     """
 
-    speed: float
-    acceleration: float
-    deceleration: float
-    jerk: float
-    unit: Literal["length", "angle"] = "length"
-
-    def values(self) -> tuple[float, float, float, float]:
-        """Return the four numbers."""
-        return self.speed, self.acceleration, self.deceleration, self.jerk
-
-    def with_each(self, other: PathBounds, pick: Callable[[float, float], float]) -> PathBounds:
-        """Return what `pick` makes of each number and the other one."""
-        speed, acceleration, deceleration, jerk = map(pick, self.values(), other.values())
-        return PathBounds(speed, acceleration, deceleration, jerk, self.unit)
+    moves: bool
+    curvature: float
+    turning: float
+    turning_change: float
 
 
-@frozen
-class LawSegment:
-    """The law over a stretch.
-
-    Attributes:
-        law: s(t) from 0, of dimension 1, starting at s = 0.
-        breaks: Where a derivative of it jumps, s, ends included; pieces that only make up a smooth function
-            have none.
-        phases: Named stretches of time.
-    """
-
-    law: PiecewisePolynomial
-    breaks: Array
-    phases: tuple[Phase, ...] = ()
-
-    def scaled(self, factor: float) -> LawSegment:
-        """Return the law that takes `factor` times as long."""
-        phases = tuple(Phase(p.name, p.start * factor, p.end * factor) for p in self.phases)
-        return LawSegment(scale_time(self.law, factor), self.breaks * factor, phases)
+def path_derivatives(path: ToolPath) -> PathDerivatives:
+    """Return the largest derivatives of a path, by sampling between its breaks."""
+    s = distinct(np.concatenate([np.linspace(0.0, path.length, _SAMPLES), path.breaks]))
+    sides = [path.poses.evaluate(s, side) for side in ("left", "right")]
+    first, second = (np.stack([side[k] for side in sides]) for k in (1, 2))
+    turning, change = (largest_norm(rows[..., 3:]) for rows in (first, second))
+    return PathDerivatives(not path.poses.pure_rotation, largest_norm(second[..., :3]), turning, change)
 
 
-def law_segment(spec: LawSpec, length: float, bounds: PathBounds, duration: float | None) -> LawSegment:
-    """Return the law over `length`, in the given duration or as fast as the bounds let it.
+def largest_norm(rows: Array) -> float:
+    """Return the largest norm of rows (..., 3)."""
+    return float(np.linalg.norm(rows, axis=-1).max())
 
-    Args:
-        spec: Says which shape; time_optimal is not among those made here.
-        length: Of the stretch, m or rad, above zero.
-        bounds: At least those that the shape needs are finite.
-        duration: s; None for the fastest.
+
+def law_bounds(
+    spec: LawSpec, limits: ToolLimits, derivatives: PathDerivatives, planner: str
+) -> tuple[PathBounds, str | None]:
+    """Return the bounds of a law of this shape, and whether translation or rotation sets the speed.
+
+    With a duration nothing is lowered by the limits, which the move is verified by: a law does what it names.
 
     Raises:
-        PlanningError: When no such law exists; names the interval of what does.
+        MissingLimitError: When one that the shape needs is unlimited.
     """
-    if spec.shape == "trapezoid":
-        return _trapezoid(spec, length, bounds, duration)
-    if spec.shape == "jerk_limited":
-        return _jerk_limited(length, bounds)
-    fastest = _fastest(spec.shape, length, bounds)
-    time = fastest if duration is None else duration
-    if time < fastest * (1 - _ROUNDING):
-        raise _too_short(spec, length, bounds, time, fastest)
-    if spec.shape == "cycloidal":
-        from trajcli.curves.cycloid import cycloid_law
-
-        law = cycloid_law(time)
-        scaled = PiecewisePolynomial(law.breaks, law.coefficients * length)
-        return LawSegment(scaled, np.array([0.0, time]))
-    start = np.zeros((_CONDITIONS[spec.shape], 1))
-    end = start.copy()
-    end[0] = length
-    coefficients = hermite_coefficients(start, end, np.array(time))[:, None, :]
-    law = PiecewisePolynomial(np.array([0.0, time]), coefficients)
-    return LawSegment(law, law.breaks)
+    bounds, ruled_by = _bounds(spec, limits, derivatives)
+    if spec.duration is None:
+        _require(spec, bounds, derivatives, planner)
+        return bounds, ruled_by
+    named, _ = _bounds(spec, ToolLimits(), derivatives)
+    if not spec.time_law.has_ramps or math.isfinite(named.speed):
+        return named, None
+    named = named.with_each(bounds, lambda own, other: own if math.isfinite(own) else other)
+    if math.isinf(named.by_order[1]):
+        raise _missing("acceleration", derivatives, planner, spec)
+    return replace(named, speed=math.inf), None
 
 
-def _fastest(shape: str, length: float, bounds: PathBounds) -> float:
-    limits = (bounds.speed, min(bounds.acceleration, bounds.deceleration), bounds.jerk)
-    pairs = zip(_PEAKS[shape], limits, strict=True)
-    times = [(peak * length / limit) ** (1 / order) for order, (peak, limit) in enumerate(pairs, 1)]
-    return float(max(times))
+def _bounds(spec: LawSpec, limits: ToolLimits, derivatives: PathDerivatives) -> tuple[PathBounds, str]:
+    """Return the bounds that law and limits set, and whether translation or rotation sets the speed.
 
-
-def _jerk_limited(length: float, bounds: PathBounds) -> LawSegment:
-    from trajcli.planners.point_to_point.ruckig import BoundaryProblem, fastest
-
-    limits = [bounds.speed, min(bounds.acceleration, bounds.deceleration), bounds.jerk]
-    both = np.array(limits)[:, None] * [-1.0, 1.0]
-    profile = fastest(BoundaryProblem("the path", (0.0, 0.0, 0.0), (length, 0.0, 0.0), both))
-    law = profile.curve()
-    return LawSegment(law, law.breaks, tuple(profile.phases(None)))
-
-
-def _trapezoid(spec: LawSpec, length: float, bounds: PathBounds, duration: float | None) -> LawSegment:
-    from trajcli.curves.trapezoid import (
-        InfeasibleProfileError,
-        MotionBounds,
-        fastest_profile,
-        profile_of_duration,
-        profile_of_speed,
+    An acceleration that a law names is along the path; one that comes from the limits is of the tool, which a
+    bent path also accelerates across: there 0.6 of it goes along and 0.8 across.
+    """
+    bent = derivatives.moves and derivatives.curvature > 0
+    along = _ALONG if bent else 1.0
+    speed = _or(spec.speed, limits.speed)
+    if spec.acceleration is None and bent:
+        speed = min(speed, math.sqrt(_ACROSS * limits.acceleration / derivatives.curvature))
+    acceleration = _or(spec.acceleration, along * limits.acceleration)
+    linear = PathBounds(
+        speed, acceleration, _or(spec.deceleration, acceleration), _or(spec.jerk, limits.jerk)
     )
-
-    rates = MotionBounds(bounds.speed, bounds.acceleration, bounds.deceleration)
-    try:
-        if duration is None:
-            profile = fastest_profile(length, 0.0, 0.0, rates, rates)
-        elif math.isfinite(bounds.speed):
-            slower = bounds.deceleration if spec.deceleration is not None else None
-            profile = profile_of_speed(length, 0.0, 0.0, duration, bounds.speed, slower)
-        else:
-            profile = profile_of_duration(length, 0.0, 0.0, duration, rates, rates)
-    except InfeasibleProfileError as error:
-        raise _infeasible(error, length, bounds, duration or 0.0) from None
-    phases = tuple(Phase(*phase) for phase in profile.phases())
-    law = profile.curve(0.0, length, duration)
-    return LawSegment(law, law.breaks, phases)
+    angular = _rotation_bounds(spec, limits, derivatives)
+    if not derivatives.moves:
+        return replace(angular, unit="angle"), "rotation"
+    return linear.with_each(angular, min), "rotation" if angular.speed < linear.speed else "translation"
 
 
-def _infeasible(
-    error: InfeasibleProfileError, length: float, bounds: PathBounds, duration: float
-) -> PlanningError:
-    order = {"speed": 1, "acceleration": 2}.get(error.reason)
-    amounts = {"length": Amount(length, 0, None, bounds.unit), "duration": Amount(duration)}
-    if order is None:
-        message = "no trapezoid covers {length} in {duration}"
-        return PlanningError(Problem(message, "allow more time, or faster ramps", amounts=amounts))
-    given = bounds.speed if order == 1 else bounds.acceleration
-    amounts["given"] = Amount(given, order, None, bounds.unit)
-    amounts["low"] = Amount(error.low, order, None, bounds.unit)
-    amounts["high"] = Amount(error.high, order, None, bounds.unit)
-    allowed = "above {low} and at most {high}" if math.isfinite(error.high) else "at least {low}"
-    message = f"a trapezoid over {{length}} in {{duration}} cannot have {{given}}: it must be {allowed}"
-    hint = f"change the {error.reason}, or the duration"
-    return PlanningError(Problem(message, hint, amounts=amounts))
+def _rotation_bounds(spec: LawSpec, limits: ToolLimits, derivatives: PathDerivatives) -> PathBounds:
+    """Return the bounds that the rotation of the tool sets."""
+    if derivatives.turning == 0:
+        return PathBounds(math.inf, math.inf, math.inf, math.inf)
+    speed = _or(spec.angular_speed, limits.angular_speed) / derivatives.turning
+    acceleration = _or(spec.angular_acceleration, limits.angular_acceleration)
+    if derivatives.turning_change > 0 and math.isfinite(acceleration):
+        speed = min(speed, math.sqrt(_ACROSS * acceleration / derivatives.turning_change))
+        acceleration *= _ALONG / 3  # w'' need not be perpendicular to w': sizes add up
+    both = acceleration / derivatives.turning
+    return PathBounds(speed, both, both, math.inf)
 
 
-def _too_short(
-    spec: LawSpec, length: float, bounds: PathBounds, duration: float, fastest: float
-) -> PlanningError:
-    """Return the error of a duration in which a polynomial exceeds what the law itself names."""
-    limits = (bounds.speed, min(bounds.acceleration, bounds.deceleration), bounds.jerk)
-    order, peak, limit = max(
-        ((n, k, limit) for n, (k, limit) in enumerate(zip(_PEAKS[spec.shape], limits, strict=True), 1)),
-        key=lambda row: float((row[1] * length / row[2]) ** (1 / row[0])),
-    )
-    amounts = {
-        "length": Amount(length, 0, None, bounds.unit),
-        "duration": Amount(duration),
-        "reached": Amount(peak * length / duration**order, order, None, bounds.unit),
-        "limit": Amount(limit, order, None, bounds.unit),
-        "fastest": Amount(fastest),
-    }
-    message = (
-        f"a {spec.shape} law over {{length}} in {{duration}} reaches {{reached}}, but the law says at most "
-        "{limit}: that takes {fastest}"
-    )
-    return PlanningError(Problem(message, "allow more time, or leave one of the two out", amounts=amounts))
+def _or(value: float | None, other: float) -> float:
+    return other if value is None else value
+
+
+def _require(spec: LawSpec, bounds: PathBounds, derivatives: PathDerivatives, planner: str) -> None:
+    """Refuse bounds that lack one that the fastest law of this shape needs."""
+    named = zip(("speed", "acceleration", "jerk"), bounds.by_order, strict=True)
+    lacking = [name for name, bound in named if name in spec.time_law.needs and math.isinf(bound)]
+    if not lacking and all(map(math.isinf, bounds.by_order)):
+        lacking = ["speed"]
+    if lacking:
+        raise _missing(lacking[0], derivatives, planner, spec)
+
+
+def _missing(name: str, derivatives: PathDerivatives, planner: str, spec: LawSpec) -> MissingLimitError:
+    """Return the error that asks for a bound."""
+    if name == "jerk" and not derivatives.moves:
+        message = f"a {spec.shape} law needs a jerk, and a rotation in place has no limit of it"
+        return MissingLimitError(Problem(message, "use shape quintic or cycloidal"))
+    key = name if derivatives.moves else f"angular_{name}"
+    message = f"{planner} with a {spec.shape} law needs the {key.replace('_', ' ')} of the tool"
+    more = " or a `duration`" if spec.time_law.takes_duration else ""
+    if spec.duration is not None:
+        speed = "speed" if derivatives.moves else "angular_speed"
+        message, more = f"{message}, or its {speed.replace('_', ' ')}", f" or `{speed}`"
+    hint = f"add `limits: {{tcp: {{{key}: ...}}}}` to the job, or `{key}`{more} to the `law`"
+    return MissingLimitError(Problem(message, hint))
+
+
+def law_along(
+    path: ToolPath, spec: LawSpec, limits: ToolLimits, planner: str
+) -> tuple[LawSegment, str | None]:
+    """Return the law over the whole path, at rest at every stop, and whether translation or rotation sets it.
+
+    A duration is shared by the segments between stops as their lengths are; where one is given, it rules.
+
+    Raises:
+        MissingLimitError: When neither the law nor the limits say how fast.
+        PlanningError: When no such law exists.
+    """
+    bounds, ruled_by = law_bounds(spec, limits, path_derivatives(path), planner)
+    stops = np.concatenate([[0.0], path.poses.stops, [path.length]])
+    segments = []
+    for low, high in pairwise(stops.tolist()):
+        length = high - low
+        share = None if spec.duration is None else spec.duration * length / path.length
+        segments.append(spec.time_law.segment(spec, length, bounds, share))
+    return _joined(lasting_at_least(spec.minimum_duration, segments), stops), ruled_by
+
+
+def lasting_at_least(duration: float | None, segments: list[LawSegment]) -> list[LawSegment]:
+    """Return the segments, slowed down where they last less than a duration altogether."""
+    total = sum(segment.law.duration for segment in segments)
+    if duration is None or total >= duration:
+        return segments
+    return [segment.scaled(duration / total) for segment in segments]
+
+
+def _joined(segments: list[LawSegment], stops: Array) -> LawSegment:
+    laws, breaks, phases, begin = [], [np.zeros(1)], list[Phase](), 0.0
+    for segment, s in zip(segments, stops[:-1], strict=True):
+        coefficients = segment.law.coefficients.copy()
+        coefficients[-1] += s
+        laws.append(PiecewisePolynomial(segment.law.breaks, coefficients))
+        breaks.append(segment.breaks[1:] + begin)
+        phases += [Phase(p.name, p.start + begin, p.end + begin) for p in segment.phases]
+        begin += segment.law.duration
+    return LawSegment(concatenate(laws), np.concatenate(breaks), tuple(phases))

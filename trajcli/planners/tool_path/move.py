@@ -1,38 +1,60 @@
-"""What moves along a path of the tool share: orientation, law, tolerance, and the arm that follows.
+"""Moves of the tool along a path: what a target fixes, how the orientation changes, how the arm follows.
 
-From a way of the tool to the planned move: law, joints, phases, and what there is to say about it.
+Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.3.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
+import numpy as np
 from pydantic import Field
 
 from trajcli.curves.piecewise import Array
-from trajcli.errors import InputError
+from trajcli.errors import Amount, Amounts, InputError, PlanningError, Problem
 from trajcli.frozen import frozen
+from trajcli.geometry.paths.orientation import (
+    AxisAngleOrientation,
+    FixedOrientation,
+    OrientationCurve,
+    SegmentProgress,
+    TangentOrientation,
+)
+from trajcli.geometry.paths.pose import PoseCurve, Screw
+from trajcli.geometry.paths.position import PositionCurve
+from trajcli.geometry.rotation import AXES, AxisName
+from trajcli.kinematics.following.motion import motion_along
+from trajcli.kinematics.following.tolerance import Tolerance
+from trajcli.kinematics.following.tool_path import ToolPath
+from trajcli.kinematics.forward import forward
+from trajcli.kinematics.inverse.target import (
+    IkTarget,
+    OrientationConstraint,
+    meeting,
+    partial_target,
+    residuals,
+)
 from trajcli.kinematics.robot import Robot
-from trajcli.language.numbers import Model, Number
-from trajcli.language.targets import Configuration
+from trajcli.language.numbers import FieldPath, Flaw, Model, Number
+from trajcli.language.targets import Configuration, Target, ik_target
+from trajcli.planners.boundary_states import standstill, start_in_motion
 from trajcli.planners.planner import Event, Planned, Planner
-from trajcli.planners.point_to_point.point_to_point import require_rest, standstill
-from trajcli.planners.tool_path.law import LawSpec
-from trajcli.planners.tool_path.target import Orientation
-from trajcli.trajectory import State
+from trajcli.planners.tool_path.follow import JointMotion, diagnosis_of_motion, followed, followed_in_time
+from trajcli.planners.tool_path.law import LawSpec, law_along
+from trajcli.trajectory import State, resting
 from trajcli.units import Quantity
 
 if TYPE_CHECKING:
     from trajcli.kinematics.following.motion import ToolMotion
-    from trajcli.kinematics.following.tool_path import ToolPath
-import numpy as np
 
-from trajcli.errors import Amount, Amounts, PlanningError, Problem
-from trajcli.kinematics.following.motion import motion_along
-from trajcli.kinematics.following.tolerance import Tolerance
-from trajcli.planners.tool_path.follow import JointMotion, diagnosis_of_motion, followed, followed_in_time
-from trajcli.planners.tool_path.law_bounds import law_over
-from trajcli.trajectory import resting
+Orientation = Literal["axis_angle", "euler", "fixed", "tangent"]
+
+_WHOLE = (True, True, True)
+_ALL_SIX = 6
+_UPRIGHT = 1e-6  # rad from upright
+_SAME = 1e-9  # of an entry of a matrix: two orientations that are meant to be one
+_ARRIVED = 1e-5  # rad or m: joint values that are given, and reached on the path
 
 
 class ToleranceSpec(Model):
@@ -47,10 +69,15 @@ class ToleranceSpec(Model):
         Number(Quantity("angle"), "Of its orientation and of the joints, likewise.", above=0.0),
     ] = 1e-6
 
+    @property
+    def tolerance(self) -> Tolerance:
+        """The same as a value of the kinematics."""
+        return Tolerance(self.position, self.angle)
+
 
 @frozen
 class PlannedPath:
-    """Where the tool shall go.
+    """A path of the tool, and how the arm shall arrive at its end.
 
     Attributes:
         path: The poses.
@@ -85,10 +112,10 @@ class ToolPathMove(Planner):
     @property
     def joins(self) -> Literal[1, 2]:
         """Acceleration joins where the law begins and ends without any."""
-        return 2 if self.law.shape in ("quintic", "cycloidal", "jerk_limited") else 1
+        return self.law.time_law.continuity
 
-    def way(self, before: Array, robot: Robot) -> PlannedPath:
-        """Return where the tool shall go from the pose `before` (4, 4).
+    def path_from(self, before: Array, robot: Robot) -> PlannedPath:
+        """Return the path of the tool from the pose `before` (4, 4).
 
         Raises:
             InputError: When the fields do not make a path.
@@ -107,92 +134,222 @@ class ToolPathMove(Planner):
         if robot.convention is None:
             hint = "give its joints theta, d, a and alpha"
             raise InputError(f"{robot.name} has no geometry, so its tool has no path", hint=hint)
-        from trajcli.kinematics.forward import forward
-
-        require_rest(self.tag, start, robot)
-        way = self.way(forward(robot, start.position), robot)
-        if way.path.length == 0:
-            check_arrival(way, start.position, robot)
+        if not start.at_rest:
+            raise start_in_motion(self.tag, start, robot)
+        planned = self.path_from(forward(robot, start.position), robot)
+        if planned.path.length == 0:
+            check_arrival(planned, start.position, robot)
             return standstill(start, self.law.duration or self.law.minimum_duration or 0.0)
-        return moved_along(way, self.law, self.tolerance, self.tag, start.position, robot)
+        joints = self._followed(planned, start.position, robot)
+        room = max(self.tolerance.position, self.tolerance.angle)
+        diagnosis_of_motion(robot, joints.motion).refuse_limits(joints.curve, room)
+        end = joints.curve.piece_ends()[1][-1]
+        check_arrival(planned, end, robot)
+        return Planned(
+            joints.curve,
+            resting(end),
+            phases=joints.phases,
+            tool=joints.motion,
+            events=(*planned.events, *joints.events),
+        )
+
+    def _followed(self, planned: PlannedPath, start: Array, robot: Robot) -> JointMotion:
+        """Return the motion along the path from joint values `start` (n,), under the law."""
+        path, tolerance = planned.path, self.tolerance.tolerance
+        if planned.overlap is not None:
+            return JointMotion(followed_in_time(robot, planned.overlap, start), planned.overlap)
+        if self.law.time_law.uses_joint_limits:
+            from trajcli.planners.tool_path.time_optimal import fastest_along
+
+            return fastest_along(followed(robot, path, start), self.law, tolerance, self.tag)
+        law, ruled_by = law_along(path, self.law, robot.limits.tcp, self.tag)
+        motion = motion_along(path, law.law, law.breaks, tolerance, ruled_by)
+        return JointMotion(followed(robot, path, start).by_time(motion), motion, law.phases)
 
 
-_ARRIVED = 1e-5  # rad or m: joint values that are given, and reached on the way
-
-
-def moved_along(
-    way: PlannedPath, spec: LawSpec, tolerance: ToleranceSpec, planner: str, start: Array, robot: Robot
-) -> Planned:
-    """Return the move along a way of the tool.
-
-    Args:
-        way: Where the tool goes.
-        spec: How fast.
-        tolerance: How near.
-        planner: Tag for messages.
-        start: Joint values (n,).
-        robot: The arm, with the limits in force.
-
-    Raises:
-        MissingLimitError: When nothing says how fast.
-        PlanningError: When the arm cannot follow; says where and why.
-    """
-    wanted = Tolerance(tolerance.position, tolerance.angle)
-    made = _made(way, spec, wanted, planner, start, robot)
-    room = max(tolerance.position, tolerance.angle)
-    diagnosis_of_motion(robot, made.motion).refuse_limits(made.curve, room)
-    end = made.curve.piece_ends()[1][-1]
-    check_arrival(way, end, robot)
-    return Planned(
-        made.curve,
-        resting(end),
-        phases=made.phases,
-        tool=made.motion,
-        events=(*way.events, *made.events),
-    )
-
-
-def _made(
-    way: PlannedPath, spec: LawSpec, tolerance: Tolerance, planner: str, start: Array, robot: Robot
-) -> JointMotion:
-    if way.overlap is not None:
-        return JointMotion(followed_in_time(robot, way.overlap, start), way.overlap)
-    if spec.shape == "time_optimal":
-        from trajcli.planners.tool_path.time_optimal import fastest_along
-
-        return fastest_along(followed(robot, way.path, start), spec, tolerance, planner)
-    law = law_over(way.path, spec, robot.limits.tcp, planner)
-    motion = motion_along(way.path, law.law, law.breaks, tolerance, law.ruled_by)
-    return JointMotion(followed(robot, way.path, start).by_time(motion), motion, law.phases)
-
-
-def check_arrival(way: PlannedPath, end: Array, robot: Robot) -> None:
+def check_arrival(planned: PlannedPath, end: Array, robot: Robot) -> None:
     """Refuse to arrive in other joint values than the target names, or on another branch.
 
     Raises:
         PlanningError: Names the joint or the branch.
     """
-    if way.arrival is not None and np.abs(end - way.arrival).max() > _ARRIVED:
-        joint = int(np.abs(end - way.arrival).argmax())
+    if planned.arrival is not None and np.abs(end - planned.arrival).max() > _ARRIVED:
+        joint = int(np.abs(end - planned.arrival).argmax())
         name = robot.joint_names[joint]
         message = "the tool arrives where the target says, but with {joint} at {value} instead of {wanted}"
         hint = "on a path the arm keeps its branch: go there in joint space, or give the target as a pose"
         amounts: Amounts = {
             "joint": name,
             "value": Amount(float(end[joint]), 0, joint),
-            "wanted": Amount(float(way.arrival[joint]), 0, joint),
+            "wanted": Amount(float(planned.arrival[joint]), 0, joint),
         }
         raise PlanningError(Problem(message, hint, joint=name, amounts=amounts))
-    wanted = {} if way.configuration is None else way.configuration.model_dump(exclude_none=True)
+    wanted = {} if planned.configuration is None else planned.configuration.model_dump(exclude_none=True)
     if not wanted:
         return
     from trajcli.kinematics.inverse.solve import solve
 
-    target = way.path.at_s(np.array([way.path.length]), "left").target()
-    found = solve(robot, target, end[None])
-    apart = np.where(found.valid[0], np.abs(found.joints[0] - end).max(axis=-1), np.inf)
-    names = found.names[int(apart.argmin())]
+    target = planned.path.at_s(np.array([planned.path.length]), "left").target()
+    answers = solve(robot, target, end[None])
+    apart = np.where(answers.valid[0], np.abs(answers.joints[0] - end).max(axis=-1), np.inf)
+    names = answers.names[int(apart.argmin())]
     if any(getattr(names, choice) != word for choice, word in wanted.items()):
         message = f"the arm arrives in the configuration {names}, not {' '.join(wanted.values())}"
         hint = "on a path the arm keeps its branch: start in that configuration, or leave it out"
         raise PlanningError(message, hint=hint)
+
+
+def flaws_of_target(target: Target, path: FieldPath, planner: str) -> Iterator[Flaw]:
+    """Yield what is wrong with the target of a move along a path: it is a position or a pose, and at rest."""
+    if not target.gives_joints_or_pose:
+        yield path, f"{planner} needs a pose or `joints` in its target", None
+    for name in ("velocity", "acceleration"):
+        if any(getattr(target, name) or ()):
+            yield (*path, name), f"{planner} ends at rest", "leave it out, or use a move in joint space"
+
+
+@frozen
+class ToolTarget:
+    """A pose to go to, and what of it is fixed on the path there.
+
+    Attributes:
+        pose: T_world_tcp, shape (4, 4): what the target leaves free is as it was before.
+        position: Which of x, y and z are fixed.
+        orientation: What is fixed of the orientation.
+        tool_axis: Which axis of the tcp is meant by direction, yaw and pitch.
+        turn: Change of yaw or pitch on the path, rad; zero for other kinds.
+        joints: Joint values (n,) that the target imposes; None where it is a pose.
+        typed: The three angles (3,) that give the target, their sequence and frame; None if others do.
+    """
+
+    pose: Array
+    position: tuple[bool, bool, bool]
+    orientation: OrientationConstraint
+    tool_axis: AxisName = "z"
+    turn: float = 0.0
+    joints: Array | None = None
+    typed: tuple[Array, str, str] | None = None
+
+
+def kept_orientation(pose: Array, robot: Robot) -> ToolTarget:
+    """Return the target of a pose with the orientation of before: free on an arm of less than six joints."""
+    return ToolTarget(pose, _WHOLE, "all" if len(robot.joints) >= _ALL_SIX else "none")
+
+
+def tool_target(target: Target, before: Array, robot: Robot) -> ToolTarget:
+    """Return what a target means for a tool that comes from the pose `before` (4, 4).
+
+    A target without orientation keeps it; one without a position keeps that.
+    """
+    if target.joints is not None:
+        joints = np.array(target.joints)
+        return ToolTarget(forward(robot, joints), _WHOLE, "all", joints=joints)
+    goal = ik_target(target)
+    position = goal.poses[:3, 3] if target.gives_position else before[:3, 3]
+    if goal.orientation == "none":
+        pose = before.copy()
+        pose[:3, 3] = position
+        return kept_orientation(pose, robot)
+    _refuse_upright(goal, before)
+    aims = None if goal.orientation == "all" else goal.aims
+    kind = {"all": "rotation", "direction": "direction"}.get(goal.orientation, goal.orientation)
+    given = goal.poses[:3, :3] if aims is None else aims if kind == "direction" else aims[0]
+    whole = partial_target(position, **{kind: given}, tool_axis=goal.tool_axis).flat()  # type: ignore[arg-type]
+    pose = meeting(whole, before[None])[0]
+    turn = float(residuals(whole, before[None])[0, 3]) if kind in ("yaw", "pitch") else 0.0
+    return ToolTarget(pose, _WHOLE, goal.orientation, goal.tool_axis, turn, typed=_typed(target))
+
+
+def _refuse_upright(goal: IkTarget, before: Array) -> None:
+    """Refuse a yaw or pitch from where the tool axis is upright: it has no heading to turn from."""
+    if goal.orientation not in ("yaw", "pitch"):
+        return
+    axis = before[:3, AXES.index(goal.tool_axis)]
+    if np.hypot(axis[0], axis[1]) <= _UPRIGHT:
+        message = f"the {goal.tool_axis} axis of the tool is upright where the move starts: it has no heading"
+        raise PlanningError(
+            message,
+            hint=f"say another `tool_axis`, or give the target's orientation without {goal.orientation}",
+        )
+
+
+def _typed(target: Target) -> tuple[Array, str, str] | None:
+    if target.euler is not None:
+        return np.array(target.euler.angles), target.euler.sequence, target.euler.frame
+    return None if target.rpy is None else (np.array(target.rpy), "XYZ", "fixed")
+
+
+def orientation_along(
+    how: Orientation,
+    start: Array,
+    targets: Sequence[ToolTarget],
+    position: PositionCurve | None,
+    progress: SegmentProgress | None,
+) -> OrientationCurve:
+    """Return R(s) from the orientation at the start through those of the targets.
+
+    Args:
+        how: The rule by which it changes.
+        start: Shape (3, 3).
+        targets: One for each segment.
+        position: The path; None for a rotation alone.
+        progress: How far each segment is done; None for a rotation alone: s is then the angle.
+
+    Raises:
+        InputError: When the targets do not give what the rule needs.
+        PlanningError: When they ask for another orientation than the rule gives.
+    """
+    rotations = np.stack([start, *(target.pose[:3, :3] for target in targets)])
+    turns = float(np.abs(rotations - start).max())
+    if how == "fixed":
+        if turns > _SAME:
+            message = "orientation: fixed keeps the orientation, but the target asks for another one"
+            raise PlanningError(message, hint="leave the target's orientation out, or use axis_angle")
+        return FixedOrientation(start, 0.0 if progress is None else progress.length)
+    if how == "tangent":
+        if turns > _SAME:
+            message = "orientation: tangent follows from the path, but the target asks for an orientation"
+            raise PlanningError(message, hint="leave the target's orientation out, or use axis_angle")
+        if position is None:
+            message = "orientation: tangent needs a path, and the tool stays in its place"
+            raise PlanningError(message, hint="use axis_angle")
+        return TangentOrientation(position, start)
+    if how == "euler":
+        return _even_in_angles(rotations, targets, progress)
+    if progress is None:
+        return AxisAngleOrientation.between(*rotations)
+    return AxisAngleOrientation(rotations, progress)
+
+
+def _even_in_angles(
+    rotations: Array, targets: Sequence[ToolTarget], progress: SegmentProgress | None
+) -> OrientationCurve:
+    """Return R(s) that goes evenly in the angles in which the targets are given."""
+    from trajcli.geometry.paths.euler_interpolation import euler_interpolation
+
+    forms = {(typed[1], typed[2]) for target in targets if (typed := target.typed) is not None}
+    if len(forms) != 1:
+        what = "different angles" if forms else "no angles"
+        message = f"orientation: euler goes evenly in the target's angles, and the targets have {what}"
+        raise InputError(message, hint="give each target `euler` of one sequence, or `rpy`")
+    sequence, frame = forms.pop()
+    known = [None, *(None if target.typed is None else target.typed[0] for target in targets)]
+    return euler_interpolation(rotations, progress, sequence, frame, known)  # type: ignore[arg-type]
+
+
+def path_to(
+    position: PositionCurve, before: Array, target: ToolTarget, orientation: Orientation, to: Target | None
+) -> PlannedPath:
+    """Return the path along a curve from a pose (4, 4) to a target, which the job gives as `to`."""
+    progress = SegmentProgress.even(position.length)
+    turning = orientation_along(orientation, before[:3, :3], [target], position, progress)
+    return path_of_poses(PoseCurve(position, turning), target, to, orientation)
+
+
+def path_of_poses(
+    poses: PoseCurve | Screw, target: ToolTarget, to: Target | None, orientation: Orientation = "axis_angle"
+) -> PlannedPath:
+    """Return the path with what its target fixes; an orientation that follows from it is fixed whole."""
+    fixed = "all" if orientation == "tangent" else target.orientation
+    path = ToolPath(poses, target.position, fixed, target.tool_axis, (target.turn,))
+    return PlannedPath(path, target.joints, None if to is None else to.configuration)

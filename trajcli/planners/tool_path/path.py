@@ -1,12 +1,8 @@
-"""A chain of lines and arcs of the tool under one law.
+"""Composite paths of lines and arcs: stops, rounded corners, and segments that overlap in time.
 
-From the segments of a path to the way of its tool: joined by stops or rounded corners, or overlapping.
-
-Segments that overlap in time: each begins before the one before it has ended, so that corners are cut.
-
-The place is p0 + sum_i (c_i(s_i(t)) - c_i(0)), the textbook's formula for a chain of anticipated segments,
-and the orientation R0 prod_i exp(f_i(t) v_i) with the rotation vectors v_i of the segments and the part f_i
-of each that is done.
+Where segments overlap, each begins before the one before it has ended, so that corners are cut. The position
+is p0 + sum_i (c_i(s_i(t)) - c_i(0)), the textbook's formula for anticipated segments, and the orientation
+R0 prod_i exp(f_i(t) v_i) with the rotation vectors v_i of the segments and the part f_i of each that is done.
 
 Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.3.2, eq. 4.43.
 """
@@ -31,18 +27,32 @@ from trajcli.geometry.paths.pose import PoseCurve
 from trajcli.geometry.paths.position import Line, PositionCurve
 from trajcli.geometry.rotation import exp
 from trajcli.kinematics.following.motion import ToolMotion
-from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.kinematics.following.tool_path import ToolPath, ToolReference
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.language.numbers import Flaw, Model, Number, refuse
 from trajcli.language.targets import NamedTarget
 from trajcli.planners.planner import Event
-from trajcli.planners.tool_path.arc import ArcFields, arc_of, arc_target, notes_of
-from trajcli.planners.tool_path.law import LawSegment, law_segment
-from trajcli.planners.tool_path.law_bounds import bounds_for, segment_derivatives
-from trajcli.planners.tool_path.move import PlannedPath, ToolPathMove
-from trajcli.planners.tool_path.target import ToolTarget, flaws_of_target, orientation_along, tool_target
+from trajcli.planners.tool_path.arc import ArcFields, arc_of, arc_target, center_events
+from trajcli.planners.tool_path.law import (
+    LawSegment,
+    PathDerivatives,
+    largest_norm,
+    lasting_at_least,
+    law_bounds,
+)
+from trajcli.planners.tool_path.move import (
+    PlannedPath,
+    ToolPathMove,
+    ToolTarget,
+    flaws_of_target,
+    orientation_along,
+    tool_target,
+)
 from trajcli.units import Quantity
+
+_ONE_TIME = 1e-9  # of the duration: times this close to each other are one
+_SHRUNK = 1e-9  # relative
+_SAMPLES = 257  # of a segment at which its largest curvature is looked for
 
 Radius = Annotated[
     float,
@@ -123,28 +133,103 @@ class PathMove(ToolPathMove):
     def _flaws_of_overlap(self) -> Iterator[Flaw]:
         if self.overlap is None:
             yield ("corner",), "corner: overlap needs the time `overlap`", None
-        if self.law.shape == "time_optimal":
+        if self.law.time_law.uses_joint_limits:
             text = "segments that overlap have laws of their own"
             yield ("law",), text, "use another shape, or corner: round"
         if self.orientation in ("euler", "tangent"):
             text = f"orientation: {self.orientation} is not defined where segments overlap"
             yield ("orientation",), text, "use axis_angle or fixed, or corner: round"
 
-    def way(self, before: Array, robot: Robot) -> PlannedPath:
-        """Return the chain from the pose `before` (4, 4)."""
-        return chain_path(before, self, robot)
+    def path_from(self, before: Array, robot: Robot) -> PlannedPath:
+        """Return the segments, joined, from the pose `before` (4, 4)."""
+        curves, targets = _segments(before, self, robot)
+        overlap = self.overlap is not None and len(curves) > 1
+        radii = [0.0] * (len(curves) - 1)
+        if self.corner == "round":
+            radii = [segment.radius or self.radius or 0.0 for segment in self.segments[:-1]]
+        chain = join(curves, np.array(radii))
+        turning = orientation_along(self.orientation, before[:3, :3], targets, chain, chain.progress)
+        poses = PoseCurve(chain, turning)
+        if poses.jumps.size and not overlap:
+            raise _jump(float(poses.jumps[0]))
+        last = targets[-1]
+        fixed = "all" if self.orientation == "tangent" else last.orientation
+        turns = tuple(target.turn for target in targets)
+        path = ToolPath(poses, last.position, fixed, last.tool_axis, turns, chain.progress)
+        to = self.segments[-1].line or (self.segments[-1].arc and self.segments[-1].arc.to)
+        events = (*center_events(curves), *(() if overlap else _radius_events(chain)))
+        planned = PlannedPath(path, last.joints, to.configuration if to else None, events)
+        if not overlap:
+            return planned
+        motion = overlapping_motion(before, curves, targets, self, robot.limits.tcp)
+        return replace(planned, overlap=replace(motion, path=path))
 
 
-_ONE_TIME = 1e-9  # of the duration: times this close to each other are one
+def _jump(s: float) -> PlanningError:
+    """Return the error of a tool whose attitude to the path jumps at a corner."""
+    message = "at the corner at s = {place} a tool that keeps its attitude to the path would jump"
+    hint = "say `corner: round`, or orientation: axis_angle"
+    return PlanningError(Problem(message, hint, amounts={"place": Amount(s, 0, None, "length")}))
+
+
+def _segments(before: Array, move: PathMove, robot: Robot) -> tuple[list[PositionCurve], list[ToolTarget]]:
+    """Return the curve and the target of each segment."""
+    curves: list[PositionCurve] = []
+    targets: list[ToolTarget] = []
+    pose = before
+    for index, segment in enumerate(move.segments):
+        try:
+            curve, target = _segment(segment, pose, robot)
+        except TrajcliError as error:
+            raise type(error)(*(problem.within(f"segment {index}") for problem in error.problems)) from None
+        if targets and (target.orientation, target.tool_axis) != (
+            targets[-1].orientation,
+            targets[-1].tool_axis,
+        ):
+            message = f"segment {index} fixes another part of the orientation than the one before"
+            raise InputError(message, hint="give the targets of all segments the same kind of orientation")
+        curves.append(curve)
+        targets.append(target)
+        pose = target.pose
+    return curves, targets
+
+
+def _segment(segment: Segment, pose: Array, robot: Robot) -> tuple[PositionCurve, ToolTarget]:
+    if segment.arc is not None:
+        target = arc_target(segment.arc, pose, robot)
+        return arc_of(segment.arc, pose, target, robot), target
+    if segment.line is None:
+        raise InputError("a segment is either a `line` or an `arc`")
+    target = tool_target(segment.line, pose, robot)
+    return Line(pose[:3, 3], target.pose[:3, 3]), target
+
+
+def _radius_events(chain: Chain) -> tuple[Event, ...]:
+    """Return an event for each corner whose radius was shrunk."""
+    return tuple(
+        _shrunk(number, corner)
+        for number, corner in enumerate(chain.corners, 1)
+        if corner.kind != "smooth" and corner.used < corner.asked * (1 - _SHRUNK)
+    )
+
+
+def _shrunk(number: int, corner: Corner) -> Event:
+    text = f"the radius of corner {number} was shrunk from {{asked}} to {{used}} to fit: it passes at {{by}}"
+    amounts = {
+        "asked": Amount(corner.asked, 0, None, "length"),
+        "used": Amount(corner.used, 0, None, "length"),
+        "by": Amount(corner.deviation, 0, None, "length"),
+    }
+    return Event("shrunk", text, amounts=amounts)
 
 
 @frozen
-class Overlapped:
-    """Segments under way, some at once.
+class OverlappingSegments:
+    """Segments of which two are in progress at once around each corner.
 
     Attributes:
         before: Pose at the start, (4, 4).
-        places: The segments.
+        curves: Positions of the segments.
         vectors: Rotation vectors of the segments, in the axes of where they begin, shape (k, 3).
         laws: s_i(t) over the whole duration.
         last: The target of the last segment.
@@ -152,26 +237,26 @@ class Overlapped:
     """
 
     before: Array
-    places: tuple[PositionCurve, ...]
+    curves: tuple[PositionCurve, ...]
     vectors: Array
     laws: tuple[PiecewisePolynomial, ...]
     last: ToolTarget
     turns: Array
 
-    def timed(self, times: Array, side: Side) -> ToolReference:
-        """Return the demand at times (N,)."""
+    def reference_at(self, times: Array, side: Side) -> ToolReference:
+        """Return what the tool shall do at times (N,)."""
         count = times.size
         poses = np.tile(self.before, (count, 1, 1))
         first, second = np.zeros((count, 6)), np.zeros((count, 6))
         aims = np.zeros((count, 3))
-        for place, vector, law, turn in zip(self.places, self.vectors, self.laws, self.turns, strict=True):
+        for curve, vector, law, turn in zip(self.curves, self.vectors, self.laws, self.turns, strict=True):
             rates = law.evaluate_orders(times, (0, 1, 2), side=side)[:, :, 0]
-            s = np.clip(rates[:, 0], 0.0, place.length)
-            p, slope, bend = place.evaluate(s, side)
-            poses[:, :3, 3] += p - place.evaluate(np.zeros(1))[0]
-            first[:, :3] += slope * rates[:, 1:2]
-            second[:, :3] += bend * rates[:, 1:2] ** 2 + slope * rates[:, 2:]
-            part = rates / place.length
+            s = np.clip(rates[:, 0], 0.0, curve.length)
+            p, tangent, curvature = curve.evaluate(s, side)
+            poses[:, :3, 3] += p - curve.evaluate(np.zeros(1))[0]
+            first[:, :3] += tangent * rates[:, 1:2]
+            second[:, :3] += curvature * rates[:, 1:2] ** 2 + tangent * rates[:, 2:]
+            part = rates / curve.length
             axis = poses[:, :3, :3] @ vector
             own = axis * part[:, 1:2]
             second[:, 3:] += axis * part[:, 2:] + np.cross(first[:, 3:], own)
@@ -188,13 +273,12 @@ class Overlapped:
         )
 
 
-def overlapped(
+def overlapping_motion(
     before: Array,
-    places: Sequence[PositionCurve],
+    curves: Sequence[PositionCurve],
     targets: Sequence[ToolTarget],
     move: PathMove,
     limits: ToolLimits,
-    tolerance: Tolerance,
 ) -> ToolMotion:
     """Return the motion of segments that overlap by the move's time.
 
@@ -203,65 +287,58 @@ def overlapped(
     """
     rotations = np.stack([before[:3, :3], *(target.pose[:3, :3] for target in targets)])
     if move.orientation == "fixed":
-        orientation_along("fixed", before[:3, :3], targets, places[0], None)
+        orientation_along("fixed", before[:3, :3], targets, curves[0], None)
     vectors = turn_vectors(rotations[:-1], rotations[1:])
-    stretches = _stretches(places, vectors, move, limits)
-    begins = np.concatenate([[0.0], np.cumsum([s.law.duration - (move.overlap or 0.0) for s in stretches])])
-    _check(stretches, move.overlap or 0.0)
-    end = float(begins[-1] + (move.overlap or 0.0))
-    laws = [
-        _padded(stretch.law, float(start), end) for stretch, start in zip(stretches, begins[:-1], strict=True)
-    ]
+    overlap = move.overlap or 0.0
+    segments = _law_segments(curves, vectors, move, limits)
+    starts = np.concatenate([[0.0], np.cumsum([segment.law.duration - overlap for segment in segments])])
+    _check(segments, overlap)
+    end = float(starts[-1] + overlap)
+    pairs = list(zip(segments, starts[:-1], strict=True))
+    laws = [_padded(segment.law, float(start), end) for segment, start in pairs]
     merged = merge_breaks(laws)
     whole = PiecewisePolynomial(merged.breaks, merged.coefficients.sum(axis=2, keepdims=True))
-    edges = [stretch.breaks + start for stretch, start in zip(stretches, begins[:-1], strict=True)]
-    breaks = _distinct(np.concatenate(edges), end)
+    breaks = _distinct(np.concatenate([segment.breaks + start for segment, start in pairs]), end)
     turns = np.array([target.turn for target in targets])
-    segments = Overlapped(before, tuple(places), vectors, tuple(laws), targets[-1], turns)
-    return ToolMotion(None, whole, segments.timed, breaks, tolerance)
+    tool = OverlappingSegments(before, tuple(curves), vectors, tuple(laws), targets[-1], turns)
+    return ToolMotion(None, whole, tool.reference_at, breaks, move.tolerance.tolerance)
 
 
-def _stretches(
-    places: Sequence[PositionCurve],
-    vectors: Array,
-    move: PathMove,
-    limits: ToolLimits,
+def _law_segments(
+    curves: Sequence[PositionCurve], vectors: Array, move: PathMove, limits: ToolLimits
 ) -> list[LawSegment]:
-    spec, total = move.law, sum(place.length for place in places)
-    whole = None
-    if spec.duration is not None:
-        whole = spec.duration + (len(places) - 1) * (move.overlap or 0.0)
-    stretches, crowd = [], _crowd(places)
-    lower = replace(
-        limits, acceleration=limits.acceleration / crowd, jerk=limits.jerk / 2
-    )  # two at once add up
-    for place, vector in zip(places, vectors, strict=True):
-        rates = segment_derivatives(place, float(np.linalg.norm(vector)) / place.length)
-        bounds, _ = bounds_for(spec, lower, rates, "path")
-        share = None if whole is None else whole * place.length / total
-        stretches.append(law_segment(spec, place.length, bounds, share))
-    if spec.minimum_duration is None:
-        return stretches
-    lasts = sum(stretch.law.duration for stretch in stretches)
-    least = spec.minimum_duration + (len(places) - 1) * (move.overlap or 0.0)
-    return stretches if lasts >= least else [stretch.scaled(least / lasts) for stretch in stretches]
+    """Return the law of each segment, of which neighbours together keep the limits."""
+    spec, total = move.law, sum(curve.length for curve in curves)
+    shared = (len(curves) - 1) * (move.overlap or 0.0)
+    lower = replace(  # two at once add up
+        limits, acceleration=limits.acceleration / _largest_turn(curves), jerk=limits.jerk / 2
+    )
+    segments = []
+    for curve, vector in zip(curves, vectors, strict=True):
+        curvature = largest_norm(curve.evaluate(np.linspace(0.0, curve.length, _SAMPLES))[2])
+        derivatives = PathDerivatives(True, curvature, float(np.linalg.norm(vector)) / curve.length, 0.0)
+        bounds, _ = law_bounds(spec, lower, derivatives, "path")
+        share = None if spec.duration is None else (spec.duration + shared) * curve.length / total
+        segments.append(spec.time_law.segment(spec, curve.length, bounds, share))
+    return lasting_at_least(spec.minimum_duration and spec.minimum_duration + shared, segments)
 
 
-def _crowd(places: Sequence[PositionCurve]) -> float:
+def _largest_turn(curves: Sequence[PositionCurve]) -> float:
     """Return how many accelerations along a segment add up to where one slows down and the next speeds up."""
     turns = [
         after.evaluate(np.zeros(1))[1][0] - before.evaluate(np.array([before.length]), "left")[1][0]
-        for before, after in pairwise(places)
+        for before, after in pairwise(curves)
     ]
     return max(1.0, *(float(np.linalg.norm(turn)) for turn in turns))
 
 
-def _check(stretches: Sequence[LawSegment], overlap: float) -> None:
-    for index, stretch in enumerate(stretches):
-        sides = 1 if index in (0, len(stretches) - 1) else 2
-        if stretch.law.duration < sides * overlap:
+def _check(segments: Sequence[LawSegment], overlap: float) -> None:
+    """Refuse segments that are too short for their overlaps."""
+    for index, segment in enumerate(segments):
+        sides = 1 if index in (0, len(segments) - 1) else 2
+        if segment.law.duration < sides * overlap:
             message = f"segment {index} lasts {{lasts}}, too short to overlap its neighbours by {{overlap}}"
-            amounts = {"lasts": Amount(stretch.law.duration), "overlap": Amount(overlap)}
+            amounts = {"lasts": Amount(segment.law.duration), "overlap": Amount(overlap)}
             hint = "shorten `overlap`, or go slower"
             raise PlanningError(Problem(message, hint, amounts=amounts))
 
@@ -284,85 +361,3 @@ def _distinct(times: Array, end: float) -> Array:
     distinct = ordered[keep]
     distinct[-1] = end
     return np.asarray(distinct)
-
-
-_SHRUNK = 1e-9  # relative
-
-
-def chain_path(before: Array, move: PathMove, robot: Robot) -> PlannedPath:
-    """Return the way along the segments of a move from a pose (4, 4)."""
-    places, targets = _segments(before, move, robot)
-    overlap = move.overlap is not None and len(places) > 1
-    radii = [0.0] * (len(places) - 1)
-    if move.corner == "round":
-        radii = [segment.radius or move.radius or 0.0 for segment in move.segments[:-1]]
-    chain = join(places, np.array(radii))
-    turning = orientation_along(move.orientation, before[:3, :3], targets, chain, chain.progress)
-    poses = PoseCurve(chain, turning)
-    if poses.jumps.size and not overlap:
-        amounts = {"place": Amount(float(poses.jumps[0]), 0, None, "length")}
-        message = "at the corner at s = {place} a tool that keeps its attitude to the path would jump"
-        hint = "say `corner: round`, or orientation: axis_angle"
-        raise PlanningError(Problem(message, hint, amounts=amounts))
-    last = targets[-1]
-    fixed = "all" if move.orientation == "tangent" else last.orientation
-    turns = tuple(target.turn for target in targets)
-    path = ToolPath(poses, last.position, fixed, last.tool_axis, turns, chain.progress)
-    end = move.segments[-1].line or (move.segments[-1].arc and move.segments[-1].arc.to)
-    way = PlannedPath(
-        path, last.joints, end.configuration if end else None, (*notes_of(places), *_events(chain))
-    )
-    if not overlap:
-        return way
-    tolerance = Tolerance(move.tolerance.position, move.tolerance.angle)
-    motion = overlapped(before, places, targets, move, robot.limits.tcp, tolerance)
-    return replace(way, overlap=replace(motion, path=path), events=notes_of(places))
-
-
-def _segments(before: Array, move: PathMove, robot: Robot) -> tuple[list[PositionCurve], list[ToolTarget]]:
-    places: list[PositionCurve] = []
-    targets: list[ToolTarget] = []
-    pose = before
-    for index, segment in enumerate(move.segments):
-        try:
-            place, target = _segment(segment, pose, robot)
-        except TrajcliError as error:
-            raise type(error)(*(problem.within(f"segment {index}") for problem in error.problems)) from None
-        if targets and (target.orientation, target.tool_axis) != (
-            targets[-1].orientation,
-            targets[-1].tool_axis,
-        ):
-            message = f"segment {index} fixes another part of the orientation than the one before"
-            raise InputError(message, hint="give the targets of all segments the same kind of orientation")
-        places.append(place)
-        targets.append(target)
-        pose = target.pose
-    return places, targets
-
-
-def _segment(segment: Segment, pose: Array, robot: Robot) -> tuple[PositionCurve, ToolTarget]:
-    if segment.arc is not None:
-        target = arc_target(segment.arc, pose, robot)
-        return arc_of(segment.arc, pose, target, robot), target
-    if segment.line is None:
-        raise InputError("a segment is either a `line` or an `arc`")
-    target = tool_target(segment.line, pose, robot)
-    return Line(pose[:3, 3], target.pose[:3, 3]), target
-
-
-def _events(chain: Chain) -> tuple[Event, ...]:
-    events = []
-    for number, corner in enumerate(chain.corners, 1):
-        if corner.kind != "smooth" and corner.used < corner.asked * (1 - _SHRUNK):
-            events.append(_shrunk(number, corner))
-    return tuple(events)
-
-
-def _shrunk(number: int, corner: Corner) -> Event:
-    text = f"the radius of corner {number} was shrunk from {{asked}} to {{used}} to fit: it passes at {{by}}"
-    amounts = {
-        "asked": Amount(corner.asked, 0, None, "length"),
-        "used": Amount(corner.used, 0, None, "length"),
-        "by": Amount(corner.deviation, 0, None, "length"),
-    }
-    return Event("shrunk", text, amounts=amounts)

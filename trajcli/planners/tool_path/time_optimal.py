@@ -1,4 +1,8 @@
-"""The fastest law along a path of the tool that joints and tool allow."""
+"""Time-optimal law along a path of the tool, under the limits of joints and tool.
+
+Source: Pham and Pham, A New Approach to Time-Optimal Path Parameterization Based on Reachability Analysis,
+IEEE Trans. Robotics 34 (2018).
+"""
 
 from __future__ import annotations
 
@@ -17,14 +21,14 @@ from trajcli.kinematics.following.motion import motion_along
 from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.robot import Robot, ToolLimits
+from trajcli.planners.boundary_states import missing_limit
 from trajcli.planners.planner import Event, Phase, stretched
-from trajcli.planners.point_to_point.point_to_point import missing_limit
 from trajcli.planners.tool_path.follow import FollowedPath, JointMotion
 from trajcli.planners.tool_path.law import LawSpec
 
 _FINER = 0.5  # of the tolerance, for q(s): what the law multiplies it with must still be within
 _CORNERS = 16  # of the polygon inside the circle of accelerations
-_BETWEEN = 6  # places of a piece at which the limits of the tool are looked at, its ends included
+_BETWEEN = 6  # times in a piece at which the limits of the tool are looked at, its ends included
 _STRETCHED = 1e-9
 _BESIDE = 1e-13  # of the length: so far before its end the last sample of an interval is
 _NOTED = 1e-6  # relative: a smaller stretch is not worth an event
@@ -44,15 +48,15 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
         PlanningError: When the joints cannot follow.
     """
     robot, path = joints.robot, joints.path
-    curve = joints.by_place(Tolerance(tolerance.position * _FINER, tolerance.angle * _FINER))
+    curve = joints.by_s(Tolerance(tolerance.position * _FINER, tolerance.angle * _FINER))
     _require_acceleration(curve, robot, planner)
     tcp = _limits(spec, robot.limits.tcp)
     solved = time_optimal(
         curve, robot.limits.velocity, robot.limits.acceleration, further=[ToolConstraint(path, tcp)]
     )
-    left = _left_over(path, solved.law, tcp)
+    remaining = _remaining_stretch(path, solved.law, tcp)
     least = spec.minimum_duration or 0.0
-    factor = max(left, least / solved.trajectory.duration)
+    factor = max(remaining, least / solved.trajectory.duration)
     law, trajectory = (
         scale_time(each, factor) if factor > 1 else each for each in (solved.law, solved.trajectory)
     )
@@ -64,19 +68,19 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
     ]
     text = f"the grid was refined {solved.refinements} times, to {solved.grid.size} places"
     events = [Event("refined", text)]
-    stretch = solved.stretch * left
+    stretch = solved.stretch * remaining
     if stretch > 1 + _NOTED:
         events.append(stretched(stretch))
     return JointMotion(trajectory, motion, tuple(phases), tuple(events if solved.refinements else events[1:]))
 
 
-def _left_over(path: ToolPath, law: PiecewisePolynomial, limits: ToolLimits) -> float:
-    """Return how many times longer the law must last to keep the tool's limits, as the whole law has them."""
+def _remaining_stretch(path: ToolPath, law: PiecewisePolynomial, limits: ToolLimits) -> float:
+    """Return how many times longer the law must last to keep the tool's limits between grid points."""
     part = np.linspace(0.0, 1.0, _BETWEEN)
     times = (law.breaks[:-1, None] + law.lengths[:, None] * part).reshape(-1)
-    passed = path.crossings(law, law.breaks)
-    demand = path.at_time(law, np.clip(times, law.start, law.end), "right", passed)
-    speed, acceleration = _used(demand.first, demand.second, limits).max(axis=1).tolist()
+    crossings = path.crossings(law, law.breaks)
+    reference = path.at_time(law, np.clip(times, law.start, law.end), "right", crossings)
+    speed, acceleration = _used(reference.first, reference.second, limits).max(axis=1).tolist()
     worst: float = max(speed, acceleration**0.5)
     return worst * (1 + _STRETCHED) if worst > 1 else 1.0
 
@@ -115,14 +119,14 @@ class ToolConstraint:
         """
         limits = self.limits
         _, first, second = self.path.poses.evaluate(np.clip(s, 0.0, self.path.length), side)
-        way, turn = (np.linalg.norm(first[:, part], axis=1) for part in (slice(0, 3), slice(3, 6)))
-        bend = np.linalg.norm(second[:, :3], axis=1)
-        a, b, c = _translation_rows(way, bend, limits.acceleration)
-        more = _rotation_rows(first[:, 3:], second[:, 3:], turn, limits.angular_acceleration)
+        tangent, turning = (np.linalg.norm(first[:, part], axis=1) for part in (slice(0, 3), slice(3, 6)))
+        curvature = np.linalg.norm(second[:, :3], axis=1)
+        linear = _translation_rows(tangent, curvature, limits.acceleration)
+        angular = _rotation_rows(first[:, 3:], second[:, 3:], turning, limits.angular_acceleration)
         with np.errstate(divide="ignore"):
-            speed = np.minimum(limits.speed / way, limits.angular_speed / turn)
-        cap = np.minimum(speed**2, more[3])
-        joined = [np.concatenate(pair, axis=1) for pair in zip((a, b, c), more[:3], strict=True)]
+            speed = np.minimum(limits.speed / tangent, limits.angular_speed / turning)
+        cap = np.minimum(speed**2, angular[3])
+        joined = [np.concatenate(pair, axis=1) for pair in zip(linear, angular[:3], strict=True)]
         return ConstraintRows(joined[0], joined[1], joined[2], cap)
 
     def excess(self, law: LawPieces) -> Array:
@@ -149,30 +153,31 @@ def _used(velocity: Array, acceleration: Array, limits: ToolLimits) -> Array:
     return np.stack(shares)
 
 
-def _translation_rows(way: Array, bend: Array, limit: float) -> tuple[Array, Array, Array]:
-    count = way.size
-    if not bend.any():
-        ones = np.ones((count, 1)) * way[:, None]
+def _translation_rows(tangent: Array, curvature: Array, limit: float) -> tuple[Array, Array, Array]:
+    """Return a, b and c of rows a sdd + b sd^2 <= c, each (N, k), of the acceleration of the tcp."""
+    count = tangent.size
+    if not curvature.any():
+        ones = np.ones((count, 1)) * tangent[:, None]
         return np.hstack([ones, -ones]), np.zeros((count, 2)), np.full((count, 2), limit)
     angles = np.pi * (np.arange(_CORNERS // 2) + 0.5) / (_CORNERS // 2)
     apothem = limit * math.cos(math.pi / _CORNERS)
     return (
-        way[:, None] * np.cos(angles),
-        bend[:, None] * np.sin(angles),
+        tangent[:, None] * np.cos(angles),
+        curvature[:, None] * np.sin(angles),
         np.full((count, angles.size), apothem),
     )
 
 
 def _rotation_rows(
-    rate: Array, change: Array, turn: Array, limit: float
+    first: Array, second: Array, turning: Array, limit: float
 ) -> tuple[Array, Array, Array, Array]:
-    """Return rows (N, 2) and caps (N,) of the angular acceleration."""
-    axis = rate / np.where(turn > 0, turn, 1.0)[:, None]
-    along = (change * axis).sum(axis=1)
-    across = np.linalg.norm(change - axis * along[:, None], axis=1)
+    """Return the same of the angular acceleration, each (N, 2), and upper bounds (N,) of sd^2."""
+    axis = first / np.where(turning > 0, turning, 1.0)[:, None]
+    along = (second * axis).sum(axis=1)
+    across = np.linalg.norm(second - axis * along[:, None], axis=1)
     bent = bool(across.any())
-    a = np.stack([turn, -turn], axis=1)
+    a = np.stack([turning, -turning], axis=1)
     b = np.stack([along, -along], axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         cap = np.where(across > 0, 0.8 * limit / across, np.inf)
-    return a, b, np.full((turn.size, 2), (0.6 if bent else 1.0) * limit), cap
+    return a, b, np.full((turning.size, 2), (0.6 if bent else 1.0) * limit), cap

@@ -1,6 +1,7 @@
-"""Straight from point to point with rounded corners: linear segments with parabolic blends.
+"""Linear segments with parabolic blends, and their times and durations where only the limits say so.
 
-When `blends` passes its points, and how long its blends last, where only the limits say so.
+Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.2.2; Craig,
+Introduction to Robotics (2005), section 7.3.
 """
 
 from __future__ import annotations
@@ -32,8 +33,8 @@ from trajcli.language.numbers import (
 from trajcli.language.per_joint import flawed
 from trajcli.language.recorded import Recorded
 from trajcli.language.targets import JointAccelerationMagnitudes
+from trajcli.planners.boundary_states import missing_limit, standstill, start_in_motion
 from trajcli.planners.planner import Event, Phase, Planned
-from trajcli.planners.point_to_point.point_to_point import missing_limit, require_rest, standstill
 from trajcli.planners.waypoints.through_points import PointTable, ThroughPoints
 from trajcli.trajectory import State, ViaPoints
 from trajcli.units import Quantity
@@ -47,7 +48,7 @@ def blend_times(
     """Return times (m,), the first zero, and blends (m,), s, of the fastest motion that keeps the limits.
 
     Args:
-        points: m of them, not all in one place.
+        points: m of them, not all the same.
         blends: Durations (m,) where they are given, s.
         robot: Its limit of velocity counts.
         acceleration: Bounds, shape (n, 2).
@@ -65,9 +66,9 @@ def blend_times(
         why = "to find when it passes its points"
         raise missing_limit("blends", "acceleration", lacking.tolist(), robot, why, *also)
     velocity = robot.limits.velocity
-    segments, found = fastest_blends(points.positions, velocity, acceleration, ends=ends)
+    segments, fastest = fastest_blends(points.positions, velocity, acceleration, ends=ends)
     if blends is None and not exactly:
-        return np.concatenate([[0.0], np.cumsum(segments)]), found
+        return np.concatenate([[0.0], np.cumsum(segments)]), fastest
     shares = _SHARES if blends is None else (None,)
     bounds = np.stack([velocity, acceleration, np.tile([-np.inf, np.inf], (len(velocity), 1))])
     best: tuple[Array, Array] | None = None
@@ -227,27 +228,27 @@ class Blends(ThroughPoints):
             PlanningError: When the arm moves at the start, or an acceleration is too small for the times.
         """
         points = self.waypoints(start)
-        if points.times is None or start.acceleration.any():
-            require_rest(self.tag, start, robot)
+        if not start.at_rest and (points.times is None or start.acceleration.any()):
+            raise start_in_motion(self.tag, start, robot)
         if points.times is None and not np.ptp(points.positions, axis=0).any():
             return standstill(points.target, self.duration or 0.0)
-        times, durations = self._asked(points, robot)
+        times, durations = self._times_and_blends(points, robot)
         try:
-            made = self._made(points, times, durations, robot)
+            motion = self._motion(points, times, durations, robot)
         except BlendAccelerationError as error:
             raise _too_slow(error, points, robot) from None
-        first, last = _ends(made, points)
+        first, last = _ends(motion, points)
         return Planned(
-            made.curve,
+            motion.curve,
             last,
-            phases=_phases(made),
-            passage=ViaPoints(times + made.shift, points.positions, made.missed),
-            origin=made.shift,
+            phases=_phases(motion),
+            passage=ViaPoints(times + motion.shift, points.positions, motion.missed),
+            origin=motion.shift,
             begins=first if start.velocity.any() else None,
-            events=(*points.events, *_shrunk(made, robot)),
+            events=(*points.events, *_shrunk(motion, robot)),
         )
 
-    def _asked(self, points: PointTable, robot: Robot) -> tuple[Array, Array | None]:
+    def _times_and_blends(self, points: PointTable, robot: Robot) -> tuple[Array, Array | None]:
         """Return when the points are passed, and the durations of the blends; None for accelerations."""
         if points.times is not None:
             return points.times, self._durations(points)
@@ -273,16 +274,16 @@ class Blends(ThroughPoints):
         durations = np.broadcast_to(np.array(self.blend_durations), (points.count,))
         return np.where(points.blends > 0, points.blends, durations)
 
-    def _made(self, points: PointTable, times: Array, durations: Array | None, robot: Robot) -> Blended:
-        asked = {
+    def _motion(self, points: PointTable, times: Array, durations: Array | None, robot: Robot) -> Blended:
+        options = {
             "ends": self.end_blends,
             "exactly": self.exactly,
             "start_velocity": points.rates[0, 0],
             "end_velocity": points.rates[0, -1],
         }
         if durations is not None:
-            return blended(times, points.positions, durations, **asked)
-        return blended_by_acceleration(times, points.positions, self._magnitudes(points, robot), **asked)
+            return blended(times, points.positions, durations, **options)
+        return blended_by_acceleration(times, points.positions, self._magnitudes(points, robot), **options)
 
     def _magnitudes(self, points: PointTable, robot: Robot) -> Array:
         if self.acceleration is not None:
@@ -296,43 +297,43 @@ class Blends(ThroughPoints):
         return np.where(np.isfinite(magnitudes), magnitudes, 1.0)
 
 
-def _ends(made: Blended, points: PointTable) -> tuple[State, State]:
+def _ends(motion: Blended, points: PointTable) -> tuple[State, State]:
     """Return the states in which the curve begins and ends: beyond a point that a centred blend passes."""
-    nothing = np.zeros(made.curve.dimension)
-    reached = made.curve.piece_ends(0)
+    zero = np.zeros(motion.curve.dimension)
+    first, last = motion.curve.piece_ends(0)
     states = [
-        State(np.where(made.shift * velocity != 0, place, position), velocity, nothing)
-        for place, position, velocity in zip(
-            (reached[0][0], reached[1][-1]), points.positions[[0, -1]], points.rates[0, [0, -1]], strict=True
+        State(np.where(motion.shift * velocity != 0, end, position), velocity, zero)
+        for end, position, velocity in zip(
+            (first[0], last[-1]), points.positions[[0, -1]], points.rates[0, [0, -1]], strict=True
         )
     ]
     return states[0], states[1]
 
 
-def _phases(made: Blended) -> tuple[Phase, ...]:
+def _phases(motion: Blended) -> tuple[Phase, ...]:
     """Return blends and straight segments in order of time, by joint where each has its own."""
-    shared = bool((made.blends == made.blends[:, :1]).all() and (made.times == made.times[:, :1]).all())
-    found: list[Phase] = []
-    for joint in range(1 if shared else made.times.shape[1]):
-        owner = None if shared else joint
-        starts = np.maximum(made.times[:, joint] - made.blends[:, joint] / 2, 0.0)
-        ends = np.minimum(made.times[:, joint] + made.blends[:, joint] / 2, made.curve.end)
+    alike = all((table == table[:, :1]).all() for table in (motion.blends, motion.times))
+    phases: list[Phase] = []
+    for joint in range(1 if alike else motion.times.shape[1]):
+        owner = None if alike else joint
+        starts = np.maximum(motion.times[:, joint] - motion.blends[:, joint] / 2, 0.0)
+        ends = np.minimum(motion.times[:, joint] + motion.blends[:, joint] / 2, motion.curve.end)
         last = 0.0
-        for point, start, end in zip(made.points.tolist(), starts.tolist(), ends.tolist(), strict=True):
+        for point, start, end in zip(motion.points.tolist(), starts.tolist(), ends.tolist(), strict=True):
             if start > last:
-                found.append(Phase("straight", last, start, owner))
+                phases.append(Phase("straight", last, start, owner))
             if end > start:
-                found.append(Phase(f"blend {point}", start, end, owner))
+                phases.append(Phase(f"blend {point}", start, end, owner))
             last = max(last, end)
-    return tuple(found)
+    return tuple(phases)
 
 
-def _shrunk(made: Blended, robot: Robot) -> tuple[Event, ...]:
-    if not made.shrunk:
+def _shrunk(motion: Blended, robot: Robot) -> tuple[Event, ...]:
+    if not motion.shrunk:
         return ()
-    worst = min(made.shrunk, key=lambda one: one.used / one.asked)
+    worst = min(motion.shrunk, key=lambda one: one.used / one.asked)
     whose = "" if worst.joint is None else " of {joint}"
-    more = f"; {len(made.shrunk) - 1} more likewise" if len(made.shrunk) > 1 else ""
+    more = f"; {len(motion.shrunk) - 1} more likewise" if len(motion.shrunk) > 1 else ""
     text = (
         f"the blend{whose} at point {worst.point} was shortened from {{asked}} to {{used}}, "
         f"for which the segments beside it have room{more}"

@@ -1,8 +1,7 @@
-"""One smooth curve through all points: the slides' 2.2, and the splines that numerical analysis knows.
+"""Splines through waypoints: the curve of each rule, and times at the points that the limits allow.
 
-Which curve each rule of `spline` means, and what it lets its ends impose.
-
-When a spline passes its points, where only the limits say how fast it may be.
+Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.2.2; Biagiotti and
+Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), chapter 4.
 """
 
 from __future__ import annotations
@@ -31,8 +30,8 @@ from trajcli.language.numbers import FieldPath, Flaw, refuse
 from trajcli.language.recorded import Recorded
 from trajcli.language.targets import Numbers
 from trajcli.language.waypoints import Waypoint
+from trajcli.planners.boundary_states import missing_limit, standstill
 from trajcli.planners.planner import Planned
-from trajcli.planners.point_to_point.point_to_point import missing_limit, standstill
 from trajcli.planners.waypoints.through_points import PointTable, ThroughPoints, via_points
 from trajcli.trajectory import State
 from trajcli.units import Quantity
@@ -59,6 +58,8 @@ IMPOSES: dict[Rule, int] = {
     "shape_preserving": 1,
 }
 """Highest derivative that the ends impose."""
+_INNER = {"imposed": 1, "quintic": 2}  # the same of the points between
+_LEAST = 1e-3  # of the mean duration: a piece between points that hardly differ begins with this much
 
 
 def curve_through(
@@ -113,9 +114,6 @@ def _quintic(points: PointTable, times: Array) -> PiecewisePolynomial:
     return quintic_through(times, points.positions, velocities, accelerations)
 
 
-_LEAST = 1e-3  # of the mean duration: a piece between points that hardly differ begins with this much
-
-
 def fastest_spline_times(rule: Rule, points: PointTable, robot: Robot) -> Array:
     """Return the times (m,) of the fastest curve of a rule that keeps the limits, the first zero.
 
@@ -151,9 +149,6 @@ def _guess(points: PointTable, bounds: Array) -> Array:
         least = np.abs(limits).min(axis=1)
         needed = np.maximum(needed, ((chords / least) ** (1 / order)).max(axis=1))
     return np.asarray(np.maximum(needed, _LEAST * needed.mean()))
-
-
-_INNER = {"imposed": 1, "quintic": 2}
 
 
 class Spline(ThroughPoints):

@@ -1,4 +1,4 @@
-"""What planners through a sequence of points share: the points as numbers, and when they are passed."""
+"""Moves through a sequence of points: the points as numbers, and the times at which they are passed."""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
-"""Through points as fast as limits on velocity and acceleration allow.
+"""Time-optimal motion through waypoints: a path in joint space, and the fastest law along it.
 
-The path in joint space that `time_optimal` follows: which way, not yet how fast.
+Source: Pham and Pham, A New Approach to Time-Optimal Path Parameterization Based on Reachability Analysis,
+IEEE Trans. Robotics 34 (2018).
 """
 
 from __future__ import annotations
@@ -34,8 +35,8 @@ from trajcli.language.numbers import (
 from trajcli.language.per_joint import JointDistance
 from trajcli.language.poses import read_numbers
 from trajcli.language.recorded import Recorded
+from trajcli.planners.boundary_states import missing_limit, standstill
 from trajcli.planners.planner import Event, Phase, Planned, stretched
-from trajcli.planners.point_to_point.point_to_point import missing_limit, standstill
 from trajcli.planners.waypoints.spline import Rule, curve_through
 from trajcli.planners.waypoints.through_points import PointTable, ThroughPoints
 from trajcli.trajectory import State, ViaPoints
@@ -43,6 +44,9 @@ from trajcli.units import Quantity
 
 Parameter = Literal["chord", "centripetal", "uniform"] | tuple[float, ...]
 
+_NAMED = ("chord", "centripetal", "uniform")
+_MOST_STOPS = 10  # that an event lists
+_STRETCHED = 1e-9  # relative: a smaller stretch is rounding
 _OFF = 1e-9  # relative: a velocity this little off the path is on it
 _ROOM = 0.999  # of a segment that two blends may share: each keeps a straight piece between
 
@@ -53,14 +57,14 @@ class JointPath:
 
     Attributes:
         curve: q(s).
-        places: s at each point, shape (m,).
+        s: Path parameter at each point, shape (m,).
         missed: By how much each joint passes beside each point, shape (m, n).
         speeds: sd at the start and at the end.
         events: What was conceded.
     """
 
     curve: PiecewisePolynomial
-    places: Array
+    s: Array
     missed: Array
     speeds: tuple[float, float]
     events: tuple[Event, ...] = ()
@@ -75,12 +79,12 @@ def spline_through(rule: Rule, parameter: Parameter, points: PointTable, robot: 
         PlanningError: When the parameter has another number of values than points, or shape_preserving does
             not allow the direction.
     """
-    places = _places(parameter, points)
+    s = _parameter_values(parameter, points)
     q, ends = points.positions, points.rates[0, [0, -1]]
     slopes, speeds = np.zeros_like(ends), [0.0, 0.0]
     for k, (velocity, piece) in enumerate(zip(ends, (0, -1), strict=True)):
         speed = float(np.linalg.norm(velocity))
-        chord = np.diff(q, axis=0)[piece] / np.diff(places)[piece]
+        chord = np.diff(q, axis=0)[piece] / np.diff(s)[piece]
         if speed:
             slopes[k] = velocity / speed * np.linalg.norm(chord)
             speeds[k] = speed / float(np.linalg.norm(chord))
@@ -89,15 +93,15 @@ def spline_through(rule: Rule, parameter: Parameter, points: PointTable, robot: 
     rates = np.zeros_like(points.rates)
     rates[0, [0, -1]] = slopes
     try:
-        curve = curve_through(rule, replace(points, rates=rates), places)
+        curve = curve_through(rule, replace(points, rates=rates), s)
     except ShapeError as error:
         name = robot.joint_names[error.component]
         message = f"the velocity of {name} at the {error.end} point does not let the path be monotone there"
         raise PlanningError(Problem(message, "use rule not_a_knot", joint=name)) from None
-    return JointPath(curve, places, np.zeros_like(q), (speeds[0], speeds[1]))
+    return JointPath(curve, s, np.zeros_like(q), (speeds[0], speeds[1]))
 
 
-def _places(parameter: Parameter, points: PointTable) -> Array:
+def _parameter_values(parameter: Parameter, points: PointTable) -> Array:
     if isinstance(parameter, tuple):
         if len(parameter) != points.count:
             message = f"{len(parameter)} values of the parameter for {points.count} points"
@@ -120,25 +124,25 @@ def polyline_through(points: PointTable, corner: Array, robot: Robot) -> JointPa
     Raises:
         PlanningError: When the arm moves at an end in another direction than the segment there.
     """
-    q, places = points.positions, _places("chord", points)
-    slopes = np.diff(q, axis=0) / np.diff(places)[:, None]
+    q, s = points.positions, _parameter_values("chord", points)
+    slopes = np.diff(q, axis=0) / np.diff(s)[:, None]
     speeds = tuple(
         _along(slope, velocity, robot)
         for slope, velocity in zip(slopes[[0, -1]], points.rates[0, [0, -1]], strict=True)
     )
     turn = np.abs(np.diff(slopes, axis=0))
     if not corner.any() or not turn.any():
-        curve = PiecewisePolynomial(places, np.stack([slopes, q[:-1]]))
-        return JointPath(curve, places, np.zeros_like(q), (speeds[0], speeds[1]))
-    asked = np.zeros(points.count)
+        curve = PiecewisePolynomial(s, np.stack([slopes, q[:-1]]))
+        return JointPath(curve, s, np.zeros_like(q), (speeds[0], speeds[1]))
+    wanted = np.zeros(points.count)
     sharpest = (turn / corner).max(axis=1)
-    asked[1:-1] = 8 / np.where(sharpest > 0, sharpest, np.inf)
-    room = np.diff(places)
+    wanted[1:-1] = 8 / np.where(sharpest > 0, sharpest, np.inf)
+    room = np.diff(s)
     limit = np.full(points.count, np.inf)
     limit[1:-1] = _ROOM * np.minimum(room[:-1], room[1:])
-    used = np.minimum(asked, limit)
-    made = blended(places, q, used, ends="inside", start_velocity=slopes[0], end_velocity=slopes[-1])
-    return JointPath(made.curve, places, made.missed, (speeds[0], speeds[1]), _shrunk(asked, used))
+    used = np.minimum(wanted, limit)
+    motion = blended(s, q, used, ends="inside", start_velocity=slopes[0], end_velocity=slopes[-1])
+    return JointPath(motion.curve, s, motion.missed, (speeds[0], speeds[1]), _shrunk(wanted, used))
 
 
 def _along(slope: Array, velocity: Array, robot: Robot) -> float:
@@ -155,21 +159,16 @@ def _along(slope: Array, velocity: Array, robot: Robot) -> float:
     return speed
 
 
-def _shrunk(asked: Array, used: Array) -> tuple[Event, ...]:
-    less = np.flatnonzero(used[1:-1] < asked[1:-1])
+def _shrunk(wanted: Array, used: Array) -> tuple[Event, ...]:
+    less = np.flatnonzero(used[1:-1] < wanted[1:-1])
     if not less.size:
         return ()
-    share = used[1:-1][less] / asked[1:-1][less]
+    share = used[1:-1][less] / wanted[1:-1][less]
     worst = int(less[share.argmin()])
     more = f"; {less.size - 1} more likewise" if less.size > 1 else ""
     part = f"{100 * share.min():.4g} % of the deviation asked for"
     text = f"the corner at point {worst + 1} is rounded by {part}: its segments are too short for more{more}"
     return (Event("shrunk", text),)
-
-
-_NAMED = ("chord", "centripetal", "uniform")
-_MOST_STOPS = 10  # that an event lists
-_STRETCHED = 1e-9  # relative: a smaller stretch is rounding
 
 
 @comparable
@@ -291,21 +290,21 @@ class TimeOptimal(ThroughPoints):
                 self.tag, "acceleration", lacking.tolist(), robot, "to find the fastest motion"
             )
         path = self._path(points, robot)
-        made = _solved(path, robot)
-        duration = made.trajectory.duration
+        motion = _solved(path, robot)
+        duration = motion.trajectory.duration
         factor = 1.0 if self.duration is None else self.duration / duration
         _check_duration(self.duration, duration, points)
-        passed = times_at(made.law, path.places)
-        binding = switching_structure(made.trajectory, robot.limits.velocity, bounds)
+        passed = times_at(motion.law, path.s)
+        binding = switching_structure(motion.trajectory, robot.limits.velocity, bounds)
         return Planned(
-            scale_time(made.trajectory, factor) if factor != 1 else made.trajectory,
+            scale_time(motion.trajectory, factor) if factor != 1 else motion.trajectory,
             points.target,
             phases=tuple(
                 Phase(f"{b.quantity} {'+' if b.sign > 0 else '-'}", b.start * factor, b.end * factor, b.joint)
                 for b in binding
             ),
             passage=ViaPoints(passed * factor, points.positions, path.missed),
-            events=(*points.events, *path.events, *_events(made)),
+            events=(*points.events, *path.events, *_events(motion)),
         )
 
     def _untimed(self) -> Self:
@@ -351,18 +350,18 @@ def _check_duration(wanted: float | None, fastest: float, points: PointTable) ->
         raise PlanningError(Problem(message, "leave `duration` out for the fastest", amounts=amounts))
 
 
-def _events(made: TimeOptimalMotion) -> Iterator[Event]:
-    if made.refinements:
+def _events(motion: TimeOptimalMotion) -> Iterator[Event]:
+    if motion.refinements:
         yield Event(
             "refined",
-            f"the grid was refined {'once' if made.refinements == 1 else f'{made.refinements} times'}, "
-            f"to {made.grid.size} places on the path",
+            f"the grid was refined {'once' if motion.refinements == 1 else f'{motion.refinements} times'}, "
+            f"to {motion.grid.size} places on the path",
         )
-    if made.stretch > 1 + _STRETCHED:
-        yield stretched(made.stretch)
-    if made.stops.size:
-        times = ", ".join(f"{time:.6g}" for time in made.stop_times[:_MOST_STOPS].tolist())
-        more = ", ..." if made.stops.size > _MOST_STOPS else ""
-        count = made.stops.size
+    if motion.stretch > 1 + _STRETCHED:
+        yield stretched(motion.stretch)
+    if motion.stops.size:
+        times = ", ".join(f"{time:.6g}" for time in motion.stop_times[:_MOST_STOPS].tolist())
+        more = ", ..." if motion.stops.size > _MOST_STOPS else ""
+        count = motion.stops.size
         text = f"stops at {count} corner{'s' * (count != 1)}, at t = {times}{more} s of the move"
         yield Event("stops", f"{text}: give `corner` to round them")

@@ -1,14 +1,12 @@
 """Fastest motions of one variable under bounds on velocity, acceleration and jerk, solved by ruckig.
 
 Ruckig sees one variable at a time, from position zero, in units that suit it. What it returns are phases; the
-end of the motion is then laid into its target, which ruckig misses by up to 1e-8. Several variables arrive
+phases are then corrected to end in their target, which ruckig misses by up to 1e-8. Several variables arrive
 together in the shortest time in which each can arrive: the set of such times may have gaps, so the time is
 raised until all agree.
 
 Source: Berscheid and Kroeger, Jerk-limited Real-time Trajectory Generation with Arbitrary Target States
 (RSS 2021).
-
-What one variable shall do, and the motion that does it: how a solver is asked, and how it answers.
 """
 
 from __future__ import annotations
@@ -34,7 +32,7 @@ _STILL = 1e-9  # of the peak velocity: less counts as rest
 
 @frozen
 class BoundaryProblem:
-    """What one variable shall do.
+    """Boundary states and bounds of the motion of one variable.
 
     Attributes:
         name: For messages.
@@ -64,7 +62,7 @@ class BoundaryProblem:
 
     @property
     def steady(self) -> bool:
-        """Whether constant velocity, or rest, is all that is asked."""
+        """Whether constant velocity, or rest, fulfils it."""
         anywhere = self.control == "velocity" or self.displacement == self.initial[1] == 0
         return anywhere and self.initial[1] == self.final[1] and self.initial[2] == self.final[2] == 0
 
@@ -127,74 +125,74 @@ class PhaseProfile:
         return names
 
 
-_LANDED = 1e-12  # relative to the joint's peaks: a larger miss means that other units may do better
+_EXACT = 1e-12  # relative to the joint's peaks: a larger miss means that other units may do better
 _ACCEPTABLE = 1e-9  # the same: a larger miss is a jump, and the phases are wrong
 _COARSE = 1e-11  # the same: what rounding times may do to the velocity
 _ROUNDING = 1e-12
-_SHAVED = (0.0, 1e-14, 1e-13, 5e-13)  # of the acceleration limits: tried in turn where ruckig finds nothing
+_MARGINS = (0.0, 1e-14, 1e-13, 5e-13)  # of the acceleration limits: tried in turn where ruckig finds nothing
 
 
-def fastest(task: BoundaryProblem) -> PhaseProfile:
+def fastest(problem: BoundaryProblem) -> PhaseProfile:
     """Return the fastest motion.
 
     Raises:
         PlanningError: When there is none.
     """
-    return _solve(task, None)
+    return _solve(problem, None)
 
 
-def fastest_of(task: BoundaryProblem, duration: float) -> PhaseProfile:
+def fastest_of(problem: BoundaryProblem, duration: float) -> PhaseProfile:
     """Return the motion that lasts `duration`, or longer where none lasts just that long.
 
     Raises:
         PlanningError: When there is none.
     """
-    return _solve(task, duration)
+    return _solve(problem, duration)
 
 
 def together(
-    tasks: Sequence[BoundaryProblem], profiles: Sequence[PhaseProfile], minimum_duration: float = 0.0
+    problems: Sequence[BoundaryProblem], profiles: Sequence[PhaseProfile], minimum_duration: float = 0.0
 ) -> list[PhaseProfile]:
-    """Return motions of one common duration, the shortest that all tasks allow.
+    """Return motions of one common duration, the shortest that all problems allow.
 
     Args:
-        tasks: One for each variable.
+        problems: One for each variable.
         profiles: Their fastest motions.
         minimum_duration: The common duration is at least this, s.
 
     Raises:
-        PlanningError: When some task has no motion of such a duration.
+        PlanningError: When some problem has no motion of such a duration.
     """
     chosen = list(profiles)
     duration = max([minimum_duration, *(profile.duration for profile in profiles)])
     agreed = False
     while not agreed:
         agreed = True
-        for k, task in enumerate(tasks):
+        for k, problem in enumerate(problems):
             if chosen[k].duration == duration:
                 continue
-            chosen[k] = profiles[k] if profiles[k].duration == duration else fastest_of(task, duration)
+            chosen[k] = profiles[k] if profiles[k].duration == duration else fastest_of(problem, duration)
             if chosen[k].duration > duration:
                 duration, agreed = chosen[k].duration, False
     return chosen
 
 
-def _solve(task: BoundaryProblem, duration: float | None) -> PhaseProfile:
-    if task.steady or (task.done and duration is None):
-        return _steady(task, duration or 0.0)
-    if task.rests and duration is not None:
-        return _slowed(task, fastest(task), duration)
-    return _found(task, duration)
+def _solve(problem: BoundaryProblem, duration: float | None) -> PhaseProfile:
+    if problem.steady or (problem.done and duration is None):
+        return _steady(problem, duration or 0.0)
+    if problem.rests and duration is not None:
+        return _slowed(problem, fastest(problem), duration)
+    return _solved_by_ruckig(problem, duration)
 
 
-def _slowed(task: BoundaryProblem, quickest: PhaseProfile, duration: float) -> PhaseProfile:
+def _slowed(problem: BoundaryProblem, quickest: PhaseProfile, duration: float) -> PhaseProfile:
     """Return a motion from rest to rest that takes longer than it needs.
 
     Full jerk for a tiny displacement in a long time would make phases that are too short for the resolution
     of time; these, and what ruckig cannot do, are done by stretching the fastest motion.
     """
     try:
-        profile = _found(task, duration)
+        profile = _solved_by_ruckig(problem, duration)
     except PlanningError:
         profile = None
     if profile is not None and profile.chain.coarseness <= _COARSE:
@@ -203,14 +201,14 @@ def _slowed(task: BoundaryProblem, quickest: PhaseProfile, duration: float) -> P
     return PhaseProfile(quickest.position, quickest.chain.stretched(longer), longer)
 
 
-def _found(task: BoundaryProblem, duration: float | None) -> PhaseProfile:
+def _solved_by_ruckig(problem: BoundaryProblem, duration: float | None) -> PhaseProfile:
     best, least = None, _ACCEPTABLE
-    for shave, (time_unit, length_unit) in product(_SHAVED, _units(task, duration)):
-        found = _ask_ruckig(_shaved(task, shave), duration, time_unit, length_unit)
-        if found is None:
+    for margin, (time_unit, length_unit) in product(_MARGINS, _units(problem, duration)):
+        answer = _call_ruckig(_with_margin(problem, margin), duration, time_unit, length_unit)
+        if answer is None:
             continue
-        profile, miss = _landed(found, duration)
-        if miss <= _LANDED:
+        profile, miss = _corrected(answer, duration)
+        if miss <= _EXACT:
             return profile
         if miss <= least:
             best, least = profile, miss
@@ -219,47 +217,47 @@ def _found(task: BoundaryProblem, duration: float | None) -> PhaseProfile:
     message = "{joint}: no motion within the velocity, acceleration and jerk limits could be found"
     message += " that lasts {duration}" if duration else ""
     hint = "change the end velocity or acceleration, or the duration, or raise the limits"
-    amounts: Amounts = {"joint": task.name, "duration": Amount(duration or 0.0)}
-    raise PlanningError(Problem(message, hint, joint=task.name, amounts=amounts))
+    amounts: Amounts = {"joint": problem.name, "duration": Amount(duration or 0.0)}
+    raise PlanningError(Problem(message, hint, joint=problem.name, amounts=amounts))
 
 
-def _shaved(task: BoundaryProblem, part: float) -> BoundaryProblem:
-    """Return the task with a little less acceleration.
+def _with_margin(problem: BoundaryProblem, part: float) -> BoundaryProblem:
+    """Return the problem with a little less acceleration.
 
     Where a limit is just reached, a case of ruckig's ends and the next begins, and rounding may leave it with
-    neither: a displacement of 2 a^3 / j^2 is such a place.
+    neither: so it is at a displacement of 2 a^3 / j^2.
     """
-    return (
-        replace(task, bounds=task.bounds * (1.0 - part * np.array([[0.0], [1.0], [0.0]]))) if part else task
-    )
+    if not part:
+        return problem
+    return replace(problem, bounds=problem.bounds * (1.0 - part * np.array([[0.0], [1.0], [0.0]])))
 
 
-def _steady(task: BoundaryProblem, duration: float) -> PhaseProfile:
+def _steady(problem: BoundaryProblem, duration: float) -> PhaseProfile:
     """Return the motion of constant velocity, or the one of no length that has arrived already."""
-    initial = np.array([0.0, *task.initial[1:]])[: task.order]
-    final = np.array([task.initial[1] * duration, *task.final[1:]])[: task.order]
-    constants = [task.initial[1] if task.order == 1 else 0.0] if duration > 0 else []
+    initial = np.array([0.0, *problem.initial[1:]])[: problem.order]
+    final = np.array([problem.initial[1] * duration, *problem.final[1:]])[: problem.order]
+    constants = [problem.initial[1] if problem.order == 1 else 0.0] if duration > 0 else []
     chain = PhaseChain(initial, final, np.full(len(constants), duration), np.array(constants))
-    return PhaseProfile(task.initial[0], chain.with_cruises() if constants else chain, duration)
+    return PhaseProfile(problem.initial[0], chain.with_cruises() if constants else chain, duration)
 
 
-def _landed(found: PhaseProfile, duration: float | None) -> tuple[PhaseProfile, float]:
-    """Return the motion laid into its target, and by how much it still misses it."""
-    free = found.chain.polished()
-    if duration is None or (found.duration > duration * (1 + 1e-12) and free.duration > duration):
-        return replace(found, chain=free, duration=free.duration), free.defect()
-    kept = found.chain.polished(duration)
-    return replace(found, chain=kept, duration=duration), kept.defect(duration)
+def _corrected(answer: PhaseProfile, duration: float | None) -> tuple[PhaseProfile, float]:
+    """Return the motion corrected to end in its target, and by how much it still misses it."""
+    free = answer.chain.polished()
+    if duration is None or (answer.duration > duration * (1 + 1e-12) and free.duration > duration):
+        return replace(answer, chain=free, duration=free.duration), free.defect()
+    kept = answer.chain.polished(duration)
+    return replace(answer, chain=kept, duration=duration), kept.defect(duration)
 
 
-def _units(task: BoundaryProblem, duration: float | None) -> Iterator[tuple[float, float]]:
+def _units(problem: BoundaryProblem, duration: float | None) -> Iterator[tuple[float, float]]:
     """Yield units of time (s) and length for ruckig.
 
     Its tolerances are absolute, and it refuses durations above 7600. Units that are powers of two change
-    nothing else. Those of the task itself come first.
+    nothing else. Those of the problem itself come first.
     """
-    bounds = np.abs(task.bounds).min(axis=1)
-    change, distance = abs(task.final[1] - task.initial[1]), abs(task.displacement)
+    bounds = np.abs(problem.bounds).min(axis=1)
+    change, distance = abs(problem.final[1] - problem.initial[1]), abs(problem.displacement)
     times = [
         distance / bounds[0],
         change / bounds[1],
@@ -272,8 +270,8 @@ def _units(task: BoundaryProblem, duration: float | None) -> Iterator[tuple[floa
             yield time_unit, 2.0**power
 
 
-def _ask_ruckig(
-    task: BoundaryProblem, duration: float | None, time_unit: float, length_unit: float
+def _call_ruckig(
+    problem: BoundaryProblem, duration: float | None, time_unit: float, length_unit: float
 ) -> PhaseProfile | None:
     """Return ruckig's answer, or None when it fails."""
     import ruckig
@@ -281,13 +279,13 @@ def _ask_ruckig(
     units = np.array([length_unit / time_unit**order for order in range(4)])
     wanted = ruckig.InputParameter(1)
     interfaces = ruckig.ControlInterface
-    wanted.control_interface = interfaces.Position if task.control == "position" else interfaces.Velocity
-    wanted.current_position, wanted.target_position = [0.0], [task.displacement / length_unit]
-    lower, upper = (task.bounds / units[1:, None]).T.tolist()
-    wanted.current_velocity = [task.initial[1] / units[1]]
-    wanted.current_acceleration = [task.initial[2] / units[2]]
-    wanted.target_velocity = [_inside(task.final[1] / units[1], lower[0], upper[0])]
-    wanted.target_acceleration = [_inside(task.final[2] / units[2], lower[1], upper[1])]
+    wanted.control_interface = interfaces.Position if problem.control == "position" else interfaces.Velocity
+    wanted.current_position, wanted.target_position = [0.0], [problem.displacement / length_unit]
+    lower, upper = (problem.bounds / units[1:, None]).T.tolist()
+    wanted.current_velocity = [problem.initial[1] / units[1]]
+    wanted.current_acceleration = [problem.initial[2] / units[2]]
+    wanted.target_velocity = [_inside(problem.final[1] / units[1], lower[0], upper[0])]
+    wanted.target_acceleration = [_inside(problem.final[2] / units[2], lower[1], upper[1])]
     wanted.min_velocity, wanted.max_velocity = [lower[0]], [upper[0]]
     wanted.min_acceleration, wanted.max_acceleration = [lower[1]], [upper[1]]
     wanted.max_jerk = [min(-lower[2], upper[2])]
@@ -300,7 +298,7 @@ def _ask_ruckig(
         return None
     if result not in (ruckig.Result.Working, ruckig.Result.Finished):
         return None
-    return _profile(task, answer, time_unit, units)
+    return _profile(problem, answer, time_unit, units)
 
 
 def _inside(value: float, lower: float, upper: float) -> float:
@@ -309,17 +307,17 @@ def _inside(value: float, lower: float, upper: float) -> float:
     return inside if abs(value - inside) <= _ROUNDING * abs(value) else value
 
 
-def _profile(task: BoundaryProblem, answer: Any, time_unit: float, units: Array) -> PhaseProfile:  # noqa: ANN401
+def _profile(problem: BoundaryProblem, answer: Any, time_unit: float, units: Array) -> PhaseProfile:  # noqa: ANN401
     """Return the phases of ruckig's answer in SI; those of length zero are left out."""
-    found, order = answer.profiles[0][0], task.order
-    parts = [(part.t, getattr(part, " vaj"[order])) for part in (found.brake, found, found.accel)]
+    profile, order = answer.profiles[0][0], problem.order
+    parts = [(part.t, getattr(part, " vaj"[order])) for part in (profile.brake, profile, profile.accel)]
     phases = [
         [(t * time_unit, c * units[order]) for t, c in zip(*part, strict=False) if t > 0] for part in parts
     ]
     lengths, constants = np.array([phase for part in phases for phase in part]).reshape(-1, 2).T
-    initial = np.array([0.0, *task.initial[1:]])[:order]
-    final = np.array([task.displacement, *task.final[1:]])[:order]
-    if task.control == "velocity":
+    initial = np.array([0.0, *problem.initial[1:]])[:order]
+    final = np.array([problem.displacement, *problem.final[1:]])[:order]
+    if problem.control == "velocity":
         final[0] = np.nan
     chain = PhaseChain(initial, final, lengths, constants).with_cruises()
-    return PhaseProfile(task.initial[0], chain, answer.duration * time_unit, len(phases[0]))
+    return PhaseProfile(problem.initial[0], chain, answer.duration * time_unit, len(phases[0]))
