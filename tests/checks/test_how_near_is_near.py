@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from motions import between, trajectory
+from motions import between, limits, trajectory
 from test_check_tool import DURATION, JERK, LENGTH, SPEED, TURN, judged, kinds, moving, with_limits
 
+from trajcli.checks.continuity import check_continuity
 from trajcli.checks.limits import peaks_by_move
 from trajcli.checks.waypoints import check_waypoints
 from trajcli.curves.piecewise import PiecewisePolynomial
@@ -48,3 +49,10 @@ def test_the_tool_keeps_a_limit_that_is_a_millionth_below_its_peak(name, peak):
     (found,) = judged(with_limits(FINE, **{name: peak * (1 - 4e-6)}))
     assert kinds([found]) == [f"tool_{name}"]
     assert 0.0 <= found.time <= DURATION
+
+
+@pytest.mark.parametrize(("larger", "named"), [(0.0, 1.0), (4e-13, 1.0), (5e-12, 2.0)])
+def test_of_jumps_that_rounding_alone_makes_unequal_the_first_is_named(larger, named):
+    curve = PiecewisePolynomial(np.arange(4.0), np.array([[0.0, 1.0, 2.0 + larger]])[:, :, None])
+    (found,) = check_continuity(trajectory(curve), [limits()])
+    assert (found.kind, found.time) == ("position_jump", named)

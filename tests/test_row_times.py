@@ -1,4 +1,4 @@
-"""The finest rate of rows: times far from zero are coarse, and rows must still be told apart."""
+"""Rows as near to each other, to a break or to the end as float64 can tell: they must still be told apart."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.errors import InputError
-from trajcli.samples import UniformGrid, sample
+from trajcli.samples import ListedGrid, UniformGrid, sample
 from trajcli.trajectory import Span, State, Trajectory
 
 UNIX = 1.7e9  # s: now, since 1970
@@ -63,3 +63,35 @@ def test_neighbouring_rows_before_a_break_are_two():
     rate = finest_rate(duration, 0.0)
     (rows,) = islice(sample(trajectory, UniformGrid(duration, rate), ["t", "q"]), 1)
     assert (np.diff(rows, axis=0) > 0).all()
+
+
+def test_an_end_that_float64_cannot_tell_from_a_grid_time_takes_its_place():
+    start, unit = 2.0**30, 2.0**-22  # at 2^30 s float64 goes by 2^-22 s
+    period = 16 * unit
+    for beyond, rows in ((-0.4, 101), (0.0, 101), (0.4, 101), (1.5, 101), (4.0, 102)):
+        grid = UniformGrid(100 * period + beyond * unit, 1 / period, start)
+        times = np.concatenate([block[0] for block in grid.blocks()])
+        assert np.unique(times).size == times.size == rows
+
+
+def stepping(duration: float, when: float) -> Trajectory:
+    """Return a joint that rests, and from `when` on goes at 1 rad/s."""
+    curve = PiecewisePolynomial([0.0, when, duration], np.array([[0.0, 1.0], [0.0, 0.0]])[:, :, None])
+    still, going = State(*np.zeros((3, 1))), State(np.array([duration - when]), np.ones(1), np.zeros(1))
+    spans = (Span(0, "quintic", 0.0, duration, 1),)
+    return Trajectory(
+        curve=curve, joint_names=("j1",), joint_types=("revolute",), spans=spans, start=still, end=going
+    )
+
+
+@pytest.mark.parametrize(
+    ("duration", "when", "rounding"),
+    [(2.0, 0.7, 1e-12), (1e6, 4e5, 4 * np.spacing(1e6))],
+    ids=["short", "long"],
+)
+def test_a_row_that_rounding_put_before_a_break_is_at_it(duration, when, rounding):
+    """A picosecond before, or a few units in the last place: the later piece speaks, and not for rows before."""
+    times = when - rounding * np.array([5.0, 0.7, -1.0])
+    for time, speed in zip(times, (0.0, 1.0, 1.0), strict=True):
+        (rows,) = sample(stepping(duration, when), ListedGrid(duration, np.array([time])), ["qd"])
+        assert rows.tolist() == [[speed]]
