@@ -14,7 +14,7 @@ from trajcli.errors import InputError, Problem, VerificationError
 from trajcli.frozen import comparable
 from trajcli.job.read import LoadedJob, load_job
 from trajcli.output.write import check_output_name, grid_of, write_rows, write_text
-from trajcli.planners.planner import Event
+from trajcli.planners.planner import Event, PlannedMove
 from trajcli.planning.plan import Plan, plan_job
 
 if TYPE_CHECKING:
@@ -23,7 +23,6 @@ import numpy as np
 
 from trajcli.curves.extrema import peaks
 from trajcli.kinematics.robot import QUANTITIES
-from trajcli.planning.retime import PlannedMove
 
 _STILL = 1e-9  # rad/s or m/s, below which a joint only rounds
 

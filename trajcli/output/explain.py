@@ -15,9 +15,9 @@ from trajcli.job.report import PeakReport
 from trajcli.output.polynomials import PolynomialInterval, polynomial_intervals
 from trajcli.output.report import passing_in_units, report_of
 from trajcli.output.tool import path_in_units
+from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan
 from trajcli.planning.resolve_poses import ResolvedPose, asked_names
-from trajcli.planning.retime import PlannedMove
 from trajcli.queries.arm import ArmInUnits
 from trajcli.queries.inverse import free_directions, ranks
 from trajcli.queries.pose import plain
@@ -59,7 +59,7 @@ def polynomial_intervals_of(move: PlannedMove, units: Units) -> list[list[Polyno
 
     Equal neighbours are joined, but not those of a spline: the slides have one between any two points.
     """
-    join = move.planner.tag != "spline"
+    join = not move.planned.one_piece_per_interval
     factors = joint_factors(move.robot.joint_types, units)
     curve = move.planned.curve
     return [
@@ -141,19 +141,14 @@ def _reached(plan: Plan, index: int | None) -> dict[str, Any] | None:
 
 def closed_form(move: PlannedMove, units: Units) -> dict[str, str] | None:
     """Return the formula of each joint where the curve is the fit of one, else None."""
-    if move.planned.closed_form is None:
+    if move.planned.formula is None:
         return None
     factors = joint_factors(move.robot.joint_types, units)
     start = move.start.position / factors
     change = (move.planned.end.position - move.start.position) / factors
-    period = f"{move.duration:.10g}"
+    law = move.planned.formula.replace("{T}", f"{move.duration:.10g}")
     return {
-        name: f"{q:.10g}"
-        + (
-            f" {'-' if dq < 0 else '+'} {abs(dq):.10g} (t/{period} - sin(2 pi t/{period})/(2 pi))"
-            if dq
-            else ""
-        )
+        name: f"{q:.10g}" + (f" {'-' if dq < 0 else '+'} {abs(dq):.10g} ({law})" if dq else "")
         for name, q, dq in zip(move.robot.joint_names, start, change, strict=True)
     }
 

@@ -6,7 +6,6 @@ What reports and explanations say about the points that a move passes.
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from trajcli.checks.finding import Finding
 from trajcli.checks.verify import Verdict
 from trajcli.columns import joint_factors
 from trajcli.curves.extrema import Peaks
-from trajcli.errors import Amount, Problem, VerificationError, said
+from trajcli.errors import Problem, VerificationError
 from trajcli.job.report import (
     BindingReport,
     EventReport,
@@ -30,13 +29,10 @@ from trajcli.job.report import (
     WaypointReport,
 )
 from trajcli.kinematics.robot import QUANTITIES
-from trajcli.output.tool import tool_finding, tool_report
-from trajcli.planners.point_to_point.point_to_point import PointToPoint
-from trajcli.planners.tool_path.move import ToolPathMove
-from trajcli.planners.waypoints.through_points import ThroughPoints
+from trajcli.output.tool import tool_report
+from trajcli.planners.planner import PlannedMove
 from trajcli.planning.lower_bound import NoBound, fastest_duration
 from trajcli.planning.plan import Plan
-from trajcli.planning.retime import PlannedMove
 from trajcli.trajectory import Span
 from trajcli.units import Quantity, Units, unit_name
 from trajcli.version import __version__
@@ -46,7 +42,7 @@ _ROUNDING = 1e-12  # rad or m: what leaves the range by less does not leave it
 
 def waypoint_reports(move: PlannedMove, span: Span) -> list[WaypointReport] | None:
     """Return when each point is passed, and by how much beside it."""
-    passage = move.planned.passage
+    passage = move.planned.via_points
     if passage is None:
         return None
     times = np.clip(span.start + passage.times, span.start, span.end)
@@ -64,7 +60,7 @@ def outside_reports(move: PlannedMove, verdict: Verdict, position: int) -> list[
         verdict: Of the whole trajectory.
         position: Where the move stands among the moves.
     """
-    passage = move.planned.passage
+    passage = move.planned.via_points
     if passage is None:
         return None
     peaks = verdict.peaks[position][0]
@@ -86,7 +82,7 @@ def passing_in_units(move: PlannedMove, span: Span, verdict: Verdict, units: Uni
     factors = joint_factors(move.robot.joint_types, units)
     kinds = ["length" if kind == "prismatic" else "angle" for kind in move.robot.joint_types]
     words = [unit_name(Quantity(kind), units) for kind in kinds]  # type: ignore[arg-type]
-    passage = move.planned.passage
+    passage = move.planned.via_points
     waypoints = passage and [
         {"time": time, "joints": point, "missed": missed, "units": words}
         for time, point, missed in zip(
@@ -114,9 +110,6 @@ def passing_in_units(move: PlannedMove, span: Span, verdict: Verdict, units: Uni
     return {"origin": move.planned.origin, "waypoints": waypoints, "outside": told}
 
 
-_JUMPS = {"position_jump": 0, "velocity_jump": 1, "acceleration_jump": 2}
-
-
 def report_of(plan: Plan, *, reference: bool = False) -> Report:
     """Return the report of a plan.
 
@@ -132,7 +125,10 @@ def report_of(plan: Plan, *, reference: bool = False) -> Report:
         robot=plan.loaded.robot.name,
         duration=plan.trajectory.duration,
         moves=[_move(plan, index, reference=reference) for index in range(len(plan.moves))],
-        findings=[FindingReport(**asdict(finding)) for finding in verdict.findings],
+        findings=[
+            FindingReport(**{name: getattr(finding, name) for name in FindingReport.model_fields})
+            for finding in verdict.findings
+        ],
         events=[EventReport(kind=e.kind, message=e.message, move=e.move) for e in plan.events],
         steps=[StepReport(**vars(step)) for step in verdict.steps],
         unchecked=[UncheckedReport(joint=joint, quantity=quantity) for joint, quantity in verdict.unchecked],
@@ -186,9 +182,8 @@ def _peak(move: PlannedMove, joint: int, order: int, peaks: Peaks) -> PeakReport
 
 def reference_of(move: PlannedMove) -> ReferenceReport:
     """Return how a move compares with the shortest duration under its limits."""
-    if isinstance(move.planner, PointToPoint) and not move.planner.to.is_place:
-        # to where a velocity is reached fastest, another way may lead a little faster
-        reason = "the move leaves its end position open"
+    reason = move.planned.no_lower_bound
+    if reason is not None:
         return ReferenceReport(duration=None, ratio=None, joint=move.robot.joint_names[0], reason=reason)
     begins = move.planned.begins or move.start
     bound = fastest_duration(begins, move.planned.end, move.robot.limits)
@@ -205,65 +200,15 @@ def verification_error(plan: Plan) -> VerificationError:
 
 
 def _problem(plan: Plan, finding: Finding) -> Problem:
-    loaded, index = plan.loaded, finding.move or 0
-    text, amounts, hint = _said(plan, finding)
-    where = f"move {index} ({plan.moves[index].planner.tag}): "
+    index = finding.move or 0
+    span = plan.trajectory.spans[index]
     return Problem(
-        said(f"{where}{text}", amounts, loaded.say),
-        hint,
-        place=loaded.place_of_move(index),
+        f"move {index} ({span.planner}): {finding.text(plan.loaded.say)}",
+        finding.hint,
+        place=plan.loaded.place_of_move(index),
         move=index,
         joint=finding.joint,
-        time=finding.time - plan.trajectory.spans[index].start,
+        time=finding.time - span.start,
         value=finding.value,
         limit=finding.limit,
     )
-
-
-def _said(plan: Plan, finding: Finding) -> tuple[str, dict[str, Amount], str | None]:
-    """Return what a finding says, with the amounts in it, and what would fix it."""
-    if finding.joint is None:
-        return tool_finding(finding, _remedy(plan, plan.moves[finding.move or 0], finding))
-    joint = plan.trajectory.joint_names.index(finding.joint)
-    order = _JUMPS.get(finding.kind, QUANTITIES.index(finding.kind) if finding.kind in QUANTITIES else 0)
-    amounts = {"value": Amount(finding.value, order, joint), "limit": Amount(finding.limit, order, joint)}
-    quantity, move = QUANTITIES[order], plan.moves[finding.move or 0]
-    if finding.kind == "waypoint":
-        quantity, what, bound, hint = "path", "passes a waypoint at", ", it shall be {limit}", finding.hint
-    elif finding.kind in _JUMPS:
-        what, bound, hint = "jumps by", "", _jump_remedy(move, finding)
-    else:
-        what, bound, hint = "reaches", ", its limit is {limit}", _remedy(plan, move, finding)
-    text = f"the {quantity} of {finding.joint} {what} {{value}} at t = {finding.time:.9g} s{bound}"
-    return text, amounts, hint
-
-
-def _jump_remedy(move: PlannedMove, finding: Finding) -> str | None:
-    if finding.kind == "acceleration_jump" and isinstance(move.planner, ThroughPoints):
-        return "use spline with rule continuous_acceleration or quintic, or say limits: {jerk: null}"
-    if finding.kind == "acceleration_jump" and isinstance(move.planner, ToolPathMove):
-        return "use `law: {shape: quintic}` or jerk_limited, or say limits: {jerk: null}"
-    if finding.hint is not None or move.planned.begins is None:
-        return finding.hint
-    if finding.kind == "position_jump":
-        return "a blend centred on a point passed in motion begins before it: use `end_blends: inside`"
-    return "this rule leaves the velocities at its ends open: use clamped or continuous_acceleration"
-
-
-def _remedy(plan: Plan, move: PlannedMove, finding: Finding) -> str:
-    useless = "slowing down does not help: change the target, the start or the limit"
-    if finding.factor is None or (move.planner.when_over_limit or plan.loaded.job.when_over_limit) == "slow":
-        return useless
-    if move.start.at_rest and move.planned.end.at_rest:
-        lasting = move.duration * finding.factor
-        longer = f"{finding.factor:.6g} times longer ({lasting:.6g} s)"
-        return f"it must last {longer}, or say `when_over_limit: slow`"
-    if finding.joint is None:
-        return "say `when_over_limit: slow`"
-    order, joint = QUANTITIES.index(finding.kind), move.robot.joint_names.index(finding.joint)
-    ends = [
-        (s.velocity, s.acceleration)[order - 1][joint] for s in (move.start, move.planned.end) if order < 3
-    ]
-    if any(abs(value) > abs(finding.limit) and value * finding.limit > 0 for value in ends):
-        return f"{useless.partition(':')[0]}: the move starts or ends over its limit"
-    return "say `when_over_limit: slow`: it finds the shortest duration between these moving states"

@@ -1,8 +1,6 @@
 """What a report says about the tool on its path.
 
 The path of a tool as a drawing office would state it: lines, arcs, corners, and the law along it.
-
-What errors say about the tool on its path.
 """
 
 from __future__ import annotations
@@ -15,17 +13,13 @@ import numpy as np
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.job.report import LowestSpeedReport, ToolPeakReport, ToolReport
 from trajcli.output.polynomials import polynomial_intervals
-from trajcli.planners.tool_path.move import ToolPathMove
-from trajcli.planners.tool_path.path import PathMove
-from trajcli.planning.retime import PlannedMove
+from trajcli.planners.planner import PlannedMove
 from trajcli.trajectory import Span, Trajectory
 from trajcli.units import Quantity, Units, factor
 
 if TYPE_CHECKING:
     from trajcli.geometry.paths.pose import Screw
     from trajcli.kinematics.following.tool_path import ToolPath
-from trajcli.checks.finding import Finding
-from trajcli.errors import Amount
 
 _HELD = 0.999  # of the wanted speed: that much counts as holding it
 _EACH = 16  # times of a piece of the law at which its speed is looked at
@@ -56,8 +50,8 @@ def tool_report(trajectory: Trajectory, span: Span, move: PlannedMove) -> ToolRe
         shown = None if math.isinf(limit) else limit
         at = span.start + peak.time
         peaks.append(ToolPeakReport(quantity=name, value=peak.value, bound=peak.most, time=at, limit=shown))
-    deviation, turned = (float(sizes.max(initial=0.0)) for sizes in rows.beside)
-    wanted = wanted_speed(move)
+    deviation, turned = (float(sizes.max(initial=0.0)) for sizes in rows.deviation)
+    wanted = move.planned.wanted_speed
     held, lowest = _held(move, tool.law, wanted)
     return ToolReport(
         length=_length(tool.law),
@@ -74,18 +68,6 @@ def tool_report(trajectory: Trajectory, span: Span, move: PlannedMove) -> ToolRe
 
 def _length(law: PiecewisePolynomial) -> float:
     return float(law.piece_ends()[1][-1, 0])
-
-
-def wanted_speed(move: PlannedMove) -> float | None:
-    """Return the speed along the path that is asked for, m/s, or rad/s in place; None where none is."""
-    if not isinstance(move.planner, ToolPathMove) or move.planned.tool is None:
-        return None
-    law, limits = move.planner.law, move.robot.limits.tcp
-    if move.planned.tool.in_place:
-        speed = limits.angular_speed if law.angular_speed is None else law.angular_speed
-    else:
-        speed = limits.speed if law.speed is None else law.speed
-    return None if math.isinf(speed) or law.duration is not None else speed
 
 
 def _held(
@@ -136,8 +118,7 @@ def path_in_units(move: PlannedMove, units: Units) -> dict[str, Any] | None:
         {"start": s.start, "end": s.end, "local": s.local.tolist(), "absolute": s.absolute.tolist()}
         for s in polynomial_intervals(tool.law.breaks, tool.law.coefficients[:, :, 0] / scale)
     ]
-    overlaps = isinstance(move.planner, PathMove) and move.planner.corner == "overlap"
-    segments, corners = _drawing(tool.path, units, overlaps=overlaps)
+    segments, corners = _drawing(tool.path, units, overlaps=tool.overlaps)
     return {
         "length": float(tool.law.piece_ends()[1][-1, 0]) / scale,
         "unit": units.angle if tool.in_place else units.length,
@@ -223,28 +204,3 @@ def _segment(place: Any, units: Units) -> dict[str, Any]:  # noqa: ANN401
 
 def _plain(vector: Array) -> list[float]:
     return [float(value) + 0.0 for value in vector]
-
-
-_ORDERS = {"speed": 1, "acceleration": 2, "jerk": 3}
-
-
-def tool_finding(finding: Finding, remedy: str) -> tuple[str, dict[str, Amount], str | None]:
-    """Return what a finding about the tool says, with the amounts in it, and what would fix it."""
-    at = f"at t = {finding.time:.9g} s"
-    if finding.kind == "branch":
-        return f"the arm changes its branch {at}: it passes a singularity", {}, "move the path"
-    name = finding.kind.removeprefix("tool_")
-    if name == "acceleration_jump":
-        amounts = {"value": Amount(finding.value, 2, None, "length")}
-        return f"the acceleration of the tool along its path steps by {{value}} {at}", amounts, finding.hint
-    angular = name.startswith("angular") or name == "orientation"
-    order = _ORDERS.get(name.removeprefix("angular_"), 0)
-    amounts = {
-        key: Amount(value, order, None, "angle" if angular else "length")
-        for key, value in (("value", finding.value), ("limit", finding.limit))
-    }
-    if order == 0:
-        what = "is turned from its path by" if angular else "is beside its path by"
-        return f"the tool {what} {{value}} {at}, promised were {{limit}}", amounts, "this is a bug: report it"
-    quantity = name.replace("_", " ")
-    return f"the {quantity} of the tool reaches {{value}} {at}, its limit is {{limit}}", amounts, remedy

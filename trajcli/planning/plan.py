@@ -15,10 +15,9 @@ from trajcli.frozen import frozen
 from trajcli.job.limits import with_move_limits
 from trajcli.job.read import LoadedJob
 from trajcli.language.targets import Target
-from trajcli.planners.planner import Event, Planner
+from trajcli.planners.planner import Event, PlannedMove, Planner
 from trajcli.planning.resolve_poses import ResolvedPose, nearest_rotation_events, resolve_target, start_state
-from trajcli.planning.retime import PlannedMove, align_to_period, slow_to_limits
-from trajcli.trajectory import Span, State, Trajectory
+from trajcli.trajectory import State, Trajectory
 
 
 @frozen
@@ -77,10 +76,15 @@ def _plan_move(loaded: LoadedJob, index: int, planner: Planner, start: State) ->
     job = loaded.job
     robot = with_move_limits(loaded.robot, planner.limits, index)
     planned = planner.plan(start, robot)
-    move = PlannedMove(index, planner, start, robot, planned)
-    if (planner.when_over_limit or job.when_over_limit) == "slow":
+    over_limit = planner.when_over_limit or job.when_over_limit
+    move = PlannedMove(index, planner, start, robot, planned, over_limit)
+    if over_limit == "slow":
+        from trajcli.planning.retime import slow_to_limits
+
         move = slow_to_limits(move)
     if job.output.align:
+        from trajcli.planning.retime import align_to_period
+
         move = align_to_period(move, job.output.rate)
     return move
 
@@ -94,7 +98,7 @@ def _with_joints(planner: Planner, loaded: LoadedJob, state: State) -> tuple[Pla
         found[0] = reached
         return resolved
 
-    return planner.with_places(resolve, state.position), found[0]
+    return planner.with_joint_targets(resolve, state.position), found[0]
 
 
 def _handed_over(state: State, before: Planner | None, after: Planner) -> State:
@@ -133,14 +137,14 @@ def _joined(moves: list[PlannedMove], loaded: LoadedJob, first: State) -> Trajec
     spans, end = [], 0.0
     for move in moves:
         start, end = end, float(move.planned.curve.breaks[-1] + end)
-        spans.append(Span(move.index, move.planner.tag, start, end, move.planner.joins))
+        spans.append(move.span(start, end))
     robot, last = loaded.robot, moves[-1].planned.end
-    laws = tuple(_way_of(move) for move in moves)
+    laws = tuple(_law_of_tool(move) for move in moves)
     return Trajectory(curve, robot.joint_names, robot.joint_types, tuple(spans), first, last, laws)
 
 
-def _way_of(move: PlannedMove) -> PiecewisePolynomial | None:
-    """Return the way s(t) of the tool; while it turns in its place it has none."""
+def _law_of_tool(move: PlannedMove) -> PiecewisePolynomial | None:
+    """Return the time law s(t) of the tool along its path; while it turns in its place it has none."""
     tool = move.planned.tool
     return None if tool is None or tool.in_place else tool.law
 

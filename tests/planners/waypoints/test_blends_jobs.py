@@ -123,7 +123,7 @@ def test_the_rows_of_a_peer_lie_on_the_straight_pieces(case):
     made = blends(*timed(np.cumsum([0, *durations]), q), blend_durations=inputs["tacc"])
     assert not made.events
     curve = curve_of(made).evaluate(np.linspace(0, curve_of(made).duration, 100_001))
-    missed = made.moves[0].planned.passage.missed
+    missed = made.moves[0].planned.via_points.missed
     for row in np.array(case["expected"]["q"], dtype=float):
         at_point = (np.abs(q - row).max(axis=1) < 1e-9) & (missed.max(axis=1) > 0)
         room = np.linalg.norm(missed[at_point], axis=1).max(initial=0.0)
@@ -160,7 +160,7 @@ def test_missed_by_exactly_the_stated_distance(seed, ends):
         missed[[0, -1]] = 0
     else:
         assert shift == tau[0] / 2
-    np.testing.assert_allclose(planned.passage.missed, missed, atol=1e-12)
+    np.testing.assert_allclose(planned.via_points.missed, missed, atol=1e-12)
     np.testing.assert_allclose(np.abs(curve.evaluate(t + shift) - q), missed, atol=1e-12)
     assert_joins(curve, 1)
 
@@ -171,7 +171,7 @@ def test_exactly(seed, ends):
     t, q, rng = drawn(seed)
     tau = rng.uniform(0.05, 0.2, t.size)
     made = blends(*timed(t, q), blend_durations=tau.tolist(), end_blends=ends, exactly=True)
-    passage = made.moves[0].planned.passage
+    passage = made.moves[0].planned.via_points
     inner = slice(1, -1) if ends == "centred" else slice(None)
     assert_passes(made, passage.times[inner], q[inner])
     assert not passage.missed[inner].any()
@@ -259,7 +259,7 @@ def test_a_duration_stretches_the_fastest():
     assert centred.trajectory.duration == pytest.approx(20, rel=1e-12)  # the blends at the ends included
     ratio = 20 / fastest.trajectory.duration
     np.testing.assert_allclose(
-        slower.moves[0].planned.passage.times, fastest.moves[0].planned.passage.times * ratio, rtol=1e-9
+        slower.moves[0].planned.via_points.times, fastest.moves[0].planned.via_points.times * ratio, rtol=1e-9
     )
 
 

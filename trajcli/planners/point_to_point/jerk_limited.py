@@ -8,6 +8,7 @@ Why there is no jerk-limited motion, joint by joint.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
@@ -215,7 +216,9 @@ def plan_motion(request: Request, robot: Robot) -> Planned:
     if request.control == "position":
         return planned
     end = State(planned.curve.piece_ends()[1][-1], request.end.velocity, request.end.acceleration)
-    return Planned(planned.curve, end, None, planned.phases, planned.events, planned.arrivals)
+    # to where a velocity is reached fastest, another path may lead a little faster
+    reason = "the move leaves its end position open"
+    return replace(planned, end=end, law=None, no_lower_bound=reason)
 
 
 def _each(request: Request, tasks: Sequence[BoundaryProblem]) -> Planned:

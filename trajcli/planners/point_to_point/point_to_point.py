@@ -5,7 +5,7 @@ Stay where the arm stands.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
@@ -36,7 +36,7 @@ class PointToPoint(Planner):
 
     to: Annotated[NamedTarget, Field(description="The state in which the move ends, or the name of a point.")]
 
-    def with_places(self, resolve: Resolve, near: Array) -> Self:
+    def with_joint_targets(self, resolve: Resolve, near: Array) -> Self:
         """Return the planner with joints in the place of the target's pose."""
         return self.model_copy(update={"to": resolve(self.to, near)})
 
@@ -59,9 +59,9 @@ class PointToPoint(Planner):
         return self
 
 
-def standstill(state: State, duration: float) -> Planned:
+def standstill(state: State, duration: float, remedies: Mapping[str, str] | None = None) -> Planned:
     """Return the move that stays in `state`, which is at rest, for `duration` seconds, which may be zero."""
-    return Planned(constant(state.position, duration), state)
+    return Planned(constant(state.position, duration), state, remedies=remedies or {})
 
 
 def same_state(a: State, b: State) -> bool:

@@ -5,6 +5,7 @@ From a way of the tool to the planned move: law, joints, phases, and what there 
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field
@@ -12,7 +13,7 @@ from pydantic import Field
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import frozen
-from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.language.numbers import Model, Number
 from trajcli.language.targets import Configuration
 from trajcli.planners.planner import Event, Planned, Planner
@@ -113,10 +114,11 @@ class ToolPathMove(Planner):
         way = self.way(forward(robot, start.position), robot)
         if way.path.length == 0:
             check_arrival(way, start.position, robot)
-            return standstill(start, self.law.duration or self.law.minimum_duration or 0.0)
+            return standstill(start, self.law.duration or self.law.minimum_duration or 0.0, REMEDIES)
         return moved_along(way, self.law, self.tolerance, self.tag, start.position, robot)
 
 
+REMEDIES = {"acceleration_jump": "use `law: {shape: quintic}` or jerk_limited, or say limits: {jerk: null}"}
 _ARRIVED = 1e-5  # rad or m: joint values that are given, and reached on the way
 
 
@@ -148,8 +150,17 @@ def moved_along(
         resting(end),
         phases=made.phases,
         tool=made.motion,
+        wanted_speed=_wanted_speed(spec, robot.limits.tcp, in_place=made.motion.in_place),
+        remedies=REMEDIES,
         events=(*way.events, *made.events),
     )
+
+
+def _wanted_speed(spec: LawSpec, limits: ToolLimits, *, in_place: bool) -> float | None:
+    """Return the speed along the path that is asked for, m/s, or rad/s in place; None where none is."""
+    given, limit = (spec.angular_speed, limits.angular_speed) if in_place else (spec.speed, limits.speed)
+    speed = limit if given is None else given
+    return None if math.isinf(speed) or spec.duration is not None else speed
 
 
 def _made(

@@ -316,7 +316,7 @@ def chain_path(before: Array, move: PathMove, robot: Robot) -> PlannedPath:
         return way
     tolerance = Tolerance(move.tolerance.position, move.tolerance.angle)
     motion = overlapped(before, places, targets, move, robot.limits.tcp, tolerance)
-    return replace(way, overlap=replace(motion, path=path), events=notes_of(places))
+    return replace(way, overlap=replace(motion, path=path, overlaps=True), events=notes_of(places))
 
 
 def _segments(before: Array, move: PathMove, robot: Robot) -> tuple[list[PositionCurve], list[ToolTarget]]:

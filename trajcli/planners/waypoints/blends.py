@@ -34,7 +34,7 @@ from trajcli.language.recorded import Recorded
 from trajcli.language.targets import JointAccelerationMagnitudes
 from trajcli.planners.planner import Event, Phase, Planned
 from trajcli.planners.point_to_point.point_to_point import missing_limit, require_rest, standstill
-from trajcli.planners.waypoints.through_points import PointTable, ThroughPoints
+from trajcli.planners.waypoints.through_points import OPEN_END_REMEDIES, REMEDIES, PointTable, ThroughPoints
 from trajcli.trajectory import State, ViaPoints
 from trajcli.units import Quantity
 
@@ -230,7 +230,7 @@ class Blends(ThroughPoints):
         if points.times is None or start.acceleration.any():
             require_rest(self.tag, start, robot)
         if points.times is None and not np.ptp(points.positions, axis=0).any():
-            return standstill(points.target, self.duration or 0.0)
+            return standstill(points.target, self.duration or 0.0, REMEDIES)
         times, durations = self._asked(points, robot)
         try:
             made = self._made(points, times, durations, robot)
@@ -241,10 +241,11 @@ class Blends(ThroughPoints):
             made.curve,
             last,
             phases=_phases(made),
-            passage=ViaPoints(times + made.shift, points.positions, made.missed),
+            via_points=ViaPoints(times + made.shift, points.positions, made.missed),
             origin=made.shift,
             begins=first if start.velocity.any() else None,
             events=(*points.events, *_shrunk(made, robot)),
+            remedies=OPEN_END_REMEDIES if start.velocity.any() else REMEDIES,
         )
 
     def _asked(self, points: PointTable, robot: Robot) -> tuple[Array, Array | None]:
