@@ -1,137 +1,95 @@
-"""From a plan to its report, and to the errors of a verdict.
-
-What reports and explanations say about the points that a move passes.
-"""
+"""Report of a plan, and the errors of its verdict."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from trajcli.checks.finding import Finding
 from trajcli.checks.verify import Verdict
-from trajcli.columns import joint_factors
 from trajcli.curves.extrema import Peaks
+from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.errors import Problem, VerificationError
 from trajcli.job.report import (
     BindingReport,
     EventReport,
     FindingReport,
+    LowestSpeedReport,
     MoveReport,
     OutsideReport,
     PeakReport,
     ReferenceReport,
     Report,
     StepReport,
+    ToolPeakReport,
+    ToolReport,
     UncheckedReport,
     WaypointReport,
 )
-from trajcli.kinematics.robot import QUANTITIES
-from trajcli.output.tool import tool_report
+from trajcli.kinematics.robot import QUANTITIES, JointType
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.lower_bound import NoBound, fastest_duration
 from trajcli.planning.plan import Plan
-from trajcli.trajectory import Span
-from trajcli.units import Quantity, Units, unit_name
+from trajcli.trajectory import Span, Trajectory
 from trajcli.version import __version__
 
+if TYPE_CHECKING:
+    from trajcli.checks.tool import SampledTool
+
 _ROUNDING = 1e-12  # rad or m: what leaves the range by less does not leave it
+_HELD = 0.999  # of the wanted speed: that much counts as holding it
+_EACH = 16  # times of a piece of the law at which its speed is looked at
+_NEAR = 0.02  # of the duration: a limit that binds as near as this is the reason
+_AT_REST = 1e-6  # SI: a tool that turns, or moves, less than that does not
+_RATES = ("", "/s", "/s^2", "/s^3")
 
 
-def waypoint_reports(move: PlannedMove, span: Span) -> list[WaypointReport] | None:
-    """Return when each point is passed, and by how much beside it."""
-    passage = move.planned.via_points
-    if passage is None:
-        return None
-    times = np.clip(span.start + passage.times, span.start, span.end)
-    return [
-        WaypointReport(time=time, missed=missed)
-        for time, missed in zip(times.tolist(), passage.missed.tolist(), strict=True)
-    ]
-
-
-def outside_reports(move: PlannedMove, verdict: Verdict, position: int) -> list[OutsideReport] | None:
-    """Return the joints that leave the range of the waypoints, above and below, and how far.
-
-    Args:
-        move: The move.
-        verdict: Of the whole trajectory.
-        position: Where the move stands among the moves.
-    """
-    passage = move.planned.via_points
-    if passage is None:
-        return None
-    peaks = verdict.peaks[position][0]
-    ways = [
-        (-1.0, passage.points.min(axis=0), peaks.low, peaks.low_time),
-        (1.0, passage.points.max(axis=0), peaks.high, peaks.high_time),
-    ]
-    found = []
-    for joint, name in enumerate(move.robot.joint_names):
-        for sign, bound, extreme, time in ways:
-            beyond = float(extreme[joint] - bound[joint])
-            if sign * beyond > _ROUNDING * max(1.0, abs(float(bound[joint]))):
-                found.append(OutsideReport(joint=name, beyond=beyond, time=float(time[joint])))
-    return found
-
-
-def passing_in_units(move: PlannedMove, span: Span, verdict: Verdict, units: Units) -> dict[str, Any]:
-    """Return {origin, waypoints, outside} of a move, in the job's units, times from the start of the move."""
-    factors = joint_factors(move.robot.joint_types, units)
-    kinds = ["length" if kind == "prismatic" else "angle" for kind in move.robot.joint_types]
-    words = [unit_name(Quantity(kind), units) for kind in kinds]  # type: ignore[arg-type]
-    passage = move.planned.via_points
-    waypoints = passage and [
-        {"time": time, "joints": point, "missed": missed, "units": words}
-        for time, point, missed in zip(
-            passage.times.tolist(),
-            (passage.points / factors).tolist(),
-            (passage.missed / factors).tolist(),
-            strict=True,
-        )
-    ]
-    outside = outside_reports(move, verdict, span.index)
-    names = move.robot.joint_names
-    told = (
-        None
-        if outside is None
-        else [
-            {
-                "joint": one.joint,
-                "beyond": one.beyond / float(factors[names.index(one.joint)]),
-                "unit": words[names.index(one.joint)],
-                "time": one.time - span.start,
-            }
-            for one in outside
-        ]
-    )
-    return {"origin": move.planned.origin, "waypoints": waypoints, "outside": told}
+def joint_units(joint_types: tuple[JointType, ...], order: int = 0) -> list[str]:
+    """Return the SI unit of each joint's position, or of its time derivative of an order."""
+    return [("m" if kind == "prismatic" else "rad") + _RATES[order] for kind in joint_types]
 
 
 def report_of(plan: Plan, *, reference: bool = False) -> Report:
-    """Return the report of a plan.
+    """Return the report of a plan, in SI.
 
     Args:
         plan: The plan.
         reference: Whether each move is compared with ruckig's bound.
     """
     verdict = plan.verdict
+    units = dict(zip(plan.trajectory.joint_names, joint_units(plan.trajectory.joint_types, 2), strict=True))
     return Report(
         trajcli=__version__,
         verdict="verified" if verdict.passed else "violated",
         job=plan.loaded.name,
         robot=plan.loaded.robot.name,
         duration=plan.trajectory.duration,
-        moves=[_move(plan, index, reference=reference) for index in range(len(plan.moves))],
-        findings=[
-            FindingReport(**{name: getattr(finding, name) for name in FindingReport.model_fields})
-            for finding in verdict.findings
-        ],
+        moves=tuple(_move(plan, index, reference=reference) for index in range(len(plan.moves))),
+        findings=[_finding(plan, finding) for finding in verdict.findings],
         events=[EventReport(kind=e.kind, message=e.message, move=e.move) for e in plan.events],
-        steps=[StepReport(**vars(step)) for step in verdict.steps],
+        steps=[StepReport(**vars(step), unit=units[step.joint]) for step in verdict.steps],
         unchecked=[UncheckedReport(joint=joint, quantity=quantity) for joint, quantity in verdict.unchecked],
+    )
+
+
+def _finding(plan: Plan, finding: Finding) -> FindingReport:
+    amount = finding.amounts.get("value")
+    return FindingReport(
+        move=finding.move,
+        joint=finding.joint,
+        kind=finding.kind,
+        value=finding.value,
+        limit=finding.limit,
+        time=finding.time,
+        method=finding.method,
+        factor=finding.factor,
+        hint=finding.hint,
+        message=finding.text(plan.loaded.say),
+        unit=""
+        if amount is None
+        else ("m" if amount.dimension == "length" else "rad") + _RATES[amount.order],
     )
 
 
@@ -155,9 +113,9 @@ def _move(plan: Plan, index: int, *, reference: bool) -> MoveReport:
         stretch=move.stretch,
         peaks=peaks,
         binding=binding,
-        waypoints=waypoint_reports(move, span),
-        outside=outside_reports(move, plan.verdict, index),
-        tool=None if move.planned.tool is None else tool_report(plan.trajectory, span, move),
+        waypoints=_waypoints(move, span),
+        outside=_outside(move, plan.verdict, index),
+        tool=_tool(plan.trajectory, span, move),
         reference=reference_of(move) if reference else None,
     )
 
@@ -177,7 +135,48 @@ def _peak(move: PlannedMove, joint: int, order: int, peaks: Peaks) -> PeakReport
         high_time=float(peaks.high_time[joint]),
         limit=(below if math.isfinite(below) else None, above if math.isfinite(above) else None),
         used=max(0.0, *parts) if parts else None,
+        unit=joint_units(move.robot.joint_types[joint : joint + 1], order)[0],
     )
+
+
+def _waypoints(move: PlannedMove, span: Span) -> tuple[WaypointReport, ...] | None:
+    """Return when each point is passed, and at what distance."""
+    points = move.planned.via_points
+    if points is None:
+        return None
+    times = np.clip(span.start + points.times, span.start, span.end).tolist()
+    units = joint_units(move.robot.joint_types)
+    return tuple(
+        WaypointReport(time=time, missed=missed, units=units)
+        for time, missed in zip(times, points.missed.tolist(), strict=True)
+    )
+
+
+def _outside(move: PlannedMove, verdict: Verdict, index: int) -> tuple[OutsideReport, ...] | None:
+    """Return the joints that leave the range of the waypoints, above and below, and how far.
+
+    Args:
+        move: The move.
+        verdict: Of the whole trajectory.
+        index: Number of the move among the moves.
+    """
+    points = move.planned.via_points
+    if points is None:
+        return None
+    peaks = verdict.peaks[index][0]
+    sides = [
+        (-1.0, points.points.min(axis=0), peaks.low, peaks.low_time),
+        (1.0, points.points.max(axis=0), peaks.high, peaks.high_time),
+    ]
+    units = joint_units(move.robot.joint_types)
+    reports = []
+    for joint, name in enumerate(move.robot.joint_names):
+        for sign, bound, extreme, time in sides:
+            beyond = float(extreme[joint] - bound[joint])
+            if sign * beyond > _ROUNDING * max(1.0, abs(float(bound[joint]))):
+                at = float(time[joint])
+                reports.append(OutsideReport(joint=name, beyond=beyond, time=at, unit=units[joint]))
+    return tuple(reports)
 
 
 def reference_of(move: PlannedMove) -> ReferenceReport:
@@ -192,6 +191,90 @@ def reference_of(move: PlannedMove) -> ReferenceReport:
         return ReferenceReport(duration=None, ratio=None, joint=name, reason=bound.reason)
     ratio = move.duration / bound.duration if bound.duration > 0 else None
     return ReferenceReport(duration=bound.duration, ratio=ratio, joint=name)
+
+
+def _tool(trajectory: Trajectory, span: Span, move: PlannedMove) -> ToolReport | None:
+    """Return the report of the tool of a move along a path; None for a move in joint space."""
+    motion = move.planned.tool
+    if motion is None:
+        return None
+    from trajcli.checks.tool import SampledTool
+
+    tool = SampledTool(trajectory, span, move.robot, motion)
+    deviation, turned = (float(sizes.max(initial=0.0)) for sizes in tool.deviation)
+    unit = "rad" if motion.in_place else "m"
+    wanted = move.planned.wanted_speed
+    held, lowest = (None, None) if wanted is None else _held(move, motion.law, wanted, unit)
+    return ToolReport(
+        length=float(motion.law.piece_ends()[1][-1, 0]),
+        unit=unit,
+        ruled_by=motion.ruled_by,
+        wanted_speed=wanted,
+        speed_unit=f"{unit}/s",
+        held=held,
+        lowest=lowest,
+        peaks=_tool_peaks(tool),
+        deviation=deviation,
+        turned=turned,
+    )
+
+
+def _tool_peaks(tool: SampledTool) -> list[ToolPeakReport]:
+    from trajcli.checks.tool import SPEEDS
+
+    reports = []
+    for _, name, order, _ in SPEEDS:
+        peak, limit = tool.peaks[name], float(getattr(tool.robot.limits.tcp, name))
+        report = ToolPeakReport(
+            quantity=name,
+            value=peak.value,
+            bound=peak.most,
+            time=tool.span.start + peak.time,
+            limit=None if math.isinf(limit) else limit,
+            unit=("rad" if name.startswith("angular_") else "m") + _RATES[order],
+            negligible=peak.value <= _AT_REST,
+        )
+        reports.append(report)
+    return reports
+
+
+def _held(
+    move: PlannedMove, law: PiecewisePolynomial, wanted: float, unit: str
+) -> tuple[float, LowestSpeedReport | None]:
+    """Return over which part of the path the wanted speed is held, and where it is lowest in between."""
+    part = np.linspace(0.0, 1.0, _EACH + 1)[:-1]
+    times = np.append((law.breaks[:-1, None] + law.lengths[:, None] * part).reshape(-1), law.end)
+    s, speeds = law.evaluate_orders(times, (0, 1))[:, :, 0].T
+    fast = speeds >= _HELD * wanted
+    both = fast[1:] & fast[:-1]
+    held = float(np.diff(s)[both].sum() / s[-1])
+    if not fast.any():
+        return held, None
+    first, last = int(fast.argmax()), int(fast.size - 1 - fast[::-1].argmax())
+    slowest = first + int(speeds[first : last + 1].argmin())
+    if speeds[slowest] >= _HELD * wanted:
+        return held, None
+    lowest = LowestSpeedReport(
+        speed=float(speeds[slowest]),
+        place=float(s[slowest]),
+        joint=_limiting_joint(move, float(times[slowest])),
+        unit=f"{unit}/s",
+        place_unit=unit,
+    )
+    return held, lowest
+
+
+def _limiting_joint(move: PlannedMove, time: float) -> str | None:
+    """Return the joint whose limit binds nearest to a time of the move."""
+    distances = [
+        (max(phase.start - time, time - phase.end, 0.0), phase.joint)
+        for phase in move.planned.phases
+        if phase.joint is not None
+    ]
+    if not distances:
+        return None
+    distance, joint = min(distances)
+    return move.robot.joint_names[joint] if distance <= _NEAR * move.duration else None
 
 
 def verification_error(plan: Plan) -> VerificationError:
