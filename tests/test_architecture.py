@@ -171,6 +171,36 @@ def test_heavy_libraries_are_imported_inside_functions(name: str) -> None:
     assert not wrong, "\n".join(wrong)
 
 
+PLANNER_CONTRACT = {"Event", "Phase", "Planned", "PlannedMove", "Planner", "WhenOverLimit"}
+ABOVE_THE_PLANNERS = ("planning/", "comparison/", "queries/", "output/", "cli/")
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name.startswith(ABOVE_THE_PLANNERS)])
+def test_nothing_above_the_planners_asks_for_one(name: str) -> None:
+    """A planner's answer says what others need: neither its class nor its name in jobs is asked for."""
+    from trajcli.planners import PLANNERS
+
+    classes = {family.__name__ for planner in PLANNERS.values() for family in planner.__mro__[:-1]} - {
+        "Planner"
+    }
+    wrong = [
+        f"{name}:{line} imports {imported}"
+        for imported, line in imports_of_file(HOUSE / name)
+        if imported.rpartition(".")[2] in classes
+        or (
+            imported.startswith("trajcli.planners.planner.")
+            and imported.rpartition(".")[2] not in PLANNER_CONTRACT
+        )
+    ]
+    compared = [node for node in ast.walk(tree_of(HOUSE / name)) if isinstance(node, ast.Compare)]
+    for node in compared:
+        words = {leaf.value for leaf in ast.walk(node) if isinstance(leaf, ast.Constant)}
+        asks = {leaf.attr for leaf in ast.walk(node) if isinstance(leaf, ast.Attribute)} & {"tag", "planner"}
+        if words & PLANNERS.keys() and asks:
+            wrong.append(f"{name}:{node.lineno} compares {ast.unparse(node)}")
+    assert not wrong, "\n".join(wrong)
+
+
 def test_nothing_has_a_name_that_says_nothing() -> None:
     parts = {part for name in NAMES for part in name.removesuffix(".py").split("/")}
     words = {word for part in parts for word in part.split("_")}

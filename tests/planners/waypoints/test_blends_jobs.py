@@ -38,7 +38,7 @@ def jobs_of(case):
 def test_the_slides(case):
     inputs, expected, within = case["inputs"], case["expected"], case["tolerance"]
     for made in jobs_of(case):
-        told = explanation(made)["moves"][0]
+        told = explanation(made).model_dump()["moves"][0]
         assert -told["origin"] == pytest.approx(expected["start_time"], abs=within)
         assert told["duration"] - told["origin"] == pytest.approx(expected["end_time"], abs=within)
         missed = [point["missed"][0] for point in told["waypoints"]]
@@ -103,11 +103,15 @@ def test_craig(case):
     made = blends(
         start, points, acceleration=inputs["acceleration"], end_blends="inside", units={"angle": "deg"}
     )
-    phases = {p["name"]: p["end"] - p["start"] for p in explanation(made)["moves"][0]["phases"]}
+    phases = {p["name"]: p["end"] - p["start"] for p in explanation(made).model_dump()["moves"][0]["phases"]}
     got = [phases[f"blend {k}"] for k in range(4)]
     np.testing.assert_allclose(got, expected["blend_times"], atol=case["tolerance"])
     curve = curve_of(made)
-    middles = [p["start"] + 1e-6 for p in explanation(made)["moves"][0]["phases"] if p["name"] == "straight"]
+    middles = [
+        p["start"] + 1e-6
+        for p in explanation(made).model_dump()["moves"][0]["phases"]
+        if p["name"] == "straight"
+    ]
     speeds = np.degrees([curve.evaluate(t, 1)[0] for t in middles])
     np.testing.assert_allclose(speeds, expected["segment_velocities"], atol=case["tolerance"])
 
@@ -197,7 +201,7 @@ def test_blends_that_would_overlap_are_shrunk():
     (event,) = made.events
     assert event.kind == "shrunk"
     assert event.message.startswith("the blend at point 1 was shortened from 1.9 s to ")
-    phases = explanation(made)["moves"][0]["phases"]
+    phases = explanation(made).model_dump()["moves"][0]["phases"]
     ends = [(p["start"], p["end"]) for p in phases if p["name"].startswith("blend")]
     assert all(b[0] >= a[1] - 1e-12 for a, b in pairwise(ends))
 

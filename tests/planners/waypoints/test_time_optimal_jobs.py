@@ -187,7 +187,7 @@ def test_a_longer_duration_is_kept():
 
 def test_where_which_limit_binds():
     """A trapezoid of the joint that is slowest: accelerate, cruise, brake."""
-    told = explanation(fastest([[0, 0], [1, 3.0]]))["moves"][0]
+    told = explanation(fastest([[0, 0], [1, 3.0]])).model_dump()["moves"][0]
     phases = [(p["name"], p["joint"]) for p in told["phases"]]
     assert phases == [("acceleration +", "j2"), ("velocity +", "j2"), ("acceleration -", "j2")]
     borders = [p["end"] for p in told["phases"]]
