@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from functools import cache
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic import Field, SerializerFunctionWrapHandler, TypeAdapter, model_serializer
 
 from trajcli.job.report import (
     MeasuredIn,
@@ -30,6 +32,16 @@ class PolynomialReport(ReportPart):
     ]
     absolute: Annotated[Vector, MeasuredIn(), Field(description="Coefficients in powers of t, ascending.")]
     unit: UnitName
+
+
+def polynomial_reports(rows: Iterable[dict[str, Any]]) -> list[PolynomialReport]:
+    """Return the reports that have these fields: a long motion has thousands."""
+    return _polynomials().validate_python(list(rows))
+
+
+@cache
+def _polynomials() -> TypeAdapter[list[PolynomialReport]]:
+    return TypeAdapter(list[PolynomialReport])
 
 
 class _Sparse(ReportPart):

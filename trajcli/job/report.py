@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import BaseModel, ConfigDict, Field
 
 from trajcli.frozen import comparable
-from trajcli.units import Quantity, Units, factor
+from trajcli.units import AngleUnit, LengthUnit, Quantity, Units, factor
 
 Part = TypeVar("Part", bound="ReportPart")
 ReportSeconds = Annotated[float, Field(description="Seconds.")]
@@ -65,25 +65,31 @@ def _measured(part: type[ReportPart]) -> dict[str, str]:
 
 
 def _converted(value: Any, unit: str | list[str], units: Units) -> Any:  # noqa: ANN401
-    if value is None:
-        return None
-    if not isinstance(value, list | tuple):
-        return value / _in_si(str(unit), units)[0]
-    each = [unit] * len(value) if isinstance(unit, str) else unit
-    return type(value)(_converted(one, name, units) for one, name in zip(value, each, strict=True))
+    """Return a number, or several, in SI, in the units of the job."""
+    if isinstance(value, list | tuple):
+        factors = [_in_job(each, units.angle, units.length)[0] for each in _each(unit, len(value))]
+        pairs = zip(value, factors, strict=True)
+        return type(value)(None if number is None else number / factor for number, factor in pairs)
+    return None if value is None else value / _in_job(str(unit), units.angle, units.length)[0]
 
 
 def _named(unit: str | list[str], units: Units) -> str | list[str]:
-    return _in_si(unit, units)[1] if isinstance(unit, str) else [_in_si(each, units)[1] for each in unit]
+    names = [_in_job(each, units.angle, units.length)[1] for each in _each(unit, 1)]
+    return names[0] if isinstance(unit, str) else names
+
+
+def _each(unit: str | list[str], count: int) -> list[str]:
+    return [unit] * count if isinstance(unit, str) else unit
 
 
 @cache
-def _in_si(unit: str, units: Units) -> tuple[float, str]:
-    """Return the SI value of one unit of the job that measures the same as an SI unit, and its name."""
+def _in_job(unit: str, angle: AngleUnit, length: LengthUnit) -> tuple[float, str]:
+    """Return the SI value of the job's unit that stands for an SI unit, and its name."""
     start, slash, rest = unit.partition("/")
-    if start == "rad":
-        return factor(Quantity("angle"), units), units.angle + slash + rest
-    return (factor(Quantity("length"), units), units.length + slash + rest) if start == "m" else (1.0, unit)
+    if start not in ("rad", "m"):
+        return 1.0, unit
+    quantity = Quantity("angle" if start == "rad" else "length")
+    return factor(quantity, Units(angle, length)), (angle if start == "rad" else length) + slash + rest
 
 
 class PeakReport(ReportPart):

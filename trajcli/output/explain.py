@@ -5,6 +5,7 @@ Polynomials stand as a textbook prints them: piece by piece, in local and absolu
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -31,8 +32,9 @@ from trajcli.job.explanation import (
     ScrewSegmentReport,
     SegmentReport,
     UnitsReport,
+    polynomial_reports,
 )
-from trajcli.job.report import MoveReport, in_units
+from trajcli.job.report import MoveReport, WaypointReport, in_units
 from trajcli.output.report import joint_units, report_of
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan
@@ -87,7 +89,7 @@ def _move(plan: Plan, index: int, report: MoveReport) -> ExplainedMove:
         "binding_phases": planned.binding_phases,
         "arrivals": None if arrivals is None else dict(zip(names, arrivals, strict=True)),
         "origin": planned.origin,
-        "waypoints": _waypoints(move, units),
+        "waypoints": _waypoints(move, report.waypoints, units),
         "outside": report.outside
         and tuple(
             ExplainedOutside(**{**one.__dict__, "time": one.time - report.start}) for one in report.outside
@@ -97,16 +99,23 @@ def _move(plan: Plan, index: int, report: MoveReport) -> ExplainedMove:
     return ExplainedMove(**{**report.__dict__, **own})
 
 
-def _waypoints(move: PlannedMove, units: Units) -> tuple[ExplainedWaypoint, ...] | None:
-    """Return the points that a move passes, times from its start."""
+def _waypoints(
+    move: PlannedMove, reports: Sequence[WaypointReport] | None, units: Units
+) -> tuple[ExplainedWaypoint, ...] | None:
+    """Return the points that a move passes, times from its start.
+
+    Args:
+        move: The move.
+        reports: Of its points, in the units of the job.
+        units: Of the job.
+    """
     points = move.planned.via_points
-    if points is None:
+    if points is None or reports is None:
         return None
-    names = joint_units(move.robot.joint_types)
-    rows = zip(points.times.tolist(), points.points.tolist(), points.missed.tolist(), strict=True)
+    joints = (points.points / joint_factors(move.robot.joint_types, units)).tolist()
     return tuple(
-        in_units(ExplainedWaypoint(time=time, joints=joints, missed=missed, units=names), units)
-        for time, joints, missed in rows
+        ExplainedWaypoint(time=time, joints=values, missed=report.missed, units=report.units)
+        for time, values, report in zip(points.times.tolist(), joints, reports, strict=True)
     )
 
 
@@ -277,22 +286,12 @@ def polynomial_intervals(
     for piece in range(1, len(lasts)):
         if not (join and like[piece] and _equal(absolute[firsts[-1]], absolute[piece], ends[piece], _SAME)):
             firsts.append(piece)
-    return [
-        PolynomialReport(
-            start=start,
-            end=lasts[after - 1],
-            local=own,
-            absolute=whole,
-            unit=unit,
-        )
-        for start, own, whole, after in zip(
-            starts[firsts].tolist(),
-            local[firsts].tolist(),
-            absolute[firsts].tolist(),
-            [*firsts[1:], len(lasts)],
-            strict=True,
-        )
-    ]
+    afters = [*firsts[1:], len(lasts)]
+    columns = (starts[firsts].tolist(), local[firsts].tolist(), absolute[firsts].tolist(), afters)
+    return polynomial_reports(
+        {"start": start, "end": lasts[after - 1], "local": own, "absolute": whole, "unit": unit}
+        for start, own, whole, after in zip(*columns, strict=True)
+    )
 
 
 def _without_noise(coefficients: Array, durations: Array) -> Array:
