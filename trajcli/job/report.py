@@ -121,7 +121,7 @@ class BindingReport(ReportPart):
 
 
 class ReferenceReport(ReportPart):
-    """The shortest duration that any point-to-point move may have under the same limits, found by ruckig."""
+    """The shortest duration that any point-to-point move may have under the same limits, from ruckig."""
 
     duration: Annotated[float | None, Field(description="Seconds; null where there is no bound.")]
     ratio: Annotated[
@@ -138,7 +138,7 @@ class WaypointReport(ReportPart):
     missed: Annotated[
         list[float],
         MeasuredIn("units"),
-        Field(description="By how much each joint passes beside it, SI; zero where it goes through."),
+        Field(description="Distance at which each joint passes it, SI; zero where it goes through."),
     ]
     units: Annotated[list[str], Field(description="Unit of each joint.")]
 
@@ -266,7 +266,7 @@ class FindingReport(ReportPart):
 
 
 class EventReport(ReportPart):
-    """A concession that was made."""
+    """A concession."""
 
     kind: str
     message: str

@@ -1,4 +1,4 @@
-"""What every planner is and gives back."""
+"""Contract of planners: what each is given and what it returns."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Phase:
 
 @comparable
 class Event:
-    """A concession that was made, and would otherwise go unnoticed; or a remark on how a curve was found.
+    """A concession, which would otherwise go unnoticed; or a remark on how a curve was computed.
 
     Attributes:
         kind: A stable word for programs, such as "slowed".
@@ -70,7 +70,7 @@ class Event:
 
 
 def stretched(factor: float) -> Event:
-    """Return the event of a time-optimal law that lasts `factor` times longer than it was found."""
+    """Return the event of a time-optimal law that lasts `factor` times longer than it was computed."""
     text = f"stretched {factor:.9g} times to keep all limits between the places"
     return Event("stretched" if factor > 1 + _LITTLE else "refined", text)
 
@@ -150,7 +150,7 @@ class Planner(Model):
         return self.continuity
 
     def with_joint_targets(self, resolve: Resolve, near: Array) -> Self:
-        """Return the planner with joints in the place of poses that it goes to in joint space.
+        """Return the planner with joints instead of the poses that it goes to in joint space.
 
         Args:
             resolve: From a target, and joint values (n,) to be near to, to the same target by its joints.
@@ -162,7 +162,7 @@ class Planner(Model):
         """Return the planner of the same move over `duration` seconds.
 
         Raises:
-            PlanningError: When it cannot be told.
+            PlanningError: When it has no such field.
         """
         fields = type(self).model_fields
         names = [name for name in ("duration", "minimum_duration") if name in fields]

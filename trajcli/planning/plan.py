@@ -32,7 +32,7 @@ class Plan:
         loaded: The job.
         moves: Its moves, in order.
         trajectory: All of them, joined.
-        verdict: What the checks found.
+        verdict: Of the checks.
         events: Concessions, in order of the moves; the job's own first.
         poses: How poses are reached, by the index of the move that goes there, or None for the job's start.
     """
@@ -129,7 +129,7 @@ def _first_state(loaded: LoadedJob, first: PlannedMove, events: list[Event]) -> 
     """Return the state in which the trajectory starts.
 
     Where the job does not say how fast, and the first move's method leaves that open, it is the method's. So
-    is the place where a first blend begins that is centred on a point passed in motion.
+    is the position in which a first blend begins that is centred on a point passed in motion.
     """
     begins, given = first.planned.begins, loaded.job.start.velocity
     if begins is None or (given is not None and not np.array_equal(begins.velocity, first.start.velocity)):
