@@ -12,7 +12,7 @@ from trajcli.checks.tool import SampledTool, check_tool
 from trajcli.checks.verify import verify
 from trajcli.curves.hermite import hermite_pieces
 from trajcli.curves.operations import scale_time
-from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.curves.piecewise import PiecewisePolynomial, concatenate, constant
 from trajcli.geometry.paths.orientation import AxisAngleOrientation, SegmentProgress
 from trajcli.geometry.paths.pose import PoseCurve
 from trajcli.geometry.paths.position import Line
@@ -289,6 +289,16 @@ def test_a_wrist_that_passes_its_middle_changes_the_branch():
     assert found.kind == "branch"
     crossing = curve.evaluate(found.time)[4]
     assert abs(crossing) < 0.11  # the first of eight rows of a piece behind it
+
+
+def test_times_are_those_of_the_whole_trajectory():
+    slow = with_limits(RIGHT, angular_speed=SPEED * TURN / LENGTH / 2)
+    still = constant(RIGHT.trajectory.curve.evaluate(0.0), 1.0)
+    whole = trajectory_of(RIGHT.robot, concatenate([still, RIGHT.trajectory.curve]))
+    later = dataclasses.replace(slow, trajectory=whole, span=Span(1, "line", 1.0, 1.0 + DURATION, 2))
+    (alone,), (after,) = judged(slow), judged(later)
+    assert (after.move, after.time) == (1, pytest.approx(alone.time + 1.0))
+    assert f"at t = {after.time:.9g} s" in after.text()
 
 
 def said(rows: SampledTool, kind: str, **promised) -> tuple[str, str | None]:

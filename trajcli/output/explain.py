@@ -38,7 +38,7 @@ from trajcli.job.report import MoveReport, WaypointReport, in_units
 from trajcli.output.report import joint_units, report_of
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan
-from trajcli.units import Units
+from trajcli.units import Quantity, Units, factor
 
 if TYPE_CHECKING:
     from trajcli.geometry.paths.chain import Corner
@@ -94,7 +94,7 @@ def _move(plan: Plan, index: int, report: MoveReport) -> ExplainedMove:
         and tuple(
             ExplainedOutside(**{**one.__dict__, "time": one.time - report.start}) for one in report.outside
         ),
-        "path": None if tool is None else in_units(_path(tool), units),
+        "path": None if tool is None else _path(tool, units),
     }
     return ExplainedMove(**{**report.__dict__, **own})
 
@@ -171,17 +171,15 @@ def _resolved(pose: ResolvedPose, plan: Plan) -> PoseReport:
     )
 
 
-def _path(tool: ToolMotion) -> PathReport:
-    """Return the path of a tool and the law along it, in SI."""
-    unit = "rad" if tool.in_place else "m"
+def _path(tool: ToolMotion, units: Units) -> PathReport:
+    """Return the path of a tool and the law along it, in the units of the job."""
     segments, corners = _drawing(tool)
-    return PathReport(
-        length=float(tool.law.piece_ends()[1][-1, 0]),
-        unit=unit,
-        segments=segments,
-        corners=corners,
-        law=polynomial_intervals(tool.law.breaks, tool.law.coefficients[:, :, 0], unit),
-    )
+    length = float(tool.law.piece_ends()[1][-1, 0])
+    unit = "rad" if tool.in_place else "m"
+    path = in_units(PathReport(length=length, unit=unit, segments=segments, corners=corners, law=[]), units)
+    scale = factor(Quantity("angle" if tool.in_place else "length"), units)
+    law = polynomial_intervals(tool.law.breaks, tool.law.coefficients[:, :, 0] / scale, path.unit)
+    return path.model_copy(update={"law": law})
 
 
 def _drawing(tool: ToolMotion) -> tuple[list[SegmentReport], list[CornerReport]]:
