@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from dataclasses import field
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -45,7 +47,7 @@ class ViaPoints:
     Attributes:
         times: When, s from the start of the move, shape (m,).
         points: Shape (m, n), rad or m.
-        missed: By how much each joint passes beside each point, shape (m, n); zero where it goes through.
+        missed: The distance at which each joint passes each point, shape (m, n); zero where it goes through.
     """
 
     times: Array
@@ -57,28 +59,35 @@ class ViaPoints:
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
     def scaled(self, factor: float) -> ViaPoints:
-        """Return the passage of the same points in a motion that takes `factor` times as long."""
+        """Return the same points of a motion that takes `factor` times as long."""
         return ViaPoints(self.times * factor, self.points, self.missed)
 
 
 @frozen
 class Promise:
-    """What a move says of itself beyond its ends, for those who judge it.
+    """What a move says of itself, for those who judge it.
 
     Attributes:
-        passage: The points that it passes.
-        tool: What its tool was told to do along a path.
+        via_points: The points that it passes.
+        tool: The reference motion of its tool along a path.
         robot: The arm with the limits in force; given where there is a tool.
+        ends: The states in which it declares to begin and to end; None where nobody says.
+        over_limit: "slow" where it was made as long as its limits ask for, if that helps; "error" where that
+            can be asked for; None where it cannot.
+        remedies: What would help against a finding, by its kind.
     """
 
-    passage: ViaPoints | None = None
+    via_points: ViaPoints | None = None
     tool: ToolMotion | None = None
     robot: Robot | None = None
+    ends: tuple[State, State] | None = None
+    over_limit: Literal["error", "slow"] | None = None
+    remedies: Mapping[str, str] = field(default_factory=dict)
 
 
 @comparable
 class Span:
-    """Where one move stands on the trajectory.
+    """The part of the trajectory that is one move.
 
     Attributes:
         index: Number of the move in the job, from 0.
@@ -111,7 +120,7 @@ class Trajectory:
         spans: One for each move, in order, covering the whole curve.
         start: State in which the job says that the arm stands when t = 0.
         end: State in which the last move declares to end.
-        laws: For each span the way s(t) of the tool along its path, m, from t = 0; None where there is none.
+        laws: For each span the time law s(t) of the tool along its path, m, from t = 0; None without one.
     """
 
     curve: PiecewisePolynomial

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
 
 from trajcli.checks.tool import SampledTool, check_tool
+from trajcli.checks.verify import verify
 from trajcli.curves.hermite import hermite_pieces
 from trajcli.curves.operations import scale_time
-from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.curves.piecewise import PiecewisePolynomial, concatenate, constant
 from trajcli.geometry.paths.orientation import AxisAngleOrientation, SegmentProgress
 from trajcli.geometry.paths.pose import PoseCurve
 from trajcli.geometry.paths.position import Line
@@ -22,7 +24,7 @@ from trajcli.kinematics.forward import forward
 from trajcli.kinematics.jacobian import tcp_acceleration, tcp_twist
 from trajcli.kinematics.robot import Limits, Robot, ToolLimits, unlimited
 from trajcli.planners.tool_path.follow import followed
-from trajcli.trajectory import Span, Trajectory, resting
+from trajcli.trajectory import Promise, Span, Trajectory, resting
 
 WHOLE = (True, True, True)
 DURATION, LENGTH, TURN = 2.0, 0.2, 0.6
@@ -287,3 +289,57 @@ def test_a_wrist_that_passes_its_middle_changes_the_branch():
     assert found.kind == "branch"
     crossing = curve.evaluate(found.time)[4]
     assert abs(crossing) < 0.11  # the first of eight rows of a piece behind it
+
+
+def test_times_are_those_of_the_whole_trajectory():
+    slow = with_limits(RIGHT, angular_speed=SPEED * TURN / LENGTH / 2)
+    still = constant(RIGHT.trajectory.curve.evaluate(0.0), 1.0)
+    whole = trajectory_of(RIGHT.robot, concatenate([still, RIGHT.trajectory.curve]))
+    later = dataclasses.replace(slow, trajectory=whole, span=Span(1, "line", 1.0, 1.0 + DURATION, 2))
+    (alone,), (after,) = judged(slow), judged(later)
+    assert (after.move, after.time) == (1, pytest.approx(alone.time + 1.0))
+    assert f"at t = {after.time:.9g} s" in after.text()
+
+
+def said(rows: SampledTool, kind: str, **promised) -> tuple[str, str | None]:
+    """Return message and remedy of the one finding of a kind, from the trajectory and the promise alone."""
+    promise = Promise(tool=rows.motion, robot=rows.robot, **promised)
+    findings = verify(rows.trajectory, [rows.robot.limits], [promise]).findings
+    (finding,) = [finding for finding in findings if finding.kind == kind]
+    number, place = re.compile(r"(?<= )\d[-+.e\d]*(?= (m|rad|s)\b)"), "#"
+    amounts = [f"{amount.value:.9g}" for amount in finding.amounts.values()]
+    assert all(amount in finding.text() for amount in amounts if f"{finding.limit:.9g}" != amount)
+    return number.sub(place, finding.text()), finding.hint
+
+
+def test_findings_about_the_tool_say_what_is_wrong_and_what_would_fix_it():
+    slow = {"ends": (RIGHT.trajectory.start, RIGHT.trajectory.end), "over_limit": "error"}
+    message, remedy = said(with_limits(RIGHT, angular_speed=SPEED * TURN / LENGTH / 2), "tool_angular_speed")
+    assert message == "the angular speed of the tool reaches # rad/s at t = # s, its limit is # rad/s"
+    assert (remedy or "").startswith("it must last 2 times longer (")
+    message, remedy = said(with_limits(RIGHT, jerk=JERK / 8), "tool_jerk", **slow)
+    assert message == "the jerk of the tool reaches # m/s^3 at t = # s, its limit is # m/s^3"
+    assert remedy == f"it must last 2 times longer ({2 * DURATION:.6g} s), or say `when_over_limit: slow`"
+    moving_ends = {
+        **slow,
+        "ends": (RIGHT.trajectory.start, dataclasses.replace(RIGHT.trajectory.end, velocity=np.full(6, 0.1))),
+    }
+    assert (
+        said(with_limits(RIGHT, jerk=JERK / 8), "tool_jerk", **moving_ends)[1]
+        == "say `when_over_limit: slow`"
+    )
+    beside = shifted(RIGHT, [1e-2, 0, 0, 0, 0, 0])
+    message, remedy = said(beside, "tool_path", **slow)
+    assert message == "the tool is beside its path by # m at t = # s, promised were # m"
+    assert remedy == "this is a bug: report it"
+    message, remedy = said(beside, "tool_orientation", **slow)
+    assert message == "the tool is turned from its path by # rad at t = # s, promised were # rad"
+    step = with_limits(moving(the_law=law(conditions=2)), jerk=1e6)
+    message, remedy = said(step, "tool_acceleration_jump", **slow)
+    assert message == "the acceleration of the tool along its path steps by # m/s^2 at t = # s"
+    assert remedy == "use shape jerk_limited or quintic, or leave the limit of the tool's jerk out"
+    message, remedy = said(planar(lambda t: 0.55 - 0.5 * t), "branch", **slow)
+    assert (message, remedy) == (
+        "the arm changes its branch at t = # s: it passes a singularity",
+        "move the path",
+    )

@@ -39,7 +39,9 @@ def test_the_verdict_holds_what_the_checks_find_by_move_and_time() -> None:
         (1, "acceleration"),
     ]
     separate = check_limits(whole, bounds) + check_continuity(whole, bounds)
-    assert set(verdict.findings) == set(separate)
+    assert {(f.move, f.time, f.text()) for f in verdict.findings} == {
+        (f.move, f.time, f.text()) for f in separate
+    }
     assert list(verdict.steps) == list(acceleration_steps(whole, bounds))
     assert [(s.move, s.time) for s in verdict.steps] == [(0, 0.0), (0, 1.0)]
 

@@ -52,6 +52,7 @@ def test_the_nearest_branch(capfd: Capture) -> None:
         "by": "nearest",
         "configuration": {},
         "near": pytest.approx([10, 60]),
+        "units": ["deg", "deg"],
         "candidates": 2,
         "within_limits": 2,
     }

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from trajcli.output.polynomials import polynomial_intervals
+from trajcli.cli.explain import polynomial_text
+from trajcli.output.explain import polynomial_intervals
 
 CUBIC = Polynomial([1.0, -2.0, 0.5, 0.25])
 OTHER = Polynomial([3.0, -2.0, 0.5, 0.25])
@@ -20,22 +21,24 @@ def cut(breaks, polynomials):
 def test_equal_neighbours_are_one_polynomial():
     breaks = np.array([0.0, 0.5, 1.25, 2.0, 3.0])
     rows = cut(breaks, [CUBIC, CUBIC, CUBIC, OTHER])
-    found = polynomial_intervals(breaks, rows)
+    found = polynomial_intervals(breaks, rows, "rad")
     assert [(each.start, each.end) for each in found] == [(0.0, 2.0), (2.0, 3.0)]
     for each, polynomial in zip(found, (CUBIC, OTHER), strict=True):
         np.testing.assert_allclose(each.absolute, polynomial.coef, rtol=0, atol=1e-12)
         shifted = polynomial(Polynomial([each.start, 1.0])).coef
         np.testing.assert_allclose(each.local, shifted, rtol=0, atol=1e-12)
-    apart = polynomial_intervals(breaks, rows, join=False)
+    apart = polynomial_intervals(breaks, rows, "rad", join=False)
     assert [(each.start, each.end) for each in apart] == [(0, 0.5), (0.5, 1.25), (1.25, 2), (2, 3)]
 
 
 def test_polynomials_that_drift_away_are_not_one():
     breaks = np.arange(5.0)
-    found = polynomial_intervals(breaks, cut(breaks, [Polynomial([1.0 + 6e-10 * k]) for k in range(4)]))
+    found = polynomial_intervals(
+        breaks, cut(breaks, [Polynomial([1.0 + 6e-10 * k]) for k in range(4)]), "rad"
+    )
     assert [(each.start, each.end) for each in found] == [(0, 2), (2, 4)]
 
 
 def test_what_came_from_rounding_is_not_printed():
-    found = polynomial_intervals(np.array([0.0, 2.0]), np.array([[1e-14], [0.5], [1e-15], [1.0]]))
-    assert found[0].text == "1 + 0.5 t^2"
+    found = polynomial_intervals(np.array([0.0, 2.0]), np.array([[1e-14], [0.5], [1e-15], [1.0]]), "rad")
+    assert polynomial_text(found[0].absolute) == "1 + 0.5 t^2"

@@ -13,8 +13,9 @@ from random_jobs import TAGS, loaded, random_job
 
 from trajcli.errors import InputError, PlanningError
 from trajcli.kinematics.robot import Limits
+from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan, plan_job
-from trajcli.planning.retime import PlannedMove, with_duration
+from trajcli.planning.retime import with_duration
 
 SEEDS = st.integers(0, 2**32 - 1)
 few = settings(max_examples=15, deadline=None)

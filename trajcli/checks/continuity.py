@@ -1,4 +1,4 @@
-"""Jumps: no joint may jump in position or velocity, nor in acceleration where its jerk is limited.
+"""Continuity: jumps in position and velocity, and in acceleration where jerk is limited.
 
 Both sides of every break are compared. Before the first break the arm is in the trajectory's declared start,
 and after the last one in its declared end.
@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.checks.finding import AccelerationSteps, Finding, FindingKind
+from trajcli.checks.finding import AccelerationSteps, Finding, FindingKind, at_time, joint_amounts
 from trajcli.checks.limits import peaks_by_move
 from trajcli.checks.tolerances import allowed_jump
 from trajcli.curves.extrema import Peaks
@@ -46,14 +46,14 @@ def check_continuity(
         ValueError: When there are more or fewer limits than spans.
     """
     known = peaks_by_move(trajectory) if peaks is None else peaks
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for order in range(2):
         jumps = _jumps(trajectory, order, known)
-        found += _largest(trajectory, order, jumps, jumps.present, _later(trajectory))
+        findings += _largest(trajectory, order, jumps, jumps.present, _later(trajectory))
     steps = _jumps(trajectory, 2, known)
     begins, ends = _limited(trajectory, limits_by_move, steps)
     owner = np.where(begins, _later(trajectory), _earlier(trajectory))
-    return found + _largest(trajectory, 2, steps, begins | ends, owner)
+    return findings + _largest(trajectory, 2, steps, begins | ends, owner)
 
 
 def acceleration_steps(
@@ -145,13 +145,13 @@ def _limited(
 
 
 def _later(trajectory: Trajectory) -> NDArray[np.intp]:
-    """Return the place in `spans` of the move after each break, the last move at the end; (pieces + 1, 1)."""
+    """Return the index in `spans` of the move after each break, the last move at the end; (pieces + 1, 1)."""
     spans = _span_of_pieces(trajectory)
     return np.append(spans, spans[-1])[:, None]
 
 
 def _earlier(trajectory: Trajectory) -> NDArray[np.intp]:
-    """Return the place in `spans` of the move before each break, the first at the start; (pieces + 1, 1)."""
+    """Return the index in `spans` of the move before each break, the first at the start; (pieces + 1, 1)."""
     spans = _span_of_pieces(trajectory)
     return np.append(spans[0], spans)[:, None]
 
@@ -171,18 +171,23 @@ def _largest(
     owners = np.broadcast_to(owner, chosen.shape)
     rows, joints = _first_largest(np.abs(jumps.size), chosen, owners)
     times = trajectory.curve.breaks - trajectory.curve.start
-    return [
-        Finding(
+    findings = []
+    for row, joint in zip(rows.tolist(), joints.tolist(), strict=True):
+        name, time = trajectory.joint_names[joint], float(times[row])
+        value, limit = float(jumps.size[row, joint]), float(jumps.allowed[row, joint])
+        finding = Finding(
             move=trajectory.spans[int(owners[row, joint])].index,
-            joint=trajectory.joint_names[joint],
+            joint=name,
             kind=_KINDS[order],
-            value=float(jumps.size[row, joint]),
-            limit=float(jumps.allowed[row, joint]),
-            time=float(times[row]),
+            value=value,
+            limit=limit,
+            time=time,
             hint=JERK_HINT if order == 2 else None,
+            message=f"the {_QUANTITIES[order]} of {{joint}} jumps by {{value}} {at_time(time)}",
+            amounts=joint_amounts(trajectory, joint, order, value=value, limit=limit),
         )
-        for row, joint in zip(rows.tolist(), joints.tolist(), strict=True)
-    ]
+        findings.append(finding)
+    return findings
 
 
 def _first_largest(

@@ -1,18 +1,18 @@
-"""What a check has to say.
-
-Steps in acceleration as a sequence: a long motion has one for every joint at every break.
-"""
+"""Findings of a check, and legal steps in acceleration."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import field
 from typing import Literal, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
+from trajcli.errors import Amount, Amounts, said
 from trajcli.frozen import comparable, frozen
+from trajcli.trajectory import Trajectory
 
 FindingKind = Literal[
     "position",
@@ -54,6 +54,8 @@ class Finding:
             within 1e-6; "sampled": on rows, without a proof of what is between them.
         factor: By what factor the move must last longer for the limit to hold; None where that does not help.
         hint: What would fix it.
+        message: What is wrong, one sentence for people.
+        amounts: Numbers and names that the message holds as `{name}`.
     """
 
     move: int | None
@@ -65,6 +67,26 @@ class Finding:
     method: FindingMethod = "exact"
     factor: float | None = None
     hint: str | None = None
+    message: str = ""
+    amounts: Amounts = field(default_factory=dict)
+
+    def text(self, say: Callable[[Amount], str] = str) -> str:
+        """Return the message with its amounts said by `say`."""
+        return said(self.message, self.amounts, say)
+
+
+def joint_amounts(trajectory: Trajectory, joint: int, order: int, **values: float) -> Amounts:
+    """Return a joint's name, and values of its position or of a derivative of it, as amounts of a message."""
+    dimension: Literal["length", "angle"] = (
+        "length" if trajectory.joint_types[joint] == "prismatic" else "angle"
+    )
+    amounts = {name: Amount(value, order, joint, dimension) for name, value in values.items()}
+    return {"joint": trajectory.joint_names[joint], **amounts}
+
+
+def at_time(time: float) -> str:
+    """Return the words that say when, in s from the start of the trajectory."""
+    return f"at t = {time:.9g} s"
 
 
 @comparable
@@ -87,7 +109,7 @@ class AccelerationStep:
 
 @frozen
 class AccelerationSteps(Sequence[AccelerationStep]):
-    """Steps in order of time, each made when it is asked for.
+    """Steps in order of time; a long motion has one for every joint at every break, made when asked for.
 
     Attributes:
         moves: Index of the move that each belongs to, shape (k,).

@@ -1,4 +1,4 @@
-"""Joint limits, judged for all t: extremes come from derivative roots, not from samples."""
+"""Joint limits for all t, from the roots of derivatives."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from trajcli.checks.finding import Finding, FindingKind
+from trajcli.checks.finding import Finding, FindingKind, at_time, joint_amounts
 from trajcli.checks.tolerances import BORDER_UNITS, exceeds
 from trajcli.curves.extrema import Peaks, peaks_between
 from trajcli.curves.piecewise import Array
@@ -31,7 +31,7 @@ def check_limits(
     limits_by_move: Sequence[Limits],
     peaks: Sequence[tuple[Peaks, ...]] | None = None,
 ) -> list[Finding]:
-    """Return where a joint breaks a limit: for each move, joint and quantity the worst place, if any.
+    """Return where a joint breaks a limit: for each move, joint and quantity the worst excess, if any.
 
     A move of no length is judged by its position and velocity: it has no time to accelerate in.
 
@@ -43,17 +43,17 @@ def check_limits(
     Raises:
         ValueError: When there are more or fewer limits than spans.
     """
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for span, limits, of_span in zip(
         trajectory.spans, limits_by_move, peaks_by_move(trajectory) if peaks is None else peaks, strict=True
     ):
         for order in range(4 if span.duration > 0 else 2):
             bounds, extremes = limits.of_order(order), of_span[order]
             broken = exceeds(extremes.high, bounds[:, 1]) | exceeds(-extremes.low, -bounds[:, 0])
-            found += [
+            findings += [
                 _worst(trajectory, span, order, int(i), bounds[i], extremes) for i in np.flatnonzero(broken)
             ]
-    return found
+    return findings
 
 
 def _worst(
@@ -66,14 +66,18 @@ def _worst(
     value, limit = (low, bounds[0]) if downwards else (high, bounds[1])
     time = extremes.low_time[joint] if downwards else extremes.high_time[joint]
     slower = order > 0 and span.duration > 0
+    name, kind = trajectory.joint_names[joint], _KINDS[order]
+    when = float(time) - trajectory.curve.start
     return Finding(
         move=span.index,
-        joint=trajectory.joint_names[joint],
-        kind=_KINDS[order],
+        joint=name,
+        kind=kind,
         value=float(value),
         limit=float(limit),
-        time=float(time) - trajectory.curve.start,
+        time=when,
         factor=float(value / limit) ** (1 / order) if slower else None,
+        message=f"the {kind} of {{joint}} reaches {{value}} {at_time(when)}, its limit is {{limit}}",
+        amounts=joint_amounts(trajectory, joint, order, value=float(value), limit=float(limit)),
     )
 
 

@@ -1,4 +1,4 @@
-"""Every tolerance of the checks, with its reason."""
+"""Tolerances of the checks, each with its reason."""
 
 from __future__ import annotations
 

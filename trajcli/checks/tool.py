@@ -1,19 +1,19 @@
-"""The tool on its path: recomputed by forward kinematics on rows of the trajectory.
-
-Rows of a trajectory with the tool recomputed from them by forward kinematics, and its peaks.
-"""
+"""Tool along its path: deviation, limits and branch, by forward kinematics of the trajectory."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
-from trajcli.checks.finding import Finding, FindingKind, FindingMethod
+from trajcli.checks.finding import Finding, FindingKind, FindingMethod, at_time
 from trajcli.checks.tolerances import JUMP_RELATIVE, TOOL_RELATIVE, exceeds
 from trajcli.checks.tool_bound import ToolPeak, tool_bounds
 from trajcli.curves.extrema import peaks
 from trajcli.curves.piecewise import Array
+from trajcli.errors import Amount
 from trajcli.frozen import frozen
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.following.motion import ToolMotion
@@ -33,13 +33,13 @@ SPEEDS: tuple[tuple[FindingKind, str, int, slice], ...] = (
 
 @frozen
 class SampledTool:
-    """The tool over one move, and what it was told.
+    """The tool over one move, at sample times, and its reference motion.
 
     Attributes:
         trajectory: The whole.
         span: Of the move.
         robot: The arm with the limits in force.
-        motion: What the tool was told.
+        motion: The reference motion of the tool.
     """
 
     trajectory: Trajectory
@@ -59,7 +59,7 @@ class SampledTool:
 
     @cached_property
     def target(self) -> IkTarget:
-        """What the tool was told at these times."""
+        """The reference of the tool at these times."""
         return self.motion.reference(self.times).target()
 
     @cached_property
@@ -68,8 +68,8 @@ class SampledTool:
         return linearisation(self.robot, self._joints)
 
     @cached_property
-    def beside(self) -> tuple[Array, Array]:
-        """How far the tool is from its path, m, and from its orientation, rad, each (N,)."""
+    def deviation(self) -> tuple[Array, Array]:
+        """Distance of the tool from its path, m, and angle from its orientation, rad, each (N,)."""
         off, split = residuals(self.target, self.linearised[0]), sum(self.target.position)
         return np.linalg.norm(off[:, :split], axis=1), np.linalg.norm(off[:, split:], axis=1)
 
@@ -80,8 +80,8 @@ class SampledTool:
         middles = curve.breaks[:-1] + curve.lengths / 2
         first, last = np.searchsorted(middles, [span.start, span.end])
         breaks = curve.breaks[first : last + 1] - span.start
-        found = tool_bounds(self.robot, breaks, curve.coefficients[:, first:last])
-        return {name: bound for (_, name, _, _), bound in zip(SPEEDS, found, strict=True)}
+        bounds = tool_bounds(self.robot, breaks, curve.coefficients[:, first:last])
+        return {name: bound for (_, name, _, _), bound in zip(SPEEDS, bounds, strict=True)}
 
     @cached_property
     def _joints(self) -> Array:
@@ -89,93 +89,110 @@ class SampledTool:
         return self.trajectory.curve.evaluate(absolute)
 
 
-def check_tool(rows: SampledTool) -> list[Finding]:
-    """Return where the tool leaves its path or its limits, and where the arm changes its branch.
-
-    Args:
-        rows: Of one move.
-    """
-    return [*_check_path(rows), *_check_limits(rows), *_check_jerk(rows), *_check_branch(rows)]
+def check_tool(tool: SampledTool) -> list[Finding]:
+    """Return where the tool leaves its path or its limits, and where the arm changes its branch."""
+    return [*_check_path(tool), *_check_limits(tool), *_check_jerk(tool), *_check_branch(tool)]
 
 
-def _check_path(rows: SampledTool) -> list[Finding]:
+def _check_path(tool: SampledTool) -> list[Finding]:
     """Return by how much the tool is beside its path, or turned, where that is more than was promised."""
-    tolerance, found = rows.motion.tolerance, []
-    kinds: tuple[tuple[FindingKind, float], ...] = (
-        ("tool_path", tolerance.position),
-        ("tool_orientation", tolerance.angle),
+    tolerance, findings = tool.motion.tolerance, []
+    kinds: tuple[tuple[FindingKind, str, float], ...] = (
+        ("tool_path", "is beside", tolerance.position),
+        ("tool_orientation", "is turned from", tolerance.angle),
     )
-    for (kind, limit), sizes in zip(kinds, rows.beside, strict=True):
+    for (kind, what, limit), sizes in zip(kinds, tool.deviation, strict=True):
         if exceeds(sizes.max(), limit):
             worst = int(sizes.argmax())
-            time = float(rows.times[worst])
-            found.append(_finding(rows, kind, float(sizes[worst]), limit, time, None))
-    return found
+            message = f"the tool {what} its path by {{value}} {{time}}, promised were {{limit}}"
+            finding = _finding(
+                tool, kind, 0, float(sizes[worst]), limit, float(tool.times[worst]), None, message
+            )
+            findings.append(replace(finding, hint="this is a bug: report it"))
+    return findings
 
 
-def _check_limits(rows: SampledTool) -> list[Finding]:
-    found = []
+def _check_limits(tool: SampledTool) -> list[Finding]:
+    findings = []
     for kind, name, order, part in SPEEDS:
-        limit = float(getattr(rows.robot.limits.tcp, name))
+        limit = float(getattr(tool.robot.limits.tcp, name))
         if np.isinf(limit):
             continue
-        peak = rows.peaks[name]
-        promised = rows.motion.tolerance.position if part.start == 0 else rows.motion.tolerance.angle
+        peak = tool.peaks[name]
+        promised = tool.motion.tolerance.position if part.start == 0 else tool.motion.tolerance.angle
         if peak.most > limit * (1 + TOOL_RELATIVE + 2 * promised):
             factor = (peak.most / limit) ** (1 / order)
-            found.append(_finding(rows, kind, peak.most, limit, peak.time, factor, "bounded"))
-    return found
+            findings.append(
+                _finding(tool, kind, order, peak.most, limit, peak.time, factor, method="bounded")
+            )
+    return findings
 
 
-def _check_jerk(rows: SampledTool) -> list[Finding]:
+def _check_jerk(tool: SampledTool) -> list[Finding]:
     """Return where the law's jerk breaks its limit, or its acceleration steps although jerk is limited."""
-    limit, law = rows.robot.limits.tcp.jerk, rows.motion.law
-    if np.isinf(limit) or rows.motion.in_place:
+    limit, law = tool.robot.limits.tcp.jerk, tool.motion.law
+    if np.isinf(limit) or tool.motion.in_place:
         return []
     before, after = law.piece_ends(2)[1][:, 0], law.piece_ends(2)[0][:, 0]
     steps = np.abs(np.append(after, 0.0) - np.append(0.0, before))
     accelerations, jerks = peaks(law, (2, 3))
-    hint = "use shape jerk_limited or quintic, or leave the limit of the tool's jerk out"
     if steps.max() > JUMP_RELATIVE * float(accelerations.magnitude[0]):
-        return [
-            Finding(
-                rows.span.index,
-                None,
-                "tool_acceleration_jump",
-                float(steps.max()),
-                0.0,
-                rows.span.start + float(law.breaks[int(steps.argmax())]),
-                hint=hint,
-            )
-        ]
+        time = float(law.breaks[int(steps.argmax())])
+        message = "the acceleration of the tool along its path steps by {value} {time}"
+        step = _finding(tool, "tool_acceleration_jump", 2, float(steps.max()), 0.0, time, None, message)
+        hint = "use shape jerk_limited or quintic, or leave the limit of the tool's jerk out"
+        return [replace(step, method="exact", hint=hint)]
     value = float(jerks.magnitude[0])
     if value <= limit * (1 + TOOL_RELATIVE):
         return []
     time = float(jerks.high_time[0] if jerks.high[0] >= value else jerks.low_time[0])
-    return [_finding(rows, "tool_jerk", value, limit, time, (value / limit) ** (1 / 3), "exact")]
+    return [_finding(tool, "tool_jerk", 3, value, limit, time, (value / limit) ** (1 / 3), method="exact")]
 
 
-def _check_branch(rows: SampledTool) -> list[Finding]:
+def _check_branch(tool: SampledTool) -> list[Finding]:
     """Return where the arm passes from one branch to another: the determinant of its rows changes sign."""
-    target = rows.target
-    slopes = residual_jacobian(target, *rows.linearised)
+    target = tool.target
+    slopes = residual_jacobian(target, *tool.linearised)
     if slopes.shape[1] != slopes.shape[2] or target.orientation == "direction":
         return []  # without as many independent rows as joints there is no determinant
-    slopes[:, : sum(target.position)] /= characteristic_length(rows.robot)
+    slopes[:, : sum(target.position)] /= characteristic_length(tool.robot)
     signs = np.sign(np.linalg.det(slopes))
     changes = np.flatnonzero(signs[1:] * signs[:-1] < 0)
     if not changes.size:
         return []
-    return [_finding(rows, "branch", 0.0, 0.0, float(rows.times[changes[0]]), None)]
+    message = "the arm changes its branch {time}: it passes a singularity"
+    finding = _finding(tool, "branch", 0, 0.0, 0.0, float(tool.times[changes[0]]), None, message)
+    return [replace(finding, hint="move the path", amounts={})]
 
 
 def _finding(
-    rows: SampledTool,
+    tool: SampledTool,
     kind: FindingKind,
+    order: int,
     value: float,
     limit: float,
     time: float,
     factor: float | None,
+    message: str | None = None,
     method: FindingMethod = "sampled",
 ) -> Finding:
-    return Finding(rows.span.index, None, kind, value, limit, rows.span.start + time, method, factor)
+    """Return a finding at a time of the move; without a message it says that a limit is broken."""
+    name = kind.removeprefix("tool_").replace("_", " ")
+    text = message or f"the {name} of the tool reaches {{value}} {{time}}, its limit is {{limit}}"
+    dimension: Literal["length", "angle"] = (
+        "angle" if name.startswith("angular") or kind == "tool_orientation" else "length"
+    )
+    amounts = {"value": Amount(value, order, None, dimension), "limit": Amount(limit, order, None, dimension)}
+    when = tool.span.start + time
+    return Finding(
+        move=tool.span.index,
+        joint=None,
+        kind=kind,
+        value=value,
+        limit=limit,
+        time=when,
+        method=method,
+        factor=factor,
+        message=text.replace("{time}", at_time(when)),
+        amounts=amounts,
+    )

@@ -1,7 +1,7 @@
-"""The largest speeds and accelerations of the tool, for all t: rows, and a proof of what is between them.
+"""Bounds of the tool's speeds and accelerations for all t: samples, and a proof of what is between them.
 
 On each piece of the curve nine rows give a polynomial of degree 8. What the tool does between the rows is
-beside it by at most f^(9) / 9! times 8! / 4 (h / 8)^9, and that derivative is bounded by those of the joints.
+off it by at most f^(9) / 9! times 8! / 4 (h / 8)^9, and that derivative is bounded by those of the joints.
 The polynomial itself lies within the hull of its Bernstein coefficients, which closes in on it when it is
 divided.
 
@@ -35,7 +35,7 @@ class ToolPeak:
     """The largest magnitude of a vector over time.
 
     Attributes:
-        value: The largest one found.
+        value: The largest one sampled.
         time: Where that is.
         most: What it does not exceed at any time.
     """
@@ -76,12 +76,12 @@ def tool_bounds(
         lengths = np.concatenate([lengths[~coarse], half, half])
         rows = np.concatenate([rows[:, ~coarse], more], axis=1)
         rest = np.concatenate([rest[:, ~coarse], left], axis=1)
-    found = [_largest(vectors, beside, starts, lengths) for vectors, beside in zip(rows, rest, strict=True)]
-    return found[0], found[1], found[2], found[3]
+    bounds = [_largest(vectors, off, starts, lengths) for vectors, off in zip(rows, rest, strict=True)]
+    return bounds[0], bounds[1], bounds[2], bounds[3]
 
 
 def _known(robot: Robot, coefficients: Array, lengths: Array) -> tuple[Array, Array]:
-    """Return v, w, a, e at nine rows of each piece (4, P, 9, 3), and how far beside they may be between them.
+    """Return v, w, a, e at nine rows of each piece (4, P, 9, 3), and how far off they may be between them.
 
     The latter has the shape (4, P).
     """
@@ -95,15 +95,15 @@ def _known(robot: Robot, coefficients: Array, lengths: Array) -> tuple[Array, Ar
     second = (slopes @ qdd[..., None])[..., 0] + jacobian_dot_qd(robot, q, qd)
     rows = np.stack([first[..., :3], first[..., 3:], second[..., :3], second[..., 3:]])
     n = _DEGREE + 1
-    place, spin = majorants(robot, q[:, 0], growth(coefficients, lengths, n + 2))
+    position, angle = majorants(robot, q[:, 0], growth(coefficients, lengths, n + 2))
     highest = np.stack(
-        [(n + 1) * place[n + 1], spin[n], (n + 1) * (n + 2) * place[n + 2], (n + 1) * spin[n + 1]]
+        [(n + 1) * position[n + 1], angle[n], (n + 1) * (n + 2) * position[n + 2], (n + 1) * angle[n + 1]]
     )
     return rows, highest * _BETWEEN * lengths**n
 
 
 def _largest(rows: Array, rest: Array, starts: Array, lengths: Array) -> ToolPeak:
-    """Return the bound of vectors at nine rows of pieces (P, 9, 3), beside by `rest` (P,) between them."""
+    """Return the bound of vectors at nine rows of pieces (P, 9, 3), off by `rest` (P,) between them."""
     hull, halves = _matrices()
     points = hull @ rows
     value, time, most = 0.0, float(starts.min()), 0.0

@@ -1,4 +1,4 @@
-"""All judgements of a trajectory in one verdict."""
+"""Verification of a trajectory: all judgements in one verdict."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from trajcli.checks.continuity import acceleration_steps, check_continuity
 from trajcli.checks.finding import AccelerationSteps, Finding
 from trajcli.checks.limits import check_limits, peaks_by_move
+from trajcli.checks.remedies import with_remedy
 from trajcli.checks.waypoints import check_waypoints
 from trajcli.curves.extrema import Peaks
 from trajcli.frozen import frozen
@@ -18,7 +19,7 @@ from trajcli.trajectory import Promise, Trajectory
 
 @frozen
 class Verdict:
-    """What the checks found.
+    """Outcome of the checks.
 
     Attributes:
         findings: What is wrong, by move and time.
@@ -48,7 +49,7 @@ def verify(
     Args:
         trajectory: What to judge.
         limits_by_move: The limits in force, one for each span.
-        promises: What each span says of itself.
+        promises: What each span says of itself; with them the tool and the via points are judged, too.
 
     Raises:
         ValueError: When there are more or fewer limits than spans.
@@ -57,20 +58,31 @@ def verify(
     findings = check_limits(trajectory, limits_by_move, peaks)
     findings += check_continuity(trajectory, limits_by_move, peaks)
     if promises is not None:
-        findings += check_waypoints(trajectory, [promise.passage for promise in promises])
+        findings += check_waypoints(trajectory, [promise.via_points for promise in promises])
         findings += _check_tools(trajectory, promises)
-    place = {span.index: k for k, span in enumerate(trajectory.spans)}
-    findings.sort(key=lambda finding: (place.get(finding.move or 0, 0), finding.time))
     return Verdict(
-        findings=tuple(findings),
+        findings=_in_order(trajectory, findings, promises),
         steps=acceleration_steps(trajectory, limits_by_move, peaks),
         peaks=peaks,
         unchecked=_unchecked(trajectory, limits_by_move),
     )
 
 
+def _in_order(
+    trajectory: Trajectory, findings: list[Finding], promises: Sequence[Promise] | None
+) -> tuple[Finding, ...]:
+    """Return the findings by move and time, each with its remedy."""
+    number = {span.index: k for k, span in enumerate(trajectory.spans)}
+    known = [(number.get(finding.move or 0, 0), finding) for finding in findings]
+    known.sort(key=lambda pair: (pair[0], pair[1].time))
+    return tuple(
+        with_remedy(finding, trajectory, trajectory.spans[k], promises[k] if promises else Promise())
+        for k, finding in known
+    )
+
+
 def _check_tools(trajectory: Trajectory, promises: Sequence[Promise]) -> list[Finding]:
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for span, promise in zip(trajectory.spans, promises, strict=True):
         if promise.tool is not None and promise.robot is not None:
             from trajcli.checks.tool import (
@@ -78,8 +90,8 @@ def _check_tools(trajectory: Trajectory, promises: Sequence[Promise]) -> list[Fi
                 check_tool,  # a plan without paths does not pay for it
             )
 
-            found += check_tool(SampledTool(trajectory, span, promise.robot, promise.tool))
-    return found
+            findings += check_tool(SampledTool(trajectory, span, promise.robot, promise.tool))
+    return findings
 
 
 def _unchecked(trajectory: Trajectory, limits_by_move: Sequence[Limits]) -> tuple[tuple[str, str], ...]:
@@ -87,10 +99,10 @@ def _unchecked(trajectory: Trajectory, limits_by_move: Sequence[Limits]) -> tupl
         [np.isinf(limits.of_order(order)).any(axis=1) for limits in limits_by_move]
         for order in range(len(QUANTITIES))
     ]
-    found = np.any(open_ended, axis=1)
+    unlimited = np.any(open_ended, axis=1)
     return tuple(
         (name, quantity)
         for joint, name in enumerate(trajectory.joint_names)
         for order, quantity in enumerate(QUANTITIES)
-        if found[order, joint]
+        if unlimited[order, joint]
     )

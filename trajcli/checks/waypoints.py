@@ -1,4 +1,4 @@
-"""Points that a move promises to pass: the curve is there at the time it says, or beside by what it says."""
+"""Via points: the curve passes each at its time, at the distance that the move promises."""
 
 from __future__ import annotations
 
@@ -6,39 +6,43 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from trajcli.checks.finding import Finding
+from trajcli.checks.finding import Finding, at_time, joint_amounts
 from trajcli.checks.tolerances import waypoint_tolerance
 from trajcli.trajectory import Trajectory, ViaPoints
 
 
-def check_waypoints(trajectory: Trajectory, passages: Sequence[ViaPoints | None]) -> list[Finding]:
+def check_waypoints(trajectory: Trajectory, promised: Sequence[ViaPoints | None]) -> list[Finding]:
     """Return for each move and joint the point that is passed furthest from where it was promised, if any.
 
     Args:
         trajectory: What to judge.
-        passages: What each span promises; None where it promises nothing.
+        promised: The points that each span promises to pass; None where it promises nothing.
 
     Raises:
-        ValueError: When there are more or fewer passages than spans.
+        ValueError: When there are more or fewer promises than spans.
     """
-    found: list[Finding] = []
-    for span, passage in zip(trajectory.spans, passages, strict=True):
-        if passage is None:
+    findings: list[Finding] = []
+    for span, points in zip(trajectory.spans, promised, strict=True):
+        if points is None:
             continue
-        times = np.clip(span.start + passage.times, span.start, span.end)
-        apart = np.abs(trajectory.curve.evaluate(times) - passage.points)
-        wrong = np.abs(apart - passage.missed)
-        over = wrong - waypoint_tolerance(trajectory, times, passage.points)
+        times = np.clip(span.start + points.times, span.start, span.end)
+        distance = np.abs(trajectory.curve.evaluate(times) - points.points)
+        wrong = np.abs(distance - points.missed)
+        over = wrong - waypoint_tolerance(trajectory, times, points.points)
         for joint in np.flatnonzero((over > 0).any(axis=0)).tolist():
             worst = int(over[:, joint].argmax())
-            found.append(
-                Finding(
-                    span.index,
-                    trajectory.joint_names[joint],
-                    "waypoint",
-                    float(apart[worst, joint]),
-                    float(passage.missed[worst, joint]),
-                    float(times[worst]),
-                )
+            name, time = trajectory.joint_names[joint], float(times[worst])
+            value, limit = float(distance[worst, joint]), float(points.missed[worst, joint])
+            passes = f"the path of {{joint}} passes a waypoint at {{value}} {at_time(time)}"
+            finding = Finding(
+                move=span.index,
+                joint=name,
+                kind="waypoint",
+                value=value,
+                limit=limit,
+                time=time,
+                message=f"{passes}, it shall be {{limit}}",
+                amounts=joint_amounts(trajectory, joint, 0, value=value, limit=limit),
             )
-    return found
+            findings.append(finding)
+    return findings

@@ -1,7 +1,4 @@
-"""From what a command does to an exit code: errors are rendered here and nowhere else.
-
-What a command prints: text for people or JSON for programs, on standard output.
-"""
+"""Outcome of a command: its exit code, its errors, and its output as text for people or JSON for programs."""
 
 from __future__ import annotations
 

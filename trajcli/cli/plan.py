@@ -1,7 +1,4 @@
-"""`trajcli plan`.
-
-The few lines that people read on standard error after a plan.
-"""
+"""`trajcli plan`, and the summary that people read on standard error after it."""
 
 from __future__ import annotations
 
@@ -10,20 +7,19 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+
+from trajcli.curves.extrema import peaks
 from trajcli.errors import InputError, Problem, VerificationError
 from trajcli.frozen import comparable
 from trajcli.job.read import LoadedJob, load_job
+from trajcli.kinematics.robot import QUANTITIES
 from trajcli.output.write import check_output_name, grid_of, write_rows, write_text
-from trajcli.planners.planner import Event
+from trajcli.planners.planner import Event, PlannedMove
 from trajcli.planning.plan import Plan, plan_job
 
 if TYPE_CHECKING:
     from trajcli.job.report import MoveReport, ReferenceReport
-import numpy as np
-
-from trajcli.curves.extrema import peaks
-from trajcli.kinematics.robot import QUANTITIES
-from trajcli.planning.retime import PlannedMove
 
 _STILL = 1e-9  # rad/s or m/s, below which a joint only rounds
 

@@ -1,33 +1,118 @@
-"""The report as a model: what `--report` writes, and what schemas/report.schema.json describes. All SI."""
+"""Report of a job: the model of what `--report` writes, in SI, and its conversion to the units of a job.
+
+schemas/report.schema.json describes it. A number that is no time and no ratio says in its annotation which
+field beside it names its unit.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from functools import cache
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import Field
+from pydantic import BaseModel, ConfigDict, Field
 
-from trajcli.language.numbers import Model
+from trajcli.frozen import comparable
+from trajcli.units import AngleUnit, LengthUnit, Quantity, Units, factor
 
+Part = TypeVar("Part", bound="ReportPart")
 ReportSeconds = Annotated[float, Field(description="Seconds.")]
+UnitName = Annotated[str, Field(description="Unit of the numbers beside it, such as rad/s.")]
 JointQuantity = Literal["position", "velocity", "acceleration", "jerk"]
 
 
-class PeakReport(Model):
+@comparable
+class MeasuredIn:
+    """Marks a number of a report, or several of them.
+
+    Attributes:
+        field: Name of the field of the same part that holds the unit; a list holds one for each number.
+    """
+
+    field: str = "unit"
+
+
+class ReportPart(BaseModel):
+    """A part of a report."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
+
+
+def in_units(part: Part, units: Units) -> Part:
+    """Return a report in SI, or a part of one, with all numbers in the units of a job."""
+    changes: dict[str, Any] = {}
+    measured = _measured(type(part))
+    for name, value in part.__dict__.items():
+        if name in measured:
+            changes[name] = _converted(value, getattr(part, measured[name]), units)
+        elif name in measured.values():
+            changes[name] = _named(value, units)
+        elif isinstance(value, ReportPart):
+            changes[name] = in_units(value, units)
+        elif isinstance(value, list | tuple) and value and isinstance(value[0], ReportPart):
+            changes[name] = type(value)(in_units(each, units) for each in value)
+    return part.model_copy(update=changes)
+
+
+@cache
+def _measured(part: type[ReportPart]) -> dict[str, str]:
+    """Return for each number of a kind of part the field that holds its unit."""
+    return {
+        name: mark.field
+        for name, field in part.model_fields.items()
+        for mark in field.metadata
+        if isinstance(mark, MeasuredIn)
+    }
+
+
+def _converted(value: Any, unit: str | list[str], units: Units) -> Any:  # noqa: ANN401
+    """Return a number, or several, in SI, in the units of the job."""
+    if isinstance(value, list | tuple):
+        factors = [_in_job(each, units.angle, units.length)[0] for each in _each(unit, len(value))]
+        pairs = zip(value, factors, strict=True)
+        return type(value)(None if number is None else number / factor for number, factor in pairs)
+    return None if value is None else value / _in_job(str(unit), units.angle, units.length)[0]
+
+
+def _named(unit: str | list[str], units: Units) -> str | list[str]:
+    names = [_in_job(each, units.angle, units.length)[1] for each in _each(unit, 1)]
+    return names[0] if isinstance(unit, str) else names
+
+
+def _each(unit: str | list[str], count: int) -> list[str]:
+    return [unit] * count if isinstance(unit, str) else unit
+
+
+@cache
+def _in_job(unit: str, angle: AngleUnit, length: LengthUnit) -> tuple[float, str]:
+    """Return the SI value of the job's unit that stands for an SI unit, and its name."""
+    start, slash, rest = unit.partition("/")
+    if start not in ("rad", "m"):
+        return 1.0, unit
+    quantity = Quantity("angle" if start == "rad" else "length")
+    return factor(quantity, Units(angle, length)), (angle if start == "rad" else length) + slash + rest
+
+
+class PeakReport(ReportPart):
     """The extremes of one joint's quantity in one move."""
 
     joint: str
     quantity: JointQuantity
-    low: Annotated[float, Field(description="Smallest value, SI.")]
+    low: Annotated[float, MeasuredIn(), Field(description="Smallest value, SI.")]
     low_time: Annotated[float, Field(description="Where it is, seconds from the start of the trajectory.")]
-    high: Annotated[float, Field(description="Largest value, SI.")]
+    high: Annotated[float, MeasuredIn(), Field(description="Largest value, SI.")]
     high_time: Annotated[float, Field(description="Where it is, seconds from the start of the trajectory.")]
-    limit: Annotated[tuple[float | None, float | None], Field(description="Bounds, SI; null is unlimited.")]
+    limit: Annotated[
+        tuple[float | None, float | None],
+        MeasuredIn(),
+        Field(description="Bounds, SI; null is unlimited."),
+    ]
     used: Annotated[
         float | None, Field(description="Largest part of the bound that is used; null if unlimited.")
     ]
+    unit: UnitName
 
 
-class BindingReport(Model):
+class BindingReport(ReportPart):
     """The limit that a move uses most."""
 
     joint: str
@@ -35,8 +120,8 @@ class BindingReport(Model):
     used: Annotated[float, Field(description="Part of the bound that is used: 1 is all of it.")]
 
 
-class ReferenceReport(Model):
-    """The shortest duration that any point-to-point move may have under the same limits, found by ruckig."""
+class ReferenceReport(ReportPart):
+    """The shortest duration that any point-to-point move may have under the same limits, from ruckig."""
 
     duration: Annotated[float | None, Field(description="Seconds; null where there is no bound.")]
     ratio: Annotated[
@@ -46,66 +131,90 @@ class ReferenceReport(Model):
     reason: Annotated[str | None, Field(description="Why there is no bound.")] = None
 
 
-class WaypointReport(Model):
+class WaypointReport(ReportPart):
     """A point that a move passes, its start and target among them."""
 
     time: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
     missed: Annotated[
         list[float],
-        Field(description="By how much each joint passes beside it, SI; zero where it goes through."),
+        MeasuredIn("units"),
+        Field(description="Distance at which each joint passes it, SI; zero where it goes through."),
     ]
+    units: Annotated[list[str], Field(description="Unit of each joint.")]
 
 
-class OutsideReport(Model):
+class OutsideReport(ReportPart):
     """How far a joint leaves the range that the waypoints of a move span."""
 
     joint: str
-    beyond: Annotated[float, Field(description="Above (positive) or below (negative) that range, SI.")]
+    beyond: Annotated[
+        float, MeasuredIn(), Field(description="Above (positive) or below (negative) that range, SI.")
+    ]
     time: Annotated[
         float, Field(description="Where it is furthest, seconds from the start of the trajectory.")
     ]
+    unit: UnitName
 
 
-class ToolPeakReport(Model):
+class ToolPeakReport(ReportPart):
     """The largest magnitude of one quantity of the tool in one move."""
 
     quantity: Literal["speed", "acceleration", "angular_speed", "angular_acceleration"]
-    value: Annotated[float, Field(description="SI, of the tool as forward kinematics has it.")]
-    bound: Annotated[float, Field(description="It is proven to be at most this at every time, SI.")]
+    value: Annotated[float, MeasuredIn(), Field(description="SI, of the tool as forward kinematics has it.")]
+    bound: Annotated[
+        float, MeasuredIn(), Field(description="It is proven to be at most this at every time, SI.")
+    ]
     time: Annotated[float, Field(description="Where it is, seconds from the start of the trajectory.")]
-    limit: Annotated[float | None, Field(description="SI; null is unlimited.")]
+    limit: Annotated[float | None, MeasuredIn(), Field(description="SI; null is unlimited.")]
+    unit: UnitName
+    negligible: Annotated[bool, Field(description="Whether it is what rounding leaves of a tool at rest.")]
 
 
-class LowestSpeedReport(Model):
-    """Where the tool is slowest between the first and the last place at which its speed is the wanted one."""
+class LowestSpeedReport(ReportPart):
+    """Where the tool is slowest between the first and the last point at which its speed is the wanted one."""
 
-    speed: Annotated[float, Field(description="m/s, or rad/s where the tool turns in its place.")]
-    place: Annotated[float, Field(description="s on the path, m or rad.")]
+    speed: Annotated[
+        float, MeasuredIn(), Field(description="m/s, or rad/s where the tool turns in its place.")
+    ]
+    place: Annotated[float, MeasuredIn("place_unit"), Field(description="s on the path, m or rad.")]
     joint: Annotated[str | None, Field(description="The joint that is the reason, where one is known.")]
+    unit: UnitName
+    place_unit: UnitName
 
 
-class ToolReport(Model):
+class ToolReport(ReportPart):
     """The tool on its path."""
 
-    length: Annotated[float, Field(description="Of the path, m, or rad where the tool turns in its place.")]
-    unit: Literal["m", "rad"]
+    length: Annotated[
+        float, MeasuredIn(), Field(description="Of the path, m, or rad where the tool turns in its place.")
+    ]
+    unit: Literal["m", "rad", "mm", "deg"]
     ruled_by: Annotated[
         Literal["translation", "rotation"] | None,
         Field(description="Whose limits say how fast; null where a duration or the joints do."),
     ]
     wanted_speed: Annotated[
-        float | None, Field(description="Along the path, m/s or rad/s; null where no speed is named.")
+        float | None,
+        MeasuredIn("speed_unit"),
+        Field(description="Along the path, m/s or rad/s; null where no speed is named."),
     ]
+    speed_unit: UnitName
     held: Annotated[
         float | None, Field(description="Part of the path over which the wanted speed is held, 0 to 1.")
     ]
     lowest: LowestSpeedReport | None
     peaks: list[ToolPeakReport]
-    deviation: Annotated[float, Field(description="Largest distance of the tool from its path, m.")]
-    turned: Annotated[float, Field(description="Largest angle between the tool and its orientation, rad.")]
+    deviation: Annotated[
+        float, MeasuredIn("deviation_unit"), Field(description="Largest distance from its path, m.")
+    ]
+    deviation_unit: UnitName = "m"
+    turned: Annotated[
+        float, MeasuredIn("turned_unit"), Field(description="Largest angle from its orientation, rad.")
+    ]
+    turned_unit: UnitName = "rad"
 
 
-class MoveReport(Model):
+class MoveReport(ReportPart):
     """One move."""
 
     index: Annotated[int, Field(description="From 0.")]
@@ -120,10 +229,11 @@ class MoveReport(Model):
     peaks: list[PeakReport]
     binding: BindingReport | None
     waypoints: Annotated[
-        list[WaypointReport] | None, Field(description="The points it passes; null for a move without any.")
+        tuple[WaypointReport, ...] | None,
+        Field(description="The points it passes; null for a move without any."),
     ] = None
     outside: Annotated[
-        list[OutsideReport] | None,
+        tuple[OutsideReport, ...] | None,
         Field(
             description="Joints that leave the range of the waypoints, and how far; null without waypoints."
         ),
@@ -134,14 +244,15 @@ class MoveReport(Model):
     reference: ReferenceReport | None = None
 
 
-class FindingReport(Model):
+class FindingReport(ReportPart):
     """Something that is wrong."""
 
     move: int | None
     joint: str | None
     kind: str
-    value: Annotated[float, Field(description="SI.")]
-    limit: Annotated[float, Field(description="SI.")]
+    value: Annotated[float, MeasuredIn(), Field(description="SI.")]
+    limit: Annotated[float, MeasuredIn(), Field(description="SI.")]
+    unit: UnitName
     time: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
     method: Annotated[
         Literal["exact", "bounded", "sampled"],
@@ -150,34 +261,36 @@ class FindingReport(Model):
     factor: Annotated[
         float | None, Field(description="The move must last this many times longer; null: no help.")
     ]
-    hint: str | None = None
+    message: Annotated[str, Field(description="What is wrong, in the units of the job.")]
+    hint: Annotated[str | None, Field(description="What would fix it.")] = None
 
 
-class EventReport(Model):
-    """A concession that was made."""
+class EventReport(ReportPart):
+    """A concession."""
 
     kind: str
     message: str
     move: int | None
 
 
-class StepReport(Model):
+class StepReport(ReportPart):
     """A legal step in a joint's acceleration."""
 
     move: int
     joint: str
     time: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
-    size: Annotated[float, Field(description="Acceleration after minus before, SI.")]
+    size: Annotated[float, MeasuredIn(), Field(description="Acceleration after minus before, SI.")]
+    unit: UnitName
 
 
-class UncheckedReport(Model):
+class UncheckedReport(ReportPart):
     """A quantity that is not checked because it has no limit."""
 
     joint: str
     quantity: JointQuantity
 
 
-class Report(Model):
+class Report(ReportPart):
     """What became of a job."""
 
     version: Literal[1] = 1
@@ -186,7 +299,7 @@ class Report(Model):
     job: Annotated[str, Field(description="The job's name.")]
     robot: Annotated[str, Field(description="The robot's name.")]
     duration: ReportSeconds
-    moves: list[MoveReport]
+    moves: tuple[MoveReport, ...]
     findings: list[FindingReport]
     events: list[EventReport]
     steps: list[StepReport]

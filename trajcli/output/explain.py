@@ -1,169 +1,305 @@
-"""What a textbook would print about each move: polynomials, phases, peaks, in the job's units.
+"""Explanation of a plan: its report in the units of the job, with polynomials, poses and paths.
 
-How a pose of a job is reached: joints, branch, why that branch, and whether the arm is singular there.
+Polynomials stand as a textbook prints them: piece by piece, in local and absolute time.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from trajcli.columns import joint_factors
-from trajcli.job.report import PeakReport
-from trajcli.output.polynomials import PolynomialInterval, polynomial_intervals
-from trajcli.output.report import passing_in_units, report_of
-from trajcli.output.tool import path_in_units
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, taylor_shift
+from trajcli.geometry.rotation import Flags
+from trajcli.job.explanation import (
+    ArcSegmentReport,
+    ChoiceReport,
+    CornerReport,
+    ExplainedMove,
+    ExplainedOutside,
+    ExplainedWaypoint,
+    Explanation,
+    LineSegmentReport,
+    PathReport,
+    PhaseReport,
+    PolynomialReport,
+    PoseReport,
+    RotationSegmentReport,
+    ScrewSegmentReport,
+    SegmentReport,
+    UnitsReport,
+    polynomial_reports,
+)
+from trajcli.job.report import MoveReport, WaypointReport, in_units
+from trajcli.output.report import joint_units, report_of
+from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan
-from trajcli.planning.resolve_poses import ResolvedPose, asked_names
-from trajcli.planning.retime import PlannedMove
-from trajcli.queries.arm import ArmInUnits
-from trajcli.queries.inverse import free_directions, ranks
-from trajcli.queries.pose import plain
-from trajcli.units import Dimension, Quantity, Units, to_user, unit_name
+from trajcli.units import Quantity, Units, factor
+
+if TYPE_CHECKING:
+    from trajcli.geometry.paths.chain import Corner
+    from trajcli.geometry.paths.pose import Screw
+    from trajcli.kinematics.following.motion import ToolMotion
+    from trajcli.planning.resolve_poses import ResolvedPose
+
+_NOTHING = 1e-12  # of the largest term over the move: what is smaller came from rounding
+_SAME = 1e-9  # of the largest term: neighbouring pieces this close are one polynomial
 
 
-def reached_in_units(reached: ResolvedPose, arm: ArmInUnits) -> dict[str, Any]:
-    """Return {joints, branch, method, chosen, singular, rank, free_direction?} in the arm's units.
-
-    `chosen` says whether the names of a configuration or nearness decided, near to which joints, between how
-    many candidates, and how many answers there are within the limits. The arm is singular where the tcp can
-    move in fewer directions, among those that the pose fixes, than it can nearby: `rank` has both numbers.
-    `free_direction` is a unit vector of joint values: the arm can move along it while the tcp keeps the pose.
-    """
-    found, joints = reached.found, reached.joints
-    asked = asked_names(reached.pose.configuration)
-    here, nearby = ranks(arm.robot, joints[None], reached.goal)
-    told = {
-        "joints": plain(joints / arm.joint_factors),
-        "branch": {key: name for key, name in asdict(found.names[reached.branch]).items() if name},
-        "method": found.method.name,
-        "chosen": {
-            "by": "configuration" if asked else "nearest",
-            "configuration": asked,
-            "near": plain(reached.near / arm.joint_factors),
-            "candidates": int(np.count_nonzero(reached.usable)),
-            "within_limits": int(np.count_nonzero(found.within_limits)),
-        },
-        "singular": bool(here[0] < nearby),
-        "rank": {"here": int(here[0]), "nearby": nearby},
-    }
-    if found.free[reached.branch].any():
-        told["free_direction"] = plain(next(free_directions(arm, joints, reached.goal)))
-    return told
-
-
-def polynomial_intervals_of(move: PlannedMove, units: Units) -> list[list[PolynomialInterval]]:
-    """Return the polynomials of each joint of a move, in order of time.
-
-    Equal neighbours are joined, but not those of a spline: the slides have one between any two points.
-    """
-    join = move.planner.tag != "spline"
-    factors = joint_factors(move.robot.joint_types, units)
-    curve = move.planned.curve
-    return [
-        polynomial_intervals(curve.breaks, curve.coefficients[:, :, joint] / factors[joint], join=join)
-        for joint in range(curve.dimension)
-    ]
-
-
-def explanation(plan: Plan) -> dict[str, Any]:
-    """Return what `trajcli explain --json` prints: report, polynomials and phases, in the job's units."""
+def explanation(plan: Plan) -> Explanation:
+    """Return what `trajcli explain` has to say, in the units of the job."""
     units = plan.loaded.units
-    report = report_of(plan, reference=True)
-    return {
-        "version": 1,
-        "job": report.job,
-        "robot": report.robot,
-        "verdict": report.verdict,
-        "units": {"angle": units.angle, "length": units.length, "time": "s"},
-        "joints": list(plan.trajectory.joint_names),
-        "duration": report.duration,
-        "moves": [
-            {
-                **_move(plan, index),
-                "peaks": [peak_in_units(peak, plan) for peak in entry.peaks],
-                "binding": entry.binding and entry.binding.model_dump(),
-                "tool": entry.tool and entry.tool.model_dump(),
-                "reference": entry.reference and entry.reference.model_dump(),
-            }
-            for index, entry in enumerate(report.moves)
-        ],
-        "events": [event.model_dump() for event in report.events],
-    }
-
-
-def _move(plan: Plan, index: int) -> dict[str, Any]:
-    move, span = plan.moves[index], plan.trajectory.spans[index]
-    names = move.robot.joint_names
-    arrivals = move.planned.arrivals
-    polynomials = {
-        name: [
-            {"start": s.start, "end": s.end, "local": s.local.tolist(), "absolute": s.absolute.tolist()}
-            for s in rows
-        ]
-        for name, rows in zip(names, polynomial_intervals_of(move, plan.loaded.units), strict=True)
-    }
-    return {
-        "index": index,
-        "joints": list(names),
-        "planner": span.planner,
-        "start": span.start,
-        "end": span.end,
-        "duration": move.duration,
-        "stretch": move.stretch,
-        "continuity": span.continuity,
-        "from_pose": _reached(plan, None) if index == 0 else None,
-        "to_pose": _reached(plan, index),
-        "breaks": move.planned.curve.breaks.tolist(),
-        "polynomials": polynomials,
-        "closed_form": closed_form(move, plan.loaded.units),
-        "phases": [
-            {**asdict(phase), "joint": None if phase.joint is None else names[phase.joint]}
-            for phase in move.planned.phases
-        ],
-        "arrivals": None if arrivals is None else dict(zip(names, arrivals, strict=True)),
-        **passing_in_units(move, span, plan.verdict, plan.loaded.units),
-        "path": None if move.planned.tool is None else path_in_units(move, plan.loaded.units),
-    }
-
-
-def _reached(plan: Plan, index: int | None) -> dict[str, Any] | None:
-    """Return how the pose was reached that a move goes to, or the job starts at; None where there is none."""
-    reached = plan.reached[index]
-    return (
-        None
-        if reached is None
-        else reached_in_units(reached, ArmInUnits(plan.loaded.robot, plan.loaded.units))
+    report = in_units(report_of(plan, reference=True), units)
+    moves = tuple(_move(plan, index, report) for index, report in enumerate(report.moves))
+    return Explanation(
+        **{**report.__dict__, "moves": moves},
+        units=UnitsReport(angle=units.angle, length=units.length),
+        joints=list(plan.trajectory.joint_names),
     )
 
 
-def closed_form(move: PlannedMove, units: Units) -> dict[str, str] | None:
+def _move(plan: Plan, index: int, report: MoveReport) -> ExplainedMove:
+    """Return what there is to say about a move.
+
+    Args:
+        plan: The whole.
+        index: Number of the move among the moves.
+        report: Of the move, in the units of the job.
+    """
+    move, units = plan.moves[index], plan.loaded.units
+    names, planned = move.robot.joint_names, move.planned
+    arrivals, tool = planned.arrivals, planned.tool
+    own = {
+        "joints": list(names),
+        "from_pose": _pose(plan, None) if index == 0 else None,
+        "to_pose": _pose(plan, index),
+        "breaks": planned.curve.breaks.tolist(),
+        "polynomials": dict(zip(names, _polynomials(move, units), strict=True)),
+        "closed_form": _closed_form(move, units),
+        "phases": [
+            PhaseReport(
+                name=p.name, start=p.start, end=p.end, joint=None if p.joint is None else names[p.joint]
+            )
+            for p in planned.phases
+        ],
+        "binding_phases": planned.binding_phases,
+        "arrivals": None if arrivals is None else dict(zip(names, arrivals, strict=True)),
+        "origin": planned.origin,
+        "waypoints": _waypoints(move, report.waypoints, units),
+        "outside": report.outside
+        and tuple(
+            ExplainedOutside(**{**one.__dict__, "time": one.time - report.start}) for one in report.outside
+        ),
+        "path": None if tool is None else _path(tool, units),
+    }
+    return ExplainedMove(**{**report.__dict__, **own})
+
+
+def _waypoints(
+    move: PlannedMove, reports: Sequence[WaypointReport] | None, units: Units
+) -> tuple[ExplainedWaypoint, ...] | None:
+    """Return the points that a move passes, times from its start.
+
+    Args:
+        move: The move.
+        reports: Of its points, in the units of the job.
+        units: Of the job.
+    """
+    points = move.planned.via_points
+    if points is None or reports is None:
+        return None
+    joints = (points.points / joint_factors(move.robot.joint_types, units)).tolist()
+    return tuple(
+        ExplainedWaypoint(time=time, joints=values, missed=report.missed, units=report.units)
+        for time, values, report in zip(points.times.tolist(), joints, reports, strict=True)
+    )
+
+
+def _closed_form(move: PlannedMove, units: Units) -> dict[str, str] | None:
     """Return the formula of each joint where the curve is the fit of one, else None."""
-    if move.planned.closed_form is None:
+    if move.planned.formula is None:
         return None
     factors = joint_factors(move.robot.joint_types, units)
     start = move.start.position / factors
     change = (move.planned.end.position - move.start.position) / factors
-    period = f"{move.duration:.10g}"
+    law = move.planned.formula.replace("{T}", f"{move.duration:.10g}")
     return {
-        name: f"{q:.10g}"
-        + (
-            f" {'-' if dq < 0 else '+'} {abs(dq):.10g} (t/{period} - sin(2 pi t/{period})/(2 pi))"
-            if dq
-            else ""
-        )
+        name: f"{q:.10g}" + (f" {'-' if dq < 0 else '+'} {abs(dq):.10g} ({law})" if dq else "")
         for name, q, dq in zip(move.robot.joint_names, start, change, strict=True)
     }
 
 
-def peak_in_units(peak: PeakReport, plan: Plan) -> dict[str, Any]:
-    """Return the extremes of one quantity with its unit, in the job's units."""
-    joint = plan.trajectory.joint_names.index(peak.joint)
-    dimension: Dimension = "length" if plan.trajectory.joint_types[joint] == "prismatic" else "angle"
-    order = ("position", "velocity", "acceleration", "jerk").index(peak.quantity)
-    quantity, units = Quantity(dimension, order), plan.loaded.units
-    said = {key: to_user(getattr(peak, key), quantity, units) for key in ("low", "high")}
-    limit = [None if bound is None else to_user(bound, quantity, units) for bound in peak.limit]
-    return {**peak.model_dump(), **said, "limit": limit, "unit": unit_name(quantity, units)}
+def _pose(plan: Plan, index: int | None) -> PoseReport | None:
+    """Return how the pose was reached that a move goes to, or the job starts at; None where there is none."""
+    pose = plan.poses.get(index)
+    return None if pose is None else in_units(_resolved(pose, plan), plan.loaded.units)
+
+
+def _resolved(pose: ResolvedPose, plan: Plan) -> PoseReport:
+    """Return how a pose was reached, in SI."""
+    from trajcli.planning.resolve_poses import asked_names
+    from trajcli.queries.arm import ArmInUnits
+    from trajcli.queries.inverse import free_directions, ranks
+    from trajcli.queries.pose import plain
+
+    solutions, joints, robot = pose.solutions, pose.joints, plan.loaded.robot
+    asked, units = asked_names(pose.target.configuration), joint_units(robot.joint_types)
+    here, nearby = ranks(robot, joints[None], pose.ik_target)
+    free = None
+    if solutions.free[pose.branch].any():
+        free = plain(next(free_directions(ArmInUnits(robot, plan.loaded.units), joints, pose.ik_target)))
+    return PoseReport(
+        joints=plain(joints),
+        units=units,
+        branch={key: name for key, name in asdict(solutions.names[pose.branch]).items() if name},
+        method=solutions.method.name,
+        chosen=ChoiceReport(
+            by="configuration" if asked else "nearest",
+            configuration=asked,
+            near=plain(pose.near),
+            units=units,
+            candidates=int(np.count_nonzero(pose.usable)),
+            within_limits=int(np.count_nonzero(solutions.within_limits)),
+        ),
+        singular=bool(here[0] < nearby),
+        rank={"here": int(here[0]), "nearby": nearby},
+        free_direction=free,
+    )
+
+
+def _path(tool: ToolMotion, units: Units) -> PathReport:
+    """Return the path of a tool and the law along it, in the units of the job."""
+    segments, corners = _drawing(tool)
+    length = float(tool.law.piece_ends()[1][-1, 0])
+    unit = "rad" if tool.in_place else "m"
+    path = in_units(PathReport(length=length, unit=unit, segments=segments, corners=corners, law=[]), units)
+    scale = factor(Quantity("angle" if tool.in_place else "length"), units)
+    law = polynomial_intervals(tool.law.breaks, tool.law.coefficients[:, :, 0] / scale, path.unit)
+    return path.model_copy(update={"law": law})
+
+
+def _drawing(tool: ToolMotion) -> tuple[list[SegmentReport], list[CornerReport]]:
+    """Return the segments of a path and the corners between them."""
+    from trajcli.geometry.paths.chain import Chain
+    from trajcli.geometry.paths.pose import PoseCurve, Screw
+
+    if tool.path is None:
+        return [], []
+    poses = tool.path.poses
+    if isinstance(poses, Screw):
+        return [_screw(poses)], []
+    curve = poses.position if isinstance(poses, PoseCurve) else None
+    if not isinstance(curve, Chain):
+        return ([] if curve is None else [_segment(curve)]), []
+    return [_segment(segment) for segment in curve.segments], [
+        _corner(corner, "overlap" if tool.overlaps else corner.kind) for corner in curve.corners
+    ]
+
+
+def _corner(corner: Corner, kind: str) -> CornerReport:
+    return CornerReport(
+        kind=kind,
+        place=corner.s,
+        point=_plain(corner.point),
+        turn=corner.turn,
+        radius=corner.used,
+        deviation=corner.deviation,
+    )
+
+
+def _screw(screw: Screw) -> ScrewSegmentReport:
+    rotation, origin = screw.start[:3, :3], screw.start[:3, 3]
+    moved, turned = rotation @ screw.twist[:3], rotation @ screw.twist[3:]
+    angle = float(np.linalg.norm(turned))
+    if angle == 0:
+        distance = float(np.linalg.norm(moved))
+        return ScrewSegmentReport(axis=_plain(moved / distance), angle=0.0, advance=distance)
+    axis = turned / angle
+    point = _plain(origin + np.cross(axis, moved) / angle)
+    return ScrewSegmentReport(axis=_plain(axis), point=point, angle=angle, advance=float(axis @ moved))
+
+
+def _segment(curve: Any) -> SegmentReport:  # noqa: ANN401
+    from trajcli.geometry.paths.arc import Arc
+    from trajcli.geometry.paths.position import Pivot
+
+    if isinstance(curve, Pivot):
+        return RotationSegmentReport(place=_plain(curve.start), angle=curve.length)
+    if isinstance(curve, Arc):
+        return ArcSegmentReport(
+            kind="helix" if curve.pitch else "arc",
+            start=_plain(curve.start),
+            end=_plain(curve.end),
+            center=_plain(curve.center),
+            axis=_plain(curve.axis),
+            radius=curve.radius,
+            angle=curve.angle,
+            pitch=curve.pitch,
+            length=curve.length,
+        )
+    ends = curve.evaluate(np.array([0.0, curve.length]))[0]
+    return LineSegmentReport(start=_plain(ends[0]), end=_plain(ends[1]), length=curve.length)
+
+
+def _plain(vector: Array) -> list[float]:
+    return [float(value) + 0.0 for value in vector]
+
+
+def _polynomials(move: PlannedMove, units: Units) -> list[list[PolynomialReport]]:
+    """Return the polynomials of each joint of a move, in order of time, in the units of the job."""
+    curve: PiecewisePolynomial = move.planned.curve
+    factors = joint_factors(move.robot.joint_types, units)
+    names = {"m": units.length, "rad": units.angle}
+    return [
+        polynomial_intervals(
+            curve.breaks,
+            curve.coefficients[:, :, joint] / factors[joint],
+            names[unit],
+            join=not move.planned.one_piece_per_interval,
+        )
+        for joint, unit in enumerate(joint_units(move.robot.joint_types))
+    ]
+
+
+def polynomial_intervals(
+    breaks: Array, coefficients: Array, unit: str, *, join: bool = True
+) -> list[PolynomialReport]:
+    """Return the polynomials of one component.
+
+    Args:
+        breaks: Shape (pieces + 1,).
+        coefficients: Shape (degree + 1, pieces), highest power first, local to each break.
+        unit: Of their values.
+        join: Whether equal neighbours become one.
+    """
+    starts, ends = breaks[:-1], breaks[1:]
+    local = _without_noise(coefficients[::-1].T, ends - starts)
+    absolute = _without_noise(taylor_shift(coefficients, -starts)[::-1].T, ends)
+    like = np.append(False, _equal(absolute[:-1], absolute[1:], ends[1:], 2 * _SAME))  # as the one before
+    firsts, lasts = [0], ends.tolist()
+    for piece in range(1, len(lasts)):
+        if not (join and like[piece] and _equal(absolute[firsts[-1]], absolute[piece], ends[piece], _SAME)):
+            firsts.append(piece)
+    afters = [*firsts[1:], len(lasts)]
+    columns = (starts[firsts].tolist(), local[firsts].tolist(), absolute[firsts].tolist(), afters)
+    return polynomial_reports(
+        {"start": start, "end": lasts[after - 1], "local": own, "absolute": whole, "unit": unit}
+        for start, own, whole, after in zip(*columns, strict=True)
+    )
+
+
+def _without_noise(coefficients: Array, durations: Array) -> Array:
+    """Return ascending coefficients (pieces, n) without those whose term over the duration is rounding."""
+    terms = np.abs(coefficients) * durations[:, None] ** np.arange(coefficients.shape[1])
+    return np.where(terms <= _NOTHING * terms.max(axis=1, keepdims=True), 0.0, coefficients)
+
+
+def _equal(a: Array, b: Array, durations: ArrayLike, same: float) -> Flags:
+    """Return whether polynomials (..., n) are equal as far as `same` of their largest term."""
+    powers = np.asarray(durations)[..., None] ** np.arange(a.shape[-1])
+    largest = (np.abs(a) * powers).max(axis=-1, keepdims=True)
+    return np.asarray((np.abs(a - b) * powers <= same * largest).all(axis=-1))

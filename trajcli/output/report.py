@@ -1,141 +1,95 @@
-"""From a plan to its report, and to the errors of a verdict.
-
-What reports and explanations say about the points that a move passes.
-"""
+"""Report of a plan, and the errors of its verdict."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from trajcli.checks.finding import Finding
 from trajcli.checks.verify import Verdict
-from trajcli.columns import joint_factors
 from trajcli.curves.extrema import Peaks
-from trajcli.errors import Amount, Amounts, Problem, VerificationError, said
+from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.errors import Amount, Problem, VerificationError
 from trajcli.job.report import (
     BindingReport,
     EventReport,
     FindingReport,
+    LowestSpeedReport,
     MoveReport,
     OutsideReport,
     PeakReport,
     ReferenceReport,
     Report,
     StepReport,
+    ToolPeakReport,
+    ToolReport,
     UncheckedReport,
     WaypointReport,
 )
-from trajcli.kinematics.robot import QUANTITIES
-from trajcli.output.tool import tool_finding, tool_report
-from trajcli.planners.point_to_point.point_to_point import PointToPoint
-from trajcli.planners.tool_path.move import ToolPathMove
-from trajcli.planners.waypoints.through_points import ThroughPoints
+from trajcli.kinematics.robot import QUANTITIES, JointType
+from trajcli.planners.planner import PlannedMove
 from trajcli.planning.lower_bound import NoBound, fastest_duration
 from trajcli.planning.plan import Plan
-from trajcli.planning.retime import PlannedMove
-from trajcli.trajectory import Span
-from trajcli.units import Quantity, Units, unit_name
+from trajcli.trajectory import Span, Trajectory
 from trajcli.version import __version__
 
+if TYPE_CHECKING:
+    from trajcli.checks.tool import SampledTool
+
 _ROUNDING = 1e-12  # rad or m: what leaves the range by less does not leave it
+_HELD = 0.999  # of the wanted speed: that much counts as holding it
+_EACH = 16  # times of a piece of the law at which its speed is looked at
+_NEAR = 0.02  # of the duration: a limit that binds as near as this is the reason
+_AT_REST = 1e-6  # SI: a tool that turns, or moves, less than that does not
+_RATES = ("", "/s", "/s^2", "/s^3")
 
 
-def waypoint_reports(move: PlannedMove, span: Span) -> list[WaypointReport] | None:
-    """Return when each point is passed, and by how much beside it."""
-    passage = move.planned.passage
-    if passage is None:
-        return None
-    times = np.clip(span.start + passage.times, span.start, span.end)
-    return [
-        WaypointReport(time=time, missed=missed)
-        for time, missed in zip(times.tolist(), passage.missed.tolist(), strict=True)
-    ]
-
-
-def outside_reports(move: PlannedMove, verdict: Verdict, position: int) -> list[OutsideReport] | None:
-    """Return the joints that leave the range of the waypoints, above and below, and how far.
-
-    Args:
-        move: The move.
-        verdict: Of the whole trajectory.
-        position: Where the move stands among the moves.
-    """
-    passage = move.planned.passage
-    if passage is None:
-        return None
-    peaks = verdict.peaks[position][0]
-    ways = [
-        (-1.0, passage.points.min(axis=0), peaks.low, peaks.low_time),
-        (1.0, passage.points.max(axis=0), peaks.high, peaks.high_time),
-    ]
-    found = []
-    for joint, name in enumerate(move.robot.joint_names):
-        for sign, bound, extreme, time in ways:
-            beyond = float(extreme[joint] - bound[joint])
-            if sign * beyond > _ROUNDING * max(1.0, abs(float(bound[joint]))):
-                found.append(OutsideReport(joint=name, beyond=beyond, time=float(time[joint])))
-    return found
-
-
-def passing_in_units(move: PlannedMove, span: Span, verdict: Verdict, units: Units) -> dict[str, Any]:
-    """Return {origin, waypoints, outside} of a move, in the job's units, times from the start of the move."""
-    factors = joint_factors(move.robot.joint_types, units)
-    kinds = ["length" if kind == "prismatic" else "angle" for kind in move.robot.joint_types]
-    words = [unit_name(Quantity(kind), units) for kind in kinds]  # type: ignore[arg-type]
-    passage = move.planned.passage
-    waypoints = passage and [
-        {"time": time, "joints": point, "missed": missed, "units": words}
-        for time, point, missed in zip(
-            passage.times.tolist(),
-            (passage.points / factors).tolist(),
-            (passage.missed / factors).tolist(),
-            strict=True,
-        )
-    ]
-    outside = outside_reports(move, verdict, span.index)
-    names = move.robot.joint_names
-    told = (
-        None
-        if outside is None
-        else [
-            {
-                "joint": one.joint,
-                "beyond": one.beyond / float(factors[names.index(one.joint)]),
-                "unit": words[names.index(one.joint)],
-                "time": one.time - span.start,
-            }
-            for one in outside
-        ]
-    )
-    return {"origin": move.planned.origin, "waypoints": waypoints, "outside": told}
-
-
-_JUMPS = {"position_jump": 0, "velocity_jump": 1, "acceleration_jump": 2}
+def joint_units(joint_types: tuple[JointType, ...], order: int = 0) -> list[str]:
+    """Return the SI unit of each joint's position, or of its time derivative of an order."""
+    return [("m" if kind == "prismatic" else "rad") + _RATES[order] for kind in joint_types]
 
 
 def report_of(plan: Plan, *, reference: bool = False) -> Report:
-    """Return the report of a plan.
+    """Return the report of a plan, in SI.
 
     Args:
         plan: The plan.
         reference: Whether each move is compared with ruckig's bound.
     """
     verdict = plan.verdict
+    units = dict(zip(plan.trajectory.joint_names, joint_units(plan.trajectory.joint_types, 2), strict=True))
     return Report(
         trajcli=__version__,
         verdict="verified" if verdict.passed else "violated",
         job=plan.loaded.name,
         robot=plan.loaded.robot.name,
         duration=plan.trajectory.duration,
-        moves=[_move(plan, index, reference=reference) for index in range(len(plan.moves))],
-        findings=[FindingReport(**asdict(finding)) for finding in verdict.findings],
+        moves=tuple(_move(plan, index, reference=reference) for index in range(len(plan.moves))),
+        findings=[_finding(plan, finding) for finding in verdict.findings],
         events=[EventReport(kind=e.kind, message=e.message, move=e.move) for e in plan.events],
-        steps=[StepReport(**vars(step)) for step in verdict.steps],
+        steps=[StepReport(**vars(step), unit=units[step.joint]) for step in verdict.steps],
         unchecked=[UncheckedReport(joint=joint, quantity=quantity) for joint, quantity in verdict.unchecked],
+    )
+
+
+def _finding(plan: Plan, finding: Finding) -> FindingReport:
+    amount = finding.amounts.get("value")
+    return FindingReport(
+        move=finding.move,
+        joint=finding.joint,
+        kind=finding.kind,
+        value=finding.value,
+        limit=finding.limit,
+        time=finding.time,
+        method=finding.method,
+        factor=finding.factor,
+        hint=finding.hint,
+        message=finding.text(plan.loaded.say),
+        unit=("m" if amount.dimension == "length" else "rad") + _RATES[amount.order]
+        if isinstance(amount, Amount)
+        else "",
     )
 
 
@@ -159,9 +113,9 @@ def _move(plan: Plan, index: int, *, reference: bool) -> MoveReport:
         stretch=move.stretch,
         peaks=peaks,
         binding=binding,
-        waypoints=waypoint_reports(move, span),
-        outside=outside_reports(move, plan.verdict, index),
-        tool=None if move.planned.tool is None else tool_report(plan.trajectory, span, move),
+        waypoints=_waypoints(move, span),
+        outside=_outside(move, plan.verdict, index),
+        tool=_tool(plan.trajectory, span, move),
         reference=reference_of(move) if reference else None,
     )
 
@@ -181,14 +135,54 @@ def _peak(move: PlannedMove, joint: int, order: int, peaks: Peaks) -> PeakReport
         high_time=float(peaks.high_time[joint]),
         limit=(below if math.isfinite(below) else None, above if math.isfinite(above) else None),
         used=max(0.0, *parts) if parts else None,
+        unit=joint_units(move.robot.joint_types[joint : joint + 1], order)[0],
     )
+
+
+def _waypoints(move: PlannedMove, span: Span) -> tuple[WaypointReport, ...] | None:
+    """Return when each point is passed, and at what distance."""
+    points = move.planned.via_points
+    if points is None:
+        return None
+    times = np.clip(span.start + points.times, span.start, span.end).tolist()
+    units = joint_units(move.robot.joint_types)
+    return tuple(
+        WaypointReport(time=time, missed=missed, units=units)
+        for time, missed in zip(times, points.missed.tolist(), strict=True)
+    )
+
+
+def _outside(move: PlannedMove, verdict: Verdict, index: int) -> tuple[OutsideReport, ...] | None:
+    """Return the joints that leave the range of the waypoints, above and below, and how far.
+
+    Args:
+        move: The move.
+        verdict: Of the whole trajectory.
+        index: Number of the move among the moves.
+    """
+    points = move.planned.via_points
+    if points is None:
+        return None
+    peaks = verdict.peaks[index][0]
+    sides = [
+        (-1.0, points.points.min(axis=0), peaks.low, peaks.low_time),
+        (1.0, points.points.max(axis=0), peaks.high, peaks.high_time),
+    ]
+    units = joint_units(move.robot.joint_types)
+    reports = []
+    for joint, name in enumerate(move.robot.joint_names):
+        for sign, bound, extreme, time in sides:
+            beyond = float(extreme[joint] - bound[joint])
+            if sign * beyond > _ROUNDING * max(1.0, abs(float(bound[joint]))):
+                at = float(time[joint])
+                reports.append(OutsideReport(joint=name, beyond=beyond, time=at, unit=units[joint]))
+    return tuple(reports)
 
 
 def reference_of(move: PlannedMove) -> ReferenceReport:
     """Return how a move compares with the shortest duration under its limits."""
-    if isinstance(move.planner, PointToPoint) and not move.planner.to.gives_joints_or_pose:
-        # to where a velocity is reached fastest, another way may lead a little faster
-        reason = "the move leaves its end position open"
+    reason = move.planned.no_lower_bound
+    if reason is not None:
         return ReferenceReport(duration=None, ratio=None, joint=move.robot.joint_names[0], reason=reason)
     begins = move.planned.begins or move.start
     bound = fastest_duration(begins, move.planned.end, move.robot.limits)
@@ -199,75 +193,105 @@ def reference_of(move: PlannedMove) -> ReferenceReport:
     return ReferenceReport(duration=bound.duration, ratio=ratio, joint=name)
 
 
+def _tool(trajectory: Trajectory, span: Span, move: PlannedMove) -> ToolReport | None:
+    """Return the report of the tool of a move along a path; None for a move in joint space."""
+    motion = move.planned.tool
+    if motion is None:
+        return None
+    from trajcli.checks.tool import SampledTool
+
+    tool = SampledTool(trajectory, span, move.robot, motion)
+    deviation, turned = (float(sizes.max(initial=0.0)) for sizes in tool.deviation)
+    unit = "rad" if motion.in_place else "m"
+    wanted = move.planned.wanted_speed
+    held, lowest = (None, None) if wanted is None else _held(move, motion.law, wanted, unit)
+    return ToolReport(
+        length=float(motion.law.piece_ends()[1][-1, 0]),
+        unit=unit,
+        ruled_by=motion.ruled_by,
+        wanted_speed=wanted,
+        speed_unit=f"{unit}/s",
+        held=held,
+        lowest=lowest,
+        peaks=_tool_peaks(tool),
+        deviation=deviation,
+        turned=turned,
+    )
+
+
+def _tool_peaks(tool: SampledTool) -> list[ToolPeakReport]:
+    from trajcli.checks.tool import SPEEDS
+
+    reports = []
+    for _, name, order, _ in SPEEDS:
+        peak, limit = tool.peaks[name], float(getattr(tool.robot.limits.tcp, name))
+        report = ToolPeakReport(
+            quantity=name,
+            value=peak.value,
+            bound=peak.most,
+            time=tool.span.start + peak.time,
+            limit=None if math.isinf(limit) else limit,
+            unit=("rad" if name.startswith("angular_") else "m") + _RATES[order],
+            negligible=peak.value <= _AT_REST,
+        )
+        reports.append(report)
+    return reports
+
+
+def _held(
+    move: PlannedMove, law: PiecewisePolynomial, wanted: float, unit: str
+) -> tuple[float, LowestSpeedReport | None]:
+    """Return over which part of the path the wanted speed is held, and where it is lowest in between."""
+    part = np.linspace(0.0, 1.0, _EACH + 1)[:-1]
+    times = np.append((law.breaks[:-1, None] + law.lengths[:, None] * part).reshape(-1), law.end)
+    s, speeds = law.evaluate_orders(times, (0, 1))[:, :, 0].T
+    fast = speeds >= _HELD * wanted
+    both = fast[1:] & fast[:-1]
+    held = float(np.diff(s)[both].sum() / s[-1])
+    if not fast.any():
+        return held, None
+    first, last = int(fast.argmax()), int(fast.size - 1 - fast[::-1].argmax())
+    slowest = first + int(speeds[first : last + 1].argmin())
+    if speeds[slowest] >= _HELD * wanted:
+        return held, None
+    lowest = LowestSpeedReport(
+        speed=float(speeds[slowest]),
+        place=float(s[slowest]),
+        joint=_limiting_joint(move, float(times[slowest])),
+        unit=f"{unit}/s",
+        place_unit=unit,
+    )
+    return held, lowest
+
+
+def _limiting_joint(move: PlannedMove, time: float) -> str | None:
+    """Return the joint whose limit binds nearest to a time of the move."""
+    distances = [
+        (max(phase.start - time, time - phase.end, 0.0), phase.joint)
+        for phase in move.planned.phases
+        if phase.joint is not None
+    ]
+    if not distances:
+        return None
+    distance, joint = min(distances)
+    return move.robot.joint_names[joint] if distance <= _NEAR * move.duration else None
+
+
 def verification_error(plan: Plan) -> VerificationError:
     """Return the error that says what the verdict found, with the places of the moves."""
     return VerificationError(*(_problem(plan, finding) for finding in plan.verdict.findings))
 
 
 def _problem(plan: Plan, finding: Finding) -> Problem:
-    loaded, index = plan.loaded, finding.move or 0
-    text, amounts, hint = _said(plan, finding)
-    where = f"move {index} ({plan.moves[index].planner.tag}): "
+    index = finding.move or 0
+    span = plan.trajectory.spans[index]
     return Problem(
-        said(f"{where}{text}", amounts, loaded.say),
-        hint,
-        place=loaded.place_of_move(index),
+        f"move {index} ({span.planner}): {finding.text(plan.loaded.say)}",
+        finding.hint,
+        place=plan.loaded.place_of_move(index),
         move=index,
         joint=finding.joint,
-        time=finding.time - plan.trajectory.spans[index].start,
+        time=finding.time - span.start,
         value=finding.value,
         limit=finding.limit,
     )
-
-
-def _said(plan: Plan, finding: Finding) -> tuple[str, Amounts, str | None]:
-    """Return what a finding says, with the amounts in it, and what would fix it."""
-    if finding.joint is None:
-        return tool_finding(finding, _remedy(plan, plan.moves[finding.move or 0], finding))
-    joint = plan.trajectory.joint_names.index(finding.joint)
-    order = _JUMPS.get(finding.kind, QUANTITIES.index(finding.kind) if finding.kind in QUANTITIES else 0)
-    amounts: Amounts = {
-        "joint": finding.joint,
-        "value": Amount(finding.value, order, joint),
-        "limit": Amount(finding.limit, order, joint),
-    }
-    quantity, move = QUANTITIES[order], plan.moves[finding.move or 0]
-    if finding.kind == "waypoint":
-        quantity, what, bound, hint = "path", "passes a waypoint at", ", it shall be {limit}", finding.hint
-    elif finding.kind in _JUMPS:
-        what, bound, hint = "jumps by", "", _jump_remedy(move, finding)
-    else:
-        what, bound, hint = "reaches", ", its limit is {limit}", _remedy(plan, move, finding)
-    text = f"the {quantity} of {{joint}} {what} {{value}} at t = {finding.time:.9g} s{bound}"
-    return text, amounts, hint
-
-
-def _jump_remedy(move: PlannedMove, finding: Finding) -> str | None:
-    if finding.kind == "acceleration_jump" and isinstance(move.planner, ThroughPoints):
-        return "use spline with rule continuous_acceleration or quintic, or say limits: {jerk: null}"
-    if finding.kind == "acceleration_jump" and isinstance(move.planner, ToolPathMove):
-        return "use `law: {shape: quintic}` or jerk_limited, or say limits: {jerk: null}"
-    if finding.hint is not None or move.planned.begins is None:
-        return finding.hint
-    if finding.kind == "position_jump":
-        return "a blend centred on a point passed in motion begins before it: use `end_blends: inside`"
-    return "this rule leaves the velocities at its ends open: use clamped or continuous_acceleration"
-
-
-def _remedy(plan: Plan, move: PlannedMove, finding: Finding) -> str:
-    useless = "slowing down does not help: change the target, the start or the limit"
-    if finding.factor is None or (move.planner.when_over_limit or plan.loaded.job.when_over_limit) == "slow":
-        return useless
-    if move.start.at_rest and move.planned.end.at_rest:
-        lasting = move.duration * finding.factor
-        longer = f"{finding.factor:.6g} times longer ({lasting:.6g} s)"
-        return f"it must last {longer}, or say `when_over_limit: slow`"
-    if finding.joint is None:
-        return "say `when_over_limit: slow`"
-    order, joint = QUANTITIES.index(finding.kind), move.robot.joint_names.index(finding.joint)
-    ends = [
-        (s.velocity, s.acceleration)[order - 1][joint] for s in (move.start, move.planned.end) if order < 3
-    ]
-    if any(abs(value) > abs(finding.limit) and value * finding.limit > 0 for value in ends):
-        return f"{useless.partition(':')[0]}: the move starts or ends over its limit"
-    return "say `when_over_limit: slow`: it finds the shortest duration between these moving states"

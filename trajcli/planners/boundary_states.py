@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -16,9 +16,9 @@ _NOTHING = 1e-15  # rad or m: a move this short is none; a thousandth of what co
 _SMALL_POSITION = 1e-3  # rad or m: what goes beyond a position bound smaller than this is relative to this
 
 
-def standstill(state: State, duration: float) -> Planned:
+def standstill(state: State, duration: float, remedies: Mapping[str, str] | None = None) -> Planned:
     """Return the move that stays in `state`, which is at rest, for `duration` seconds, which may be zero."""
-    return Planned(constant(state.position, duration), state)
+    return Planned(constant(state.position, duration), state, remedies=remedies or {})
 
 
 def same_state(a: State, b: State) -> bool:

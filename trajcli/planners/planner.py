@@ -1,8 +1,8 @@
-"""What every planner is and gives back."""
+"""Contract of planners: what each is given and what it returns."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import field
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
@@ -14,7 +14,7 @@ from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Robot
 from trajcli.language.limits import LimitsSpec
 from trajcli.language.numbers import Model
-from trajcli.trajectory import State, ViaPoints
+from trajcli.trajectory import Promise, Span, State, Trajectory, ViaPoints
 
 if TYPE_CHECKING:
     from trajcli.kinematics.following.motion import ToolMotion
@@ -28,7 +28,7 @@ _LITTLE = 1e-3  # relative: a law that is stretched by less still counts as the 
 
 @comparable
 class Phase:
-    """A named stretch of a move.
+    """A named interval of a move.
 
     Attributes:
         name: Such as "accelerate", "cruise", "jerk +".
@@ -45,7 +45,7 @@ class Phase:
 
 @comparable
 class Event:
-    """A concession that was made, and would otherwise go unnoticed; or a remark on how a curve was found.
+    """A concession, which would otherwise go unnoticed; or a remark on how a curve was computed.
 
     Attributes:
         kind: A stable word for programs, such as "slowed".
@@ -70,7 +70,7 @@ class Event:
 
 
 def stretched(factor: float) -> Event:
-    """Return the event of a time-optimal law that lasts `factor` times longer than it was found."""
+    """Return the event of a time-optimal law that lasts `factor` times longer than it was computed."""
     text = f"stretched {factor:.9g} times to keep all limits between the places"
     return Event("stretched" if factor > 1 + _LITTLE else "refined", text)
 
@@ -83,15 +83,23 @@ class Planned:
         curve: q(t) from t = 0 to the move's duration.
         end: The state in which the move declares to end.
         law: s(t) with values in [0, 1] where one law moves all joints along a straight line, else None.
-        phases: Named stretches, in order of time.
+        phases: Named intervals, in order of time.
         events: Concessions.
         arrivals: Seconds after which each joint alone has arrived, shape (n,); None where all share one law.
-        closed_form: "cycloid" where the curve is a fit of q0 + dq (t/T - sin(2 pi t/T) / (2 pi)).
-        passage: The points that it passes between start and target, where it has any.
+        via_points: The points that it passes between start and target, where it has any.
         origin: Where the zero of the planner's own time lies on the curve, s: above zero where the motion had
             to begin before it.
-        tool: What the tool was told to do, where the move follows a path of it.
         begins: The state in which the curve begins where the method does not let its start be imposed.
+        tool: The reference motion of the tool, where the move follows a path of it.
+        wanted_speed: Speed along the tool's path that is asked for, m/s, or rad/s where the tool turns in
+            its place; None where none is.
+        formula: s(t) in words of mathematics with `{T}` for the duration, where the curve is a fit of
+            q0 + dq s(t) with another law than a polynomial.
+        one_piece_per_interval: Whether equal polynomials that follow each other are one each, as between
+            the points of a spline.
+        binding_phases: Whether the phases say, one after the other, which limit binds.
+        no_lower_bound: Why nothing is known of the shortest duration between its end states.
+        remedies: What would help against a finding, by its kind, where that depends on the method.
     """
 
     curve: PiecewisePolynomial
@@ -100,11 +108,16 @@ class Planned:
     phases: tuple[Phase, ...] = ()
     events: tuple[Event, ...] = ()
     arrivals: tuple[float, ...] | None = None
-    closed_form: Literal["cycloid"] | None = None
-    passage: ViaPoints | None = None
+    via_points: ViaPoints | None = None
     origin: float = 0.0
     begins: State | None = None
     tool: ToolMotion | None = None
+    wanted_speed: float | None = None
+    formula: str | None = None
+    one_piece_per_interval: bool = False
+    binding_phases: bool = False
+    no_lower_bound: str | None = None
+    remedies: Mapping[str, str] = field(default_factory=dict)
 
 
 class Planner(Model):
@@ -136,8 +149,8 @@ class Planner(Model):
         """The continuity of this move: the planner's, unless its fields promise more."""
         return self.continuity
 
-    def with_places(self, resolve: Resolve, near: Array) -> Self:
-        """Return the planner with joints in the place of poses that it goes to in joint space.
+    def with_joint_targets(self, resolve: Resolve, near: Array) -> Self:
+        """Return the planner with joints instead of the poses that it goes to in joint space.
 
         Args:
             resolve: From a target, and joint values (n,) to be near to, to the same target by its joints.
@@ -145,11 +158,11 @@ class Planner(Model):
         """
         return self
 
-    def told_to_last(self, duration: float) -> Self:
+    def with_duration(self, duration: float) -> Self:
         """Return the planner of the same move over `duration` seconds.
 
         Raises:
-            PlanningError: When it cannot be told.
+            PlanningError: When it has no such field.
         """
         fields = type(self).model_fields
         names = [name for name in ("duration", "minimum_duration") if name in fields]
@@ -170,3 +183,52 @@ class Planner(Model):
             PlanningError: When no such move exists.
         """
         raise TypeError(f"{type(self).__name__} does not say how to plan")
+
+
+@frozen
+class PlannedMove:
+    """A move with all that it was planned from.
+
+    Attributes:
+        index: Number in the job, from 0.
+        planner: The move as it stands in the job.
+        start: State in which it begins.
+        robot: With the limits in force for this move.
+        planned: What the planner returned, stretched where that was asked for.
+        over_limit: What is done where it is over its limits.
+        stretch: How many times longer it lasts than its planner said.
+    """
+
+    index: int
+    planner: Planner
+    start: State
+    robot: Robot
+    planned: Planned
+    over_limit: WhenOverLimit = "error"
+    stretch: float = 1.0
+
+    @property
+    def duration(self) -> float:
+        """Seconds."""
+        return self.planned.curve.duration
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether it begins and ends at rest."""
+        return self.start.at_rest and self.planned.end.at_rest
+
+    @property
+    def promise(self) -> Promise:
+        """What the move says of itself."""
+        planned, ends = self.planned, (self.start, self.planned.end)
+        return Promise(planned.via_points, planned.tool, self.robot, ends, self.over_limit, planned.remedies)
+
+    def span(self, start: float, end: float) -> Span:
+        """Return the part of a trajectory, from `start` to `end` s, that is this move."""
+        return Span(self.index, self.planner.tag, start, end, self.planner.joins)
+
+    def alone(self) -> Trajectory:
+        """Return the trajectory of this move alone."""
+        names, types = self.robot.joint_names, self.robot.joint_types
+        spans = (self.span(0.0, self.duration),)
+        return Trajectory(self.planned.curve, names, types, spans, self.start, self.planned.end)

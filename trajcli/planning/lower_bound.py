@@ -1,4 +1,4 @@
-"""A bound from below for the duration of a point-to-point move, from a solver that did not plan it."""
+"""Lower bound of the duration of a point-to-point move, from a solver that did not plan it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from trajcli.planners.ruckig import BoundaryProblem, fastest
 from trajcli.trajectory import State
 
 _ROUNDING = 1e-12
-_NOWHERE = 1e-9  # rad or m: a joint that comes back so near to where it was has no way to go
+_NOWHERE = 1e-9  # rad or m: a joint that comes back so near to where it was need not move
 
 
 @comparable
@@ -54,14 +54,14 @@ def fastest_duration(start: State, end: State, limits: Limits) -> LowerBound | N
     """
     bound = LowerBound(0.0, None)
     for joint in range(start.position.size):
-        task = _task(start, end, limits, joint)
-        if task.done:
+        problem = _problem(start, end, limits, joint)
+        if problem.done:
             continue
-        reason = _why_unbounded(task)
+        reason = _why_unbounded(problem)
         if reason:
             return NoBound(reason, joint)
         try:
-            profile = fastest(task)
+            profile = fastest(problem)
         except PlanningError:
             return NoBound("no motion within its limits could be found", joint)
         if profile.braking:
@@ -71,7 +71,7 @@ def fastest_duration(start: State, end: State, limits: Limits) -> LowerBound | N
     return bound
 
 
-def _task(start: State, end: State, limits: Limits, joint: int) -> BoundaryProblem:
+def _problem(start: State, end: State, limits: Limits, joint: int) -> BoundaryProblem:
     bounds = np.stack([limits.of_order(order)[joint] for order in (1, 2, 3)])
     bounds[2] = np.abs(bounds[2]).max() * np.array([-1.0, 1.0])
     counts = float(np.isfinite(bounds[2, 1]))
@@ -84,12 +84,12 @@ def _task(start: State, end: State, limits: Limits, joint: int) -> BoundaryProbl
     return BoundaryProblem(f"joint {joint + 1}", ends[0], ends[1], bounds)
 
 
-def _why_unbounded(task: BoundaryProblem) -> str | None:
+def _why_unbounded(problem: BoundaryProblem) -> str | None:
     for order in (1, 2):
-        low, high = task.bounds[order - 1].tolist()
+        low, high = problem.bounds[order - 1].tolist()
         if not np.isfinite([low, high]).all():
             return f"its {QUANTITIES[order]} is unlimited"
-        for when, state in (("starts", task.initial), ("ends", task.final)):
+        for when, state in (("starts", problem.initial), ("ends", problem.final)):
             if not low * (1 + _ROUNDING) <= state[order] <= high * (1 + _ROUNDING):
                 return f"it {when} outside its {QUANTITIES[order]} limit"
     return None

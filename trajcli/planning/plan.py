@@ -1,10 +1,12 @@
-"""From a job to a judged trajectory."""
+"""Planning of a job: from its moves to a judged trajectory."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,10 +17,11 @@ from trajcli.frozen import frozen
 from trajcli.job.limits import with_move_limits
 from trajcli.job.read import LoadedJob
 from trajcli.language.targets import Target
-from trajcli.planners.planner import Event, Planner
-from trajcli.planning.resolve_poses import ResolvedPose, nearest_rotation_events, resolve_target, start_state
-from trajcli.planning.retime import PlannedMove, align_to_period, slow_to_limits
-from trajcli.trajectory import Span, State, Trajectory
+from trajcli.planners.planner import Event, PlannedMove, Planner
+from trajcli.trajectory import State, Trajectory
+
+if TYPE_CHECKING:
+    from trajcli.planning.resolve_poses import ResolvedPose
 
 
 @frozen
@@ -29,10 +32,9 @@ class Plan:
         loaded: The job.
         moves: Its moves, in order.
         trajectory: All of them, joined.
-        verdict: What the checks found.
+        verdict: Of the checks.
         events: Concessions, in order of the moves; the job's own first.
-        reached: How poses are reached, by the index of the move that goes there, or None for the job's
-            start; None where joints were given.
+        poses: How poses are reached, by the index of the move that goes there, or None for the job's start.
     """
 
     loaded: LoadedJob
@@ -40,7 +42,7 @@ class Plan:
     trajectory: Trajectory
     verdict: Verdict
     events: tuple[Event, ...]
-    reached: Mapping[int | None, ResolvedPose | None]
+    poses: Mapping[int | None, ResolvedPose]
 
 
 def plan_job(loaded: LoadedJob) -> Plan:
@@ -51,50 +53,69 @@ def plan_job(loaded: LoadedJob) -> Plan:
         PlanningError: When a move has no curve.
     """
     moves: list[PlannedMove] = []
-    reached: dict[int | None, ResolvedPose | None] = {}
+    poses: dict[int | None, ResolvedPose] = {}
+    resolve = partial(_resolved, loaded=loaded, poses=poses)
     with _errors_at(loaded, loaded.document.place(("start",))):
-        state, reached[None] = start_state(loaded.job.start, loaded.robot)
-    events = [*loaded.events, *nearest_rotation_events(reached[None])]
+        state = resolve(loaded.job.start, np.zeros(len(loaded.robot.joints)), index=None).as_state()
+    events = [*loaded.events, *_events_of(poses.get(None), None)]
     before: Planner | None = None
     for index, planner in enumerate(loaded.job.moves):
         start = _handed_over(state, before, planner)
         with _errors_of(loaded, index, planner):
-            reachable, reached[index] = _with_joints(planner, loaded, state)
+            reachable = planner.with_joint_targets(partial(resolve, index=index), state.position)
             move = _plan_move(loaded, index, reachable, start)
         moves.append(move)
-        events += [
-            replace(event, move=index)
-            for event in (*nearest_rotation_events(reached[index]), *move.planned.events)
-        ]
+        events += _events_of(poses.get(index), index)
+        events += [replace(event, move=index) for event in move.planned.events]
         state, before = move.planned.end, planner
     trajectory = _joined(moves, loaded, _first_state(loaded, moves[0], events))
     verdict = verify(trajectory, [move.robot.limits for move in moves], [move.promise for move in moves])
-    said = tuple(replace(event, message=event.text(loaded.say), amounts={}) for event in events)
-    return Plan(loaded, tuple(moves), trajectory, verdict, said, reached)
+    shown = tuple(replace(event, message=event.text(loaded.say), amounts={}) for event in events)
+    return Plan(loaded, tuple(moves), trajectory, verdict, shown, poses)
+
+
+def _resolved(
+    target: Target,
+    near: Array,
+    *,
+    loaded: LoadedJob,
+    index: int | None,
+    poses: dict[int | None, ResolvedPose],
+) -> Target:
+    """Return the target with joints instead of a pose, and note how that is reached."""
+    if not target.gives_pose:
+        poses.pop(index, None)  # of the points of a move the last one counts
+        return target
+    from trajcli.planning.resolve_poses import resolve_pose
+
+    resolved, poses[index] = resolve_pose(target, loaded.robot, near)
+    return resolved
+
+
+def _events_of(pose: ResolvedPose | None, index: int | None) -> list[Event]:
+    """Return what was conceded to reach a pose."""
+    if pose is None:
+        return []
+    from trajcli.planning.resolve_poses import nearest_rotation_events
+
+    return [replace(event, move=index) for event in nearest_rotation_events(pose)]
 
 
 def _plan_move(loaded: LoadedJob, index: int, planner: Planner, start: State) -> PlannedMove:
     job = loaded.job
     robot = with_move_limits(loaded.robot, planner.limits, index)
     planned = planner.plan(start, robot)
-    move = PlannedMove(index, planner, start, robot, planned)
-    if (planner.when_over_limit or job.when_over_limit) == "slow":
+    over_limit = planner.when_over_limit or job.when_over_limit
+    move = PlannedMove(index, planner, start, robot, planned, over_limit)
+    if over_limit == "slow":
+        from trajcli.planning.retime import slow_to_limits
+
         move = slow_to_limits(move)
     if job.output.align:
+        from trajcli.planning.retime import align_to_period
+
         move = align_to_period(move, job.output.rate)
     return move
-
-
-def _with_joints(planner: Planner, loaded: LoadedJob, state: State) -> tuple[Planner, ResolvedPose | None]:
-    """Return the planner with joints in the place of poses, and how the last one is reached, if it is one."""
-    found: list[ResolvedPose | None] = [None]
-
-    def resolve(target: Target, near: Array) -> Target:
-        resolved, reached = resolve_target(target, loaded.robot, near)
-        found[0] = reached
-        return resolved
-
-    return planner.with_places(resolve, state.position), found[0]
 
 
 def _handed_over(state: State, before: Planner | None, after: Planner) -> State:
@@ -108,7 +129,7 @@ def _first_state(loaded: LoadedJob, first: PlannedMove, events: list[Event]) -> 
     """Return the state in which the trajectory starts.
 
     Where the job does not say how fast, and the first move's method leaves that open, it is the method's. So
-    is the place where a first blend begins that is centred on a point passed in motion.
+    is the position in which a first blend begins that is centred on a point passed in motion.
     """
     begins, given = first.planned.begins, loaded.job.start.velocity
     if begins is None or (given is not None and not np.array_equal(begins.velocity, first.start.velocity)):
@@ -133,14 +154,14 @@ def _joined(moves: list[PlannedMove], loaded: LoadedJob, first: State) -> Trajec
     spans, end = [], 0.0
     for move in moves:
         start, end = end, float(move.planned.curve.breaks[-1] + end)
-        spans.append(Span(move.index, move.planner.tag, start, end, move.planner.joins))
+        spans.append(move.span(start, end))
     robot, last = loaded.robot, moves[-1].planned.end
-    laws = tuple(_way_of(move) for move in moves)
+    laws = tuple(_law_of_tool(move) for move in moves)
     return Trajectory(curve, robot.joint_names, robot.joint_types, tuple(spans), first, last, laws)
 
 
-def _way_of(move: PlannedMove) -> PiecewisePolynomial | None:
-    """Return the way s(t) of the tool; while it turns in its place it has none."""
+def _law_of_tool(move: PlannedMove) -> PiecewisePolynomial | None:
+    """Return the time law s(t) of the tool along its path; while it turns in its place it has none."""
     tool = move.planned.tool
     return None if tool is None or tool.in_place else tool.law
 

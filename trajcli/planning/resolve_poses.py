@@ -1,4 +1,4 @@
-"""From a pose that a job names to the joints that reach it."""
+"""Resolution of poses: from a pose that a job names to the joints that reach it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Robot
 from trajcli.language.targets import Configuration, Target
 from trajcli.planners.planner import Event
-from trajcli.trajectory import State
 
 if TYPE_CHECKING:
     from trajcli.kinematics.inverse.solutions import Solutions
@@ -28,34 +27,34 @@ class ResolvedPose:
     """A pose that a job names, and the branch on which it is reached.
 
     Attributes:
-        pose: What the job says.
-        goal: The coordinates that it fixes.
+        target: What the job says.
+        ik_target: The coordinates that it fixes.
         near: Joint values (n,) of where the arm comes from, rad or m.
-        found: All answers.
+        solutions: All of inverse kinematics.
         usable: Those within the limits that have the names the job asks for, shape (branches,).
         branch: Index of the usable one that is nearest to `near`.
     """
 
-    pose: Target
-    goal: IkTarget
+    target: Target
+    ik_target: IkTarget
     near: Array
-    found: Solutions
+    solutions: Solutions
     usable: NDArray[np.bool_]
     branch: int
 
     @property
     def joints(self) -> Array:
         """Joint values (n,), rad or m."""
-        return np.asarray(self.found.joints[self.branch])
+        return np.asarray(self.solutions.joints[self.branch])
 
 
-def resolve_target(target: Target, robot: Robot, near: Array) -> tuple[Target, ResolvedPose | None]:
-    """Return the target with joints in the place of its pose, and how that is reached; None without a pose.
+def resolve_pose(target: Target, robot: Robot, near: Array) -> tuple[Target, ResolvedPose]:
+    """Return the target with joints instead of its pose, and how that is reached.
 
     The branch is the one that the target's configuration names; without one, that nearest to `near`.
 
     Args:
-        target: With joints or a pose; one with neither comes back as it is.
+        target: With a pose.
         robot: Its base, tool and position limits count.
         near: Joint values (n,) of where the arm comes from, rad or m.
 
@@ -63,25 +62,12 @@ def resolve_target(target: Target, robot: Robot, near: Array) -> tuple[Target, R
         InputError: When the robot has no geometry, or the configuration names what its arm has not.
         PlanningError: When no branch reaches the pose within the limits.
     """
-    if not target.gives_pose:
-        return target, None
     if robot.convention is None:
         hint = "give its joints theta, d, a and alpha, or the target `joints`"
         raise InputError(f"{robot.name} has no geometry, so it reaches no pose", hint=hint)
-    reached = _on_nearest_branch(target, robot, near)
-    joints = tuple(reached.joints.tolist())
-    return Target(joints=joints, velocity=target.velocity, acceleration=target.acceleration), reached
-
-
-def start_state(target: Target, robot: Robot) -> tuple[State, ResolvedPose | None]:
-    """Return the state in which a job starts; a pose is reached near to where all joints are zero.
-
-    Raises:
-        InputError: As `with_joints`.
-        PlanningError: As `with_joints`.
-    """
-    resolved, reached = resolve_target(target, robot, np.zeros(len(robot.joints)))
-    return resolved.as_state(), reached
+    pose = _on_nearest_branch(target, robot, near)
+    joints = tuple(pose.joints.tolist())
+    return Target(joints=joints, velocity=target.velocity, acceleration=target.acceleration), pose
 
 
 def _on_nearest_branch(target: Target, robot: Robot, near: Array) -> ResolvedPose:
@@ -89,20 +75,20 @@ def _on_nearest_branch(target: Target, robot: Robot, near: Array) -> ResolvedPos
     from trajcli.kinematics.inverse.solve import solve
     from trajcli.language.targets import ik_target
 
-    goal = ik_target(target)
-    found = solve(robot, goal, near)
-    check_reachable(robot, found)
-    chosen = _of_configuration(
-        target.configuration, [str(name) for name in found.names], robot, found.method.name
+    wanted = ik_target(target)
+    solutions = solve(robot, wanted, near)
+    check_reachable(robot, solutions)
+    names = [str(name) for name in solutions.names]
+    usable = solutions.within_limits & _of_configuration(
+        target.configuration, names, robot, solutions.method.name
     )
-    usable = found.within_limits & chosen
     if not usable.any():
         words = " ".join(asked_names(target.configuration).values())
-        others = sorted({str(found.names[k]) for k in np.flatnonzero(found.within_limits)})
+        others = sorted({names[k] for k in np.flatnonzero(solutions.within_limits)})
         message = f"{robot.name} does not reach the pose within its limits in the configuration {words}"
         raise PlanningError(Problem(message, f"it does in: {', '.join(others)}"))
-    distance = np.where(usable, np.abs(found.joints - near).max(axis=-1), np.inf)
-    return ResolvedPose(target, goal, near, found, usable, int(distance.argmin()))
+    distance = np.where(usable, np.abs(solutions.joints - near).max(axis=-1), np.inf)
+    return ResolvedPose(target, wanted, near, solutions, usable, int(distance.argmin()))
 
 
 def _of_configuration(
@@ -125,13 +111,13 @@ def asked_names(wanted: Configuration | None) -> dict[str, str]:
     return {choice: word for choice in _CHOICES if (word := getattr(wanted, choice, None)) is not None}
 
 
-def nearest_rotation_events(reached: ResolvedPose | None) -> list[Event]:
-    """Return the event that a matrix was not quite a rotation and stands for the nearest one."""
-    if reached is None or reached.pose.matrix is None:
+def nearest_rotation_events(pose: ResolvedPose) -> list[Event]:
+    """Return the event that a matrix was not quite a rotation, so that the nearest one is taken."""
+    if pose.target.matrix is None:
         return []
     from trajcli.geometry.rotation import rotation_defect
 
-    defect = float(rotation_defect(np.array([row[:3] for row in reached.pose.matrix[:3]])))
+    defect = float(rotation_defect(np.array([row[:3] for row in pose.target.matrix[:3]])))
     if defect <= _NOTED:
         return []
     return [

@@ -1,4 +1,4 @@
-"""Make a planned move last longer: until it keeps its limits, or until it fills whole periods."""
+"""Retiming of planned moves: until they keep their limits, or until they fill whole periods."""
 
 from __future__ import annotations
 
@@ -9,63 +9,20 @@ import numpy as np
 
 from trajcli.checks.finding import Finding
 from trajcli.checks.limits import peaks_by_move
-from trajcli.checks.verify import Verdict, verify
+from trajcli.checks.verify import verify
 from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import Array
 from trajcli.curves.smallest_feasible import smallest_feasible
 from trajcli.errors import Amount, Amounts, PlanningError
-from trajcli.frozen import frozen
-from trajcli.kinematics.robot import QUANTITIES, Robot
+from trajcli.kinematics.robot import QUANTITIES
 from trajcli.planners.boundary_states import share_of_limits
-from trajcli.planners.planner import Event, Planned, Planner
-from trajcli.trajectory import Promise, Span, State, Trajectory
+from trajcli.planners.planner import Event, Planned, PlannedMove
 
 _LONGEST = 1e4  # times the planned duration: a move that needs more is not over its limit, it is wrong
 _ROOM = 1e-10  # relative; a tenth of the tolerance of limits, so that rounding does not tip the later verdict
-_ONE_BY_ONE = 1  # stretches tried at once: each costs a plan of its own
+_ONE_BY_ONE = 1  # factors tried at once: each costs a plan of its own
 _WHOLE = 1e-9  # of a period: what is this close to whole is whole
 _TRIES = 50
-
-
-@frozen
-class PlannedMove:
-    """A move with all that it was planned from.
-
-    Attributes:
-        index: Number in the job, from 0.
-        planner: The move as it stands in the job.
-        start: State in which it begins.
-        robot: With the limits in force for this move.
-        planned: What the planner returned, stretched where that was asked for.
-        stretch: How many times longer it lasts than its planner said.
-    """
-
-    index: int
-    planner: Planner
-    start: State
-    robot: Robot
-    planned: Planned
-    stretch: float = 1.0
-
-    @property
-    def duration(self) -> float:
-        """Seconds."""
-        return self.planned.curve.duration
-
-    def alone(self) -> Trajectory:
-        """Return the trajectory of this move alone."""
-        span = Span(self.index, self.planner.tag, 0.0, self.duration, self.planner.joins)
-        names, types = self.robot.joint_names, self.robot.joint_types
-        return Trajectory(self.planned.curve, names, types, (span,), self.start, self.planned.end)
-
-    @property
-    def promise(self) -> Promise:
-        """What the move says of itself."""
-        return Promise(self.planned.passage, self.planned.tool, self.robot)
-
-    def verdict(self) -> Verdict:
-        """Return the verdict on this move alone."""
-        return verify(self.alone(), [self.robot.limits], [self.promise])
 
 
 def with_duration(move: PlannedMove, duration: float) -> PlannedMove:
@@ -77,9 +34,9 @@ def with_duration(move: PlannedMove, duration: float) -> PlannedMove:
         PlanningError: When the planner cannot last that long.
     """
     factor = duration / move.duration
-    if move.start.at_rest and move.planned.end.at_rest:
+    if move.at_rest:
         return replace(move, planned=_scaled(move.planned, factor), stretch=move.stretch * factor)
-    planned = move.planner.told_to_last(duration).plan(move.start, move.robot)
+    planned = move.planner.with_duration(duration).plan(move.start, move.robot)
     stretch = move.stretch * planned.curve.duration / move.duration
     return replace(move, planned=planned, stretch=stretch)
 
@@ -91,7 +48,7 @@ def _scaled(planned: Planned, factor: float) -> Planned:
         law=planned.law and scale_time(planned.law, factor),
         phases=tuple(replace(p, start=p.start * factor, end=p.end * factor) for p in planned.phases),
         arrivals=planned.arrivals and tuple(time * factor for time in planned.arrivals),
-        passage=planned.passage and planned.passage.scaled(factor),
+        via_points=planned.via_points and planned.via_points.scaled(factor),
         origin=planned.origin * factor,
         tool=planned.tool and planned.tool.scaled(factor),
     )
@@ -106,7 +63,7 @@ def slow_to_limits(move: PlannedMove) -> PlannedMove:
     over = _over_limit(move)
     if not over or move.duration == 0:
         return move
-    if move.start.at_rest and move.planned.end.at_rest:
+    if move.at_rest:
         factors = [finding.factor for finding in over]
         factor = None if None in factors else max(f for f in factors if f is not None)
     else:
@@ -129,7 +86,8 @@ def slow_to_limits(move: PlannedMove) -> PlannedMove:
 
 
 def _over_limit(move: PlannedMove) -> list[Finding]:
-    return [f for f in move.verdict().findings if f.kind in QUANTITIES or f.factor is not None]
+    findings = verify(move.alone(), [move.robot.limits], [move.promise]).findings
+    return [f for f in findings if f.kind in QUANTITIES or f.factor is not None]
 
 
 def _excess(move: PlannedMove, factors: Array) -> Array:

@@ -84,7 +84,7 @@ def in_time(coefficients: list[float], origin: float) -> np.ndarray:
 
 def coefficients_of(plan: Plan, move: int, kind: str = "absolute", joint: str = "j1") -> list[float]:
     """Return what `explain --json` prints for a move of one polynomial."""
-    (only,) = explanation(plan)["moves"][move]["polynomials"][joint]
+    (only,) = explanation(plan).model_dump()["moves"][move]["polynomials"][joint]
     return list(only[kind])
 
 
@@ -124,7 +124,7 @@ def test_cycloidal(case: Case) -> None:
     given, expected = case["inputs"], case["expected"]
     move = {"planner": "cycloidal", "to": {"joints": [given["qf"]]}, "duration": given["T"]}
     plan = compare_samples(case, {"joints": [given["q0"]]}, [move], expected["samples_t_q_v_a"])
-    peak = explanation(plan)["moves"][0]["peaks"][1]
+    peak = explanation(plan).model_dump()["moves"][0]["peaks"][1]
     close(peak["high"], 2 * expected["k"], case)  # k (1 - cos(a t)) is 2 k in the middle
     close(2 * np.pi / given["T"], expected["a"], case)
 
@@ -161,7 +161,7 @@ def test_trapezoid_212(case: Case) -> None:
 
 
 def coefficients_of_first_piece(plan: Plan) -> list[float]:
-    return list(explanation(plan)["moves"][0]["polynomials"]["j1"][0]["absolute"])
+    return list(explanation(plan).model_dump()["moves"][0]["polynomials"]["j1"][0]["absolute"])
 
 
 def unit(case: Case) -> float:
@@ -213,7 +213,7 @@ def test_trapezoid_with_boundary_velocities(case: Case) -> None:
     close(plan.trajectory.duration, expected["duration"], case)
     got = [lengths(plan).get(name, 0.0) for name in ("accelerate", "cruise", "decelerate")]
     close(got, [expected["Ta"], expected["Tv"], expected["Td"]], case)
-    close(explanation(plan)["moves"][0]["peaks"][1]["high"], expected["peak_velocity"], case)
+    close(explanation(plan).model_dump()["moves"][0]["peaks"][1]["high"], expected["peak_velocity"], case)
 
 
 @of_kind("sync_constant_speed")

@@ -38,7 +38,7 @@ def jobs_of(case):
 def test_the_slides(case):
     inputs, expected, within = case["inputs"], case["expected"], case["tolerance"]
     for made in jobs_of(case):
-        told = explanation(made)["moves"][0]
+        told = explanation(made).model_dump()["moves"][0]
         assert -told["origin"] == pytest.approx(expected["start_time"], abs=within)
         assert told["duration"] - told["origin"] == pytest.approx(expected["end_time"], abs=within)
         missed = [point["missed"][0] for point in told["waypoints"]]
@@ -103,11 +103,15 @@ def test_craig(case):
     made = blends(
         start, points, acceleration=inputs["acceleration"], end_blends="inside", units={"angle": "deg"}
     )
-    phases = {p["name"]: p["end"] - p["start"] for p in explanation(made)["moves"][0]["phases"]}
+    phases = {p["name"]: p["end"] - p["start"] for p in explanation(made).model_dump()["moves"][0]["phases"]}
     got = [phases[f"blend {k}"] for k in range(4)]
     np.testing.assert_allclose(got, expected["blend_times"], atol=case["tolerance"])
     curve = curve_of(made)
-    middles = [p["start"] + 1e-6 for p in explanation(made)["moves"][0]["phases"] if p["name"] == "straight"]
+    middles = [
+        p["start"] + 1e-6
+        for p in explanation(made).model_dump()["moves"][0]["phases"]
+        if p["name"] == "straight"
+    ]
     speeds = np.degrees([curve.evaluate(t, 1)[0] for t in middles])
     np.testing.assert_allclose(speeds, expected["segment_velocities"], atol=case["tolerance"])
 
@@ -123,7 +127,7 @@ def test_the_rows_of_a_peer_lie_on_the_straight_pieces(case):
     made = blends(*timed(np.cumsum([0, *durations]), q), blend_durations=inputs["tacc"])
     assert not made.events
     curve = curve_of(made).evaluate(np.linspace(0, curve_of(made).duration, 100_001))
-    missed = made.moves[0].planned.passage.missed
+    missed = made.moves[0].planned.via_points.missed
     for row in np.array(case["expected"]["q"], dtype=float):
         at_point = (np.abs(q - row).max(axis=1) < 1e-9) & (missed.max(axis=1) > 0)
         room = np.linalg.norm(missed[at_point], axis=1).max(initial=0.0)
@@ -160,7 +164,7 @@ def test_missed_by_exactly_the_stated_distance(seed, ends):
         missed[[0, -1]] = 0
     else:
         assert shift == tau[0] / 2
-    np.testing.assert_allclose(planned.passage.missed, missed, atol=1e-12)
+    np.testing.assert_allclose(planned.via_points.missed, missed, atol=1e-12)
     np.testing.assert_allclose(np.abs(curve.evaluate(t + shift) - q), missed, atol=1e-12)
     assert_joins(curve, 1)
 
@@ -171,7 +175,7 @@ def test_exactly(seed, ends):
     t, q, rng = drawn(seed)
     tau = rng.uniform(0.05, 0.2, t.size)
     made = blends(*timed(t, q), blend_durations=tau.tolist(), end_blends=ends, exactly=True)
-    passage = made.moves[0].planned.passage
+    passage = made.moves[0].planned.via_points
     inner = slice(1, -1) if ends == "centred" else slice(None)
     assert_passes(made, passage.times[inner], q[inner])
     assert not passage.missed[inner].any()
@@ -197,7 +201,7 @@ def test_blends_that_would_overlap_are_shrunk():
     (event,) = made.events
     assert event.kind == "shrunk"
     assert event.message.startswith("the blend at point 1 was shortened from 1.9 s to ")
-    phases = explanation(made)["moves"][0]["phases"]
+    phases = explanation(made).model_dump()["moves"][0]["phases"]
     ends = [(p["start"], p["end"]) for p in phases if p["name"].startswith("blend")]
     assert all(b[0] >= a[1] - 1e-12 for a, b in pairwise(ends))
 
@@ -259,7 +263,7 @@ def test_a_duration_stretches_the_fastest():
     assert centred.trajectory.duration == pytest.approx(20, rel=1e-12)  # the blends at the ends included
     ratio = 20 / fastest.trajectory.duration
     np.testing.assert_allclose(
-        slower.moves[0].planned.passage.times, fastest.moves[0].planned.passage.times * ratio, rtol=1e-9
+        slower.moves[0].planned.via_points.times, fastest.moves[0].planned.via_points.times * ratio, rtol=1e-9
     )
 
 

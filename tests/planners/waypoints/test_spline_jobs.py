@@ -163,7 +163,7 @@ def test_explain_agrees_with_itself():
     """Local and absolute coefficients are the same polynomial."""
     start, points = timed([0, 0.7, 1.5, 4], [[0, 1], [2, -1], [1, 0], [3, 3]])
     made = plan(start, {"planner": "spline", "through": points})
-    for pieces in explanation(made)["moves"][0]["polynomials"].values():
+    for pieces in explanation(made).model_dump()["moves"][0]["polynomials"].values():
         for piece in pieces:
             np.testing.assert_allclose(in_time(piece["local"], piece["start"]), piece["absolute"], atol=1e-9)
 
@@ -174,7 +174,7 @@ def test_there_is_a_polynomial_for_each_interval_also_where_two_are_one_cubic(ru
     t, q = np.array([0, 1, 2.5, 3, 5]), np.array([[0, 7], [2, 7], [1, 7], [3, 7], [4, 7]])
     start, through = timed(t, q)
     made = plan(start, {"planner": "spline", "rule": rule, "through": through})
-    told = explanation(made)["moves"][0]
+    told = explanation(made).model_dump()["moves"][0]
     assert told["breaks"] == t.tolist()
     spline = CubicSpline(t, q, bc_type="clamped" if ends else "not-a-knot")
     for joint, pieces in enumerate(told["polynomials"].values()):

@@ -106,7 +106,7 @@ def test_no_slower_than_the_fastest(rule, seed, joints, count):
     rng = np.random.default_rng(seed)
     q = np.cumsum(rng.uniform(-1, 1, (count, joints)), axis=0)
     made = free(rule, q)
-    times = made.moves[0].planned.passage.times
+    times = made.moves[0].planned.via_points.times
     assert_passes(made, times, q)
     assert made.trajectory.duration <= WITHIN * fastest(rule, q, np.diff(times))
 
@@ -124,7 +124,7 @@ def test_limits_by_direction():
     points = [{"joints": row} for row in q[1:].tolist()]
     limits = {"velocity": [[-0.2, VELOCITY]], "acceleration": ACCELERATION}
     made = plan({"joints": q[0].tolist()}, {"planner": "spline", "through": points}, limits=limits)
-    times = made.moves[0].planned.passage.times
+    times = made.moves[0].planned.via_points.times
     assert made.trajectory.duration <= WITHIN * fastest(
         "continuous_acceleration", q, np.diff(times), down=0.2
     )
@@ -151,8 +151,8 @@ def test_a_duration_keeps_the_proportions_of_the_fastest(rule):
     made = plan({"joints": q[0].tolist()}, move, limits=limits)
     alone = free(rule, q)
     assert made.trajectory.duration == 30.0
-    at = alone.moves[0].planned.passage.times / alone.trajectory.duration
-    np.testing.assert_allclose(made.moves[0].planned.passage.times / 30.0, at, rtol=1e-9)
+    at = alone.moves[0].planned.via_points.times / alone.trajectory.duration
+    np.testing.assert_allclose(made.moves[0].planned.via_points.times / 30.0, at, rtol=1e-9)
     assert_passes(made, at * 30.0, q)
 
 
@@ -187,8 +187,8 @@ def test_many_points_take_no_longer_than_stopping_at_each():
     ways = np.abs(np.diff(q, axis=0)).max(axis=1)
     stopping = np.maximum(1.875 * ways / VELOCITY, np.sqrt(10 / np.sqrt(3) * ways / ACCELERATION)).sum()
     assert made.trajectory.duration < 0.8 * stopping
-    np.testing.assert_array_less(np.diff(made.moves[0].planned.passage.times), 10)
-    assert_passes(made, made.moves[0].planned.passage.times, q)
+    np.testing.assert_array_less(np.diff(made.moves[0].planned.via_points.times), 10)
+    assert_passes(made, made.moves[0].planned.via_points.times, q)
     curve = curve_of(made)
     assert np.abs(curve.evaluate(np.linspace(0, curve.duration, 50_001), 2)).max() <= ACCELERATION * (
         1 + 1e-9

@@ -55,11 +55,11 @@ def test_units_stand_in_the_columns_names(tmp_path):
 
 def test_times_count_from_the_first_row_where_the_arm_stands(tmp_path):
     made = recorded(tmp_path, "t,q1,q2\n10,0,0\n11,1,0\n13,1,1\n")
-    assert made.moves[0].planned.passage.times.tolist() == [0, 1, 3]
+    assert made.moves[0].planned.via_points.times.tolist() == [0, 1, 3]
     elsewhere = recorded(tmp_path, "t,q1,q2\n1,1,0\n3,1,1\n", limits={"velocity": 5})
-    assert elsewhere.moves[0].planned.passage.times.tolist() == [0, 1, 3]
+    assert elsewhere.moves[0].planned.via_points.times.tolist() == [0, 1, 3]
     halved = recorded(tmp_path, "t,q1,q2\n10,0,0\n11,1,0\n13,1,1\n", {"duration": 1.5}, limits={})
-    assert halved.moves[0].planned.passage.times.tolist() == [0, 0.5, 1.5]
+    assert halved.moves[0].planned.via_points.times.tolist() == [0, 0.5, 1.5]
 
 
 def test_a_target_after_the_recording(tmp_path):
@@ -67,7 +67,7 @@ def test_a_target_after_the_recording(tmp_path):
     made = recorded(tmp_path, "t,q1,q2\n0,0,0\n1,1,0\n3,1,1\n", to)
     assert_passes(made, [0, 1, 3, 4], [[0, 0], [1, 0], [1, 1], [0, 0]])
     free = recorded(tmp_path, "q1,q2\n0,0\n1,0\n1,1\n", {"to": {"joints": [1, 1]}})
-    assert len(free.moves[0].planned.passage.times) == 3, "the last row and the target are one point"
+    assert len(free.moves[0].planned.via_points.times) == 3, "the last row and the target are one point"
 
 
 @pytest.mark.parametrize("planner", PLANNERS)
@@ -79,7 +79,7 @@ def test_repeated_rows_are_left_out_and_told(tmp_path, planner):
     assert told.endswith("points.csv: too near to the one before")
     made = recorded(tmp_path, text, {"planner": planner, "through": {"csv": "points.csv", "merge": 0.001}})
     assert "left out 3 of 6" in made.events[0].message
-    np.testing.assert_allclose(made.moves[0].planned.passage.points, [[0, 0], [0.5, 0], [1, 1]])
+    np.testing.assert_allclose(made.moves[0].planned.via_points.points, [[0, 0], [0.5, 0], [1, 1]])
 
 
 def test_near_is_an_angle_or_a_length_as_the_joint_is(tmp_path):
@@ -87,7 +87,7 @@ def test_near_is_an_angle_or_a_length_as_the_joint_is(tmp_path):
     text = "turn_deg,lift_mm\n10,0\n10.4,0.4\n11,0\n11,0.6\n20,5\n"
     move = {"through": {"csv": "points.csv", "merge": 0.5}}
     made = recorded(tmp_path, text, move, robot=robot, units={"angle": "deg", "length": "mm"})
-    left = made.moves[0].planned.passage.points / [np.pi / 180, 1e-3]
+    left = made.moves[0].planned.via_points.points / [np.pi / 180, 1e-3]
     np.testing.assert_allclose(left, [[0, 0], [10, 0], [11, 0], [11, 0.6], [20, 5]], atol=1e-9)
 
 
@@ -95,7 +95,7 @@ def test_the_end_of_a_recording_is_kept_even_where_it_is_near(tmp_path):
     text = "q1,q2\n0,0\n1,0\n2,0\n2.001,0\n"
     made = recorded(tmp_path, text, {"through": {"csv": "points.csv", "merge": 0.01}})
     np.testing.assert_array_equal(made.trajectory.end.position, [2.001, 0])
-    np.testing.assert_allclose(made.moves[0].planned.passage.points, [[0, 0], [1, 0], [2.001, 0]])
+    np.testing.assert_allclose(made.moves[0].planned.via_points.points, [[0, 0], [1, 0], [2.001, 0]])
 
 
 def test_standing_still_may_be_meant_where_rows_have_times(tmp_path):
@@ -218,7 +218,7 @@ def test_names_poses_and_joints_may_be_mixed():
             job["limits"] = {"acceleration": 8}
         made = plan_job(job_from_text(json.dumps(job)))
         assert made.verdict.passed
-        place = forward(made.loaded.robot, made.moves[0].planned.passage.points[2])
+        place = forward(made.loaded.robot, made.moves[0].planned.via_points.points[2])
         np.testing.assert_allclose(place[:3, 3], [0.4, 0.1, 0.25], atol=1e-9)
         np.testing.assert_allclose(np.diag(place)[:3], [1, -1, -1], atol=1e-9)
 
@@ -294,7 +294,7 @@ def test_a_recording_that_follows_a_stretch(tmp_path):
     for move in ({}, {"to": {"joints": [0, 0], "time": 0.4}}, {"duration": 0.2}):
         made = recorded(tmp_path, text, move, start=start, when_over_limit="slow")
         assert made.verdict.passed
-        times = made.moves[0].planned.passage.times
+        times = made.moves[0].planned.via_points.times
         assert made.moves[0].stretch > 1
         np.testing.assert_allclose(times[1:3] / times[2], [1 / 3, 1], rtol=1e-9)
 
@@ -315,7 +315,7 @@ def test_aligned_moves_end_on_whole_periods(tmp_path):
         )
         periods = made.trajectory.duration * 125
         assert periods == pytest.approx(round(periods), abs=1e-6)
-        passage = made.moves[0].planned.passage
+        passage = made.moves[0].planned.via_points
         missed = np.abs(
             curve_of(made).evaluate(np.clip(passage.times, 0, made.trajectory.duration)) - passage.points
         )

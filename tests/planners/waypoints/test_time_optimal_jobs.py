@@ -58,7 +58,7 @@ def test_a_straight_way(path, distance):
 def test_points_are_passed_in_order_within_the_limits(fields):
     q = points()
     made = fastest(q, **fields)
-    curve, passage = curve_of(made), made.moves[0].planned.passage
+    curve, passage = curve_of(made), made.moves[0].planned.via_points
     assert (np.diff(passage.times) > 0).all()
     np.testing.assert_allclose(curve.evaluate(passage.times), q, atol=1e-9)
     assert_joins(curve, 1)
@@ -118,7 +118,7 @@ def test_a_corner_is_stopped_at_or_rounded_by_no_more_than_asked_for():
         # each row lies on a segment, or nowhere further from both than the corner
         away = np.minimum(np.abs(rows[:, 1]), np.abs(rows[:, 0] - 1))
         assert away.max() <= corner * ALLOWED
-        np.testing.assert_allclose(made.moves[0].planned.passage.missed[1], corner, rtol=1e-9)
+        np.testing.assert_allclose(made.moves[0].planned.via_points.missed[1], corner, rtol=1e-9)
         durations.append(made.trajectory.duration)
     assert durations == sorted(durations, reverse=True)
 
@@ -131,7 +131,7 @@ def test_a_corner_is_an_angle_or_a_length_as_the_joint_is():
 
     def missed(corner):
         made = plan(start, move | {"corner": corner}, **rest)
-        return made.moves[0].planned.passage.missed[1:-1] / [1e-3, np.pi / 180]
+        return made.moves[0].planned.via_points.missed[1:-1] / [1e-3, np.pi / 180]
 
     alike = missed(1)
     assert alike.max(axis=1) == pytest.approx([1, 1], rel=1e-9)  # mm, degrees
@@ -182,12 +182,12 @@ def test_a_longer_duration_is_kept():
     shortest = fastest(q).trajectory.duration
     made = fastest(q, duration=2 * shortest)
     assert made.trajectory.duration == pytest.approx(2 * shortest, rel=1e-12)
-    np.testing.assert_allclose(curve_of(made).evaluate(made.moves[0].planned.passage.times), q, atol=1e-9)
+    np.testing.assert_allclose(curve_of(made).evaluate(made.moves[0].planned.via_points.times), q, atol=1e-9)
 
 
 def test_where_which_limit_binds():
     """A trapezoid of the joint that is slowest: accelerate, cruise, brake."""
-    told = explanation(fastest([[0, 0], [1, 3.0]]))["moves"][0]
+    told = explanation(fastest([[0, 0], [1, 3.0]])).model_dump()["moves"][0]
     phases = [(p["name"], p["joint"]) for p in told["phases"]]
     assert phases == [("acceleration +", "j2"), ("velocity +", "j2"), ("acceleration -", "j2")]
     borders = [p["end"] for p in told["phases"]]

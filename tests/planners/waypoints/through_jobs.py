@@ -69,7 +69,7 @@ def in_time(coefficients: list[float], origin: float) -> np.ndarray:
 
 def printed(made: Plan, time: float, joint: str = "j1", kind: str = "absolute") -> np.ndarray:
     """Return the coefficients that `explain --json` prints for the polynomial in force at a time."""
-    pieces = explanation(made)["moves"][0]["polynomials"][joint]
+    pieces = explanation(made).model_dump()["moves"][0]["polynomials"][joint]
     (piece,) = [piece for piece in pieces if piece["start"] <= time < piece["end"]]
     return np.array(piece[kind])
 

@@ -26,6 +26,7 @@ class ToolMotion:
         tolerance: How near the joints' curve promises to be.
         in_place: Whether s is an angle.
         ruled_by: "translation" or "rotation", whose limits determine the speed; None where a duration does.
+        overlaps: Whether segments of the path overlap in time, so that its corners are cut.
     """
 
     path: ToolPath | None
@@ -35,6 +36,7 @@ class ToolMotion:
     tolerance: Tolerance
     in_place: bool = False
     ruled_by: str | None = None
+    overlaps: bool = False
 
     def reference(self, times: Array, side: Side = "right") -> ToolReference:
         """Return the reference of the tool at times (N,) from the start of the move."""

@@ -16,6 +16,8 @@ from trajcli.planners.planner import Planned
 from trajcli.planners.point_to_point.point_to_point import PointToPoint
 from trajcli.trajectory import State
 
+FORMULA = "t/{T} - sin(2 pi t/{T})/(2 pi)"
+
 
 class Cycloidal(PointToPoint):
     """Rest to rest with a sine-shaped acceleration, zero at both ends.
@@ -44,7 +46,7 @@ class Cycloidal(PointToPoint):
             return standstill(end, self.duration or 0.0)
         displacement = end.position - start.position
         law = cycloid_law(self.duration or self._fastest(displacement, robot))
-        return Planned(along_line(start.position, displacement, law), end, law=law, closed_form="cycloid")
+        return Planned(along_line(start.position, displacement, law), end, law=law, formula=FORMULA)
 
     def _fastest(self, displacement: Array, robot: Robot) -> float:
         """Return the shortest duration (s) in which all joints keep their limits."""

@@ -7,6 +7,7 @@ Source: Berscheid and Kroeger, Jerk-limited Real-time Trajectory Generation with
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -118,7 +119,9 @@ def plan_motion(request: Request, robot: Robot) -> Planned:
     if request.control == "position":
         return planned
     end = State(planned.curve.piece_ends()[1][-1], request.end.velocity, request.end.acceleration)
-    return Planned(planned.curve, end, None, planned.phases, planned.events, planned.arrivals)
+    # to where a velocity is reached fastest, another path may lead a little faster
+    reason = "the move leaves its end position open"
+    return replace(planned, end=end, law=None, no_lower_bound=reason)
 
 
 def _each(request: Request, boundaries: Sequence[BoundaryProblem]) -> Planned:

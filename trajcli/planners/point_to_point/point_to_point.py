@@ -28,7 +28,7 @@ class PointToPoint(Planner):
 
     to: Annotated[NamedTarget, Field(description="The state in which the move ends, or the name of a point.")]
 
-    def with_places(self, resolve: Resolve, near: Array) -> Self:
+    def with_joint_targets(self, resolve: Resolve, near: Array) -> Self:
         """Return the planner with joints in the place of the target's pose."""
         return self.model_copy(update={"to": resolve(self.to, near)})
 

@@ -5,6 +5,7 @@ Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), sect
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
@@ -35,7 +36,7 @@ from trajcli.kinematics.inverse.target import (
     partial_target,
     residuals,
 )
-from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.language.numbers import FieldPath, Flaw, Model, Number
 from trajcli.language.targets import Configuration, Target, ik_target
 from trajcli.planners.boundary_states import standstill, start_in_motion
@@ -54,6 +55,7 @@ _WHOLE = (True, True, True)
 _ALL_SIX = 6
 _UPRIGHT = 1e-6  # rad from upright
 _SAME = 1e-9  # of an entry of a matrix: two orientations that are meant to be one
+REMEDIES = {"acceleration_jump": "use `law: {shape: quintic}` or jerk_limited, or say limits: {jerk: null}"}
 _ARRIVED = 1e-5  # rad or m: joint values that are given, and reached on the path
 
 
@@ -139,7 +141,7 @@ class ToolPathMove(Planner):
         planned = self.path_from(forward(robot, start.position), robot)
         if planned.path.length == 0:
             check_arrival(planned, start.position, robot)
-            return standstill(start, self.law.duration or self.law.minimum_duration or 0.0)
+            return standstill(start, self.law.duration or self.law.minimum_duration or 0.0, REMEDIES)
         joints = self._followed(planned, start.position, robot)
         room = max(self.tolerance.position, self.tolerance.angle)
         diagnosis_of_motion(robot, joints.motion).refuse_limits(joints.curve, room)
@@ -150,6 +152,8 @@ class ToolPathMove(Planner):
             resting(end),
             phases=joints.phases,
             tool=joints.motion,
+            wanted_speed=_wanted_speed(self.law, robot.limits.tcp, angular=joints.motion.in_place),
+            remedies=REMEDIES,
             events=(*planned.events, *joints.events),
         )
 
@@ -165,6 +169,13 @@ class ToolPathMove(Planner):
         law, ruled_by = law_along(path, self.law, robot.limits.tcp, self.tag)
         motion = motion_along(path, law.law, law.breaks, tolerance, ruled_by)
         return JointMotion(followed(robot, path, start).by_time(motion), motion, law.phases)
+
+
+def _wanted_speed(law: LawSpec, limits: ToolLimits, *, angular: bool) -> float | None:
+    """Return the speed along the path that is asked for, m/s, or rad/s of a rotation; None where none is."""
+    given, limit = (law.angular_speed, limits.angular_speed) if angular else (law.speed, limits.speed)
+    speed = limit if given is None else given
+    return None if math.isinf(speed) or law.duration is not None else speed
 
 
 def check_arrival(planned: PlannedPath, end: Array, robot: Robot) -> None:

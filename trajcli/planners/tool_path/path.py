@@ -162,7 +162,7 @@ class PathMove(ToolPathMove):
         if not overlap:
             return planned
         motion = overlapping_motion(before, curves, targets, self, robot.limits.tcp)
-        return replace(planned, overlap=replace(motion, path=path))
+        return replace(planned, overlap=replace(motion, path=path, overlaps=True))
 
 
 def _jump(s: float) -> PlanningError:

@@ -35,7 +35,7 @@ from trajcli.language.recorded import Recorded
 from trajcli.language.targets import JointAccelerationMagnitudes
 from trajcli.planners.boundary_states import missing_limit, standstill, start_in_motion
 from trajcli.planners.planner import Event, Phase, Planned
-from trajcli.planners.waypoints.through_points import PointTable, ThroughPoints
+from trajcli.planners.waypoints.through_points import OPEN_END_REMEDIES, REMEDIES, PointTable, ThroughPoints
 from trajcli.trajectory import State, ViaPoints
 from trajcli.units import Quantity
 
@@ -231,7 +231,7 @@ class Blends(ThroughPoints):
         if not start.at_rest and (points.times is None or start.acceleration.any()):
             raise start_in_motion(self.tag, start, robot)
         if points.times is None and not np.ptp(points.positions, axis=0).any():
-            return standstill(points.target, self.duration or 0.0)
+            return standstill(points.target, self.duration or 0.0, REMEDIES)
         times, durations = self._times_and_blends(points, robot)
         try:
             motion = self._motion(points, times, durations, robot)
@@ -242,10 +242,11 @@ class Blends(ThroughPoints):
             motion.curve,
             last,
             phases=_phases(motion),
-            passage=ViaPoints(times + motion.shift, points.positions, motion.missed),
+            via_points=ViaPoints(times + motion.shift, points.positions, motion.missed),
             origin=motion.shift,
             begins=first if start.velocity.any() else None,
             events=(*points.events, *_shrunk(motion, robot)),
+            remedies=OPEN_END_REMEDIES if start.velocity.any() else REMEDIES,
         )
 
     def _times_and_blends(self, points: PointTable, robot: Robot) -> tuple[Array, Array | None]:

@@ -32,7 +32,13 @@ from trajcli.language.targets import Numbers
 from trajcli.language.waypoints import Waypoint
 from trajcli.planners.boundary_states import missing_limit, standstill
 from trajcli.planners.planner import Planned
-from trajcli.planners.waypoints.through_points import PointTable, ThroughPoints, via_points
+from trajcli.planners.waypoints.through_points import (
+    OPEN_END_REMEDIES,
+    REMEDIES,
+    PointTable,
+    ThroughPoints,
+    via_points,
+)
 from trajcli.trajectory import State
 from trajcli.units import Quantity
 
@@ -264,13 +270,13 @@ class Spline(ThroughPoints):
         text = f"the virtual points must lie inside the first interval and inside the last one, {spans}"
         yield ("virtual_times",), text, "leave it out for their middles"
 
-    def told_to_last(self, duration: float) -> Self:
+    def with_duration(self, duration: float) -> Self:
         """Return the planner whose points, virtual ones too, are passed in the same proportion.
 
         Raises:
             PlanningError: When virtual times belong to a recording whose end nothing but its file says.
         """
-        longer = super().told_to_last(duration)
+        longer = super().with_duration(duration)
         if self.virtual_times is None:
             return longer
         last = self._last_time() or self.duration
@@ -288,15 +294,17 @@ class Spline(ThroughPoints):
         """
         points = self.waypoints(start)
         if points.times is None and not np.ptp(points.positions, axis=0).any() and not points.rates.any():
-            return standstill(points.target, self.duration or 0.0)
+            return standstill(points.target, self.duration or 0.0, REMEDIES)
         times = self._times_of(points, robot)
         curve = self._curve(points, times, robot)
         return Planned(
             curve,
             self._end(points, curve),
-            passage=via_points(points, times),
+            via_points=via_points(points, times),
             begins=_beginning(curve) if self.rule in FREE_ENDS else None,
             events=points.events,
+            one_piece_per_interval=True,
+            remedies=OPEN_END_REMEDIES if self.rule in FREE_ENDS else REMEDIES,
         )
 
     def _times_of(self, points: PointTable, robot: Robot) -> Array:

@@ -55,6 +55,20 @@ class PointTable:
         return len(self.positions)
 
 
+REMEDIES = {
+    "acceleration_jump": (
+        "use spline with rule continuous_acceleration or quintic, or say limits: {jerk: null}"
+    )
+}
+OPEN_END_REMEDIES = {
+    **REMEDIES,
+    "position_jump": "a blend centred on a point passed in motion begins before it: use `end_blends: inside`",
+    "velocity_jump": (
+        "this rule leaves the velocities at its ends open: use clamped or continuous_acceleration"
+    ),
+}
+
+
 class ThroughPoints(Planner):
     """A planner that passes points on the way to its target.
 
@@ -148,7 +162,7 @@ class ThroughPoints(Planner):
             if time <= before
         ]
 
-    def with_places(self, resolve: Resolve, near: Array) -> Self:
+    def with_joint_targets(self, resolve: Resolve, near: Array) -> Self:
         """Return the planner with joints in the place of poses, each near to the point before it.
 
         Raises:
@@ -172,7 +186,7 @@ class ThroughPoints(Planner):
         through = self.through if recorded else tuple(points[:-1])
         return self.model_copy(update={"through": through, "to": points[-1]})
 
-    def told_to_last(self, duration: float) -> Self:
+    def with_duration(self, duration: float) -> Self:
         """Return the planner whose points are passed in the same proportion, the last after `duration` s."""
         last = self._last_time() or self.duration
         scaled: dict[str, object] = {"duration": duration}

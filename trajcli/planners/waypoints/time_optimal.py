@@ -38,7 +38,7 @@ from trajcli.language.recorded import Recorded
 from trajcli.planners.boundary_states import missing_limit, standstill
 from trajcli.planners.planner import Event, Phase, Planned, stretched
 from trajcli.planners.waypoints.spline import Rule, curve_through
-from trajcli.planners.waypoints.through_points import PointTable, ThroughPoints
+from trajcli.planners.waypoints.through_points import REMEDIES, PointTable, ThroughPoints
 from trajcli.trajectory import State, ViaPoints
 from trajcli.units import Quantity
 
@@ -282,7 +282,7 @@ class TimeOptimal(ThroughPoints):
         points = self._untimed().waypoints(start)
         moving = np.ptp(points.positions, axis=0) > 0
         if not moving.any():
-            return standstill(points.target, self.duration or 0.0)
+            return standstill(points.target, self.duration or 0.0, REMEDIES)
         bounds = robot.limits.acceleration
         lacking = np.flatnonzero(moving & ~np.isfinite(bounds).all(axis=1))
         if lacking.size:
@@ -303,8 +303,10 @@ class TimeOptimal(ThroughPoints):
                 Phase(f"{b.quantity} {'+' if b.sign > 0 else '-'}", b.start * factor, b.end * factor, b.joint)
                 for b in binding
             ),
-            passage=ViaPoints(passed * factor, points.positions, path.missed),
+            via_points=ViaPoints(passed * factor, points.positions, path.missed),
             events=(*points.events, *path.events, *_events(motion)),
+            binding_phases=True,
+            remedies=REMEDIES,
         )
 
     def _untimed(self) -> Self:

@@ -1,0 +1,219 @@
+"""Explanation of a job: its report with polynomials, poses and paths, in the units of the job."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cache
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, SerializerFunctionWrapHandler, TypeAdapter, model_serializer
+
+from trajcli.job.report import (
+    MeasuredIn,
+    MoveReport,
+    OutsideReport,
+    Report,
+    ReportPart,
+    UnitName,
+    WaypointReport,
+)
+
+Vector = list[float]
+MoveSeconds = Annotated[float, Field(description="Seconds from the start of the move.")]
+
+
+class PolynomialReport(ReportPart):
+    """One polynomial of one coordinate."""
+
+    start: MoveSeconds
+    end: MoveSeconds
+    local: Annotated[
+        Vector, MeasuredIn(), Field(description="Coefficients in powers of t - start, ascending.")
+    ]
+    absolute: Annotated[Vector, MeasuredIn(), Field(description="Coefficients in powers of t, ascending.")]
+    unit: UnitName
+
+
+def polynomial_reports(rows: Iterable[dict[str, Any]]) -> list[PolynomialReport]:
+    """Return the reports that have these fields: a long motion has thousands."""
+    return _polynomials().validate_python(list(rows))
+
+
+@cache
+def _polynomials() -> TypeAdapter[list[PolynomialReport]]:
+    return TypeAdapter(list[PolynomialReport])
+
+
+class _Sparse(ReportPart):
+    """A part that leaves out what there is not."""
+
+    @model_serializer(mode="wrap")
+    def _without_nulls(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return {key: value for key, value in serialize(self).items() if value is not None}
+
+
+class ChoiceReport(ReportPart):
+    """Why a pose is reached on its branch and not on another."""
+
+    by: Literal["configuration", "nearest"]
+    configuration: Annotated[dict[str, str], Field(description="The names that the job asks for.")]
+    near: Annotated[Vector, MeasuredIn("units"), Field(description="Where the arm comes from.")]
+    units: list[str]
+    candidates: Annotated[int, Field(description="Answers within the limits that have these names.")]
+    within_limits: Annotated[int, Field(description="Answers within the limits.")]
+
+
+class PoseReport(_Sparse):
+    """How a pose that the job names is reached.
+
+    The arm is singular there where the tcp can move in fewer directions, among those that the pose fixes,
+    than it can nearby.
+    """
+
+    joints: Annotated[Vector, MeasuredIn("units")]
+    units: list[str]
+    branch: dict[str, str]
+    method: str
+    chosen: ChoiceReport
+    singular: bool
+    rank: Annotated[dict[str, int], Field(description="Numbers of these directions.")]
+    free_direction: Annotated[
+        Vector | None,
+        Field(
+            description="Unit vector of joint values in the units of the job, along which the arm can move "
+            "while the tcp keeps the pose."
+        ),
+    ] = None
+
+
+class PhaseReport(ReportPart):
+    """A named interval of a move."""
+
+    name: str
+    start: MoveSeconds
+    end: MoveSeconds
+    joint: str | None
+
+
+class LineSegmentReport(ReportPart):
+    """A straight segment of a path."""
+
+    kind: Literal["line"] = "line"
+    start: Annotated[Vector, MeasuredIn()]
+    end: Annotated[Vector, MeasuredIn()]
+    length: Annotated[float, MeasuredIn()]
+    unit: UnitName = "m"
+
+
+class ArcSegmentReport(ReportPart):
+    """An arc, or a helix."""
+
+    kind: Literal["arc", "helix"]
+    start: Annotated[Vector, MeasuredIn()]
+    end: Annotated[Vector, MeasuredIn()]
+    center: Annotated[Vector, MeasuredIn()]
+    axis: Vector
+    radius: Annotated[float, MeasuredIn()]
+    angle: Annotated[float, MeasuredIn("angle_unit")]
+    pitch: Annotated[float, MeasuredIn()]
+    length: Annotated[float, MeasuredIn()]
+    unit: UnitName = "m"
+    angle_unit: UnitName = "rad"
+
+
+class RotationSegmentReport(ReportPart):
+    """A rotation of the tool where it stands."""
+
+    kind: Literal["rotation"] = "rotation"
+    place: Annotated[Vector, MeasuredIn()]
+    angle: Annotated[float, MeasuredIn("angle_unit")]
+    unit: UnitName = "m"
+    angle_unit: UnitName = "rad"
+
+
+class ScrewSegmentReport(_Sparse):
+    """A screw: the axis in world, a point of it, and angle and distance along it.
+
+    Source: Lynch and Park, Modern Robotics (2017), section 3.3.2.
+    """
+
+    kind: Literal["screw"] = "screw"
+    axis: Vector
+    point: Annotated[Vector | None, MeasuredIn()] = None
+    angle: Annotated[float, MeasuredIn("angle_unit")]
+    advance: Annotated[float, MeasuredIn()]
+    unit: UnitName = "m"
+    angle_unit: UnitName = "rad"
+
+
+SegmentReport = LineSegmentReport | ArcSegmentReport | RotationSegmentReport | ScrewSegmentReport
+
+
+class CornerReport(ReportPart):
+    """A corner between two segments."""
+
+    kind: str
+    place: Annotated[float, MeasuredIn(), Field(description="s on the path.")]
+    point: Annotated[Vector, MeasuredIn()]
+    turn: Annotated[float, MeasuredIn("turn_unit")]
+    radius: Annotated[float, MeasuredIn()]
+    deviation: Annotated[float, MeasuredIn()]
+    unit: UnitName = "m"
+    turn_unit: UnitName = "rad"
+
+
+class PathReport(ReportPart):
+    """The path of the tool as a drawing office would state it, and the law along it."""
+
+    length: Annotated[float, MeasuredIn()]
+    unit: UnitName
+    segments: list[SegmentReport]
+    corners: list[CornerReport]
+    law: list[PolynomialReport]
+
+
+class ExplainedWaypoint(WaypointReport):
+    """A point that a move passes, its start and target among them."""
+
+    time: MoveSeconds
+    joints: Annotated[Vector, MeasuredIn("units")]
+
+
+class ExplainedOutside(OutsideReport):
+    """How far a joint leaves the range that the waypoints of a move span."""
+
+    time: MoveSeconds
+
+
+class ExplainedMove(MoveReport):
+    """One move, with its polynomials."""
+
+    joints: list[str]
+    from_pose: PoseReport | None
+    to_pose: PoseReport | None
+    breaks: list[MoveSeconds]
+    polynomials: Annotated[dict[str, list[PolynomialReport]], Field(description="By the name of the joint.")]
+    closed_form: Annotated[dict[str, str] | None, Field(description="Formulas of which these are a fit.")]
+    phases: list[PhaseReport]
+    binding_phases: Annotated[bool, Field(description="Whether the phases say which limit binds.")]
+    arrivals: Annotated[dict[str, float] | None, Field(description="Durations of each joint alone, s.")]
+    origin: Annotated[float, Field(description="Where the zero of the move's own time lies, s.")]
+    waypoints: tuple[ExplainedWaypoint, ...] | None = None
+    outside: tuple[ExplainedOutside, ...] | None = None
+    path: PathReport | None
+
+
+class UnitsReport(ReportPart):
+    """The units of all numbers."""
+
+    angle: str
+    length: str
+    time: Literal["s"] = "s"
+
+
+class Explanation(Report):
+    """What `trajcli explain --json` prints."""
+
+    units: UnitsReport
+    joints: list[str]
+    moves: tuple[ExplainedMove, ...]
