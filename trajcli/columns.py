@@ -17,7 +17,14 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import JointType
-from trajcli.units import Dimension, Quantity, Units, factor, joint_quantity, unit_name
+from trajcli.units import (
+    Dimension,
+    Quantity,
+    Units,
+    factor,
+    joint_quantity,
+    unit_name,
+)
 
 Group = Literal["t", "q", "qd", "qdd", "qddd", "pose", "twist", "twistd", "path", "move"]
 GROUPS: tuple[Group, ...] = ("t", "q", "qd", "qdd", "qddd", "pose", "twist", "twistd", "path", "move")

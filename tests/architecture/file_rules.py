@@ -19,9 +19,6 @@ SMALL_FILE = 150
 SMALL_FILES = {
     "checks/tool_bound.py": "the proof of a bound for all t, beside the judgement of rows",
     "checks/waypoints.py": "one file a judgement, as those beside it",
-    "geometry/paths/frame_transport.py": "an integrator of rotations, which knows nothing of corners",
-    "job/override.py": "a grammar of the command line, `--set PATH=VALUE`",
-    "job/recording.py": "a format of its own, CSV of joint values",
     "job/yaml/source.py": "bytes to clean text, before there is any YAML",
     "kinematics/inverse/families/planar.py": "one file a family; `choose` is their table",
     "kinematics/inverse/families/three_parallel.py": "one file a family; `choose` is their table",
@@ -151,7 +148,7 @@ RULES = [
             Planted({**_SMALL, "curves/__init__.py": _TABLE}, {"curves/__init__.py": ""}, [_PART]),
         ],
         SMALL_FILES,
-        most=8,
+        most=5,
     ),
     Rule(
         folders_are_not_too_full,

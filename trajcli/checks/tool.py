@@ -131,7 +131,7 @@ def _check_limits(tool: SampledTool) -> list[Finding]:
 def _check_jerk(tool: SampledTool) -> list[Finding]:
     """Return where the law's jerk breaks its limit, or its acceleration steps although jerk is limited."""
     limit, law = tool.robot.limits.tcp.jerk, tool.motion.law
-    if np.isinf(limit) or tool.motion.in_place:
+    if np.isinf(limit) or tool.motion.pure_rotation:
         return []
     before, after = law.piece_ends(2)[1][:, 0], law.piece_ends(2)[0][:, 0]
     steps = np.abs(np.append(after, 0.0) - np.append(0.0, before))

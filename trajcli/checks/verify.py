@@ -1,20 +1,30 @@
-"""Verification of a trajectory: all judgements in one verdict."""
+"""Verification of a trajectory: all judgements in one verdict, each finding with its remedy."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from trajcli.checks.continuity import acceleration_steps, check_continuity
 from trajcli.checks.finding import AccelerationSteps, Finding
 from trajcli.checks.limits import check_limits, peaks_by_move
-from trajcli.checks.remedies import with_remedy
 from trajcli.checks.waypoints import check_waypoints
 from trajcli.curves.extrema import Peaks
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import QUANTITIES, Limits
-from trajcli.trajectory import Promise, Trajectory
+from trajcli.trajectory import Promise, Span, Trajectory
+
+_TOOL_LIMITS = (
+    "tool_speed",
+    "tool_angular_speed",
+    "tool_acceleration",
+    "tool_angular_acceleration",
+    "tool_jerk",
+)
+_NO_HELP = "slowing down does not help"
+_SLOW = "say `when_over_limit: slow`"
 
 
 @frozen
@@ -85,10 +95,7 @@ def _check_tools(trajectory: Trajectory, promises: Sequence[Promise]) -> list[Fi
     findings: list[Finding] = []
     for span, promise in zip(trajectory.spans, promises, strict=True):
         if promise.tool is not None and promise.robot is not None:
-            from trajcli.checks.tool import (
-                SampledTool,
-                check_tool,  # a plan without paths does not pay for it
-            )
+            from trajcli.checks.tool import SampledTool, check_tool
 
             findings += check_tool(SampledTool(trajectory, span, promise.robot, promise.tool))
     return findings
@@ -106,3 +113,40 @@ def _unchecked(trajectory: Trajectory, limits_by_move: Sequence[Limits]) -> tupl
         for order, quantity in enumerate(QUANTITIES)
         if unlimited[order, joint]
     )
+
+
+def with_remedy(finding: Finding, trajectory: Trajectory, span: Span, promise: Promise) -> Finding:
+    """Return the finding with what would fix it, where that is known.
+
+    Args:
+        finding: What is wrong.
+        trajectory: The whole.
+        span: Of the move that it is about.
+        promise: What that move says of itself.
+    """
+    hint = promise.remedies.get(finding.kind, finding.hint)
+    if hint is None and (finding.kind in QUANTITIES or finding.kind in _TOOL_LIMITS):
+        hint = _by_slowing(finding, trajectory, span, promise)
+    return finding if hint == finding.hint else replace(finding, hint=hint)
+
+
+def _by_slowing(finding: Finding, trajectory: Trajectory, span: Span, promise: Promise) -> str:
+    """Return how much longer the move must last to keep a limit, or why that is no help."""
+    if finding.factor is None or promise.over_limit == "slow":
+        return f"{_NO_HELP}: change the target, the start or the limit"
+    if promise.ends is None or all(state.at_rest for state in promise.ends):
+        longer = f"{finding.factor:.6g} times longer ({span.duration * finding.factor:.6g} s)"
+        return f"it must last {longer}" + (f", or {_SLOW}" if promise.over_limit else "")
+    if finding.joint is None:
+        return _SLOW
+    if _ends_over_limit(finding, trajectory.joint_names.index(finding.joint), promise):
+        return f"{_NO_HELP}: the move starts or ends over its limit"
+    return f"{_SLOW}: it finds the shortest duration between these moving states"
+
+
+def _ends_over_limit(finding: Finding, joint: int, promise: Promise) -> bool:
+    """Return whether the joint is over its limit where the move declares to begin or to end."""
+    order = QUANTITIES.index(finding.kind)
+    rates = [(state.velocity, state.acceleration)[order - 1] for state in promise.ends or () if order < 3]
+    ends = [float(values[joint]) for values in rates]
+    return any(abs(value) > abs(finding.limit) and value * finding.limit > 0 for value in ends)

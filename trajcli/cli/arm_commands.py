@@ -12,7 +12,15 @@ from typing import Annotated, Literal
 import typer
 import typer.core
 
-from trajcli.cli.options import DigitsOption, Errors, Joints, Json, RobotName, Si, Tool
+from trajcli.cli.options import (
+    DigitsOption,
+    Errors,
+    Joints,
+    Json,
+    RobotName,
+    Si,
+    Tool,
+)
 from trajcli.cli.outcome import guarded
 
 _NUMBER_LIKE = re.compile(r"[-+]?(?:\.?[0-9][^=]*|\.?nan|\.?inf(?:inity)?)", re.IGNORECASE)

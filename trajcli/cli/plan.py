@@ -170,7 +170,7 @@ def _tool_speed(move: PlannedMove) -> tuple[float, str]:
     tool, limits = move.planned.tool, move.robot.limits.tcp
     if tool is None:
         return 0.0, "speed"
-    limit, name = (limits.angular_speed, "angular speed") if tool.in_place else (limits.speed, "speed")
+    limit, name = (limits.angular_speed, "angular speed") if tool.pure_rotation else (limits.speed, "speed")
     return float(peaks(tool.law, (1,))[0].magnitude[0]) / limit, name
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import inf
 from typing import Literal
 
@@ -13,6 +14,8 @@ from trajcli.frozen import comparable, frozen
 JointType = Literal["revolute", "prismatic"]
 Convention = Literal["standard", "modified"]
 QUANTITIES = ("position", "velocity", "acceleration", "jerk")
+
+_SMALL_POSITION = 1e-3  # rad or m: what goes beyond a position bound smaller than this is relative to this
 
 
 @comparable
@@ -96,6 +99,29 @@ def unlimited(joints: int) -> Limits:
     """Return limits that bound nothing."""
     none = np.tile([-np.inf, np.inf], (joints, 1))
     return Limits(none, none, none, none)
+
+
+def share_of_limits(extremes: Sequence[tuple[Array, Array]], limits: Limits) -> Array:
+    """Return how much of its limits a motion uses: above 1 where it breaks one, shape (...).
+
+    Args:
+        extremes: Lowest and highest value, each (..., n), of position, velocity, acceleration and jerk.
+        limits: Those of the n joints. Position counts as 1 plus what it goes beyond, relative to the bound.
+    """
+    shares = []
+    for order, (low, high) in enumerate(extremes):
+        lower, upper = limits.of_order(order).T
+        if order:
+            shares.append(np.maximum(low / lower, high / upper).max(axis=-1))
+            continue
+        beyond = np.maximum((lower - low) / _scale(lower), (high - upper) / _scale(upper))
+        shares.append(1 + np.maximum(beyond.max(axis=-1), -1.0))
+    share: Array = np.max(shares, axis=0)
+    return share
+
+
+def _scale(bound: Array) -> Array:
+    return np.where(np.isfinite(bound), np.maximum(np.abs(bound), _SMALL_POSITION), 1.0)
 
 
 @frozen

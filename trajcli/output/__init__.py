@@ -1,1 +1,1 @@
-"""What comes out of a plan: rows, report, explanation."""
+"""Output of a plan: rows, report, explanation."""

@@ -175,9 +175,9 @@ def _path(tool: ToolMotion, units: Units) -> PathReport:
     """Return the path of a tool and the law along it, in the units of the job."""
     segments, corners = _drawing(tool)
     length = float(tool.law.piece_ends()[1][-1, 0])
-    unit = "rad" if tool.in_place else "m"
+    unit = "rad" if tool.pure_rotation else "m"
     path = in_units(PathReport(length=length, unit=unit, segments=segments, corners=corners, law=[]), units)
-    scale = factor(Quantity("angle" if tool.in_place else "length"), units)
+    scale = factor(Quantity("angle" if tool.pure_rotation else "length"), units)
     law = polynomial_intervals(tool.law.breaks, tool.law.coefficients[:, :, 0] / scale, path.unit)
     return path.model_copy(update={"law": law})
 

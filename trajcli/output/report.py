@@ -202,7 +202,7 @@ def _tool(trajectory: Trajectory, span: Span, move: PlannedMove) -> ToolReport |
 
     tool = SampledTool(trajectory, span, move.robot, motion)
     deviation, turned = (float(sizes.max(initial=0.0)) for sizes in tool.deviation)
-    unit = "rad" if motion.in_place else "m"
+    unit = "rad" if motion.pure_rotation else "m"
     wanted = move.planned.wanted_speed
     held, lowest = (None, None) if wanted is None else _held(move, motion.law, wanted, unit)
     return ToolReport(

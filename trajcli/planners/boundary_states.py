@@ -6,14 +6,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from trajcli.curves.piecewise import Array, constant
+from trajcli.curves.piecewise import constant
 from trajcli.errors import Amount, Amounts, MissingLimitError, PlanningError, Problem
-from trajcli.kinematics.robot import QUANTITIES, Limits, Robot
+from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.planners.planner import Planned
 from trajcli.trajectory import State
 
 _NOTHING = 1e-15  # rad or m: a move this short is none; a thousandth of what counts as a jump
-_SMALL_POSITION = 1e-3  # rad or m: what goes beyond a position bound smaller than this is relative to this
 
 
 def standstill(state: State, duration: float, remedies: Mapping[str, str] | None = None) -> Planned:
@@ -61,26 +60,3 @@ def missing_limit(
             joint=robot.joint_names[joints[0]],
         )
     )
-
-
-def share_of_limits(extremes: Sequence[tuple[Array, Array]], limits: Limits) -> Array:
-    """Return how much of its limits a motion uses: above 1 where it breaks one, shape (...).
-
-    Args:
-        extremes: Lowest and highest value, each (..., n), of position, velocity, acceleration and jerk.
-        limits: Those of the n joints. Position counts as 1 plus what it goes beyond, relative to the bound.
-    """
-    shares = []
-    for order, (low, high) in enumerate(extremes):
-        lower, upper = limits.of_order(order).T
-        if order:
-            shares.append(np.maximum(low / lower, high / upper).max(axis=-1))
-            continue
-        beyond = np.maximum((lower - low) / _scale(lower), (high - upper) / _scale(upper))
-        shares.append(1 + np.maximum(beyond.max(axis=-1), -1.0))
-    share: Array = np.max(shares, axis=0)
-    return share
-
-
-def _scale(bound: Array) -> Array:
-    return np.where(np.isfinite(bound), np.maximum(np.abs(bound), _SMALL_POSITION), 1.0)

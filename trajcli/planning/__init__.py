@@ -1,1 +1,1 @@
-"""From a job to a judged plan."""
+"""Planning of whole jobs: poses resolved, moves planned, retimed and judged."""

@@ -163,7 +163,7 @@ def _joined(moves: list[PlannedMove], loaded: LoadedJob, first: State) -> Trajec
 def _law_of_tool(move: PlannedMove) -> PiecewisePolynomial | None:
     """Return the time law s(t) of the tool along its path; while it turns in its place it has none."""
     tool = move.planned.tool
-    return None if tool is None or tool.in_place else tool.law
+    return None if tool is None or tool.pure_rotation else tool.law
 
 
 @contextmanager

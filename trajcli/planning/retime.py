@@ -14,8 +14,7 @@ from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import Array
 from trajcli.curves.smallest_feasible import smallest_feasible
 from trajcli.errors import Amount, Amounts, PlanningError
-from trajcli.kinematics.robot import QUANTITIES
-from trajcli.planners.boundary_states import share_of_limits
+from trajcli.kinematics.robot import QUANTITIES, share_of_limits
 from trajcli.planners.planner import Event, Planned, PlannedMove
 
 _LONGEST = 1e4  # times the planned duration: a move that needs more is not over its limit, it is wrong

@@ -18,7 +18,14 @@ from trajcli.job.robot import RobotSheet, catalogue_names, load_sheet
 from trajcli.kinematics.inverse.joint_turns import beyond
 from trajcli.kinematics.robot import Robot
 from trajcli.kinematics.serial_chain import links_of
-from trajcli.units import Quantity, Units, amount_text, factor, joint_quantity, unit_name
+from trajcli.units import (
+    Quantity,
+    Units,
+    amount_text,
+    factor,
+    joint_quantity,
+    unit_name,
+)
 
 
 @frozen

@@ -24,7 +24,7 @@ class ToolMotion:
         reference_at: The reference at times (N,), derivatives by t; from one side of breaks.
         breaks: Times at which a second derivative may jump, the ends included.
         tolerance: How near the joints' curve promises to be.
-        in_place: Whether s is an angle.
+        pure_rotation: Whether s is an angle.
         ruled_by: "translation" or "rotation", whose limits determine the speed; None where a duration does.
         overlaps: Whether segments of the path overlap in time, so that its corners are cut.
     """
@@ -34,7 +34,7 @@ class ToolMotion:
     reference_at: ReferenceAt
     breaks: Array
     tolerance: Tolerance
-    in_place: bool = False
+    pure_rotation: bool = False
     ruled_by: str | None = None
     overlaps: bool = False
 

@@ -1,4 +1,4 @@
-"""Candidates of a flat batch on their way to solutions: their residuals, their names, Newton refinement."""
+"""Candidate solutions of a flat batch: their residuals, their names, Newton refinement."""
 
 from __future__ import annotations
 

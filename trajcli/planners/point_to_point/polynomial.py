@@ -16,9 +16,9 @@ from trajcli.curves.hermite import hermite_coefficients
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.curves.smallest_feasible import smallest_feasible
 from trajcli.errors import PlanningError, Problem
-from trajcli.kinematics.robot import Limits, Robot
+from trajcli.kinematics.robot import Limits, Robot, share_of_limits
 from trajcli.language.targets import Duration
-from trajcli.planners.boundary_states import missing_limit, same_state, share_of_limits, standstill
+from trajcli.planners.boundary_states import missing_limit, same_state, standstill
 from trajcli.planners.planner import Planned
 from trajcli.planners.point_to_point.point_to_point import PointToPoint
 from trajcli.trajectory import State

@@ -242,7 +242,9 @@ def diagnosis_of_motion(
 ) -> FollowingDiagnosis:
     """Return the diagnosis of an arm in a motion."""
     free = 0 if exact is None else len(exact.held)
-    return FollowingDiagnosis(robot, motion.reference_at, motion.law.end, motion.law, motion.in_place, free)
+    return FollowingDiagnosis(
+        robot, motion.reference_at, motion.law.end, motion.law, motion.pure_rotation, free
+    )
 
 
 def followed(robot: Robot, path: ToolPath, start: Array) -> FollowedPath:

@@ -152,7 +152,7 @@ class ToolPathMove(Planner):
             resting(end),
             phases=joints.phases,
             tool=joints.motion,
-            wanted_speed=_wanted_speed(self.law, robot.limits.tcp, angular=joints.motion.in_place),
+            wanted_speed=_wanted_speed(self.law, robot.limits.tcp, angular=joints.motion.pure_rotation),
             remedies=REMEDIES,
             events=(*planned.events, *joints.events),
         )
