@@ -44,6 +44,8 @@ def test_help_imports_no_numbers() -> None:
         "toppra",
         "matplotlib",
         "yaml",
+        "tempfile",
+        "trajcli.streams",
     }
 
 

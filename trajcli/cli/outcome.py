@@ -10,7 +10,6 @@ from functools import wraps
 from typing import Any, NoReturn
 
 from trajcli.errors import TrajcliError
-from trajcli.streams.whole_file import standard_output
 
 INTERRUPTED, PIPE_CLOSED, BUG = 130, 141, 70
 
@@ -90,6 +89,8 @@ def print_lines(lines: Iterable[str]) -> None:
         BrokenPipeError: When its reader has closed it.
     """
     text = "\n".join(lines) + "\n"
+    from trajcli.streams.whole_file import standard_output  # `--help` writes by other means
+
     with standard_output() as out:
         out.write(text.encode(errors="backslashreplace"))
 
