@@ -25,6 +25,7 @@ BENCHMARKS = (
     "time_optimal",
     "through_points",
     "operational",
+    "long_path",
 )
 OURS = ("trajcli", "numpy", "pydantic", "pyyaml", "typer")
 THEIRS = ("roboticstoolbox-python", "eaik", "toppra", "numpy", "scipy")

@@ -21,7 +21,8 @@ from trajcli.curves.hermite import hermite_coefficients
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, derivative_coefficients, horner
 from trajcli.frozen import frozen
 
-MOST_PIECES = 4096
+MOST_PIECES = 4096  # of a function without inner breaks
+_MORE_PIECES = 256  # for each inner break, of which a long path has many
 RowIndices = NDArray[np.intp]
 Guess = Callable[[Array], Array]
 """Values (N, n) near the function's at points (N,)."""
@@ -74,8 +75,18 @@ class FitError(ValueError):
         self.misfit = misfit
 
 
+def most_pieces(breaks: Array) -> int:
+    """Return how many pieces a function with breaks (m,), the ends included, may be divided into."""
+    return MOST_PIECES + _MORE_PIECES * max(breaks.size - 2, 0)
+
+
 def fit(
-    exact: ExactValues[K], misfit: ErrorMeasure[K], breaks: Array, guess: Guess, *, most: int = MOST_PIECES
+    exact: ExactValues[K],
+    misfit: ErrorMeasure[K],
+    breaks: Array,
+    guess: Guess,
+    *,
+    most: int | None = None,
 ) -> PiecewisePolynomial:
     """Return quintic pieces through a function, each within tolerance where its error is largest.
 
@@ -86,11 +97,12 @@ def fit(
         misfit: Its tolerance.
         breaks: Shape (m,), increasing: where the second derivative may jump, and the ends.
         guess: Values (N, n) near the function's at points (N,), to begin with.
-        most: Pieces.
+        most: Pieces; None for as many as `most_pieces` allows.
 
     Raises:
         FitError: When more pieces would be needed.
     """
+    most = most_pieces(breaks) if most is None else most
     pending = _whole(exact, breaks, guess)
     done: list[_Pieces] = []
     count = 0

@@ -23,6 +23,7 @@ from trajcli.geometry.paths.position import (
     Smooth,
     Triple,
     inside,
+    nearest,
 )
 from trajcli.geometry.pose import build, check_pose, exp_pose, invert
 from trajcli.geometry.rotation import Array
@@ -106,12 +107,12 @@ class PoseCurve:
         """Whether the position is fixed and s is an angle."""
         return isinstance(self.position, Pivot)
 
-    @property
+    @cached_property
     def breaks(self) -> Array:
         """Where a derivative may jump."""
         return self._united(self.position.breaks, self.orientation.breaks)
 
-    @property
+    @cached_property
     def stops(self) -> Array:
         """Where a law must stop."""
         return self._united(self.position.stops, self.orientation.stops)
@@ -132,7 +133,7 @@ class PoseCurve:
         """Return s of both, those of the second that are beside one of the first left out."""
         if not first.size:
             return second
-        near = np.abs(second[:, None] - first).min(axis=-1) <= _SAME * self.length
+        near = np.abs(second - nearest(first, second)) <= _SAME * self.length
         return np.sort(np.concatenate([first, second[~near]]))
 
 

@@ -262,6 +262,13 @@ def inside(s: Array, length: float) -> Array:
     return np.clip(values, 0.0, length)
 
 
+def nearest(breaks: Array, s: Array) -> Array:
+    """Return the nearest one of breaks (k,), increasing, k > 0, for each s (N,): of two the lower one."""
+    after = np.searchsorted(breaks, s).clip(1, max(breaks.size - 1, 1))
+    low, high = breaks[after - 1], breaks[np.minimum(after, breaks.size - 1)]
+    return np.asarray(np.where(np.abs(s - low) <= np.abs(s - high), low, high))
+
+
 def angle_between(first: Array, second: Array) -> float:
     """Return the angle, rad, between two unit vectors (3,), accurate near 0 and near pi."""
     return float(2.0 * np.arctan2(np.linalg.norm(first - second), np.linalg.norm(first + second)))

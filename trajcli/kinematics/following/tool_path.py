@@ -9,6 +9,7 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side
 from trajcli.frozen import frozen
 from trajcli.geometry.paths.orientation import SegmentProgress
 from trajcli.geometry.paths.pose import PosePath
+from trajcli.geometry.paths.position import nearest
 from trajcli.geometry.rotation import AXES, AxisName
 from trajcli.kinematics.inverse.target import IkTarget, OrientationConstraint
 
@@ -160,10 +161,11 @@ class ToolPath:
         if not inner.size:
             return inner
         s, times = law.evaluate(breaks)[:, 0], times_at(law, inner)
-        away = np.abs(inner[:, None] - s)
-        own = breaks[away.argmin(axis=1)]
+        s = np.maximum.accumulate(s)  # increasing but for rounding
+        own_s = nearest(s, inner)
+        own = breaks[np.searchsorted(s, own_s)]
         late = np.abs(times - own)
-        same = (late <= _MERGED * law.duration) | (away.min(axis=1) <= _AT_BREAK * self.length)
+        same = (late <= _MERGED * law.duration) | (np.abs(inner - own_s) <= _AT_BREAK * self.length)
         return np.where(same, own, times)
 
     def _onto_breaks(self, s: Array) -> Array:
@@ -171,8 +173,8 @@ class ToolPath:
         inner = self.poses.breaks
         if not inner.size:
             return s
-        nearest = inner[np.abs(s[:, None] - inner).argmin(axis=1)]
-        return np.where(np.abs(s - nearest) <= _AT_BREAK * self.length, nearest, s)
+        near = nearest(inner, s)
+        return np.where(np.abs(s - near) <= _AT_BREAK * self.length, near, s)
 
     def _keep_sides(self, s: Array, times: Array, crossings: Array, same: float) -> Array:
         """Return s (N,) on the side of each break on which their times are.

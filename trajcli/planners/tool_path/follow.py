@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from trajcli.curves.extrema import peaks
-from trajcli.curves.hermite_fit import MOST_PIECES, FitError, fit
+from trajcli.curves.hermite_fit import FitError, fit, most_pieces
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.frozen import frozen
@@ -55,15 +55,15 @@ class FollowingDiagnosis:
     def stuck(self, error: StuckError) -> PlanningError:
         """Return the error of an arm that could not be followed beyond some s."""
         unreachable = self._unreachable(error.s)
-        return unreachable or self._singular(error.s, error.joints, error.rates, stuck=True)
+        return unreachable or self._singular(error.s, error.joints, error.rates)
 
-    def unfit(self, at: float, guess: Callable[[Array], Array]) -> PlanningError:
-        """Return the error of joints that no curve of the allowed pieces follows around some s or time."""
+    def unfit(self, at: float, guess: Callable[[Array], Array], most: int) -> PlanningError:
+        """Return the error of joints that no curve of so many pieces follows around some s or time."""
         step = _SLOPE * self.end
         around = np.clip(np.array([at - step, at, at + step]), 0.0, self.end)
         before, here, after = guess(around)
         rates = (after - before) / (around[2] - around[0])
-        return self._unreachable(at) or self._singular(at, here, rates, stuck=False)
+        return self._unreachable(at) or self._singular(at, here, rates, most=most)
 
     def refuse_limits(self, curve: PiecewisePolynomial, room: float) -> None:
         """Refuse a curve that leaves the range of a joint: the branch is fixed, and going slower is no help.
@@ -135,7 +135,7 @@ class FollowingDiagnosis:
                 high = middle
         return low
 
-    def _singular(self, at: float, joints: Array, rates: Array, *, stuck: bool) -> PlanningError:
+    def _singular(self, at: float, joints: Array, rates: Array, most: int | None = None) -> PlanningError:
         """Return the error that names the singularity at `at`, and the joint that goes fastest there."""
         reference = self.reference(np.array([at]), "right")
         poses, columns = forward(self.robot, joints[None]), jacobian(self.robot, joints[None])
@@ -143,8 +143,8 @@ class FollowingDiagnosis:
         rows[: sum(reference.position)] /= characteristic_length(self.robot)
         values = np.linalg.svd(rows, compute_uv=False)
         ratio = float(values[len(joints) - self.free - 1] / values[0])
-        if ratio > _REGULAR and (self.free or not stuck):
-            return self._regular(at, stuck=stuck)
+        if ratio > _REGULAR and (self.free or most is not None):
+            return self._regular(at, most)
         joint = int(np.abs(rates).argmax())
         name = self.robot.joint_names[joint]
         unit = "rad" if self.robot.joint_types[joint] == "revolute" else "m"
@@ -160,11 +160,11 @@ class FollowingDiagnosis:
         amounts: Amounts = {"joint": name, "place": self._s(at)}
         return PlanningError(Problem(message, hint, joint=name, amounts=amounts))
 
-    def _regular(self, at: float, *, stuck: bool) -> PlanningError:
+    def _regular(self, at: float, most: int | None) -> PlanningError:
         """Return the error of a regular configuration, in which the tool could go on."""
-        message = f"{MOST_PIECES} pieces do not meet the tolerance on this path, worst around s = {{place}}"
+        message = f"{most} pieces do not meet the tolerance on this path, worst around s = {{place}}"
         hint = "choose a larger `tolerance`, or split the path"
-        if stuck:
+        if most is None:
             message = (
                 "what the target leaves free cannot be held beyond s = {place} of the path: "
                 "{robot} would have to turn round in its place"
@@ -211,7 +211,7 @@ class FollowedPath:
         """Return q(s) within a tolerance.
 
         Raises:
-            PlanningError: When no 4096 pieces are enough: names the singularity.
+            PlanningError: When no pieces of the allowed number are enough: names the singularity.
         """
         diagnosis = diagnosis_on_path(self.robot, self.path, self.follower)
         return _fitted(self.follower, self.path.breaks, self.coarse.evaluate, tolerance, diagnosis)
@@ -289,4 +289,4 @@ def _fitted(
         return fit(exact.joint_state, ratio, breaks, guess)
     except (LostError, FitError) as error:
         at = float(error.s[0]) if isinstance(error, LostError) else error.at
-        raise diagnosis.unfit(at, guess) from None
+        raise diagnosis.unfit(at, guess, most_pieces(breaks)) from None

@@ -11,14 +11,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Annotated, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from trajcli.curves.operations import merge_breaks
-from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, concatenate, constant
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side
 from trajcli.errors import Amount, InputError, PlanningError, Problem, TrajcliError
 from trajcli.frozen import frozen
 from trajcli.geometry.paths.chain import Chain, Corner, join
@@ -225,13 +227,13 @@ def _shrunk(number: int, corner: Corner) -> Event:
 
 @frozen
 class OverlappingSegments:
-    """Segments of which two are in progress at once around each corner.
+    """Segments of which two are in progress at once around each corner, and never more.
 
     Attributes:
         before: Pose at the start, (4, 4).
         curves: Positions of the segments.
         vectors: Rotation vectors of the segments, in the axes of where they begin, shape (k, 3).
-        laws: s_i(t) over the whole duration.
+        laws: s_i(t), each from the time at which its segment begins to that at which it is done.
         last: The target of the last segment.
         turns: Changes of yaw or pitch, rad, one for each segment.
     """
@@ -245,32 +247,68 @@ class OverlappingSegments:
 
     def reference_at(self, times: Array, side: Side) -> ToolReference:
         """Return what the tool shall do at times (N,)."""
-        count = times.size
-        poses = np.tile(self.before, (count, 1, 1))
-        first, second = np.zeros((count, 6)), np.zeros((count, 6))
-        aims = np.zeros((count, 3))
-        for curve, vector, law, turn in zip(self.curves, self.vectors, self.laws, self.turns, strict=True):
-            rates = law.evaluate_orders(times, (0, 1, 2), side=side)[:, :, 0]
-            s = np.clip(rates[:, 0], 0.0, curve.length)
-            p, tangent, curvature = curve.evaluate(s, side)
-            poses[:, :3, 3] += p - curve.evaluate(np.zeros(1))[0]
-            first[:, :3] += tangent * rates[:, 1:2]
-            second[:, :3] += curvature * rates[:, 1:2] ** 2 + tangent * rates[:, 2:]
-            part = rates / curve.length
-            axis = poses[:, :3, :3] @ vector
-            own = axis * part[:, 1:2]
-            second[:, 3:] += axis * part[:, 2:] + np.cross(first[:, 3:], own)
-            first[:, 3:] += own
-            poses[:, :3, :3] = poses[:, :3, :3] @ exp(vector * part[:, :1])
-            aims += turn * part
+        order = np.argsort(times, kind="stable")
+        ordered, first, second = times[order], np.zeros((times.size, 6)), np.zeros((times.size, 6))
+        begun, done = self._rows_in_progress(ordered, side)
+        behind = np.searchsorted(done, np.arange(times.size), "right")
+        poses, aims = self._poses[behind], np.zeros((times.size, 3))
+        aims[:, 0] = np.append(0.0, np.cumsum(self.turns))[behind]
+        for k in np.flatnonzero(begun < done).tolist():
+            rows = slice(begun[k], done[k])
+            self._add(k, ordered[rows], side, poses[rows], first[rows], second[rows], aims[rows])
+        back = np.empty_like(order)
+        back[order] = np.arange(order.size)
         target = self.last
         if target.orientation not in ("yaw", "pitch"):
             aims = aims[:, :0]
         else:
             aims[:, 0] += ToolPath.angle_of(self.before, target.orientation, target.tool_axis)
         return ToolReference(
-            poses, first, second, target.position, target.orientation, target.tool_axis, aims
+            poses[back],
+            first[back],
+            second[back],
+            target.position,
+            target.orientation,
+            target.tool_axis,
+            aims[back],
         )
+
+    def _rows_in_progress(self, ordered: Array, side: Side) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Return the first row (k,) of increasing times in which each segment is begun, and is done."""
+        opposite: Side = "right" if side == "left" else "left"
+        starts, ends = (np.array([getattr(law, name) for law in self.laws]) for name in ("start", "end"))
+        begun, done = (np.searchsorted(ordered, edges, opposite) for edges in (starts, ends))
+        begun[0], done[-1] = 0, ordered.size  # start and end have one side only
+        return begun, done
+
+    def _add(
+        self, k: int, times: Array, side: Side, poses: Array, first: Array, second: Array, aims: Array
+    ) -> None:
+        """Add what segment k does at times (m,) to the rows of those that began before it."""
+        curve, law = self.curves[k], self.laws[k]
+        rates = law.evaluate_orders(np.clip(times, law.start, law.end), (0, 1, 2), side=side)[:, :, 0]
+        s = np.clip(rates[:, 0], 0.0, curve.length)
+        p, tangent, curvature = curve.evaluate(s, side)
+        poses[:, :3, 3] += p - curve.evaluate(np.zeros(1))[0]
+        first[:, :3] += tangent * rates[:, 1:2]
+        second[:, :3] += curvature * rates[:, 1:2] ** 2 + tangent * rates[:, 2:]
+        part = rates / curve.length
+        axis = poses[:, :3, :3] @ self.vectors[k]
+        own = axis * part[:, 1:2]
+        second[:, 3:] += axis * part[:, 2:] + np.cross(first[:, 3:], own)
+        first[:, 3:] += own
+        poses[:, :3, :3] = poses[:, :3, :3] @ exp(self.vectors[k] * part[:, :1])
+        aims += self.turns[k] * part
+
+    @cached_property
+    def _poses(self) -> Array:
+        """The pose (k + 1, 4, 4) after no segment, after the first one, and so on to the last."""
+        poses = np.tile(self.before, (len(self.curves) + 1, 1, 1))
+        for k, (curve, turned) in enumerate(zip(self.curves, exp(self.vectors), strict=True), 1):
+            ends = curve.evaluate(np.array([0.0, curve.length]), "left")[0]
+            poses[k, :3, 3] = poses[k - 1, :3, 3] + ends[1] - ends[0]
+            poses[k, :3, :3] = poses[k - 1, :3, :3] @ turned
+        return poses
 
 
 def overlapping_motion(
@@ -295,8 +333,10 @@ def overlapping_motion(
     _check(segments, overlap)
     end = float(starts[-1] + overlap)
     pairs = list(zip(segments, starts[:-1], strict=True))
-    laws = [_padded(segment.law, float(start), end) for segment, start in pairs]
-    merged = merge_breaks(laws)
+    laws = [
+        PiecewisePolynomial(segment.law.breaks + start, segment.law.coefficients) for segment, start in pairs
+    ]
+    merged = merge_breaks([_in_turn(laws[first::2], end) for first in (0, 1)])
     whole = PiecewisePolynomial(merged.breaks, merged.coefficients.sum(axis=2, keepdims=True))
     breaks = _distinct(np.concatenate([segment.breaks + start for segment, start in pairs]), end)
     turns = np.array([target.turn for target in targets])
@@ -343,15 +383,27 @@ def _check(segments: Sequence[LawSegment], overlap: float) -> None:
             raise PlanningError(Problem(message, hint, amounts=amounts))
 
 
-def _padded(law: PiecewisePolynomial, start: float, end: float) -> PiecewisePolynomial:
-    """Return the law at rest before `start` and after it is done, over [0, end]."""
-    before = constant(np.zeros(1), start)
-    rest = end - start - law.duration
-    after = constant(law.piece_ends()[1][-1], rest if rest > _ONE_TIME * end else 0.0)
-    joined = concatenate([before, law, after])
-    breaks = joined.breaks.copy()
+def _in_turn(laws: Sequence[PiecewisePolynomial], end: float) -> PiecewisePolynomial:
+    """Return what laws that do not overlap add up to over [0, end], at rest between them."""
+    breaks, coefficients, s = np.zeros(1), list[Array](), np.zeros(1)
+    for law in laws:
+        if law.start - breaks[-1] > _ONE_TIME * end:
+            coefficients.append(_at_rest(s, law))
+            breaks = np.append(breaks, law.start)
+        coefficients.append(law.coefficients.copy())
+        coefficients[-1][-1] += s
+        breaks = np.append(breaks, law.breaks[1:])
+        s = s + law.piece_ends()[1][-1]
+    if end - breaks[-1] > _ONE_TIME * end:
+        coefficients.append(_at_rest(s, laws[-1]))
+        breaks = np.append(breaks, end)
     breaks[-1] = end
-    return PiecewisePolynomial(breaks, joined.coefficients)
+    return PiecewisePolynomial(breaks, np.concatenate(coefficients, axis=1))
+
+
+def _at_rest(s: Array, law: PiecewisePolynomial) -> Array:
+    """Return the coefficients (degree + 1, 1, 1) of one piece at rest at s (1,), of the degree of a law."""
+    return np.concatenate([np.zeros((law.degree, 1, 1)), s.reshape(1, 1, 1)])
 
 
 def _distinct(times: Array, end: float) -> Array:
