@@ -19,6 +19,7 @@ BENCHMARKS = (
     "planning",
     "help",
     "writing",
+    "reading",
     "evaluation",
     "forward_kinematics",
     "inverse_kinematics",

@@ -9,6 +9,7 @@ import pytest
 
 from trajcli.columns import parse_column
 from trajcli.errors import FileError, TrajcliError
+from trajcli.streams import csv
 from trajcli.streams.csv import verify_csv, write_csv
 from trajcli.streams.formats import write_verified
 
@@ -140,15 +141,21 @@ def test_a_lost_negative_zero_is_found_where_digits_are_full():
 
 def test_a_verified_file_appears_whole(tmp_path):
     rows = table()
-    write_verified(tmp_path / "out.csv", lambda: blocks_of(rows), COLUMNS)
+    write_verified(tmp_path / "out.csv", blocks_of(rows), COLUMNS)
     assert (tmp_path / "out.csv").read_bytes() == written(rows)
     assert [path.name for path in tmp_path.iterdir()] == ["out.csv"]
 
 
-def test_a_file_that_fails_its_check_does_not_appear(tmp_path):
-    calls = iter([table(), table() + 1e-8])
+@pytest.mark.parametrize("digits", ["fixed", "full"])
+def test_a_file_that_fails_its_check_does_not_appear(tmp_path, monkeypatch, digits):
+    def off(rows, whole_numbers):
+        return encode(rows + 1e-8 * (np.arange(rows.size).reshape(rows.shape) == 2345), whole_numbers)
+
+    name = f"encode_{digits}"
+    encode = getattr(csv, name)
+    monkeypatch.setattr(csv, name, off)
     with pytest.raises(TrajcliError, match="read back says"):
-        write_verified(tmp_path / "out.csv", lambda: blocks_of(next(calls)), COLUMNS)
+        write_verified(tmp_path / "out.csv", blocks_of(table()), COLUMNS, digits)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -157,14 +164,14 @@ def test_a_file_of_numbers_that_end_does_not_appear(tmp_path):
     rows[2500, 1] = np.nan
     (tmp_path / "out.csv").write_text("old")
     with pytest.raises(TrajcliError, match="q1 is nan"):
-        write_verified(tmp_path / "out.csv", lambda: blocks_of(rows), COLUMNS)
+        write_verified(tmp_path / "out.csv", blocks_of(rows), COLUMNS)
     assert (tmp_path / "out.csv").read_text() == "old"
     assert len(list(tmp_path.iterdir())) == 1
 
 
 def test_a_full_disk_is_an_error_of_the_file():
     with pytest.raises(FileError, match="cannot write /dev/full: No space left") as caught:
-        write_verified("/dev/full", lambda: blocks_of(table()), COLUMNS)
+        write_verified("/dev/full", blocks_of(table()), COLUMNS)
     assert caught.value.exit_code == 4
 
 
@@ -182,7 +189,7 @@ def test_memory_is_the_same_for_many_rows(tmp_path):
 
     def peak(count):
         tracemalloc.start()
-        write_verified(tmp_path / "out.csv", lambda: rows(count), COLUMNS[:3])
+        write_verified(tmp_path / "out.csv", rows(count), COLUMNS[:3])
         result = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         return result

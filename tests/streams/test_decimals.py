@@ -124,3 +124,27 @@ def test_any_width(columns):
     rows = np.arange(2 * columns, dtype=float).reshape(2, columns) / 8
     lines = encode_fixed(rows).decode().splitlines()
     assert [[float(cell) for cell in line.split(",")] for line in lines] == rows.tolist()
+
+
+def test_full_digits_are_those_of_repr():
+    generator = np.random.default_rng(5)
+    drawn = generator.integers(0, 2**64, 40_000, dtype=np.uint64).view(np.float64)
+    sized = generator.normal(size=40_000) * 10.0 ** generator.integers(-9, 19, 40_000)
+    edges = [
+        0.0,
+        -0.0,
+        1e-4,
+        9.999999999999999e-05,
+        1e15,
+        1e16,
+        9999999999999998.0,
+        1e17,
+        5e-324,
+        1e22,
+        0.1,
+        -2.0,
+    ]
+    powers = [10.0**k for k in range(-30, 30)] + [2.0**k for k in range(-60, 70)]
+    values = np.concatenate([drawn[np.isfinite(drawn)], sized, edges, powers])
+    values = values[: values.size // 2 * 2].reshape(-1, 2)
+    assert encode_full(values) == "".join(f"{a!r},{b!r}\n" for a, b in values.tolist()).encode()

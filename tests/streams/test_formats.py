@@ -23,7 +23,7 @@ def test_rows_are_csv_where_a_name_promises_nothing_else(path):
 @pytest.mark.parametrize("ending", [".mcap", ".jsonl", ".json", ".yaml", ".YML", ".xlsx", ".parquet"])
 def test_a_name_of_another_format_is_refused(ending, tmp_path):
     with pytest.raises(InputError) as caught:
-        write_verified(tmp_path / f"out{ending}", lambda: [ROWS], COLUMNS)
+        write_verified(tmp_path / f"out{ending}", [ROWS], COLUMNS)
     (problem,) = caught.value.problems
     assert problem.message == f"rows are written as CSV, not as {ending.lower()}"
     assert problem.hint == "name the file .csv"
@@ -35,15 +35,19 @@ def test_a_format_is_one_entry(tmp_path, monkeypatch):
 
     def write(rows, columns, out, digits):
         seen.append([(column.quantity, column.joint, column.factor) for column in columns])
-        out.write(repr([block.tolist() for block in rows]).encode())
+        for block in rows:
+            out.write(repr(block.tolist()).encode())
+            yield block
 
     def verify(written, rows, columns, digits):
-        written.seek(0)
-        assert written.read().decode() == repr([block.tolist() for block in rows])
+        for block in rows:
+            assert written.read().decode() == repr(block.tolist())
 
-    monkeypatch.setattr(formats, "FORMATS", {**FORMATS, ".jsonl": StreamFormat("JSON lines", write, verify)})
-    write_verified(tmp_path / "out.jsonl", lambda: [ROWS], COLUMNS)
-    assert (tmp_path / "out.jsonl").read_text() == repr([ROWS.tolist()])
+    monkeypatch.setattr(
+        formats, "FORMATS", {**FORMATS, ".jsonl": StreamFormat("JSON lines", lambda *_: None, write, verify)}
+    )
+    write_verified(tmp_path / "out.jsonl", [ROWS], COLUMNS)
+    assert (tmp_path / "out.jsonl").read_text() == repr(ROWS.tolist())
     assert [(quantity.dimension, joint) for quantity, joint, _ in seen[0]] == [
         ("time", None), ("angle", 0), ("length", 1),
     ]  # fmt: skip

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from trajcli.columns import columns_of
-from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.planning.plan import Plan
 from trajcli.samples import Grid, ListedGrid, UniformGrid, sample
@@ -57,15 +54,12 @@ def write_rows(plan: Plan, grid: Grid, path: str | None, digits: Digits) -> None
     loaded = plan.loaded
     groups = loaded.job.output.columns
     columns = columns_of(groups, loaded.robot.joint_types, loaded.units)
-
-    def rows() -> Iterator[Array]:
-        return sample(plan.trajectory, grid, groups, loaded.units, robot=loaded.robot)
-
+    rows = sample(plan.trajectory, grid, groups, loaded.units, robot=loaded.robot)
     if path is not None and path != "-":
         write_verified(path, rows, columns, digits)
         return
     with standard_output() as out:
-        DEFAULT.write(rows(), columns, out, digits)
+        DEFAULT.write(rows, columns, out, digits)
 
 
 def write_plan(plan: Plan, path: str | None = None, digits: Digits = "fixed") -> None:

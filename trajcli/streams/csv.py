@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from typing import BinaryIO
 
 import numpy as np
@@ -11,6 +12,7 @@ from trajcli.columns import Column, whole_number_columns
 from trajcli.curves.piecewise import Array
 from trajcli.errors import TrajcliError
 from trajcli.streams.decimals import Digits, NotFixedError, encode_fixed, encode_full, scan_fixed
+from trajcli.streams.number_cells import scan_decimals
 
 _CHUNK = 1 << 18  # bytes read back at a time
 _HALF_UNIT = 0.5e-9 + 1e-12  # the last decimal's half, and the first of the two roundings
@@ -30,6 +32,14 @@ def write_csv(
     Raises:
         TrajcliError: When a value is not finite; its row and what follows are not written.
     """
+    for _ in write_csv_blocks(rows, columns, out, digits):
+        pass
+
+
+def write_csv_blocks(
+    rows: Iterable[Array], columns: Sequence[Column], out: BinaryIO, digits: Digits = "fixed"
+) -> Iterator[Array]:
+    """Write as `write_csv`, and yield each block as soon as its text has left for `out`."""
     encode = encode_fixed if digits == "fixed" else encode_full
     whole_numbers = whole_number_columns(columns)
     out.write(_header(columns).encode())
@@ -38,6 +48,7 @@ def write_csv(
         _require_finite(block, columns, written)
         out.write(encode(block, whole_numbers))
         written += len(block)
+        yield block
 
 
 def verify_csv(
@@ -46,7 +57,7 @@ def verify_csv(
     """Read a stream from its beginning and compare every number with the rows it was written from.
 
     Args:
-        written: What `write_csv` wrote.
+        written: What `write_csv` wrote; it need hold a block only when that block has been taken from `rows`.
         rows: The same blocks once more.
         columns: As in `write_csv`.
         digits: As in `write_csv`.
@@ -56,10 +67,7 @@ def verify_csv(
             its last decimal, or by anything at all where the digits are full.
     """
     written.seek(0)
-    header = written.readline().decode(errors="replace")
-    if header != _header(columns):
-        raise TrajcliError(f"the file read back begins with {header!r} instead of the columns' names")
-    blocks = _RowsReadBack(written, len(columns), whole_number_columns(columns))
+    blocks = _RowsReadBack(written, columns)
     count = 0
     for block in rows:
         _compare(blocks.take(len(block), count), block, columns, count, digits)
@@ -74,18 +82,33 @@ def _header(columns: Sequence[Column]) -> str:
 class _RowsReadBack:
     """The rows of a stream, as many at a time as are asked for."""
 
-    def __init__(self, stream: BinaryIO, width: int, whole_numbers: Sequence[int]) -> None:
-        self._width = width
-        self._blocks = self._scan(stream, whole_numbers)
-        self._left = np.empty((0, width))
+    def __init__(self, stream: BinaryIO, columns: Sequence[Column]) -> None:
+        self._stream = stream
+        self._columns = columns
+        self._width = len(columns)
+        self._whole_numbers = whole_number_columns(columns)
+        self._left = np.empty((0, self._width))
 
-    def _scan(self, stream: BinaryIO, whole_numbers: Sequence[int]) -> Iterator[Array]:
-        while text := stream.read(_CHUNK):
-            text += stream.readline()
-            try:
-                yield scan_fixed(text, self._width, whole_numbers)
-            except NotFixedError:
-                yield self._scan_any(text)
+    def _expect_names(self) -> None:
+        """Refuse another first line than the columns' names."""
+        header = self._stream.readline().decode(errors="replace")
+        if header != _header(self._columns):
+            raise TrajcliError(f"the file read back begins with {header!r} instead of the columns' names")
+
+    def _next(self) -> Array | None:
+        """Return some rows more; None where the stream ends, for now."""
+        if self._stream.tell() == 0:
+            self._expect_names()
+        text = self._stream.read(_CHUNK)
+        if not text:
+            return None
+        text += self._stream.readline()
+        with suppress(NotFixedError):
+            return scan_fixed(text, self._width, self._whole_numbers)
+        if text.endswith(b"\n"):
+            with suppress(NotFixedError):
+                return scan_decimals(text, self._width)[0]
+        return self._scan_any(text)
 
     def _scan_any(self, text: bytes) -> Array:
         lines = [line.split(b",") for line in text.splitlines()]
@@ -100,7 +123,7 @@ class _RowsReadBack:
         """Return the next `count` rows; `before` is how many were taken before."""
         parts, available = [self._left], len(self._left)
         while available < count:
-            block = next(self._blocks, None)
+            block = self._next()
             if block is None:
                 raise TrajcliError(
                     f"the file read back ends after {before + available} rows, but more were written"
@@ -113,7 +136,7 @@ class _RowsReadBack:
 
     def expect_end(self, count: int) -> None:
         """Refuse rows after the first `count`."""
-        if len(self._left) or next(self._blocks, None) is not None:
+        if len(self._left) or self._next() is not None:
             raise TrajcliError(f"the file read back goes on after the {count} rows that were written")
 
 

@@ -6,7 +6,7 @@ and the m columns, which say what is in them: quantity, joint and unit.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
@@ -14,7 +14,7 @@ from trajcli.columns import Column
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import frozen
-from trajcli.streams.csv import verify_csv, write_csv
+from trajcli.streams.csv import verify_csv, write_csv, write_csv_blocks
 from trajcli.streams.decimals import Digits
 from trajcli.streams.whole_file import whole_file
 
@@ -26,16 +26,18 @@ class StreamFormat:
     Attributes:
         name: For messages.
         write: Writes blocks of rows, one by one, to a stream.
+        write_blocks: The same, and yields each block when it has been written.
         verify: Reads a stream from its beginning, and raises TrajcliError where it does not hold these rows.
     """
 
     name: str
     write: Callable[[Iterable[Array], Sequence[Column], BinaryIO, Digits], None]
+    write_blocks: Callable[[Iterable[Array], Sequence[Column], BinaryIO, Digits], Iterator[Array]]
     verify: Callable[[BinaryIO, Iterable[Array], Sequence[Column], Digits], None]
 
 
 FORMATS: Mapping[str, StreamFormat] = {
-    ".csv": StreamFormat("CSV", write_csv, verify_csv),
+    ".csv": StreamFormat("CSV", write_csv, write_csv_blocks, verify_csv),
 }
 DEFAULT = FORMATS[".csv"]
 """The format of standard output, of devices, and of files whose names tell no other."""
@@ -63,7 +65,7 @@ def format_of(path: str | Path) -> StreamFormat:
 
 def write_verified(
     path: str | Path,
-    rows: Callable[[], Iterable[Array]],
+    rows: Iterable[Array],
     columns: Sequence[Column],
     digits: Digits = "fixed",
 ) -> None:
@@ -72,7 +74,7 @@ def write_verified(
     Args:
         path: The file; its ending names the format. A device or pipe is written to directly, and not read
             back.
-        rows: Called once to write and once to compare; returns blocks of shape (N, m).
+        rows: Blocks of shape (N, m); each is written, and compared with what then stands in the file.
         columns: What the rows hold, in the units that the columns say.
         digits: Of numbers that are written as text: nine decimals, or as many as restore each bit.
 
@@ -84,6 +86,15 @@ def write_verified(
     """
     stream_format = format_of(path)
     with whole_file(path) as out:
-        stream_format.write(rows(), columns, out, digits)
-        if out.readable():
-            stream_format.verify(out, rows(), columns, digits)
+        if not out.readable():
+            stream_format.write(rows, columns, out, digits)
+            return
+        with Path(out.name).open("rb") as back:
+            flushed = _flushed(stream_format.write_blocks(rows, columns, out, digits), out)
+            stream_format.verify(back, flushed, columns, digits)
+
+
+def _flushed(blocks: Iterable[Array], out: BinaryIO) -> Iterator[Array]:
+    for block in blocks:
+        out.flush()
+        yield block

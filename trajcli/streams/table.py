@@ -20,12 +20,12 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import FileError, InputError, Place, Problem
 from trajcli.frozen import frozen
 from trajcli.streams.decimals import DECIMALS, NotFixedError, scan_fixed
+from trajcli.streams.number_cells import decimals_of, scan_decimals
 
 _CHUNK = 1 << 20  # bytes read at a time
 _LONGEST_HEADER = 1 << 16  # bytes; what has no line feed by then is no CSV
 _MOST_PROBLEMS = 10
 _NUMBER = re.compile(rb"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
-_SPACED = re.compile(rb"[eE \t\r\f\v]|\n\n|\A\n")  # exponents, blanks or empty lines
 
 
 @frozen
@@ -212,6 +212,7 @@ class _Reader:
         self._file = file
         self._names = names
         self._line = 2
+        self._nine_decimals = True  # until they are not
         self._whole_numbers = whole_number_columns(map(parse_column, names))
         self._fixed_decimals = np.full(len(names), DECIMALS)
         self._fixed_decimals[list(self._whole_numbers)] = 0
@@ -219,12 +220,21 @@ class _Reader:
     def read(self, text: bytes) -> Array:
         """Return the rows (N, m) of whole lines; none if something is wrong with them."""
         try:
-            rows = scan_fixed(text, len(self._names), self._whole_numbers)
-            self.decimals = np.maximum(self.decimals, self._fixed_decimals)
+            rows, decimals = self._read_blocks(text)
+            self.decimals = np.maximum(self.decimals, decimals)
         except NotFixedError:
             rows = self._read_any(text)
         self._line += text.count(b"\n")
         return rows
+
+    def _read_blocks(self, text: bytes) -> tuple[Array, NDArray[np.int64]]:
+        """Return the rows of lines and their decimals; NotFixedError where they are of an unusual form."""
+        if self._nine_decimals:
+            try:
+                return scan_fixed(text, len(self._names), self._whole_numbers), self._fixed_decimals
+            except NotFixedError:
+                self._nine_decimals = False
+        return scan_decimals(text, len(self._names))
 
     def _read_any(self, text: bytes) -> Array:
         """Return the rows of lines whose numbers are written in any form."""
@@ -243,7 +253,7 @@ class _Reader:
         if len(rows) != len(cells) or not np.isfinite(rows).all():
             self._explain(lines)
             return np.empty((0, width))
-        self.decimals = np.maximum(self.decimals, _most_decimals(text, cells))
+        self.decimals = np.maximum(self.decimals, _most_decimals(cells))
         return rows
 
     def _explain(self, lines: Sequence[bytes]) -> None:
@@ -278,21 +288,6 @@ def _is_number(cell: bytes) -> bool:
     return _NUMBER.fullmatch(cell.strip()) is not None
 
 
-def _most_decimals(text: bytes, cells: Sequence[Sequence[bytes]]) -> NDArray[np.int64]:
+def _most_decimals(cells: Sequence[Sequence[bytes]]) -> NDArray[np.int64]:
     """Return how many decimals the numbers of each column show at most, shape (m,)."""
-    if _SPACED.search(text):
-        return np.array([max(map(_decimals, column)) for column in zip(*cells, strict=True)])
-    buffer = np.frombuffer(text, dtype=np.uint8)
-    ends = np.flatnonzero((buffer == ord(",")) | (buffer == ord("\n")))
-    points = np.flatnonzero(buffer == ord("."))
-    decimals = np.zeros(ends.size, dtype=np.int64)
-    cell = np.searchsorted(ends, points)
-    decimals[cell] = ends[cell] - points - 1
-    most: NDArray[np.int64] = decimals.reshape(len(cells), -1).max(axis=0)
-    return most
-
-
-def _decimals(cell: bytes) -> int:
-    """Return how many decimals a number shows, at least 0."""
-    mantissa, _, exponent = cell.strip().lower().partition(b"e")
-    return max(len(mantissa.partition(b".")[2]) - int(exponent or 0), 0)
+    return np.array([max(map(decimals_of, column)) for column in zip(*cells, strict=True)])
