@@ -19,7 +19,7 @@ from trajcli.errors import Amount, Amounts, MissingLimitError, PlanningError, Pr
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import QUANTITIES, Limits, Robot
 from trajcli.language.targets import MinimumDuration
-from trajcli.planners.boundary_states import missing_limit
+from trajcli.planners.boundary_states import instant, missing_limit
 from trajcli.planners.planner import Event, Phase, Planned
 from trajcli.planners.point_to_point.point_to_point import PointToPoint
 from trajcli.planners.ruckig import (
@@ -116,6 +116,8 @@ def plan_motion(request: Request, robot: Robot) -> Planned:
         planned = _on_one_line(request, boundaries, robot)
     else:
         planned = _each(request, boundaries)
+    if planned.curve.duration == 0:
+        planned = replace(planned, curve=instant(request.start))
     if request.control == "position":
         return planned
     end = State(planned.curve.piece_ends()[1][-1], request.end.velocity, request.end.acceleration)
