@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from trajcli.curves.piecewise import constant
+from trajcli.curves.piecewise import PiecewisePolynomial, constant
 from trajcli.errors import Amount, Amounts, MissingLimitError, PlanningError, Problem
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.planners.planner import Planned
@@ -16,8 +16,15 @@ _NOTHING = 1e-15  # rad or m: a move this short is none; a thousandth of what co
 
 
 def standstill(state: State, duration: float, remedies: Mapping[str, str] | None = None) -> Planned:
-    """Return the move that stays in `state`, which is at rest, for `duration` seconds, which may be zero."""
-    return Planned(constant(state.position, duration), state, remedies=remedies or {})
+    """Return the move that stays in `state` for `duration` seconds: zero where the state is not at rest."""
+    curve = constant(state.position, duration) if duration else instant(state)
+    return Planned(curve, state, remedies=remedies or {})
+
+
+def instant(state: State) -> PiecewisePolynomial:
+    """Return the curve of no length whose derivatives are those of `state`."""
+    rows = np.stack([state.acceleration / 2, state.velocity, state.position])
+    return PiecewisePolynomial(np.zeros(2), rows[:, None, :])
 
 
 def same_state(a: State, b: State) -> bool:

@@ -13,7 +13,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
+from functools import cached_property
 from itertools import product
 from typing import Any, Literal
 
@@ -93,9 +95,13 @@ class PhaseProfile:
     duration: float
     braking: int = 0
 
+    @cached_property
+    def _curve(self) -> PiecewisePolynomial:
+        return self.chain.curve(self.position, self.duration)
+
     def curve(self) -> PiecewisePolynomial:
         """Return the position over [0, duration], n = 1."""
-        return self.chain.curve(self.position, self.duration)
+        return self._curve
 
     def phases(self, joint: int | None) -> list[Phase]:
         """Return the phases by name, equal neighbours joined."""
@@ -129,6 +135,8 @@ _EXACT = 1e-12  # relative to the joint's peaks: a larger miss means that other 
 _ACCEPTABLE = 1e-9  # the same: a larger miss is a jump, and the phases are wrong
 _COARSE = 1e-11  # the same: what rounding times may do to the velocity
 _ROUNDING = 1e-12
+_ROOM = 2e-10  # relative; a fifth of the tolerance with which limits are verified
+_SHARES = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)  # of acceleration and jerk: given up in turn
 _MARGINS = (0.0, 1e-14, 1e-13, 5e-13)  # of the acceleration limits: tried in turn where ruckig finds nothing
 
 
@@ -202,6 +210,38 @@ def _slowed(problem: BoundaryProblem, quickest: PhaseProfile, duration: float) -
 
 
 def _solved_by_ruckig(problem: BoundaryProblem, duration: float | None) -> PhaseProfile:
+    """Return a motion within the bounds; where rounding leads outside, with a little less of them.
+
+    A phase of 1e-12 s has no room for rounding its ends, and ruckig itself exceeds bounds by up to 1e-6 where
+    one of its cases ends and the next begins.
+    """
+    profile = _accurate(problem, duration)
+    for part in _SHARES:
+        if profile.braking or _within(profile, problem.bounds):
+            break
+        with suppress(PlanningError):
+            profile = _accurate(_with_less(problem, part), duration)
+    return profile
+
+
+def _within(profile: PhaseProfile, bounds: Array) -> bool:
+    """Return whether velocity, acceleration and jerk at the ends of phases keep the bounds."""
+    curve, room = profile.curve(), _ROOM * np.abs(bounds)
+    ends = np.array([np.ravel(curve.piece_ends(order)) for order in (1, 2, 3)])
+    low, high = (bounds + np.where(np.isfinite(room), room, 0.0) * [-1.0, 1.0]).T[:, :, None]
+    return bool(((low <= ends) & (ends <= high)).all())
+
+
+def _with_less(problem: BoundaryProblem, part: float) -> BoundaryProblem:
+    """Return the problem with less jerk, and with less acceleration where its ends allow it."""
+    ends = max(abs(problem.initial[2]), abs(problem.final[2]))
+    inside = ends <= np.abs(problem.bounds[1]).min() * (1 - part)
+    less = np.array([[0.0], [part if inside else 0.0], [part]])
+    return replace(problem, bounds=problem.bounds * (1.0 - less))
+
+
+def _accurate(problem: BoundaryProblem, duration: float | None) -> PhaseProfile:
+    """Return the motion that misses its target least, of those that units and margins of ruckig lead to."""
     best, least = None, _ACCEPTABLE
     for margin, (time_unit, length_unit) in product(_MARGINS, _units(problem, duration)):
         answer = _call_ruckig(_with_margin(problem, margin), duration, time_unit, length_unit)

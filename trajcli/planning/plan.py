@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from trajcli.checks.tolerances import JUMP_ABSOLUTE
 from trajcli.checks.verify import Verdict, verify
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
 from trajcli.errors import Amount, Amounts, Place, TrajcliError
@@ -119,10 +120,15 @@ def _plan_move(loaded: LoadedJob, index: int, planner: Planner, start: State) ->
 
 
 def _handed_over(state: State, before: Planner | None, after: Planner) -> State:
-    """Return the state in which `after` starts: the acceleration is handed over between continuity 2 only."""
-    if before is None or (before.joins == 2 and after.joins == 2):
-        return state
-    return State(state.position, state.velocity, np.zeros_like(state.acceleration))
+    """Return the state in which `after` starts: the acceleration is handed over between continuity 2 only.
+
+    Rates too small to be seen as a jump are rest.
+    """
+    smooth = before is None or (before.joins == 2 and after.joins == 2)
+    velocity, acceleration = (
+        np.where(np.abs(rates) <= JUMP_ABSOLUTE, 0.0, rates) for rates in (state.velocity, state.acceleration)
+    )
+    return State(state.position, velocity, acceleration if smooth else np.zeros_like(acceleration))
 
 
 def _first_state(loaded: LoadedJob, first: PlannedMove, events: list[Event]) -> State:

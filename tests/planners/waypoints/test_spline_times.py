@@ -193,3 +193,40 @@ def test_many_points_take_no_longer_than_stopping_at_each():
     assert np.abs(curve.evaluate(np.linspace(0, curve.duration, 50_001), 2)).max() <= ACCELERATION * (
         1 + 1e-9
     )
+
+
+@pytest.mark.parametrize("rule", ["imposed", "computed", "clamped"])
+def test_a_return_to_the_start_in_motion(rule):
+    """The cubic v t (1 - t/T)^2 has its largest acceleration, 4 v / T, at the start."""
+    start = {"joints": [0.3], "velocity": [0.5]}
+    move = {"planner": "spline", "rule": rule, "to": {"joints": [0.3]}}
+    made = plan(start, move, limits={"velocity": VELOCITY, "acceleration": ACCELERATION})
+    assert made.trajectory.duration == pytest.approx(4 * 0.5 / ACCELERATION, rel=1e-8)
+
+
+def test_a_quintic_return_to_the_start_in_motion():
+    """The quintic v T (u - 6 u^3 + 8 u^4 - 3 u^5) has its largest jerk, 36 v / T^2, at the start."""
+    start = {"joints": [0.0], "velocity": [-0.5]}
+    move = {"planner": "spline", "rule": "quintic", "to": {"joints": [0.0]}}
+    made = plan(start, move, limits={"velocity": VELOCITY, "acceleration": 20.0, "jerk": 10.0})
+    assert made.trajectory.duration == pytest.approx(np.sqrt(36 * 0.5 / 10.0), rel=1e-8)
+
+
+@pytest.mark.parametrize("rule", ["natural", "not_a_knot", "continuous_acceleration", "shape_preserving"])
+def test_a_return_to_the_start_in_motion_has_a_verdict(rule):
+    """Monotone from a point to itself is only rest; the other rules overshoot and come back."""
+    start, move = {"joints": [0.3], "velocity": [0.5]}, {"planner": "spline", "to": {"joints": [0.3]}}
+    limits = {"velocity": VELOCITY, "acceleration": ACCELERATION}
+    if rule == "shape_preserving":
+        assert "monotone" in str(refusal(start, move | {"rule": rule}, limits=limits))
+        return
+    curve = curve_of(plan(start, move | {"rule": rule}, limits=limits))
+    t = np.linspace(curve.start, curve.end, 2001)
+    second = np.abs(curve.evaluate(t, 2)).max()
+    assert curve.evaluate(t[:1], 1)[0, 0] == pytest.approx(0.5)
+    assert second == pytest.approx(ACCELERATION, rel=1e-3)
+
+
+def test_a_return_to_the_start_in_motion_without_a_limit_that_takes_time():
+    start, move = {"joints": [0.3], "velocity": [0.5]}, {"planner": "spline", "to": {"joints": [0.3]}}
+    assert "limit on the acceleration of j1" in str(refusal(start, move, limits={"velocity": VELOCITY}))

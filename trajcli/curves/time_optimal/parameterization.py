@@ -81,7 +81,7 @@ class TimeOptimalMotion:
 
     Attributes:
         trajectory: q(t) from t = 0 on.
-        law: s(t), quadratic or cubic pieces.
+        law: s(t), of degree 3; where sdd is constant, pieces have no cubic term.
         stretch: By what factor the solution was slowed down as a whole to keep the limits everywhere.
         tightened: Number of intervals in which the limits were lowered to be kept between their ends.
         refinements: How often the grid was refined.

@@ -19,7 +19,7 @@ from trajcli.errors import Amount, Amounts, MissingLimitError, PlanningError, Pr
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import QUANTITIES, Limits, Robot
 from trajcli.language.targets import MinimumDuration
-from trajcli.planners.boundary_states import missing_limit
+from trajcli.planners.boundary_states import instant, missing_limit
 from trajcli.planners.planner import Event, Phase, Planned
 from trajcli.planners.point_to_point.point_to_point import PointToPoint
 from trajcli.planners.ruckig import (
@@ -116,6 +116,8 @@ def plan_motion(request: Request, robot: Robot) -> Planned:
         planned = _on_one_line(request, boundaries, robot)
     else:
         planned = _each(request, boundaries)
+    if planned.curve.duration == 0:
+        planned = replace(planned, curve=instant(request.start))
     if request.control == "position":
         return planned
     end = State(planned.curve.piece_ends()[1][-1], request.end.velocity, request.end.acceleration)
@@ -153,6 +155,7 @@ def _on_one_line(request: Request, boundaries: Sequence[BoundaryProblem], robot:
     initial, final = (0.0, on_line[0], on_line[2]), (length, on_line[1], on_line[3])
     bounds = _bounds_along(direction, robot.limits)
     boundary = BoundaryProblem("the common law", initial, final, bounds, request.control)
+    _require_common_law(boundary, boundaries, direction, robot)
     alone = fastest(boundary)
     profile = fastest_of(boundary, least) if alone.duration < least else alone
     law = profile.curve()
@@ -316,6 +319,45 @@ def _approach_problems(boundary: BoundaryProblem, joint: int) -> list[Problem]:
     }
     hint = "lower the end acceleration or velocity, or raise the velocity or jerk limit"
     return [Problem(message, hint, joint=boundary.name, value=before, limit=limit, amounts=amounts)]
+
+
+def _require_common_law(
+    law: BoundaryProblem, boundaries: Sequence[BoundaryProblem], direction: Array, robot: Robot
+) -> None:
+    """Refuse ends that each joint by itself can keep within its limits, but not with the jerk of one law.
+
+    Raises:
+        PlanningError: Names the joint whose velocity limit would be exceeded.
+    """
+    ends = ((law.initial, 1, "from its start"), (law.final, -1, "before its end"))
+    for k, ((_, velocity, acceleration), sign, when) in enumerate(ends):
+        alone = [_beyond(b.final if k else b.initial, sign, b.bounds) for b in boundaries]
+        beyond = _beyond((0.0, velocity, acceleration), sign, law.bounds)
+        if not beyond or any(alone):
+            continue
+        share = (beyond * direction[:, None] / robot.limits.velocity).max(axis=1)
+        joint = int(share.argmax())
+        limit = float(robot.limits.velocity[joint, int(beyond * direction[joint] > 0)])
+        message = (
+            "`synchronize: phase` gives all joints one law, and within its jerk "
+            f"{{joint}} would have to move at {{value}} {when}, beyond its limit {{limit}}"
+        )
+        value, name = float(beyond * direction[joint]), robot.joint_names[joint]
+        amounts: Amounts = {
+            "joint": name,
+            "value": Amount(value, 1, joint),
+            "limit": Amount(limit, 1, joint),
+        }
+        hint = "say `synchronize: time`"
+        raise PlanningError(Problem(message, hint, joint=name, value=value, limit=limit, amounts=amounts))
+
+
+def _beyond(state: tuple[float, float, float], sign: int, bounds: Array) -> float:
+    """Return the velocity beyond its bounds to which the acceleration leads (or leads from), or 0."""
+    _, velocity, acceleration = state
+    reached = velocity + sign * acceleration * abs(acceleration) / (2 * float(np.abs(bounds[2]).min()))
+    low, high = bounds[0].tolist()
+    return 0.0 if low * (1 + _ROUNDING) <= reached <= high * (1 + _ROUNDING) else reached
 
 
 def _leaves_line(value: float, order: int, joint: int, robot: Robot) -> PlanningError:

@@ -30,7 +30,7 @@ from trajcli.language.numbers import FieldPath, Flaw, refuse
 from trajcli.language.recorded import Recorded
 from trajcli.language.targets import Numbers
 from trajcli.language.waypoints import Waypoint
-from trajcli.planners.boundary_states import missing_limit, standstill
+from trajcli.planners.boundary_states import missing_limit, same_state, standstill
 from trajcli.planners.planner import Planned
 from trajcli.planners.waypoints.through_points import (
     OPEN_END_REMEDIES,
@@ -128,18 +128,19 @@ def fastest_spline_times(rule: Rule, points: PointTable, robot: Robot) -> Array:
         PlanningError: When no durations keep the limits.
     """
     bounds = np.stack([robot.limits.of_order(order) for order in (1, 2, 3)])
-    moving = np.ptp(points.positions, axis=0) > 0
+    guess, moving = _guess(points, bounds), np.ptp(points.positions, axis=0) > 0
     lacking = np.flatnonzero(moving & ~np.isfinite(bounds).all(axis=2).any(axis=0))
+    quantity = "velocity"
+    if not guess.any() and not lacking.size:  # back to where it starts, and only velocities are limited
+        lacking, quantity = np.flatnonzero(points.rates.any(axis=(0, 1))), "acceleration"
     if lacking.size:
-        also = "give every waypoint a `time`"
-        raise missing_limit(
-            "spline", "velocity", lacking.tolist(), robot, "to find when it passes its points", also
-        )
+        why, also = "to find when it passes its points", "give every waypoint a `time`"
+        raise missing_limit("spline", quantity, lacking.tolist(), robot, why, also)
 
     def family(durations: Array) -> PiecewisePolynomial:
         return curve_through(rule, points, np.concatenate([[0.0], np.cumsum(durations)]))
 
-    durations = fastest_durations(family, _guess(points, bounds), bounds)
+    durations = fastest_durations(family, guess, bounds)
     if durations is None:
         message = f"no times let rule {rule} pass these points within all limits"
         hint = "an imposed velocity or acceleration asks too much: lower it, or give every waypoint a `time`"
@@ -148,12 +149,18 @@ def fastest_spline_times(rule: Rule, points: PointTable, robot: Robot) -> Array:
 
 
 def _guess(points: PointTable, bounds: Array) -> Array:
-    """Return the time that the slowest joint needs for each piece, if it could stop at every point."""
+    """Return the time that the slowest joint needs for each piece, if it could stop at every point.
+
+    Where it goes back to where it starts, this is the time that the rates of its ends need.
+    """
     chords = np.abs(np.diff(points.positions, axis=0))
     needed = np.zeros(len(chords))
     for order, limits in enumerate(bounds, 1):
         least = np.abs(limits).min(axis=1)
         needed = np.maximum(needed, ((chords / least) ** (1 / order)).max(axis=1))
+        if not chords.any():
+            for below, rates in enumerate(np.abs(points.rates).max(axis=1)[: order - 1], 1):
+                needed = np.maximum(needed, ((rates / least) ** (1 / (order - below))).max())
     return np.asarray(np.maximum(needed, _LEAST * needed.mean()))
 
 
@@ -293,8 +300,10 @@ class Spline(ThroughPoints):
             PlanningError: When no times keep the limits, or the ends ask for what the rule cannot do.
         """
         points = self.waypoints(start)
-        if points.times is None and not np.ptp(points.positions, axis=0).any() and not points.rates.any():
-            return standstill(points.target, self.duration or 0.0, REMEDIES)
+        if points.times is None and not np.ptp(points.positions, axis=0).any():
+            arrived = same_state(start, points.target) and (start.at_rest or not self.duration)
+            if arrived or not points.rates.any():
+                return standstill(points.target, self.duration or 0.0, REMEDIES)
         times = self._times_of(points, robot)
         curve = self._curve(points, times, robot)
         return Planned(

@@ -1,0 +1,48 @@
+"""A first move without a duration between equal states in motion: it has arrived when it starts."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from trajcli.job.read import job_from_text
+from trajcli.planning.plan import Plan, plan_job
+
+PLANNERS = ("jerk_limited", "trapezoid", "cubic", "quintic", "septic", "spline")
+STATE = {"joints": [0.3, -0.2], "velocity": [0.5, 0.25]}
+NEXT = {"planner": "jerk_limited", "to": {"joints": [1.0, 0.0]}}
+
+
+def planned(*moves: dict[str, Any]) -> Plan:
+    limits = {"velocity": 1.0, "acceleration": 2.0, "jerk": 10.0}
+    job = {"version": 1, "robot": {"joints": 2}, "limits": limits, "start": STATE, "moves": list(moves)}
+    return plan_job(job_from_text(json.dumps(job)))
+
+
+@pytest.mark.parametrize("fields", [*({"planner": tag} for tag in PLANNERS)], ids=PLANNERS)
+@pytest.mark.parametrize("also", [{}, {"when_over_limit": "slow"}], ids=["as_is", "slow"])
+def test_it_takes_no_time_and_keeps_its_velocity(fields: dict[str, Any], also: dict[str, Any]) -> None:
+    plan = planned({**fields, **also, "to": STATE})
+    curve = plan.trajectory.curve
+    assert plan.verdict.passed
+    assert plan.trajectory.duration == 0
+    for order, values in enumerate(([0.3, -0.2], [0.5, 0.25], [0.0, 0.0])):
+        np.testing.assert_array_equal(curve.evaluate(np.zeros(1), order)[0], values)
+
+
+@pytest.mark.parametrize("synchronize", ["time", "phase", "none"])
+def test_every_synchronisation(synchronize: str) -> None:
+    plan = planned({"planner": "jerk_limited", "synchronize": synchronize, "to": STATE})
+    assert plan.verdict.passed
+    assert plan.trajectory.duration == 0
+
+
+@pytest.mark.parametrize("tag", PLANNERS)
+def test_the_next_move_goes_on_as_if_it_were_first(tag: str) -> None:
+    both, alone = planned({"planner": tag, "to": STATE}, NEXT), planned(NEXT)
+    assert both.verdict.passed
+    t = np.linspace(0, alone.trajectory.duration, 50)
+    np.testing.assert_array_equal(both.trajectory.curve.evaluate(t), alone.trajectory.curve.evaluate(t))
