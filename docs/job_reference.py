@@ -93,7 +93,8 @@ _CONFIGURATION = """\
 Which branch is meant, whatever the signs and zeros of the joints. `left` reaches to the side where axis 2
 stands beside axis 1 (along the x axis of the first link where they meet), `right` over the shoulder; `up` has
 the elbow higher in world (for planar arms: left of the line to the tcp, against the z axis of the table);
-`no_flip` bends joint 5 positively about its z axis in the table. `trajcli ik` lists the branches of a pose by these names."""
+`no_flip` bends joint 5 positively about its z axis in the table. `trajcli ik` lists the branches of a pose by
+these names."""
 
 _WAYPOINTS = """\
 A point that a move passes: the name of a point, or a state with a position and, if it is said when, a
