@@ -90,9 +90,11 @@ where all joints are zero). A rotation matrix may be off by 1e-4: the nearest ro
 event tells so."""
 
 _CONFIGURATION = """\
-Which branch is meant. `left` reaches along the x axis of the first link, `right` over the shoulder;
-`up` has the elbow higher along the first axis (for planar arms: left of the line to the tcp); `no_flip`
-bends joint 5 positively. `trajcli ik` lists the branches of a pose by these names."""
+Which branch is meant, whatever the signs and zeros of the joints. `left` reaches to the side where axis 2
+stands beside axis 1 (along the x axis of the first link where they meet), `right` over the shoulder; `up` has
+the elbow higher in world (for planar arms: left of the line to the tcp, against the z axis of the table);
+`no_flip` bends joint 5 positively about its z axis in the table. `trajcli ik` lists the branches of a pose by
+these names."""
 
 _WAYPOINTS = """\
 A point that a move passes: the name of a point, or a state with a position and, if it is said when, a

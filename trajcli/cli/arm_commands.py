@@ -13,6 +13,7 @@ import typer
 import typer.core
 
 from trajcli.cli.options import (
+    ArmUnits,
     DigitsOption,
     Errors,
     Joints,
@@ -104,6 +105,7 @@ def fk(
         Literal["world", "base"], typer.Option("--frame", help="Where the pose is counted from.")
     ] = "world",
     links: Annotated[bool, typer.Option("--links", help="Also the frame of each link.")] = False,
+    units: ArmUnits = None,
     si: Si = False,
     as_json: Json = False,
     digits: DigitsOption = "fixed",
@@ -115,7 +117,7 @@ def fk(
     """
     from trajcli.cli.fk import FkOptions, run_fk
 
-    return run_fk(robot, joints, FkOptions(tool, frame, links, si, as_json, digits))
+    return run_fk(robot, joints, FkOptions(tool, frame, links, units, si, as_json, digits))
 
 
 @guarded
@@ -134,7 +136,10 @@ def ik(
             "--near", metavar="Q...", help="Joint values to be near to, instead of zero; -- ends them."
         ),
     ] = None,
-    every: Annotated[bool, typer.Option("--all", help="Also answers outside the limits.")] = False,
+    every: Annotated[
+        bool,
+        typer.Option("--all", help="Also answers outside the limits; of a CSV every branch of each pose."),
+    ] = False,
     turns: Annotated[
         bool, typer.Option("--turns", help="Also every full turn of a joint that its limits allow.")
     ] = False,
@@ -142,6 +147,7 @@ def ik(
         float, typer.Option("--tolerance", metavar="TOL", help="What an answer may miss by, m and rad.")
     ] = 1e-6,
     tool: Tool = None,
+    units: ArmUnits = None,
     si: Si = False,
     as_json: Json = False,
     digits: DigitsOption = "fixed",
@@ -151,10 +157,13 @@ def ik(
 
     An answer is singular where the tool can move in fewer directions, of those that the pose fixes, than it
     can nearby. What is free is a direction in which the joints can move while the pose is kept.
+
+    Exit codes: 0 an answer lies within the limits; 3 the pose is out of reach, or all its answers lie outside
+    the limits (they are printed with --all); 2 robot, pose or rows are wrong; 4 a file cannot be read.
     """
     from trajcli.cli.ik import IkOptions, run_ik
 
-    options = IkOptions(pose, near, every, turns, tolerance, tool, si, as_json, digits)
+    options = IkOptions(pose, near, every, turns, tolerance, tool, units, si, as_json, digits)
     return run_ik(robot, rows or [], options)
 
 
@@ -174,14 +183,19 @@ def jacobian(
             help="A rate for each joint, for the acceleration they cause; -- ends them.",
         ),
     ] = None,
+    units: ArmUnits = None,
     si: Si = False,
     as_json: Json = False,
     errors: Errors = "text",
 ) -> int:
-    """Say how the tool moves with the joints: the Jacobian, manipulability, rank, what is lost."""
+    """Say how the tool moves with the joints: the Jacobian, manipulability, rank, what is lost.
+
+    The Jacobian is the one of textbooks: angular rows in rad, columns per rad, whatever the unit of angles
+    is; lengths are in the unit of lengths. Joint values and --qd are in the units of the robot's file.
+    """
     from trajcli.cli.jacobian import JacobianOptions, run_jacobian
 
-    return run_jacobian(robot, joints, JacobianOptions(tool, frame, rates, si, as_json))
+    return run_jacobian(robot, joints, JacobianOptions(tool, frame, rates, units, si, as_json))
 
 
 @guarded
@@ -232,7 +246,8 @@ def pose(
 @guarded
 def robots(
     name: Annotated[
-        str | None, typer.Argument(metavar="NAME|FILE", help="One robot; without it all are listed.")
+        str | None,
+        typer.Argument(metavar="NAME|FILE", help="One robot, or a job's; without it all are listed."),
     ] = None,
     as_yaml: Annotated[
         bool, typer.Option("--yaml", help="Print the robot's file, to start a new one from.")

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from typing import Any, Literal
 
 from trajcli.cli.numbers import pose_lines
-from trajcli.cli.outcome import print_json, print_lines
+from trajcli.cli.outcome import print_json, print_lines, print_remark
 from trajcli.errors import InputError
 from trajcli.frozen import comparable
 from trajcli.kinematics.forward import forward, link_poses
@@ -25,6 +24,7 @@ class FkOptions:
     tool: str | None = None
     frame: Literal["world", "base"] = "world"
     links: bool = False
+    units: str | None = None
     si: bool = False
     as_json: bool = False
     digits: Digits = "fixed"
@@ -37,7 +37,7 @@ def run_fk(robot: str, words: Sequence[str], options: FkOptions) -> int:
         InputError: When robot, joints, tool or rows are not as they should be.
         FileError: When a file cannot be read, or standard output not written.
     """
-    arm = open_arm(robot, options.tool, si=options.si, frame=options.frame)
+    arm = open_arm(robot, options.tool, units=options.units, si=options.si, frame=options.frame)
     if list(words) == ["-"]:
         return _stream(arm, options)
     q = arm.joint_values(words)
@@ -82,6 +82,8 @@ def _stream(arm: ArmInUnits, options: FkOptions) -> int:
 
 def _remark(arm: ArmInUnits, watch: LimitWatch, *, rows: bool = False) -> None:
     """Say on standard error that joint values are outside the limits of the robot; their poses stand."""
+    if watch.remark is not None:
+        print_remark(watch.remark)
     first = watch.first
     if first is None:
         return
@@ -91,4 +93,4 @@ def _remark(arm: ArmInUnits, watch: LimitWatch, *, rows: bool = False) -> None:
         where = f" in {watch.outside} of {watch.rows} rows, first in row {first.row} (from 0{when})"
     what = f"{first.joint} is at {first.value:.9g} {first.unit}, its limit is {first.limit:.9g} {first.unit}"
     more = f", and {first.others} more joint{'s' * (first.others > 1)}" if first.others else ""
-    print(f"outside the limits of {arm.robot.name}{where}: {what}{more}", file=sys.stderr)  # noqa: T201
+    print_remark(f"outside the limits of {arm.robot.name}{where}: {what}{more}")

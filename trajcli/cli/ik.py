@@ -7,14 +7,14 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from trajcli.cli.numbers import number, numbers
-from trajcli.cli.outcome import print_json, print_lines
+from trajcli.cli.outcome import print_json, print_lines, print_remark
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import comparable
 from trajcli.job.inline import inline_target
 from trajcli.kinematics.inverse.solutions import Solutions
 from trajcli.language.targets import ik_target
-from trajcli.queries.arm import ArmInUnits, open_arm
+from trajcli.queries.arm import ArmInUnits, LimitWatch, open_arm
 from trajcli.queries.inverse import answer_reports, find_answers, require_answer
 from trajcli.streams.decimals import Digits
 
@@ -29,6 +29,7 @@ class IkOptions:
     turns: bool = False
     tolerance: float = 1e-6
     tool: str | None = None
+    units: str | None = None
     si: bool = False
     as_json: bool = False
     digits: Digits = "fixed"
@@ -43,8 +44,10 @@ def run_ik(robot: str, words: Sequence[str], options: IkOptions) -> int:
         FileError: When a file cannot be read, or standard output not written.
     """
     _check(words, options)
-    arm = open_arm(robot, options.tool, si=options.si)
+    arm = open_arm(robot, options.tool, units=options.units, si=options.si)
     near = None if options.near is None else arm.joint_values([options.near], "--near")
+    if near is not None:
+        _remark_on(arm, near)
     if options.pose is None:
         return _stream(arm, near, options)
     asked = inline_target(options.pose, "--pose", arm.units)
@@ -57,6 +60,18 @@ def run_ik(robot: str, words: Sequence[str], options: IkOptions) -> int:
         print_lines(_lines(arm, solutions, reports))
     require_answer(arm, solutions, chosen, asked.configuration)
     return 0
+
+
+def _remark_on(arm: ArmInUnits, near: Array) -> None:
+    """Say on standard error that --near is where the arm cannot be; it counts all the same."""
+    watch = LimitWatch(arm.robot)
+    watch.see(near[None], arm.joint_factors, [arm.joint_unit(i) for i in range(len(near))])
+    if watch.remark is not None:
+        print_remark(f"--near: {watch.remark}")
+    if watch.first is not None:
+        joint, unit = watch.first, watch.first.unit
+        what = f"{joint.joint} is at {joint.value:.9g} {unit}, its limit is {joint.limit:.9g} {unit}"
+        print_remark(f"--near is outside the limits of {arm.robot.name}: {what}")
 
 
 def _check(words: Sequence[str], options: IkOptions) -> None:

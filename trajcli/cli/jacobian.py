@@ -6,11 +6,11 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from trajcli.cli.numbers import matrix_lines, number, numbers
-from trajcli.cli.outcome import print_json, print_lines
+from trajcli.cli.outcome import print_json, print_lines, print_remark
 from trajcli.errors import InputError
 from trajcli.frozen import comparable
 from trajcli.kinematics.jacobian import ReferenceFrame
-from trajcli.queries.arm import ArmInUnits, open_arm
+from trajcli.queries.arm import ArmInUnits, beyond_two_turns, open_arm
 from trajcli.queries.jacobian import jacobian_report
 from trajcli.streams.whole_file import standard_output
 
@@ -24,6 +24,7 @@ class JacobianOptions:
     tool: str | None = None
     frame: ReferenceFrame = "world"
     rates: str | None = None
+    units: str | None = None
     si: bool = False
     as_json: bool = False
 
@@ -35,11 +36,14 @@ def run_jacobian(robot: str, words: Sequence[str], options: JacobianOptions) -> 
         InputError: When robot, joints, rates, tool or rows are not as they should be.
         FileError: When a file cannot be read, or standard output not written.
     """
-    arm = open_arm(robot, options.tool, si=options.si)
+    arm = open_arm(robot, options.tool, units=options.units, si=options.si)
     if list(words) == ["-"]:
         return _stream(arm, options)
     q = arm.joint_values(words)
     qd = None if options.rates is None else arm.joint_values([options.rates], "--qd", 1)
+    remark = beyond_two_turns(arm.robot, q[None], [arm.joint_unit(i) for i in range(len(q))])
+    if remark is not None:
+        print_remark(remark)
     report = jacobian_report(arm, q, options.frame, qd)
     if options.as_json:
         print_json(report)
@@ -49,10 +53,10 @@ def run_jacobian(robot: str, words: Sequence[str], options: JacobianOptions) -> 
 
 
 def _lines(arm: ArmInUnits, report: dict[str, Any], frame: str) -> Iterator[str]:
-    length, angle = arm.units.length, arm.units.angle
-    rates = ", ".join(dict.fromkeys(arm.joint_unit(i, 1) for i in range(len(arm.robot.joints))))
+    length, types = arm.units.length, arm.robot.joint_types
+    rates = ", ".join(dict.fromkeys(f"{length}/s" if kind == "prismatic" else "rad/s" for kind in types))
     yield f"Jacobian of {arm.robot.name} in the axes of the {frame} frame"
-    yield f"(rows vx vy vz in {length}/s, wx wy wz in {angle}/s; joint rates in {rates}):"
+    yield f"(rows vx vy vz in {length}/s, wx wy wz in rad/s; joint rates in {rates}):"
     yield from matrix_lines(report["jacobian"])
     yield f"manipulability: {number(report['manipulability'])} (in m and rad)"
     condition = "infinite" if report["condition"] is None else number(report["condition"])
@@ -64,7 +68,7 @@ def _lines(arm: ArmInUnits, report: dict[str, Any], frame: str) -> Iterator[str]
         rate = _sum(motion, [f"d/dt {name}" for name in arm.robot.joint_names])
         yield f"moves nothing: {rate} (in rad/s and m/s)"
     if "jdot_qd" in report:
-        units = f"{length}/s^2 and {angle}/s^2"
+        units = f"{length}/s^2 and rad/s^2"
         yield f"acceleration at constant joint rates ({units}): {numbers(report['jdot_qd'])}"
 
 

@@ -17,11 +17,27 @@ Errors = Annotated[
     Literal["text", "json"], typer.Option("--errors", help="How errors are written to stderr.")
 ]
 RobotName = Annotated[
-    str, typer.Option("--robot", "-r", metavar="NAME|FILE", help="A robot of the catalogue, or a robot file.")
+    str,
+    typer.Option(
+        "--robot",
+        "-r",
+        metavar="NAME|FILE",
+        help="A robot of the catalogue, a robot file, or a job: its robot, base and tool.",
+    ),
 ]
 Tool = Annotated[
     str | None,
-    typer.Option("--tool", metavar="POSE", help="T_flange_tcp as YAML or @FILE, instead of the robot's own."),
+    typer.Option(
+        "--tool",
+        metavar="POSE",
+        help="T_flange_tcp as YAML or @FILE, instead of the robot's own or the job's.",
+    ),
+]
+ArmUnits = Annotated[
+    str | None,
+    typer.Option(
+        "--units", metavar="UNITS", help="Of numbers, such as deg,mm; else those of the robot's file."
+    ),
 ]
 Si = Annotated[bool, typer.Option("--si", help="Numbers in rad and m, whatever units the robot's file has.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]

@@ -95,6 +95,11 @@ def print_lines(lines: Iterable[str]) -> None:
         out.write(text.encode(errors="backslashreplace"))
 
 
+def print_remark(text: str) -> None:
+    """Print a line for people on standard error."""
+    print(text, file=sys.stderr)  # noqa: T201
+
+
 def print_json(value: Any) -> None:  # noqa: ANN401
     """Print a value as JSON; a matrix takes a line for each row.
 

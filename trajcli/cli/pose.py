@@ -12,13 +12,13 @@ from trajcli.frozen import comparable
 from trajcli.geometry.pose import invert
 from trajcli.geometry.rotation import rotation_defect
 from trajcli.job.inline import inline_number
+from trajcli.queries.arm import parse_units
 from trajcli.queries.pose import (
     OrientationInterpolation,
     PoseAtEnd,
     composed,
     parse_fractions,
     parse_sequence,
-    parse_units,
     pose_path,
     pose_report,
     read_end,

@@ -37,6 +37,9 @@ def run_robots(name: str | None, *, as_yaml: bool, as_json: bool) -> int:
         return 0
     sheet = open_sheet(name)
     if as_yaml:
+        if sheet.text is None:
+            hint = f"`trajcli plan {name} --no-output --resolved FILE` writes the job with its robot"
+            raise InputError(f"{name} is a job, and no robot file", hint=hint)
         print_lines([sheet.text.rstrip("\n")])
     elif as_json:
         print_json(robot_card(name, sheet))

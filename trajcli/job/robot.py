@@ -186,7 +186,7 @@ class RobotSheet:
         source: Where the numbers come from; None where the file does not say, as below.
         licence: Of the source.
         note: What a user should know about the numbers.
-        text: The file as it stands.
+        text: The file as it stands; None where the robot is that of a job.
     """
 
     robot: Robot
@@ -194,7 +194,7 @@ class RobotSheet:
     source: str | None
     licence: str | None
     note: str | None
-    text: str
+    text: str | None
 
 
 def catalogue_names() -> list[str]:

@@ -15,6 +15,7 @@ from trajcli.errors import Amount, InputError
 from trajcli.frozen import comparable, frozen
 from trajcli.job.inline import inline_number, inline_pose
 from trajcli.job.robot import RobotSheet, catalogue_names, load_sheet
+from trajcli.job.yaml.load import read_document
 from trajcli.kinematics.inverse.joint_turns import beyond
 from trajcli.kinematics.robot import Robot
 from trajcli.kinematics.serial_chain import links_of
@@ -26,6 +27,8 @@ from trajcli.units import (
     joint_quantity,
     unit_name,
 )
+
+_TWO_TURNS = 4.0 * np.pi  # rad: no joint is sent there, and 13 degrees read as radians are
 
 
 @frozen
@@ -103,38 +106,91 @@ class ArmInUnits:
 
 
 def open_sheet(name: str) -> RobotSheet:
-    """Return the sheet of a robot of the catalogue, or of a robot file of any name.
+    """Return the sheet of a robot of the catalogue, of a robot file of any name, or of a job's robot.
+
+    A file is a job where it has a key `robot` or `moves`. Its robot has the job's base, tool and limits, and
+    the job's units.
 
     Raises:
         InputError: When there is no such robot, or with every flaw of the file.
         FileError: When the file cannot be read.
     """
-    is_file = name not in catalogue_names() and Path(name).is_file()
-    return load_sheet(Path(name) if is_file else name)
+    if name in catalogue_names() or not Path(name).is_file():
+        return load_sheet(name)
+    if not {"robot", "moves"} & read_document(name).plain().keys():
+        return load_sheet(Path(name))
+    from trajcli.job.read import load_job  # brings the planners
+
+    loaded = load_job(name)
+    return RobotSheet(loaded.robot, loaded.units, None, None, f"the robot of the job {loaded.name}", None)
 
 
 def open_arm(
-    name: str, tool: str | None = None, *, si: bool = False, frame: Literal["world", "base"] = "world"
+    name: str,
+    tool: str | None = None,
+    *,
+    units: str | None = None,
+    si: bool = False,
+    frame: Literal["world", "base"] = "world",
 ) -> ArmInUnits:
-    """Return an arm of the catalogue or of a file.
+    """Return an arm of the catalogue, of a robot file or of a job.
 
     Args:
-        name: Of a robot in the catalogue, or the path of a robot file.
-        tool: T_flange_tcp as YAML or @FILE, instead of the robot's own.
-        si: Whether numbers are in rad and m, whatever units the robot's file has.
+        name: Of a robot in the catalogue, or the path of a robot file or a job.
+        tool: T_flange_tcp as YAML or @FILE, instead of the robot's own and the job's.
+        units: Of numbers, such as "deg,mm"; what it leaves out is as in the file.
+        si: Whether numbers are in rad and m, whatever units the file has.
         frame: "base" counts poses from the robot's base, as if it stood at the world's origin.
 
     Raises:
-        InputError: When there is no such robot, it has no geometry, or the tool is no pose.
+        InputError: When there is no such robot, it has no geometry, the tool is no pose, or units are unknown
+            or given twice.
         FileError: When a file cannot be read.
     """
+    if si and units is not None:
+        raise InputError("--si is the same as --units rad,m", hint="leave one of --si and --units out")
     sheet = open_sheet(name)
-    units = Units() if si else sheet.units
+    shown = Units() if si else parse_units(units or "", sheet.units)
     robot = sheet.robot
     links_of(robot)  # refuses bare joints before anything is read or written
     if tool is not None:
-        robot = replace(robot, tool=inline_pose(tool, "--tool", units))
-    return ArmInUnits(replace(robot, base=np.eye(4)) if frame == "base" else robot, units)
+        robot = replace(robot, tool=inline_pose(tool, "--tool", shown))
+    return ArmInUnits(replace(robot, base=np.eye(4)) if frame == "base" else robot, shown)
+
+
+def parse_units(text: str, default: Units = Units()) -> Units:  # noqa: B008
+    """Return the units that "deg,mm" names; what it leaves out is that of `default`.
+
+    Raises:
+        InputError: When a word is none of rad, deg, m and mm, or two name units of the same kind.
+    """
+    chosen: dict[str, str] = {}
+    for word in filter(None, (part.strip() for part in text.split(","))):
+        if word not in ("rad", "deg", "m", "mm"):
+            raise InputError(f"--units: expected rad or deg, m or mm, got {word}", hint="such as deg,mm")
+        kind = "angle" if word in ("rad", "deg") else "length"
+        if kind in chosen:
+            raise InputError(f"--units: {chosen[kind]} and {word} are both units of {kind}")
+        chosen[kind] = word
+    angle, length = chosen.get("angle", default.angle), chosen.get("length", default.length)
+    return Units("deg" if angle == "deg" else "rad", "mm" if length == "mm" else "m")
+
+
+def beyond_two_turns(robot: Robot, values: Array, units: Sequence[str]) -> str | None:
+    """Return a remark on the first joint, given in rad, more than 4 pi from zero; None where there is none.
+
+    Args:
+        robot: The arm.
+        values: Shape (N, n), rad or m.
+        units: In which each joint was given.
+    """
+    radians = np.array([unit == "rad" for unit in units])
+    rows, joints = np.nonzero((np.abs(values) > _TWO_TURNS) & radians)
+    if not len(rows):
+        return None
+    joint, value = int(joints[0]), float(values[rows[0], joints[0]])
+    shown = f"{robot.joint_names[joint]} is at {value:.9g} rad, more than two turns from zero"
+    return f"{shown}: if these are degrees, say --units deg, or q1_deg in a CSV"
 
 
 @comparable
@@ -167,12 +223,14 @@ class LimitWatch:
         rows: How many were seen.
         outside: How many of them have a joint outside its limits.
         first: The first of these; None while there is none.
+        remark: On the first joint beyond two turns, as `beyond_two_turns` says it; None while there is none.
     """
 
     def __init__(self, robot: Robot) -> None:
         """Watch the position limits of a robot."""
         self.rows, self.outside = 0, 0
         self.first: JointOutsideLimits | None = None
+        self.remark: str | None = None
         self._robot = robot
 
     def see(
@@ -192,6 +250,7 @@ class LimitWatch:
             times: Shape (N,), s.
             room: What rounding may have added to a number, in the units.
         """
+        self.remark = self.remark or beyond_two_turns(self._robot, values, units)
         excess = beyond(values, self._robot.limits.position)
         excess[np.abs(excess) <= room * factors] = 0.0
         rows = np.flatnonzero(excess.any(axis=1))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,12 +22,12 @@ def jacobian_report(
 ) -> dict[str, Any]:
     """Return {jacobian, manipulability, condition, rank, singular_directions, idle_motions, jdot_qd?}.
 
-    With joint rates in the arm's units, `jacobian` (6, n) gives the tcp's linear velocity in the unit of
-    length and its angular one in the unit of angle, by second. `manipulability` is in m and rad; `condition`
-    is of the Jacobian scaled by the arm's length, None where the rank is lost. `singular_directions` are unit
-    vectors u with u J = 0 for the J in m and rad: components of the velocity (v, w), in the axes of `frame`,
-    that are zero for all joint rates. `idle_motions` are unit vectors of joint rates, in rad and m, that
-    leave the tcp at rest.
+    With joint rates in rad and the arm's unit of length, `jacobian` (6, n) gives the tcp's linear velocity in
+    that unit of length and its angular one in rad, by second, as textbooks do whatever the unit of angles is.
+    `manipulability` is in m and rad; `condition` is of the Jacobian scaled by the arm's length, None where
+    the rank is lost. `singular_directions` are unit vectors u with u J = 0 for the J in m and rad: components of
+    the velocity (v, w), in the axes of `frame`, that are zero for all joint rates. `idle_motions` are unit
+    vectors of joint rates, in rad and m, that leave the tcp at rest.
 
     Args:
         arm: The arm.
@@ -39,7 +40,8 @@ def jacobian_report(
     """
     measures, lost = dexterity(arm.robot, q), singular_directions(arm.robot, q)
     condition = float(measures.condition)
-    shown = jacobian(arm.robot, q, frame) * arm.joint_factors / arm.twist_factors[:, None]
+    in_rad = replace(arm, units=replace(arm.units, angle="rad"))
+    shown = jacobian(arm.robot, q, frame) * in_rad.joint_factors / in_rad.twist_factors[:, None]
     result = {
         "jacobian": plain(shown),
         "manipulability": float(measures.manipulability),
@@ -49,7 +51,7 @@ def jacobian_report(
         "idle_motions": plain(simplest(lost.idle)),
     }
     if qd is not None:
-        result["jdot_qd"] = plain(jacobian_dot_qd(arm.robot, q, qd, frame) / arm.twist_factors)
+        result["jdot_qd"] = plain(jacobian_dot_qd(arm.robot, q, qd, frame) / in_rad.twist_factors)
     return result
 
 

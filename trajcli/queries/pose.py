@@ -34,7 +34,7 @@ from trajcli.job.inline import inline_document, read_at
 from trajcli.language.numbers import FlawError, ReadingContext, shown
 from trajcli.language.poses import Pose, read_numbers
 from trajcli.suggest import did_you_mean
-from trajcli.units import AngleUnit, LengthUnit, Quantity, Units, factor
+from trajcli.units import Quantity, Units, factor
 
 OrientationInterpolation = Literal["axis_angle", "euler"]
 
@@ -268,25 +268,6 @@ def angles_view(angles: Array, units: Units) -> list[float]:
 def plain(values: ArrayLike) -> Any:  # noqa: ANN401
     """Return an array as nested lists of floats, without negative zeros."""
     return (np.asarray(values, dtype=np.float64) + 0.0).tolist()
-
-
-def parse_units(text: str) -> Units:
-    """Return the units that "deg,mm" names; what it leaves out is rad or m.
-
-    Raises:
-        InputError: When a word is none of rad, deg, m and mm, or two name units of the same kind.
-    """
-    chosen: dict[str, str] = {}
-    for word in filter(None, (part.strip() for part in text.split(","))):
-        if word not in ("rad", "deg", "m", "mm"):
-            raise InputError(f"--units: expected rad or deg, m or mm, got {word}", hint="such as deg,mm")
-        kind = "angle" if word in ("rad", "deg") else "length"
-        if kind in chosen:
-            raise InputError(f"--units: {chosen[kind]} and {word} are both units of {kind}")
-        chosen[kind] = word
-    angle: AngleUnit = "deg" if chosen.get("angle") == "deg" else "rad"
-    length: LengthUnit = "mm" if chosen.get("length") == "mm" else "m"
-    return Units(angle, length)
 
 
 def parse_sequence(text: str) -> tuple[str, Frame]:

@@ -98,7 +98,7 @@ class ToolAxisModel:
     def pitch_sign(self) -> float:
         """The sign with which the first solution of `levels` has the tool axis on the side of link 1's x."""
         if self.shoulder is None:
-            return -1.0
+            return -self.axis.sign
         ahead = forward_sign(self.shoulder, self.axis, self.arm.forward)
         return ahead * float(np.copysign(1.0, dot(self.up, self.shoulder.direction)))
 
@@ -223,7 +223,12 @@ class OrientationSolver:
             raise ValueError("the arm has no roll")
         aim = self._to_shoulder(self._aim(), shoulder)
         around, bend = two_turns(
-            model.axis.direction, model.roll.direction, model.marker.direction, aim, self.flags
+            model.axis.direction,
+            model.roll.direction,
+            model.marker.direction,
+            aim,
+            self.flags,
+            model.axis.sign * model.roll.sign,
         )
         return _both(around), _both(bend)
 

@@ -9,8 +9,8 @@ The elbow arm (axes 2 and 3 parallel, axis 1 not): turns about axes 2 and 3 do n
 them, so that h2 . R1^-1 t = h2 . p holds with the shoulder's offset and a1 in it. It has two solutions for
 the first angle, the shoulder facing the target or turned away from it; with the pair's two there are four.
 
-"Left" faces the side of the first link's x axis, which is forward where the table is drawn with positive
-lengths; "up" has the elbow above the line from shoulder to point, seen along axis 1.
+"Left" faces the side where axis 2 lies, seen from axis 1; where they meet, that of the first link's x axis.
+"Up" has the elbow above the line from shoulder to point, along axis 1: it is the higher one.
 
 Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning and Control (2009), section
 2.12.4, here without assuming right angles or lengths.
@@ -58,8 +58,8 @@ def parallel_pair(
 ) -> tuple[Turn, Turn]:
     """Return the turns about two parallel axes that bring `point` to `aim`, both (2, ..., B).
 
-    The first solution has the elbow on the side of h2 x w if `up` is None, else on the side where w . up
-    counts it as up: up is axis 1 x axis 2.
+    The first solution has the elbow on the side of h2 x w if `up` is None, with h2 as the table draws it,
+    else on the side where w . up counts it as up: up is axis 1, taken upward, x axis 2.
     """
     axis = two.direction
     link = across(minus(three.point, two.point), axis)
@@ -69,7 +69,7 @@ def parallel_pair(
         0.5, difference(difference(dot(to_aim, to_aim), dot(beyond_elbow, beyond_elbow)), dot(link, link))
     )
     same = same_direction(two, three)
-    sign = -same if up is None else product(-same, dot(to_aim, up))
+    sign = -same * two.sign if up is None else product(-same, dot(to_aim, up))
     third, (x, y) = levels(three.direction, beyond_elbow, link, level, flags, flags.length**2, sign)
     square = float(dot(link, link))
     scale = flags.length * float(np.sqrt(square))
@@ -110,11 +110,12 @@ def elbow(
     target: VectorEntries,
     flags: DegeneracyFlags,
     forward: Floats,
+    upward: Floats,
 ) -> tuple[Turn, Turn, Turn]:
     """Return the turns that bring `point` (at zero) to `target`: choices shoulder, then elbow."""
     one, two, three = axes
     first = shoulder_turn(one, two.direction, point, target, flags, forward_sign(one, two, forward))
-    up = across_floats(one.direction, two.direction)
+    up = across_floats(upward, two.direction)
     second, third = parallel_pair(two, three, point, before_turn(one, target, first), flags, up)
     return first, second, third
 

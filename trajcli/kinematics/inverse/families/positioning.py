@@ -85,6 +85,7 @@ from trajcli.kinematics.inverse.families.subproblems import (
 
 PositionSolver = Callable[[VectorEntries, VectorEntries, DegeneracyFlags], Sequence[Value]]
 StructureMatch = tuple[str, tuple[Choice, ...], PositionSolver]
+Sides = tuple[Floats, Floats] | None  # what is forward and what is upward, seen from the base
 INDEPENDENT = 1e-6  # volume of three unit directions: below, an arm hardly moves in one direction
 
 
@@ -102,7 +103,7 @@ def cylindrical(
     """Return a turn and two slides."""
     one, two, three = axes
     normal = across_floats(two.direction, three.direction)
-    first = shoulder_turn(one, normal, point, target, flags, 1.0)
+    first = shoulder_turn(one, normal, point, target, flags, one.sign * two.sign * three.sign)
     displacement = minus(before_turn(one, target, first), point)
     rows = _rows([two.direction, three.direction, normal])
     return first, dot(rows[0], displacement), dot(rows[1], displacement)
@@ -132,7 +133,7 @@ def turn_and_slide(
     )
     ahead = dot(arm, slide.direction)
     rest = _plus_square(difference(dot(to_aim, to_aim), dot(arm, arm)), ahead)
-    distance = difference(_lengths(rest, flags), ahead)
+    distance = difference(_lengths(rest, flags, slide.sign), ahead)
     reached = advance(arm, distance, slide.direction)
     return unit(onto(turn.direction, reached, to_aim), flags, FREE * flags.length**2), np.asarray(distance)
 
@@ -163,14 +164,15 @@ def ball(
         arm = minus(point, center)
         ahead = dot(arm, three.direction)
         rest = _plus_square(difference(dot(to_aim, to_aim), dot(arm, arm)), ahead)
-        third = difference(_lengths(rest, flags), ahead)
+        third = difference(_lengths(rest, flags, three.sign), ahead)
         arm = advance(arm, third, three.direction)
     else:
         link, arm = minus(three.point, center), minus(point, three.point)
         level = product(0.5, difference(difference(dot(to_aim, to_aim), dot(arm, arm)), dot(link, link)))
-        third, _ = levels(three.direction, arm, link, level, flags, flags.length**2)
+        third, _ = levels(three.direction, arm, link, level, flags, flags.length**2, three.sign)
         arm = plus(link, turned(arm, three.direction, third))
-    second, _ = levels(two.direction, arm, one.direction, dot(one.direction, to_aim), flags, flags.length)
+    height, sign = dot(one.direction, to_aim), one.sign * two.sign
+    second, _ = levels(two.direction, arm, one.direction, height, flags, flags.length, sign)
     first = onto(one.direction, turned(arm, two.direction, second), to_aim)
     return unit(first, flags, FREE * flags.length**2), second, third
 
@@ -180,10 +182,10 @@ def _plus_square(value: Entry, root: Entry) -> Array:
     return np.asarray(value + np.square(root))
 
 
-def _lengths(square: Array, flags: DegeneracyFlags) -> Array:
-    """Return plus and minus the root along a new first axis, zero where the square is negative."""
+def _lengths(square: Array, flags: DegeneracyFlags, sign: float) -> Array:
+    """Return `sign` times the root, zero of a negative square, and the opposite, along a new first axis."""
     flags.note(np.abs(square) <= (TANGENT * flags.length) ** 2)
-    return flags.both(np.sqrt(np.maximum(square, 0.0)))
+    return flags.both(sign * np.sqrt(np.maximum(square, 0.0)))
 
 
 def _rows(columns: Sequence[Floats]) -> list[Floats]:
@@ -214,14 +216,19 @@ class PositioningStructure:
     axes: tuple[ScrewAxis, ...]
 
 
-def positioning_structure(arm: AxisGeometry) -> PositioningStructure | None:
-    """Return the structure of the first three joints of an arm; None where no row of the table fits."""
+def positioning_structure(arm: AxisGeometry, *, from_base: bool = True) -> PositioningStructure | None:
+    """Return the structure of the first three joints of an arm; None where no row of the table fits.
+
+    Args:
+        arm: The arm.
+        from_base: Whether its first joint stands on the base; what is forward and upward has no meaning else.
+    """
     axes = arm.axes[:3]
     for order, ordered in _orders(axes):
         for backwards in (False, True):
             chain = tuple(axis.opposite for axis in reversed(ordered)) if backwards else ordered
-            given = not backwards and order == (0, 1, 2)
-            matched = _match(chain, arm.length, arm.forward if given else None)
+            given = from_base and not backwards and order == (0, 1, 2)
+            matched = _match(chain, arm.length, (arm.forward, arm.upward) if given else None)
             if matched is not None:
                 name, choices, solve = matched
                 return PositioningStructure(name, choices, partial(_restored, solve, order, backwards), axes)
@@ -252,13 +259,13 @@ def _orders(axes: Sequence[ScrewAxis]) -> Iterator[tuple[tuple[int, ...], tuple[
             yield order, tuple(axes[k] for k in order)
 
 
-def _match(axes: tuple[ScrewAxis, ...], length: float, forward: Floats | None) -> StructureMatch | None:
+def _match(axes: tuple[ScrewAxis, ...], length: float, sides: Sides) -> StructureMatch | None:
     kinds = "".join("P" if axis.prismatic else "R" for axis in axes)
     match kinds:
         case "RRR":
-            return _match_turns(axes, length, forward)
+            return _match_turns(axes, length, sides)
         case "RRP":
-            return _match_turns_and_slide(axes, length, forward)
+            return _match_turns_and_slide(axes, length, sides)
         case "RPP":
             normal = np.cross(axes[1].direction, axes[2].direction)
             fits = np.linalg.norm(np.cross(normal, axes[0].direction)) > INDEPENDENT
@@ -269,32 +276,30 @@ def _match(axes: tuple[ScrewAxis, ...], length: float, forward: Floats | None) -
     return None
 
 
-def _normal_of(one: ScrewAxis, two: ScrewAxis) -> Floats:
-    """Return a direction at right angles to two axes: forward for arms that are read in another order."""
-    return across_floats(two.direction, one.direction)
+def _sides_of(one: ScrewAxis, two: ScrewAxis) -> tuple[Floats, Floats]:
+    """Return what is forward and upward for arms that are read in another order."""
+    return across_floats(two.drawn, one.drawn), one.drawn
 
 
-def _match_turns(axes: tuple[ScrewAxis, ...], length: float, forward: Floats | None) -> StructureMatch | None:
+def _match_turns(axes: tuple[ScrewAxis, ...], length: float, sides: Sides) -> StructureMatch | None:
     one, two, three = axes
     if is_elbow(axes):
-        ahead = forward or _normal_of(one, two)
-        return "elbow", ("shoulder", "elbow"), partial(elbow, axes, forward=ahead)
+        ahead, upward = sides or _sides_of(one, two)
+        return "elbow", ("shoulder", "elbow"), partial(elbow, axes, forward=ahead, upward=upward)
     center = meeting_point(one, two, length)
     if center is not None and not parallel(two, three):
         return "two axes that meet", ("elbow", "shoulder"), partial(ball, axes, center)
     return None
 
 
-def _match_turns_and_slide(
-    axes: tuple[ScrewAxis, ...], length: float, forward: Floats | None
-) -> StructureMatch | None:
+def _match_turns_and_slide(axes: tuple[ScrewAxis, ...], length: float, sides: Sides) -> StructureMatch | None:
     one, two, three = axes
     if parallel(one, two):
         if perpendicular(one, three):
             return None
         return "SCARA base", ("elbow",), partial(scara, axes)
     if perpendicular(two, three):
-        ahead = forward or _normal_of(one, two)
+        ahead, _ = sides or _sides_of(one, two)
         return "Stanford base", ("shoulder", "elbow"), partial(stanford, axes, forward=ahead)
     center = meeting_point(one, two, length)
     if center is None or parallel(two, three):

@@ -30,7 +30,7 @@ from trajcli.kinematics.columns import (
 )
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.robot import Robot
-from trajcli.kinematics.serial_chain import links_of, travel
+from trajcli.kinematics.serial_chain import Link, MovingFrame, links_of, travel
 
 PARALLEL = 1e-9  # sine of the angle: an alpha typed with ten digits is meant to be a right angle
 MEETING = 1e-9  # of the arm's length: a picometre, where drawings say a tenth of a millimetre
@@ -42,17 +42,27 @@ _AXES: tuple[Floats, Floats, Floats] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 
 
 @comparable
 class ScrewAxis:
-    """The axis of one joint at zero: unit direction, pointing as the joint counts, and a point on it, m."""
+    """The axis of one joint at zero: unit direction, pointing as the joint counts, and a point on it, m.
+
+    `sign` times the direction is the axis as the table draws it, whichever way the joint counts: the names of
+    branches refer to that.
+    """
 
     prismatic: bool
     direction: Floats
     point: Floats
+    sign: float = 1.0
 
     @property
     def opposite(self) -> ScrewAxis:
         """The axis of the joint read backwards: its motion is undone by the same value."""
         x, y, z = self.direction
-        return ScrewAxis(self.prismatic, (-x + 0.0, -y + 0.0, -z + 0.0), self.point)
+        return ScrewAxis(self.prismatic, (-x + 0.0, -y + 0.0, -z + 0.0), self.point, self.sign)
+
+    @property
+    def drawn(self) -> Floats:
+        """The direction that the axis has in the table."""
+        return self.direction if self.sign > 0.0 else self.opposite.direction
 
 
 @frozen
@@ -63,7 +73,9 @@ class AxisGeometry:
         axes: One for each joint, in the frame of the base.
         home: T_base_tcp at zero, shape (4, 4).
         base: T_world_base, shape (4, 4).
-        forward: Direction of the first link's x axis at zero: where the arm reaches with the shoulder left.
+        forward: Direction from axis 1 to axis 2 at zero, of the first link's x axis where they meet: where
+            the arm reaches with the shoulder left.
+        upward: Direction of axis 1, upward in world; where it is horizontal, in the base.
         length: The arm's characteristic length, m.
     """
 
@@ -71,6 +83,7 @@ class AxisGeometry:
     home: Array
     base: Array
     forward: Floats
+    upward: Floats
     length: float
 
     @property
@@ -88,12 +101,41 @@ def axis_geometry(robot: Robot) -> AxisGeometry:
     """
     links = links_of(robot)
     at_zero, tcp = travel(links, np.eye(4), robot.tool, cast("Sequence[Array]", [0.0] * len(links)))
-    axes = tuple(ScrewAxis(axis.prismatic, _clean(axis.direction), _clean(axis.point)) for axis in at_zero)
+    axes = tuple(
+        ScrewAxis(axis.prismatic, _clean(axis.direction), _clean(axis.point), link.sign)
+        for axis, link in zip(at_zero, links, strict=True)
+    )
     home = np.eye(4)
     home[:3] = np.array([_clean(column) for column in (tcp.x, tcp.y, tcp.z, tcp.p)]).T
-    angle = links[0].theta
-    forward = _clean((float(np.cos(angle)), float(np.sin(angle)), 0.0))
-    return AxisGeometry(axes, home, robot.base, forward, characteristic_length(robot))
+    length = characteristic_length(robot)
+    forward = _forward(links, axes, length)
+    return AxisGeometry(axes, home, robot.base, forward, _upward(axes[0], robot.base), length)
+
+
+def _forward(links: Sequence[Link], axes: Sequence[ScrewAxis], length: float) -> Floats:
+    """Return the unit vector from axis 1 to axis 2, across both; x of the first link where they meet."""
+    frame = MovingFrame(np.eye(4))
+    frame.screw(*links[0].before)
+    frame.move(links[0], cast("Array", 0.0))
+    x = _clean(frame.x)
+    normal = np.cross(axes[0].direction, axes[1].direction) if len(axes) > 1 else np.zeros(3)
+    size = float(np.linalg.norm(normal))
+    if size <= PARALLEL:
+        return x
+    apart = float(np.subtract(axes[1].point, axes[0].point) @ normal) / size
+    if abs(apart) <= MEETING * length or axes[0].prismatic or axes[1].prismatic:
+        return x
+    a, b, c = (np.copysign(1.0, apart) * normal / size).tolist()
+    return _clean((a, b, c))
+
+
+def _upward(one: ScrewAxis, base: Array) -> Floats:
+    """Return the direction of axis 1 that rises in world, else in the base, else the one in the table."""
+    for rise in (float(base[2, :3] @ one.drawn), one.drawn[2]):
+        if abs(rise) > PARALLEL:
+            x, y, z = one.drawn
+            return one.drawn if rise > 0.0 else (-x + 0.0, -y + 0.0, -z + 0.0)
+    return one.drawn
 
 
 class Displacement:

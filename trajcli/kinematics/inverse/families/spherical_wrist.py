@@ -6,8 +6,9 @@ wrist: its first two joints bring the last axis to R^-1 G last, two solutions, a
 the tool sees the first axis. Eight solutions over a structure with four.
 
 Where axis 5 is at right angles to both others the two solutions differ by half a turn of joints 4 and 6 and
-the sign of joint 5's bend: "no_flip" is the positive one. Where first and last axis are in line only the sum
-(or difference) of their turns is fixed: the first is zero then, the last makes the sum.
+the sign of joint 5's bend: "no_flip" is the positive one, from axis 4 to axis 6 about axis 5 as the table
+draws them, whichever way the joints count and wherever they are zero. Where first and last axis are in line
+only the sum (or difference) of their turns is fixed: the first is zero then, the last makes the sum.
 
 An arm whose first three axes meet is the same read from the tool to the base.
 
@@ -59,12 +60,12 @@ from trajcli.kinematics.inverse.families.subproblems import (
     unit,
 )
 
-Directions = tuple[Floats, Floats, Floats]
+WristAxes = tuple[ScrewAxis, ScrewAxis, ScrewAxis]
 WristTurns = tuple[Turn | Mirrored, Turn | Opposed, Turn | Mirrored]
 
 
 def wrist_turns(
-    directions: Directions,
+    axes: WristAxes,
     back: Callable[[VectorEntries], VectorEntries],
     first_axis: VectorEntries,
     goal: Displacement,
@@ -73,16 +74,17 @@ def wrist_turns(
     """Return the turns about three axes, with one more choice.
 
     Args:
-        directions: Of the first, second and last axis at zero.
+        axes: The first, second and last axis at zero.
         back: Takes a direction to what it was before the joints before the wrist moved.
         first_axis: Where the first axis points.
         goal: The displacement of the tool.
         flags: Of the block.
     """
-    first, second, last = directions
+    first, second, last = (axis.direction for axis in axes)
+    sign = axes[0].sign * axes[1].sign * axes[2].sign
     aim = back(goal.direction(last))
-    around, bend = two_turns(first, second, last, aim, flags)
-    end = _last(directions, bend, first_axis, goal, flags)
+    around, bend = two_turns(first, second, last, aim, flags, sign)
+    end = _last((first, second, last), bend, first_axis, goal, flags, sign)
     aligned = np.asarray(_distance(aim, first, bend) < FREE)
     if not aligned.any():
         return around, bend, end
@@ -98,7 +100,7 @@ def wrist_turns(
 def _distance(aim: VectorEntries, axis: Floats, bend: Turn | Opposed) -> Array:
     """Return how far the unit vector `aim` is from an axis: the sine of a square wrist's bend."""
     if isinstance(bend, Opposed):
-        return bend.turn[1]
+        return np.abs(bend.turn[1])
     away = across(aim, axis)
     return np.asarray(np.sqrt(dot(away, away)))
 
@@ -111,11 +113,12 @@ def _replaced(value: Turn | Mirrored, where: Flags, turn: Turn) -> Turn | Mirror
 
 
 def _last(
-    directions: Directions,
+    directions: tuple[Floats, Floats, Floats],
     bend: Turn | Opposed,
     first_axis: VectorEntries,
     goal: Displacement,
     flags: DegeneracyFlags,
+    sign: float,
 ) -> Turn | Mirrored:
     """Return the turn about the last axis: it brings the tool's view of the first axis to where it must be.
 
@@ -125,9 +128,11 @@ def _last(
         first_axis: Where the first axis points.
         goal: The displacement of the tool.
         flags: Right after the turns about the first two, so that their choice is its last.
+        sign: Of the sine of the first solution's bend.
     """
     first, second, last = directions
     if square_wrist(first, second, last):
+        second = second if sign > 0.0 else (-second[0], -second[1], -second[2])
         side = goal.direction(across_floats(last, second))
         seen = dot(side, first_axis), dot(goal.direction(second), first_axis)
         return flags.mirrored(unit(seen, flags))
@@ -146,10 +151,10 @@ class SphericalWrist:
 
     def __call__(self, goal: Displacement, flags: DegeneracyFlags) -> Sequence[Value]:
         """Return the joints: choices of the positioning structure, then wrist."""
-        four, five, six = (axis.direction for axis in self.axes)
+        four, five, six = self.axes
         values = self.structure.solve(self.center, goal.point(self.center), flags)
         turns = _turns(self.structure.axes, values)
-        axis_four: VectorEntries = four
+        axis_four: VectorEntries = four.direction
         for direction, turn in reversed(turns):
             axis_four = turned(axis_four, direction, turn)
         back = partial(_back, turns)
@@ -159,7 +164,7 @@ class SphericalWrist:
 def match(arm: AxisGeometry) -> IkMethod | None:
     """Return the method where the arm has six joints, a spherical wrist and a positioning structure."""
     for backwards in (False, True):
-        solver = _solver(reversed_arm(arm) if backwards else arm)
+        solver = _solver(reversed_arm(arm) if backwards else arm, from_base=not backwards)
         if solver is None:
             continue
         structure = solver.structure
@@ -181,10 +186,13 @@ def reversed_arm(arm: AxisGeometry) -> AxisGeometry:
     return replace(arm, axes=tuple(axis.opposite for axis in reversed(arm.axes)))
 
 
-def _solver(arm: AxisGeometry) -> SphericalWrist | None:
+def _solver(arm: AxisGeometry, *, from_base: bool) -> SphericalWrist | None:
     if len(arm.axes) != 6 or arm.kinds[3:] != "RRR":
         return None
-    center, structure = common_point(arm.axes[3:], arm.length), positioning_structure(arm)
+    center, structure = (
+        common_point(arm.axes[3:], arm.length),
+        positioning_structure(arm, from_base=from_base),
+    )
     if center is None or structure is None:
         return None
     return SphericalWrist(structure, arm.axes[3:], center)

@@ -271,24 +271,30 @@ def levels(
 
 
 def two_turns(
-    first: Floats, second: Floats, vector: Floats, aim: VectorEntries, flags: DegeneracyFlags
+    first: Floats,
+    second: Floats,
+    vector: Floats,
+    aim: VectorEntries,
+    flags: DegeneracyFlags,
+    sign: float = 1.0,
 ) -> tuple[Turn | Mirrored, Turn | Opposed]:
     """Return the turns about `first`, and those about `second` before, that bring `vector` to `aim`.
 
     Two solutions; all are unit vectors. In the first one `vector` stands on the positive side of the plane of
-    both axes: second . (first x vector) >= 0. Where the axes are at right angles, and the vector to the
-    second one, the sine is found from the aim's distance to the first axis and keeps all its digits near 0
-    and pi.
+    both axes: sign * second . (first x vector) >= 0. Where the axes are at right angles, and the vector to
+    the second one, the sine is found from the aim's distance to the first axis and keeps all its digits near
+    0 and pi.
     """
     if not square_wrist(first, second, vector):
-        turn, _ = levels(second, vector, first, dot(first, aim), flags)
+        turn, _ = levels(second, vector, first, dot(first, aim), flags, sign=sign)
         return unit(onto(first, turned(vector, second, turn), aim), flags, FREE), turn
     side = across_floats(second, first)
     turn = dot(side, aim), dot(second, aim)
     sine = length(turn)
     flags.choices += 1
-    around = flags.mirrored(_divided(turn, sine, flags))
-    bend = Opposed(flags.mirrored((dot(first, aim), sine)).turn)
+    signed = (product(sign, turn[0]), product(sign, turn[1])) if sign < 0.0 else turn
+    around = flags.mirrored(_divided(signed, sine, flags))
+    bend = Opposed(flags.mirrored((dot(first, aim), sign * sine)).turn)
     if dot(vector, side) == 0.0 and dot(vector, first) == 1.0:
         return around, bend
     return around, added(bend.both(), (dot(vector, first), dot(vector, side)), -1.0)

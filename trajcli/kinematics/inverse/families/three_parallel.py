@@ -79,7 +79,7 @@ class ThreeParallel:
         first = shoulder_turn(one, axis, self.point, target, flags, sign)
         total, after = self._sum(goal, first, flags)
         aim = minus(before_turn(one, target, first), turned(minus(self.point, four.point), axis, total))
-        up = across_floats(one.direction, axis)
+        up = across_floats(self.arm.upward, axis)
         second, third = parallel_pair(two, three, four.point, aim, flags, up)
         rest = added(added(total, second, -1.0), third, -same_direction(two, three))
         fourth = rest[0], product(same_direction(two, four), rest[1])
@@ -91,9 +91,9 @@ class ThreeParallel:
         axis = two.direction
         seen = turned(axis, one.direction, first)
         if len(self.arm.axes) == 6:
-            five = self.arm.axes[4].direction
+            five = self.arm.axes[4]
             back = partial(turned_back, axis=one.direction, turn=first)
-            total, fifth, sixth = wrist_turns((axis, five, last.direction), back, seen, goal, flags)
+            total, fifth, sixth = wrist_turns((two, five, last), back, seen, goal, flags)
             return total.both() if isinstance(total, Mirrored) else total, [fifth, sixth]
         marker = last.direction if len(self.arm.axes) == 5 else across_floats(one.direction, axis)
         aim = turned_back(goal.direction(marker), one.direction, first)
