@@ -33,7 +33,19 @@ The column *unit* says what a plain number measures: `angle` and `length` are th
 always in seconds."""
 
 _STATES = """\
-A state is the name of a point, or a mapping. What it leaves out is zero."""
+A state is the name of a point, a mapping, or [relative to a point](#relative-points). What it leaves out
+is zero."""
+
+_RELATIVE = """\
+`{from: pick, offset: {xyz: [0, 0, -100]}}` is the pose of the point `pick`, displaced by the pose `offset`.
+With `frame: tool` (the default) the offset is along and about the axes that the tool has in that point,
+T_point T_offset: for a tool that looks down, negative z is above. With `frame: world` it is along and about
+the axes of world: the position is moved by `xyz`, the orientation turned about the tcp.
+
+The point is given as a pose, or relative to another point; not by its joints. Its `configuration` holds,
+too, if none stands beside `from`. A point without a whole orientation can only be displaced, with
+`frame: world`. `velocity` and `acceleration`, and in a [waypoint](#waypoints) `time` and `blend`, stand
+beside `from`."""
 
 _VALUES = """\
 A value for each joint has one of three forms: one value that holds for all joints, a list with one
@@ -69,12 +81,14 @@ sign q for a prismatic one."""
 
 _POSES = f"""\
 A pose is a mapping with a position `xyz: [x, y, z]` and at most one orientation; what it leaves out is
-zero.
+zero. Poses of points, targets, `tool` and `base` are read alike.
 
 | key | orientation |
 |---|---|
 | `rpy` | `[about x, about y, about z]`, fixed axes: R = Rz Ry Rx |
 | `quat_wxyz` | unit quaternion, w first |
+| `quat_xyzw` | unit quaternion, w last: the order of ROS and scipy |
+| `rotvec` | axis times angle, `[rx, ry, rz]` as a UR pendant shows them |
 | `matrix` | 3x3, or 4x4 with the position inside |
 | `axis_angle` | `{{axis: x, y, z or [x, y, z], angle}}` |
 | `euler` | `{{sequence, angles, frame}}`: three angles about `current` axes (the default) or `fixed` ones |
@@ -147,6 +161,7 @@ def job_reference() -> str:
     parts += ["## Job", field_table(Job, {"points": "none"})]
     parts += ["## Units", field_table(UnitsSpec), *_strings_with_units()]
     parts += ["## States", _STATES, field_table(Target, {"joints": "see the planner"}), _POSE_TARGETS]
+    parts += ["### Relative points", _RELATIVE]
     parts += ["### Axis and angle", field_table(AxisAngleSpec), "### Euler angles", field_table(EulerSpec)]
     parts += ["### Configuration", _CONFIGURATION, field_table(Configuration)]
     parts += ["### Waypoints", _WAYPOINTS, field_table(Waypoint, {"joints": "a pose instead"})]

@@ -9,6 +9,8 @@ import yaml
 
 from trajcli.errors import InputError, Problem
 from trajcli.job.read import job_from_text
+from trajcli.planners import ALSO_CALLED, PLANNERS
+from trajcli.planning.plan import plan_job
 
 JOB = """\
 version: 1
@@ -124,3 +126,53 @@ def test_all_limits_that_moves_loosen_come_at_once() -> None:
         (10, "null", 1, "j3"),
         (10, "null", 1, "j4"),
     ]
+
+
+@pytest.mark.parametrize(
+    ("word", "planner"),
+    [
+        *(("PTP", "jerk_limited"), ("LIN", "line"), ("CIRC", "arc"), ("movej", "jerk_limited")),
+        *(("MoveL", "line"), ("movec", "arc"), ("lspb", "trapezoid"), ("minimum_jerk", "quintic")),
+        *(("ruckig", "jerk_limited"), ("toppra", "time_optimal")),
+    ],
+)
+def test_words_of_other_programs_name_the_planner_and_all_are_listed(word: str, planner: str) -> None:
+    hint = problems_of(changed("planner: quintic", f"planner: {word}"))[0].hint or ""
+    assert f"write `planner: {planner}`" in hint
+    assert all(f" {name}" in hint for name in PLANNERS)
+
+
+def test_other_names_lead_to_planners() -> None:
+    assert set(ALSO_CALLED.values()) <= set(PLANNERS)
+    assert not set(ALSO_CALLED) & set(PLANNERS)
+
+
+LINE = """version: 1
+units: {angle: deg, length: mm}
+robot: ur5e
+start: {xyz: [400, 100, 250], rpy: [180, 0, 0]}
+moves:
+  - {planner: line, to: {xyz: [450, 100, 250]}, WORDS}
+"""
+
+
+@pytest.mark.parametrize(
+    ("words", "law"),
+    [
+        ("duration: 3", "law: {shape: quintic, duration: 3}"),
+        ("time: 3 s", "law: {shape: quintic, duration: 3 s}"),
+        ("shape: cubic, duration: 3", "law: {shape: cubic, duration: 3}"),
+        ("speed: 50 mm/s, acceleration: 100", "law: {speed: 50 mm/s, acceleration: 100}"),
+        ("velocity: 50, acceleration: 100", "law: {speed: 50, acceleration: 100}"),
+        ("duration: 3, law: {shape: quintic}", "law: {shape: quintic, duration: 3}"),
+    ],
+)
+def test_fields_of_the_law_beside_it_are_shown_where_they_stand(words: str, law: str) -> None:
+    problems = problems_of(LINE.replace("WORDS", words))
+    assert all(law in (problem.hint or "") for problem in problems)
+    assert not plan_job(job_from_text(LINE.replace("WORDS", law))).verdict.findings
+
+
+def test_a_radius_belongs_to_a_path() -> None:
+    problem = problems_of(LINE.replace("WORDS", "radius: 10"))[0]
+    assert "corner: round, radius: " in (problem.hint or "")

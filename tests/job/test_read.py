@@ -218,6 +218,8 @@ POSES = [  # the same pose in every form
     "{xyz: [1, 2, 3], rpy: [0, 0, 90]}",
     f"{{xyz: [1, 2, 3], quat_wxyz: [{QUARTER}, 0, 0, {QUARTER}]}}",
     f"{{xyz: [1, 2, 3], quat_wxyz: [-{QUARTER}, 0, 0, -{QUARTER}]}}",
+    f"{{xyz: [1, 2, 3], quat_xyzw: [0, 0, {QUARTER}, {QUARTER}]}}",
+    "{xyz: [1, 2, 3], rotvec: [0, 0, 90]}",
     "{xyz: [1, 2, 3], matrix: [[0, -1, 0], [1, 0, 0], [0, 0, 1]]}",
     "{matrix: [[0, -1, 0, 1], [1, 0, 0, 2 mm], [0, 0, 1, 3], [0, 0, 0, 1]]}",
     "{xyz: [1, 2, 0.3 cm], axis_angle: {axis: z, angle: 90}}",

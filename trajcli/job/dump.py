@@ -28,11 +28,11 @@ _INVISIBLE = ("Cc", "Cf", "Zl", "Zp", "Cn", "Co")
 def dump_job(loaded: LoadedJob) -> str:
     """Return a job as YAML that reads as the same job: robot and limits in force, points, moves, output.
 
-    Limits and tool of the job have become the robot's, and overrides are part of what they changed.
+    Limits, base and tool of the job have become the robot's, and overrides are part of what they changed.
     """
     robot, job = loaded.robot, loaded.job
     context = ReadingContext(loaded.units, robot.joint_names, robot.joint_types)
-    written = job.model_dump(context=context, exclude={"robot", "tool", "limits"}, exclude_none=True)
+    written = job.model_dump(context=context, exclude={"robot", "base", "tool", "limits"}, exclude_none=True)
     moves = [{"planner": move.pop("planner"), **move} for move in written["moves"]]
     ordered = {
         "version": job.version,

@@ -12,7 +12,7 @@ from pydantic_core import ErrorDetails
 from trajcli.errors import Problem
 from trajcli.job.yaml.load import Document
 from trajcli.language.numbers import AT_KEY, FieldPath, Flaw, shown
-from trajcli.planners import PLANNERS
+from trajcli.planners import ALSO_CALLED, PLANNERS
 from trajcli.suggest import did_you_mean, valid_names
 
 _KINDS = {
@@ -26,6 +26,24 @@ _KINDS = {
     "string_type": "a text",
     "tuple_type": "a list",
 }
+
+_LAW_FIELDS = {
+    "shape": "shape",
+    "duration": "duration",
+    "time": "duration",
+    "minimum_duration": "minimum_duration",
+    "speed": "speed",
+    "velocity": "speed",
+    "vel": "speed",
+    "acceleration": "acceleration",
+    "acc": "acceleration",
+    "deceleration": "deceleration",
+    "jerk": "jerk",
+    "angular_speed": "angular_speed",
+    "angular_acceleration": "angular_acceleration",
+}
+"""Words that stand beside `to` in other programs, with the field of the law that is meant."""
+_NEEDS_NO_LIMIT = "quintic"  # the shape of a law that a duration is enough for
 
 
 def problems_of(
@@ -58,7 +76,9 @@ def _flaws(
         return [_flaw((*path, *below), text, hint) for below, text, hint in flaws]
     if kind == "extra_forbidden":
         names = _field_names(model, loc[:-1])
-        known = did_you_mean(str(path[-1]), names) or valid_names(names)
+        known = (
+            _other_place(path, names, document) or did_you_mean(str(path[-1]), names) or valid_names(names)
+        )
         return [(path, f"unknown key '{path[-1]}'", known, True)]
     if kind == "missing":
         field = _model_at(model, loc[:-1]).model_fields[str(loc[-1])]
@@ -79,13 +99,47 @@ def _flaw(path: FieldPath, text: str, hint: str | None) -> tuple[FieldPath, str,
 def _unknown_planner(move: object) -> tuple[str, str | None]:
     tag = move.get("planner") if isinstance(move, Mapping) else move
     if not isinstance(tag, str):
-        return f"expected a planner's name, got {shown(tag)}", valid_names(PLANNERS)
-    return f"unknown planner '{tag}'", did_you_mean(tag, PLANNERS) or valid_names(PLANNERS)
+        return f"expected a planner's name, got {shown(tag)}", _every_planner()
+    meant = ALSO_CALLED.get(tag.strip().casefold().replace("-", "_").replace(" ", "_"))
+    own = f"write `planner: {meant}`" if meant else did_you_mean(tag, PLANNERS)
+    return f"unknown planner '{tag}'", f"{own} ({_every_planner()})" if own else _every_planner()
+
+
+def _every_planner() -> str:
+    return f"planners: {', '.join(PLANNERS)}"
+
+
+def _other_place(path: FieldPath, names: list[str], document: Document) -> str | None:
+    """Return where a key of a move along a path stands instead, with the text to write."""
+    move, key = document.node(path[:-1]), str(path[-1])
+    if "law" not in names or move is None or not isinstance(move.value, dict):
+        return None
+    if key == "radius":
+        return (
+            "corners are rounded in a path: "
+            "{planner: path, segments: [{line: ...}, {line: ...}], corner: round, radius: ...}"
+        )
+    if _LAW_FIELDS.get(key) is None:
+        return None
+    law = move.child("law")
+    parts = dict(law.value) if law is not None and isinstance(law.value, dict) else {}
+    parts |= {
+        field: move.value[name]
+        for name, field in _LAW_FIELDS.items()
+        if name in move.value and field not in parts
+    }
+    texts = {name: node.text for name, node in parts.items()}
+    if "shape" not in texts and texts.keys() <= {"duration"} and document.node(("limits", "tcp")) is None:
+        texts = {"shape": _NEEDS_NO_LIMIT, **texts}
+    if not all(texts.values()):
+        return f"`{_LAW_FIELDS[key]}` stands under `law`"
+    written = ", ".join(f"{name}: {text}" for name, text in texts.items())
+    return f"`{_LAW_FIELDS[key]}` stands under `law`: write `law: {{{written}}}`"
 
 
 def _text(kind: str, context: Mapping[str, Any], value: object) -> tuple[str, str | None]:
     if kind == "union_tag_not_found":
-        return "a move needs `planner`", valid_names(PLANNERS)
+        return "a move needs `planner`", _every_planner()
     if kind == "literal_error":
         names = [word.strip().strip("'") for word in context["expected"].replace(" or ", ", ").split(",")]
         quoted = isinstance(value, str) and value in names  # "1" where 1 is meant

@@ -35,14 +35,16 @@ from trajcli.language.numbers import (
     refuse,
     shown,
 )
+from trajcli.language.points import NamedTarget
 from trajcli.language.poses import Pose
-from trajcli.language.targets import NamedTarget
 from trajcli.planners import PLANNERS, Planner, moves_adapter
 from trajcli.planners.planner import WhenOverLimit
 from trajcli.units import Quantity, Units
 
 ROBOT_DEFINITION = "a robot"
 """Stands in a schema for the definition of a robot, which comes from another model."""
+CATALOGUE_NAME = "a name of the catalogue"
+"""Stands in a schema for the names of the robots that come with trajcli."""
 
 
 class UnitsSpec(Model):
@@ -72,7 +74,7 @@ class RobotSource(FieldType):
         """Return the schema of the three forms."""
         file = {"type": "object", "properties": {"file": {"type": "string"}}, "required": ["file"]}
         inline = {"$comment": ROBOT_DEFINITION}
-        return {"anyOf": [{"type": "string"}, {**file, "additionalProperties": False}, inline]}
+        return {"anyOf": [{"$comment": CATALOGUE_NAME}, {**file, "additionalProperties": False}, inline]}
 
 
 Seconds = Annotated[float, Number(Quantity("time"), "Time, s.")]
@@ -152,6 +154,12 @@ class Job(Model):
     units: UnitsSpec = UnitsSpec()
     robot: Annotated[Robot, RobotSource()]
     tool: Annotated[np.ndarray, Pose("T_flange_tcp, instead of the robot's own.")] | None = None
+    base: (
+        Annotated[
+            np.ndarray, Pose("T_world_base, instead of the robot's own: a pedestal, a ceiling, a table.")
+        ]
+        | None
+    ) = None
     limits: Annotated[LimitsSpec | None, Field(description="Replaces the robot's limits, then scales.")] = (
         None
     )

@@ -113,8 +113,8 @@ def _load(document: Document) -> LoadedJob:
         problems += problems_of(error, Job, document)
     if problems or robot is None:
         raise InputError(*sorted(problems, key=_position))
-    tooled = robot if job.tool is None else replace(robot, tool=job.tool)
-    effective, events = with_job_limits(tooled, job.limits)
+    mounted = {key: pose for key in ("base", "tool") if (pose := getattr(job, key)) is not None}
+    effective, events = with_job_limits(replace(robot, **mounted), job.limits)
     name = job.name or ("stdin" if document.file in ("-", "<stdin>") else Path(document.file).stem)
     loaded = LoadedJob(job, name, effective, document, tuple(events))
     flaws = [*_loosened_by_moves(loaded), *_loosened_tool_limits(loaded), *_columns_without_geometry(loaded)]

@@ -22,15 +22,48 @@ def schema_of(kind: SchemaKind) -> dict[str, Any]:
 
 
 def _job() -> dict[str, Any]:
-    from trajcli.job.model import ROBOT_DEFINITION, Job
+    from trajcli.job.model import CATALOGUE_NAME, ROBOT_DEFINITION, Job
+    from trajcli.job.robot import catalogue_names
+    from trajcli.language.points import RELATIVE_DEFINITION
 
-    reference = {"$ref": "#/$defs/RobotModel"}
-    own = _without_nulls(Job.model_json_schema())
-    schema: dict[str, Any] = _replaced(own, {"$comment": ROBOT_DEFINITION}, reference)
+    schema: dict[str, Any] = _without_nulls(Job.model_json_schema())
     robot = _robot()
-    definitions = robot.pop("$defs", {})
-    schema["$defs"] = dict(sorted({**schema["$defs"], **definitions, "RobotModel": robot}.items()))
+    definitions = {**schema["$defs"], **robot.pop("$defs", {}), "RobotModel": robot}
+    stand_ins: dict[str, dict[str, Any]] = {
+        ROBOT_DEFINITION: {"$ref": "#/$defs/RobotModel"},
+        CATALOGUE_NAME: {"enum": catalogue_names(), "description": "A robot of the catalogue."},
+    }
+    for name in ("Target", "Waypoint"):
+        stand_ins[RELATIVE_DEFINITION + name] = {"$ref": f"#/$defs/Relative{name}"}
+        definitions[f"Relative{name}"] = _relative(definitions[name])
+    schema["$defs"] = dict(sorted((name, _described(node)) for name, node in definitions.items()))
+    for comment, instead in stand_ins.items():
+        schema = _replaced(schema, {"$comment": comment}, instead)
     return schema
+
+
+def _relative(state: dict[str, Any]) -> dict[str, Any]:
+    """Return the schema of a state that is given relative to a point."""
+    from trajcli.language.points import BESIDE, RELATIVE_FIELDS
+
+    beside = {key: state["properties"][key] for key in BESIDE if key in state["properties"]}
+    return {
+        "type": "object",
+        "description": "A state whose pose is that of a point, displaced: such as 100 mm above it.",
+        "properties": {**RELATIVE_FIELDS, **beside},
+        "required": ["from"],
+        "additionalProperties": False,
+    }
+
+
+def _described(definition: dict[str, Any]) -> dict[str, Any]:
+    """Return the definition of a move with its description at `planner`, where an editor shows it."""
+    properties = definition.get("properties", {})
+    planner = properties.get("planner", {})
+    if "const" not in planner:
+        return definition
+    text = " ".join(definition["description"].split("\n\n")[0].split())
+    return {**definition, "properties": {**properties, "planner": {**planner, "description": text}}}
 
 
 def _robot() -> dict[str, Any]:

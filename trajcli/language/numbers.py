@@ -52,6 +52,7 @@ class ReadingContext:
             values by joint are then checked for form only.
         joint_types: "revolute" or "prismatic" for each joint.
         points: The file's named points, as plain mappings.
+        shifted: Relative points that were resolved, by name: their fields as in a file.
         read_points: Reads a file of recorded joint values, its path relative to the job; raises FlawError.
     """
 
@@ -59,6 +60,7 @@ class ReadingContext:
     joint_names: tuple[str, ...] | None = None
     joint_types: tuple[str, ...] = ()
     points: Mapping[str, Any] = field(default_factory=dict)
+    shifted: dict[str, dict[str, Any]] = field(default_factory=dict)
     read_points: Callable[[str], Recorded] | None = None
 
     def joint_quantity(self, joint: int, order: int) -> Quantity:

@@ -23,7 +23,8 @@ from trajcli.language.numbers import (
 from trajcli.units import Quantity
 
 SEQUENCES = ("XYX", "XYZ", "XZX", "XZY", "YXY", "YXZ", "YZX", "YZY", "ZXY", "ZXZ", "ZYX", "ZYZ")
-_ROTATIONS = ("rpy", "quat_wxyz", "matrix", "axis_angle", "euler")
+ROTATIONS = ("rpy", "quat_wxyz", "quat_xyzw", "rotvec", "matrix", "axis_angle", "euler")
+"""The forms of a full orientation."""
 _ROUNDING = 1e-14  # a rotation written with all its digits stays as it stands, bit by bit
 _ANGLE, _LENGTH, _RATIO = Quantity("angle"), Quantity("length"), Quantity("ratio")
 
@@ -40,15 +41,15 @@ class Pose(FieldType):
             return value
         if not isinstance(value, Mapping):
             raise FlawError(f"expected a pose such as {{xyz: [0, 0, 0], rpy: [0, 0, 0]}}, got {shown(value)}")
-        unknown = [key for key in value if key not in ("xyz", *_ROTATIONS)]
+        unknown = [key for key in value if key not in ("xyz", *ROTATIONS)]
         if unknown:
             raise FlawError(
                 f"unknown key '{unknown[0]}'",
                 unknown[0],
                 AT_KEY,
-                hint=f"a pose has xyz, {', '.join(_ROTATIONS)}",
+                hint=f"a pose has xyz, {', '.join(ROTATIONS)}",
             )
-        given = [key for key in _ROTATIONS if key in value]
+        given = [key for key in ROTATIONS if key in value]
         if len(given) > 1:
             raise FlawError(
                 f"{given[0]} and {given[1]} exclude each other", given[1], hint="leave one of them out"
@@ -81,6 +82,11 @@ class Pose(FieldType):
                 "description": "Angles about the fixed axes x, y, z: R = Rz Ry Rx (angle unit).",
             },
             "quat_wxyz": {**numbers(4), "description": "Unit quaternion, w first."},
+            "quat_xyzw": {**numbers(4), "description": "Unit quaternion, w last (ROS, scipy)."},
+            "rotvec": {
+                **numbers(3),
+                "description": "Axis times angle, as rx, ry, rz of a UR pendant (angle unit).",
+            },
             "matrix": {
                 **rows,
                 "minItems": 3,
@@ -188,6 +194,21 @@ def _quaternion(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401
     return matrix_from_quaternion(numbers / np.linalg.norm(numbers))
 
 
+def _quaternion_w_last(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401
+    numbers = read_numbers(value, 4, _RATIO, context).tolist()
+    try:
+        return _quaternion([numbers[3], *numbers[:3]], context)
+    except InputError as error:
+        hint = "divide it by its length" if any(numbers) else "no rotation is (0, 0, 0, 1)"
+        raise FlawError(str(error), hint=hint) from None
+
+
+def _rotation_vector(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401
+    from trajcli.geometry.rotation import exp
+
+    return exp(read_numbers(value, 3, _ANGLE, context))
+
+
 def _axis_angle(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401
     from trajcli.geometry.rotation import matrix_from_axis_angle
 
@@ -246,6 +267,8 @@ def _exactly(value: Any, needed: tuple[str, ...], optional: tuple[str, ...]) -> 
 _READERS = {
     "rpy": _rpy,
     "quat_wxyz": _quaternion,
+    "quat_xyzw": _quaternion_w_last,
+    "rotvec": _rotation_vector,
     "matrix": _matrix,
     "axis_angle": _axis_angle,
     "euler": _euler,

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import (
     Field,
-    GetCoreSchemaHandler,
-    GetJsonSchemaHandler,
-    ValidationError,
     model_validator,
 )
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema, core_schema
 
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import comparable
@@ -31,8 +27,7 @@ from trajcli.language.numbers import (
     written_number,
 )
 from trajcli.language.per_joint import PerJoint
-from trajcli.language.poses import Pose, read_numbers
-from trajcli.suggest import did_you_mean, valid_names
+from trajcli.language.poses import ROTATIONS, Pose, read_numbers
 from trajcli.trajectory import State
 from trajcli.units import Quantity
 
@@ -40,9 +35,8 @@ if TYPE_CHECKING:
     from trajcli.kinematics.inverse.target import IkTarget
 
 _ANGLE, _LENGTH, _RATIO = Quantity("angle"), Quantity("length"), Quantity("ratio")
-_ROTATIONS = ("rpy", "quat_wxyz", "matrix", "axis_angle", "euler")
 _UPRIGHT = 1e-9  # rad: a pitch this close to a quarter turn is one
-_AIMS = ("yaw", "pitch", "direction")
+AIMS = ("yaw", "pitch", "direction")
 _NUMBER: JsonSchemaValue = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": "^[-+.0-9]"}]}
 
 AxisName = Literal["x", "y", "z"]
@@ -173,6 +167,11 @@ class PoseFields(Model):
         Annotated[Row, Numbers(3, _ANGLE, "Angles about fixed x, y, z: R = Rz Ry Rx (angle unit).")] | None
     ) = None
     quat_wxyz: Annotated[Row, Numbers(4, _RATIO, "Unit quaternion, w first.")] | None = None
+    quat_xyzw: Annotated[Row, Numbers(4, _RATIO, "Unit quaternion, w last (ROS, scipy).")] | None = None
+    rotvec: (
+        Annotated[Row, Numbers(3, _ANGLE, "Axis times angle, as rx, ry, rz of a UR pendant (angle unit).")]
+        | None
+    ) = None
     matrix: (
         Annotated[tuple[Row, ...], Matrix("Rotation 3x3, or homogeneous 4x4 with the position.")] | None
     ) = None
@@ -191,7 +190,7 @@ class PoseFields(Model):
 
     @model_validator(mode="after")
     def _is_one_pose(self) -> PoseFields:
-        given = [key for key in (*_ROTATIONS, *_AIMS) if getattr(self, key) is not None]
+        given = [key for key in (*ROTATIONS, *AIMS) if getattr(self, key) is not None]
         if len(given) > 1:
             text = f"{given[0]} and {given[1]} exclude each other"
             raise refuse([((given[1],), text, "leave one of them out")])
@@ -199,7 +198,7 @@ class PoseFields(Model):
             raise refuse(
                 [(("xyz",), "a 4x4 matrix already has a position", "leave xyz out, or give a 3x3 matrix")]
             )
-        if given and given[0] in _ROTATIONS:
+        if given and given[0] in ROTATIONS:
             try:
                 self.full_pose()
             except FlawError as error:
@@ -212,7 +211,7 @@ class PoseFields(Model):
     @property
     def pose_keys(self) -> tuple[str, ...]:
         """The keys of a pose that are given."""
-        return tuple(key for key in ("xyz", *_ROTATIONS, *_AIMS) if getattr(self, key) is not None)
+        return tuple(key for key in ("xyz", *ROTATIONS, *AIMS) if getattr(self, key) is not None)
 
     @property
     def gives_pose(self) -> bool:
@@ -222,7 +221,7 @@ class PoseFields(Model):
     @property
     def rotation_form(self) -> str | None:
         """The key that gives a full orientation, if one does."""
-        return next((key for key in _ROTATIONS if getattr(self, key) is not None), None)
+        return next((key for key in ROTATIONS if getattr(self, key) is not None), None)
 
     @property
     def gives_position(self) -> bool:
@@ -300,60 +299,6 @@ class Target(PoseFields, defer_build=False):  # made once, not for each planner 
         return State(
             np.array(self.joints), np.array(self.velocity or zero), np.array(self.acceleration or zero)
         )
-
-
-class Named:
-    """Lets the name of a point stand for the point."""
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
-        return core_schema.with_info_wrap_validator_function(self._read, handler(source))
-
-    @staticmethod
-    def _read(
-        value: Any,  # noqa: ANN401
-        validate: core_schema.ValidatorFunctionWrapHandler,
-        info: core_schema.ValidationInfo,
-    ) -> Any:  # noqa: ANN401
-        if not isinstance(value, str):
-            if not isinstance(value, Mapping | Target):
-                hint = "write {joints: ...}, or the name of a point"
-                raise refuse([((), f"expected a state, got {shown(value)}", hint)])
-            return validate(value)
-        state = _look_up(value, (info.context or SI).points)
-        try:
-            return validate(state)
-        except ValidationError:
-            raise refuse([]) from None  # the flaw is the point's, and is reported where the point stands
-
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        name = {"type": "string", "description": "Name of a point under `points`."}
-        return {"anyOf": [name, handler(schema)]}
-
-
-def _look_up(name: str, points: Mapping[str, Any]) -> Any:  # noqa: ANN401
-    """Return the state that a point's name stands for; the point may itself be the name of another."""
-    state, seen = name, [name]
-    while state in points:
-        state = points[state]
-        if not isinstance(state, str):
-            return state
-        if state in seen:
-            raise refuse(
-                [((), f"the point '{state}' is named by itself ({' -> '.join([*seen, state])})", None)]
-            )
-        seen.append(state)
-    if len(seen) > 1:
-        raise refuse([])  # reported where the point that names it stands
-    raise refuse([((), f"there is no point '{name}'", _known(name, points))])
-
-
-def _known(name: str, points: Mapping[str, Any]) -> str:
-    return did_you_mean(name, points) or valid_names(points, "points") or "the job has no `points`"
-
-
-NamedTarget = Annotated[Target, Named()]
 
 
 def ik_target(fields: PoseFields) -> IkTarget:

@@ -20,9 +20,10 @@ from trajcli.language.numbers import (
     shown,
 )
 from trajcli.language.per_joint import JointDistance, PerJoint
+from trajcli.language.points import Named
 from trajcli.language.poses import read_numbers
 from trajcli.language.recorded import Recorded
-from trajcli.language.targets import Named, Target
+from trajcli.language.targets import Target
 from trajcli.units import Quantity
 
 _TIME = Quantity("time")
@@ -48,7 +49,7 @@ class Waypoint(Target):
         return self
 
 
-NamedWaypoint = Annotated[Waypoint, Named()]
+NamedWaypoint = Annotated[Waypoint, Named("Waypoint")]
 
 
 class PointsField:

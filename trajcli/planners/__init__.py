@@ -33,6 +33,40 @@ _WHERE = {
 }
 """The module and class of each planner, by its name in job files."""
 
+ALSO_CALLED = {
+    "ptp": "jerk_limited",
+    "movej": "jerk_limited",
+    "ruckig": "jerk_limited",
+    "otg": "jerk_limited",
+    "s_curve": "jerk_limited",
+    "scurve": "jerk_limited",
+    "lspb": "trapezoid",
+    "trapezoidal": "trapezoid",
+    "trap": "trapezoid",
+    "minimum_jerk": "quintic",
+    "min_jerk": "quintic",
+    "jtraj": "quintic",
+    "lin": "line",
+    "movel": "line",
+    "linear": "line",
+    "ctraj": "line",
+    "circ": "arc",
+    "movec": "arc",
+    "circle": "arc",
+    "circular": "arc",
+    "movep": "path",
+    "toppra": "time_optimal",
+    "topp": "time_optimal",
+    "topp_ra": "time_optimal",
+    "totg": "time_optimal",
+    "mstraj": "blends",
+    "wait": "hold",
+    "dwell": "hold",
+    "pause": "hold",
+    "sleep": "hold",
+}
+"""What other programs and books call what a planner does, in lower case."""
+
 
 class _Planners(Mapping[str, type[Planner]]):
     """Every planner by its name; one that is asked for is loaded."""
@@ -75,4 +109,4 @@ def moves_adapter(tags: Iterable[str]) -> TypeAdapter[list[Planner]]:
     return TypeAdapter(Annotated[list[Annotated[Planner, planner]], Field(min_length=1)])
 
 
-__all__ = ["PLANNERS", "Planner", "moves_adapter"]
+__all__ = ["ALSO_CALLED", "PLANNERS", "Planner", "moves_adapter"]

@@ -9,7 +9,8 @@ from pydantic import Field, model_validator
 from trajcli.curves.piecewise import Array
 from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import refuse
-from trajcli.language.targets import Duration, NamedTarget
+from trajcli.language.points import NamedTarget
+from trajcli.language.targets import Duration
 from trajcli.planners.boundary_states import standstill, start_in_motion
 from trajcli.planners.planner import Planned, Planner, Resolve
 from trajcli.trajectory import State

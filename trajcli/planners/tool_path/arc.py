@@ -19,7 +19,8 @@ from trajcli.geometry.paths.position import SAME_POINT, PositionCurve
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import Flaw, Model, Number, refuse
-from trajcli.language.targets import Direction, NamedTarget, Numbers, Row
+from trajcli.language.points import NamedTarget
+from trajcli.language.targets import Direction, Numbers, Row
 from trajcli.planners.planner import Event
 from trajcli.planners.tool_path.move import (
     PlannedPath,

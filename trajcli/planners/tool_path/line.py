@@ -18,7 +18,8 @@ from trajcli.geometry.paths.pose import PoseCurve, Screw
 from trajcli.geometry.paths.position import SAME_POINT, Line, Pivot
 from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import refuse
-from trajcli.language.targets import NamedTarget, Target
+from trajcli.language.points import NamedTarget
+from trajcli.language.targets import Target
 from trajcli.planners.tool_path.move import (
     PlannedPath,
     ToolPathMove,

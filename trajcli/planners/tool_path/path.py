@@ -32,7 +32,7 @@ from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.kinematics.following.tool_path import ToolPath, ToolReference
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.language.numbers import Flaw, Model, Number, refuse
-from trajcli.language.targets import NamedTarget
+from trajcli.language.points import NamedTarget
 from trajcli.planners.planner import Event
 from trajcli.planners.tool_path.arc import ArcFields, arc_of, arc_target, center_events
 from trajcli.planners.tool_path.law import (

@@ -1,0 +1,229 @@
+"""Points by name, and poses relative to a point: how they become the states that they stand for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationError
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, core_schema
+
+from trajcli.curves.piecewise import Array
+from trajcli.language.numbers import AT_KEY, SI, FlawError, ReadingContext, refuse, shown, written_number
+from trajcli.language.poses import Pose
+from trajcli.language.targets import AIMS, PoseFields, Target
+from trajcli.suggest import did_you_mean, valid_names
+from trajcli.units import Quantity
+
+RELATIVE_DEFINITION = "relative to "
+"""Begins a comment that stands in a schema for a state relative to a point; the name of its model ends it."""
+
+RELATIVE_FIELDS: dict[str, JsonSchemaValue] = {
+    "from": {"type": "string", "description": "Name of a point that is given as a pose."},
+    "offset": {**Pose("").json_schema(), "description": "How far from it; what it leaves out is zero."},
+    "frame": {
+        "enum": ["tool", "world"],
+        "default": "tool",
+        "description": "Whose axes the offset is along and about: those of the tool there, or of world.",
+    },
+}
+"""Schema of what makes a state relative to a point."""
+
+BESIDE = ("configuration", "velocity", "acceleration", "time", "blend")
+"""Fields of a state that may stand beside `from`."""
+_LONGEST_CHAIN = 100  # points, each relative to the next
+_Fields = dict[str, Any]
+
+
+class Named:
+    """Lets the name of a point, or an offset from one, stand for a state, of the model named `model`."""
+
+    def __init__(self, model: str = "Target") -> None:
+        self.model = model
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
+        return core_schema.with_info_wrap_validator_function(self._read, handler(source))
+
+    @staticmethod
+    def _read(
+        value: Any,  # noqa: ANN401
+        validate: core_schema.ValidatorFunctionWrapHandler,
+        info: core_schema.ValidationInfo,
+    ) -> Any:  # noqa: ANN401
+        context = info.context or SI
+        if isinstance(value, str):
+            return _of_name(value, validate, context)
+        if not isinstance(value, Mapping | Target):
+            hint = "write {joints: ...}, or the name of a point"
+            raise refuse([((), f"expected a state, got {shown(value)}", hint)])
+        if isinstance(value, Mapping) and "from" in value:
+            try:
+                value = _relative(value, context)
+            except FlawError as error:
+                raise refuse(error.flaws) from None
+        return validate(value)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        name = {"type": "string", "description": "Name of a point under `points`."}
+        return {"anyOf": [name, handler(schema), {"$comment": RELATIVE_DEFINITION + self.model}]}
+
+
+NamedTarget = Annotated[Target, Named()]
+
+
+def _of_name(name: str, validate: core_schema.ValidatorFunctionWrapHandler, context: ReadingContext) -> Any:  # noqa: ANN401
+    """Return the state that a name stands for; a flaw of the point is reported where the point stands."""
+    try:
+        names = _names_from(name, context)
+    except FlawError as error:
+        raise refuse(error.flaws) from None
+    state = context.points[names[-1]]
+    try:
+        if isinstance(state, Mapping) and "from" in state:
+            state = _of_point(names[-1], context)
+        return validate(state)
+    except (FlawError, ValidationError):
+        raise refuse([]) from None
+
+
+def _names_from(name: str, context: ReadingContext) -> list[str]:
+    """Return a name and the names that it stands for, the last one that of a state.
+
+    Raises:
+        FlawError: When there is no such point, or a point is named by itself.
+    """
+    points, names = context.points, [name]
+    if name not in points:
+        raise FlawError(f"there is no point '{name}'", hint=_known(name, points))
+    while isinstance(state := points[names[-1]], str):
+        if state in names:
+            raise FlawError(f"the point '{state}' is named by itself ({' -> '.join([*names, state])})")
+        if state not in points:
+            raise _flaw_elsewhere()
+        names.append(state)
+    return names
+
+
+def _known(name: str, points: Mapping[str, Any]) -> str:
+    return did_you_mean(name, points) or valid_names(points, "points") or "the job has no `points`"
+
+
+def _flaw_elsewhere() -> FlawError:
+    """Return the error about a flaw that is reported where the point stands."""
+    error = FlawError("a point is wrong")
+    error.flaws = []
+    return error
+
+
+def _relative(value: Mapping[str, Any], context: ReadingContext) -> _Fields:
+    """Return the fields of the state that is given relative to a point."""
+    return _moved(value, _of_point(_name_in(value, context), context), context)
+
+
+def _of_point(name: str, context: ReadingContext) -> _Fields:
+    """Return the fields of a point that may itself be relative to others, at most to a chain of 100."""
+    chain = [name]
+    while chain[-1] not in context.shifted and "from" in _mapping(chain[-1], context):
+        try:
+            following = _name_in(context.points[chain[-1]], context)
+        except FlawError:
+            raise _flaw_elsewhere() from None
+        if following in chain:
+            circle = " -> ".join([*chain[chain.index(following) :], following])
+            raise FlawError(f"the point '{following}' is relative to itself ({circle})", "from")
+        if len(chain) == _LONGEST_CHAIN:
+            text = f"more than {_LONGEST_CHAIN} points stand one relative to the next"
+            raise FlawError(text, "from", hint="give one of them as a pose of its own")
+        chain.append(following)
+    last = chain.pop()
+    fields: _Fields = context.shifted[last] if last in context.shifted else dict(_mapping(last, context))
+    for link in reversed(chain):
+        try:
+            fields = context.shifted[link] = _moved(context.points[link], fields, context)
+        except FlawError:
+            raise _flaw_elsewhere() from None
+    return fields
+
+
+def _mapping(name: str, context: ReadingContext) -> Mapping[str, Any]:
+    state = context.points[name]
+    if not isinstance(state, Mapping):
+        raise _flaw_elsewhere()
+    return state
+
+
+def _name_in(value: Mapping[str, Any], context: ReadingContext) -> str:
+    """Return the name of the point that a relative state starts from, at the end of all names for it."""
+    name = value["from"]
+    if not isinstance(name, str):
+        raise FlawError(f"expected the name of a point, got {shown(name)}", "from")
+    try:
+        return _names_from(name, context)[-1]
+    except FlawError as error:
+        error.flaws = [(("from", *path), text, hint) for path, text, hint in error.flaws]
+        raise
+
+
+def _moved(value: Mapping[str, Any], point: _Fields, context: ReadingContext) -> _Fields:
+    """Return the fields of a relative state whose point has the fields `point`."""
+    offset, frame = _offset(value, context), value.get("frame", "tool")
+    if frame not in ("tool", "world"):
+        raise FlawError(f"expected tool or world, got {shown(frame)}", "frame")
+    for key in value:
+        if (key in PoseFields.model_fields and key not in BESIDE) or key == "joints":
+            text = f"from and {key} exclude each other"
+            raise FlawError(text, key, AT_KEY, hint=f"say how far from the point: offset: {{{key}: ...}}")
+        if key not in (*RELATIVE_FIELDS, *BESIDE):
+            known = (*RELATIVE_FIELDS, *BESIDE[:3])
+            raise FlawError(
+                f"unknown key '{key}'", key, AT_KEY, hint=did_you_mean(key, known) or valid_names(known)
+            )
+    pose = _pose_of(value["from"], point, context)
+    fields = _displaced(value["from"], pose, offset, frame)
+    return {**fields, **{key: value[key] for key in value if key in BESIDE}}
+
+
+def _offset(value: Mapping[str, Any], context: ReadingContext) -> Array:
+    try:
+        return Pose("").read(value.get("offset", {}), context)
+    except FlawError as error:
+        error.flaws = [(("offset", *path), text, hint) for path, text, hint in error.flaws]
+        raise
+
+
+def _pose_of(name: str, point: _Fields, context: ReadingContext) -> PoseFields:
+    """Return the pose of a point, which is not given by its joints."""
+    given = {key: point[key] for key in PoseFields.model_fields if key in point}
+    if "joints" in point or not given:
+        by = "by its joints" if "joints" in point else "without a pose"
+        hint = "give it as a pose: `trajcli fk` prints that of joints"
+        raise FlawError(f"the point '{name}' is given {by}: nothing is relative to it", "from", hint=hint)
+    try:
+        return PoseFields.model_validate(given, context=context)
+    except ValidationError:
+        raise _flaw_elsewhere() from None
+
+
+def _displaced(name: str, pose: PoseFields, offset: Array, frame: str) -> _Fields:
+    """Return the fields of a pose after an offset: T @ offset, or in world p + d and R_offset R."""
+    whole, turns = pose.rotation_form is not None, not np.array_equal(offset[:3, :3], np.eye(3))
+    if not pose.gives_position:
+        raise FlawError(f"the point '{name}' has no position to be relative to", "from")
+    if not whole and (turns or frame == "tool"):
+        what = "the offset cannot turn it" if frame == "world" else "the frame of the tool is not known there"
+        hint = f"give '{name}' an orientation" + ("" if turns else ", or say `frame: world`")
+        raise FlawError(f"the point '{name}' has no whole orientation: {what}", "from", hint=hint)
+    at, turn = pose.full_pose(), offset[:3, :3]
+    position = at[:3, 3] + (at[:3, :3] @ offset[:3, 3] if frame == "tool" else offset[:3, 3])
+    fields = pose.model_dump(context=ReadingContext(), exclude_none=True, exclude={"xyz"})
+    if turns or pose.rotation_form == "matrix":
+        kept = fields.keys() - {pose.rotation_form, *AIMS}
+        rotation = np.array([row[:3] for row in pose.matrix[:3]]) if pose.matrix else at[:3, :3]
+        if turns:
+            rotation = at[:3, :3] @ turn if frame == "tool" else turn @ at[:3, :3]
+        fields = {**{key: fields[key] for key in kept}, "matrix": rotation.tolist()}
+    return {"xyz": [written_number(float(x), Quantity("length")) for x in position], **fields}
