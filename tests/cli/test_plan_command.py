@@ -144,6 +144,7 @@ def test_the_resolved_job(job: Path, capfd: Capture) -> None:
 WRONG_OPTIONS = [
     (("--no-output", "-o", "a.csv"), "--no-output and --output exclude each other"),
     (("-o", "a.mcap"), "rows are written as CSV, not as .mcap"),
+    (("-o", "a.txt"), "rows are written as CSV, not as .txt"),
     (("--report", "-"), "--report and the rows cannot both go to -"),
     (("-o", "a.csv", "--report", "./a.csv"), "--report and the rows cannot both go to ./a.csv"),
     (("--report", "a", "--resolved", "a"), "--resolved and --report cannot both go to a"),

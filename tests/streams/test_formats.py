@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 
@@ -15,12 +17,28 @@ COLUMNS = columns_of(("t", "q"), ("revolute", "prismatic"), Units("deg", "mm"))
 ROWS = np.arange(6.0).reshape(2, 3)
 
 
-@pytest.mark.parametrize("path", ["out.csv", "OUT.CSV", "out", "out.txt", "/dev/stdout", "a.json/out"])
-def test_rows_are_csv_where_a_name_promises_nothing_else(path):
+@pytest.mark.parametrize(
+    "path", ["out.csv", "OUT.CSV", "a.txt/o.csv", "-", "/dev/stdout", "/dev/null", "/dev/fd/63"]
+)
+def test_rows_are_csv_where_a_name_says_so_and_on_devices(path):
     assert format_of(path) is FORMATS[".csv"] is DEFAULT
 
 
-@pytest.mark.parametrize("ending", [".mcap", ".jsonl", ".json", ".yaml", ".YML", ".xlsx", ".parquet"])
+def test_a_pipe_needs_no_name(tmp_path):
+    os.mkfifo(tmp_path / "rows")
+    assert format_of(tmp_path / "rows") is DEFAULT
+
+
+def test_a_name_without_an_ending_is_refused(tmp_path):
+    with pytest.raises(
+        InputError, match=r"^rows are written as CSV, not to a file without an ending, 'out'$"
+    ):
+        format_of(tmp_path / "a.csv" / "out")
+
+
+@pytest.mark.parametrize(
+    "ending", [".mcap", ".jsonl", ".json", ".yaml", ".YML", ".xlsx", ".parquet", ".txt", ".cvs"]
+)
 def test_a_name_of_another_format_is_refused(ending, tmp_path):
     with pytest.raises(InputError) as caught:
         write_verified(tmp_path / f"out{ending}", [ROWS], COLUMNS)

@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 
 from trajcli.errors import TrajcliError
 
-INTERRUPTED, PIPE_CLOSED, BUG = 130, 141, 70
+FILE_FAILED, BUG, INTERRUPTED, PIPE_CLOSED = 4, 70, 130, 141
 
 
 def guarded(command: Callable[..., int]) -> Callable[..., NoReturn]:
@@ -23,6 +23,8 @@ def guarded(command: Callable[..., int]) -> Callable[..., NoReturn]:
             code = _outcome(command, args, options)
         except BrokenPipeError:  # nobody reads the errors either
             code = PIPE_CLOSED
+        except OSError:  # standard error cannot be written
+            code = FILE_FAILED
         sys.exit(code)
 
     return run
@@ -38,6 +40,10 @@ def _outcome(command: Callable[..., int], args: tuple[Any, ...], options: dict[s
         return PIPE_CLOSED
     except KeyboardInterrupt:
         return INTERRUPTED
+    except OSError as error:
+        if error.filename is not None:
+            return _bug(error, as_json=options.get("errors") == "json")
+        return FILE_FAILED  # of standard error: nobody can be told
     except Exception as error:  # noqa: BLE001
         return _bug(error, as_json=options.get("errors") == "json")
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -12,11 +11,12 @@ import numpy as np
 from trajcli.curves.extrema import peaks
 from trajcli.errors import InputError, Problem, VerificationError
 from trajcli.frozen import comparable
-from trajcli.job.read import LoadedJob, load_job
+from trajcli.job.read import LoadedJob, files_of, load_job
 from trajcli.kinematics.robot import QUANTITIES
 from trajcli.output.write import check_output_name, grid_of, write_rows, write_text
 from trajcli.planners.planner import Event, PlannedMove
 from trajcli.planning.plan import Plan, plan_job
+from trajcli.streams.whole_file import identity
 
 if TYPE_CHECKING:
     from trajcli.job.report import MoveReport, ReferenceReport
@@ -47,24 +47,35 @@ def run_plan(job: str, overrides: Sequence[str], options: PlanOptions) -> int:
     """
     _check_options(options)
     loaded = load_job(job, overrides, rate=options.rate)
+    _check_inputs_stay(loaded, options)
     if options.resolved is not None:
         _write_resolved(loaded, options.resolved)
     plan = plan_job(loaded)
     grid = grid_of(plan)
-    if options.report is not None or options.reference:
-        _report(plan, options)
-    if not plan.verdict.passed:
-        from trajcli.output.report import verification_error
-
-        raise verification_error(plan)
-    conceded = [event for event in plan.events if event.concedes]
-    if options.strict and conceded:
-        raise VerificationError(*(_problem(plan, event) for event in conceded))
-    if not options.no_output:
+    refusal = _refusal(plan, options)
+    if refusal is None and not options.no_output:
         write_rows(plan, grid, options.output, options.digits)
+    if options.report is not None or options.reference:
+        _report(plan, options)  # behind the rows: where it stands, they do
+    if refusal is not None:
+        raise refusal
     if not options.quiet:
         _summarise(plan, grid.count, options)
     return 0
+
+
+def _refusal(plan: Plan, options: PlanOptions) -> VerificationError | None:
+    """Return why no rows are written: the findings, or the concessions that `--strict` refuses."""
+    if not plan.verdict.passed:
+        from trajcli.output.report import verification_error
+
+        return verification_error(plan)
+    conceded = [event for event in plan.events if event.concedes]
+    return (
+        VerificationError(*(_problem(plan, event) for event in conceded))
+        if options.strict and conceded
+        else None
+    )
 
 
 def _problem(plan: Plan, event: Event) -> Problem:
@@ -77,18 +88,30 @@ def _check_options(options: PlanOptions) -> None:
         if options.no_output:
             raise InputError("--no-output and --output exclude each other", hint="leave one of them out")
         check_output_name(options.output)
-    rows = None if options.no_output else options.output or "-"
-    taken: dict[str, str] = {} if rows is None else {_real(rows): "the rows"}
-    for name, path in (("--report", options.report), ("--resolved", options.resolved)):
-        if path is None:
-            continue
-        other = taken.setdefault(_real(path), name)
+    taken: dict[tuple[object, ...], str] = {}
+    for name, path in _outputs(options):
+        same = identity(path)
+        other = name if same is None else taken.setdefault(same, name)
         if other != name:
             raise InputError(f"{name} and {other} cannot both go to {path}", hint="name another file")
 
 
-def _real(path: str) -> str:
-    return path if path == "-" else os.path.realpath(path)
+def _outputs(options: PlanOptions) -> Iterator[tuple[str, str]]:
+    """Yield what is written, and where to."""
+    if not options.no_output:
+        yield "the rows", options.output or "-"
+    for name, path in (("--report", options.report), ("--resolved", options.resolved)):
+        if path is not None:
+            yield name, path
+
+
+def _check_inputs_stay(loaded: LoadedJob, options: PlanOptions) -> None:
+    """Refuse to write over a file that the job was read from."""
+    read = {identity(path, 0): f"{what} {path}" for what, path in files_of(loaded.document)}
+    for name, path in _outputs(options):
+        same = identity(path)
+        if same is not None and same in read:
+            raise InputError(f"{name} to {path} would overwrite {read[same]}", hint="name another file")
 
 
 def _write_resolved(loaded: LoadedJob, path: str) -> None:

@@ -92,6 +92,21 @@ def job_from_text(text: str, file: str = "<text>") -> LoadedJob:
     return _load(parse_document(text, file))
 
 
+def files_of(document: Document) -> Iterator[tuple[str, str]]:
+    """Yield the files that a job was read from: what each is, and its path; standard input is `-`."""
+    standard = document.file in ("-", "<stdin>")
+    yield "the job", "-" if standard else document.file
+    folder = Path() if standard else Path(document.file).parent
+    root = document.plain()
+    robot, moves = root.get("robot"), root.get("moves")
+    if isinstance(robot, Mapping) and isinstance(robot.get("file"), str):
+        yield "the robot's file", str(folder / robot["file"])
+    for move in moves if isinstance(moves, list) else []:
+        through = move.get("through") if isinstance(move, Mapping) else None
+        if isinstance(through, Mapping) and isinstance(through.get("csv"), str):
+            yield "the recording", str(folder / through["csv"])
+
+
 def _load(document: Document) -> LoadedJob:
     plain = dict(document.plain())
     units = _units(plain.get("units"))

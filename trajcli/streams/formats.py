@@ -16,7 +16,7 @@ from trajcli.errors import InputError
 from trajcli.frozen import frozen
 from trajcli.streams.csv import verify_csv, write_csv, write_csv_blocks
 from trajcli.streams.decimals import Digits
-from trajcli.streams.whole_file import whole_file
+from trajcli.streams.whole_file import is_special, whole_file
 
 
 @frozen
@@ -42,25 +42,25 @@ FORMATS: Mapping[str, StreamFormat] = {
 DEFAULT = FORMATS[".csv"]
 """The format of standard output, of devices, and of files whose names tell no other."""
 
-# Names that promise a content: where it is not in the table, a file of that name would deceive its readers.
-_PROMISING = (".mcap", ".jsonl", ".json", ".yaml", ".yml", ".xlsx", ".parquet")
-
 
 def format_of(path: str | Path) -> StreamFormat:
-    """Return the format that the name of a file stands for.
+    """Return the format that the name of a file stands for; a device or a pipe needs no name.
 
     Raises:
-        InputError: When its ending is that of a format which is not written.
+        InputError: When the table does not know its ending: the file would promise what it does not hold.
     """
-    name = str(path).lower()
-    ending = next((known for known in (*FORMATS, *_PROMISING) if name.endswith(known)), None)
-    if ending is None:
+    name = str(path)
+    ending = next((known for known in FORMATS if name.lower().endswith(known)), None)
+    if ending is not None:
+        return FORMATS[ending]
+    if name == "-" or is_special(name):
         return DEFAULT
-    if ending not in FORMATS:
-        written = " or ".join(known.name for known in FORMATS.values())
-        hint = f"name the file {' or '.join(FORMATS)}"
-        raise InputError(f"rows are written as {written}, not as {ending}", hint=hint)
-    return FORMATS[ending]
+    written = " or ".join(known.name for known in FORMATS.values())
+    suffix = Path(name).suffix.lower()
+    as_what = f"as {suffix}" if suffix else f"to a file without an ending, '{Path(name).name}'"
+    raise InputError(
+        f"rows are written as {written}, not {as_what}", hint=f"name the file {' or '.join(FORMATS)}"
+    )
 
 
 def write_verified(

@@ -37,7 +37,7 @@ def whole_file(path: str | Path) -> Iterator[BinaryIO]:
     with _named_errors(str(path)):
         special = _open_special(str(path))
         if special is not None:
-            with special:
+            with special, _nothing_after_failure(special):
                 yield special
             return
         target = Path(os.path.realpath(path))
@@ -66,15 +66,27 @@ def standard_output() -> Iterator[BinaryIO]:
     """
     with _named_errors("standard output"):
         if sys.stdout is None:
-            raise OSError(errno.EBADF, "it is closed")
+            raise OSError(errno.EBADF, os.strerror(errno.EBADF))
         try:
             number = os.dup(sys.stdout.fileno())
         except UnsupportedOperation:  # replaced by a stream in memory, as tests do
             yield sys.stdout.buffer
             return
         # A stream of our own takes with it what could not be written: the interpreter will not try again.
-        with os.fdopen(number, "wb") as stream:
+        with os.fdopen(number, "wb") as stream, _nothing_after_failure(stream):
             yield stream
+
+
+@contextmanager
+def _nothing_after_failure(stream: BinaryIO) -> Iterator[None]:
+    """Drop what a failed block has left in the buffer: closing would wait for a reader that has stopped."""
+    try:
+        yield
+    except BaseException:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)
+        raise
 
 
 @contextmanager
@@ -85,7 +97,8 @@ def _named_errors(name: str) -> Iterator[None]:
     except BrokenPipeError:
         raise
     except OSError as error:
-        reason = error.strerror or str(error)
+        closed = error.errno == errno.EBADF
+        reason = "it is closed" if closed else error.strerror or str(error)
         raise FileError(f"cannot write {name}: {reason}", hint=_hint(error)) from error
 
 
@@ -97,13 +110,48 @@ def _hint(error: OSError) -> str | None:
     return None
 
 
+def is_special(path: str) -> bool:
+    """Return whether a path is an open descriptor such as /dev/stdout, a device or a pipe."""
+    if descriptor_of(path) is not None:
+        return True
+    try:
+        kind = Path(path).stat().st_mode
+    except (OSError, ValueError):
+        return False
+    return not (stat.S_ISREG(kind) or stat.S_ISDIR(kind))
+
+
+def descriptor_of(path: str) -> int | None:
+    """Return the number of the open descriptor that a path stands for; None when it stands for a file."""
+    match = _DESCRIPTOR.fullmatch(path)
+    return int(match["number"] or match["other"] or _NUMBERS[match["name"]]) if match else None
+
+
+def identity(path: str, descriptor: int = 1) -> tuple[object, ...] | None:
+    """Return what is equal for two names of one file: other spellings, links, an open descriptor.
+
+    None is equal to nothing: any number of outputs may go to a device such as /dev/null.
+
+    Args:
+        path: The name; "-" stands for the descriptor.
+        descriptor: 0 for standard input, 1 for standard output.
+    """
+    number = descriptor if path == "-" else descriptor_of(path)
+    try:
+        status = Path(path).stat() if number is None else os.fstat(number)
+    except (OSError, ValueError):  # it does not exist yet
+        return ("path", os.path.realpath(path))
+    if stat.S_ISCHR(status.st_mode) or stat.S_ISBLK(status.st_mode):
+        return None if number is None else ("descriptor", number)
+    return ("file", status.st_dev, status.st_ino)
+
+
 def _open_special(path: str) -> BinaryIO | None:
     """Return a stream to what is not a regular file, unless it is one."""
-    descriptor = _DESCRIPTOR.fullmatch(path)
-    if descriptor:
-        number = descriptor["number"] or descriptor["other"] or _NUMBERS[descriptor["name"]]
+    number = descriptor_of(path)
+    if number is not None:
         # A duplicate shares the position: what was written before stays, what comes later follows.
-        return os.fdopen(os.dup(int(number)), "wb")
+        return os.fdopen(os.dup(number), "wb")
     with suppress(FileNotFoundError):
         kind = Path(path).stat().st_mode
         if not stat.S_ISREG(kind):
