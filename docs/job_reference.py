@@ -64,9 +64,10 @@ robot's is allowed, and reported as an event. A move's `limits` apply to that mo
 tighten."""
 
 _TOOL_LIMITS = """\
-Speeds and accelerations of the tcp, in world, of [moves along a path](#along-a-path-of-the-tool): their
-laws take them from here, and they are verified there. Moves in joint space are not judged by them. `jerk`
-is the one along the path."""
+Speeds and accelerations of the tcp, in world. They hold in every move of an arm with geometry: the laws of
+[moves along a path](#along-a-path-of-the-tool) take them from here, and a move in joint space without a
+duration, times or rates of its own is stretched to them, with an event. All moves are verified. `jerk` is the
+one along the path; in joint space it is not judged, and the summary says so."""
 
 _ROBOT = f"""\
 Under `robot` stands the name of a robot of the [catalogue](#catalogue), `{{file: PATH}}` (relative to

@@ -70,7 +70,7 @@ class Promise:
     Attributes:
         via_points: The points that it passes.
         tool: The reference motion of its tool along a path.
-        robot: The arm with the limits in force; given where there is a tool.
+        robot: The arm with the limits in force; None where nobody says.
         ends: The states in which it declares to begin and to end; None where nobody says.
         over_limit: "slow" where it was made as long as its limits ask for, if that helps; "error" where that
             can be asked for; None where it cannot.

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 
-from trajcli.checks.finding import Finding, FindingKind, FindingMethod, at_time
+from trajcli.checks.finding import Finding, FindingKind
 from trajcli.checks.tolerances import JUMP_RELATIVE, TOOL_RELATIVE, exceeds
-from trajcli.checks.tool_bound import ToolPeak, tool_bounds
+from trajcli.checks.tool_bound import ToolPeak
+from trajcli.checks.tool_limits import check_tool_limits, limits_tool, tool_finding, tool_peaks
 from trajcli.curves.extrema import peaks
 from trajcli.curves.piecewise import Array
-from trajcli.errors import Amount
 from trajcli.frozen import frozen
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.following.motion import ToolMotion
@@ -23,12 +23,6 @@ from trajcli.kinematics.robot import Robot
 from trajcli.trajectory import Span, Trajectory
 
 _EACH = 8  # rows of a piece
-SPEEDS: tuple[tuple[FindingKind, str, int, slice], ...] = (
-    ("tool_speed", "speed", 1, slice(0, 3)),
-    ("tool_angular_speed", "angular_speed", 1, slice(3, 6)),
-    ("tool_acceleration", "acceleration", 2, slice(0, 3)),
-    ("tool_angular_acceleration", "angular_acceleration", 2, slice(3, 6)),
-)
 
 
 @frozen
@@ -74,14 +68,9 @@ class SampledTool:
         return np.linalg.norm(off[:, :split], axis=1), np.linalg.norm(off[:, split:], axis=1)
 
     @cached_property
-    def peaks(self) -> dict[str, ToolPeak]:
+    def peaks(self) -> Mapping[str, ToolPeak]:
         """Largest magnitude of each of `SPEEDS`, from the start of the move, by the name of its limit."""
-        curve, span = self.trajectory.curve, self.span
-        middles = curve.breaks[:-1] + curve.lengths / 2
-        first, last = np.searchsorted(middles, [span.start, span.end])
-        breaks = curve.breaks[first : last + 1] - span.start
-        bounds = tool_bounds(self.robot, breaks, curve.coefficients[:, first:last])
-        return {name: bound for (_, name, _, _), bound in zip(SPEEDS, bounds, strict=True)}
+        return tool_peaks(self.trajectory, self.span, self.robot)
 
     @cached_property
     def _joints(self) -> Array:
@@ -105,27 +94,18 @@ def _check_path(tool: SampledTool) -> list[Finding]:
         if exceeds(sizes.max(), limit):
             worst = int(sizes.argmax())
             message = f"the tool {what} its path by {{value}} {{time}}, promised were {{limit}}"
-            finding = _finding(
-                tool, kind, 0, float(sizes[worst]), limit, float(tool.times[worst]), None, message
-            )
+            value, time = float(sizes[worst]), float(tool.times[worst])
+            finding = tool_finding(tool.span, kind, 0, value, limit, time, None, message)
             findings.append(replace(finding, hint="this is a bug: report it"))
     return findings
 
 
 def _check_limits(tool: SampledTool) -> list[Finding]:
-    findings = []
-    for kind, name, order, part in SPEEDS:
-        limit = float(getattr(tool.robot.limits.tcp, name))
-        if np.isinf(limit):
-            continue
-        peak = tool.peaks[name]
-        promised = tool.motion.tolerance.position if part.start == 0 else tool.motion.tolerance.angle
-        if peak.most > limit * (1 + TOOL_RELATIVE + 2 * promised):
-            factor = (peak.most / limit) ** (1 / order)
-            findings.append(
-                _finding(tool, kind, order, peak.most, limit, peak.time, factor, method="bounded")
-            )
-    return findings
+    if not limits_tool(tool.robot):
+        return []
+    tolerance = tool.motion.tolerance
+    promised = tolerance.position, tolerance.angle
+    return check_tool_limits(tool.span, tool.robot.limits.tcp, tool.peaks, promised)
 
 
 def _check_jerk(tool: SampledTool) -> list[Finding]:
@@ -139,14 +119,17 @@ def _check_jerk(tool: SampledTool) -> list[Finding]:
     if steps.max() > JUMP_RELATIVE * float(accelerations.magnitude[0]):
         time = float(law.breaks[int(steps.argmax())])
         message = "the acceleration of the tool along its path steps by {value} {time}"
-        step = _finding(tool, "tool_acceleration_jump", 2, float(steps.max()), 0.0, time, None, message)
+        step = tool_finding(
+            tool.span, "tool_acceleration_jump", 2, float(steps.max()), 0.0, time, None, message
+        )
         hint = "use shape jerk_limited or quintic, or leave the limit of the tool's jerk out"
         return [replace(step, method="exact", hint=hint)]
     value = float(jerks.magnitude[0])
     if value <= limit * (1 + TOOL_RELATIVE):
         return []
     time = float(jerks.high_time[0] if jerks.high[0] >= value else jerks.low_time[0])
-    return [_finding(tool, "tool_jerk", 3, value, limit, time, (value / limit) ** (1 / 3), method="exact")]
+    factor = (value / limit) ** (1 / 3)
+    return [tool_finding(tool.span, "tool_jerk", 3, value, limit, time, factor, method="exact")]
 
 
 def _check_branch(tool: SampledTool) -> list[Finding]:
@@ -161,38 +144,5 @@ def _check_branch(tool: SampledTool) -> list[Finding]:
     if not changes.size:
         return []
     message = "the arm changes its branch {time}: it passes a singularity"
-    finding = _finding(tool, "branch", 0, 0.0, 0.0, float(tool.times[changes[0]]), None, message)
+    finding = tool_finding(tool.span, "branch", 0, 0.0, 0.0, float(tool.times[changes[0]]), None, message)
     return [replace(finding, hint="move the path", amounts={})]
-
-
-def _finding(
-    tool: SampledTool,
-    kind: FindingKind,
-    order: int,
-    value: float,
-    limit: float,
-    time: float,
-    factor: float | None,
-    message: str | None = None,
-    method: FindingMethod = "sampled",
-) -> Finding:
-    """Return a finding at a time of the move; without a message it says that a limit is broken."""
-    name = kind.removeprefix("tool_").replace("_", " ")
-    text = message or f"the {name} of the tool reaches {{value}} {{time}}, its limit is {{limit}}"
-    dimension: Literal["length", "angle"] = (
-        "angle" if name.startswith("angular") or kind == "tool_orientation" else "length"
-    )
-    amounts = {"value": Amount(value, order, None, dimension), "limit": Amount(limit, order, None, dimension)}
-    when = tool.span.start + time
-    return Finding(
-        move=tool.span.index,
-        joint=None,
-        kind=kind,
-        value=value,
-        limit=limit,
-        time=when,
-        method=method,
-        factor=factor,
-        message=text.replace("{time}", at_time(when)),
-        amounts=amounts,
-    )

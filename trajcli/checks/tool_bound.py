@@ -104,6 +104,8 @@ def _known(robot: Robot, coefficients: Array, lengths: Array) -> tuple[Array, Ar
 
 def _largest(rows: Array, rest: Array, starts: Array, lengths: Array) -> ToolPeak:
     """Return the bound of vectors at nine rows of pieces (P, 9, 3), off by `rest` (P,) between them."""
+    if not (np.isfinite(rows).all() and np.isfinite(rest).all()):
+        return ToolPeak(np.inf, float(starts.min()), np.inf)  # nothing is proven of what no float64 holds
     hull, halves = _matrices()
     points = hull @ rows
     value, time, most = 0.0, float(starts.min()), 0.0

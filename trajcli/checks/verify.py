@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,8 +14,11 @@ from trajcli.checks.limits import check_limits, peaks_by_move
 from trajcli.checks.waypoints import check_waypoints
 from trajcli.curves.extrema import Peaks
 from trajcli.frozen import frozen
-from trajcli.kinematics.robot import QUANTITIES, Limits
+from trajcli.kinematics.robot import QUANTITIES, Limits, ToolLimits
 from trajcli.trajectory import Promise, Span, Trajectory
+
+if TYPE_CHECKING:
+    from trajcli.checks.tool_bound import ToolPeak
 
 _TOOL_LIMITS = (
     "tool_speed",
@@ -23,6 +27,7 @@ _TOOL_LIMITS = (
     "tool_angular_acceleration",
     "tool_jerk",
 )
+_NO_TOOL_LIMITS = ToolLimits()
 _NO_HELP = "slowing down does not help"
 _SLOW = "say `when_over_limit: slow`"
 
@@ -36,12 +41,18 @@ class Verdict:
         steps: Legal steps in acceleration, in order of time.
         peaks: For each span the extremes of position, velocity, acceleration and jerk, times on the curve.
         unchecked: (joint, quantity) that some move leaves unlimited in at least one direction.
+        tool_peaks: For each span the largest speeds and accelerations of the tool by the name of their limit,
+            times from the start of the move; None on a path, and where no limit asks for them.
+        unchecked_of_tool: Limits of the tool that are stated and cannot be judged in some move: of an arm
+            without geometry, and of the jerk in joint space.
     """
 
     findings: tuple[Finding, ...]
     steps: AccelerationSteps
     peaks: tuple[tuple[Peaks, ...], ...]
     unchecked: tuple[tuple[str, str], ...]
+    tool_peaks: tuple[Mapping[str, ToolPeak] | None, ...] = ()
+    unchecked_of_tool: tuple[str, ...] = ()
 
     @property
     def passed(self) -> bool:
@@ -64,17 +75,19 @@ def verify(
     Raises:
         ValueError: When there are more or fewer limits than spans.
     """
-    peaks = tuple(peaks_by_move(trajectory))
+    peaks, tool_peaks = tuple(peaks_by_move(trajectory)), _tool_peaks(trajectory, promises)
     findings = check_limits(trajectory, limits_by_move, peaks)
     findings += check_continuity(trajectory, limits_by_move, peaks)
     if promises is not None:
         findings += check_waypoints(trajectory, [promise.via_points for promise in promises])
-        findings += _check_tools(trajectory, promises)
+        findings += _check_tools(trajectory, promises, tool_peaks)
     return Verdict(
         findings=_in_order(trajectory, findings, promises),
         steps=acceleration_steps(trajectory, limits_by_move, peaks),
         peaks=peaks,
         unchecked=_unchecked(trajectory, limits_by_move),
+        tool_peaks=tool_peaks,
+        unchecked_of_tool=_unchecked_of_tool(limits_by_move, promises, peaks),
     )
 
 
@@ -91,14 +104,56 @@ def _in_order(
     )
 
 
-def _check_tools(trajectory: Trajectory, promises: Sequence[Promise]) -> list[Finding]:
+def _tool_peaks(
+    trajectory: Trajectory, promises: Sequence[Promise] | None
+) -> tuple[Mapping[str, ToolPeak] | None, ...]:
+    """Return for each span the peaks of the tool in joint space, where it has limits and can be judged."""
+    peaks: list[Mapping[str, ToolPeak] | None] = []
+    for span, promise in zip(trajectory.spans, promises or [Promise()] * len(trajectory.spans), strict=True):
+        robot, known = promise.robot, None
+        if robot is not None and promise.tool is None and robot.limits.tcp != _NO_TOOL_LIMITS:
+            from trajcli.checks.tool_limits import limits_tool, tool_peaks
+
+            known = tool_peaks(trajectory, span, robot) if limits_tool(robot) else None
+        peaks.append(known)
+    return tuple(peaks)
+
+
+def _check_tools(
+    trajectory: Trajectory,
+    promises: Sequence[Promise],
+    tool_peaks: Sequence[Mapping[str, ToolPeak] | None],
+) -> list[Finding]:
     findings: list[Finding] = []
-    for span, promise in zip(trajectory.spans, promises, strict=True):
-        if promise.tool is not None and promise.robot is not None:
+    for span, promise, peaks in zip(trajectory.spans, promises, tool_peaks, strict=True):
+        if promise.robot is None:
+            continue
+        if promise.tool is not None:
             from trajcli.checks.tool import SampledTool, check_tool
 
             findings += check_tool(SampledTool(trajectory, span, promise.robot, promise.tool))
+        elif peaks is not None:
+            from trajcli.checks.tool_limits import check_tool_limits
+
+            findings += check_tool_limits(span, promise.robot.limits.tcp, peaks)
     return findings
+
+
+def _unchecked_of_tool(
+    limits_by_move: Sequence[Limits], promises: Sequence[Promise] | None, peaks: Sequence[tuple[Peaks, ...]]
+) -> tuple[str, ...]:
+    """Return the limits of the tool that are stated and cannot be judged in some move where the arm moves."""
+    names: set[str] = set()
+    for k, (limits, of_span) in enumerate(zip(limits_by_move, peaks, strict=True)):
+        if limits.tcp == _NO_TOOL_LIMITS or not of_span[1].magnitude.any():
+            continue
+        from trajcli.checks.tool_limits import stated_limits
+
+        promise = promises[k] if promises else Promise()
+        whole = promise.robot is None or promise.robot.convention is None
+        on_path = promise.tool is not None and not promise.tool.pure_rotation
+        names |= {name for name in stated_limits(limits.tcp) if whole or (name == "jerk" and not on_path)}
+    return tuple(name for name in vars(_NO_TOOL_LIMITS) if name in names)
 
 
 def _unchecked(trajectory: Trajectory, limits_by_move: Sequence[Limits]) -> tuple[tuple[str, str], ...]:
@@ -138,7 +193,10 @@ def _by_slowing(finding: Finding, trajectory: Trajectory, span: Span, promise: P
         longer = f"{finding.factor:.6g} times longer ({span.duration * finding.factor:.6g} s)"
         return f"it must last {longer}" + (f", or {_SLOW}" if promise.over_limit else "")
     if finding.joint is None:
-        return _SLOW
+        from trajcli.checks.tool_limits import tool_ends_over_limit
+
+        over = promise.robot is not None and tool_ends_over_limit(promise.robot, promise.ends)
+        return f"{_NO_HELP}: the tool is too fast where the move starts or ends" if over else _SLOW
     if _ends_over_limit(finding, trajectory.joint_names.index(finding.joint), promise):
         return f"{_NO_HELP}: the move starts or ends over its limit"
     return f"{_SLOW}: it finds the shortest duration between these moving states"

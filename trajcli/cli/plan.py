@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -19,6 +19,7 @@ from trajcli.planning.plan import Plan, plan_job
 from trajcli.streams.whole_file import identity
 
 if TYPE_CHECKING:
+    from trajcli.checks.tool_bound import ToolPeak
     from trajcli.job.report import MoveReport, ReferenceReport
 
 _STILL = 1e-9  # rad/s or m/s, below which a joint only rounds
@@ -159,6 +160,9 @@ def summary(plan: Plan, rows: int) -> str:
     unchecked = _unchecked(plan)
     if unchecked:
         lines.append(f"  without a limit, not checked: {unchecked}")
+    if plan.verdict.unchecked_of_tool:
+        names = ", ".join(name.replace("_", " ") for name in plan.verdict.unchecked_of_tool)
+        lines.append(f"  limited, but not checked in every move: {names} of the tool")
     if plan.verdict.steps:
         first = plan.verdict.steps[0]
         more = f" and {len(plan.verdict.steps) - 1} more" if len(plan.verdict.steps) > 1 else ""
@@ -173,7 +177,8 @@ def _where(move: int | None) -> str:
 
 def _tightest(plan: Plan) -> str:
     best, text = 0.0, ""
-    for move, extremes in zip(plan.moves, plan.verdict.peaks, strict=True):
+    verdict = plan.verdict
+    for move, extremes, of_tool in zip(plan.moves, verdict.peaks, verdict.tool_peaks, strict=True):
         for order in (1, 2, 3):
             bounds = move.robot.limits.of_order(order)
             used = np.maximum(extremes[order].low / bounds[:, 0], extremes[order].high / bounds[:, 1])
@@ -182,7 +187,7 @@ def _tightest(plan: Plan) -> str:
                 best = float(used[joint])
                 name = move.robot.joint_names[joint]
                 text = f"{QUANTITIES[order]} of {name} in move {move.index}, {100 * best:.4g} % used"
-        speed, name = _tool_speed(move)
+        speed, name = _tool_speed(move) if of_tool is None else _tool_in_joint_space(move, of_tool)
         if speed > best * (1 + 1e-6):
             best, text = speed, f"{name} of the tool in move {move.index}, {100 * speed:.4g} % used"
     return text
@@ -195,6 +200,13 @@ def _tool_speed(move: PlannedMove) -> tuple[float, str]:
         return 0.0, "speed"
     limit, name = (limits.angular_speed, "angular speed") if tool.pure_rotation else (limits.speed, "speed")
     return float(peaks(tool.law, (1,))[0].magnitude[0]) / limit, name
+
+
+def _tool_in_joint_space(move: PlannedMove, peaks: Mapping[str, ToolPeak]) -> tuple[float, str]:
+    """Return the largest part of a limit of the tool that is used, and the limit's name."""
+    limits = move.robot.limits.tcp
+    used, name = max((peak.value / getattr(limits, name), name) for name, peak in peaks.items())
+    return used, name.replace("_", " ")
 
 
 def _unchecked(plan: Plan) -> str:

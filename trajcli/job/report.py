@@ -241,6 +241,10 @@ class MoveReport(ReportPart):
     tool: Annotated[
         ToolReport | None, Field(description="The tool on its path; null for a move in joint space.")
     ] = None
+    tool_peaks: Annotated[
+        list[ToolPeakReport] | None,
+        Field(description="Of the tool in joint space; null where `limits.tcp` asks for none."),
+    ] = None
     reference: ReferenceReport | None = None
 
 
@@ -290,6 +294,12 @@ class UncheckedReport(ReportPart):
     quantity: JointQuantity
 
 
+class UncheckedToolReport(ReportPart):
+    """A limit of the tool that is stated, but cannot be judged in some move."""
+
+    quantity: Literal["speed", "acceleration", "jerk", "angular_speed", "angular_acceleration"]
+
+
 class Report(ReportPart):
     """What became of a job."""
 
@@ -304,3 +314,4 @@ class Report(ReportPart):
     events: list[EventReport]
     steps: list[StepReport]
     unchecked: list[UncheckedReport]
+    unchecked_of_tool: list[UncheckedToolReport] = []

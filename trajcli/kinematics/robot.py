@@ -43,7 +43,7 @@ class Joint:
 
 @comparable
 class ToolLimits:
-    """Bounds of the tool's motion along a path, magnitudes; infinite means unlimited, and is not checked.
+    """Bounds of the tool's motion, magnitudes; infinite means unlimited, and is not checked.
 
     Attributes:
         speed: m/s.
@@ -69,7 +69,7 @@ class Limits:
         velocity: Shape (n, 2), per second; lower < 0 < upper.
         acceleration: Shape (n, 2), per second squared; lower < 0 < upper.
         jerk: Shape (n, 2), per second cubed; lower < 0 < upper.
-        tcp: Of the tool, for moves along a path of the tool.
+        tcp: Of the tool.
     """
 
     position: Array

@@ -164,7 +164,7 @@ AngularAcceleration = Annotated[
 
 
 class ToolLimitsSpec(Model):
-    """Limits of the tool, for moves along a path of the tool; what is left out is unlimited."""
+    """Limits of the tool, in all moves; what is left out is unlimited."""
 
     speed: ToolSpeed | None = None
     acceleration: ToolAcceleration | None = None

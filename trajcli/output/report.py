@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,9 +27,10 @@ from trajcli.job.report import (
     ToolPeakReport,
     ToolReport,
     UncheckedReport,
+    UncheckedToolReport,
     WaypointReport,
 )
-from trajcli.kinematics.robot import QUANTITIES, JointType
+from trajcli.kinematics.robot import QUANTITIES, JointType, Robot
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.lower_bound import NoBound, fastest_duration
 from trajcli.planning.plan import Plan
@@ -36,7 +38,7 @@ from trajcli.trajectory import Span, Trajectory
 from trajcli.version import __version__
 
 if TYPE_CHECKING:
-    from trajcli.checks.tool import SampledTool
+    from trajcli.checks.tool_bound import ToolPeak
 
 _ROUNDING = 1e-12  # rad or m: what leaves the range by less does not leave it
 _HELD = 0.999  # of the wanted speed: that much counts as holding it
@@ -71,6 +73,7 @@ def report_of(plan: Plan, *, reference: bool = False) -> Report:
         events=[EventReport(kind=e.kind, message=e.message, move=e.move) for e in plan.events],
         steps=[StepReport(**vars(step), unit=units[step.joint]) for step in verdict.steps],
         unchecked=[UncheckedReport(joint=joint, quantity=quantity) for joint, quantity in verdict.unchecked],
+        unchecked_of_tool=[UncheckedToolReport(quantity=name) for name in verdict.unchecked_of_tool],
     )
 
 
@@ -100,6 +103,7 @@ def _move(plan: Plan, index: int, *, reference: bool) -> MoveReport:
         for order, extremes in enumerate(plan.verdict.peaks[index])
         for joint in range(len(move.robot.joints))
     ]
+    of_tool = plan.verdict.tool_peaks[index]
     used = [peak for peak in peaks if peak.used is not None and peak.quantity != "position"]
     most = max(used, key=lambda peak: peak.used or 0.0, default=None)
     binding = most and BindingReport(joint=most.joint, quantity=most.quantity, used=most.used or 0.0)
@@ -116,6 +120,7 @@ def _move(plan: Plan, index: int, *, reference: bool) -> MoveReport:
         waypoints=_waypoints(move, span),
         outside=_outside(move, plan.verdict, index),
         tool=_tool(plan.trajectory, span, move),
+        tool_peaks=None if of_tool is None else _tool_peaks(of_tool, span, move.robot),
         reference=reference_of(move) if reference else None,
     )
 
@@ -213,23 +218,23 @@ def _tool(trajectory: Trajectory, span: Span, move: PlannedMove) -> ToolReport |
         speed_unit=f"{unit}/s",
         held=held,
         lowest=lowest,
-        peaks=_tool_peaks(tool),
+        peaks=_tool_peaks(tool.peaks, span, move.robot),
         deviation=deviation,
         turned=turned,
     )
 
 
-def _tool_peaks(tool: SampledTool) -> list[ToolPeakReport]:
-    from trajcli.checks.tool import SPEEDS
+def _tool_peaks(peaks: Mapping[str, ToolPeak], span: Span, robot: Robot) -> list[ToolPeakReport]:
+    from trajcli.checks.tool_limits import SPEEDS
 
     reports = []
-    for _, name, order, _ in SPEEDS:
-        peak, limit = tool.peaks[name], float(getattr(tool.robot.limits.tcp, name))
+    for _, name, order in SPEEDS:
+        peak, limit = peaks[name], float(getattr(robot.limits.tcp, name))
         report = ToolPeakReport(
             quantity=name,
             value=peak.value,
             bound=peak.most,
-            time=tool.span.start + peak.time,
+            time=span.start + peak.time,
             limit=None if math.isinf(limit) else limit,
             unit=("rad" if name.startswith("angular_") else "m") + _RATES[order],
             negligible=peak.value <= _AT_REST,

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 Resolve = Callable[["Target", Array], "Target"]
 WhenOverLimit = Literal["error", "slow"]
-_REMARKS = ("refined",)  # kinds of events that concede nothing
+_REMARKS = ("refined", "within_tool_limits")  # kinds of events that concede nothing
+_GIVEN = ("duration", "velocity", "acceleration", "deceleration", "timed")  # where they say how long it lasts
 _LITTLE = 1e-3  # relative: a law that is stretched by less still counts as the fastest
 
 
@@ -128,11 +129,14 @@ class Planner(Model):
     Attributes:
         continuity: Derivatives that join without a jump at either end and inside: 1 (velocity) or 2
             (acceleration). A step in the derivative after that is legal where the joint has no limit on it.
+        one_shape: Whether all its motions between two positions of rest differ by their duration alone, so
+            that a stretched one is still the fastest of its kind.
         limits: Tightens the job's limits for this move; applied before `plan` is called.
         when_over_limit: Overrides the job's; applied after `plan` was called.
     """
 
     continuity: ClassVar[Literal[1, 2]]
+    one_shape: ClassVar[bool] = False
 
     limits: Annotated[LimitsSpec | None, Field(description="Tighter limits for this move.")] = None
     when_over_limit: Annotated[
@@ -148,6 +152,11 @@ class Planner(Model):
     def joins(self) -> Literal[1, 2]:
         """The continuity of this move: the planner's, unless its fields promise more."""
         return self.continuity
+
+    @property
+    def finds_duration(self) -> bool:
+        """Whether only the limits say how long it lasts: no duration, no times and no rates are given."""
+        return not any(getattr(self, name, None) for name in _GIVEN)
 
     def with_joint_targets(self, resolve: Resolve, near: Array) -> Self:
         """Return the planner with joints instead of the poses that it goes to in joint space.

@@ -17,12 +17,15 @@ from trajcli.errors import Amount, Amounts, Place, TrajcliError
 from trajcli.frozen import frozen
 from trajcli.job.limits import with_move_limits
 from trajcli.job.read import LoadedJob
+from trajcli.kinematics.robot import ToolLimits
 from trajcli.language.targets import Target
 from trajcli.planners.planner import Event, PlannedMove, Planner
 from trajcli.trajectory import State, Trajectory
 
 if TYPE_CHECKING:
     from trajcli.planning.resolve_poses import ResolvedPose
+
+_NO_TOOL_LIMITS = ToolLimits()
 
 
 @frozen
@@ -108,6 +111,10 @@ def _plan_move(loaded: LoadedJob, index: int, planner: Planner, start: State) ->
     planned = planner.plan(start, robot)
     over_limit = planner.when_over_limit or job.when_over_limit
     move = PlannedMove(index, planner, start, robot, planned, over_limit)
+    if robot.limits.tcp != _NO_TOOL_LIMITS:
+        from trajcli.planning.retime import keep_tool_limits
+
+        move = keep_tool_limits(move)
     if over_limit == "slow":
         from trajcli.planning.retime import slow_to_limits
 

@@ -14,7 +14,7 @@ from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import Array
 from trajcli.curves.smallest_feasible import smallest_feasible
 from trajcli.errors import Amount, Amounts, PlanningError
-from trajcli.kinematics.robot import QUANTITIES, share_of_limits
+from trajcli.kinematics.robot import QUANTITIES, ToolLimits, share_of_limits
 from trajcli.planners.planner import Event, Planned, PlannedMove
 
 _LONGEST = 1e4  # times the planned duration: a move that needs more is not over its limit, it is wrong
@@ -22,6 +22,7 @@ _ROOM = 1e-10  # relative; a tenth of the tolerance of limits, so that rounding 
 _ONE_BY_ONE = 1  # factors tried at once: each costs a plan of its own
 _WHOLE = 1e-9  # of a period: what is this close to whole is whole
 _TRIES = 50
+_NO_TOOL_LIMITS = ToolLimits()
 
 
 def with_duration(move: PlannedMove, duration: float) -> PlannedMove:
@@ -53,6 +54,24 @@ def _scaled(planned: Planned, factor: float) -> Planned:
     )
 
 
+def keep_tool_limits(move: PlannedMove) -> PlannedMove:
+    """Return the move in joint space, where it finds its duration itself, within the limits of the tool.
+
+    It is stretched by the smallest factor that does it, with an event. Planners in joint space know limits of
+    joints alone, and a limit that is in force says how fast a move may be, whichever it is.
+    """
+    known = move.planned.tool is None and move.planner.finds_duration and move.duration > 0
+    if not known or move.robot.limits.tcp == _NO_TOOL_LIMITS:
+        return move
+    over = [finding for finding in _over_limit(move) if finding.joint is None]
+    factor = _smallest_stretch(move, over) if over else None
+    if factor is None:
+        return move
+    exactly = move.planner.one_shape and move.at_rest
+    kind, remark = ("within_tool_limits", "") if exactly else ("stretched", "; a faster motion may exist")
+    return _stretched(move, factor, over, kind, remark)
+
+
 def slow_to_limits(move: PlannedMove) -> PlannedMove:
     """Return the smallest stretch of the move that keeps its limits, with an event if it is one.
 
@@ -62,25 +81,40 @@ def slow_to_limits(move: PlannedMove) -> PlannedMove:
     over = _over_limit(move)
     if not over or move.duration == 0:
         return move
-    if move.at_rest:
-        factors = [finding.factor for finding in over]
-        factor = None if None in factors else max(f for f in factors if f is not None)
-    else:
-        factor = smallest_feasible(lambda factors: _excess(move, factors), 1.0, _LONGEST, block=_ONE_BY_ONE)
-    if factor is None:
-        return move
+    factor = _smallest_stretch(move, over)
+    return move if factor is None else _stretched(move, factor, over, "slowed")
+
+
+def _smallest_stretch(move: PlannedMove, over: list[Finding]) -> float | None:
+    """Return the smallest factor by which a move that is over limits keeps them, if there is one."""
+    if not move.at_rest:
+        if move.robot.limits.tcp != _NO_TOOL_LIMITS:
+            from trajcli.checks.tool_limits import tool_ends_over_limit
+
+            if tool_ends_over_limit(move.robot, (move.start, move.planned.end)):
+                return None
+        return smallest_feasible(lambda factors: _excess(move, factors), 1.0, _LONGEST, block=_ONE_BY_ONE)
+    factors = [finding.factor for finding in over]
+    return None if None in factors else max(f for f in factors if f is not None)
+
+
+def _stretched(
+    move: PlannedMove, factor: float, over: list[Finding], kind: str, remark: str = ""
+) -> PlannedMove:
+    """Return the move that lasts `factor` times longer, with an event that names the worst finding."""
     slower = with_duration(move, move.duration * factor)
     worst = max(over, key=lambda finding: finding.factor or 0.0)
+    limit = worst.kind.removeprefix("tool_").replace("_", " ")
     message = (
         f"stretched {slower.stretch:.6g} times, from {{before}} to {{after}}, "
-        f"to keep the {worst.kind.removeprefix('tool_')} limit of {{whose}}"
+        f"to keep the {limit} limit of {{whose}}{remark}"
     )
     amounts: Amounts = {
         "before": Amount(move.duration),
         "after": Amount(slower.duration),
         "whose": worst.joint or "the tool",
     }
-    event = Event("slowed", message, move.index, amounts)
+    event = Event(kind, message, move.index, amounts)
     return replace(slower, planned=replace(slower.planned, events=(event, *slower.planned.events)))
 
 
@@ -99,8 +133,17 @@ def _excess_of(move: PlannedMove, duration: float) -> float:
         longer = with_duration(move, duration)
     except PlanningError:
         return np.inf
-    (peaks,) = peaks_by_move(longer.alone())
-    return float(share_of_limits([(p.low, p.high) for p in peaks], move.robot.limits)) - (1 + _ROOM)
+    alone = longer.alone()
+    (peaks,) = peaks_by_move(alone)
+    joints = float(share_of_limits([(p.low, p.high) for p in peaks], move.robot.limits)) - (1 + _ROOM)
+    if move.robot.limits.tcp == _NO_TOOL_LIMITS:
+        return joints
+    from trajcli.checks.tool_limits import limits_tool, share_of_tool_limits, tool_peaks
+
+    if not limits_tool(move.robot):
+        return joints
+    of_tool = tool_peaks(alone, alone.spans[0], move.robot)
+    return max(joints, share_of_tool_limits(move.robot.limits.tcp, of_tool) - 1)
 
 
 def align_to_period(move: PlannedMove, rate: float) -> PlannedMove:

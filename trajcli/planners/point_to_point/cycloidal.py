@@ -27,6 +27,7 @@ class Cycloidal(PointToPoint):
     """
 
     continuity: ClassVar[Literal[1, 2]] = 2
+    one_shape: ClassVar[bool] = True
     imposes: ClassVar[int] = 0
 
     planner: Literal["cycloidal"] = "cycloidal"

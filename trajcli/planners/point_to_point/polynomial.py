@@ -36,6 +36,8 @@ class PolynomialPlanner(PointToPoint):
 
     conditions: ClassVar[int]
 
+    one_shape: ClassVar[bool] = True
+
     duration: Duration | None = None
 
     def plan(self, start: State, robot: Robot) -> Planned:

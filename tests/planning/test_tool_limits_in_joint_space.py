@@ -1,0 +1,149 @@
+"""Limits of the tool in joint space: an arm of one link, whose tool obeys v = L qd, and a UR5e by differences."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from random_jobs import loaded
+
+from trajcli.cli.plan import summary
+from trajcli.kinematics.forward import forward
+from trajcli.output.report import report_of
+from trajcli.planning.plan import Plan, plan_job
+
+LEVER, TURN, SPEED = 0.5, 1.2, 0.25
+ONE_LINK = {"convention": "standard", "joints": [{"a": LEVER}]}
+PEAKS = {"cubic": 1.5, "quintic": 15 / 8, "septic": 35 / 16, "cycloidal": 2.0}  # of the speed, by textbook
+
+
+def job(move: dict[str, Any], tcp: dict[str, float], **more: Any) -> dict[str, Any]:
+    return {
+        "version": 1,
+        "robot": ONE_LINK,
+        "limits": {"velocity": 3, "acceleration": 20, "tcp": tcp},
+        "start": {"joints": [0.1]},
+        "moves": [{"to": {"joints": [0.1 + TURN]}, **move}],
+        **more,
+    }
+
+
+def planned(*arguments: Any, **more: Any) -> Plan:
+    return plan_job(loaded(job(*arguments, **more)))
+
+
+def fastest_sampled(plan: Plan) -> float:
+    """Return the largest speed of the tool by differences of positions at 20 000 times."""
+    t = np.linspace(0, plan.trajectory.duration, 20_001)
+    positions = forward(plan.loaded.robot, plan.trajectory.curve.evaluate(t))[:, :3, 3]
+    return float(np.linalg.norm(np.diff(positions, axis=0), axis=1).max() / (t[1] - t[0]))
+
+
+@pytest.mark.parametrize("planner", PEAKS)
+def test_the_fastest_duration_of_a_law_respects_the_speed_of_the_tool(planner: str) -> None:
+    plan = planned({"planner": planner}, {"speed": SPEED})
+    assert plan.verdict.passed
+    assert plan.trajectory.duration == pytest.approx(PEAKS[planner] * LEVER * TURN / SPEED, rel=2e-6)
+    (event,) = plan.events
+    assert (event.kind, event.concedes) == ("within_tool_limits", False)
+    assert "to keep the speed limit of the tool" in event.message
+
+
+@pytest.mark.parametrize("planner", ["jerk_limited", "trapezoid", "spline", "time_optimal", "blends"])
+def test_other_planners_are_stretched_and_say_so(planner: str) -> None:
+    move: dict[str, Any] = {"planner": planner}
+    if planner == "jerk_limited":
+        move["limits"] = {"jerk": 300}
+    if planner in ("spline", "time_optimal", "blends"):
+        move |= {"through": [{"joints": [0.7]}]}
+    plan = planned(move, {"speed": SPEED})
+    assert plan.verdict.passed
+    assert fastest_sampled(plan) == pytest.approx(SPEED, rel=1e-4)
+    event = next(event for event in plan.events if event.kind == "stretched")
+    assert event.concedes
+    assert "a faster motion may exist" in event.message
+
+
+def test_an_acceleration_counts_as_a_vector() -> None:
+    """|a| = L sqrt(qdd^2 + qd^4) of a tool on a circle; scaled by time it goes with 1 / T^2."""
+    plan = planned({"planner": "quintic"}, {"acceleration": 0.5})
+    t = np.linspace(0, 1, 200_001)
+    qd, qdd = TURN * (30 * t**2 - 60 * t**3 + 30 * t**4), TURN * (60 * t - 180 * t**2 + 120 * t**3)
+    assert plan.trajectory.duration == pytest.approx(
+        np.sqrt(LEVER * np.hypot(qdd, qd**2).max() / 0.5), rel=2e-6
+    )
+
+
+def test_a_given_duration_is_judged_and_not_changed() -> None:
+    plan = planned({"planner": "quintic", "duration": 1}, {"speed": SPEED})
+    assert plan.trajectory.duration == 1
+    (finding,) = plan.verdict.findings
+    peak = 15 / 8 * LEVER * TURN
+    assert (finding.kind, finding.joint, finding.method) == ("tool_speed", None, "bounded")
+    assert (finding.value, finding.limit) == (pytest.approx(peak, rel=1e-6), SPEED)
+    assert (finding.time, finding.factor) == (
+        pytest.approx(0.5, abs=0.02),
+        pytest.approx(peak / SPEED, rel=1e-6),
+    )
+    assert finding.hint is not None
+    assert f"{finding.factor:.6g} times longer" in finding.hint
+    again = planned({"planner": "quintic", "duration": finding.factor}, {"speed": SPEED})
+    assert again.verdict.passed
+
+
+def test_slow_stretches_a_given_duration() -> None:
+    plan = planned({"planner": "quintic", "duration": 1}, {"speed": SPEED}, when_over_limit="slow")
+    assert plan.verdict.passed
+    assert plan.trajectory.duration == pytest.approx(15 / 8 * LEVER * TURN / SPEED, rel=2e-6)
+    assert [event.kind for event in plan.events] == ["slowed"]
+
+
+@pytest.mark.parametrize("given", [{}, {"duration": 0.9}])
+def test_between_moving_states_the_search_sees_the_tool(given: dict[str, float]) -> None:
+    move = {"planner": "quintic", "to": {"joints": [0.1 + TURN], "velocity": [0.3]}, **given}
+    plan = planned(move, {"speed": SPEED}, when_over_limit="slow")
+    assert plan.verdict.passed
+    assert fastest_sampled(plan) == pytest.approx(SPEED, rel=1e-4)
+    assert plan.trajectory.curve.evaluate(plan.trajectory.duration, 1)[0] == pytest.approx(0.3, rel=1e-9)
+
+
+def test_a_boundary_speed_over_the_limit_is_past_help() -> None:
+    move = {"planner": "quintic", "to": {"joints": [0.1 + TURN], "velocity": [0.6]}}
+    plan = planned(move, {"speed": SPEED}, when_over_limit="slow")
+    assert {finding.kind for finding in plan.verdict.findings} == {"tool_speed"}
+    strict = planned(move, {"speed": SPEED})
+    assert strict.verdict.findings[0].hint == (
+        "slowing down does not help: the tool is too fast where the move starts or ends"
+    )
+
+
+def test_the_collaborative_speed_of_a_cell() -> None:
+    """A swing of a UR5e at 1601 mm/s was verified under 250 mm/s."""
+    swing = {
+        "version": 1,
+        "robot": "ur5e",
+        "units": {"angle": "deg", "length": "mm"},
+        "limits": {"acceleration": 800, "jerk": 8000, "tcp": {"speed": 250}},
+        "start": {"joints": [0, -90, 90, -90, -90, 0]},
+        "moves": [{"planner": "jerk_limited", "to": {"joints": [90, -60, 60, -90, -90, 0]}}],
+    }
+    plan = plan_job(loaded(swing))
+    assert plan.verdict.passed
+    assert fastest_sampled(plan) == pytest.approx(0.25, rel=1e-4)
+    assert fastest_sampled(plan) < 0.25 * (1 + 1e-6)
+    report = report_of(plan)
+    (speed,) = [peak for peak in report.moves[0].tool_peaks or [] if peak.quantity == "speed"]
+    assert (speed.value, speed.limit) == (pytest.approx(0.25, rel=1e-6), 0.25)
+    assert "speed of the tool in move 0, 100 % used" in summary(plan, 0)
+
+
+def test_what_cannot_be_judged_is_named() -> None:
+    bare = job({"planner": "quintic", "duration": 1}, {"speed": SPEED, "jerk": 1.0})
+    with_geometry = plan_job(loaded(bare))
+    assert with_geometry.verdict.unchecked_of_tool == ("jerk",)
+    plan = plan_job(loaded({**bare, "robot": {"joints": 1}}))
+    assert plan.verdict.passed
+    assert plan.verdict.unchecked_of_tool == ("speed", "jerk")
+    assert "  limited, but not checked in every move: speed, jerk of the tool" in summary(plan, 0)
+    assert [each.quantity for each in report_of(plan).unchecked_of_tool] == ["speed", "jerk"]
