@@ -6,6 +6,7 @@ stands in one), and what would fix it.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import field, replace
@@ -28,6 +29,10 @@ class Place:
         return f"{self.file}:{self.line}:{self.column}"
 
 
+_DIGITS = 9
+_SHOWN = 1e-13  # relative: a number that misses by no more than rounding is shown as it is
+
+
 @comparable
 class Amount:
     """A number inside a message, in SI, which a reader may want in other units.
@@ -37,12 +42,14 @@ class Amount:
         order: 0 for a position, 1 to 3 for its time derivatives.
         joint: Index of the joint that says whether angle or length is meant.
         dimension: "length" or "angle" of the tool; with neither this nor a joint the number is a time.
+        rounded: "up" for a lower bound, "down" for an upper one: the number that is shown keeps it.
     """
 
     value: float | tuple[float, ...]
     order: int = 0
     joint: int | None = None
     dimension: Literal["length", "angle"] | None = None
+    rounded: Literal["up", "down"] | None = None
 
     def __str__(self) -> str:
         unit = {"length": " m", "angle": " rad", None: ""}[self.dimension]
@@ -52,7 +59,17 @@ class Amount:
         """Return the number, or the coordinates in brackets, each after `scale`."""
         if isinstance(self.value, tuple):
             return "[" + ", ".join(f"{scale(value) + 0.0:.9g}" for value in self.value) + "]"
-        return f"{scale(self.value):.9g}"
+        return f"{_towards(scale(self.value), self.rounded):.{_DIGITS}g}"
+
+
+def _towards(value: float, side: Literal["up", "down"] | None) -> float:
+    """Return a number rounded to the digits that are shown, up or down where it is another one then."""
+    nearest = float(f"{value:.{_DIGITS}g}")
+    wrong = nearest < value if side == "up" else nearest > value
+    if side is None or not wrong or abs(nearest - value) <= _SHOWN * abs(value):
+        return value
+    unit = 10.0 ** (math.floor(math.log10(abs(value))) + 1 - _DIGITS)
+    return nearest + (unit if side == "up" else -unit)
 
 
 Amounts = Mapping[str, Amount | str]

@@ -118,8 +118,21 @@ class FollowingDiagnosis:
             "missed": Amount(float(missed[kind]), 0, None, ("length", "angle")[kind]),
         }
         message = "{robot} does not reach the path beyond s = {place}: it stays up to {missed} away"
-        hint = "move the path nearer to the arm, or leave coordinates of the target free"
+        hint = "move the path nearer to the arm"
+        if self._reached_with_free_roll(samples[~valid]):
+            axis = self.reference(samples[:1], "left").tool_axis
+            hint += f", or give only the `direction` of the tool's {axis} axis at the target"
         return PlanningError(Problem(message, hint, amounts=amounts))
+
+    def _reached_with_free_roll(self, samples: Array) -> bool:
+        """Return whether the arm reaches the path at samples (k,) where the tool may roll about its axis."""
+        from trajcli.kinematics.inverse.solve import solve
+
+        reference = self.reference(samples, "left")
+        if reference.orientation != "all":
+            return False
+        target = replace(reference, orientation="direction").target()
+        return bool(solve(self.robot, target, None).valid.any(axis=-1).all())
 
     def _last_reached(self, low: float, high: float, known: Array) -> float:
         """Return how far beyond `low`, where joint values (k, n) are known, some meet the target."""

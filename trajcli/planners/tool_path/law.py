@@ -19,7 +19,7 @@ from pydantic import Field, model_validator
 
 from trajcli.curves.hermite import hermite_coefficients
 from trajcli.curves.operations import scale_time
-from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate, distinct
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
 from trajcli.errors import Amount, MissingLimitError, PlanningError, Problem
 from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import ToolLimits
@@ -27,13 +27,13 @@ from trajcli.language.limits import AngularAcceleration, AngularSpeed, ToolAccel
 from trajcli.language.numbers import Flaw, Model, refuse
 from trajcli.language.targets import Duration, MinimumDuration
 from trajcli.planners.planner import Phase
+from trajcli.planners.tool_path.derivatives import PathDerivatives, path_derivatives
 
 if TYPE_CHECKING:
-    from trajcli.curves.trapezoid import InfeasibleProfileError
+    from trajcli.curves.trapezoid import InfeasibleProfileError, MotionBounds, VelocityProfile
     from trajcli.kinematics.following.tool_path import ToolPath
 
 _ROUNDING = 1e-9  # relative
-_SAMPLES = 257  # values of s at which the largest derivatives of the path are looked for
 _ALONG, _ACROSS = 0.6, 0.8  # of an acceleration, where the path is bent: 0.6^2 + 0.8^2 = 1
 
 
@@ -149,11 +149,27 @@ class TrapezoidLaw(TimeLaw):
             elif math.isfinite(bounds.speed):
                 profile = trapezoid.profile_of_speed(length, 0.0, 0.0, duration, bounds.speed, slowing)
             else:
-                profile = trapezoid.profile_of_duration(length, 0.0, 0.0, duration, both, both)
+                profile = _triangle(length, both, duration) or trapezoid.profile_of_duration(
+                    length, 0.0, 0.0, duration, both, both
+                )
         except trapezoid.InfeasibleProfileError as error:
             raise _no_trapezoid(error, length, bounds, duration or 0.0) from None
         law = profile.curve(0.0, length, duration)
         return LawSegment(law, law.breaks, tuple(Phase(*phase) for phase in profile.phases()))
+
+
+def _triangle(length: float, bounds: MotionBounds, duration: float) -> VelocityProfile | None:
+    """Return the triangle that lasts a duration, where its ramps are those of the bounds but for rounding.
+
+    The cruise of a trapezoid is a root there: rounding of the length, squared, would make one of 1e-7 s.
+    """
+    from trajcli.curves.trapezoid import VelocityProfile
+
+    up, down = 1.0 / bounds.acceleration, 1.0 / bounds.deceleration
+    if abs(2.0 * length * (up + down) / duration**2 - 1.0) > _ROUNDING / 2:
+        return None
+    rise, peak = duration * up / (up + down), 2.0 * length / duration
+    return VelocityProfile(0.0, ((rise, peak), (duration - rise, 0.0)))
 
 
 def _no_trapezoid(
@@ -163,13 +179,17 @@ def _no_trapezoid(
     amounts = {"length": Amount(length, 0, None, bounds.unit), "duration": Amount(duration)}
     if order is None:
         message = "no trapezoid covers {length} in {duration}"
-        return PlanningError(Problem(message, "allow more time, or faster ramps", amounts=amounts))
+        return PlanningError(
+            Problem(message, "allow a longer `duration` of the `law`, or faster ramps", amounts=amounts)
+        )
     given = bounds.speed if order == 1 else bounds.acceleration
-    for name, value in (("given", given), ("low", error.low), ("high", error.high)):
-        amounts[name] = Amount(value, order, None, bounds.unit)
+    amounts["given"] = Amount(given, order, None, bounds.unit)
+    amounts["low"] = Amount(error.low, order, None, bounds.unit, "up")
+    amounts["high"] = Amount(error.high, order, None, bounds.unit, "down")
     allowed = "above {low} and at most {high}" if math.isfinite(error.high) else "at least {low}"
     message = f"a trapezoid over {{length}} in {{duration}} cannot have {{given}}: it must be {allowed}"
-    hint = f"change the {error.reason}, or the duration"
+    angular = "angular_" if bounds.unit == "angle" else ""
+    hint = f"change `{angular}{error.reason}` or `duration` of the `law`"
     return PlanningError(Problem(message, hint, amounts=amounts))
 
 
@@ -197,13 +217,19 @@ class PolynomialLaw(TimeLaw):
             "duration": Amount(time),
             "reached": Amount(peak * length / time**order, order, None, bounds.unit),
             "limit": Amount(limit, order, None, bounds.unit),
-            "fastest": Amount(fastest),
+            "fastest": Amount(fastest, rounded="up"),
         }
         message = (
             f"a {self.shape} law over {{length}} in {{duration}} reaches {{reached}}, "
             "but the law says at most {limit}: that takes {fastest}"
         )
-        raise PlanningError(Problem(message, "allow more time, or leave one of the two out", amounts=amounts))
+        raise PlanningError(
+            Problem(
+                message,
+                "allow a `duration` of {fastest} under `law`, or leave one of the two out",
+                amounts=amounts,
+            )
+        )
 
     def _lasting(self, time: float, length: float) -> PiecewisePolynomial:
         """Return the polynomial whose derivatives up to the continuity are zero at both ends."""
@@ -334,37 +360,6 @@ class LawSpec(Model):
         if flaws:
             raise refuse(flaws)
         return self
-
-
-@comparable
-class PathDerivatives:
-    """The largest derivatives of a path by its parameter s.
-
-    Attributes:
-        moves: Whether the tcp moves; else it only turns, and s is an angle.
-        curvature: Of the position, 1/m.
-        turning: First derivative of the orientation, rad per unit of s.
-        turning_change: Second derivative of the orientation, rad per unit squared.
-    """
-
-    moves: bool
-    curvature: float
-    turning: float
-    turning_change: float
-
-
-def path_derivatives(path: ToolPath) -> PathDerivatives:
-    """Return the largest derivatives of a path, by sampling between its breaks."""
-    s = distinct(np.concatenate([np.linspace(0.0, path.length, _SAMPLES), path.breaks]))
-    sides = [path.poses.evaluate(s, side) for side in ("left", "right")]
-    first, second = (np.stack([side[k] for side in sides]) for k in (1, 2))
-    turning, change = (largest_norm(rows[..., 3:]) for rows in (first, second))
-    return PathDerivatives(not path.poses.pure_rotation, largest_norm(second[..., :3]), turning, change)
-
-
-def largest_norm(rows: Array) -> float:
-    """Return the largest norm of rows (..., 3)."""
-    return float(np.linalg.norm(rows, axis=-1).max())
 
 
 def law_bounds(

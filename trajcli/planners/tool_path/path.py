@@ -35,13 +35,8 @@ from trajcli.language.numbers import Flaw, Model, Number, refuse
 from trajcli.language.points import NamedTarget
 from trajcli.planners.planner import Event
 from trajcli.planners.tool_path.arc import ArcFields, arc_of, arc_target, center_events
-from trajcli.planners.tool_path.law import (
-    LawSegment,
-    PathDerivatives,
-    largest_norm,
-    lasting_at_least,
-    law_bounds,
-)
+from trajcli.planners.tool_path.derivatives import PathDerivatives, largest_norm
+from trajcli.planners.tool_path.law import LawSegment, lasting_at_least, law_bounds
 from trajcli.planners.tool_path.move import (
     PlannedPath,
     ToolPathMove,

@@ -1,0 +1,35 @@
+"""Advice of paths that are out of reach: freeing the orientation is proposed where it helps, and then helps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tool_jobs import arm, line, plan, refusal
+
+from trajcli.kinematics.forward import forward
+
+FREE = {"velocity": None, "acceleration": None, "jerk": None}
+LAW = {"shape": "quintic", "duration": 3}
+JOINTS = [0.2, 0.5, -1.2, 0.0]
+
+
+def outwards(by):
+    """Return the position `by` further from the base than the tool in JOINTS, and the rotation there."""
+    pose = forward(arm("elbow4r"), np.array(JOINTS))
+    return pose[:3, 3] + by * np.array([np.cos(0.2), np.sin(0.2), 0.0]), pose[:3, :3]
+
+
+@pytest.mark.parametrize(("by", "helps"), [(0.1, True), (0.15, False), (0.5, False)])
+def test_freeing_the_orientation_is_proposed_where_it_helps(by, helps):
+    xyz, rotation = outwards(by)
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = rotation, xyz
+    start = {"joints": JOINTS}
+    error = refusal("elbow4r", start, line({"matrix": matrix.tolist()}, law=LAW), limits=FREE)
+    assert ("`direction`" in error.problems[0].advice()) == helps
+    assert "move the path nearer to the arm" in error.problems[0].advice()
+    to = {"xyz": xyz.tolist(), "direction": rotation[:, 2].tolist(), "tool_axis": "z"}
+    if helps:
+        plan("elbow4r", start, line(to, law=LAW), limits=FREE)
+    else:
+        refusal("elbow4r", start, line(to, law=LAW), limits=FREE)
