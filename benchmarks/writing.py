@@ -5,9 +5,10 @@ from __future__ import annotations
 import io
 import os
 import sys
+import tempfile
 from pathlib import Path
 
-from benchmarks.contest import ROOT, Command, Function, compete
+from benchmarks.contest import ROOT, Command, Function, Runs, compete
 from benchmarks.figures import MEGABYTE, Figure
 from benchmarks.planning import NEEDED
 
@@ -60,17 +61,21 @@ def savetxt():
 def figures(peers: str | None, *, long: bool) -> list[Figure]:
     """Return the figures: time of the writer and of the whole command, and the command's peak memory."""
     module = "benchmarks.writing"
-    runs = compete(
-        {
-            "writer": Function(sys.executable, module, "writer"),
-            "plan": _plan(ROWS),
-            "savetxt": Function(sys.executable, module, "savetxt"),
-            "imports": Command([sys.executable, "-c", NEEDED]),
-        }
-    )
+    with tempfile.TemporaryDirectory() as folder:
+        runs = compete(
+            {
+                "writer": Function(sys.executable, module, "writer"),
+                "plan": _plan(ROWS),
+                "file": _plan(ROWS, "-o", f"{folder}/rows.csv"),
+                "full": _plan(ROWS, "--digits", "full"),
+                "savetxt": Function(sys.executable, module, "savetxt"),
+                "imports": Command([sys.executable, "-c", NEEDED]),
+            }
+        )
     theirs, start = runs["savetxt"].seconds, runs["imports"].peaks
     peer, above = "np.savetxt %.9f of an array", "import numpy, yaml, pydantic"
     found = [
+        *_choices(runs),
         Figure("write 10^6 x 19 as CSV", peer, runs["writer"].seconds, theirs, 0.5, aim=0.25),
         Figure("plan, whole process, 10^6 x 19", peer, runs["plan"].seconds, theirs, 0.5, aim=0.25),
         Figure("peak memory, 10^6 x 19", above, runs["plan"].peaks, start, 40 * MEGABYTE, kind="memory"),
@@ -85,10 +90,19 @@ def figures(peers: str | None, *, long: bool) -> list[Figure]:
     return found
 
 
-def _plan(rows: int) -> Command:
+def _choices(runs: dict[str, Runs]) -> list[Figure]:
+    """Return what a file read back and full digits cost beside standard output with nine decimals."""
+    plain, name = runs["plan"].seconds, "plan, whole process, 10^6 x 19"
+    return [
+        Figure(f"{name}, -o FILE", "to standard output", runs["file"].seconds, plain, 1.4),
+        Figure(f"{name}, --digits full", "nine decimals", runs["full"].seconds, plain, 2.0),
+    ]
+
+
+def _plan(rows: int, *options: str) -> Command:
     duration = f"moves.0.duration={(rows - 1) / 1000}"
     job = f"{ROOT}/benchmarks/quintic.yaml"
-    return Command([sys.executable, "-m", "trajcli", "plan", job, "--set", duration])
+    return Command([sys.executable, "-m", "trajcli", "plan", job, "--set", duration, *options])
 
 
 def _rows():

@@ -238,3 +238,17 @@ def test_memory_does_not_grow_with_the_rows():
     few, many = (peak(count / trajectory.duration) for count in (2e4, 2e5))
     assert many < 1.1 * few + 1e5
     assert many < 10e6
+
+
+def test_a_block_holds_only_its_own_pieces_whatever_their_number():
+    pieces = 200_000
+    trajectory = trajectory_of(random_curve(2, pieces, degree=3))  # 19 MB of coefficients
+    grid = UniformGrid(trajectory.duration, 1.0)
+    tracemalloc.start()
+    first = next(sample(trajectory, grid, ("t", "q", "move"), size=64))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    curve = trajectory.curve
+    expected = PPoly(curve.coefficients[:, :300], curve.breaks[:301])(first[:, 0])
+    np.testing.assert_allclose(first[:, 1:4], expected, rtol=1e-9, atol=1e-12)
+    assert peak < 4e6

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from math import ceil, isfinite
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajcli.columns import (
     JOINT_ORDERS,
@@ -161,11 +162,11 @@ def sample(
     units = units or Units()
     check_groups(groups)
     factors = joint_factors(trajectory.joint_types, units)
-    curve = _in_units(trajectory.curve, factors)
+    curve, starts = trajectory.curve, _Starts(trajectory)
     orders, last = _orders(groups), None
     for times, local in grid.blocks(size):
         local = _onto_breaks(local, curve.breaks)
-        motion = _window(curve, local).evaluate_orders(local, orders)
+        motion = _in_units(_window(curve, local), factors).evaluate_orders(local, orders)
         parts = []
         for group in groups:
             if group in JOINT_ORDERS:
@@ -175,9 +176,9 @@ def sample(
                 last = part[-1, 3:] if group == "pose" else last
                 parts.append(part / group_factors(group, units))
             elif group == "path":
-                parts.append(_path_law(trajectory, local) / group_factors(group, units))
+                parts.append(_path_law(trajectory, starts, local) / group_factors(group, units))
             else:
-                parts.append((times if group == "t" else _moves(trajectory, local))[:, None])
+                parts.append((times if group == "t" else starts.moves(local))[:, None])
         yield np.concatenate(parts, axis=1)
 
 
@@ -234,23 +235,34 @@ def _window(curve: PiecewisePolynomial, local: Array) -> PiecewisePolynomial:
     return PiecewisePolynomial(curve.breaks[first : last + 2], curve.coefficients[:, first : last + 1])
 
 
-def _path_law(trajectory: Trajectory, local: Array) -> Array:
+class _Starts:
+    """Where the spans of a trajectory start, gathered once for all blocks."""
+
+    def __init__(self, trajectory: Trajectory) -> None:
+        # a move of no length has no rows
+        moving = [span for span in trajectory.spans if span.duration > 0] or list(trajectory.spans[:1])
+        self._moving = np.array([span.start for span in moving])
+        self._indices = np.array([span.index for span in moving], dtype=np.float64)
+        self._all = np.array([span.start for span in trajectory.spans])
+
+    def moves(self, local: Array) -> Array:
+        """Return the index of the move at each time, shape (N,)."""
+        owner = np.searchsorted(self._moving, local + _BREAK, "right") - 1
+        return self._indices[np.maximum(owner, 0)]
+
+    def spans(self, local: Array) -> NDArray[np.intp]:
+        """Return which span holds each time, shape (N,)."""
+        return np.searchsorted(self._all, local + _BREAK, "right") - 1
+
+
+def _path_law(trajectory: Trajectory, starts: _Starts, local: Array) -> Array:
     """Return s along the path and two derivatives, shape (N, 3), SI; zero where a move has no path."""
     values = np.zeros((local.size, 3))
-    starts = np.array([span.start for span in trajectory.spans])
-    owner = np.searchsorted(starts, local + _BREAK, "right") - 1
-    for index, (span, law) in enumerate(zip(trajectory.spans, trajectory.laws, strict=False)):
-        rows = np.flatnonzero(owner == index)
-        if law is not None and rows.size:
-            times = np.clip(local[rows] - span.start, law.start, law.end)
+    owner = starts.spans(local)
+    for index in np.unique(owner):
+        law = trajectory.laws[index] if 0 <= index < len(trajectory.laws) else None
+        if law is not None:
+            rows = np.flatnonzero(owner == index)
+            times = np.clip(local[rows] - trajectory.spans[index].start, law.start, law.end)
             values[rows] = law.evaluate_orders(_onto_breaks(times, law.breaks), (0, 1, 2))[:, :, 0]
     return values
-
-
-def _moves(trajectory: Trajectory, local: Array) -> Array:
-    """Return the index of the move at each time, shape (N,); a move of no length has no rows."""
-    spans = [span for span in trajectory.spans if span.duration > 0] or list(trajectory.spans[:1])
-    starts = np.array([span.start for span in spans])
-    indices = np.array([span.index for span in spans], dtype=np.float64)
-    owner = np.searchsorted(starts, local + _BREAK, "right") - 1
-    return indices[np.maximum(owner, 0)]
