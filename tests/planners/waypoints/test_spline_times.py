@@ -263,3 +263,20 @@ def test_dense_points_of_two_joints_in_every_rule(rule):
         move = {"planner": "spline", "rule": rule, "through": points}
         durations.append(plan({"joints": q[0].tolist()}, move, limits=limits).trajectory.duration)
     assert durations[1] <= 1.05 * durations[0]
+
+
+@pytest.mark.parametrize("rule", ["natural", "not_a_knot"])
+def test_slowing_down_helps_where_the_rule_leaves_the_ends_open(rule):
+    """Times that are f times as long divide the velocities of a spline by f, those of its ends, too."""
+    t, q = np.array([0, 0.5, 1]), np.array([0, 1, 2.5])
+    start, through = (
+        {"joints": [0]},
+        [{"joints": [v], "time": at} for v, at in zip(q[1:], t[1:], strict=True)],
+    )
+    move, limits = {"planner": "spline", "rule": rule, "through": through}, {"velocity": VELOCITY}
+    spline = CubicSpline(t, q, bc_type=rule.replace("_", "-"))
+    factor = np.abs(spline(np.linspace(0, 1, 20001), 1)).max() / VELOCITY
+    (finding,) = plan(start, move, passes=False, limits=limits).verdict.findings
+    assert finding.hint.startswith(f"it must last {factor:.6g} times longer")
+    slower = plan(start, move | {"when_over_limit": "slow"}, limits=limits)
+    assert slower.trajectory.duration == pytest.approx(factor, rel=1e-6)
