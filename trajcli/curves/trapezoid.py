@@ -302,11 +302,14 @@ def _motion_parts(
     if initial >= 0 and not overshoot:
         reason = "turns" if final < 0 else "too_fast" if change > 0 else "too_slow"
         raise InfeasibleProfileError(reason, needed)
-    if initial < 0 or (final >= 0 and change > 0):
-        brake = _ramp(initial, 0.0, forward if initial > 0 else backward)
+    brake = _ramp(initial, 0.0, forward if initial > 0 else backward)
+    run_up = _ramp(0.0, final, forward if final > 0 else backward)
+    first = initial < 0 or (final >= 0 and change > 0)
+    if overshoot and initial * final < 0:  # one turn, where the brake ends or where the run-up begins
+        first = (brake.distance > distance - run_up.distance) == (initial > 0)
+    if first:
         rest = _motion_parts(distance - brake.distance, 0.0, final, forward, backward, overshoot=overshoot)
         return replace(rest, before=brake.then(rest.before))
-    run_up = _ramp(0.0, final, forward if final > 0 else backward)
     rest = _motion_parts(distance - run_up.distance, initial, 0.0, forward, backward, overshoot=overshoot)
     return replace(rest, after=rest.after.then(run_up))
 

@@ -228,8 +228,9 @@ class PlannedMove:
 
     @property
     def promise(self) -> Promise:
-        """What the move says of itself."""
-        planned, ends = self.planned, (self.start, self.planned.end)
+        """What the move says of itself; ends whose velocities follow from its times are none of its terms."""
+        planned, follows = self.planned, self.planned.begins is not None and not self.start.velocity.any()
+        ends = None if follows else (self.start, planned.end)
         return Promise(planned.via_points, planned.tool, self.robot, ends, self.over_limit, planned.remedies)
 
     def span(self, start: float, end: float) -> Span:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import ruckig
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from random_jobs import loaded, only_move, plan_of
@@ -296,3 +297,37 @@ def test_what_is_impossible_is_explained(fields: dict[str, float], match: str) -
         planner.plan(start, robot)
     text = str(caught.value.said_by(loaded(job).say))
     assert re.search(match, text), text
+
+
+def least_duration(distance: float, start: float, end: float, speed: float, rate: float) -> float:
+    """Return the duration that ruckig finds without a limit of jerk."""
+    wanted, answer = ruckig.InputParameter(1), ruckig.Trajectory(1)
+    wanted.current_position, wanted.target_position = [0.0], [distance]
+    wanted.current_velocity, wanted.target_velocity = [start], [end]
+    wanted.current_acceleration, wanted.target_acceleration = [0.0], [0.0]
+    wanted.max_velocity, wanted.max_acceleration, wanted.max_jerk = [speed], [rate], [math.inf]
+    assert ruckig.Ruckig(1).calculate(wanted, answer) in (ruckig.Result.Working, ruckig.Result.Finished)
+    return float(answer.duration)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("synchronize", ["time", "none"])
+def test_an_end_against_the_way(sign: int, synchronize: str) -> None:
+    fields = {"velocity": 4.758, "acceleration": 4.178, "overshoot": True, "synchronize": synchronize}
+    planned = trapezoid(sign * 0.0356, sign * 0.8, sign * -0.4, **fields)
+    least = least_duration(0.0356, 0.8, -0.4, 4.758, 4.178)
+    assert least == pytest.approx(0.3357, abs=1e-4)
+    assert planned.curve.duration == pytest.approx(least, rel=1e-9)
+
+
+@settings(max_examples=200, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_with_overshoot_it_is_the_fastest_of_all(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    speed, rate = rng.uniform(0.5, 5, 2).tolist()
+    start, end = (rng.uniform(-0.95, 0.95, 2) * speed).tolist()
+    distance = float(rng.normal() * 10 ** rng.uniform(-3, 0.5))
+    planned = trapezoid(distance, start, end, velocity=speed, acceleration=rate, overshoot=True)
+    assert planned is not None
+    least = least_duration(distance, start, end, speed, rate)
+    assert planned.curve.duration == pytest.approx(least, rel=1e-7, abs=1e-7)

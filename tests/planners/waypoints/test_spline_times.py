@@ -230,3 +230,53 @@ def test_a_return_to_the_start_in_motion_has_a_verdict(rule):
 def test_a_return_to_the_start_in_motion_without_a_limit_that_takes_time():
     start, move = {"joints": [0.3], "velocity": [0.5]}, {"planner": "spline", "to": {"joints": [0.3]}}
     assert "limit on the acceleration of j1" in str(refusal(start, move, limits={"velocity": VELOCITY}))
+
+
+def straight_through_the_turns(q, velocity, acceleration):
+    """Return the least time in which one joint runs from turn to turn of its points, at rest in each."""
+    kept = np.flatnonzero(np.diff(np.sign(np.diff(q)))) + 1
+    runs = np.abs(np.diff(q[[0, *kept, -1]]))
+    cruising = runs > velocity**2 / acceleration
+    return np.where(
+        cruising, runs / velocity + velocity / acceleration, 2 * np.sqrt(runs / acceleration)
+    ).sum()
+
+
+@pytest.mark.parametrize("count", [100, 300, 1000, 3000])
+def test_dense_points_are_passed_about_as_fast_as_any_motion_could(count):
+    q = np.sin(10 * np.arange(count + 1) / count)
+    points = [{"joints": [value]} for value in q[1:].tolist()]
+    limits = {"velocity": 1.0, "acceleration": 5.0}
+    made = plan({"joints": [0.0]}, {"planner": "spline", "through": points}, limits=limits)
+    assert made.trajectory.duration <= 1.05 * straight_through_the_turns(q, 1.0, 5.0)
+
+
+@pytest.mark.parametrize("rule", ["natural", "clamped", "computed", "quintic", "shape_preserving"])
+def test_dense_points_of_two_joints_in_every_rule(rule):
+    """Four times as many points on the same curve do not slow it down."""
+    limits = {"velocity": 1.0, "acceleration": 5.0}
+    durations = []
+    for count in (120, 480):
+        u = np.linspace(0, 6, count + 1)
+        q = np.stack([np.sin(u), np.sin(1.3 * u)], axis=1)
+        points = [{"joints": row} for row in q[1:].tolist()]
+        move = {"planner": "spline", "rule": rule, "through": points}
+        durations.append(plan({"joints": q[0].tolist()}, move, limits=limits).trajectory.duration)
+    assert durations[1] <= 1.05 * durations[0]
+
+
+@pytest.mark.parametrize("rule", ["natural", "not_a_knot"])
+def test_slowing_down_helps_where_the_rule_leaves_the_ends_open(rule):
+    """Times that are f times as long divide the velocities of a spline by f, those of its ends, too."""
+    t, q = np.array([0, 0.5, 1]), np.array([0, 1, 2.5])
+    start, through = (
+        {"joints": [0]},
+        [{"joints": [v], "time": at} for v, at in zip(q[1:], t[1:], strict=True)],
+    )
+    move, limits = {"planner": "spline", "rule": rule, "through": through}, {"velocity": VELOCITY}
+    spline = CubicSpline(t, q, bc_type=rule.replace("_", "-"))
+    factor = np.abs(spline(np.linspace(0, 1, 20001), 1)).max() / VELOCITY
+    (finding,) = plan(start, move, passes=False, limits=limits).verdict.findings
+    assert finding.hint.startswith(f"it must last {factor:.6g} times longer")
+    slower = plan(start, move | {"when_over_limit": "slow"}, limits=limits)
+    assert slower.trajectory.duration == pytest.approx(factor, rel=1e-6)

@@ -16,7 +16,7 @@ the estimation of sparse Jacobian matrices, J. Inst. Math. Appl. 13 (1974).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -41,23 +41,31 @@ _LONGEST = 0.7  # of log h in one step
 _NEARER = 0.6  # of the distance to the limits in one step, by the slopes
 _FAR = 0.2  # of log h: slopes from further away are computed anew
 _AMPLE = 1e4
+_WIDTHS = (4, 16, 64)  # pieces to either side of one that exceeds a limit
+_EASINGS = 30
 
 
 CurveFamily = Callable[[Array], PiecewisePolynomial]
 
 
-def fastest_durations(family: CurveFamily, guess: Array, bounds: Array) -> Array | None:
+def fastest_durations(
+    family: CurveFamily, guess: Array, bounds: Array, further: Iterable[Array] = ()
+) -> Array | None:
     """Return the durations (m,) of the pieces of the fastest curve of a family that keeps its limits.
 
-    The optimum is a local one. None where the guess keeps the limits with no factor of time.
+    The optimum is a local one, looked for from the guess that is the fastest when stretched to keep the
+    limits. None where no guess keeps them with any factor of time.
 
     Args:
         family: The curve from 0 whose pieces, or runs of pieces, last as long as asked, shape (m,).
         guess: Positive, shape (m,).
         bounds: Lower and upper limits of velocity, acceleration and jerk, shape (3, n, 2), infinite if none.
+        further: Other guesses, which may exceed the limits in few places: these are passed more slowly.
     """
-    start = _stretched(family, guess, bounds)
-    if start is None or guess.size == 1:
+    eased = (_eased(family, durations, bounds, width) for durations in further for width in _WIDTHS)
+    stretched = (_stretched(family, durations, bounds) for durations in (guess, *eased))
+    start = min((h for h in stretched if h is not None), key=np.sum, default=None)
+    if start is None or start.size == 1:
         return start
     problem, y = _Problem(family, bounds), np.log(start * _INSIDE)
     uses = problem.uses(y)
@@ -177,6 +185,31 @@ def _improved(problem: _Problem, point: _Point, weight: float) -> _Point | None:
             return better
         step = np.where(_windows(gains, 0.0).sum(axis=1) > 0, step / 2, step)
     return None
+
+
+def _eased(family: CurveFamily, durations: Array, bounds: Array, width: int) -> Array:
+    """Return the durations made longer around those pieces that exceed a limit, again and again.
+
+    Args:
+        family: The curve from 0 whose pieces last as long as asked.
+        durations: Positive, shape (m,).
+        bounds: Shape (3, n, 2).
+        width: How many pieces to either side follow, as much at first, and then less and less.
+    """
+    orders = np.repeat(np.array(_orders(bounds), dtype=np.float64), bounds.shape[1])
+    best, least = durations, np.inf
+    for _ in range(_EASINGS):
+        excess = np.maximum((_all_uses(family, durations, bounds) / orders).max(axis=1), 0.0)
+        total = float(durations.sum() * np.exp(excess.max()))
+        if total < least:
+            best, least = durations, total
+        if not excess.any():
+            break
+        for combine in (np.max, np.mean):
+            around = np.pad(excess, width, mode="edge")
+            excess = combine(np.lib.stride_tricks.sliding_window_view(around, 2 * width + 1), axis=1)
+        durations = durations * np.exp(excess)
+    return best
 
 
 def _stretched(family: CurveFamily, durations: Array, bounds: Array) -> Array | None:

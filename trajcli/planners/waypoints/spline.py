@@ -7,11 +7,13 @@ Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), chapte
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from trajcli.curves.operations import times_at
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.curves.splines.cubic import clamped, natural, not_a_knot
 from trajcli.curves.splines.hermite import (
@@ -65,6 +67,7 @@ IMPOSES: dict[Rule, int] = {
 }
 """Highest derivative that the ends impose."""
 _INNER = {"imposed": 1, "quintic": 2}  # the same of the points between
+_MANY = 32  # points from which on the fastest motion along a path says how they may be passed
 _LEAST = 1e-3  # of the mean duration: a piece between points that hardly differ begins with this much
 
 
@@ -140,7 +143,7 @@ def fastest_spline_times(rule: Rule, points: PointTable, robot: Robot) -> Array:
     def family(durations: Array) -> PiecewisePolynomial:
         return curve_through(rule, points, np.concatenate([[0.0], np.cumsum(durations)]))
 
-    durations = fastest_durations(family, guess, bounds)
+    durations = fastest_durations(family, guess, bounds, _path_durations(points.positions, robot))
     if durations is None:
         message = f"no times let rule {rule} pass these points within all limits"
         hint = "an imposed velocity or acceleration asks too much: lower it, or give every waypoint a `time`"
@@ -162,6 +165,27 @@ def _guess(points: PointTable, bounds: Array) -> Array:
             for below, rates in enumerate(np.abs(points.rates).max(axis=1)[: order - 1], 1):
                 needed = np.maximum(needed, ((rates / least) ** (1 / (order - below))).max())
     return np.asarray(np.maximum(needed, _LEAST * needed.mean()))
+
+
+def _path_durations(positions: Array, robot: Robot) -> Iterator[Array]:
+    """Yield the durations of the fastest motion along a cubic through the points, if they are many.
+
+    Where points are dense, the time from one to the next with a stop at both says little of how fast they may
+    be passed.
+    """
+    moving = np.ptp(positions, axis=0) > 0
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1))])
+    limited = np.isfinite(robot.limits.acceleration[moving]).all()
+    if len(positions) <= _MANY or not limited or not (np.diff(s) > np.spacing(s[-1])).all():
+        return
+    from trajcli.curves.time_optimal.parameterization import time_optimal
+    from trajcli.curves.time_optimal.passes import UnlimitedSpeedError
+
+    with suppress(UnlimitedSpeedError):
+        law = time_optimal(not_a_knot(s, positions), robot.limits.velocity, robot.limits.acceleration).law
+        durations = np.diff(times_at(law, s))
+        if (durations > 0).all():
+            yield durations
 
 
 class Spline(ThroughPoints):
