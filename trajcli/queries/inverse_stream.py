@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import asdict
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from trajcli.kinematics.inverse.solve import fits, solve
 from trajcli.kinematics.inverse.target import IkTarget, closure_of, partial_target
 from trajcli.queries.arm import ArmInUnits
 from trajcli.queries.forward import Stream
+from trajcli.streams.decimals import Digits, encode_fixed, encode_full
 from trajcli.streams.table import TableBlocks
 
 _AHEAD = 256  # rows that are looked at together at most, where one branch stays the nearest
@@ -53,6 +55,52 @@ def joints_of(arm: ArmInUnits, rows: TableBlocks, near: Array | None, tolerance:
     groups: tuple[Group, ...] = ("q",) if inputs.time is None else ("t", "q")
     columns = columns_of(groups, arm.robot.joint_types, arm.units)
     return Stream(columns, _follow(arm, rows, inputs, near, tolerance))
+
+
+class EveryAnswer:
+    """All answers to each row of poses, as lines of a CSV: row, names of the branch, joints, within_limits.
+
+    Attributes:
+        missed: The first row, from 0, that no answer within the limits meets; None while there is none.
+    """
+
+    def __init__(self, arm: ArmInUnits, rows: TableBlocks, near: Array | None, tolerance: float) -> None:
+        """Take what `joints_of` takes."""
+        self.missed: int | None = None
+        self._arm, self._rows, self._near, self._tolerance = arm, rows, near, tolerance
+        self._inputs = _pose_columns(rows)
+
+    def lines(self, digits: Digits) -> Iterator[bytes]:
+        """Yield the header, then the lines of the answers to each block.
+
+        Raises:
+            InputError: When a row is wrong.
+        """
+        encode = encode_fixed if digits == "fixed" else encode_full
+        joints = columns_of(("q",), self._arm.robot.joint_types, self._arm.units)
+        done, header = 0, True
+        for block in self._rows.blocks:
+            target = _targets(block, self._inputs, done, self._rows.file)
+            solutions = solve(self._arm.robot, target, self._near, self._tolerance)
+            names = [tuple(filter(None, asdict(branch).values())) for branch in solutions.names]
+            if header:
+                choices = [key for key, name in asdict(solutions.names[0]).items() if name is not None]
+                yield f"{','.join(['row', *choices, *(c.name for c in joints), 'within_limits'])}\n".encode()
+                header = False
+            rows, branches = np.nonzero(solutions.valid)
+            inside = solutions.within_limits
+            values = (
+                encode(solutions.joints[rows, branches] / self._arm.joint_factors).decode()
+                if len(rows)
+                else ""
+            )
+            for row, branch, text in zip(rows.tolist(), branches.tolist(), values.splitlines(), strict=True):
+                words = [str(done + row), *names[branch], text, str(int(inside[row, branch]))]
+                yield f"{','.join(words)}\n".encode()
+            none = np.flatnonzero(~inside.any(axis=1))
+            if len(none) and self.missed is None:
+                self.missed = done + int(none[0])
+            done += len(block)
 
 
 def _follow(
