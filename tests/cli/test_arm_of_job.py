@@ -114,3 +114,20 @@ def test_near_outside_the_limits_is_noticed(arms, job):
     assert "--near is outside the limits" in outcome.err
     assert "j2 is at 175 deg, its limit is 170 deg" in outcome.err
     assert "--near" not in arms.call("ik", "--robot", job, "--pose", pose, "--near", 10, 165).err
+
+
+def test_every_branch_of_each_row_of_poses(arms, job):
+    x, y = 400 * np.cos(A) + 350 * np.cos(B), 400 * np.sin(A) + 350 * np.sin(B)
+    rows = f"x_mm,y_mm,z_mm\n{x:.9f},{y:.9f},500\n900,0,500\n"
+    outcome = arms.call("ik", "--robot", job, "--all", "-", stdin=rows)
+    names, *lines = outcome.out.split()
+    assert names == "row,elbow,q1_deg,q2_deg,within_limits"
+    answers = [line.split(",") for line in lines]
+    assert {(answer[0], answer[1]) for answer in answers} == {("0", "up"), ("0", "down")}
+    for answer in answers:
+        one, both = np.radians([float(answer[2]), float(answer[2]) + float(answer[3])])
+        np.testing.assert_allclose(400 * np.cos(one) + 350 * np.cos(both), x, atol=1e-6)
+        np.testing.assert_allclose(400 * np.sin(one) + 350 * np.sin(both), y, atol=1e-6)
+        assert answer[4] == "1"
+    assert outcome.code == 3
+    assert "row 1" in outcome.err

@@ -183,7 +183,6 @@ BAD = [
     (["--pose", "{xyz: [0, 0, 1], configuration: {elbow: left}}"], "expected up or down"),
     (["--pose", "{xyz: [0, 0, 1]}", "--tolerance", "0"], "--tolerance must be above 0"),
     (["--pose", "{xyz: [0, 0, 1]}", "--near", "1"], "--near has 1 value, UR5e has 6 joints"),
-    (["--all", "-"], "--all is for one pose"),
     (["1"], "there is no place for 1"),
 ]
 

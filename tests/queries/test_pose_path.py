@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from trajcli.errors import InputError
-from trajcli.queries.pose import PoseAtEnd, TypedAngles, parse_fractions, pose_path
+from trajcli.queries.pose import PoseAtEnd, TypedAngles, parse_fractions, pose_path, pose_view
+from trajcli.units import Units
 
 ANGLES = st.tuples(*[st.floats(-3, 3)] * 3)
 S = np.linspace(0, 1, 9)
@@ -63,3 +64,15 @@ def test_refusals():
     for text in ("", "a", "-0.1", "nan", "0,2"):
         with pytest.raises(InputError):
             parse_fractions(text)
+
+
+def test_the_sign_of_a_quaternion_at_half_a_turn_is_not_that_of_rounding():
+    rng = np.random.default_rng(2)
+    for axis in rng.normal(size=(200, 3)):
+        axis /= np.linalg.norm(axis)
+        for angle in (np.pi - 1e-14, np.pi, np.pi + 1e-14):
+            pose = np.eye(4)
+            pose[:3, :3] = Rotation.from_rotvec(angle * axis).as_matrix()
+            w, x, *_ = pose_view(pose, Units())["quat_wxyz"]
+            assert abs(w) < 1e-12
+            assert x > 0.0

@@ -9,7 +9,7 @@ from typing import Any
 from trajcli.cli.numbers import number, numbers
 from trajcli.cli.outcome import print_json, print_lines, print_remark
 from trajcli.curves.piecewise import Array
-from trajcli.errors import InputError
+from trajcli.errors import InputError, PlanningError
 from trajcli.frozen import comparable
 from trajcli.job.inline import inline_target
 from trajcli.kinematics.inverse.solutions import Solutions
@@ -83,7 +83,7 @@ def _check(words: Sequence[str], options: IkOptions) -> None:
         raise InputError("say either --pose POSE, or - to read poses from a CSV")
     if not 0.0 < options.tolerance < math.inf:
         raise InputError(f"--tolerance must be above 0, got {options.tolerance:.6g}")
-    given = {"--all": options.every, "--turns": options.turns, "--json": options.as_json}
+    given = {"--turns": options.turns, "--json": options.as_json}
     for name, value in given.items() if words else ():
         if value:
             raise InputError(f"{name} is for one pose, rows from standard input become a CSV")
@@ -107,11 +107,19 @@ def _lines(arm: ArmInUnits, solutions: Solutions, reports: Sequence[dict[str, An
 
 
 def _stream(arm: ArmInUnits, near: Array | None, options: IkOptions) -> int:
-    from trajcli.queries.inverse_stream import joints_of
+    from trajcli.queries.inverse_stream import EveryAnswer, joints_of
     from trajcli.streams.csv import write_csv
     from trajcli.streams.table import open_rows
     from trajcli.streams.whole_file import standard_output
 
+    if options.every:
+        answers = EveryAnswer(arm, open_rows("-"), near, options.tolerance)
+        with standard_output() as out:
+            out.writelines(answers.lines(options.digits))
+        if answers.missed is not None:
+            hint = "its other answers, if any, have within_limits 0"
+            raise PlanningError(f"no answer to row {answers.missed} (from 0) is within the limits", hint=hint)
+        return 0
     columns, blocks = joints_of(arm, open_rows("-"), near, options.tolerance)
     with standard_output() as out:
         write_csv(blocks, columns, out, options.digits)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import asdict
 from typing import NamedTuple
 
 import numpy as np
@@ -13,16 +14,19 @@ from trajcli.errors import InputError, Place, PlanningError, Problem
 from trajcli.geometry.rotation import QUATERNION_DEFECT, Flags, matrix_from_quaternion
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.families.choose import method_for
-from trajcli.kinematics.inverse.joint_turns import FULL, beyond, choose_turns, revolute
+from trajcli.kinematics.inverse.joint_turns import FULL, beyond, revolute, widened
 from trajcli.kinematics.inverse.numeric import descend
 from trajcli.kinematics.inverse.solutions import Solutions, check_reachable
 from trajcli.kinematics.inverse.solve import fits, solve
 from trajcli.kinematics.inverse.target import IkTarget, closure_of, partial_target
 from trajcli.queries.arm import ArmInUnits
 from trajcli.queries.forward import Stream
+from trajcli.streams.decimals import Digits, encode_fixed, encode_full
 from trajcli.streams.table import TableBlocks
 
-_AHEAD = 256  # rows that are looked at together
+_AHEAD = 256  # rows that are looked at together at most, where one branch stays the nearest
+_FEW = 8  # rows that are looked at together at first
+_STAYS = 3  # rows on one branch before more are looked at together: poses at random do not stay
 _CLOSE = 0.2  # rad or m: a larger step may have missed a nearer answer, so all are sought
 _AXES, _QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
 
@@ -51,6 +55,52 @@ def joints_of(arm: ArmInUnits, rows: TableBlocks, near: Array | None, tolerance:
     groups: tuple[Group, ...] = ("q",) if inputs.time is None else ("t", "q")
     columns = columns_of(groups, arm.robot.joint_types, arm.units)
     return Stream(columns, _follow(arm, rows, inputs, near, tolerance))
+
+
+class EveryAnswer:
+    """All answers to each row of poses, as lines of a CSV: row, names of the branch, joints, within_limits.
+
+    Attributes:
+        missed: The first row, from 0, that no answer within the limits meets; None while there is none.
+    """
+
+    def __init__(self, arm: ArmInUnits, rows: TableBlocks, near: Array | None, tolerance: float) -> None:
+        """Take what `joints_of` takes."""
+        self.missed: int | None = None
+        self._arm, self._rows, self._near, self._tolerance = arm, rows, near, tolerance
+        self._inputs = _pose_columns(rows)
+
+    def lines(self, digits: Digits) -> Iterator[bytes]:
+        """Yield the header, then the lines of the answers to each block.
+
+        Raises:
+            InputError: When a row is wrong.
+        """
+        encode = encode_fixed if digits == "fixed" else encode_full
+        joints = columns_of(("q",), self._arm.robot.joint_types, self._arm.units)
+        done, header = 0, True
+        for block in self._rows.blocks:
+            target = _targets(block, self._inputs, done, self._rows.file)
+            solutions = solve(self._arm.robot, target, self._near, self._tolerance)
+            names = [tuple(filter(None, asdict(branch).values())) for branch in solutions.names]
+            if header:
+                choices = [key for key, name in asdict(solutions.names[0]).items() if name is not None]
+                yield f"{','.join(['row', *choices, *(c.name for c in joints), 'within_limits'])}\n".encode()
+                header = False
+            rows, branches = np.nonzero(solutions.valid)
+            inside = solutions.within_limits
+            values = (
+                encode(solutions.joints[rows, branches] / self._arm.joint_factors).decode()
+                if len(rows)
+                else ""
+            )
+            for row, branch, text in zip(rows.tolist(), branches.tolist(), values.splitlines(), strict=True):
+                words = [str(done + row), *names[branch], text, str(int(inside[row, branch]))]
+                yield f"{','.join(words)}\n".encode()
+            none = np.flatnonzero(~inside.any(axis=1))
+            if len(none) and self.missed is None:
+                self.missed = done + int(none[0])
+            done += len(block)
 
 
 def _follow(
@@ -87,6 +137,17 @@ class _Follower:
             self._usable = self._solutions.within_limits
             alone = self._solutions.singular.any(axis=-1) | ~self._usable.any(axis=-1)
             self._alone: Flags = np.asarray(alone)
+            self._ahead, self._branch, self._stayed = _FEW, -1, 0
+            self._prepare_turns(self._solutions)
+
+    def _prepare_turns(self, solutions: Solutions) -> None:
+        """Find how many full turns down and up the limits leave each joint of all answers."""
+        low, high = widened(solutions.bounds).T
+        with np.errstate(invalid="ignore"):
+            down, up = np.ceil((low - solutions.joints) / FULL), np.floor((high - solutions.joints) / FULL)
+        self._down: Array = np.where(self._turning, np.minimum(down, 0.0), 0.0)
+        self._up: Array = np.where(self._turning, np.maximum(up, 0.0), 0.0)
+        self._refused: Array = np.where(self._usable, 0.0, np.inf)
 
     def take(self, row: int, last: Array) -> Array:
         """Return the answers (k, n), k >= 1, of the rows from `row` on, each nearest to the one before.
@@ -103,12 +164,22 @@ class _Follower:
             return self._solved_alone(row, last)[None] if continued is None else continued
         if self._alone[row]:
             return self._solved_alone(row, last)[None]
-        answers = self._on_one_branch(self._solutions, row, last)
-        return answers if len(answers) else self._nearest(self._solutions, row, last)[None]
+        answers, branch = self._nearest(self._solutions, row, last)
+        self._stayed = self._stayed + 1 if branch == self._branch else 0
+        self._branch = branch
+        if self._stayed < _STAYS:
+            self._ahead = _FEW
+            return answers
+        more = self._on_one_branch(self._solutions, row + 1, answers[0]) if row + 1 < len(self._alone) else ()
+        if not len(more):
+            self._ahead = _FEW
+            return answers
+        self._ahead = min(2 * self._ahead, _AHEAD) if len(more) == self._ahead else _FEW
+        return np.concatenate([answers, more])
 
     def _on_one_branch(self, solutions: Solutions, row: int, last: Array) -> Array:
         """Return the answers while one branch stays the nearest and inside the limits; maybe none."""
-        rows = slice(row, row + _AHEAD)
+        rows = slice(row, row + self._ahead)
         joints, usable = solutions.joints[rows], self._usable[rows]
         branch = int(self._apart(joints[0] - last, usable[0]).argmin())
         along = joints[:, branch]
@@ -125,11 +196,15 @@ class _Follower:
         wrapped = np.where(self._turning, gaps - FULL * np.round(gaps / FULL), gaps)
         return np.where(usable, np.abs(wrapped).max(axis=-1), np.inf)
 
-    def _nearest(self, solutions: Solutions, row: int, last: Array) -> Array:
-        turned = np.ascontiguousarray(solutions.joints[row][self._usable[row]].T)[..., None]
-        choose_turns(self._arm.robot, turned, last[:, None])
-        best = int(np.abs(turned[..., 0] - last[:, None]).max(axis=0).argmin())
-        return np.array(turned[:, best, 0])
+    def _nearest(self, solutions: Solutions, row: int, last: Array) -> tuple[Array, int]:
+        """Return the nearest answer (1, n) of one row, and its branch; few steps, as rows may be many."""
+        joints = solutions.joints[row]
+        turns = np.rint((last - joints) / FULL)
+        np.maximum(turns, self._down[row], out=turns)
+        np.minimum(turns, self._up[row], out=turns)
+        values = joints + FULL * turns
+        branch = int((np.abs(values - last).max(axis=1) + self._refused[row]).argmin())
+        return values[branch : branch + 1], branch
 
     def _continued(self, row: int, last: Array) -> Array | None:
         """Return the answer (1, n) that Newton's steps find near to the row before; None where they fail."""

@@ -25,9 +25,9 @@ def jacobian_report(
     With joint rates in rad and the arm's unit of length, `jacobian` (6, n) gives the tcp's linear velocity in
     that unit of length and its angular one in rad, by second, as textbooks do whatever the unit of angles is.
     `manipulability` is in m and rad; `condition` is of the Jacobian scaled by the arm's length, None where
-    the rank is lost. `singular_directions` are unit vectors u with u J = 0, J in m and rad: components of
-    the velocity (v, w), in the axes of `frame`, that are zero for all joint rates. `idle_motions` are unit
-    vectors of joint rates, in rad and m, that leave the tcp at rest.
+    the rank is lost. `singular_directions` are unit vectors u with u J = 0 for the J in m and rad:
+    components of the velocity (v, w), in the axes of `frame`, that are zero for all joint rates.
+    `idle_motions` are unit vectors of joint rates, in rad and m, that leave the tcp at rest.
 
     Args:
         arm: The arm.

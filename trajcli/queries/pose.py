@@ -29,6 +29,7 @@ from trajcli.geometry.rotation import (
     compose_turns,
     nearest_rotation,
     quaternion_from_matrix,
+    without_jumps,
 )
 from trajcli.job.inline import inline_document, read_at
 from trajcli.language.numbers import FlawError, ReadingContext, shown
@@ -246,7 +247,8 @@ def pose_view(pose: Array, units: Units) -> dict[str, Any]:
     """Return one pose (4, 4), in m, as {matrix, xyz, rpy, quat_wxyz} in the given units.
 
     `matrix` has its translation in the unit of length; `rpy` are angles about the fixed axes x, y and z,
-    read off the matrix as it stands.
+    read off the matrix as it stands. The quaternion has w >= 0; where w is zero but for rounding, its first
+    other component that is not is positive.
     """
     rotation = pose[:3, :3]
     shown = np.array(pose)
@@ -255,7 +257,7 @@ def pose_view(pose: Array, units: Units) -> dict[str, Any]:
         "matrix": plain(shown),
         "xyz": plain(shown[:3, 3]),
         "rpy": angles_view(rpy_from_matrix(rotation).angles, units),
-        "quat_wxyz": plain(quaternion_from_matrix(rotation)),
+        "quat_wxyz": plain(without_jumps(quaternion_from_matrix(rotation)[None], None)[0]),
     }
 
 
