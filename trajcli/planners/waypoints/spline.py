@@ -292,7 +292,7 @@ class Spline(ThroughPoints):
             MissingLimitError: When times are left out and a moving joint has no limit.
             PlanningError: When no times keep the limits, or the ends ask for what the rule cannot do.
         """
-        points = self.waypoints(start)
+        points = self.waypoints(start, robot)
         if points.times is None and not np.ptp(points.positions, axis=0).any() and not points.rates.any():
             return standstill(points.target, self.duration or 0.0, REMEDIES)
         times = self._times_of(points, robot)
