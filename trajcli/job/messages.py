@@ -101,8 +101,8 @@ def _unknown_planner(move: object) -> tuple[str, str | None]:
     if not isinstance(tag, str):
         return f"expected a planner's name, got {shown(tag)}", _every_planner()
     meant = ALSO_CALLED.get(tag.strip().casefold().replace("-", "_").replace(" ", "_"))
-    own = f"write `planner: {meant}`" if meant else did_you_mean(tag, PLANNERS)
-    return f"unknown planner '{tag}'", f"{own} ({_every_planner()})" if own else _every_planner()
+    own = f"write `planner: {meant}` ({_every_planner()})" if meant else did_you_mean(tag, PLANNERS)
+    return f"unknown planner '{tag}'", own or _every_planner()
 
 
 def _every_planner() -> str:

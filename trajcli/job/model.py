@@ -27,6 +27,7 @@ from trajcli.frozen import comparable
 from trajcli.kinematics.robot import Robot
 from trajcli.language.limits import LimitsSpec
 from trajcli.language.numbers import (
+    AT_KEY,
     FieldType,
     FlawError,
     Model,
@@ -35,6 +36,7 @@ from trajcli.language.numbers import (
     refuse,
     shown,
 )
+from trajcli.language.per_joint import PerJoint
 from trajcli.language.points import NamedTarget
 from trajcli.language.poses import Pose
 from trajcli.planners import PLANNERS, Planner, moves_adapter
@@ -75,6 +77,44 @@ class RobotSource(FieldType):
         file = {"type": "object", "properties": {"file": {"type": "string"}}, "required": ["file"]}
         inline = {"$comment": ROBOT_DEFINITION}
         return {"anyOf": [{"$comment": CATALOGUE_NAME}, {**file, "additionalProperties": False}, inline]}
+
+
+class _FirstRow:
+    """Lets {csv: PATH} stand for a start: the first row of a recording."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
+        return core_schema.with_info_before_validator_function(self._read, handler(source))
+
+    @staticmethod
+    def _read(value: Any, info: core_schema.ValidationInfo) -> Any:  # noqa: ANN401
+        context = info.context
+        if not isinstance(value, Mapping) or "csv" not in value or context is None:
+            return value
+        try:
+            return _first_row(value, context)
+        except FlawError as error:
+            raise refuse(error.flaws) from None
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        keys = {"csv": {"type": "string", "description": "A recording, relative to the job's folder."}}
+        file = {"type": "object", "properties": keys, "required": ["csv"], "additionalProperties": False}
+        state = handler(schema)
+        return {**state, "anyOf": [*state["anyOf"], file]}
+
+
+def _first_row(value: Mapping[str, Any], context: ReadingContext) -> dict[str, Any]:
+    """Return the state of the first row of the file that `csv` names."""
+    other = next((key for key in value if key != "csv"), None)
+    if other is not None:
+        raise FlawError(f"csv and {other} exclude each other", other, AT_KEY, hint="leave one of them out")
+    if not isinstance(value["csv"], str):
+        raise FlawError(f"expected the path of a file, got {shown(value['csv'])}", "csv")
+    if context.read_points is None:
+        return {"joints": 0}  # the robot has flaws of its own
+    first = context.read_points(value["csv"]).positions[0]
+    return {"joints": PerJoint(0, "").write(tuple(first.tolist()), context)}
 
 
 Seconds = Annotated[float, Number(Quantity("time"), "Time, s.")]
@@ -164,7 +204,13 @@ class Job(Model):
         None
     )
     points: dict[str, NamedTarget] = Field(default_factory=dict, description="Named states.")
-    start: Annotated[NamedTarget, Field(description="Where the arm stands before the first move.")]
+    start: Annotated[
+        NamedTarget,
+        _FirstRow(),
+        Field(
+            description="Where the arm stands before the first move; {csv: PATH}: first row of a recording."
+        ),
+    ]
     moves: Annotated[list[Planner], _Moves(), Field(description="What to do, in order.")]
     when_over_limit: Annotated[
         WhenOverLimit,

@@ -18,10 +18,12 @@ from trajcli.job.limits import looser_bounds, looser_problem, looser_tool_bounds
 from trajcli.job.messages import problems_of
 from trajcli.job.model import Job, UnitsSpec
 from trajcli.job.robot import find_robot
+from trajcli.job.yaml.document import Node
 from trajcli.job.yaml.load import Document, parse_document, read_document
 from trajcli.kinematics.robot import Robot, unlimited
-from trajcli.language.numbers import ReadingContext
+from trajcli.language.numbers import FieldPath, ReadingContext
 from trajcli.language.recorded import Recorded
+from trajcli.language.targets import PoseFields, Target
 from trajcli.planners.planner import Event
 from trajcli.units import Units, amount_text
 
@@ -55,6 +57,19 @@ class LoadedJob:
     def say(self, amount: Amount) -> str:
         """Return a number of a message in the job's units."""
         return amount_text(amount, self.robot.joint_types, self.units)
+
+    def point_meant(self, target: Target, path: FieldPath) -> str | None:
+        """Return the name of the point that a target is, where the value at a path of the file names it."""
+        named = {text for text in _texts(self.document.node(path)) if text in self.job.points}
+        fields = PoseFields.model_fields
+        return next(
+            (
+                name
+                for name in sorted(named)
+                if all(getattr(self.job.points[name], field) == getattr(target, field) for field in fields)
+            ),
+            None,
+        )
 
     def place_of_move(self, index: int) -> Place:
         """Return where a move stands in the file."""
@@ -136,6 +151,15 @@ def _load(document: Document) -> LoadedJob:
     if flaws:
         raise InputError(*sorted(flaws, key=_position))
     return loaded
+
+
+def _texts(node: Node | None) -> Iterator[str]:
+    """Yield every text below a node."""
+    value = None if node is None else node.value
+    if isinstance(value, str):
+        yield value
+    for below in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
+        yield from _texts(below)
 
 
 def _recorded(document: Document, robot: Robot, path: str) -> Recorded:

@@ -50,7 +50,8 @@ def _named_at(document: Document, path: str) -> tuple[str | int, ...]:
         node = through and through.child("csv")
         if node is not None and node.value == path:
             return ("moves", index, "through", "csv")
-    return ("moves",)
+    start = document.node(("start", "csv"))
+    return ("start", "csv") if start is not None and start.value == path else ("moves",)
 
 
 def _placed(problem: Problem) -> str:

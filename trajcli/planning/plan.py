@@ -13,7 +13,7 @@ import numpy as np
 from trajcli.checks.tolerances import JUMP_ABSOLUTE
 from trajcli.checks.verify import Verdict, verify
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
-from trajcli.errors import Amount, Amounts, Place, TrajcliError
+from trajcli.errors import Amount, Amounts, Place, PlanningError, TrajcliError
 from trajcli.frozen import frozen
 from trajcli.job.limits import with_move_limits
 from trajcli.job.read import LoadedJob
@@ -74,6 +74,7 @@ def plan_job(loaded: LoadedJob) -> Plan:
         state, before = move.planned.end, planner
     trajectory = _joined(moves, loaded, _first_state(loaded, moves[0], events))
     verdict = verify(trajectory, [move.robot.limits for move in moves], [move.promise for move in moves])
+    verdict = _with_unit_hint(verdict, loaded)
     shown = tuple(replace(event, message=event.text(loaded.say), amounts={}) for event in events)
     return Plan(loaded, tuple(moves), trajectory, verdict, shown, poses)
 
@@ -92,7 +93,14 @@ def _resolved(
         return target
     from trajcli.planning.resolve_poses import resolve_pose
 
-    resolved, poses[index] = resolve_pose(target, loaded.robot, near)
+    try:
+        resolved, poses[index] = resolve_pose(target, loaded.robot, near)
+    except TrajcliError as error:
+        name = loaded.point_meant(target, ("start",) if index is None else ("moves", index))
+        if name is None:
+            raise
+        problems = (problem.within(f"the point '{name}'") for problem in error.problems)
+        raise type(error)(*problems).located(place=loaded.document.place(("points", name))) from None
     return resolved
 
 
@@ -198,4 +206,26 @@ def _errors_at(loaded: LoadedJob, place: Place) -> Iterator[None]:
     try:
         yield
     except TrajcliError as error:
-        raise error.said_by(loaded.say).located(place=place) from None
+        said = error.said_by(loaded.say).located(place=place)
+        hint = _unit_hint(loaded) if isinstance(error, PlanningError) else None
+        if hint is None:
+            raise said from None
+        hints = (f"{hint}; else {problem.hint}" if problem.hint else hint for problem in said.problems)
+        problems = (replace(p, hint=text) for p, text in zip(said.problems, hints, strict=True))
+        raise type(error)(*problems) from None
+
+
+def _unit_hint(loaded: LoadedJob) -> str | None:
+    from trajcli.job.unit_hints import unit_hint
+
+    return unit_hint(loaded)
+
+
+def _with_unit_hint(verdict: Verdict, loaded: LoadedJob) -> Verdict:
+    """Return the verdict with a hint to the units where a position is beyond its limit because of them."""
+    beyond = any(finding.kind == "position" for finding in verdict.findings)
+    hint = _unit_hint(loaded) if beyond else None
+    if hint is None:
+        return verdict
+    findings = (replace(f, hint=hint) if f.kind == "position" else f for f in verdict.findings)
+    return replace(verdict, findings=tuple(findings))

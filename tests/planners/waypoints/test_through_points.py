@@ -128,7 +128,7 @@ WRONG_FILES = {
     "t,q1,q2\n0,0,0\n1,1,1\n1,2,2\n": "times must increase, but row 3 has t = 1 s after 1 s (remove the rows",
     "time,q1,q2\n1,1,0\n2,1,1\n": "times stand in the column t, in s; this file has 'time' (call it t",
     "T_ms,q1,q2\n1,1,0\n2,1,1\n": "this file has 'T_ms'",
-    "t,q1,q2\n0,1,0\n1,1,1\n": "the recording begins at t = 0 s, but not where the arm then stands (go to",
+    "t,q1,q2\n0,1,0\n1,1,1\n": "the recording begins at t = 0 s, but not where the arm then stands: it has j1 at 1 rad, the arm at 0 rad, 1 rad apart (go to",
 }
 
 

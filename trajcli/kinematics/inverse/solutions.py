@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
-from trajcli.errors import Amount, PlanningError, Problem
+from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.frozen import comparable, frozen
 from trajcli.geometry.rotation import AxisName, Flags
 from trajcli.kinematics.inverse.families.method import Branch, IkMethod
@@ -153,11 +153,13 @@ def check_reachable(robot: Robot, solutions: Solutions) -> None:
     which = f" (number {', '.join(map(str, index))} of the batch, from 0)" if index else ""
     if not solutions.valid[index].any():
         metres, radians = solutions.shortfall[index].tolist()
-        raise PlanningError(
-            f"{robot.name} cannot reach the pose{which}: "
-            f"it comes within {metres:.6g} m and {round(radians, 12):.6g} rad",
-            hint=_hint_for(solutions),
-        )
+        amounts: Amounts = {
+            "robot": robot.name,
+            "distance": Amount(float(f"{metres:.6g}"), 0, None, "length"),
+            "angle": Amount(float(f"{round(radians, 12):.6g}"), 0, None, "angle"),
+        }
+        message = f"{{robot}} cannot reach the pose{which}: it comes within {{distance}} and {{angle}}"
+        raise PlanningError(Problem(message, _hint_for(solutions), amounts=amounts))
     raise PlanningError(_problem(robot, solutions, index, which))
 
 

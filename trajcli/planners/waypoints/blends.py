@@ -227,7 +227,7 @@ class Blends(ThroughPoints):
             MissingLimitError: When a time or a blend follows neither from the fields nor from the limits.
             PlanningError: When the arm moves at the start, or an acceleration is too small for the times.
         """
-        points = self.waypoints(start)
+        points = self.waypoints(start, robot)
         if not start.at_rest and (points.times is None or start.acceleration.any()):
             raise start_in_motion(self.tag, start, robot)
         if points.times is None and not np.ptp(points.positions, axis=0).any():

@@ -323,7 +323,7 @@ class Spline(ThroughPoints):
             MissingLimitError: When times are left out and a moving joint has no limit.
             PlanningError: When no times keep the limits, or the ends ask for what the rule cannot do.
         """
-        points = self.waypoints(start)
+        points = self.waypoints(start, robot)
         if points.times is None and not np.ptp(points.positions, axis=0).any():
             arrived = same_state(start, points.target) and (start.at_rest or not self.duration)
             if arrived or not points.rates.any():

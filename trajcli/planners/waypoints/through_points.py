@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from trajcli.curves.piecewise import Array
-from trajcli.errors import PlanningError, TrajcliError
+from trajcli.errors import Amount, Amounts, PlanningError, Problem, TrajcliError
 from trajcli.frozen import frozen
+from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import Flaw, refuse
 from trajcli.language.recorded import Recorded
 from trajcli.language.targets import Duration, Target
@@ -196,21 +197,44 @@ class ThroughPoints(Planner):
             scaled["to"] = self.to and _at(self.to, factor)
         return self.model_copy(update=scaled)
 
-    def waypoints(self, start: State) -> PointTable:
+    def waypoints(self, start: State, robot: Robot) -> PointTable:
         """Return the points as numbers; repeated ones are left out where nothing says when they are passed.
 
         Args:
             start: Where the move begins.
+            robot: For the names of its joints in messages.
         """
         recorded = self.through
         if not isinstance(recorded, Recorded):
             points = self._stacked(start, None)
             return points if points.times is not None else _without_repeats(points)
         here = start.position
+        self._refuse_another_start(recorded, here, robot)
         kept = recorded.after(here, None if self.to is None else self.to.as_state().position)
         points = self._stacked(start, kept)
         dropped = len(recorded.positions) - int(recorded.begins_at(here)) - len(kept.positions)
         return replace(points, events=_merged(dropped, recorded)) if dropped else points
+
+    def _refuse_another_start(self, recorded: Recorded, here: Array, robot: Robot) -> None:
+        """Refuse a recording that leaves no time to go to its first point."""
+        if recorded.times is None or recorded.times[0] > 0 or recorded.begins_at(here):
+            return
+        apart = np.abs(recorded.positions[0] - here)
+        if not apart.any():
+            text = f"the recording has one row, where the arm stands, at t = {recorded.times[0]:.12g} s"
+            raise PlanningError(text, hint="leave out its column t, or the move")
+        joint = int(apart.argmax())
+        numbers = {"there": recorded.positions[0, joint], "here": here[joint], "distance": apart[joint]}
+        amounts: Amounts = {key: Amount(float(value), 0, joint) for key, value in numbers.items()}
+        message = (
+            f"the recording begins at t = {recorded.times[0]:.12g} s, but not where the arm then stands: "
+            "it has {joint} at {there}, the arm at {here}, {distance} apart"
+        )
+        hint = (
+            "go to its first point in a move before, give a larger `merge` or a later `t`, or begin there "
+            "(`start: {csv: ...}` with the same file)"
+        )
+        raise PlanningError(Problem(message, hint, amounts={"joint": robot.joint_names[joint], **amounts}))
 
     def _stacked(self, start: State, recorded: Recorded | None) -> PointTable:
         listed = self.listed
@@ -237,11 +261,6 @@ class ThroughPoints(Planner):
             before = [time * (self.duration / before[-1]) for time in before]
         times = np.array([0.0, *before, *listed])
         late = np.flatnonzero(np.diff(times) <= 0)
-        if late.size and late[0] == 0 and before:
-            raise PlanningError(
-                f"the recording begins at t = {before[0]:.12g} s, but not where the arm then stands",
-                hint="go to its first point in a move before, or give a larger `merge` or a later `t`",
-            )
         if late.size:
             message = (
                 f"the target is reached after {times[-1]:.12g} s, "

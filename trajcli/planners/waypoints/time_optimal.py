@@ -279,7 +279,7 @@ class TimeOptimal(ThroughPoints):
             MissingLimitError: When a moving joint has no limit of acceleration.
             PlanningError: When the velocities at the ends do not fit the path, or the duration is too short.
         """
-        points = self._untimed().waypoints(start)
+        points = self._untimed().waypoints(start, robot)
         moving = np.ptp(points.positions, axis=0) > 0
         if not moving.any():
             return standstill(points.target, self.duration or 0.0, REMEDIES)

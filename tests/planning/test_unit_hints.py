@@ -1,0 +1,95 @@
+"""Degrees read as radians and millimetres read as metres are recognised; doing what the hint says works."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from trajcli.errors import PlanningError
+from trajcli.job.read import job_from_text, load_job
+from trajcli.planning.plan import plan_job
+
+JOINTS = "start: {joints: [0, -90, 90, 0, 90, 0]}\n"
+SWING = "moves: [{planner: quintic, to: {joints: [30, -90, 90, 0, 90, 0]}, duration: 3}]\n"
+POSE = "moves: [{planner: quintic, to: {xyz: [400, 100, 250], rpy: [180, 0, 0]}, duration: 6}]\n"
+LINE = (
+    "points: {pick: {xyz: [400, 100, 250], rpy: [3.14159, 0, 0]}}\nstart: {joints: [0, -1.6, 1.6, 0, 1.6, 0]}\n"
+    "moves: [{planner: quintic, to: {from: pick}, duration: 6}]\n"
+)
+
+
+def hints_of(text: str) -> list[str]:
+    try:
+        verdict = plan_job(job_from_text(text, "job.yaml")).verdict
+    except PlanningError as error:
+        return [problem.hint or "" for problem in error.problems]
+    return [finding.hint or "" for finding in verdict.findings if finding.kind == "position"]
+
+
+@pytest.mark.parametrize(
+    ("head", "units"),
+    [
+        (f"version: 1\nrobot: ur5e\n{JOINTS}{SWING}", "{angle: deg}"),
+        (f"version: 1\nrobot: ur5e\nunits: {{length: mm}}\n{JOINTS}{SWING}", "{angle: deg, length: mm}"),
+        (f"version: 1\nrobot: ur5e\n{JOINTS}{POSE}", "{angle: deg, length: mm}"),
+        (f"version: 1\nrobot: ur5e\nunits: {{angle: deg}}\n{JOINTS}{POSE}", "{angle: deg, length: mm}"),
+        (f"version: 1\nrobot: ur5e\n{LINE}", "{length: mm}"),
+    ],
+)
+def test_following_the_hint_to_the_letter_works(head: str, units: str) -> None:
+    hints = hints_of(head)
+    assert hints
+    assert all(f"say `units: {units}`" in hint for hint in hints), hints
+    said = re.search(r"say `(units: \{.*?\})`", hints[0])
+    assert said is not None
+    without = re.sub(r"^units:.*\n", "", head, flags=re.MULTILINE)
+    assert plan_job(job_from_text(f"{without}{said[1]}\n")).verdict.passed
+
+
+def test_numbers_that_fit_or_have_their_unit_get_no_hint_about_units() -> None:
+    near = POSE.replace("[400, 100, 250]", "[4 m, 100 mm, 250 mm]").replace("180", "180 deg")
+    (hint,) = hints_of(f"version: 1\nrobot: ur5e\nstart: {{joints: [0, -90 deg, 90 deg, 0, 1, 0]}}\n{near}")
+    assert "units" not in hint
+    moving = "start: {joints: 0}\nmoves: [{planner: quintic, to: {joints: 90}, duration: 3}]\n"
+    assert hints_of(f"version: 1\nrobot: {{joints: 2}}\n{moving}") == []  # a conveyor may turn often
+
+
+def test_an_unreachable_point_is_named_where_it_stands_in_the_units_of_the_job() -> None:
+    text = (
+        "version: 1\nunits: {angle: deg, length: mm}\nrobot: ur5e\npoints:\n  far: {xyz: [4000, 0, 300]}\n"
+        f"{JOINTS}moves: [{{planner: quintic, to: far, duration: 3}}]\n"
+    )
+    with pytest.raises(PlanningError) as caught:
+        plan_job(job_from_text(text, "job.yaml"))
+    (problem,) = caught.value.problems
+    assert str(problem.place) == "job.yaml:5:8"
+    assert problem.message.startswith("move 0 (quintic): the point 'far': UR5e cannot reach the pose")
+    millimetres = re.search(r"within ([0-9.]+) mm and ([0-9.]+) deg", problem.message)
+    assert millimetres is not None
+    assert 2500 < float(millimetres[1]) < 4000  # the arm is about 0.95 m long, its shoulder at the origin
+
+
+def test_a_start_is_the_first_row_of_a_recording(tmp_path: Path) -> None:
+    rows = np.rad2deg([[0.1, 0.2], [0.3, 0.5], [0.4, 0.9]])
+    lines = ["t,q1_deg,q2_deg", *(f"{k},{a!r},{b!r}" for k, (a, b) in enumerate(rows.tolist()))]
+    (tmp_path / "led.csv").write_text("\n".join(lines) + "\n")
+    job = tmp_path / "job.yaml"
+    moves = "moves: [{planner: spline, through: {csv: led.csv}}]\n"
+    job.write_text(f"version: 1\nrobot: {{joints: 2}}\nstart: {{csv: led.csv}}\n{moves}")
+    plan = plan_job(load_job(job))
+    assert plan.trajectory.duration == 2
+    np.testing.assert_allclose(
+        plan.trajectory.curve.evaluate(np.array([0.0, 1, 2])), np.deg2rad(rows), atol=1e-12
+    )
+    job.write_text(f"version: 1\nunits: {{angle: deg}}\nrobot: {{joints: 2}}\nstart: {{joints: 0}}\n{moves}")
+    with pytest.raises(PlanningError) as caught:
+        plan_job(load_job(job))
+    (problem,) = caught.value.problems
+    assert (
+        f"it has j2 at {np.rad2deg(0.2):.9g} deg, the arm at 0 deg, {np.rad2deg(0.2):.9g} deg apart"
+        in problem.message
+    )
+    assert "`start: {csv: ...}`" in (problem.hint or "")
