@@ -73,7 +73,8 @@ app = typer.Typer(
     cls=Commands,
     help="Trajectory planning for serial robots: a YAML job in, a verified sample stream out. "
     "`trajcli --version` prints the version.",
-    epilog="Exit codes: 0 done and verified, 1 judged and found wrong, 2 wrong input, 3 no curve exists, "
+    epilog="Example: trajcli init job.yaml && trajcli plan job.yaml\n\n"
+    "Exit codes: 0 done and verified, 1 judged and found wrong, 2 wrong input, 3 no curve exists, "
     "4 file trouble, 70 a bug in trajcli.",
     rich_markup_mode=None,
     no_args_is_help=True,

@@ -19,7 +19,7 @@ from trajcli.kinematics.inverse.solutions import Solutions, check_reachable
 from trajcli.kinematics.inverse.solve import fits, solve
 from trajcli.kinematics.inverse.target import IkTarget, closure_of, partial_target
 from trajcli.queries.arm import ArmInUnits
-from trajcli.queries.forward import Stream
+from trajcli.queries.forward import Stream, refuse_far
 from trajcli.streams.table import TableBlocks
 
 _AHEAD = 256  # rows that are looked at together
@@ -156,6 +156,7 @@ def _of_row(
 
 
 def _targets(block: Array, inputs: _PoseColumns, done: int, file: str) -> IkTarget:
+    refuse_far(block[:, [*inputs.position, *inputs.rotation]], file)
     position = block[:, inputs.position] * inputs.factors
     if not inputs.rotation:
         return partial_target(position)
