@@ -91,7 +91,7 @@ class Problem:
         place: Where it stands in the user's file.
         move: Index of the move, from 0.
         joint: Name of the joint.
-        time: Seconds from the start of the move.
+        time: Seconds from the start of the trajectory; in what a planner raises, of its move.
         value: The offending number, SI.
         limit: The bound it breaks, SI.
         amounts: Numbers and names that the message holds as `{name}`.
@@ -134,6 +134,11 @@ def said(message: str, amounts: Amounts, say: Callable[[Amount], str] = str) -> 
         return amount if isinstance(amount, str) else say(amount)
 
     return _FIELD.sub(fill, message) if amounts else message
+
+
+def utf8(name: str) -> str:
+    """Return the name of a file with its bytes that are no UTF-8 as escapes, so that it can be written."""
+    return name.encode("utf-8", "backslashreplace").decode()
 
 
 class TrajcliError(Exception):

@@ -142,7 +142,7 @@ BAD_CALLS = [
     (["--robot", "none.yaml", *HOME], 4, "there is no file 'none.yaml'"),
     (["--robot", "ur5e", "1", "2"], 2, "q has 2 values, UR5e has 6 joints"),
     (["--robot", "ur5e", *HOME[:5], "nan"], 2, "q of wrist_3_joint: expected a number (deg), got nan"),
-    (["--robot", "ur5e", *HOME[:5], "1e400"], 2, "too large"),
+    (["--robot", "ur5e", *HOME[:5], "1e400"], 2, "expected a magnitude of at most"),
     (["--robot", "ur5e", *HOME[:5], "10mm"], 2, "expected an angle"),
     (["--robot", "ur5e", "--jsn", *HOME], 2, "No such option: --jsn"),
     (["--robot", "ur5e", "--tool", "{xyz: [1, 2]}", *HOME], 2, "--tool:1:7: error: expected 3 numbers"),

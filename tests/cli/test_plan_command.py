@@ -161,6 +161,53 @@ def test_wrong_options(options: tuple[str, ...], message: str, job: Path, capfd:
     assert {path.name for path in Path().iterdir()} == {"job.yaml"}
 
 
+def test_times_of_errors_count_from_the_start_of_the_job(job: Path, capfd: Capture) -> None:
+    """A quintic over D = 1 s from 0 to 30 deg in 0.25 s is fastest at its middle: 1.875 D / T."""
+    slow = "  - {planner: quintic, to: {joints: 0}, duration: 2}\n"
+    job.write_text(FAST.replace("moves:\n", "moves:\n" + slow))
+    code, _, err = call(capfd, "plan", job, "--errors", "json", "--report", "r.json")
+    (problem,) = json.loads(err)["problems"]
+    assert (code, problem["move"], problem["time"]) == (1, 1, 2.125)
+    assert "at t = 2.125 s" in problem["message"]
+    assert json.loads(Path("r.json").read_text())["findings"][0]["time"] == 2.125
+
+
+def test_one_error_for_each_move_and_kind(job: Path, capfd: Capture) -> None:
+    """A quintic is fastest at its middle, 1.875 D / T: 56.25, 112.5 and 75 deg/s."""
+    text = JOB.replace("{joints: [{velocity: 90}]}", "{joints: 3}").replace("joints: 0", "joints: [0, 0, 0]")
+    text = text.replace("joints: 30", "joints: [30, 60, 40]").replace(
+        "start:", "limits: {velocity: 50}\nstart:"
+    )
+    job.write_text(text)
+    code, _, err = call(capfd, "plan", job)
+    assert (code, err.count("error:")) == (1, 1)
+    assert (
+        "the velocity of j2 reaches 112.5 deg/s at t = 0.5 s, its limit is 50 deg/s (and 2 more like it: --all)"
+        in err
+    )
+    code, _, err = call(capfd, "plan", job, "--all")
+    assert (code, err.count("error:"), "--all" in err) == (1, 3, False)
+    code, _, err = call(capfd, "plan", job, "--errors", "json")
+    assert {problem["joint"] for problem in json.loads(err)["problems"]} == {"j1", "j2", "j3"}
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("plan", "--errors", "json"), "Missing argument 'JOB'."),
+        (("plan", "a", "--nothing", "--errors=json"), "No such option: --nothing"),
+        (("plan", "a", "--digits", "5", "--errors", "json"), "Invalid value for '--digits'"),
+        (("plam", "--errors", "json"), "Did you mean 'plan'"),
+    ],
+)
+def test_errors_of_usage_for_machines(words: tuple[str, ...], message: str, capfd: Capture) -> None:
+    code, out, err = call(capfd, *words)
+    said = json.loads(err)
+    assert (code, out, said["exit"], said["error"]) == (2, "", 2, "InputError")
+    assert message in said["problems"][0]["message"]
+    assert call(capfd, "plan", "--help", "--errors", "json").code == 0
+
+
 def test_errors_for_machines(job: Path, capfd: Capture) -> None:
     job.write_text(FAST)
     code, out, err = call(capfd, "plan", job, "--errors", "json")

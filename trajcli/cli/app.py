@@ -6,19 +6,75 @@ Only typer is imported here: `--help` must stay fast.
 from __future__ import annotations
 
 import sys
-from typing import Annotated, Literal, get_type_hints
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Annotated, Any, Literal, get_type_hints
 
 import typer
+import typer.core
 
 from trajcli.cli.arm_commands import register
 from trajcli.cli.options import Errors, JobFile, Json, Overrides
 from trajcli.cli.outcome import guarded
 
+_JUDGE = "trajcli plan JOB --no-output"
+_OTHER_NAMES = {
+    **dict.fromkeys(("validate", "check", "verify", "lint", "test"), _JUDGE),
+    **dict.fromkeys(("run", "simulate", "sample", "generate", "execute", "trajectory"), "trajcli plan JOB"),
+    **dict.fromkeys(("convert", "transform", "rotation", "quaternion", "euler"), "trajcli pose STEP..."),
+    **dict.fromkeys(("forward", "forward-kinematics"), "trajcli fk"),
+    **dict.fromkeys(("inverse", "inverse-kinematics", "solve"), "trajcli ik"),
+    "kinematics": "trajcli fk, trajcli ik or trajcli jacobian",
+    **dict.fromkeys(("list", "ls", "robot", "catalogue", "catalog"), "trajcli robots"),
+    **dict.fromkeys(("compare", "cmp"), "trajcli diff A B"),
+    **dict.fromkeys(("new", "create", "start", "example"), "trajcli init"),
+    **dict.fromkeys(("show", "describe", "info"), "trajcli explain JOB"),
+    "report": "trajcli plan JOB --report FILE",
+    "help": "trajcli --help",
+    "version": "trajcli --version",
+}  # fmt: skip
+
+
+class Commands(typer.core.TyperGroup):
+    """The commands, which know by what other names people call them."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401
+        """Return the command of the first word, its name, and the words behind it."""
+        known = _OTHER_NAMES.get(args[0].lower())
+        if args[0] not in self.commands and known is not None:
+            ctx.fail(f"No such command '{args[0]}': here it is `{known}`.")
+        return super().resolve_command(ctx, args)
+
+    def main(self, args: Sequence[str] | None = None, *rest: Any, **options: Any) -> Any:  # noqa: ANN401
+        """Run the command; errors of usage are JSON where the words ask for that."""
+        if not _wants_json(sys.argv[1:] if args is None else args):
+            return super().main(args, *rest, **options)
+        try:
+            code = super().main(args, *rest, **{**options, "standalone_mode": False})
+        except Exception as error:
+            words = getattr(error, "format_message", None)
+            if words is None:  # no error of usage
+                raise
+            from trajcli.cli.outcome import report_error
+            from trajcli.errors import InputError
+
+            report_error(InputError(words(), hint="see --help"), as_json=True)
+            sys.exit(InputError.exit_code)
+        sys.exit(code or 0)
+
+
+def _wants_json(words: Sequence[str]) -> bool:
+    options = list(words[: words.index("--")] if "--" in words else words)
+    return "--errors=json" in options or ("--errors", "json") in pairwise(options)
+
+
 app = typer.Typer(
     name="trajcli",
+    cls=Commands,
     help="Trajectory planning for serial robots: a YAML job in, a verified sample stream out. "
     "`trajcli --version` prints the version.",
-    epilog="Exit codes: 0 done and verified, 1 judged and found wrong, 2 wrong input, 3 no curve exists, "
+    epilog="Example: trajcli init job.yaml && trajcli plan job.yaml\n\n"
+    "Exit codes: 0 done and verified, 1 judged and found wrong, 2 wrong input, 3 no curve exists, "
     "4 file trouble, 70 a bug in trajcli.",
     rich_markup_mode=None,
     no_args_is_help=True,
@@ -32,7 +88,7 @@ def commands() -> None:
     """Let typer ask for a command's name also where `run` leaves only one."""
 
 
-@app.command()
+@app.command(epilog="Example: trajcli plan examples/ur5e_pick.yaml -o rows.csv")
 @guarded
 def plan(
     job: JobFile,
@@ -62,16 +118,20 @@ def plan(
     ] = False,
     no_output: Annotated[bool, typer.Option("--no-output", help="Only judge: write no rows.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on stderr.")] = False,
+    every: Annotated[
+        bool, typer.Option("--all", help="Every finding, not only the worst of each move and kind.")
+    ] = False,
     errors: Errors = "text",
 ) -> int:
     """Plan a job, verify it, and write its samples as CSV."""
     from trajcli.cli.plan import PlanOptions, run_plan
 
-    options = PlanOptions(rate, output, report, resolved, digits, strict, reference, no_output, quiet)
+    every = every or errors == "json"
+    options = PlanOptions(rate, output, report, resolved, digits, strict, reference, no_output, quiet, every)
     return run_plan(job, override, options)
 
 
-@app.command()
+@app.command(epilog="Example: trajcli explain examples/cubic.yaml")
 @guarded
 def explain(
     job: JobFile,
@@ -85,7 +145,7 @@ def explain(
     return run_explain(job, override, as_json=as_json)
 
 
-@app.command()
+@app.command(epilog="Example: trajcli diff old.csv new.csv --atol 1e-9")
 @guarded
 def diff(
     a: Annotated[str, typer.Argument(metavar="A", help="A CSV file; - is standard input.")],
@@ -110,7 +170,7 @@ def diff(
     return run_diff(a, b, atol, rtol, resample=resample)
 
 
-@app.command()
+@app.command(epilog="Example: trajcli schema job")
 @guarded
 def schema(
     kind: Annotated[
@@ -127,7 +187,7 @@ def schema(
     return 0
 
 
-@app.command()
+@app.command(epilog="Example: trajcli init job.yaml")
 @guarded
 def init(
     file: Annotated[str, typer.Argument(metavar="FILE", help="The file to write; - is stdout.")] = "job.yaml",

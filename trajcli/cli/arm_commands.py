@@ -28,6 +28,13 @@ _NUMBER_LIKE = re.compile(r"[-+]?(?:\.?[0-9][^=]*|\.?nan|\.?inf(?:inity)?)", re.
 JOINED = ("--qd", "--near", "--point", "--s")
 """Options that take all the numbers behind them."""
 
+_EXAMPLES = {
+    "fk": "trajcli fk --robot ur5e 0 -90 90 0 90 0",
+    "ik": "trajcli ik -r ur5e --pose '{xyz: [0.4, 0.1, 0.3]}'",
+    "jacobian": "trajcli jacobian --robot ur5e 0 -90 90 0 90 0",
+    "pose": "trajcli pose --units deg '{rpy: [0, 0, 90]}' '{xyz: [1, 0, 0]}'",
+}
+
 
 class NumbersCommand(typer.core.TyperCommand):
     """Takes `--qd 1 -2 3` as one option and `-90` as a number, with or without `--` before it."""
@@ -89,11 +96,9 @@ def sorted_words(args: list[str], takes: Mapping[str, int]) -> list[str]:
 
 def register(app: typer.Typer) -> None:
     """Add the commands fk, ik, jacobian, pose and robots."""
-    app.command(cls=NumbersCommand)(fk)
-    app.command(cls=NumbersCommand)(ik)
-    app.command(cls=NumbersCommand)(jacobian)
-    app.command(cls=NumbersCommand)(pose)
-    app.command()(robots)
+    for command in (fk, ik, jacobian, pose):
+        app.command(cls=NumbersCommand, epilog=f"Example: {_EXAMPLES[command.__name__]}")(command)
+    app.command(epilog="Example: trajcli robots ur5e")(robots)
 
 
 @guarded

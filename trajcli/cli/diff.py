@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from trajcli.cli.outcome import print_lines
 from trajcli.comparison.difference import compare, describe, parse_tolerances
 from trajcli.errors import InputError
 from trajcli.streams.table import read_csv
-from trajcli.streams.whole_file import standard_output
 
 
 def run_diff(a: str, b: str, atol: str, rtol: str, *, resample: bool) -> int:
@@ -19,6 +19,5 @@ def run_diff(a: str, b: str, atol: str, rtol: str, *, resample: bool) -> int:
         raise InputError("only one of the files can be standard input")
     tolerances = [parse_tolerances(text) if text else {} for text in (atol, rtol)]
     difference = compare(read_csv(a), read_csv(b), *tolerances, resample=resample)
-    with standard_output() as out:
-        out.write((describe(difference) + "\n").encode())
+    print_lines([describe(difference)])
     return 0 if difference.equal else 1

@@ -64,8 +64,8 @@ def render_problem(problem: Problem, *, color: bool) -> str:
 def problem_as_json(problem: Problem) -> dict[str, Any]:
     """Return a problem as a mapping that JSON can hold, with the same keys for every problem.
 
-    Lines and columns count from 1, moves from 0; `value` and `limit` are SI. What is not known, or not
-    finite, is None.
+    Lines and columns count from 1, moves from 0, times from the start of the trajectory; `value` and
+    `limit` are SI. What is not known, or not finite, is None.
     """
     place = problem.place
     return {

@@ -34,7 +34,7 @@ def _outcome(command: Callable[..., int], args: tuple[Any, ...], options: dict[s
     try:
         return command(*args, **options)
     except TrajcliError as error:
-        _render(error, as_json=options.get("errors") == "json")
+        report_error(error, as_json=options.get("errors") == "json")
         return error.exit_code
     except BrokenPipeError:
         return PIPE_CLOSED
@@ -48,7 +48,8 @@ def _outcome(command: Callable[..., int], args: tuple[Any, ...], options: dict[s
         return _bug(error, as_json=options.get("errors") == "json")
 
 
-def _render(error: TrajcliError, *, as_json: bool) -> None:
+def report_error(error: TrajcliError, *, as_json: bool) -> None:
+    """Print an error on standard error, for people or for programs."""
     from trajcli.cli.frames import problem_as_json, render_problem
 
     if as_json:

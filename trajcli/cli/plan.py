@@ -38,6 +38,7 @@ class PlanOptions:
     reference: bool = False
     no_output: bool = False
     quiet: bool = False
+    every: bool = True
 
 
 def run_plan(job: str, overrides: Sequence[str], options: PlanOptions) -> int:
@@ -70,7 +71,7 @@ def _refusal(plan: Plan, options: PlanOptions) -> VerificationError | None:
     if not plan.verdict.passed:
         from trajcli.output.report import verification_error
 
-        return verification_error(plan)
+        return verification_error(plan, every=options.every)
     conceded = [event for event in plan.events if event.concedes]
     return (
         VerificationError(*(_problem(plan, event) for event in conceded))

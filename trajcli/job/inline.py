@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -14,7 +13,7 @@ from trajcli.errors import InputError, Problem
 from trajcli.job.messages import problems_of
 from trajcli.job.yaml.document import Document
 from trajcli.job.yaml.load import parse_document, read_document
-from trajcli.language.numbers import AT_KEY, FlawError, ReadingContext
+from trajcli.language.numbers import AT_KEY, FlawError, ReadingContext, within_bounds
 from trajcli.language.poses import Pose
 from trajcli.language.targets import PoseFields
 from trajcli.units import (
@@ -38,16 +37,20 @@ def inline_number(word: str, name: str, quantity: Quantity, units: Units) -> flo
     """
     unit = unit_name(quantity, units)
     if _NUMBER.fullmatch(word):
-        value = float(word) * factor(quantity, units)
-        if math.isfinite(value):
-            return value
-        raise InputError(f"{name}: {word} is too large")
+        return _bounded(float(word) * factor(quantity, units), word, name, quantity, units)
     try:
-        return parse_quantity(word, quantity)
+        return _bounded(parse_quantity(word, quantity), word, name, quantity, units)
     except UnitError as error:
         raise InputError(
             f"{name}: expected a number{f' ({unit})' if unit else ''}, got {word[:40]}", hint=str(error)
         ) from None
+
+
+def _bounded(number: float, word: str, name: str, quantity: Quantity, units: Units) -> float:
+    try:
+        return within_bounds(number, word, quantity, units)
+    except FlawError as error:
+        raise InputError(f"{name}: {error}", hint=error.flaws[0][2]) from None
 
 
 def inline_document(word: str, name: str) -> Document:

@@ -9,9 +9,10 @@ from typing import NamedTuple
 from trajcli.errors import InputError, Place
 from trajcli.frozen import frozen
 from trajcli.job.yaml.document import Document, Node
-from trajcli.job.yaml.load import parse_document
+from trajcli.job.yaml.load import MAX_DEPTH, parse_document
 
 _Steps = tuple[str | int, ...]
+_QUOTED = 40  # characters of a path without end that a message repeats
 
 
 class Setting(NamedTuple):
@@ -38,6 +39,9 @@ def parse_setting(text: str) -> Setting:
     steps = tuple(int(step) if step.isdecimal() else step for step in name.strip().split("."))
     if not equals or "" in steps:
         raise InputError(f"--set {text}: expected PATH=VALUE", hint="such as --set moves.0.duration=3")
+    if len(steps) > MAX_DEPTH:
+        depth = f"a path of {len(steps)} parts, a job is at most {MAX_DEPTH} levels deep"
+        raise InputError(f"--set {text[:_QUOTED]}...: {depth}", hint="such as --set moves.0.duration=3")
     return Setting(f"--set {text}", steps, value or "null")
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from trajcli.columns import TOOL_COLUMNS
-from trajcli.errors import Amount, InputError, Place, Problem
+from trajcli.errors import Amount, InputError, Place, Problem, utf8
 from trajcli.frozen import frozen
 from trajcli.job.limits import looser_bounds, looser_problem, looser_tool_bounds, with_job_limits
 from trajcli.job.messages import problems_of
@@ -145,7 +145,7 @@ def _load(document: Document) -> LoadedJob:
         raise InputError(*sorted(problems, key=_position))
     mounted = {key: pose for key in ("base", "tool") if (pose := getattr(job, key)) is not None}
     effective, events = with_job_limits(replace(robot, **mounted), job.limits)
-    name = job.name or ("stdin" if document.file in ("-", "<stdin>") else Path(document.file).stem)
+    name = job.name or ("stdin" if document.file in ("-", "<stdin>") else utf8(Path(document.file).stem))
     loaded = LoadedJob(job, name, effective, document, tuple(events))
     flaws = [*_loosened_by_moves(loaded), *_loosened_tool_limits(loaded), *_columns_without_geometry(loaded)]
     if flaws:

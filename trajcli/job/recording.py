@@ -12,7 +12,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import FileError, InputError, Problem
 from trajcli.job.yaml.load import Document
 from trajcli.kinematics.robot import Robot
-from trajcli.language.numbers import FlawError
+from trajcli.language.numbers import LARGEST_POSITION, FlawError
 from trajcli.language.recorded import Recorded
 from trajcli.streams.table import Table, read_csv
 
@@ -60,6 +60,11 @@ def _placed(problem: Problem) -> str:
 
 def _recorded(table: Table, robot: Robot) -> Recorded:
     positions = np.stack([_joint(table, robot, joint) for joint in range(len(robot.joints))], axis=1)
+    if np.abs(positions).max(initial=0.0) > LARGEST_POSITION:
+        most = f"{LARGEST_POSITION:g} rad or m"
+        raise InputError(
+            f"{table.file}: a value is larger than {most}", hint="check its exponent and its unit"
+        )
     if "t" not in table.names:
         _refuse_other_times(table)
         return Recorded(positions, file=table.file)

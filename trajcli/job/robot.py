@@ -18,7 +18,7 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
-from trajcli.errors import FileError, InputError, Problem
+from trajcli.errors import FileError, InputError, Problem, utf8
 from trajcli.frozen import frozen
 from trajcli.job.messages import problems_of
 from trajcli.job.model import UnitsSpec
@@ -280,7 +280,7 @@ def read_sheet(path: str) -> RobotSheet:
         "deg" if spec.get("angle") == "deg" else "rad",
         "mm" if spec.get("length") == "mm" else "m",
     )
-    model = _validated({"name": Path(path).stem, **plain}, document, (), units)
+    model = _validated({"name": utf8(Path(path).stem), **plain}, document, (), units)
     text = "\n".join(document.lines)
     return RobotSheet(model.as_robot(), units, model.source, model.licence, model.note, text)
 

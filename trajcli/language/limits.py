@@ -15,6 +15,7 @@ from trajcli.language.numbers import (
     Model,
     Number,
     ReadingContext,
+    check_not_tiny,
     read_number,
     shown,
     written_number,
@@ -44,12 +45,16 @@ def read_bound(value: Any, quantity: Quantity, context: ReadingContext) -> Lower
             raise FlawError(
                 f"expected a pair [lower, upper], {wanted}, got [{shown(value[0])}, {shown(value[1])}]"
             )
+        if rate:
+            for index, end in enumerate((low, high)):
+                check_not_tiny(abs(end), value[index], quantity, context.units)
         return low, high
     size = read_number(value, quantity, context.units)
     if size <= 0:
         raise FlawError(
             f"expected a number above 0, a pair [lower, upper] or null (unlimited), got {shown(value)}"
         )
+    check_not_tiny(size, value, quantity, context.units)
     return -size, size
 
 
@@ -57,7 +62,7 @@ def _read_end(value: Any, index: int, quantity: Quantity, context: ReadingContex
     try:
         return read_number(value, quantity, context.units)
     except FlawError as error:
-        raise FlawError(str(error), index) from None
+        raise FlawError(str(error), index, hint=error.flaws[0][2]) from None
 
 
 def written_bound(bound: LowerUpper, quantity: Quantity) -> list[float | str] | None:

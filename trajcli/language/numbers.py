@@ -35,6 +35,16 @@ from trajcli.units import (
 )
 
 MAX_JOINTS = 12
+LARGEST_POSITION = 1e6
+"""Magnitude of an angle or a length, rad or m, that no robot reaches."""
+LARGEST_RATE = 1e18
+"""Magnitude of a velocity, an acceleration or a jerk that no robot reaches, SI."""
+LARGEST_OTHER = 1e9
+"""Magnitude of times, frequencies and ratios: a motion of thirty years, rows every nanosecond."""
+SMALLEST = 1e-9
+"""Least duration, s, and least limit, SI; below it rounding is as large as what is asked for."""
+SMALLEST_DISTANCE = 1e-12
+"""Least length or angle that must be above zero, such as a tolerance, m or rad."""
 FieldPath = tuple[str | int, ...]
 Flaw = tuple[FieldPath, str, str | None]
 """Where below a value something is wrong, what, and what would fix it."""
@@ -70,6 +80,7 @@ class ReadingContext:
 
 
 SI = ReadingContext()
+_BEYOND_ANY_ROBOT = "no robot has such a number: check its exponent and its unit"
 
 
 class FlawError(ValueError):
@@ -118,14 +129,55 @@ def read_number(value: object, quantity: Quantity, units: Units) -> float:
     unit = unit_name(quantity, units)
     if isinstance(value, str):
         try:
-            return parse_quantity(value, quantity)
+            number = parse_quantity(value, quantity)
         except UnitError as error:
             raise FlawError(str(error)) from None
+        return within_bounds(number, value, quantity, units)
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise FlawError(f"expected a number{f' ({unit})' if unit else ''}, got {shown(value)}")
     if not math.isfinite(value):
         raise FlawError(f"expected a finite number{f' ({unit})' if unit else ''}, got {value}")
-    return float(value) * factor(quantity, units)
+    return within_bounds(float(value) * factor(quantity, units), value, quantity, units)
+
+
+def within_bounds(number: float, value: object, quantity: Quantity, units: Units) -> float:
+    """Return a number in SI, unless no robot has such.
+
+    The bounds are far from what any robot needs: they keep powers of numbers, and sums of them, finite.
+
+    Args:
+        number: SI.
+        value: The number as the user wrote it.
+        quantity: What it measures.
+        units: For the bound in the message.
+
+    Raises:
+        FlawError: When it is too large.
+    """
+    if quantity.dimension in ("angle", "length"):
+        most = LARGEST_RATE if quantity.order else LARGEST_POSITION
+    else:
+        most = LARGEST_OTHER
+    if abs(number) <= most:
+        return number
+    bound = f"{most / factor(quantity, units):.6g} {unit_name(quantity, units)}".rstrip()
+    raise FlawError(f"expected a magnitude of at most {bound}, got {shown(value)}", hint=_BEYOND_ANY_ROBOT)
+
+
+def check_not_tiny(number: float, value: object, quantity: Quantity, units: Units) -> None:
+    """Refuse a number above zero, such as a duration or a limit, that is smaller than any robot needs.
+
+    Raises:
+        FlawError: When it is too small.
+    """
+    least = SMALLEST_DISTANCE if _is_distance(quantity) else SMALLEST
+    if 0 < number < least:
+        bound = f"{least / factor(quantity, units):.6g} {unit_name(quantity, units)}".rstrip()
+        raise FlawError(f"expected at least {bound}, got {shown(value)}", hint=_BEYOND_ANY_ROBOT)
+
+
+def _is_distance(quantity: Quantity) -> bool:
+    return quantity.dimension in ("angle", "length") and quantity.order == 0
 
 
 def written_number(value: float, quantity: Quantity) -> float | str:
@@ -207,6 +259,8 @@ class Number(FieldType):
         if not all(keeps(bound) for _, bound, keeps in stated):
             bounds = " and ".join(f"{word} {bound:g}" for word, bound, _ in stated)
             raise FlawError(f"expected a number {bounds}{f' {unit}' if unit else ''}, got {shown(value)}")
+        if self.above == 0:
+            check_not_tiny(number, value, self.quantity, context.units)
         return number
 
     def write(self, value: float, context: ReadingContext) -> float | str:

@@ -142,7 +142,7 @@ def read_numbers(
         try:
             numbers[index] = read_number(item, quantity, context.units)
         except FlawError as error:
-            raise FlawError(str(error), *path, index) from None
+            raise FlawError(str(error), *path, index, hint=error.flaws[0][2]) from None
     return numbers
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -282,9 +283,35 @@ def _limiting_joint(move: PlannedMove, time: float) -> str | None:
     return move.robot.joint_names[joint] if distance <= _NEAR * move.duration else None
 
 
-def verification_error(plan: Plan) -> VerificationError:
-    """Return the error that says what the verdict found, with the places of the moves."""
-    return VerificationError(*(_problem(plan, finding) for finding in plan.verdict.findings))
+def verification_error(plan: Plan, *, every: bool = True) -> VerificationError:
+    """Return the error that says what the verdict found, with the places of the moves.
+
+    Args:
+        plan: A plan that fails.
+        every: Whether each finding is said; otherwise the worst of each move and kind, which tells how many
+            more there are.
+    """
+    findings = plan.verdict.findings
+    if every:
+        return VerificationError(*(_problem(plan, finding) for finding in findings))
+    alike: dict[tuple[int | None, str], list[Finding]] = {}
+    for finding in findings:
+        alike.setdefault((finding.move, finding.kind), []).append(finding)
+    return VerificationError(*(_worst(plan, group) for group in alike.values()))
+
+
+def _worst(plan: Plan, alike: Sequence[Finding]) -> Problem:
+    """Return the problem of the worst of findings of one move and kind."""
+    problem = _problem(plan, max(alike, key=_excess))
+    more = f" (and {len(alike) - 1} more like it: --all)" if len(alike) > 1 else ""
+    return replace(problem, message=problem.message + more)
+
+
+def _excess(finding: Finding) -> float:
+    """Return how far a finding is beyond its limit: of positions the distance, else the part of the limit."""
+    if finding.kind == "position" or finding.limit == 0:
+        return abs(finding.value - finding.limit)
+    return abs(finding.value / finding.limit)
 
 
 def _problem(plan: Plan, finding: Finding) -> Problem:
@@ -296,7 +323,7 @@ def _problem(plan: Plan, finding: Finding) -> Problem:
         place=plan.loaded.place_of_move(index),
         move=index,
         joint=finding.joint,
-        time=finding.time - span.start,
+        time=finding.time,
         value=finding.value,
         limit=finding.limit,
     )

@@ -65,7 +65,8 @@ def plan_job(loaded: LoadedJob) -> Plan:
     before: Planner | None = None
     for index, planner in enumerate(loaded.job.moves):
         start = _handed_over(state, before, planner)
-        with _errors_of(loaded, index, planner):
+        begun = sum(float(done.planned.curve.breaks[-1]) for done in moves)
+        with _errors_of(loaded, index, planner, begun):
             reachable = planner.with_joint_targets(partial(resolve, index=index), state.position)
             move = _plan_move(loaded, index, reachable, start)
         moves.append(move)
@@ -188,14 +189,26 @@ def _law_of_tool(move: PlannedMove) -> PiecewisePolynomial | None:
 
 
 @contextmanager
-def _errors_of(loaded: LoadedJob, index: int, planner: Planner) -> Iterator[None]:
-    """Give errors the move they are about, its place in the file, and the job's units."""
+def _errors_of(loaded: LoadedJob, index: int, planner: Planner, begun: float) -> Iterator[None]:
+    """Give errors the move they are about, its place in the file, the job's units, and times since its start.
+
+    Args:
+        loaded: The job.
+        index: Of the move.
+        planner: Of the move.
+        begun: When the move begins, s from the start of the trajectory.
+    """
     try:
         with _errors_at(loaded, loaded.place_of_move(index)):
             yield
     except TrajcliError as error:
         problems = (
-            replace(problem.within(f"move {index} ({planner.tag})"), move=index) for problem in error.problems
+            replace(
+                problem.within(f"move {index} ({planner.tag})"),
+                move=index,
+                time=None if problem.time is None else begun + problem.time,
+            )
+            for problem in error.problems
         )
         raise type(error)(*problems) from None
 

@@ -16,6 +16,7 @@ from trajcli.kinematics.dexterity import dexterity
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.jacobian import ReferenceFrame, jacobian
 from trajcli.kinematics.robot import Robot
+from trajcli.language.numbers import LARGEST_POSITION
 from trajcli.queries.arm import ArmInUnits, LimitWatch
 from trajcli.streams.decimals import DECIMALS
 from trajcli.streams.table import TableBlocks
@@ -52,6 +53,22 @@ class _JointColumns(NamedTuple):
         return np.asarray(block[:, self.joints] * self.factors)
 
 
+def refuse_far(values: Array, file: str) -> None:
+    """Refuse rows that hold what no robot reaches.
+
+    Args:
+        values: Any shape, SI.
+        file: Where they stand.
+
+    Raises:
+        InputError: Names the largest.
+    """
+    largest = float(np.abs(values).max(initial=0.0))
+    if largest > LARGEST_POSITION:
+        most = f"expected a magnitude of at most {LARGEST_POSITION:g} (rad, m)"
+        raise InputError(f"{file}: {most}, got {largest:.9g}", hint="check its exponent and its unit")
+
+
 def poses_of(arm: ArmInUnits, rows: TableBlocks, watch: LimitWatch | None = None) -> Stream:
     """Return t, where there is one, and the tcp's pose (x y z qw qx qy qz) for each row of joint values.
 
@@ -78,6 +95,7 @@ def _poses(
     last = None
     for block in rows.blocks:
         q = inputs.values(block)
+        refuse_far(q, rows.file)
         if watch is not None:
             times = None if inputs.time is None else block[:, inputs.time]
             watch.see(q, inputs.factors, inputs.units, times, _HALF)
@@ -108,6 +126,7 @@ def _jacobians(
 ) -> Iterator[Array]:
     for block in rows.blocks:
         q = inputs.values(block)
+        refuse_far(q, rows.file)
         measures = dexterity(arm.robot, q)
         entries = jacobian(arm.robot, q, frame).reshape(len(q), -1)
         columns = np.stack([measures.manipulability, 1.0 / measures.condition], axis=1)

@@ -20,7 +20,7 @@ from trajcli.kinematics.inverse.solutions import Solutions, check_reachable
 from trajcli.kinematics.inverse.solve import fits, solve
 from trajcli.kinematics.inverse.target import IkTarget, closure_of, partial_target
 from trajcli.queries.arm import ArmInUnits
-from trajcli.queries.forward import Stream
+from trajcli.queries.forward import Stream, refuse_far
 from trajcli.streams.decimals import Digits, encode_fixed, encode_full
 from trajcli.streams.table import TableBlocks
 
@@ -231,6 +231,7 @@ def _of_row(
 
 
 def _targets(block: Array, inputs: _PoseColumns, done: int, file: str) -> IkTarget:
+    refuse_far(block[:, [*inputs.position, *inputs.rotation]], file)
     position = block[:, inputs.position] * inputs.factors
     if not inputs.rotation:
         return partial_target(position)

@@ -90,7 +90,8 @@ class FollowingDiagnosis:
         }
         message = "{joint} would be at {value} at s = {place} of the path, its limit is {limit}"
         hint = "start in another configuration, or move the path"
-        raise PlanningError(Problem(message, hint, joint=name, time=float(time[joint]), amounts=amounts))
+        when = None if self.law is None else float(time[joint])  # without a law it is s
+        raise PlanningError(Problem(message, hint, joint=name, time=when, amounts=amounts))
 
     def _s(self, at: float) -> Amount:
         s = at if self.law is None else float(self.law.evaluate(min(at, self.law.end))[0])

@@ -1,0 +1,50 @@
+"""Help that helps: an example for each command, which runs, and commands by their other names."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from running import ROOT, call
+
+from trajcli.cli.app import app
+
+Capture = pytest.CaptureFixture[str]
+NAMES = [info.callback.__name__ for info in app.registered_commands if info.callback]
+OTHER_NAMES = {
+    "validate": "plan JOB --no-output",
+    "check": "plan JOB --no-output",
+    "run": "plan",
+    "simulate": "plan",
+    "convert": "pose",
+    "forward": "fk",
+    "inverse": "ik",
+    "kinematics": "jacobian",
+    "list": "robots",
+    "Compare": "diff",
+}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_each_command_has_an_example_that_runs(
+    name: str, capfd: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = call(capfd, name, "--help").out
+    (example,) = re.findall(r"^ *Example: trajcli (.*)$", text, flags=re.MULTILINE)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    for file in ("old.csv", "new.csv"):
+        (tmp_path / file).write_text("t,q1\n0,0\n1,1\n")
+    words = shlex.split(example)
+    assert words[0] == name
+    assert call(capfd, *words).code == 0
+
+
+@pytest.mark.parametrize(("word", "named"), OTHER_NAMES.items())
+def test_a_command_that_exists_under_another_name_is_named(word: str, named: str, capfd: Capture) -> None:
+    code, out, err = call(capfd, word, "job.yaml")
+    assert (code, out) == (2, "")
+    assert f"No such command '{word}'" in err
+    assert f"trajcli {named}" in err
