@@ -11,6 +11,7 @@ import numpy as np
 from trajcli.checks.continuity import acceleration_steps, check_continuity
 from trajcli.checks.finding import AccelerationSteps, Finding
 from trajcli.checks.limits import check_limits, peaks_by_move
+from trajcli.checks.target import check_targets
 from trajcli.checks.waypoints import check_waypoints
 from trajcli.curves.extrema import Peaks
 from trajcli.frozen import frozen
@@ -80,6 +81,7 @@ def verify(
     findings += check_continuity(trajectory, limits_by_move, peaks)
     if promises is not None:
         findings += check_waypoints(trajectory, [promise.via_points for promise in promises])
+        findings += check_targets(trajectory, promises)
         findings += _check_tools(trajectory, promises, tool_peaks)
     return Verdict(
         findings=_in_order(trajectory, findings, promises),

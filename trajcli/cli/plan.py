@@ -50,7 +50,10 @@ def run_plan(job: str, overrides: Sequence[str], options: PlanOptions) -> int:
     loaded = load_job(job, overrides, rate=options.rate)
     if options.resolved is not None:
         _write_resolved(loaded, options.resolved)
-    plan = plan_job(loaded)
+    with np.errstate(
+        all="ignore"
+    ):  # what is not finite is for the checks to find, and not for numpy to print
+        plan = plan_job(loaded)
     grid = grid_of(plan)
     if options.report is not None or options.reference:
         _report(plan, options)
