@@ -46,6 +46,8 @@ class Verdict:
             times from the start of the move; None on a path, and where no limit asks for them.
         unchecked_of_tool: Limits of the tool that are stated and cannot be judged in some move: of an arm
             without geometry, and of the jerk in joint space.
+        sampled: Moves along a path: the distance from it and the branch are judged on rows alone, which is no
+            proof of what lies between them.
     """
 
     findings: tuple[Finding, ...]
@@ -54,6 +56,7 @@ class Verdict:
     unchecked: tuple[tuple[str, str], ...]
     tool_peaks: tuple[Mapping[str, ToolPeak] | None, ...] = ()
     unchecked_of_tool: tuple[str, ...] = ()
+    sampled: tuple[int, ...] = ()
 
     @property
     def passed(self) -> bool:
@@ -89,6 +92,11 @@ def verify(
         peaks=peaks,
         unchecked=_unchecked(trajectory, limits_by_move),
         tool_peaks=tool_peaks,
+        sampled=tuple(
+            span.index
+            for span, promise in zip(trajectory.spans, promises or (), strict=False)
+            if promise.tool is not None
+        ),
         unchecked_of_tool=_unchecked_of_tool(limits_by_move, promises, peaks),
     )
 
