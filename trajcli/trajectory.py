@@ -14,6 +14,11 @@ from trajcli.kinematics.robot import JointType, Robot
 
 if TYPE_CHECKING:
     from trajcli.kinematics.following.motion import ToolMotion
+    from trajcli.kinematics.inverse.target import IkTarget
+
+_BORDER_UNITS = (
+    4.0  # in the last place: a span whose length was added up in another order ends beside a break
+)
 
 
 @frozen
@@ -64,6 +69,21 @@ class ViaPoints:
 
 
 @frozen
+class Destination:
+    """Where a move ends, as the job says it.
+
+    Attributes:
+        joints: Joint values (n,), rad or m; None where a pose is given.
+        pose: The coordinates of the tcp's pose that the job fixes; None where joints are given.
+        tolerance: How near the tool comes, m and rad, where it follows a path; None in joint space.
+    """
+
+    joints: Array | None = None
+    pose: IkTarget | None = None
+    tolerance: tuple[float, float] | None = None
+
+
+@frozen
 class Promise:
     """What a move says of itself, for those who judge it.
 
@@ -75,6 +95,7 @@ class Promise:
         over_limit: "slow" where it was made as long as its limits ask for, if that helps; "error" where that
             can be asked for; None where it cannot.
         remedies: What would help against a finding, by its kind.
+        destination: Where it ends; None where the job does not say it.
     """
 
     via_points: ViaPoints | None = None
@@ -83,6 +104,7 @@ class Promise:
     ends: tuple[State, State] | None = None
     over_limit: Literal["error", "slow"] | None = None
     remedies: Mapping[str, str] = field(default_factory=dict)
+    destination: Destination | None = None
 
 
 @comparable
@@ -135,6 +157,14 @@ class Trajectory:
     def duration(self) -> float:
         """Seconds."""
         return self.curve.duration
+
+    def before(self, times: Array, order: int = 0) -> Array:
+        """Return a derivative of the joints just before `times` (k,), (k, n): rounding crosses no break."""
+        breaks = self.curve.breaks
+        last = np.clip(np.searchsorted(breaks, times), 1, breaks.size - 1)
+        beside = times - breaks[last - 1] <= _BORDER_UNITS * np.spacing(np.abs(times))
+        on_breaks = np.where(beside & (last > 1), breaks[last - 1], np.minimum(times, breaks[-1]))
+        return self.curve.evaluate(on_breaks, order, side="left")
 
     def span_at(self, time: float) -> Span:
         """Return the span that holds `time`; at a border the later one, as long as it has a length."""

@@ -112,3 +112,12 @@ def test_the_verdict_on_a_plan_holds_it():
 def test_one_promise_for_each_move():
     with pytest.raises(ValueError, match="zip"):
         check_waypoints(trajectory(passing()), [None, None])
+
+
+def test_a_jump_of_the_next_move_is_not_a_missed_waypoint():
+    """The end of a move is judged from its own side."""
+    whole = trajectory(passing(), between([0.8, -2.5], [2.0, 2.0]))
+    assert check_waypoints(whole, [promise(), None]) == []
+    unlimited = Limits(*(np.tile([-np.inf, np.inf], (2, 1)) for _ in range(4)))
+    broken = verify(whole, [unlimited] * 2, [Promise(promise()), Promise()])
+    assert {(finding.move, finding.kind) for finding in broken.findings} == {(1, "position_jump")}

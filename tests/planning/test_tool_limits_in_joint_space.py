@@ -147,3 +147,23 @@ def test_what_cannot_be_judged_is_named() -> None:
     assert plan.verdict.unchecked_of_tool == ("speed", "jerk")
     assert "  limited, but not checked in every move: speed, jerk of the tool" in summary(plan, 0)
     assert [each.quantity for each in report_of(plan).unchecked_of_tool] == ["speed", "jerk"]
+
+
+def test_what_is_only_sampled_is_said() -> None:
+    """On a path the distance from it and the branch are looked at on rows; in joint space there is no such thing."""
+    line = {"planner": "line", "to": {"xyz": [0.4, 0.0, 0.3]}}
+    lines = {
+        "version": 1,
+        "robot": "ur5e",
+        "limits": {"acceleration": 10, "tcp": {"speed": 0.2, "acceleration": 1}},
+        "start": {"xyz": [0.4, 0.1, 0.3]},
+        "moves": [line, {"planner": "cubic", "to": {"xyz": [0.4, 0.1, 0.3]}}, line],
+    }
+    plan = plan_job(loaded(lines))
+    assert plan.verdict.passed
+    assert plan.verdict.sampled == (0, 2)
+    assert "\n  on samples only: distance from the path and branch, moves 0, 2" in summary(plan, 0)
+    report = report_of(plan)
+    assert [move.tool.method if move.tool else None for move in report.moves] == ["sampled", None, "sampled"]
+    joints = planned({"planner": "quintic", "duration": 3}, {"speed": 1})
+    assert "on samples only" not in summary(joints, 0)

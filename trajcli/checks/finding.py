@@ -23,6 +23,7 @@ FindingKind = Literal[
     "velocity_jump",
     "acceleration_jump",
     "waypoint",
+    "target",
     "tool_path",
     "tool_orientation",
     "tool_speed",
@@ -43,12 +44,13 @@ class Finding:
     Attributes:
         move: Index of the move; None when it is about the whole trajectory.
         joint: Name of the joint; None when it is about the tool.
-        kind: The quantity that breaks its limit, or that jumps; a waypoint that is not where it should be; a
+        kind: The quantity that breaks its limit, or that jumps; a waypoint or an end
+            that is not where it should be; a
             tool that leaves its path or its limits; an arm that changes its branch.
         value: SI, signed as on the curve; for a jump the value after minus the value before; for a waypoint
-            the distance from it.
+            or target the distance from it.
         limit: The bound it breaks, SI, signed as the value; for a jump the size that rounding explains; for a
-            waypoint the distance that was promised.
+            waypoint or target the distance that was promised.
         time: Seconds from the start of the trajectory.
         method: "exact": from the roots of derivatives; "bounded": at most that for all t, proven between rows
             within 1e-6; "sampled": on rows, without a proof of what is between them.

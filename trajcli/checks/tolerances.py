@@ -37,6 +37,13 @@ BORDER_UNITS = 4.0
 WAYPOINT_RELATIVE = 1e-12
 WAYPOINT_ABSOLUTE = 1e-12
 
+# Inverse kinematics misses a pose by at most 1e-9 m and rad; a row has nine decimals.
+TARGET_CLOSURE = 1e-8
+
+# On a path the joints follow from the tool: joint values of a target are met as well as the arm can tell the
+# tool's tolerance, which near a singularity is several times as much at a joint.
+TARGET_ON_PATH = 2e-5
+
 # The tool's speed and acceleration are those of its law as far as the joints' curve follows it, which comes
 # on top; their peaks are looked for between rows until they change by less than this.
 TOOL_RELATIVE = 1e-6
@@ -63,6 +70,21 @@ def allowed_jump(peak: Array, breaks: Array, next_derivative: Array) -> Array:
     """
     late = JUMP_BREAK_UNITS * np.spacing(np.abs(breaks))[:, None] * next_derivative
     return JUMP_ABSOLUTE + JUMP_RELATIVE * peak + late
+
+
+def allowed_at_end(trajectory: Trajectory, time: float, target: Array) -> Array:
+    """Return the distance from the target of a move in joint space that rounding explains, shape (n,).
+
+    Args:
+        trajectory: The one that ends there.
+        time: When, s on the trajectory.
+        target: Where, shape (n,).
+    """
+    last = np.array([time])
+    speed = np.abs(trajectory.before(last, 1)[0])
+    late = JUMP_BREAK_UNITS * np.spacing(abs(time)) * speed
+    tolerance: Array = JUMP_ABSOLUTE + JUMP_RELATIVE * np.maximum(np.abs(target), 1.0) + late
+    return tolerance
 
 
 def waypoint_tolerance(trajectory: Trajectory, times: Array, points: Array) -> Array:

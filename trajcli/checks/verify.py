@@ -11,6 +11,7 @@ import numpy as np
 from trajcli.checks.continuity import acceleration_steps, check_continuity
 from trajcli.checks.finding import AccelerationSteps, Finding
 from trajcli.checks.limits import check_limits, peaks_by_move
+from trajcli.checks.target import check_targets
 from trajcli.checks.waypoints import check_waypoints
 from trajcli.curves.extrema import Peaks
 from trajcli.frozen import frozen
@@ -45,6 +46,8 @@ class Verdict:
             times from the start of the move; None on a path, and where no limit asks for them.
         unchecked_of_tool: Limits of the tool that are stated and cannot be judged in some move: of an arm
             without geometry, and of the jerk in joint space.
+        sampled: Moves along a path: the distance from it and the branch are judged on rows alone, which is no
+            proof of what lies between them.
     """
 
     findings: tuple[Finding, ...]
@@ -53,6 +56,7 @@ class Verdict:
     unchecked: tuple[tuple[str, str], ...]
     tool_peaks: tuple[Mapping[str, ToolPeak] | None, ...] = ()
     unchecked_of_tool: tuple[str, ...] = ()
+    sampled: tuple[int, ...] = ()
 
     @property
     def passed(self) -> bool:
@@ -80,6 +84,7 @@ def verify(
     findings += check_continuity(trajectory, limits_by_move, peaks)
     if promises is not None:
         findings += check_waypoints(trajectory, [promise.via_points for promise in promises])
+        findings += check_targets(trajectory, promises)
         findings += _check_tools(trajectory, promises, tool_peaks)
     return Verdict(
         findings=_in_order(trajectory, findings, promises),
@@ -87,6 +92,11 @@ def verify(
         peaks=peaks,
         unchecked=_unchecked(trajectory, limits_by_move),
         tool_peaks=tool_peaks,
+        sampled=tuple(
+            span.index
+            for span, promise in zip(trajectory.spans, promises or (), strict=False)
+            if promise.tool is not None
+        ),
         unchecked_of_tool=_unchecked_of_tool(limits_by_move, promises, peaks),
     )
 

@@ -26,7 +26,10 @@ def check_waypoints(trajectory: Trajectory, promised: Sequence[ViaPoints | None]
         if points is None:
             continue
         times = np.clip(span.start + points.times, span.start, span.end)
-        distance = np.abs(trajectory.curve.evaluate(times) - points.points)
+        passed = trajectory.curve.evaluate(times)
+        last = times >= span.end  # what the next move makes of it is not this one's
+        passed[last] = trajectory.before(times[last])
+        distance = np.abs(passed - points.points)
         wrong = np.abs(distance - points.missed)
         over = wrong - waypoint_tolerance(trajectory, times, points.points)
         for joint in np.flatnonzero((over > 0).any(axis=0)).tolist():

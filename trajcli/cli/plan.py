@@ -52,7 +52,10 @@ def run_plan(job: str, overrides: Sequence[str], options: PlanOptions) -> int:
     _check_inputs_stay(loaded, options)
     if options.resolved is not None:
         _write_resolved(loaded, options.resolved)
-    plan = plan_job(loaded)
+    with np.errstate(
+        all="ignore"
+    ):  # what is not finite is for the checks to find, and not for numpy to print
+        plan = plan_job(loaded)
     grid = grid_of(plan)
     refusal = _refusal(plan, options)
     if refusal is None and not options.no_output:
@@ -164,12 +167,19 @@ def summary(plan: Plan, rows: int) -> str:
     if plan.verdict.unchecked_of_tool:
         names = ", ".join(name.replace("_", " ") for name in plan.verdict.unchecked_of_tool)
         lines.append(f"  limited, but not checked in every move: {names} of the tool")
+    if plan.verdict.sampled:
+        lines.append(f"  on samples only: distance from the path and branch, {_moves(plan.verdict.sampled)}")
     if plan.verdict.steps:
         first = plan.verdict.steps[0]
         more = f" and {len(plan.verdict.steps) - 1} more" if len(plan.verdict.steps) > 1 else ""
         lines.append(f"  the acceleration steps: {first.joint} at t = {first.time:.6g} s{more}")
     lines += [f"  {event.kind}: {_where(event.move)}{event.message}" for event in plan.events]
     return "\n".join(lines)
+
+
+def _moves(indices: Sequence[int]) -> str:
+    more = f" and {len(indices) - 5} more" if len(indices) > 5 else ""
+    return f"move{'s' * (len(indices) > 1)} {', '.join(str(index) for index in indices[:5])}{more}"
 
 
 def _where(move: int | None) -> str:

@@ -212,6 +212,12 @@ class ToolReport(ReportPart):
         float, MeasuredIn("turned_unit"), Field(description="Largest angle from its orientation, rad.")
     ]
     turned_unit: UnitName = "rad"
+    method: Annotated[
+        Literal["sampled"],
+        Field(
+            description="How deviation, turned and the branch are judged: on rows, without a proof between."
+        ),
+    ] = "sampled"
 
 
 class MoveReport(ReportPart):

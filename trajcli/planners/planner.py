@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import field
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
+import numpy as np
 from pydantic import Field
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
@@ -14,7 +15,7 @@ from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Robot
 from trajcli.language.limits import LimitsSpec
 from trajcli.language.numbers import Model
-from trajcli.trajectory import Promise, Span, State, Trajectory, ViaPoints
+from trajcli.trajectory import Destination, Promise, Span, State, Trajectory, ViaPoints
 
 if TYPE_CHECKING:
     from trajcli.kinematics.following.motion import ToolMotion
@@ -158,6 +159,25 @@ class Planner(Model):
         """Whether only the limits say how long it lasts: no duration, no times and no rates are given."""
         return not any(getattr(self, name, None) for name in _GIVEN)
 
+    @property
+    def target(self) -> Target | None:
+        """The target as it stands in the job; None where the move names none."""
+        target: Target | None = getattr(self, "to", None)
+        return target
+
+    @property
+    def destination(self) -> Destination | None:
+        """Where the move ends, as the job says it."""
+        target, tolerance = self.target, getattr(self, "tolerance", None)
+        if target is None or not target.gives_joints_or_pose:
+            return None
+        within = None if tolerance is None else (tolerance.position, tolerance.angle)
+        if target.joints is not None:
+            return Destination(np.array(target.joints), None, within)
+        from trajcli.language.targets import ik_target
+
+        return Destination(None, ik_target(target), within)
+
     def with_joint_targets(self, resolve: Resolve, near: Array) -> Self:
         """Return the planner with joints instead of the poses that it goes to in joint space.
 
@@ -230,8 +250,15 @@ class PlannedMove:
     def promise(self) -> Promise:
         """What the move says of itself; ends whose velocities follow from its times are none of its terms."""
         planned, follows = self.planned, self.planned.begins is not None and not self.start.velocity.any()
-        ends = None if follows else (self.start, planned.end)
-        return Promise(planned.via_points, planned.tool, self.robot, ends, self.over_limit, planned.remedies)
+        return Promise(
+            planned.via_points,
+            planned.tool,
+            self.robot,
+            None if follows else (self.start, planned.end),
+            self.over_limit,
+            planned.remedies,
+            self.planner.destination,
+        )
 
     def span(self, start: float, end: float) -> Span:
         """Return the part of a trajectory, from `start` to `end` s, that is this move."""

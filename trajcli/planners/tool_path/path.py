@@ -33,6 +33,7 @@ from trajcli.kinematics.following.tool_path import ToolPath, ToolReference
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.language.numbers import Flaw, Model, Number, refuse
 from trajcli.language.points import NamedTarget
+from trajcli.language.targets import Target
 from trajcli.planners.planner import Event
 from trajcli.planners.tool_path.arc import ArcFields, arc_of, arc_target, center_events
 from trajcli.planners.tool_path.derivatives import PathDerivatives, largest_norm
@@ -98,6 +99,12 @@ class PathMove(ToolPathMove):
         ]
         | None
     ) = None
+
+    @property
+    def target(self) -> Target | None:
+        """Where the last segment ends; None where an arc ends after an angle."""
+        last = self.segments[-1]
+        return last.line if last.arc is None else last.arc.to
 
     @model_validator(mode="after")
     def _corners_fit(self) -> PathMove:

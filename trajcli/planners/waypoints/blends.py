@@ -32,7 +32,7 @@ from trajcli.language.numbers import (
 )
 from trajcli.language.per_joint import flawed
 from trajcli.language.recorded import Recorded
-from trajcli.language.targets import JointAccelerationMagnitudes
+from trajcli.language.targets import JointAccelerationMagnitudes, Target
 from trajcli.planners.boundary_states import missing_limit, standstill, start_in_motion
 from trajcli.planners.planner import Event, Phase, Planned
 from trajcli.planners.waypoints.through_points import OPEN_END_REMEDIES, REMEDIES, PointTable, ThroughPoints
@@ -173,6 +173,11 @@ class Blends(ThroughPoints):
     exactly: Annotated[
         bool, Field(strict=True, description="Pass through the points, by way of pseudo-points beside them.")
     ] = False
+
+    @property
+    def target(self) -> Target | None:
+        """The last point; None where blends are centred: the move may end after it passed there."""
+        return None if self.end_blends == "centred" else super().target
 
     @model_validator(mode="after")
     def _blends_fit(self) -> Blends:

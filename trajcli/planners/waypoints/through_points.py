@@ -95,6 +95,11 @@ class ThroughPoints(Planner):
         return points if self.to is None else (*points, self.to)
 
     @property
+    def target(self) -> Target | None:
+        """The last of the points; None where they are recorded."""
+        return self.listed[-1] if self.listed else None
+
+    @property
     def timed(self) -> bool:
         """Whether the points say when they are passed."""
         if isinstance(self.through, Recorded):
