@@ -89,7 +89,7 @@ def far_job(x: float) -> dict:
     }
 
 
-@pytest.mark.parametrize("x", [1e308, -1e200, 1e14])
+@pytest.mark.parametrize("x", [1e14, -1e13, 2e12])
 def test_a_path_far_outside_of_any_robot_has_no_curve(x):
     """It was verified with one move of 0 s."""
     with pytest.raises(PlanningError, match="no robot reaches so far"):
@@ -98,6 +98,6 @@ def test_a_path_far_outside_of_any_robot_has_no_curve(x):
 
 @pytest.mark.parametrize("planner", ["quintic", "line", "screw"])
 def test_a_target_far_outside_of_any_robot_has_no_curve(planner):
-    move = {"planner": planner, "to": {"xyz": [1e308, 0, 0], "rpy": [180, 0, 0]}}
+    move = {"planner": planner, "to": {"xyz": [1e14, 0, 0], "rpy": [180, 0, 0]}}
     with pytest.raises(PlanningError, match="no robot reaches so far"):
         plan_job(loaded({**far_job(0), "moves": [move]}))

@@ -28,6 +28,9 @@ JUMP_ABSOLUTE = 1e-12
 # ends of the piece are rounded, hence two units.
 JUMP_BREAK_UNITS = 2.0
 
+# The end of a long piece is a sum of terms that may be much larger than it: each is rounded.
+SUM_UNITS = 8.0
+
 # A span whose length was added up in another order than the curve's breaks ends some units beside one.
 BORDER_UNITS = 4.0
 
@@ -80,10 +83,14 @@ def allowed_at_end(trajectory: Trajectory, time: float, target: Array) -> Array:
         time: When, s on the trajectory.
         target: Where, shape (n,).
     """
-    last = np.array([time])
+    curve, last = trajectory.curve, np.array([time])
     speed = np.abs(trajectory.before(last, 1)[0])
     late = JUMP_BREAK_UNITS * np.spacing(abs(time)) * speed
-    tolerance: Array = JUMP_ABSOLUTE + JUMP_RELATIVE * np.maximum(np.abs(target), 1.0) + late
+    piece = max(int(np.searchsorted(curve.breaks, curve.start + time)) - 1, 0)
+    powers = curve.lengths[piece] ** np.arange(curve.degree, -1, -1)
+    summands = (np.abs(curve.coefficients[:, piece]) * powers[:, None]).sum(axis=0)
+    rounding = SUM_UNITS * np.spacing(summands)
+    tolerance: Array = JUMP_ABSOLUTE + JUMP_RELATIVE * np.maximum(np.abs(target), 1.0) + late + rounding
     return tolerance
 
 

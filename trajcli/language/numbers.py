@@ -35,15 +35,15 @@ from trajcli.units import (
 )
 
 MAX_JOINTS = 12
-LARGEST_POSITION = 1e6
+LARGEST_POSITION = 1e12
 """Magnitude of an angle or a length, rad or m, that no robot reaches."""
-LARGEST_RATE = 1e18
+LARGEST_RATE = 1e30
 """Magnitude of a velocity, an acceleration or a jerk that no robot reaches, SI."""
-LARGEST_OTHER = 1e9
-"""Magnitude of times, frequencies and ratios: a motion of thirty years, rows every nanosecond."""
-SMALLEST = 1e-9
+LARGEST_OTHER = 1e12
+"""Magnitude of times, frequencies and ratios that no job needs."""
+SMALLEST = 1e-12
 """Least duration, s, and least limit, SI; below it rounding is as large as what is asked for."""
-SMALLEST_DISTANCE = 1e-12
+SMALLEST_DISTANCE = 1e-15
 """Least length or angle that must be above zero, such as a tolerance, m or rad."""
 FieldPath = tuple[str | int, ...]
 Flaw = tuple[FieldPath, str, str | None]

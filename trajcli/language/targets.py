@@ -14,6 +14,7 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 
 from trajcli.curves.piecewise import Array
+from trajcli.errors import Amount, PlanningError, Problem
 from trajcli.frozen import comparable
 from trajcli.language.numbers import (
     SI,
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from trajcli.kinematics.inverse.target import IkTarget
 
 _ANGLE, _LENGTH, _RATIO = Quantity("angle"), Quantity("length"), Quantity("ratio")
+_FAR = 1e9  # m: float64 tells there no micrometres any more
 _UPRIGHT = 1e-9  # rad: a pitch this close to a quarter turn is one
 AIMS = ("yaw", "pitch", "direction")
 _NUMBER: JsonSchemaValue = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": "^[-+.0-9]"}]}
@@ -302,10 +304,19 @@ class Target(PoseFields, defer_build=False):  # made once, not for each planner 
 
 
 def ik_target(fields: PoseFields) -> IkTarget:
-    """Return the coordinates of the tcp's pose that a target fixes."""
+    """Return the coordinates of the tcp's pose that a target fixes.
+
+    Raises:
+        PlanningError: When the position is further than any robot reaches.
+    """
     from trajcli.kinematics.inverse.target import partial_target
 
     pose = fields.full_pose()
+    furthest = float(np.abs(pose[:3, 3]).max())
+    if fields.gives_position and not furthest <= _FAR:
+        far = Amount(furthest, 0, None, "length")
+        message = "a position has a coordinate of {far}: no robot reaches so far"
+        raise PlanningError(Problem(message, "check the numbers and their units", amounts={"far": far}))
     position = pose[:3, 3] if fields.gives_position else None
     if fields.rotation_form is not None:
         return partial_target(position, rotation=pose[:3, :3])
