@@ -73,7 +73,7 @@ class Event:
 
 def stretched(factor: float) -> Event:
     """Return the event of a time-optimal law that lasts `factor` times longer than it was computed."""
-    text = f"stretched {factor:.9g} times to keep all limits between the places"
+    text = f"stretched {factor:.9g} times to keep all limits between grid points"
     return Event("stretched" if factor > 1 + _LITTLE else "refined", text)
 
 

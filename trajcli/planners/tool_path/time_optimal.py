@@ -66,7 +66,7 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
         Phase(f"{b.quantity} {'+' if b.sign > 0 else '-'}", b.start * factor, b.end * factor, b.joint)
         for b in binding
     ]
-    text = f"the grid was refined {solved.refinements} times, to {solved.grid.size} places"
+    text = f"the grid was refined {solved.refinements} times, to {solved.grid.size} grid points"
     events = [Event("refined", text)]
     stretch = solved.stretch * remaining
     if stretch > 1 + _NOTED:

@@ -357,7 +357,7 @@ def _events(motion: TimeOptimalMotion) -> Iterator[Event]:
         yield Event(
             "refined",
             f"the grid was refined {'once' if motion.refinements == 1 else f'{motion.refinements} times'}, "
-            f"to {motion.grid.size} places on the path",
+            f"to {motion.grid.size} grid points of the path",
         )
     if motion.stretch > 1 + _STRETCHED:
         yield stretched(motion.stretch)

@@ -1,4 +1,4 @@
-"""Speeds between the places of the grid: paths on which they peak there, judged by dense rows."""
+"""Speeds between grid points: paths on which they peak there, judged by dense rows."""
 
 from __future__ import annotations
 
