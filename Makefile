@@ -4,6 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 PEERS := .venv-peers
+EXTRAS ?= dev  # dev,viewers: also what the tests of viewers need
 
 .PHONY: setup demo check format lint types test soak bench golden schema docs clean
 
@@ -11,7 +12,7 @@ setup: $(STAMP)
 
 $(STAMP): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[$(strip $(EXTRAS))]'
 	$(BIN)/python -m compileall -q trajcli
 	@touch $@
 
