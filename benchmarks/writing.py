@@ -19,7 +19,7 @@ NAMES = ["t", *(f"{kind}{joint}" for kind in ("q", "qd", "qdd") for joint in ran
 def writer():
     """Prepare the writer, on the blocks in which rows are sampled."""
     from trajcli.columns import parse_column
-    from trajcli.samples import ROWS as SIZE
+    from trajcli.grids import ROWS as SIZE
     from trajcli.streams.csv import write_csv
 
     columns = [parse_column(name) for name in NAMES]

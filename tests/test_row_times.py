@@ -9,7 +9,8 @@ import pytest
 
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.errors import InputError
-from trajcli.samples import ListedGrid, UniformGrid, sample
+from trajcli.grids import ListedGrid, UniformGrid
+from trajcli.samples import sample
 from trajcli.trajectory import Span, State, Trajectory
 
 UNIX = 1.7e9  # s: now, since 1970

@@ -13,7 +13,8 @@ from scipy.interpolate import PPoly
 from trajcli.columns import columns_of
 from trajcli.curves.piecewise import PiecewisePolynomial, constant
 from trajcli.errors import InputError
-from trajcli.samples import ListedGrid, UniformGrid, sample
+from trajcli.grids import ListedGrid, UniformGrid
+from trajcli.samples import sample
 from trajcli.trajectory import Span, Trajectory, resting
 from trajcli.units import Units
 

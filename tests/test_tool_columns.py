@@ -15,11 +15,12 @@ from trajcli.columns import columns_of
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.errors import InputError
 from trajcli.geometry.rotation import without_jumps
+from trajcli.grids import ListedGrid, UniformGrid
 from trajcli.job.read import job_from_text, load_job
 from trajcli.kinematics.robot import Joint, Robot, unlimited
 from trajcli.output.write import write_plan
 from trajcli.planning.plan import plan_job
-from trajcli.samples import ListedGrid, UniformGrid, sample
+from trajcli.samples import sample
 from trajcli.streams.table import read_csv
 from trajcli.units import Units
 

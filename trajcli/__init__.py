@@ -4,11 +4,12 @@ What the command line does, from Python:
 
     import trajcli
 
-    plan = trajcli.plan_job(trajcli.load_job("job.yaml"))
-    if not plan.verdict.passed:
-        raise trajcli.verification_error(plan)
-    q = plan.trajectory.curve.evaluate([0.0, 0.5, 1.0])  # shape (3, n), rad or m
-    qd = plan.trajectory.curve.evaluate([0.0, 0.5, 1.0], order=1)
+    plan = trajcli.plan("job.yaml")  # a path, YAML text or a mapping
+    print(plan.verdict)
+    q = plan.trajectory([0.0, 0.5, 1.0])  # shape (3, n), rad or m
+    qd = plan.trajectory([0.0, 0.5, 1.0], 1)
+    rows = plan.trajectory.sample(100)  # rows.t (N,), rows.q, rows.qd, rows.qdd (N, n)
+    plan.save("rows.csv")  # refuses what does not verify
 
 All numbers are SI: rad, m, s. Importing this module costs nothing: each name is loaded when it is first used.
 """
@@ -20,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 from trajcli.version import __version__
 
 if TYPE_CHECKING:
+    from trajcli.api import Arm, InverseSolution, PlannedJob, load_robot, plan
     from trajcli.checks.finding import Finding
     from trajcli.checks.verify import Verdict
     from trajcli.curves.piecewise import PiecewisePolynomial
@@ -37,14 +39,15 @@ if TYPE_CHECKING:
     from trajcli.job.model import Job
     from trajcli.job.read import LoadedJob, job_from_text, load_job
     from trajcli.job.report import Report
-    from trajcli.job.robot import catalogue_names, load_robot
+    from trajcli.job.robot import catalogue_names
     from trajcli.kinematics.robot import Joint, Limits, Robot
     from trajcli.output.report import report_of, verification_error
     from trajcli.output.write import write_plan
     from trajcli.planning.plan import Plan, plan_job
-    from trajcli.trajectory import State, Trajectory
+    from trajcli.trajectory import Rows, State, Trajectory
 
 _HOMES = {
+    "trajcli.api": ("Arm", "InverseSolution", "PlannedJob", "load_robot", "plan"),
     "trajcli.checks.finding": ("Finding",),
     "trajcli.checks.verify": ("Verdict",),
     "trajcli.curves.piecewise": ("PiecewisePolynomial",),
@@ -62,19 +65,21 @@ _HOMES = {
     "trajcli.job.model": ("Job",),
     "trajcli.job.read": ("LoadedJob", "job_from_text", "load_job"),
     "trajcli.job.report": ("Report",),
-    "trajcli.job.robot": ("catalogue_names", "load_robot"),
+    "trajcli.job.robot": ("catalogue_names",),
     "trajcli.kinematics.robot": ("Joint", "Limits", "Robot"),
     "trajcli.planning.plan": ("Plan", "plan_job"),
     "trajcli.output.report": ("report_of", "verification_error"),
     "trajcli.output.write": ("write_plan",),
-    "trajcli.trajectory": ("State", "Trajectory"),
+    "trajcli.trajectory": ("Rows", "State", "Trajectory"),
 }
 _MODULES = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [
+    "Arm",
     "FileError",
     "Finding",
     "InputError",
+    "InverseSolution",
     "Job",
     "Joint",
     "Limits",
@@ -83,10 +88,12 @@ __all__ = [
     "PiecewisePolynomial",
     "Place",
     "Plan",
+    "PlannedJob",
     "PlanningError",
     "Problem",
     "Report",
     "Robot",
+    "Rows",
     "State",
     "TrajcliError",
     "Trajectory",
@@ -98,6 +105,7 @@ __all__ = [
     "job_from_text",
     "load_job",
     "load_robot",
+    "plan",
     "plan_job",
     "report_of",
     "verification_error",

@@ -14,11 +14,16 @@ C = TypeVar("C")
 
 @dataclass_transform(frozen_default=True, eq_default=False, field_specifiers=(field,))
 def frozen(cls: type[C]) -> type[C]:
-    """Return the class as a dataclass whose values cannot be changed, and are equal only to themselves."""
+    """Return the class as a dataclass whose values cannot be changed, and are equal only to themselves.
+
+    A class that shows itself by a `__repr__` of its own keeps it.
+    """
     cls.__doc__ = cls.__doc__ or cls.__name__  # where there is none, dataclass takes its time to write one
     made = dataclass(init=False, repr=False, eq=False)(cls)
-    for method in (__init__, __repr__, __setattr__, __delattr__):
+    for method in (__init__, __setattr__, __delattr__):
         setattr(made, method.__name__, method)
+    if made.__repr__ is object.__repr__:
+        made.__repr__ = __repr__  # type: ignore[method-assign]
     return made
 
 

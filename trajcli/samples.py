@@ -6,7 +6,6 @@ Rows are evaluated in blocks of bounded size, so that memory does not grow with 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from math import ceil, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,118 +18,14 @@ from trajcli.columns import (
     group_factors,
     joint_factors,
 )
-from trajcli.curves.piecewise import Array, PiecewisePolynomial, read_only
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import InputError
-from trajcli.frozen import comparable, frozen
+from trajcli.grids import AT_BREAK, ROWS, Grid, onto_breaks
 from trajcli.kinematics.robot import Robot
 from trajcli.trajectory import Trajectory
 from trajcli.units import Units
 
-ROWS = 4096  # rows of a block: long enough to hide the cost of a call, short enough for the cache
-
-_NANOSECOND = 1e-9  # the last decimal of a time in a file: rows closer than this would show the same time
-_END = 1e-6  # of a period: an end this close to a grid time replaces that row
-_BREAK = 1e-12  # s: a row this close before a break is at it; rounding decides no row's side
-
 _TOOL_ORDERS = {"pose": 0, "twist": 1, "twistd": 2}  # the highest derivative of q that each group needs
-
-
-@comparable
-class UniformGrid:
-    """Rows at `start_time` + k / rate, and one exactly at the end.
-
-    Attributes:
-        duration: Seconds, at least 0.
-        rate: Hz.
-        start_time: Time of the first row, s.
-    """
-
-    duration: float
-    rate: float
-    start_time: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not (isfinite(self.rate) and self.rate > 0):
-            raise InputError(f"the rate is {self.rate:g} Hz, expected a finite number above 0")
-        if not isfinite(self.start_time):
-            raise InputError(f"the start time is {self.start_time:g} s, expected a finite number")
-        finest = max(2 * _NANOSECOND, 8 * self._spacing)
-        if 1 / self.rate < finest:
-            raise InputError(
-                f"the rate of {self.rate:g} Hz is too high: the times of neighbouring rows would be equal",
-                hint=f"from {self.start_time:g} s on, the rate can be at most {1 / finest:g} Hz",
-            )
-
-    @property
-    def count(self) -> int:
-        """Number of rows, at least 1."""
-        near = max(_END / self.rate, _NANOSECOND, 2 * self._spacing)
-        return max(ceil((self.duration - near) * self.rate), 0) + 1
-
-    @property
-    def _spacing(self) -> float:
-        """Distance of neighbouring float64 numbers at the largest time, s."""
-        return float(np.spacing(abs(self.start_time) + self.duration))
-
-    def blocks(self, size: int = ROWS) -> Iterator[tuple[Array, Array]]:
-        """Yield, for `size` rows at a time, their times as written and from the start, each (N,), s."""
-        count = self.count
-        for low in range(0, count, size):
-            high = min(low + size, count)
-            local = np.arange(low, high) / self.rate
-            if high == count:
-                local[-1] = self.duration
-            yield self.start_time + local, local
-
-
-@frozen
-class ListedGrid:
-    """Rows at given times.
-
-    Attributes:
-        duration: Seconds, at least 0.
-        times: Shape (N,), s, counted like `start_time`: strictly increasing, inside the trajectory.
-        start_time: Time at which the trajectory starts, s.
-    """
-
-    duration: float
-    times: Array
-    start_time: float = 0.0
-
-    def __post_init__(self) -> None:
-        times = read_only(self.times)
-        low, high = self.start_time, self.start_time + self.duration
-        if times.ndim != 1 or times.size == 0:
-            raise InputError("the list of times is empty", hint="give at least one time, or a rate")
-        inside = (times >= low - _NANOSECOND) & (times <= high + _NANOSECOND)
-        if not inside.all():
-            raise InputError(
-                f"the time {times[~inside][0]:.12g} s lies outside the trajectory",
-                hint=f"it lasts from {low:.12g} s to {high:.12g} s",
-            )
-        times = read_only(np.clip(times, low, high))
-        close = np.flatnonzero(np.diff(times) <= _NANOSECOND)
-        if close.size:
-            first, second = times[close[0]], times[close[0] + 1]
-            raise InputError(
-                f"the time {first:.12g} s is followed by {second:.12g} s",
-                hint="times must increase, by more than 1e-9 s each",
-            )
-        object.__setattr__(self, "times", times)
-
-    @property
-    def count(self) -> int:
-        """Number of rows, at least 1."""
-        return int(self.times.size)
-
-    def blocks(self, size: int = ROWS) -> Iterator[tuple[Array, Array]]:
-        """Yield, for `size` rows at a time, their times as written and from the start, each (N,), s."""
-        for low in range(0, self.count, size):
-            times = self.times[low : low + size]
-            yield times, np.clip(times - self.start_time, 0.0, self.duration)
-
-
-Grid = UniformGrid | ListedGrid
 
 
 def sample(
@@ -165,7 +60,7 @@ def sample(
     curve, starts = trajectory.curve, _Starts(trajectory)
     orders, last = _orders(groups), None
     for times, local in grid.blocks(size):
-        local = _onto_breaks(local, curve.breaks)
+        local = onto_breaks(local, curve.breaks)
         motion = _in_units(_window(curve, local), factors).evaluate_orders(local, orders)
         parts = []
         for group in groups:
@@ -221,13 +116,6 @@ def _in_units(curve: PiecewisePolynomial, factors: Array) -> PiecewisePolynomial
     return PiecewisePolynomial(curve.breaks, curve.coefficients / factors)
 
 
-def _onto_breaks(local: Array, breaks: Array) -> Array:
-    """Return the times (N,), those that rounding put just before a break moved onto it; the start stays."""
-    following = breaks[np.minimum(np.searchsorted(breaks, local, "right"), breaks.size - 1)]
-    near = max(_BREAK, 4 * float(np.spacing(breaks[-1])))
-    return np.where((following - local <= near) & (local > breaks[0]), np.maximum(following, local), local)
-
-
 def _window(curve: PiecewisePolynomial, local: Array) -> PiecewisePolynomial:
     """Return the pieces that hold the sorted times `local`, so that a block costs what it holds."""
     ends = np.searchsorted(curve.breaks, local[[0, -1]], "right") - 1
@@ -247,12 +135,12 @@ class _Starts:
 
     def moves(self, local: Array) -> Array:
         """Return the index of the move at each time, shape (N,)."""
-        owner = np.searchsorted(self._moving, local + _BREAK, "right") - 1
+        owner = np.searchsorted(self._moving, local + AT_BREAK, "right") - 1
         return self._indices[np.maximum(owner, 0)]
 
     def spans(self, local: Array) -> NDArray[np.intp]:
         """Return which span holds each time, shape (N,)."""
-        return np.searchsorted(self._all, local + _BREAK, "right") - 1
+        return np.searchsorted(self._all, local + AT_BREAK, "right") - 1
 
 
 def _path_law(trajectory: Trajectory, starts: _Starts, local: Array) -> Array:
@@ -264,5 +152,5 @@ def _path_law(trajectory: Trajectory, starts: _Starts, local: Array) -> Array:
         if law is not None:
             rows = np.flatnonzero(owner == index)
             times = np.clip(local[rows] - trajectory.spans[index].start, law.start, law.end)
-            values[rows] = law.evaluate_orders(_onto_breaks(times, law.breaks), (0, 1, 2))[:, :, 0]
+            values[rows] = law.evaluate_orders(onto_breaks(times, law.breaks), (0, 1, 2))[:, :, 0]
     return values

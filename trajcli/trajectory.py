@@ -7,15 +7,19 @@ from dataclasses import field
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, read_only
+from trajcli.errors import InputError
 from trajcli.frozen import comparable, frozen
+from trajcli.grids import UniformGrid, onto_breaks
 from trajcli.kinematics.robot import JointType, Robot
 
 if TYPE_CHECKING:
     from trajcli.kinematics.following.motion import ToolMotion
     from trajcli.kinematics.inverse.target import IkTarget
 
+_ROUNDING = 1e-9  # s: a time this far outside is at the end
 _BORDER_UNITS = (
     4.0  # in the last place: a span whose length was added up in another order ends beside a break
 )
@@ -132,8 +136,34 @@ class Span:
 
 
 @frozen
+class Rows:
+    """States of the joints at some times.
+
+    Attributes:
+        t: When, s, shape (N,).
+        q: Positions, rad or m, shape (N, n).
+        qd: Velocities, per second.
+        qdd: Accelerations, per second squared.
+    """
+
+    t: Array
+    q: Array
+    qd: Array
+    qdd: Array
+
+    def __repr__(self) -> str:
+        span = f", {self.t[0]:g} s to {self.t[-1]:g} s" if len(self.t) else ""
+        return f"Rows({len(self.t)} rows, {self.q.shape[-1]} joints{span})"
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+
+@frozen
 class Trajectory:
     """The motion of all joints over time.
+
+    A call gives states: `trajectory(t)` positions, `trajectory(t, 1)` velocities, of any shape of times.
 
     Attributes:
         curve: q(t) from t = 0, rad or m by joint.
@@ -143,6 +173,8 @@ class Trajectory:
         start: State in which the job says that the arm stands when t = 0.
         end: State in which the last move declares to end.
         laws: For each span the time law s(t) of the tool along its path, m, from t = 0; None without one.
+        start_time: Time at which the job lets it start, s. Calls and samples count from there, the curve and
+            the spans from 0.
     """
 
     curve: PiecewisePolynomial
@@ -152,6 +184,47 @@ class Trajectory:
     start: State
     end: State
     laws: tuple[PiecewisePolynomial | None, ...] = ()
+    start_time: float = 0.0
+
+    def __repr__(self) -> str:
+        moves, joints = len(self.spans), len(self.joint_names)
+        of_moves = f"{moves} move{'s' * (moves != 1)}"
+        return f"Trajectory({joints} joint{'s' * (joints != 1)}, {of_moves}, {self.duration:g} s)"
+
+    def __call__(self, t: ArrayLike, order: int = 0) -> Array:
+        """Return the positions of the joints, or a derivative of them, shape (*t.shape, n), SI.
+
+        Args:
+            t: Times of any shape, s, from `start_time` on. At a break the later piece counts.
+            order: 0 for positions, 1 velocities, 2 accelerations, and so on.
+
+        Raises:
+            InputError: When a time lies outside the trajectory, or the order is none.
+        """
+        times = np.asarray(t, dtype=np.float64)
+        if isinstance(order, bool) or not isinstance(order, int) or order < 0:
+            raise InputError(f"the order of the derivative is {order!r}, expected 0, 1, 2 or more")
+        local = np.atleast_1d(times).reshape(-1) - self.start_time
+        outside = ~((local >= -_ROUNDING) & (local <= self.duration + _ROUNDING))
+        if outside.any():
+            end = self.start_time + self.duration
+            raise InputError(
+                f"the time {times.reshape(-1)[outside][0]:.12g} s lies outside the trajectory",
+                hint=f"it lasts from {self.start_time:.12g} s to {end:.12g} s",
+            )
+        local = onto_breaks(np.clip(local, 0.0, self.duration), self.curve.breaks)
+        return self.curve.evaluate(local, order).reshape(*times.shape, self.curve.dimension)
+
+    def sample(self, rate: float) -> Rows:
+        """Return states at a rate, Hz, and one exactly at the end: the rows of `trajcli plan`, in SI.
+
+        Raises:
+            InputError: When the rate is not above 0, or so high that times would be equal.
+        """
+        parts = list(UniformGrid(self.duration, rate, self.start_time).blocks())
+        local = onto_breaks(np.concatenate([part for _, part in parts]), self.curve.breaks)
+        states = self.curve.evaluate_orders(local, (0, 1, 2))
+        return Rows(np.concatenate([times for times, _ in parts]), *(states[:, k] for k in range(3)))
 
     @property
     def duration(self) -> float:

@@ -12,13 +12,13 @@ FLOORS = (
     ("errors", "frozen", "suggest", "units", "version"),
     ("curves", "geometry"),
     ("kinematics", "catalogue"),
-    ("trajectory", "samples", "columns"),
+    ("trajectory", "samples", "columns", "grids"),
     ("language",),
     ("planners", "checks", "streams"),
     ("job",),
     ("planning", "comparison", "queries"),
     ("output",),
-    ("cli",),
+    ("cli", "api"),
     ("",),  # trajcli/__init__.py, the public face
     ("__main__",),
 )

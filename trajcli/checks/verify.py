@@ -58,10 +58,21 @@ class Verdict:
     unchecked_of_tool: tuple[str, ...] = ()
     sampled: tuple[int, ...] = ()
 
+    def __repr__(self) -> str:
+        worst = [f"{found.kind} of {found.joint or 'the tool'}" for found in self.findings[:2]]
+        more = ["..."] if len(self.findings) > len(worst) else []
+        return f"Verdict({self.text}{': ' * bool(worst)}{', '.join(worst + more)})"
+
     @property
     def passed(self) -> bool:
         """Whether nothing is wrong."""
         return not self.findings
+
+    @property
+    def text(self) -> str:
+        """The verdict in words: `verified`, or the number of findings."""
+        count = len(self.findings)
+        return f"{count} finding{'s' * (count != 1)}" if count else "verified"
 
 
 def verify(

@@ -54,6 +54,10 @@ class PiecewisePolynomial:
         object.__setattr__(self, "breaks", breaks)
         object.__setattr__(self, "coefficients", coefficients)
 
+    def __repr__(self) -> str:
+        pieces = f"{self.pieces} piece{'s' * (self.pieces != 1)} of degree {self.degree}"
+        return f"PiecewisePolynomial({pieces} in R^{self.dimension} over [{self.start:g}, {self.end:g}])"
+
     @property
     def degree(self) -> int:
         """Highest power that the coefficients have room for."""

@@ -11,9 +11,13 @@ import re
 import unicodedata
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
-from math import isfinite
+from math import isfinite, isnan
+from pathlib import PurePath
 from typing import Any
 
+import numpy as np
+
+from trajcli.errors import InputError
 from trajcli.job.read import LoadedJob
 from trajcli.job.robot import robot_as_mapping
 from trajcli.kinematics.robot import Robot
@@ -49,6 +53,43 @@ def dump_job(loaded: LoadedJob) -> str:
     if job.output.times is not None:
         ordered["output"].pop("rate")
     return "\n".join(_block(_without_empty(ordered))) + "\n"
+
+
+def mapping_text(mapping: Mapping[str, Any]) -> str:
+    """Return a job, a robot or a part of one as YAML.
+
+    Args:
+        mapping: Of mappings, lists, texts, numbers, truth values and None; numpy's arrays and numbers too.
+
+    Raises:
+        InputError: When a key is no text, or a value is of another kind.
+    """
+    return "\n".join(_block(_plain(mapping, ()))) + "\n"
+
+
+def _plain(value: Any, path: tuple[str | int, ...]) -> Any:  # noqa: ANN401
+    """Return a value with lists for arrays and tuples, and Python's numbers for numpy's."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, PurePath):
+        value = str(value)
+    if isinstance(value, Mapping):
+        for key in value:
+            if not isinstance(key, str):
+                raise InputError(f"{_path_text(path)}: expected texts as keys, got {key!r}")
+        return {str(key): _plain(item, (*path, key)) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item, (*path, index)) for index, item in enumerate(value)]
+    if value is None or isinstance(value, str | bool | int | float):
+        return value
+    raise InputError(
+        f"{_path_text(path)}: a value of type {type(value).__name__}",
+        hint="a job has mappings, lists, texts, numbers, true, false and None",
+    )
+
+
+def _path_text(path: tuple[str | int, ...]) -> str:
+    return "the job's " + ".".join(map(str, path)) if path else "the job"
 
 
 def _tool_limits(robot: Robot, context: ReadingContext) -> dict[str, Any]:
@@ -93,6 +134,8 @@ def _flow(value: Any) -> str:  # noqa: ANN401
         return "{" + ", ".join(f"{_key(key)}: {_flow(item)}" for key, item in value.items()) + "}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(_flow, value)) + "]"
+    if isinstance(value, float) and not isfinite(value):
+        return ".nan" if isnan(value) else ".inf" if value > 0 else "-.inf"
     return _text(value) if isinstance(value, str) else json.dumps(value)
 
 

@@ -49,6 +49,10 @@ class LoadedJob:
     document: Document
     events: tuple[Event, ...]
 
+    def __repr__(self) -> str:
+        tags = ", ".join(move.tag for move in self.job.moves)
+        return f"LoadedJob({self.name!r}, {self.robot.name}: {tags})"
+
     @property
     def units(self) -> Units:
         """Units of the file, and of what is written."""

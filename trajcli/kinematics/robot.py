@@ -90,6 +90,10 @@ class Limits:
                 )
             object.__setattr__(self, name, bounds)
 
+    def __repr__(self) -> str:
+        limited = [name for name in QUANTITIES if np.isfinite(getattr(self, name)).any()]
+        return f"Limits({len(self.position)} joints: {', '.join(limited) or 'none'})"
+
     def of_order(self, order: int) -> Array:
         """Return the bounds (n, 2) of the derivative of the given order, 0 (position) to 3 (jerk)."""
         return getattr(self, QUANTITIES[order])  # type: ignore[no-any-return]
@@ -147,6 +151,11 @@ class Robot:
     def __post_init__(self) -> None:
         object.__setattr__(self, "base", read_only(self.base))
         object.__setattr__(self, "tool", read_only(self.tool))
+
+    def __repr__(self) -> str:
+        joints = f"{len(self.joints)} joint{'s' * (len(self.joints) != 1)}"
+        table = "bare joints" if self.convention is None else f"{self.convention} DH rows"
+        return f"{type(self).__name__}({self.name!r}, {joints}, {table})"
 
     @property
     def joint_names(self) -> tuple[str, ...]:

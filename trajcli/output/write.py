@@ -6,8 +6,9 @@ import numpy as np
 
 from trajcli.columns import columns_of
 from trajcli.errors import InputError
+from trajcli.grids import Grid, ListedGrid, UniformGrid
 from trajcli.planning.plan import Plan
-from trajcli.samples import Grid, ListedGrid, UniformGrid, sample
+from trajcli.samples import sample
 from trajcli.streams.decimals import Digits
 from trajcli.streams.formats import DEFAULT, format_of, write_verified
 from trajcli.streams.whole_file import standard_output, whole_file

@@ -48,6 +48,12 @@ class Plan:
     events: tuple[Event, ...]
     poses: Mapping[int | None, ResolvedPose]
 
+    def __repr__(self) -> str:
+        moves, duration = len(self.moves), self.trajectory.duration
+        of_moves = f"{moves} move{'s' * (moves != 1)}"
+        of_what = f"{self.loaded.name!r}, {self.loaded.robot.name}, {of_moves}"
+        return f"{type(self).__name__}({of_what}, {duration:g} s, {self.verdict.text})"
+
 
 def plan_job(loaded: LoadedJob) -> Plan:
     """Return the plan of a job, with its verdict: a verdict with findings is no error here.
@@ -179,7 +185,16 @@ def _joined(moves: list[PlannedMove], loaded: LoadedJob, first: State) -> Trajec
         spans.append(move.span(start, end))
     robot, last = loaded.robot, moves[-1].planned.end
     laws = tuple(_law_of_tool(move) for move in moves)
-    return Trajectory(curve, robot.joint_names, robot.joint_types, tuple(spans), first, last, laws)
+    return Trajectory(
+        curve,
+        robot.joint_names,
+        robot.joint_types,
+        tuple(spans),
+        first,
+        last,
+        laws,
+        loaded.job.output.start_time,
+    )
 
 
 def _law_of_tool(move: PlannedMove) -> PiecewisePolynomial | None:

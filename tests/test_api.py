@@ -1,0 +1,239 @@
+"""The API for Python: jobs of every form, callable trajectories, one-line texts, arms."""
+
+from __future__ import annotations
+
+import csv
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import trajcli
+from trajcli.api import _is_yaml
+
+ROOT = Path(__file__).parents[1]
+EXAMPLES = ROOT / "examples"
+CUBIC = {
+    "version": 1,
+    "units": {"angle": "deg"},
+    "robot": {"joints": 1},
+    "start": {"joints": 20},
+    "moves": [{"planner": "cubic", "to": {"joints": [50]}, "duration": 1}],
+}
+TEXT = """
+version: 1
+units: {angle: deg}
+robot: {joints: 1}
+start: {joints: 20}
+moves: [{planner: cubic, to: {joints: [50]}, duration: 1}]
+"""
+
+
+def test_a_path_a_text_a_mapping_and_a_read_job_give_the_same_plan(tmp_path: Path) -> None:
+    file = tmp_path / "job.yaml"
+    file.write_text(TEXT)
+    loaded = trajcli.load_job(file)
+    numpy_mapping = {**CUBIC, "start": {"joints": np.array([20.0])}, "robot": {"joints": np.int64(1)}}
+    curves = [
+        trajcli.plan(job).trajectory.curve.coefficients
+        for job in (file, str(file), TEXT, TEXT.strip(), CUBIC, numpy_mapping, loaded)
+    ]
+    for other in curves[1:]:
+        np.testing.assert_array_equal(other, curves[0])
+    # 20 + 90 t^2 - 60 t^3, the textbook's cubic
+    assert np.rad2deg(curves[0][:, 0, 0]) == pytest.approx([-60, 90, 0, 20])
+
+
+def test_a_flow_mapping_is_a_text_and_a_name_is_a_path() -> None:
+    assert _is_yaml("{version: 1}")
+    assert _is_yaml("version: 1")
+    assert not _is_yaml("folder/job.yaml")
+    assert not _is_yaml("C:/folder/job.yaml")
+    with pytest.raises(trajcli.FileError, match=r"nowhere\.yaml"):
+        trajcli.plan("nowhere.yaml")
+
+
+@pytest.mark.parametrize(
+    ("job", "message"),
+    [
+        ({**CUBIC, "moves": [{"planner": "cubik", "to": {"joints": 1}}]}, "cubik"),
+        ({**CUBIC, "start": {"joints": float("nan")}}, "expected a finite number, got .nan"),
+        ({**CUBIC, "start": {"joints": {1, 2}}}, "the job's start.joints: a value of type set"),
+        ({**CUBIC, 3: 4}, "expected texts as keys, got 3"),
+        (3, "expected a job, got a value of type int"),
+        (None, "expected a job, got a value of type NoneType"),
+    ],
+)
+def test_a_wrong_job_is_one_clear_error(job: object, message: str) -> None:
+    with pytest.raises(trajcli.InputError, match=re.escape(message)):
+        trajcli.plan(job)  # type: ignore[arg-type]
+
+
+def test_an_error_shows_its_place_and_advice_in_a_traceback(tmp_path: Path) -> None:
+    file = tmp_path / "job.yaml"
+    file.write_text(TEXT.replace("cubic", "cubik"))
+    with pytest.raises(trajcli.InputError) as raised:
+        trajcli.plan(file)
+    assert raised.value.__notes__ == [f"{file}:6:19: did you mean 'cubic'?"]
+    with pytest.raises(trajcli.InputError) as raised:
+        trajcli.plan({**CUBIC, "start": {"joints": float("nan")}})
+    assert raised.value.__notes__ == ["mapping:4:17"]
+
+
+def test_overrides_change_a_file_and_nothing_else() -> None:
+    plan = trajcli.plan(EXAMPLES / "cubic.yaml", overrides=["moves.0.duration=3"])
+    assert plan.trajectory.duration == 3
+    with pytest.raises(trajcli.InputError, match="overrides are for job files"):
+        trajcli.plan(CUBIC, overrides=["moves.0.duration=3"])
+
+
+def test_a_trajectory_is_a_function_of_time() -> None:
+    trajectory = trajcli.plan(CUBIC).trajectory
+    t = np.linspace(0, 1, 12).reshape(3, 4)
+    for order, expected in enumerate([20 + 90 * t**2 - 60 * t**3, 180 * t - 180 * t**2, 180 - 360 * t]):
+        values = trajectory(t, order)
+        assert values.shape == (3, 4, 1)
+        np.testing.assert_allclose(np.rad2deg(values[..., 0]), expected, atol=1e-12)
+    assert trajectory(0.5).shape == (1,)
+
+
+def test_times_count_from_the_start_time() -> None:
+    plan = trajcli.plan({**CUBIC, "output": {"start_time": 10}})
+    assert plan.trajectory.start_time == 10
+    assert np.rad2deg(plan.trajectory(10.5)) == pytest.approx([35])
+    rows = plan.trajectory.sample(4)
+    assert rows.t.tolist() == [10, 10.25, 10.5, 10.75, 11]
+
+
+@pytest.mark.parametrize("time", [-0.01, 1.01, float("nan"), float("inf")])
+def test_a_time_outside_is_an_error(time: float) -> None:
+    with pytest.raises(trajcli.InputError, match="lies outside the trajectory"):
+        trajcli.plan(CUBIC).trajectory([0.5, time])
+
+
+@pytest.mark.parametrize("order", [-1, 1.5, True, "1"])
+def test_a_wrong_order_is_an_error(order: object) -> None:
+    with pytest.raises(trajcli.InputError, match="the order of the derivative is"):
+        trajcli.plan(CUBIC).trajectory(0.5, order)  # type: ignore[arg-type]
+
+
+@given(rate=st.floats(0.5, 2000))
+def test_the_ends_of_rounded_times_are_inside(rate: float) -> None:
+    trajectory = trajcli.plan({**CUBIC, "output": {"start_time": 0.1}}).trajectory
+    rows = trajectory.sample(rate)
+    np.testing.assert_allclose(trajectory(rows.t), rows.q, atol=1e-12)
+
+
+@pytest.mark.parametrize("rate", [0, -1, float("nan"), float("inf"), 1e30])
+def test_a_wrong_rate_is_an_error(rate: float) -> None:
+    with pytest.raises(trajcli.InputError, match="the rate"):
+        trajcli.plan(CUBIC).trajectory.sample(rate)
+
+
+def test_samples_are_the_rows_that_the_command_writes() -> None:
+    job = EXAMPLES / "ur5e_pick.yaml"
+    rows = trajcli.plan(job).trajectory.sample(125)
+    with (Path(__file__).parent / "golden/ur5e_pick.csv").open() as file:
+        written = np.array([[float(cell) for cell in row] for row in list(csv.reader(file))[1:]])
+    factors = np.pi / 180
+    assert len(rows) == len(written)
+    np.testing.assert_allclose(rows.t, written[:, 0], atol=1e-9)
+    for k, values in enumerate((rows.q, rows.qd, rows.qdd)):
+        np.testing.assert_allclose(values, written[:, 1 + 6 * k : 7 + 6 * k] * factors, atol=1e-9)
+
+
+def test_every_text_is_one_short_line() -> None:
+    plan = trajcli.plan(EXAMPLES / "ur5e_pick.yaml")
+    robot = trajcli.load_robot("ur5e")
+    solution = robot.ik(robot.fk([0.1] * 6))[0]
+    shown = [
+        plan,
+        plan.trajectory,
+        plan.trajectory.sample(10),
+        plan.verdict,
+        plan.loaded,
+        plan.trajectory.curve,
+        robot,
+        robot.limits,
+        solution,
+    ]
+    for value in shown:
+        assert "\n" not in repr(value)
+        assert len(repr(value)) <= 160, repr(value)
+    assert repr(plan) == "PlannedJob('ur5e_pick', UR5e, 9 moves, 6.8513 s, verified)"
+    assert repr(plan.trajectory) == "Trajectory(6 joints, 9 moves, 6.8513 s)"
+    assert repr(robot) == "Arm('UR5e', 6 joints, standard DH rows)"
+
+
+def test_a_verdict_says_what_is_wrong() -> None:
+    plan = trajcli.plan({**CUBIC, "limits": {"velocity": 40}})
+    assert repr(plan.verdict) == "Verdict(1 finding: velocity of j1)"
+
+
+def test_a_plan_saves_itself(tmp_path: Path) -> None:
+    plan = trajcli.plan(EXAMPLES / "sync.yaml")
+    plan.save(tmp_path / "rows.csv")
+    assert (tmp_path / "rows.csv").read_bytes() == (Path(__file__).parent / "golden/sync.csv").read_bytes()
+    with pytest.raises(trajcli.InputError, match=r"not as \.txt"):
+        plan.save(tmp_path / "rows.txt")
+    wrong = trajcli.plan({**CUBIC, "limits": {"velocity": 40}})
+    with pytest.raises(trajcli.VerificationError, match="reaches 45 deg/s"):
+        wrong.save(tmp_path / "wrong.csv")
+    assert [file.name for file in tmp_path.iterdir()] == ["rows.csv"]
+    assert plan.report().verdict == "verified"
+
+
+def test_an_arm_answers_questions() -> None:
+    robot = trajcli.load_robot("ur5e")
+    q = np.array([0.3, -1.2, 1.4, -0.7, 0.9, 0.2])
+    pose = robot.fk(q)
+    solutions = robot.ik(pose, near=q)
+    assert len(solutions) == 8
+    np.testing.assert_allclose(solutions[0].joints, q, atol=1e-9)
+    for solution in solutions:
+        np.testing.assert_allclose(robot.fk(solution.joints), pose, atol=1e-9)
+        assert solution.within_limits
+    assert {tuple(solution.branch.values()) for solution in solutions} == {
+        (shoulder, elbow, wrist)
+        for shoulder in ("left", "right")
+        for elbow in ("up", "down")
+        for wrist in ("flip", "no_flip")
+    }
+    # the Jacobian's linear rows are the derivative of the position
+    step = 1e-6
+    columns = [
+        (robot.fk(q + step * e)[:3, 3] - robot.fk(q - step * e)[:3, 3]) / (2 * step) for e in np.eye(6)
+    ]
+    np.testing.assert_allclose(robot.jacobian(q)[:3], np.transpose(columns), atol=1e-8)
+    far = pose.copy()
+    far[0, 3] = 10.0
+    assert robot.ik(far) == ()
+
+
+def test_the_page_runs_as_it_stands(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    page = (ROOT / "docs/python.md").read_text(encoding="utf-8")
+    (tmp_path / "examples").symlink_to(EXAMPLES)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "job.yaml").write_text("version: 2")
+    names: dict[str, object] = {}
+    blocks = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    for block in blocks:
+        exec(block, names)
+        for line in block.splitlines():
+            statement, _, promised = line.partition("  # ")
+            if promised.strip().startswith(("PlannedJob", "True")):
+                assert repr(eval(statement, names)) == promised.strip()
+    assert len(blocks) == 5
+    assert (tmp_path / "swing.csv").exists()
+
+
+def test_a_rounded_pose_is_projected_and_a_wrong_one_refused() -> None:
+    robot = trajcli.load_robot("ur5e")
+    pose = robot.fk([0.3, -1.2, 1.4, -0.7, 0.9, 0.2])
+    assert len(robot.ik(np.round(pose, 5))) == 8
+    for wrong in (np.eye(3), 2 * pose, pose * [-1, 1, 1, 1], np.full((4, 4), np.nan)):
+        with pytest.raises(trajcli.InputError):
+            robot.ik(wrong)

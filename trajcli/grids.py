@@ -1,0 +1,127 @@
+"""Times of rows: a uniform grid, or a list of times.
+
+A grid knows the duration of what is sampled, and yields its times block by block, so that memory does not
+grow with their number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import ceil, isfinite
+
+import numpy as np
+
+from trajcli.curves.piecewise import Array, read_only
+from trajcli.errors import InputError
+from trajcli.frozen import comparable, frozen
+
+ROWS = 4096  # rows of a block: long enough to hide the cost of a call, short enough for the cache
+AT_BREAK = 1e-12  # s: a row this close before a break is at it; rounding decides no row's side
+
+_NANOSECOND = 1e-9  # the last decimal of a time in a file: rows closer than this would show the same time
+_END = 1e-6  # of a period: an end this close to a grid time replaces that row
+
+
+@comparable
+class UniformGrid:
+    """Rows at `start_time` + k / rate, and one exactly at the end.
+
+    Attributes:
+        duration: Seconds, at least 0.
+        rate: Hz.
+        start_time: Time of the first row, s.
+    """
+
+    duration: float
+    rate: float
+    start_time: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.rate) and self.rate > 0):
+            raise InputError(f"the rate is {self.rate:g} Hz, expected a finite number above 0")
+        if not isfinite(self.start_time):
+            raise InputError(f"the start time is {self.start_time:g} s, expected a finite number")
+        finest = max(2 * _NANOSECOND, 8 * self._spacing)
+        if 1 / self.rate < finest:
+            raise InputError(
+                f"the rate of {self.rate:g} Hz is too high: the times of neighbouring rows would be equal",
+                hint=f"from {self.start_time:g} s on, the rate can be at most {1 / finest:g} Hz",
+            )
+
+    @property
+    def count(self) -> int:
+        """Number of rows, at least 1."""
+        near = max(_END / self.rate, _NANOSECOND, 2 * self._spacing)
+        return max(ceil((self.duration - near) * self.rate), 0) + 1
+
+    @property
+    def _spacing(self) -> float:
+        """Distance of neighbouring float64 numbers at the largest time, s."""
+        return float(np.spacing(abs(self.start_time) + self.duration))
+
+    def blocks(self, size: int = ROWS) -> Iterator[tuple[Array, Array]]:
+        """Yield, for `size` rows at a time, their times as written and from the start, each (N,), s."""
+        count = self.count
+        for low in range(0, count, size):
+            high = min(low + size, count)
+            local = np.arange(low, high) / self.rate
+            if high == count:
+                local[-1] = self.duration
+            yield self.start_time + local, local
+
+
+@frozen
+class ListedGrid:
+    """Rows at given times.
+
+    Attributes:
+        duration: Seconds, at least 0.
+        times: Shape (N,), s, counted like `start_time`: strictly increasing, inside the trajectory.
+        start_time: Time at which the trajectory starts, s.
+    """
+
+    duration: float
+    times: Array
+    start_time: float = 0.0
+
+    def __post_init__(self) -> None:
+        times = read_only(self.times)
+        low, high = self.start_time, self.start_time + self.duration
+        if times.ndim != 1 or times.size == 0:
+            raise InputError("the list of times is empty", hint="give at least one time, or a rate")
+        inside = (times >= low - _NANOSECOND) & (times <= high + _NANOSECOND)
+        if not inside.all():
+            raise InputError(
+                f"the time {times[~inside][0]:.12g} s lies outside the trajectory",
+                hint=f"it lasts from {low:.12g} s to {high:.12g} s",
+            )
+        times = read_only(np.clip(times, low, high))
+        close = np.flatnonzero(np.diff(times) <= _NANOSECOND)
+        if close.size:
+            first, second = times[close[0]], times[close[0] + 1]
+            raise InputError(
+                f"the time {first:.12g} s is followed by {second:.12g} s",
+                hint="times must increase, by more than 1e-9 s each",
+            )
+        object.__setattr__(self, "times", times)
+
+    @property
+    def count(self) -> int:
+        """Number of rows, at least 1."""
+        return int(self.times.size)
+
+    def blocks(self, size: int = ROWS) -> Iterator[tuple[Array, Array]]:
+        """Yield, for `size` rows at a time, their times as written and from the start, each (N,), s."""
+        for low in range(0, self.count, size):
+            times = self.times[low : low + size]
+            yield times, np.clip(times - self.start_time, 0.0, self.duration)
+
+
+Grid = UniformGrid | ListedGrid
+
+
+def onto_breaks(local: Array, breaks: Array) -> Array:
+    """Return times (N,), s, those that rounding put just before a break moved onto it; the start stays."""
+    following = breaks[np.minimum(np.searchsorted(breaks, local, "right"), breaks.size - 1)]
+    near = max(AT_BREAK, 4 * float(np.spacing(breaks[-1])))
+    return np.where((following - local <= near) & (local > breaks[0]), np.maximum(following, local), local)
