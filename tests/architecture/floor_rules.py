@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from sources import HOUSE, Import, Offence, Planted, Rule, Sources
 
 FLOORS = (
-    ("errors", "frozen", "suggest", "units", "version"),
+    ("errors", "frozen", "progress", "suggest", "units", "version"),
     ("curves", "geometry"),
     ("kinematics", "catalogue"),
     ("trajectory", "samples", "columns", "grids"),

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from trajcli.cli.numbers import numbers
+from trajcli.cli.progress import progress
 from trajcli.job.read import load_job
 from trajcli.output.explain import explanation
 from trajcli.planning.plan import plan_job
@@ -208,8 +209,9 @@ def run_explain(job: str, overrides: Sequence[str], *, as_json: bool) -> int:
         VerificationError: After printing, when the trajectory breaks a limit.
         TrajcliError: When there is nothing to explain.
     """
-    plan = plan_job(load_job(job, overrides))
-    explained = explanation(plan)
+    with progress():
+        plan = plan_job(load_job(job, overrides))
+        explained = explanation(plan)
     text = explained.model_dump_json(indent=2) if as_json else "\n".join(_lines(explained))
     with standard_output() as out:
         out.write((text + "\n").encode())

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from trajcli.cli.progress import progress
 from trajcli.curves.extrema import peaks
 from trajcli.errors import InputError, Problem, VerificationError
 from trajcli.frozen import comparable
@@ -52,14 +53,15 @@ def run_plan(job: str, overrides: Sequence[str], options: PlanOptions) -> int:
     _check_inputs_stay(loaded, options)
     if options.resolved is not None:
         _write_resolved(loaded, options.resolved)
-    with np.errstate(
-        all="ignore"
-    ):  # what is not finite is for the checks to find, and not for numpy to print
-        plan = plan_job(loaded)
-    grid = grid_of(plan)
-    refusal = _refusal(plan, options)
-    if refusal is None and not options.no_output:
-        write_rows(plan, grid, options.output, options.digits)
+    with progress(to_terminal=options.output in (None, "-") and not options.no_output):
+        with np.errstate(
+            all="ignore"
+        ):  # what is not finite is for the checks to find, not for numpy to print
+            plan = plan_job(loaded)
+        grid = grid_of(plan)
+        refusal = _refusal(plan, options)
+        if refusal is None and not options.no_output:
+            write_rows(plan, grid, options.output, options.digits)
     if options.report is not None or options.reference:
         _report(plan, options)  # behind the rows: where it stands, they do
     if refusal is not None:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from trajcli.columns import columns_of
+from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.grids import Grid, ListedGrid, UniformGrid
 from trajcli.planning.plan import Plan
+from trajcli.progress import report_progress
 from trajcli.samples import sample
 from trajcli.streams.decimals import Digits
 from trajcli.streams.formats import DEFAULT, format_of, write_verified
@@ -55,12 +59,21 @@ def write_rows(plan: Plan, grid: Grid, path: str | None, digits: Digits) -> None
     loaded = plan.loaded
     groups = loaded.job.output.columns
     columns = columns_of(groups, loaded.robot.joint_types, loaded.units)
-    rows = sample(plan.trajectory, grid, groups, loaded.units, robot=loaded.robot)
+    rows = _counted(sample(plan.trajectory, grid, groups, loaded.units, robot=loaded.robot), grid.count)
     if path is not None and path != "-":
         write_verified(path, rows, columns, digits)
         return
     with standard_output() as out:
         DEFAULT.write(rows, columns, out, digits)
+
+
+def _counted(blocks: Iterator[Array], count: int) -> Iterator[Array]:
+    """Yield the blocks of `count` rows, and say how far it is."""
+    done = 0
+    for block in blocks:
+        done += len(block)
+        report_progress(f"writing row {done} of {count}")
+        yield block
 
 
 def write_plan(plan: Plan, path: str | None = None, digits: Digits = "fixed") -> None:

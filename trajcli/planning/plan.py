@@ -20,6 +20,7 @@ from trajcli.job.read import LoadedJob
 from trajcli.kinematics.robot import ToolLimits
 from trajcli.language.targets import Target
 from trajcli.planners.planner import Event, PlannedMove, Planner
+from trajcli.progress import report_progress
 from trajcli.trajectory import State, Trajectory
 
 if TYPE_CHECKING:
@@ -70,6 +71,7 @@ def plan_job(loaded: LoadedJob) -> Plan:
     events = [*loaded.events, *_events_of(poses.get(None), None)]
     before: Planner | None = None
     for index, planner in enumerate(loaded.job.moves):
+        report_progress(f"planning move {index + 1} of {len(loaded.job.moves)} ({planner.tag})")
         start = _handed_over(state, before, planner)
         begun = sum(float(done.planned.curve.breaks[-1]) for done in moves)
         with _errors_of(loaded, index, planner, begun):
@@ -80,6 +82,7 @@ def plan_job(loaded: LoadedJob) -> Plan:
         events += [replace(event, move=index) for event in move.planned.events]
         state, before = move.planned.end, planner
     trajectory = _joined(moves, loaded, _first_state(loaded, moves[0], events))
+    report_progress("checking the trajectory")
     verdict = verify(trajectory, [move.robot.limits for move in moves], [move.promise for move in moves])
     verdict = _with_unit_hint(verdict, loaded)
     shown = tuple(replace(event, message=event.text(loaded.say), amounts={}) for event in events)
