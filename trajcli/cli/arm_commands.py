@@ -95,10 +95,11 @@ def sorted_words(args: list[str], takes: Mapping[str, int]) -> list[str]:
 
 
 def register(app: typer.Typer) -> None:
-    """Add the commands fk, ik, jacobian, pose and robots."""
+    """Add the commands fk, ik, jacobian, pose, robots and mobility."""
     for command in (fk, ik, jacobian, pose):
         app.command(cls=NumbersCommand, epilog=f"Example: {_EXAMPLES[command.__name__]}")(command)
     app.command(epilog="Example: trajcli robots ur5e")(robots)
+    app.command(epilog="Example: trajcli mobility --links 4 --joints 1x4 --space planar")(mobility)
 
 
 @guarded
@@ -264,3 +265,35 @@ def robots(
     from trajcli.cli.robots import run_robots
 
     return run_robots(name, as_yaml=as_yaml, as_json=as_json)
+
+
+@guarded
+def mobility(
+    robot: Annotated[
+        str | None,
+        typer.Option("--robot", "-r", metavar="NAME|FILE", help="The open chain of a robot, or of a job's."),
+    ] = None,
+    links: Annotated[
+        int | None, typer.Option("--links", metavar="N", help="Number of links, the frame counted.")
+    ] = None,
+    joints: Annotated[
+        str | None,
+        typer.Option(
+            "--joints",
+            metavar="F|FxCOUNT,...",
+            help="Freedoms of the joints: 1x4,3x2, or by kind: Rx4,Sx2 (R P H: 1, C U: 2, S: 3).",
+        ),
+    ] = None,
+    space: Annotated[
+        Literal["spatial", "planar"], typer.Option("--space", help="Where the links move: lambda 6 or 3.")
+    ] = "spatial",
+    passive: Annotated[
+        int, typer.Option("--passive", metavar="F0", help="Freedoms that change nothing for the others.")
+    ] = 0,
+    as_json: Json = False,
+    errors: Errors = "text",
+) -> int:
+    """Count the freedoms of a robot or a linkage by the formula of Gruebler and Kutzbach."""
+    from trajcli.cli.mobility import MobilityOptions, run_mobility
+
+    return run_mobility(MobilityOptions(robot, links, joints, space, passive, as_json))
