@@ -151,3 +151,14 @@ def test_wrong_calls(arms, words, code, message, tmp_path: Path, monkeypatch):
     outcome = arms.call("robots", *words)
     assert (outcome.code, outcome.out) == (code, "")
     assert message in outcome.err
+
+
+def test_a_table_shows_beta_where_an_arm_has_it(arms, tmp_path):
+    rows = "{a: 0.4, beta: 0.01}, {a: 0.3}"
+    (tmp_path / "arm.yaml").write_text(f"convention: standard\njoints: [{rows}]\n")
+    out = arms.call("robots", tmp_path / "arm.yaml").out
+    assert "alpha  beta" in out
+    card = arms.json("robots", tmp_path / "arm.yaml")
+    assert [joint["beta"] for joint in card["joints"]] == [0.01, 0]
+    assert "beta" not in arms.call("robots", "ur5e").out
+    assert "beta" not in arms.json("robots", "ur5e")["joints"][0]

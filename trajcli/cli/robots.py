@@ -14,7 +14,7 @@ from trajcli.queries.arm import open_sheet
 from trajcli.queries.robot_card import robot_card, robot_row
 
 _WIDTH, _SOURCE = 100, 48  # columns of a paragraph, and of a source in the list
-_DH = ("theta", "d", "a", "alpha")
+_DH = ("theta", "d", "a", "alpha", "beta")
 _LIMITS = ("position", "velocity", "acceleration", "jerk")
 
 
@@ -75,7 +75,8 @@ def _card_lines(card: Mapping[str, Any]) -> Iterator[str]:
         yield f"bare joints without geometry ({angle}, {length}):"
     else:
         yield f"{card['convention']} Denavit-Hartenberg table ({angle}, {length}):"
-        yield from table_lines([["joint", "type", *_DH, "sign"], *map(_dh_row, card["joints"])])
+        head = [key for key in _DH if key in card["joints"][0]]
+        yield from table_lines([["joint", "type", *head, "sign"], *map(_dh_row, card["joints"])])
     yield ""
     yield f"limits ({angle} or {length}, per s, s^2, s^3):"
     yield from table_lines([["joint", *_LIMITS], *map(_limit_row, card["joints"])])
@@ -89,7 +90,7 @@ def _card_lines(card: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _dh_row(joint: Mapping[str, Any]) -> list[str]:
-    cells = [number(joint[key]) for key in _DH]
+    cells = [number(joint[key]) for key in _DH if key in joint]
     variable = 1 if joint["type"] == "prismatic" else 0
     cells[variable] = _with_q(cells[variable], joint["sign"])
     return [joint["name"], joint["type"], *cells, str(joint["sign"])]

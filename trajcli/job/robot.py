@@ -41,7 +41,7 @@ from trajcli.units import Quantity, Units, joint_quantity
 CATALOGUE = Path(__file__).parent.parent / "catalogue"
 
 _ANGLE, _LENGTH = Quantity("angle"), Quantity("length")
-_DH = {"theta": _ANGLE, "d": _LENGTH, "a": _LENGTH, "alpha": _ANGLE}
+_DH = {"theta": _ANGLE, "d": _LENGTH, "a": _LENGTH, "alpha": _ANGLE, "beta": _ANGLE}
 
 
 class JointModel(Model):
@@ -55,6 +55,10 @@ class JointModel(Model):
     d: Annotated[float, Number(_LENGTH, "Offset along z (length unit).")] = 0.0
     a: Annotated[float, Number(_LENGTH, "Length along x (length unit).")] = 0.0
     alpha: Annotated[float, Number(_ANGLE, "Angle about x (angle unit).")] = 0.0
+    beta: Annotated[
+        float,
+        Number(_ANGLE, "Angle about y behind alpha, where axes are almost parallel (Hayati; angle unit)."),
+    ] = 0.0
     sign: Annotated[Literal[1, -1], Field(description="Direction in which the joint counts.")] = 1
     position: Annotated[LowerUpper, JointBound(0, "Range [lower, upper] (angle or length unit).")] = UNLIMITED
     velocity: Annotated[LowerUpper, JointBound(1, "Velocity limit, or [lower, upper], per s.")] = UNLIMITED
@@ -133,7 +137,7 @@ class RobotModel(Model):
             names.append(name)
         described = [joint for joint in joints if any(key in joint.model_fields_set for key in _DH)]
         if described and self.convention is None:
-            text = "joints with theta, d, a or alpha need a `convention`"
+            text = "joints with theta, d, a, alpha or beta need a `convention`"
             raise refuse([((), text, "say `convention: standard` or `convention: modified`")])
         return self
 
@@ -144,7 +148,7 @@ class RobotModel(Model):
     def as_robot(self) -> Robot:
         """Return the robot that this describes."""
         joints = tuple(
-            Joint(name, m.type, m.theta, m.d, m.a, m.alpha, m.sign)
+            Joint(name, m.type, m.theta, m.d, m.a, m.alpha, m.sign, m.beta)
             for name, m in zip(self.joint_names(), self.joints, strict=True)
         )
         position, *rates = (np.array([getattr(m, quantity) for m in self.joints]) for quantity in QUANTITIES)
@@ -167,7 +171,8 @@ def robot_as_mapping(robot: Robot) -> dict[str, Any]:
 
 def _joint_as_mapping(robot: Robot, index: int, *, described: bool) -> dict[str, Any]:
     joint = robot.joints[index]
-    row = {key: written_number(getattr(joint, key), _DH[key]) for key in _DH} if described else {}
+    keys = [key for key in _DH if key != "beta" or joint.beta] if described else []
+    row = {key: written_number(getattr(joint, key), _DH[key]) for key in keys}
     bounds = [robot.limits.of_order(order)[index].tolist() for order in range(len(QUANTITIES))]
     limits = {
         quantity: written_bound((low, high), joint_quantity(joint.type, order))

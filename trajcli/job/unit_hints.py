@@ -12,7 +12,7 @@ from trajcli.kinematics.robot import Robot
 _MANY_TURNS = 4 * math.pi  # rad: two turns; most joints have one
 _FAR = 50.0  # m: no arm reaches as far
 _REACHES = 10.0  # times the length of the arm: far out of reach, and near it where a thousandth is meant
-_ANGLES = ("rpy", "rotvec", "angles", "angle", "yaw", "pitch", "theta", "alpha")
+_ANGLES = ("rpy", "rotvec", "angles", "angle", "yaw", "pitch", "theta", "alpha", "beta")
 _LENGTHS = ("xyz", "center", "a", "d")
 _BY_JOINT = ("joints", "positions")
 _SECTIONS = ("start", "points", "moves", "robot", "base", "tool")

@@ -30,6 +30,10 @@ class Joint:
         a: Length along x, m.
         alpha: Angle about x, rad.
         sign: 1 or -1: the direction in which the joint counts.
+        beta: Angle about y behind alpha, rad: where two axes are almost parallel, d would be far off and
+            depend on the last digit of alpha without it.
+
+    Source: Hayati, Robot arm geometric link parameter estimation, IEEE CDC (1983), for beta.
     """
 
     name: str
@@ -39,6 +43,7 @@ class Joint:
     a: float = 0.0
     alpha: float = 0.0
     sign: int = 1
+    beta: float = 0.0
 
 
 @comparable

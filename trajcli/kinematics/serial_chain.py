@@ -1,8 +1,8 @@
 """Serial chain: links from Denavit-Hartenberg rows, and a frame moved along them for many configurations.
 
-A standard row is Rz(theta) Tz(d) Tx(a) Rx(alpha), a modified one Rx(alpha) Tx(a) Rz(theta) Tz(d). A turn
-about z stays pending until an axis is needed, so that neighbouring parallel axes add their angles instead of
-multiplying matrices.
+A standard row is Rz(theta) Tz(d) Tx(a) Rx(alpha), a modified one Rx(alpha) Tx(a) Rz(theta) Tz(d); where axes
+are almost parallel, Ry(beta) follows Rx(alpha) and Tx(a). A turn about z stays pending until an axis is
+needed, so that neighbouring parallel axes add their angles instead of multiplying matrices.
 """
 
 from __future__ import annotations
@@ -37,15 +37,16 @@ _BLOCK = 4096  # configurations at a time: the arrays in use stay in the process
 class Link:
     """A joint and the fixed screws about x before and after it, each (a, cos alpha, sin alpha).
 
-    A standard DH row has its screw after the joint, a modified one before.
+    A standard DH row has its screw after the joint, a modified one before. Where the row has a beta, its
+    cosine and sine follow.
     """
 
     prismatic: bool
     sign: float
     theta: float
     d: float
-    before: tuple[float, float, float]
-    after: tuple[float, float, float]
+    before: tuple[float, ...]
+    after: tuple[float, ...]
 
 
 @frozen
@@ -73,7 +74,8 @@ def links_of(robot: Robot) -> tuple[Link, ...]:
     cosines, sines = cos_sin([joint.alpha for joint in robot.joints])
     links = []
     for joint, cosine, sine in zip(robot.joints, cosines.tolist(), sines.tolist(), strict=True):
-        screw = (float(joint.a), cosine, sine)
+        tilt = () if joint.beta == 0.0 else map(float, cos_sin(joint.beta))
+        screw = (float(joint.a), cosine, sine, *tilt)
         before, after = (none, screw) if robot.convention == "standard" else (screw, none)
         prismatic = joint.type == "prismatic"
         links.append(Link(prismatic, float(joint.sign), float(joint.theta), float(joint.d), before, after))
@@ -127,14 +129,26 @@ class MovingFrame:
         self._angle = total(self._angle, angle)
         self._turned = self._x_now = None
 
-    def screw(self, a: float, cosine: float, sine: float) -> None:
-        """Slide along x by a, and turn about it by the angle of the given cosine and sine."""
+    def screw(self, a: float, cosine: float, sine: float, *tilt: float) -> None:
+        """Slide along x by a, and turn about it by the angle of the given cosine and sine; then tilt about y.
+
+        Args:
+            a: m.
+            cosine: Of the angle about x.
+            sine: Of the angle about x.
+            tilt: Cosine and sine of the angle about y, where there is one.
+        """
         if a != 0.0:
             self.p = advance(self.p, a, self.x)
         if cosine != 1.0 or sine != 0.0:
             y = self.y
             self._x, self._y = self.x, combine(cosine, y, sine, self.z)
             self.z = combine(cosine, self.z, -sine, y)
+            self._angle, self._turned, self._x_now = 0.0, None, None
+        if tilt:
+            x, y = self.x, self.y
+            self._x, self._y = combine(tilt[0], x, -tilt[1], self.z), y
+            self.z = combine(tilt[0], self.z, tilt[1], x)
             self._angle, self._turned, self._x_now = 0.0, None, None
 
     def attach(self, tool: Array) -> None:

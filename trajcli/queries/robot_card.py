@@ -122,6 +122,8 @@ def _joint_card(sheet: RobotSheet, index: int) -> dict[str, Any]:
     joint, units = sheet.robot.joints[index], sheet.units
     angle, length = Quantity("angle"), Quantity("length")
     row = {"theta": angle, "d": length, "a": length, "alpha": angle}
+    if any(each.beta for each in sheet.robot.joints):
+        row["beta"] = angle
     table = {key: round(to_user(getattr(joint, key), quantity, units), 12) for key, quantity in row.items()}
     limits: dict[str, Any] = {}
     for order, quantity in enumerate(QUANTITIES):

@@ -219,7 +219,7 @@ class ResidualCheck:
         """Return a direction in the base as the first link sees it behind its joint."""
         link = self._links[0]
         turn, _ = _motion(link, self._offsets[0], value)
-        return turned_back(turned_back(vector, _X, link.before[1:]), _Z, turn)
+        return turned_back(turned_back(vector, _X, (link.before[1], link.before[2])), _Z, turn)
 
     def _point_from_first_link(self, point: VectorEntries, value: Turn | Entry) -> VectorEntries:
         """Return a point in the base as the first link sees it behind its joint."""

@@ -25,13 +25,14 @@ def method_for(robot: Robot) -> IkMethod:
     nor of an arm two of whose axes are one.
 
     Axes count as parallel when the sine of their angle is at most 1e-9, and as meeting when their distance is
-    at most 1e-9 of the arm's length.
+    at most 1e-9 of the arm's length. An arm with a beta in its table has no closed form: its axes are almost
+    parallel, and not quite.
 
     Raises:
         InputError: When the robot has no geometry.
     """
     arm = axis_geometry(robot)
-    for match in FAMILIES:
+    for match in FAMILIES if not any(joint.beta for joint in robot.joints) else ():
         method = match(arm)
         if method is not None and _every_joint_counts(robot, method):
             return method
