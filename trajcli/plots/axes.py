@@ -61,7 +61,7 @@ def note_of(panel: Panel, view: tuple[float, float]) -> str:
         return "no limit"
     limits = finite_limits(panel)
     outside = limits[(limits < view[0]) | (limits > view[1])]
-    if not outside.size or not panel.y_label.startswith(("q", "speed", "angular")):
+    if not outside.size:
         return ""
     below, above = outside[outside < view[0]], outside[outside > view[1]]
     if below.size and above.size and below[-1] == -above[0]:

@@ -146,7 +146,9 @@ def _draw_block(
             _draw_borders(frame, borders)
             if row == 0:
                 _draw_names(frame, borders, _named(block, borders, width))
-        _draw_panel(frame, panel, numbered=times is None or index + block.columns >= len(block.panels))
+        lowest = index + block.columns >= len(block.panels)
+        note = "" if times is None else note_of(panel, view)
+        _draw_panel(frame, panel, note, numbered=times is None or lowest)
 
 
 def _draw_borders(frame: PanelFrame, borders: MoveBorders) -> None:
@@ -163,8 +165,8 @@ def _draw_names(frame: PanelFrame, borders: MoveBorders, named: tuple[bool, list
         frame.sheet.text(middle, frame.top - 0.9 * TITLE, borders.names[index], SMALL, **options)
 
 
-def _draw_panel(frame: PanelFrame, panel: Panel, *, numbered: bool) -> None:
-    """Draw what a panel holds, with numbers at x where asked for."""
+def _draw_panel(frame: PanelFrame, panel: Panel, note: str, *, numbered: bool) -> None:
+    """Draw what a panel holds, with a remark above it, and with numbers at x where asked for."""
     for line in panel.limits:
         frame.plot(line[:, 0], line[:, 1], "limit", **LIMIT)
     for trace in panel.traces:
@@ -176,7 +178,6 @@ def _draw_panel(frame: PanelFrame, panel: Panel, *, numbered: bool) -> None:
     frame.y_axis(y_ticks, y_names, panel.y_label)
     if numbered:
         frame.x_axis(x_ticks, x_names, panel.x_label)
-    note = note_of(panel, frame.y)
     room = 0.95 * (frame.width - text_width(note, SMALL)) - 0.15
     frame.titles(shortened(panel.title, NORMAL, room), note, LIMIT_COLOUR)
 
