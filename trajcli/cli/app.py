@@ -115,7 +115,11 @@ def plan(
         bool, typer.Option("--strict", help="Exit 1 when a concession (event) was made.")
     ] = False,
     reference: Annotated[
-        bool, typer.Option("--reference", help="Compare each move with the fastest under the same limits.")
+        bool,
+        typer.Option(
+            "--reference",
+            help="Compare each move with the fastest under the same limits, along a path with toppra.",
+        ),
     ] = False,
     no_output: Annotated[bool, typer.Option("--no-output", help="Only judge: write no rows.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on stderr.")] = False,
