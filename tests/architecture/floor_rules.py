@@ -17,7 +17,7 @@ FLOORS = (
     ("planners", "checks", "streams"),
     ("job",),
     ("planning", "comparison", "queries"),
-    ("output",),
+    ("output", "plots"),
     ("cli", "api"),
     ("",),  # trajcli/__init__.py, the public face
     ("__main__",),
@@ -36,7 +36,7 @@ HOMES = {
 }
 """The only folders that import a library."""
 
-HEAVY = ("scipy", "ruckig", "toppra", "matplotlib", "mcap", "mcap_ros2", "plotly")
+HEAVY = ("scipy", "ruckig", "toppra", "matplotlib", "mpl_toolkits", "mcap", "mcap_ros2", "plotly")
 NUMPY_ONLY = ("curves", "geometry", "kinematics")
 PLANNERS = f"{HOUSE}.planners"
 SAME_WORDS = {

@@ -29,6 +29,7 @@ _OTHER_NAMES = {
     **dict.fromkeys(("compare", "cmp"), "trajcli diff A B"),
     **dict.fromkeys(("new", "create", "start", "example"), "trajcli init"),
     **dict.fromkeys(("show", "describe", "info"), "trajcli explain JOB"),
+    **dict.fromkeys(("draw", "graph", "picture", "chart"), "trajcli plot JOB"),
     "report": "trajcli plan JOB --report FILE",
     "help": "trajcli --help",
     "version": "trajcli --version",
@@ -114,7 +115,11 @@ def plan(
         bool, typer.Option("--strict", help="Exit 1 when a concession (event) was made.")
     ] = False,
     reference: Annotated[
-        bool, typer.Option("--reference", help="Compare each move with the fastest under the same limits.")
+        bool,
+        typer.Option(
+            "--reference",
+            help="Compare each move with the fastest under the same limits, along a path with toppra.",
+        ),
     ] = False,
     no_output: Annotated[bool, typer.Option("--no-output", help="Only judge: write no rows.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on stderr.")] = False,
@@ -168,6 +173,52 @@ def diff(
     from trajcli.cli.diff import run_diff
 
     return run_diff(a, b, atol, rtol, resample=resample)
+
+
+@app.command(epilog="Example: trajcli plot examples/ur5e_pick.yaml -o pick.svg")
+@guarded
+def plot(
+    files: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="JOB|FILE...", help="A job, CSV files, or files to draw over a job; - is stdin."
+        ),
+    ],
+    output: Annotated[
+        str | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="FILE.svg, .png or .pdf; - is stdout. Else the first name's stem with .svg, in this folder.",
+        ),
+    ] = None,
+    kind: Annotated[
+        Literal["svg", "png", "pdf"] | None, typer.Option("--format", help="Where no name says it; else svg.")
+    ] = None,
+    quantities: Annotated[
+        str | None,
+        typer.Option(
+            "--quantities",
+            metavar="LIST",
+            help="Some of q,qd,qdd,qddd,tool,path,phase; else those that suit the job.",
+        ),
+    ] = None,
+    joints: Annotated[
+        list[str], typer.Option("--joints", metavar="NAME...", help="Only these, as a,b or a b; else all.")
+    ] = [],  # noqa: B006
+    override: Overrides = [],  # noqa: B006
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Do not say what was written.")] = False,
+    every: Annotated[
+        bool, typer.Option("--all", help="Every finding, not only the worst of each move and kind.")
+    ] = False,
+    errors: Errors = "text",
+) -> int:
+    """Draw joints, tool and phase plane with limits. Exit 1: one is broken, and the picture shows where."""
+    from trajcli.cli.plot import PlotOptions, run_plot
+
+    every = every or errors == "json"
+    return run_plot(files, override, PlotOptions(output, kind, quantities, tuple(joints), quiet, every))
 
 
 @app.command(epilog="Example: trajcli schema job")

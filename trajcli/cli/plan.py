@@ -21,7 +21,7 @@ from trajcli.streams.whole_file import identity
 
 if TYPE_CHECKING:
     from trajcli.checks.tool_bound import ToolPeak
-    from trajcli.job.report import MoveReport, ReferenceReport
+    from trajcli.job.report import MoveReport, PathReferenceReport, ReferenceReport
 
 _STILL = 1e-9  # rad/s or m/s, below which a joint only rounds
 
@@ -138,6 +138,8 @@ def _report(plan: Plan, options: PlanOptions) -> None:
         if move.reference is not None:
             text = _compared(move, move.reference)
             print(f"move {move.index} ({move.planner}): {text}", file=sys.stderr)  # noqa: T201
+        if move.path_reference is not None:
+            print(f"  {_beside_toppra(move, move.path_reference)}", file=sys.stderr)  # noqa: T201
 
 
 def _compared(move: MoveReport, bound: ReferenceReport) -> str:
@@ -148,6 +150,19 @@ def _compared(move: MoveReport, bound: ReferenceReport) -> str:
         return "no bound: it ends where it starts" if max(speeds) > _STILL else "nothing to move"
     how = "the fastest" if move.tool is None else "the fastest off the path"
     return f"{move.duration:.6g} s, {bound.ratio:.4g} x {how} under the same limits ({bound.duration:.6g} s)"
+
+
+def _beside_toppra(move: MoveReport, other: PathReferenceReport) -> str:
+    if other.duration is None or other.ratio is None:
+        return other.reason or "nothing to move"
+    uses = ", toppra ".join(
+        f"{100 * use.used:.5g} % ({use.quantity} of {use.joint})" for use in (other.own_use, other.use) if use
+    )
+    beside = "" if move.tool is None else ", which does not know the limits of the tool"
+    return (
+        f"{other.ratio:.4g} x toppra along the same path ({other.duration:.6g} s{beside}); "
+        f"most used of a limit: {uses}"
+    )
 
 
 def _summarise(plan: Plan, rows: int, options: PlanOptions) -> None:

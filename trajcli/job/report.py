@@ -131,6 +131,26 @@ class ReferenceReport(ReportPart):
     reason: Annotated[str | None, Field(description="Why there is no bound.")] = None
 
 
+class LimitUseReport(ReportPart):
+    """The limit of which a motion uses most, for all t."""
+
+    quantity: Literal["velocity", "acceleration"]
+    joint: str
+    used: Annotated[float, Field(description="Part of the limit that is used: 1 is all of it.")]
+    time: Annotated[float, Field(description="Seconds from the start of the motion.")]
+
+
+class PathReferenceReport(ReportPart):
+    """The motion of toppra along the same path, within the same limits of velocity and acceleration."""
+
+    solver: Literal["toppra"] = "toppra"
+    duration: Annotated[float | None, Field(description="Seconds; null where it finds no motion.")]
+    ratio: Annotated[float | None, Field(description="Duration of the move over it.")]
+    use: Annotated[LimitUseReport | None, Field(description="What toppra uses; above 1 it is too fast.")]
+    own_use: Annotated[LimitUseReport | None, Field(description="What the move uses.")]
+    reason: Annotated[str | None, Field(description="Why there is none.")] = None
+
+
 class WaypointReport(ReportPart):
     """A point that a move passes, its start and target among them."""
 
@@ -252,6 +272,10 @@ class MoveReport(ReportPart):
         Field(description="Of the tool in joint space; null where `limits.tcp` asks for none."),
     ] = None
     reference: ReferenceReport | None = None
+    path_reference: Annotated[
+        PathReferenceReport | None,
+        Field(description="Asked for by `--reference`; null where a move is not time-optimal."),
+    ] = None
 
 
 class FindingReport(ReportPart):

@@ -13,14 +13,16 @@ from trajcli.checks.finding import Finding
 from trajcli.checks.verify import Verdict
 from trajcli.curves.extrema import Peaks
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.errors import Amount, Problem, VerificationError
+from trajcli.errors import Amount, PlanningError, Problem, VerificationError
 from trajcli.job.report import (
     BindingReport,
     EventReport,
     FindingReport,
+    LimitUseReport,
     LowestSpeedReport,
     MoveReport,
     OutsideReport,
+    PathReferenceReport,
     PeakReport,
     ReferenceReport,
     Report,
@@ -123,6 +125,7 @@ def _move(plan: Plan, index: int, *, reference: bool) -> MoveReport:
         tool=_tool(plan.trajectory, span, move),
         tool_peaks=None if of_tool is None else _tool_peaks(of_tool, span, move.robot),
         reference=reference_of(move) if reference else None,
+        path_reference=path_reference_of(move) if reference and move.planned.phase_plane else None,
     )
 
 
@@ -197,6 +200,27 @@ def reference_of(move: PlannedMove) -> ReferenceReport:
         return ReferenceReport(duration=None, ratio=None, joint=name, reason=bound.reason)
     ratio = move.duration / bound.duration if bound.duration > 0 else None
     return ReferenceReport(duration=bound.duration, ratio=ratio, joint=name)
+
+
+def path_reference_of(move: PlannedMove) -> PathReferenceReport | None:
+    """Return how a time-optimal move compares with toppra's motion along its path; None for other moves."""
+    from trajcli.planning.path_reference import LimitUse, limit_use, path_reference
+
+    def report(use: LimitUse | None) -> LimitUseReport | None:
+        if use is None:
+            return None
+        name = move.robot.joint_names[use.joint]
+        return LimitUseReport(quantity=use.quantity, joint=name, used=use.used, time=use.time)
+
+    own = report(limit_use(move.planned.curve, move.robot.limits))
+    try:
+        other = path_reference(move)
+    except PlanningError as error:
+        return PathReferenceReport(duration=None, ratio=None, use=None, own_use=own, reason=str(error))
+    if other is None:
+        return None
+    ratio = move.duration / other.duration if other.duration > 0 else None
+    return PathReferenceReport(duration=other.duration, ratio=ratio, use=report(other.use), own_use=own)
 
 
 def _tool(trajectory: Trajectory, span: Span, move: PlannedMove) -> ToolReport | None:

@@ -18,6 +18,7 @@ from trajcli.language.numbers import Model
 from trajcli.trajectory import Destination, Promise, Span, State, Trajectory, ViaPoints
 
 if TYPE_CHECKING:
+    from trajcli.curves.time_optimal.phase_plane import PhasePlane
     from trajcli.kinematics.following.motion import ToolMotion
     from trajcli.language.targets import Target
 
@@ -102,6 +103,8 @@ class Planned:
         binding_phases: Whether the phases say, one after the other, which limit binds.
         no_lower_bound: Why nothing is known of the shortest duration between its end states.
         remedies: What would help against a finding, by its kind, where that depends on the method.
+        virtual_points: Points that the method adds to those that it is given.
+        phase_plane: Of a time-optimal law: the law s(t), and what limits it.
     """
 
     curve: PiecewisePolynomial
@@ -120,6 +123,8 @@ class Planned:
     binding_phases: bool = False
     no_lower_bound: str | None = None
     remedies: Mapping[str, str] = field(default_factory=dict)
+    virtual_points: ViaPoints | None = None
+    phase_plane: PhasePlane | None = None
 
 
 class Planner(Model):

@@ -51,6 +51,8 @@ def _scaled(planned: Planned, factor: float) -> Planned:
         via_points=planned.via_points and planned.via_points.scaled(factor),
         origin=planned.origin * factor,
         tool=planned.tool and planned.tool.scaled(factor),
+        virtual_points=planned.virtual_points and planned.virtual_points.scaled(factor),
+        phase_plane=planned.phase_plane and planned.phase_plane.scaled(factor),
     )
 
 

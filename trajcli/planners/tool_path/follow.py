@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +24,9 @@ from trajcli.kinematics.inverse.target import residual_jacobian
 from trajcli.kinematics.jacobian import jacobian
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.planner import Event, Phase
+
+if TYPE_CHECKING:
+    from trajcli.curves.time_optimal.phase_plane import PhasePlane
 
 _BISECTIONS = 20
 _SAMPLES = 17  # of the rest of the path, at which it is asked whether the arm reaches it
@@ -197,12 +201,14 @@ class JointMotion:
         motion: What the tool shall do.
         phases: Named intervals of time.
         events: What was conceded.
+        phase_plane: Of a time-optimal law.
     """
 
     curve: PiecewisePolynomial
     motion: ToolMotion
     phases: tuple[Phase, ...] = ()
     events: tuple[Event, ...] = ()
+    phase_plane: PhasePlane | None = None
 
 
 @frozen

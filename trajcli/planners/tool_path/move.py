@@ -155,6 +155,7 @@ class ToolPathMove(Planner):
             wanted_speed=_wanted_speed(self.law, robot.limits.tcp, angular=joints.motion.pure_rotation),
             remedies=REMEDIES,
             events=(*planned.events, *joints.events),
+            phase_plane=joints.phase_plane,
         )
 
     def _followed(self, planned: PlannedPath, start: Array, robot: Robot) -> JointMotion:

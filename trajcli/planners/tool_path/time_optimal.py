@@ -7,13 +7,22 @@ IEEE Trans. Robotics 34 (2018).
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 import numpy as np
 
 from trajcli.curves.operations import scale_time
-from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, derivative_coefficients, horner
-from trajcli.curves.time_optimal.constraints import ConstraintRows
+from trajcli.curves.piecewise import (
+    Array,
+    PiecewisePolynomial,
+    Side,
+    derivative_coefficients,
+    distinct,
+    horner,
+)
+from trajcli.curves.time_optimal.constraints import ConstraintRows, JointConstraint
 from trajcli.curves.time_optimal.parameterization import time_optimal
+from trajcli.curves.time_optimal.phase_plane import PhasePlane
 from trajcli.curves.time_optimal.switching import switching_structure
 from trajcli.curves.time_optimal.time_law import LawPieces
 from trajcli.frozen import frozen
@@ -51,9 +60,8 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
     curve = joints.by_s(Tolerance(tolerance.position * _FINER, tolerance.angle * _FINER))
     _require_acceleration(curve, robot, planner)
     tcp = _limits(spec, robot.limits.tcp)
-    solved = time_optimal(
-        curve, robot.limits.velocity, robot.limits.acceleration, further=[ToolConstraint(path, tcp)]
-    )
+    limits, of_tool = robot.limits, ToolConstraint(path, tcp)
+    solved = time_optimal(curve, limits.velocity, limits.acceleration, further=[of_tool])
     remaining = _remaining_stretch(path, solved.law, tcp)
     least = spec.minimum_duration or 0.0
     factor = max(remaining, least / solved.trajectory.duration)
@@ -61,7 +69,7 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
         scale_time(each, factor) if factor > 1 else each for each in (solved.law, solved.trajectory)
     )
     motion = motion_along(path, law, law.breaks, tolerance, None)
-    binding = switching_structure(solved.trajectory, robot.limits.velocity, robot.limits.acceleration)
+    binding = switching_structure(solved.trajectory, limits.velocity, limits.acceleration)
     phases = [
         Phase(f"{b.quantity} {'+' if b.sign > 0 else '-'}", b.start * factor, b.end * factor, b.joint)
         for b in binding
@@ -71,7 +79,12 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
     stretch = solved.stretch * remaining
     if stretch > 1 + _NOTED:
         events.append(stretched(stretch))
-    return JointMotion(trajectory, motion, tuple(phases), tuple(events if solved.refinements else events[1:]))
+    joint_constraint = JointConstraint(curve, limits.velocity, limits.acceleration)
+    breaks = distinct(np.concatenate([curve.breaks, path.breaks]))
+    dimension: Literal["length", "angle"] = "angle" if path.poses.pure_rotation else "length"
+    plane = PhasePlane(law, (joint_constraint, of_tool), breaks, solved.stops, dimension)
+    kept = tuple(events if solved.refinements else events[1:])
+    return JointMotion(trajectory, motion, tuple(phases), kept, plane)
 
 
 def _remaining_stretch(path: ToolPath, law: PiecewisePolynomial, limits: ToolLimits) -> float:

@@ -25,7 +25,7 @@ from trajcli.curves.splines.hermite import (
 )
 from trajcli.curves.splines.shape_preserving import ShapeError, shape_preserving
 from trajcli.curves.splines.time_allocation import fastest_durations
-from trajcli.curves.splines.virtual_points import continuous_acceleration
+from trajcli.curves.splines.virtual_points import continuous_acceleration, virtual_points
 from trajcli.errors import Amount, PlanningError, Problem
 from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import FieldPath, Flaw, refuse
@@ -41,7 +41,7 @@ from trajcli.planners.waypoints.through_points import (
     ThroughPoints,
     via_points,
 )
-from trajcli.trajectory import State
+from trajcli.trajectory import State, ViaPoints
 from trajcli.units import Quantity
 
 Rule = Literal[
@@ -338,6 +338,7 @@ class Spline(ThroughPoints):
             events=points.events,
             one_piece_per_interval=True,
             remedies=OPEN_END_REMEDIES if self.rule in FREE_ENDS else REMEDIES,
+            virtual_points=_virtual(curve) if self.rule == "continuous_acceleration" else None,
         )
 
     def _times_of(self, points: PointTable, robot: Robot) -> Array:
@@ -375,6 +376,11 @@ def _not_monotone(error: ShapeError, robot: Robot, *, given: bool) -> PlanningEr
     hint = "change that velocity, or use another rule than shape_preserving"
     hint += "" if given else ", or give every waypoint a `time`"
     return PlanningError(Problem(message, hint, joint=name, amounts=amounts))
+
+
+def _virtual(curve: PiecewisePolynomial) -> ViaPoints:
+    times, positions = virtual_points(curve)
+    return ViaPoints(times, positions, np.zeros_like(positions))
 
 
 def _beginning(curve: PiecewisePolynomial) -> State:

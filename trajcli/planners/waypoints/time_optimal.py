@@ -18,8 +18,10 @@ from trajcli.curves.operations import scale_time, times_at
 from trajcli.curves.parabolic_blends.blends import blended
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.curves.splines.shape_preserving import ShapeError
+from trajcli.curves.time_optimal.constraints import JointConstraint
 from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion, UnsettledSpeedError, time_optimal
 from trajcli.curves.time_optimal.passes import UnreachableSpeedError
+from trajcli.curves.time_optimal.phase_plane import PhasePlane
 from trajcli.curves.time_optimal.switching import switching_structure
 from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.frozen import comparable, frozen
@@ -307,7 +309,19 @@ class TimeOptimal(ThroughPoints):
             events=(*points.events, *path.events, *_events(motion)),
             binding_phases=True,
             remedies=REMEDIES,
+            phase_plane=self._phase_plane(path, motion, robot).scaled(factor),
         )
+
+    def _phase_plane(self, path: JointPath, motion: TimeOptimalMotion, robot: Robot) -> PhasePlane:
+        """Return the law with its limits; the length of chords has a unit where all joints share one."""
+        limits, kinds = robot.limits, set(robot.joint_types)
+        by_chord = self.path == "polyline" or (self.parameter or "chord") == "chord"
+        alike = by_chord and len(kinds) == 1
+        dimension: Literal["length", "angle", "ratio"] = (
+            "ratio" if not alike else "length" if "prismatic" in kinds else "angle"
+        )
+        joints = JointConstraint(path.curve, limits.velocity, limits.acceleration)
+        return PhasePlane(motion.law, (joints,), path.curve.breaks, motion.stops, dimension)
 
     def _untimed(self) -> Self:
         """Return the move without the times of a recording: it is to be passed faster."""

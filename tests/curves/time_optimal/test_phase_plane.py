@@ -1,0 +1,106 @@
+"""The maximum velocity curve against linear programs, and laws that stay below it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.curves.time_optimal.constraints import JointConstraint
+from trajcli.curves.time_optimal.phase_plane import PhasePlane
+from trajcli.job.read import job_from_text, load_job
+from trajcli.planning.plan import plan_job
+
+JOB = """\
+version: 1
+units: {{angle: deg}}
+robot: {{joints: [{{velocity: 90, acceleration: 400}}, {{velocity: [-50, 70], acceleration: [-300, 200]}}]}}
+start: {{joints: [0, 0]}}
+moves:
+  - {{planner: time_optimal, through: [{{joints: [30, 10]}}, {{joints: [20, 40]}}, {{joints: [60, 30]}}]{more}}}
+"""
+
+
+def plane_of(text: str) -> PhasePlane:
+    (move,) = plan_job(job_from_text(text)).moves
+    assert move.planned.phase_plane is not None
+    return move.planned.phase_plane
+
+
+def by_linear_program(
+    q1: np.ndarray, q2: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray
+) -> float:
+    """Return the largest x = sd^2 for which some u keeps all limits: scipy, on qd = q' sd, qdd = q' u + q'' x."""
+    rows = [[q1, q2], [-q1, -q2]]
+    matrix = np.concatenate([np.column_stack(row) for row in rows])
+    bounds = np.concatenate([acceleration[:, 1], -acceleration[:, 0]])
+    cap = min((v[1] if p > 0 else v[0]) / p for p, v in zip(q1, velocity, strict=True)) ** 2
+    answer = linprog([0, -1], matrix, bounds, bounds=[(None, None), (0, cap)])
+    assert answer.status == 0
+    return float(answer.x[1])
+
+
+@pytest.mark.parametrize("more", ["", ", rule: natural", ", path: polyline, corner: 3"])
+def test_the_curve_is_the_solution_of_a_linear_program_at_each_point(more: str) -> None:
+    plane = plane_of(JOB.format(more=more))
+    (joints,) = plane.constraints
+    assert isinstance(joints, JointConstraint)
+    s = np.sort(np.random.default_rng(1).uniform(plane.breaks[0], plane.breaks[-1], 40))
+    s = np.concatenate([s, plane.breaks[1:-1]])
+    for side in ("left", "right"):
+        ours = plane.largest_speed(s, side) ** 2
+        q1, q2 = (joints.path.evaluate(s, order, side=side) for order in (1, 2))
+        theirs = [
+            by_linear_program(*pair, joints.velocity, joints.acceleration)
+            for pair in zip(q1, q2, strict=True)
+        ]
+        np.testing.assert_allclose(ours, theirs, rtol=1e-7)
+
+
+def test_a_circle_has_the_speed_at_which_its_own_curvature_uses_the_limit() -> None:
+    # q = (s, s^2 / 2) at s = 0: u is bounded by |u| <= 3 and |x + 0 u| <= 2, so x <= 2
+    path = PiecewisePolynomial([0.0, 1.0], [[[0.0, 0.5]], [[1.0, 0.0]], [[0.0, 0.0]]])
+    wide, bounds = np.tile([-9.0, 9.0], (2, 1)), np.array([[-3.0, 3.0], [-2.0, 2.0]])
+    law = PiecewisePolynomial([0.0, 1.0], [[[1.0]], [[0.0]]])
+    plane = PhasePlane(
+        law, (JointConstraint(path, wide, bounds),), np.array([0.0, 1.0]), np.array([]), "ratio"
+    )
+    assert plane.largest_speed(np.array([0.0])) == pytest.approx([2.0**0.5], rel=1e-12)
+    # at s = 1: |u| <= 3 and |u + x| <= 2 leave x <= 5
+    assert plane.largest_speed(np.array([1.0])) == pytest.approx([5.0**0.5], rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["time_optimal", "dispense"])
+def test_a_law_stays_below_its_curve_and_ends_with_the_move(name: str) -> None:
+    planes = [
+        (move, move.planned.phase_plane)
+        for move in plan_job(load_job(f"examples/{name}.yaml")).moves
+        if move.planned.phase_plane is not None
+    ]
+    assert planes
+    for move, plane in planes:
+        assert plane.law.duration == pytest.approx(move.duration, rel=1e-12)
+        states = plane.law.evaluate_orders(plane.law.breaks, (0, 1))[:, :, 0]
+        s = np.clip(states[:, 0], plane.breaks[0], plane.breaks[-1])
+        top = np.minimum(plane.largest_speed(s, "left"), plane.largest_speed(s))
+        assert (states[:, 1] <= top * (1 + 1e-6) + 1e-9).all()
+        assert (states[:, 1] / top).max() > 0.9
+
+
+def test_a_slower_law_keeps_the_curve() -> None:
+    fast, slow = plane_of(JOB.format(more="")), plane_of(JOB.format(more=", duration: 5"))
+    assert slow.law.duration == pytest.approx(5.0, rel=1e-12)
+    s = np.linspace(fast.breaks[0], fast.breaks[-1], 9)
+    np.testing.assert_array_equal(fast.largest_speed(s), slow.largest_speed(s))
+    shorter = 5.0 / fast.law.duration
+    np.testing.assert_allclose(
+        slow.law.evaluate(np.array([2.0]), 1) * shorter, fast.law.evaluate(np.array([2.0 / shorter]), 1)
+    )
+
+
+def test_sharp_corners_are_stops_and_units_are_those_of_the_joints() -> None:
+    plane = plane_of(JOB.format(more=", path: polyline"))
+    assert plane.stops.size == 2
+    assert plane.dimension == "angle"
+    assert plane_of(JOB.format(more=", parameter: uniform")).dimension == "ratio"

@@ -1,0 +1,147 @@
+"""`trajcli plot`: pictures of a job and of sample streams."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from trajcli.cli.outcome import print_remark
+from trajcli.errors import InputError
+from trajcli.frozen import comparable
+from trajcli.job.read import files_of, load_job
+from trajcli.planning.plan import Plan, plan_job
+from trajcli.plots.choice import parse_quantities, split_names
+from trajcli.plots.picture import picture_of
+from trajcli.plots.write import format_of_picture, rendered
+from trajcli.streams.table import read_csv
+from trajcli.streams.whole_file import identity, standard_output, whole_file
+
+_OF_JOBS = (".yaml", ".yml", ".json")
+_OF_ROWS = (".csv", ".txt")
+_PEEKED = 4096  # bytes of standard input that are looked at
+
+
+@comparable
+class PlotOptions:
+    """What the command line says beside the files; see `trajcli plot --help`."""
+
+    output: str | None = None
+    kind: Literal["svg", "png", "pdf"] | None = None
+    quantities: str | None = None
+    joints: tuple[str, ...] = ()
+    quiet: bool = False
+    every: bool = True
+
+
+def run_plot(words: Sequence[str], overrides: Sequence[str], options: PlotOptions) -> int:
+    """Draw a job, files, or files over a job; return the exit code.
+
+    Raises:
+        VerificationError: When the job fails its verification: behind the picture, which shows where.
+        TrajcliError: When anything else is wrong; then nothing was written.
+    """
+    kind = format_of_picture(options.output, options.kind)
+    wanted = None if options.quantities is None else parse_quantities(options.quantities)
+    files, joints = _files_and_joints(words, split_names(options.joints))
+    job, rows = _sorted_out(files, overrides)
+    target = options.output or f"{_stem(job or rows[0])}.{kind}"
+    if target == "-" and kind != "svg" and sys.stdout is not None and sys.stdout.isatty():
+        raise InputError(
+            f"a terminal shows no {kind}", hint=f"name a file: -o {_stem(job or rows[0])}.{kind}"
+        )
+    plan = None if job is None else _planned(job, overrides)
+    _check_inputs_stay(plan, rows, target)
+    tables = [read_csv(name) for name in rows]
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # where its caches are is nobody's concern
+    with np.errstate(all="ignore"):  # what is not finite was found by the checks
+        picture = picture_of(plan, tables, wanted, joints)
+        _write(rendered(picture, kind), target)
+    if plan is not None and not plan.verdict.passed:
+        from trajcli.output.report import verification_error
+
+        _say_written(target, options)
+        raise verification_error(plan, every=options.every)
+    _say_written(target, options)
+    return 0
+
+
+def _planned(job: str, overrides: Sequence[str]) -> Plan:
+    with np.errstate(all="ignore"):
+        return plan_job(load_job(job, overrides))
+
+
+def _files_and_joints(words: Sequence[str], joints: Sequence[str]) -> tuple[list[str], tuple[str, ...]]:
+    """Return the files among the words, and all joints: `--joints a b` leaves the second one to the words."""
+    if not joints:
+        return list(words), ()
+    files = [word for word in words if word == "-" or Path(word).exists() or Path(word).suffix]
+    if not files:
+        raise InputError("there is no file to plot", hint="name a job or a CSV file before --joints")
+    return files, (*joints, *(word for word in words if word not in files))
+
+
+def _sorted_out(files: Sequence[str], overrides: Sequence[str]) -> tuple[str | None, list[str]]:
+    """Return the job, if there is one, and the files of rows.
+
+    Raises:
+        InputError: When there are several jobs, standard input is named twice, or `--set` has no job.
+    """
+    if files.count("-") > 1:
+        raise InputError("only one of the files can be standard input")
+    jobs = [name for name in files if _is_job(name)]
+    if len(jobs) > 1:
+        hint = f"write the rows of the others, and plot these: trajcli plan {jobs[1]} -o rows.csv"
+        raise InputError(f"{jobs[0]} and {jobs[1]} are both jobs, and one can be plotted", hint=hint)
+    if overrides and not jobs:
+        raise InputError(
+            "--set overrides values of a job, and there is none", hint="leave it out, or name the job"
+        )
+    return jobs[0] if jobs else None, [name for name in files if name not in jobs]
+
+
+def _is_job(name: str) -> bool:
+    """Return whether a file is a job: by its ending, else its first line; a pipe holds rows."""
+    ending = Path(name).suffix.lower()
+    if name != "-" and ending in _OF_JOBS + _OF_ROWS:
+        return ending in _OF_JOBS
+    try:
+        if name == "-":
+            text = getattr(sys.stdin.buffer, "peek", bytes)(_PEEKED)
+        elif Path(name).is_file():
+            with Path(name).open("rb") as stream:
+                text = stream.read(_PEEKED)
+        else:
+            return not Path(name).exists()
+    except (OSError, AttributeError):  # who reads it says what is wrong
+        return False
+    first = text.lstrip().partition(b"\n")[0]
+    return b":" in first or b"," not in first
+
+
+def _stem(name: str) -> str:
+    return "plot" if name == "-" else Path(name).stem
+
+
+def _check_inputs_stay(plan: Plan | None, rows: Sequence[str], target: str) -> None:
+    """Refuse to write over a file that is read."""
+    read = [] if plan is None else list(files_of(plan.loaded.document))
+    read += [("the rows of", name) for name in rows]
+    same = identity(target)
+    for what, path in read:
+        if same is not None and same == identity(path, 0):
+            raise InputError(f"the picture would overwrite {what} {path}", hint="name another file")
+
+
+def _write(content: bytes, target: str) -> None:
+    with standard_output() if target == "-" else whole_file(target) as out:
+        out.write(content)
+
+
+def _say_written(target: str, options: PlotOptions) -> None:
+    if target != "-" and not options.quiet:
+        print_remark(f"{target} written")

@@ -1,0 +1,101 @@
+"""Views of the path of the tool: in space, from above, from the front and from the side."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trajcli.plots.axes import ticks_of
+from trajcli.plots.frame import AXIS, BELOW, NORMAL, SMALL, TITLE, PanelFrame, Sheet, left_of, panel_width
+from trajcli.plots.legend import LIMIT_COLOUR, WAYPOINT, style_of
+from trajcli.plots.panel import PathViews
+
+_LEAST, _MOST = 2.1, 3.2  # width of a view, inches
+_VIEW_TICKS, _SPACE_TICKS = 4, 4
+_SPACE = 0.82  # of the view in space is its box: numbers and labels stand outside of it
+_SHIFT = 0.3  # of that view to the left, inches
+
+
+def views_height(width: float) -> float:
+    """Return the height of the views on a sheet of a width, inches."""
+    return 4 // _views_columns(width) * (TITLE + _view_size(width) + AXIS) + BELOW
+
+
+def draw_views(sheet: Sheet, views: PathViews, top: float) -> None:
+    """Draw the path in space and from three sides, to one scale."""
+    points = np.concatenate([*(trace for _, trace in views.traces), views.waypoints])
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    half = max(0.55 * float(np.ptp(points, axis=0).max()), 1e-6)
+    ranges = [(float(value) - half, float(value) + half) for value in middle]
+    columns, size = _views_columns(sheet.width), _view_size(sheet.width)
+    titles = ("path of the tool", "from above", "from the front", "from the side")
+    for index, title in enumerate(titles):
+        row, column = divmod(index, columns)
+        left = left_of(column, panel_width(columns, sheet.width))
+        box = (left, top + row * (TITLE + size + AXIS) + TITLE, size, size)
+        if index == 0:
+            sheet.text(left, box[1] - 0.06, title, NORMAL, va="baseline")
+            _draw_space(sheet, views, box, ranges)
+        else:
+            _draw_side(sheet, views, box, ranges, (((0, 1), (0, 2), (1, 2))[index - 1], title))
+
+
+def _draw_side(
+    sheet: Sheet,
+    views: PathViews,
+    box: tuple[float, float, float, float],
+    ranges: list[tuple[float, float]],
+    sides: tuple[tuple[int, int], str],
+) -> None:
+    """Draw the path along one axis of the world."""
+    (first, second), title = sides
+    frame = PanelFrame(sheet, box, ranges[first], ranges[second], f"view-{'xyz'[first]}{'xyz'[second]}")
+    for source, trace in views.traces:
+        frame.plot(trace[:, first], trace[:, second], f"source{source}", **style_of(source))
+    if views.waypoints.size:
+        frame.plot(views.waypoints[:, first], views.waypoints[:, second], "waypoints", **WAYPOINT)
+    (x, x_names), (y, y_names) = (ticks_of(ranges[side], _VIEW_TICKS) for side in (first, second))
+    frame.outline(x, y)
+    frame.x_axis(x, x_names, f"{'xyz'[first]} [{views.unit}]")
+    frame.y_axis(y, y_names, f"{'xyz'[second]} [{views.unit}]")
+    frame.titles(title, "", LIMIT_COLOUR)
+
+
+def _draw_space(
+    sheet: Sheet,
+    views: PathViews,
+    box: tuple[float, float, float, float],
+    ranges: list[tuple[float, float]],
+) -> None:
+    """Draw the path in space."""
+    from mpl_toolkits.mplot3d import Axes3D
+
+    left, top, width, height = box
+    bounds = (
+        (left - _SHIFT) / sheet.width,
+        1 - (top + height) / sheet.height,
+        width / sheet.width,
+        height / sheet.height,
+    )
+    axes = Axes3D(sheet.figure, bounds)
+    axes.set_box_aspect((1, 1, 1), zoom=_SPACE)
+    sheet.figure.add_axes(axes)
+    for source, trace in views.traces:
+        axes.plot(*trace.T, gid=f"space-source{source}", **style_of(source))
+    if views.waypoints.size:
+        axes.plot(*views.waypoints.T, gid="space-waypoints", **WAYPOINT)
+    axes.set(xlim=ranges[0], ylim=ranges[1], zlim=ranges[2])
+    for side, axis in enumerate((axes.xaxis, axes.yaxis, axes.zaxis)):
+        low, high = ranges[side]
+        inner = 0.15 * (high - low)  # numbers at the corners would stand on each other
+        axis.set_ticks(*ticks_of((low + inner, high - inner), _SPACE_TICKS))
+        axis.set_label_text(f"{'xyz'[side]} [{views.unit}]", fontsize=SMALL)
+        axis.set_tick_params(labelsize=SMALL, pad=0)
+        axis.labelpad = -2
+
+
+def _views_columns(width: float) -> int:
+    return 4 if panel_width(4, width) >= _LEAST else 2
+
+
+def _view_size(width: float) -> float:
+    return min(panel_width(_views_columns(width), width), _MOST)

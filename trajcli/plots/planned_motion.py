@@ -1,0 +1,200 @@
+"""Motion of a plan: traces of joints and tool, with limits, waypoints and findings, in the job's units."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from trajcli.curves.piecewise import Array, derivative_coefficients, horner
+from trajcli.frozen import frozen
+from trajcli.planners.planner import PlannedMove
+from trajcli.planning.plan import Plan
+from trajcli.plots.display_units import DisplayUnits
+from trajcli.plots.panel import NO_POINTS, MoveBorders
+from trajcli.plots.sampling import component_points, local_times, thinned
+from trajcli.trajectory import ViaPoints
+
+JOINT_KINDS = {
+    "position": 0,
+    "velocity": 1,
+    "acceleration": 2,
+    "jerk": 3,
+    "position_jump": 0,
+    "velocity_jump": 1,
+    "acceleration_jump": 2,
+}
+"""Order of the derivative that a kind of finding is about."""
+
+TOOL_KINDS = ("tool_speed", "tool_angular_speed")
+_TOOL_LIMITS = ("speed", "angular_speed")
+
+
+@frozen
+class ToolSamples:
+    """The tool along a plan.
+
+    Attributes:
+        times: Of the rows, s as written, shape (N,), both sides of each break.
+        positions: In world, shape (N, 3), m.
+        speeds: Speed and angular speed, shape (N, 2), m/s and rad/s.
+    """
+
+    times: Array
+    positions: Array
+    speeds: Array
+
+
+class PlannedMotion:
+    """A plan as a picture shows it; times are those of its rows, s.
+
+    Attributes:
+        plan: The plan.
+        display: Joints and units of the job.
+        offset: When the trajectory starts.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        robot = plan.loaded.robot
+        self.plan = plan
+        self.display = DisplayUnits(robot.joint_names, robot.joint_types, plan.loaded.units)
+        self.offset = plan.loaded.job.output.start_time
+        self._tool: ToolSamples | None = None
+
+    @property
+    def borders(self) -> MoveBorders:
+        """The borders of its moves."""
+        spans = self.plan.trajectory.spans
+        times = [spans[0].start, *(span.end for span in spans)]
+        names = tuple(f"{span.index} {span.planner}" for span in spans)
+        return MoveBorders(np.array(times) + self.offset, names)
+
+    @property
+    def has_tool(self) -> bool:
+        """Whether the arm has the geometry that says where its tool is."""
+        return self.plan.loaded.robot.convention is not None
+
+    @property
+    def moves(self) -> tuple[PlannedMove, ...]:
+        """Its moves."""
+        return self.plan.moves
+
+    def joint_trace(self, joint: int, order: int) -> tuple[Array, Array]:
+        """Return times (N,) and values (N,) of a joint, steps and extremes included."""
+        times, values = component_points(self.plan.trajectory.curve, order, joint)
+        return thinned(times + self.offset, values / self.display.joint_factor(joint))
+
+    def joint_limits(self, joint: int, order: int) -> tuple[Array, Array]:
+        """Return the lines (m, 2) of the lower and the upper limit in force; NaN where there is none."""
+        bounds = np.array([move.robot.limits.of_order(order)[joint] for move in self.moves])
+        low, high = (self._steps(side / self.display.joint_factor(joint)) for side in bounds.T)
+        return low, high
+
+    def tool_limit(self, angular: bool) -> Array:
+        """Return the line (m, 2) of the limit of the tool's speed."""
+        scale = self.display.factor("angle" if angular else "length")
+        limits = [getattr(move.robot.limits.tcp, _TOOL_LIMITS[angular]) for move in self.moves]
+        return self._steps(np.array(limits) / scale)
+
+    def waypoints(self, joint: int) -> Array:
+        """Return when a joint passes the points that it is to pass, and where they are, shape (k, 2)."""
+        return self._marks([_passed(move) for move in self.moves], joint)
+
+    def virtual_points(self, joint: int) -> Array:
+        """Return the same of points that a planner added by itself."""
+        return self._marks([move.planned.virtual_points for move in self.moves], joint)
+
+    def joint_findings(self, joint: int, order: int) -> Array:
+        """Return when checks fail, and the value where it is one of this joint and order, shape (k, 2)."""
+        name, scale = self.display.joint_names[joint], self.display.joint_factor(joint)
+        rows = []
+        for finding in self.plan.verdict.findings:
+            own = finding.joint == name and JOINT_KINDS.get(finding.kind) == order
+            value = finding.value / scale if own and not finding.kind.endswith("_jump") else np.nan
+            if own and np.isnan(value):
+                value = float(self.plan.trajectory.curve.evaluate(finding.time, order)[joint]) / scale
+            rows.append((finding.time + self.offset, value))
+        return np.array(rows or NO_POINTS)
+
+    def tool_findings(self, angular: bool) -> Array:
+        """Return the same for the speed of the tool."""
+        scale = self.display.factor("angle" if angular else "length")
+        rows = [
+            (
+                finding.time + self.offset,
+                finding.value / scale if finding.kind == TOOL_KINDS[angular] else np.nan,
+            )
+            for finding in self.plan.verdict.findings
+        ]
+        return np.array(rows or NO_POINTS)
+
+    def tool(self) -> ToolSamples:
+        """Return where the tool is and how fast, at both sides of breaks and where a check saw a peak."""
+        if self._tool is None:
+            self._tool = self._sampled_tool()
+        return self._tool
+
+    def tool_waypoints(self) -> Array:
+        """Return where the tool is (k, 3), in the unit of lengths, at waypoints and ends of moves."""
+        from trajcli.kinematics.forward import forward
+
+        points = [passed.points for move in self.moves if (passed := _passed(move)) is not None]
+        joints = np.concatenate([self.plan.trajectory.curve.evaluate([0.0]), *points])
+        positions = forward(self.plan.loaded.robot, joints)[:, :3, 3]
+        return np.asarray(positions / self.display.factor("length"))
+
+    def _sampled_tool(self) -> ToolSamples:
+        from trajcli.kinematics.forward import forward
+        from trajcli.kinematics.jacobian import tcp_twist
+
+        curve, robot = self.plan.trajectory.curve, self.plan.loaded.robot
+        piece, local = local_times(curve)
+        peaks = self._tool_peaks()
+        owner = np.clip(np.searchsorted(curve.breaks, peaks, "right") - 1, 0, curve.pieces - 1)
+        piece, local = np.append(piece, owner), np.append(local, peaks - curve.breaks[owner])
+        ordered = np.lexsort((local, piece))
+        piece, local = piece[ordered], local[ordered]
+        q, qd = (
+            horner(derivative_coefficients(curve.coefficients, order)[:, piece], local[:, None])
+            for order in (0, 1)
+        )
+        twist = tcp_twist(robot, q, qd)
+        speeds = [np.linalg.norm(twist[:, part], axis=1) for part in (slice(3), slice(3, 6))]
+        times = np.minimum(curve.breaks[piece] + local, curve.breaks[piece + 1])
+        return ToolSamples(times + self.offset, forward(robot, q)[:, :3, 3], np.stack(speeds, axis=1))
+
+    def _tool_peaks(self) -> Array:
+        """Return when the checks saw the tool fastest, move by move, shape (k,)."""
+        spans, known = self.plan.trajectory.spans, self.plan.verdict.tool_peaks
+        return np.array(
+            [
+                span.start + peaks[name].time
+                for span, peaks in zip(spans, known, strict=False)
+                if peaks is not None
+                for name in _TOOL_LIMITS
+            ]
+        )
+
+    def _steps(self, values: Array) -> Array:
+        """Return the line (m, 2) that has one value (moves,) from border to border; NaN for infinite ones."""
+        borders = self.borders.times
+        x = np.stack([borders[:-1], borders[1:]], axis=1).reshape(-1)
+        finite = np.where(np.isfinite(values), values, np.nan)
+        return np.stack([x, np.repeat(finite, 2)], axis=1)
+
+    def _marks(self, points: Sequence[ViaPoints | None], joint: int) -> Array:
+        scale, starts = self.display.joint_factor(joint), self.borders.times
+        rows = [
+            np.stack([start + each.times, each.points[:, joint] / scale], axis=1)
+            for start, each in zip(starts, points, strict=False)
+            if each is not None
+        ]
+        return np.concatenate([NO_POINTS, *rows])
+
+
+def _passed(move: PlannedMove) -> ViaPoints | None:
+    """Return the points that a move is to pass; of one without points between only its end."""
+    points, end = move.planned.via_points, move.planned.end.position
+    if points is not None:
+        return points
+    return ViaPoints(np.array([move.duration]), end[None], np.zeros((1, end.size)))

@@ -1,0 +1,121 @@
+"""Motion recorded in a file: values of joints and tool by the names of its columns."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trajcli.columns import Column, parse_column
+from trajcli.curves.piecewise import Array
+from trajcli.errors import InputError
+from trajcli.frozen import frozen
+from trajcli.kinematics.robot import Robot
+from trajcli.plots.choice import JOINT_QUANTITIES
+from trajcli.plots.display_units import DisplayUnits
+from trajcli.streams.table import Table
+
+_SPEEDS = (("vx", "vy", "vz"), ("wx", "wy", "wz"))
+_POSITION = ("x", "y", "z")
+
+
+def columns_of_table(table: Table) -> tuple[Column, ...]:
+    """Return what the columns of a file are.
+
+    Raises:
+        InputError: When none is the time.
+    """
+    columns = tuple(map(parse_column, table.names))
+    if not any(column.kind == "t" and column.joint is None for column in columns):
+        hint = f"it has {', '.join(table.names[:12])}"
+        raise InputError(f"{table.file} has no column t, over which it could be plotted", hint=hint)
+    return columns
+
+
+@frozen
+class RecordedMotion:
+    """A file, in the units of a picture.
+
+    Attributes:
+        table: Its numbers.
+        columns: What they are.
+        display: Units and joints of the picture.
+        robot: Whose tool it is where the file does not say where that is; None without a job.
+    """
+
+    table: Table
+    columns: tuple[Column, ...]
+    display: DisplayUnits
+    robot: Robot | None = None
+
+    @property
+    def times(self) -> Array:
+        """Of the rows, shape (N,), s."""
+        return np.asarray(self._of("t")[0])
+
+    def joint(self, kind: str, joint: int) -> Array | None:
+        """Return the values (N,) of a joint in the unit of its axis; None where the file has none."""
+        for index, column in enumerate(self.columns):
+            if column.kind == kind and column.joint == joint:
+                scale = 1.0 if column.unit is None else column.factor
+                return np.asarray(self.table.columns[:, index] * (scale / self.display.joint_factor(joint)))
+        return None
+
+    def tool_speeds(self) -> tuple[Array, Array] | None:
+        """Return speed and angular speed of the tool, each (N,), in the units of the picture."""
+        if self._has(_SPEEDS[0] + _SPEEDS[1]):
+            linear, angular = (np.linalg.norm(self._of(*names), axis=0) for names in _SPEEDS)
+        else:
+            motion = self._joints("q", "qd")
+            if self.robot is None or motion is None:
+                return None
+            from trajcli.kinematics.jacobian import tcp_twist
+
+            twist = tcp_twist(self.robot, motion[0], motion[1])
+            linear, angular = (np.linalg.norm(twist[:, part], axis=1) for part in (slice(3), slice(3, 6)))
+        return linear / self.display.factor("length"), angular / self.display.factor("angle")
+
+    def tool_positions(self) -> Array | None:
+        """Return the positions (N, 3) of the tool in world, in the unit of the picture."""
+        if self._has(_POSITION):
+            positions = self._of(*_POSITION).T
+        else:
+            motion = self._joints("q")
+            if self.robot is None or motion is None:
+                return None
+            from trajcli.kinematics.forward import forward
+
+            positions = forward(self.robot, motion[0])[:, :3, 3]
+        return np.asarray(positions / self.display.factor("length"))
+
+    def shows(self) -> frozenset[str]:
+        """Return the quantities of a picture that this file has something to say about."""
+        kinds = {column.kind for column in self.columns if column.joint is not None}
+        found = {kind for kind in JOINT_QUANTITIES if kind in kinds}
+        if self.tool_speeds() is not None:
+            found.add("tool")
+        if self.tool_positions() is not None:
+            found.add("path")
+        return frozenset(found)
+
+    def _has(self, kinds: tuple[str, ...]) -> bool:
+        return set(kinds) <= {column.kind for column in self.columns if column.joint is None}
+
+    def _of(self, *kinds: str) -> Array:
+        """Return columns that are not about joints, SI, shape (kinds, N)."""
+        index = {column.kind: k for k, column in enumerate(self.columns) if column.joint is None}
+        rows = [self.table.columns[:, index[kind]] * self.columns[index[kind]].factor for kind in kinds]
+        return np.array(rows)
+
+    def _joints(self, *kinds: str) -> tuple[Array, ...] | None:
+        """Return values of all joints of the robot, SI, each (N, n); None where some are missing."""
+        count = len(self.display.joint_names)
+        if self.robot is None or self.robot.convention is None:
+            return None
+        found = []
+        for kind in kinds:
+            columns = [self.joint(kind, joint) for joint in range(count)]
+            known = [values for values in columns if values is not None]
+            if len(known) < count:
+                return None
+            scales = [self.display.joint_factor(joint) for joint in range(count)]
+            found.append(np.stack(known, axis=1) * scales)
+        return tuple(found)
