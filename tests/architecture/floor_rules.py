@@ -12,7 +12,7 @@ FLOORS = (
     ("errors", "frozen", "suggest", "units", "version"),
     ("curves", "geometry"),
     ("kinematics", "catalogue"),
-    ("trajectory", "samples", "columns"),
+    ("trajectory", "samples", "columns", "knots"),
     ("language",),
     ("planners", "checks", "streams"),
     ("job",),
