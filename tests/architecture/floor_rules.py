@@ -14,7 +14,7 @@ FLOORS = (
     ("kinematics", "catalogue"),
     ("trajectory", "samples", "columns", "knots"),
     ("language",),
-    ("planners", "checks", "streams"),
+    ("planners", "checks", "streams", "urdf"),
     ("job",),
     ("planning", "comparison", "queries"),
     ("output",),
