@@ -1,8 +1,8 @@
 """JSON lines: an object for each row, with an array for each group of columns, in SI.
 
-A line reads `{"t": 0.008, "q": [...], "qd": [...], "qdd": [...], "move": 0}`, by the columns in use. The numbers
-of a pose are under `pose` (x, y, z, qw, qx, qy, qz), those of `twist`, `twistd` and `path` likewise. Each number
-has as many digits as restore all its bits.
+A line reads `{"t": 0.008, "q": [...], "qd": [...], "qdd": [...], "move": 0}`, by the columns in use. The
+numbers of a pose are under `pose` (x, y, z, qw, qx, qy, qz), those of `twist`, `twistd` and `path` likewise.
+Each number has as many digits as restore all its bits.
 """
 
 from __future__ import annotations
