@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -184,6 +185,14 @@ def test_a_plan_saves_itself(tmp_path: Path) -> None:
         wrong.save(tmp_path / "wrong.csv")
     assert [file.name for file in tmp_path.iterdir()] == ["rows.csv"]
     assert plan.report().verdict == "verified"
+
+
+def test_a_notebook_draws_a_plan():
+    plan = trajcli.plan(EXAMPLES / "cubic.yaml")
+    picture = plan._repr_svg_()
+    root = ElementTree.fromstring(picture)
+    assert root.tag == "{http://www.w3.org/2000/svg}svg"
+    assert picture == trajcli.plan(EXAMPLES / "cubic.yaml")._repr_svg_()
 
 
 def test_an_arm_answers_questions() -> None:

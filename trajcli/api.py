@@ -56,7 +56,7 @@ class PlannedJob(Plan):
 
     def _repr_svg_(self) -> str:
         """Return a picture of the plan: notebooks show it."""
-        from trajcli.plots.draw import svg_of
+        from trajcli.plots.write import svg_of
 
         return svg_of(self)
 

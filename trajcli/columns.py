@@ -108,6 +108,11 @@ def parse_column(name: str) -> Column:
     return Column(kind, int(joint["number"]) - 1, unit, quantity)
 
 
+def group_of(column: Column) -> str:
+    """Return the group that a column belongs to; one of no group is a group of its own."""
+    return next((group for group, kinds in _COLUMNS.items() if column.kind in kinds), column.kind)
+
+
 def columns_of(groups: Sequence[Group], joint_types: Sequence[JointType], units: Units) -> tuple[Column, ...]:
     """Return every column of `groups`, in the order of the groups, joints from the base on.
 

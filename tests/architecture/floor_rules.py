@@ -12,9 +12,9 @@ FLOORS = (
     ("errors", "frozen", "progress", "suggest", "units", "version"),
     ("curves", "geometry"),
     ("kinematics", "catalogue"),
-    ("trajectory", "samples", "columns", "grids"),
+    ("trajectory", "samples", "columns", "grids", "knots"),
     ("language",),
-    ("planners", "checks", "streams"),
+    ("planners", "checks", "streams", "urdf"),
     ("job",),
     ("planning", "comparison", "queries"),
     ("output", "plots"),
@@ -27,7 +27,7 @@ FLOORS = (
 FLOOR_OF = {room: level for level, floor in enumerate(FLOORS) for room in floor}
 HOMES = {
     "pydantic": ("language/", "planners/", "job/"),
-    "pydantic_core": ("language/", "planners/", "job/", "streams/decimals.py"),
+    "pydantic_core": ("language/", "planners/", "job/", "streams/decimals.py", "streams/jsonl.py"),
     "yaml": ("job/yaml/",),
     "typer": ("cli/",),
     "click": ("cli/",),

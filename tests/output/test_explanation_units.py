@@ -31,7 +31,7 @@ PLAIN = {
         "low_time",
     ),
     *("high_time", "factor", "held", "ratio", "breaks", "origin", "here", "nearby", "candidates", "axis"),
-    *("within_limits", "free_direction"),
+    *("within_limits", "free_direction", "count"),
 }
 """Times, ratios, counts and directions; `start` and `end` of a segment are points, and stand in lists."""
 

@@ -258,13 +258,16 @@ def robots(
     as_yaml: Annotated[
         bool, typer.Option("--yaml", help="Print the robot's file, to start a new one from.")
     ] = False,
+    as_urdf: Annotated[
+        bool, typer.Option("--urdf", help="Print the robot as URDF, for viewers and ROS.")
+    ] = False,
     as_json: Json = False,
     errors: Errors = "text",
 ) -> int:
     """List the catalogue, or show a robot: DH table, limits, reach, inverse kinematics, source."""
     from trajcli.cli.robots import run_robots
 
-    return run_robots(name, as_yaml=as_yaml, as_json=as_json)
+    return run_robots(name, as_yaml=as_yaml, as_urdf=as_urdf, as_json=as_json)
 
 
 @guarded

@@ -18,16 +18,14 @@ _DH = ("theta", "d", "a", "alpha", "beta")
 _LIMITS = ("position", "velocity", "acceleration", "jerk")
 
 
-def run_robots(name: str | None, *, as_yaml: bool, as_json: bool) -> int:
+def run_robots(name: str | None, *, as_yaml: bool, as_urdf: bool, as_json: bool) -> int:
     """Print the catalogue, or what there is to say about one robot; return the exit code.
 
     Raises:
         InputError: When there is no such robot, or the options exclude each other.
         FileError: When a file cannot be read, or standard output not written.
     """
-    if as_yaml and (as_json or name is None):
-        message = "--yaml and --json exclude each other" if as_json else "--yaml prints the file of one robot"
-        raise InputError(message, hint="leave one out" if as_json else "such as trajcli robots ur5e --yaml")
+    _check_forms(name, {"--yaml": as_yaml, "--urdf": as_urdf, "--json": as_json})
     if name is None:
         rows = [robot_row(each, open_sheet(each)) for each in catalogue_names()]
         if as_json:
@@ -41,11 +39,25 @@ def run_robots(name: str | None, *, as_yaml: bool, as_json: bool) -> int:
             hint = f"`trajcli plan {name} --no-output --resolved FILE` writes the job with its robot"
             raise InputError(f"{name} is a job, and no robot file", hint=hint)
         print_lines([sheet.text.rstrip("\n")])
+    elif as_urdf:
+        from trajcli.urdf.write import urdf_of
+
+        print_lines([urdf_of(sheet.robot).rstrip("\n")])
     elif as_json:
         print_json(robot_card(name, sheet))
     else:
         print_lines(_card_lines(robot_card(name, sheet)))
     return 0
+
+
+def _check_forms(name: str | None, forms: Mapping[str, bool]) -> None:
+    """Refuse two forms of output at once, and the file of no robot."""
+    asked = [option for option, wanted in forms.items() if wanted]
+    if len(asked) > 1:
+        raise InputError(f"{asked[0]} and {asked[1]} exclude each other", hint="leave one out")
+    if asked and name is None and asked[0] != "--json":
+        hint = f"such as trajcli robots ur5e {asked[0]}"
+        raise InputError(f"{asked[0]} prints the file of one robot", hint=hint)
 
 
 def _list_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:

@@ -330,6 +330,26 @@ class UncheckedToolReport(ReportPart):
     quantity: Literal["speed", "acceleration", "jerk", "angular_speed", "angular_acceleration"]
 
 
+class KnotsDeviation(ReportPart):
+    """What quintics between the knots miss, of the joint that deviates most."""
+
+    position: Annotated[
+        float, MeasuredIn("position_unit"), Field(description="Of the position, for all t; SI.")
+    ]
+    position_unit: UnitName
+    velocity: Annotated[
+        float, MeasuredIn("velocity_unit"), Field(description="Of the velocity, for all t; SI.")
+    ]
+    velocity_unit: UnitName
+
+
+class KnotsReport(ReportPart):
+    """The knots that a controller gets, and how well quintics between them reproduce the trajectory."""
+
+    count: Annotated[int, Field(description="How many.")]
+    deviation: KnotsDeviation
+
+
 class Report(ReportPart):
     """What became of a job."""
 
@@ -345,3 +365,7 @@ class Report(ReportPart):
     steps: list[StepReport]
     unchecked: list[UncheckedReport]
     unchecked_of_tool: list[UncheckedToolReport] = []
+    knots: Annotated[
+        KnotsReport | None,
+        Field(description="Of /joint_trajectory and of ROS goals; null where a limit is broken."),
+    ] = None

@@ -18,6 +18,8 @@ from trajcli.job.report import (
     BindingReport,
     EventReport,
     FindingReport,
+    KnotsDeviation,
+    KnotsReport,
     LimitUseReport,
     LowestSpeedReport,
     MoveReport,
@@ -34,6 +36,7 @@ from trajcli.job.report import (
     WaypointReport,
 )
 from trajcli.kinematics.robot import QUANTITIES, JointType, Robot
+from trajcli.knots import knots_of
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.lower_bound import NoBound, fastest_duration
 from trajcli.planning.plan import Plan
@@ -77,6 +80,22 @@ def report_of(plan: Plan, *, reference: bool = False) -> Report:
         steps=[StepReport(**vars(step), unit=units[step.joint]) for step in verdict.steps],
         unchecked=[UncheckedReport(joint=joint, quantity=quantity) for joint, quantity in verdict.unchecked],
         unchecked_of_tool=[UncheckedToolReport(quantity=name) for name in verdict.unchecked_of_tool],
+        knots=_knots(plan.trajectory) if verdict.passed else None,
+    )
+
+
+def _knots(trajectory: Trajectory) -> KnotsReport:
+    knots = knots_of(trajectory)
+    missed = knots.deviation
+    units = [joint_units(trajectory.joint_types, order) for order in (0, 1)]
+    return KnotsReport(
+        count=knots.nanoseconds.size,
+        deviation=KnotsDeviation(
+            position=missed.position,
+            position_unit=units[0][missed.joints[0]],
+            velocity=missed.velocity,
+            velocity_unit=units[1][missed.joints[1]],
+        ),
     )
 
 

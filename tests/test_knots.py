@@ -1,0 +1,169 @@
+"""Knots: what the interpolation of ros2_control's joint_trajectory_controller makes of them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from trajcli.curves.piecewise import PiecewisePolynomial, constant
+from trajcli.job.read import job_from_text, load_job
+from trajcli.knots import LARGEST_DEVIATION, Knots, knots_of
+from trajcli.output.report import report_of
+from trajcli.planning.plan import plan_job
+from trajcli.trajectory import Span, State, Trajectory, resting
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+SMOOTH = ["quintic", "slow", "scorbot_draw", "cycloidal", "stop"]
+ROUGH = ["trapezoid", "septic", "sync", "units", "blends_ur5e", "time_optimal", "dispense", "cubic", "gantry"]
+
+
+def played(knots: Knots, t: np.ndarray) -> np.ndarray:
+    """Return (3, N, n) of the controller's quintic segments, written from trajectory.cpp of ros2_controllers."""
+    times = knots.nanoseconds / 1e9
+    k = np.clip(np.searchsorted(times, t, "right") - 1, 0, times.size - 2)
+    T, u = (times[k + 1] - times[k])[:, None], (t - times[k])[:, None]
+    p0, v0, a0 = knots.position[k], knots.velocity[k], knots.acceleration[k]
+    p1, v1, a1 = knots.position[k + 1], knots.velocity[k + 1], knots.acceleration[k + 1]
+    c3 = (20 * (p1 - p0) - 3 * a0 * T**2 + a1 * T**2 - 12 * v0 * T - 8 * v1 * T) / (2 * T**3)
+    c4 = (30 * (p0 - p1) + 3 * a0 * T**2 - 2 * a1 * T**2 + 16 * v0 * T + 14 * v1 * T) / (2 * T**4)
+    c5 = (12 * (p1 - p0) - a0 * T**2 + a1 * T**2 - 6 * v0 * T - 6 * v1 * T) / (2 * T**5)
+    c = [p0, v0, a0 / 2, c3, c4, c5]
+    position = sum(c[i] * u**i for i in range(6))
+    velocity = sum(i * c[i] * u ** (i - 1) for i in range(1, 6))
+    acceleration = sum(i * (i - 1) * c[i] * u ** (i - 2) for i in range(2, 6))
+    return np.array([position, velocity, acceleration])
+
+
+def largest_differences(trajectory: Trajectory, knots: Knots) -> np.ndarray:
+    """Return the largest difference of order 0 to 2 on times between and beside all breaks and knots."""
+    curve = trajectory.curve
+    marks = np.unique(np.concatenate([curve.breaks, knots.nanoseconds / 1e9]))
+    marks = marks[marks <= curve.end]
+    within = marks[:-1, None] + np.diff(marks)[:, None] * np.linspace(0, 1, 41)
+    t = np.minimum(within.reshape(-1), min(curve.end, knots.nanoseconds[-1] / 1e9))
+    t = t[t >= 0]
+    wanted = curve.evaluate_orders(t, (0, 1, 2)).transpose(1, 0, 2)
+    return np.abs(played(knots, t) - wanted).max(axis=(1, 2))
+
+
+def trajectory_of(name: str) -> Trajectory:
+    return plan_job(load_job(str(EXAMPLES / f"{name}.yaml"))).trajectory
+
+
+def trajectory_of_job(move: dict, **limits: float) -> Trajectory:
+    names = ("velocity", "acceleration", "jerk")
+    bounds = {name: limits[name] for name in names if name in limits}
+    joints = [{"name": f"j{k}", "type": "revolute", **bounds} for k in range(3)]
+    job = {"version": 1, "robot": {"joints": joints}, "start": {"joints": [0, 0.1, -0.2]}, "moves": [move]}
+    return plan_job(job_from_text(json.dumps(job))).trajectory
+
+
+@pytest.mark.parametrize("name", SMOOTH)
+def test_quintics_of_continuity_two_are_reproduced(name: str) -> None:
+    trajectory = trajectory_of(name)
+    knots = knots_of(trajectory)
+    assert (largest_differences(trajectory, knots) <= [1e-9, 1e-8, 1e-6]).all()
+    assert knots.deviation.position <= 1e-9
+    assert knots.deviation.velocity <= 1e-8
+    assert knots.deviation.acceleration <= 1e-6
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_jerk_limited_motion_at_odd_times_is_reproduced(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    target = rng.uniform(-2, 2, 3).tolist()
+    trajectory = trajectory_of_job(
+        {"planner": "jerk_limited", "to": {"joints": target}}, velocity=1.3, acceleration=3.7, jerk=41.0
+    )
+    knots = knots_of(trajectory)
+    assert (largest_differences(trajectory, knots) <= [1e-9, 1e-8, 1e-6]).all()
+
+
+@pytest.mark.parametrize("name", ROUGH + SMOOTH)
+def test_every_trajectory_is_reproduced_within_the_stated_deviation(name: str) -> None:
+    trajectory = trajectory_of(name)
+    knots = knots_of(trajectory)
+    position, velocity, _ = largest_differences(trajectory, knots)
+    assert position <= knots.deviation.position + 1e-13
+    assert velocity <= knots.deviation.velocity * (1 + 1e-9) + 1e-9
+    assert knots.deviation.position <= LARGEST_DEVIATION == 1e-6
+    if name != "sync":  # its velocity is there within 1e-14 s
+        assert position >= 0.9 * knots.deviation.position - 1e-13  # nothing is claimed to be worse than it is
+
+
+@pytest.mark.parametrize("name", ROUGH + SMOOTH)
+def test_a_controller_takes_the_times_and_the_end(name: str) -> None:
+    trajectory = trajectory_of(name)
+    knots = knots_of(trajectory)
+    whole = knots.nanoseconds
+    assert whole.dtype == np.int64
+    assert whole[0] == 0
+    assert (np.diff(whole) >= 1000).all()
+    assert -1e-3 <= whole[-1] - trajectory.duration * 1e9 <= 1.001  # rounded up, but for a break beside it
+    assert (knots.velocity[-1] == 0.0).all()
+    shape = (whole.size, trajectory.curve.dimension)
+    assert knots.position.shape == knots.velocity.shape == knots.acceleration.shape == shape
+
+
+@pytest.mark.parametrize("name", SMOOTH)
+def test_knots_are_states_at_their_whole_nanoseconds(name: str) -> None:
+    trajectory = trajectory_of(name)
+    knots = knots_of(trajectory)
+    t = np.minimum(knots.nanoseconds / 1e9, trajectory.curve.end)
+    for order, values in enumerate((knots.position, knots.velocity)):
+        scale = 1 + np.abs(values).max()
+        assert (
+            np.abs(values - trajectory.curve.evaluate(t, order)).max() <= 1e-11 * scale
+        )  # a break within 1e-12 s counts
+
+
+def made_of(curve: PiecewisePolynomial, end: State) -> Trajectory:
+    n = curve.dimension
+    names = tuple(f"j{k}" for k in range(n))
+    span = Span(0, "quintic", 0.0, curve.end, 1)
+    start = resting(np.zeros(n))
+    return Trajectory(curve, names, ("revolute",) * n, (span,), start, end)
+
+
+def test_a_trajectory_of_no_length_is_one_knot() -> None:
+    knots = knots_of(made_of(constant([0.3, 0.4], 0.0), resting(np.array([0.3, 0.4]))))
+    assert knots.nanoseconds.tolist() == [0]
+    assert knots.position.tolist() == [[0.3, 0.4]]
+    assert knots.deviation.position == 0.0
+
+
+def test_breaks_within_a_microsecond_are_one_knot() -> None:
+    # acceleration 1 up to t = 1, within 0.3 us to -1, and down to rest at about t = 2
+    breaks = np.array([0.0, 1.0, 1.0 + 1e-7, 1.0 + 3e-7, 2.0])
+    pieces, q, v = [], 0.0, 0.0
+    for length, a in zip(np.diff(breaks), [1.0, 0.5, -0.5, -1.0], strict=True):
+        pieces.append([a / 2, v, q])
+        q, v = q + v * length + a * length**2 / 2, v + a * length
+    curve = PiecewisePolynomial(breaks, np.array(pieces).T[:, :, None])
+    knots = knots_of(made_of(curve, resting(np.array([q]))))
+    assert (np.diff(knots.nanoseconds) >= 1000).all()
+    assert sum(abs(knots.nanoseconds - 1_000_000_000) <= 1000) == 1
+    assert knots.acceleration[np.searchsorted(knots.nanoseconds, 1_000_000_000), 0] == -1.0
+    assert knots.deviation.position <= 1e-7  # 0.3 us of an acceleration of 2 rad/s^2, for a second
+
+
+def test_an_end_in_motion_keeps_its_velocity() -> None:
+    curve = PiecewisePolynomial(np.array([0.0, 1.0]), np.array([[[0.5]], [[0.0]], [[0.0]]]))
+    one = np.array([1.0])
+    knots = knots_of(made_of(curve, State(one / 2, one, one)))
+    assert knots.velocity[-1] == 1.0
+
+
+def test_the_report_says_how_many_and_how_good() -> None:
+    plan = plan_job(load_job(str(EXAMPLES / "septic.yaml")))
+    knots, report = knots_of(plan.trajectory), report_of(plan).knots
+    assert report is not None
+    assert report.count == len(knots.nanoseconds) > plan.trajectory.curve.pieces + 1
+    assert report.deviation.position == knots.deviation.position
+    assert (report.deviation.position_unit, report.deviation.velocity_unit) == ("rad", "rad/s")
+    broken = plan_job(load_job(str(EXAMPLES / "septic.yaml"), ["limits.velocity=0.001"]))
+    assert not broken.verdict.passed
+    assert report_of(broken).knots is None

@@ -1,0 +1,1 @@
+"""Unified Robot Description Format."""
