@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from typing import Literal, overload
 
 import numpy as np
@@ -84,6 +84,16 @@ def joint_amounts(trajectory: Trajectory, joint: int, order: int, **values: floa
     )
     amounts = {name: Amount(value, order, joint, dimension) for name, value in values.items()}
     return {"joint": trajectory.joint_names[joint], **amounts}
+
+
+def excess_amounts(trajectory: Trajectory, joint: int, order: int, value: float, limit: float) -> Amounts:
+    """Return a joint's name, a value beyond its limit, and the limit, rounded so that both pass."""
+    amounts = joint_amounts(trajectory, joint, order, value=value, limit=limit)
+    sides = {"value": "up" if value > limit else "down", "limit": "down" if value > limit else "up"}
+    return {
+        name: replace(amount, rounded=sides[name]) if isinstance(amount, Amount) else amount
+        for name, amount in amounts.items()
+    }
 
 
 def at_time(time: float) -> str:

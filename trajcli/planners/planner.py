@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.errors import Amount, Amounts, PlanningError, said
+from trajcli.errors import Amount, Amounts, PlanningError, Problem, said
 from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Robot
 from trajcli.language.limits import LimitsSpec
@@ -132,12 +132,15 @@ class Planner(Model):
             (acceleration). A step in the derivative after that is legal where the joint has no limit on it.
         one_shape: Whether all its motions between two positions of rest differ by their duration alone, so
             that a stretched one is still the fastest of its kind.
+        proportional: Whether another duration scales the times of all its parts alike, so that between given
+            velocities at its ends each position is linear in the duration.
         limits: Tightens the job's limits for this move; applied before `plan` is called.
         when_over_limit: Overrides the job's; applied after `plan` was called.
     """
 
     continuity: ClassVar[Literal[1, 2]]
     one_shape: ClassVar[bool] = False
+    proportional: ClassVar[bool] = False
 
     limits: Annotated[LimitsSpec | None, Field(description="Tighter limits for this move.")] = None
     when_over_limit: Annotated[
@@ -226,6 +229,7 @@ class PlannedMove:
         planned: What the planner returned, stretched where that was asked for.
         over_limit: What is done where it is over its limits.
         stretch: How many times longer it lasts than its planner said.
+        not_slowed: Why no duration keeps its limits, where one was looked for in vain.
     """
 
     index: int
@@ -235,6 +239,7 @@ class PlannedMove:
     planned: Planned
     over_limit: WhenOverLimit = "error"
     stretch: float = 1.0
+    not_slowed: Problem | None = None
 
     @property
     def duration(self) -> float:

@@ -37,6 +37,7 @@ class PolynomialPlanner(PointToPoint):
     conditions: ClassVar[int]
 
     one_shape: ClassVar[bool] = True
+    proportional: ClassVar[bool] = True
 
     duration: Duration | None = None
 

@@ -196,6 +196,7 @@ class Spline(ThroughPoints):
     """
 
     continuity: ClassVar[Literal[1, 2]] = 1
+    proportional: ClassVar[bool] = True
 
     planner: Literal["spline"] = "spline"
     rule: Annotated[
