@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field
@@ -134,6 +134,9 @@ class Planner(Model):
             that a stretched one is still the fastest of its kind.
         proportional: Whether another duration scales the times of all its parts alike, so that between given
             velocities at its ends each position is linear in the duration.
+        follows_jerk: Whether it plans within the limits of jerk, and perhaps not without them.
+        smoother: Changes of its fields that make a move without steps in acceleration, each by the words that
+            ask for it; "planner" may be among them.
         limits: Tightens the job's limits for this move; applied before `plan` is called.
         when_over_limit: Overrides the job's; applied after `plan` was called.
     """
@@ -141,6 +144,8 @@ class Planner(Model):
     continuity: ClassVar[Literal[1, 2]]
     one_shape: ClassVar[bool] = False
     proportional: ClassVar[bool] = False
+    follows_jerk: ClassVar[bool] = False
+    smoother: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
 
     limits: Annotated[LimitsSpec | None, Field(description="Tighter limits for this move.")] = None
     when_over_limit: Annotated[
@@ -202,6 +207,15 @@ class Planner(Model):
             raise PlanningError(f"{self.tag} cannot last longer than it does")
         given = [name for name in names if getattr(self, name) is not None]
         return self.model_copy(update={(given or names[::-1])[0]: duration})
+
+    def lasting(self, duration: float) -> Iterator[tuple[str, Self]]:
+        """Yield what may be given to a move so that it lasts `duration` seconds, and the move with it."""
+        given = getattr(self, "duration", None) is not None
+        if "duration" in type(self).model_fields:
+            yield f"`duration: {duration:.12g}`", self.model_copy(update={"duration": duration})
+        if "minimum_duration" in type(self).model_fields and not given:
+            longer = self.model_copy(update={"minimum_duration": duration})
+            yield f"`minimum_duration: {duration:.12g}`", longer
 
     def plan(self, start: State, robot: Robot) -> Planned:
         """Return the move that begins in `start` at t = 0.

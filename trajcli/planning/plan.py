@@ -17,7 +17,7 @@ from trajcli.errors import Amount, Amounts, Place, PlanningError, TrajcliError
 from trajcli.frozen import frozen
 from trajcli.job.limits import with_move_limits
 from trajcli.job.read import LoadedJob
-from trajcli.kinematics.robot import ToolLimits
+from trajcli.kinematics.robot import QUANTITIES, ToolLimits
 from trajcli.language.targets import Target
 from trajcli.planners.planner import Event, PlannedMove, Planner
 from trajcli.trajectory import State, Trajectory
@@ -75,7 +75,10 @@ def plan_job(loaded: LoadedJob) -> Plan:
         state, before = move.planned.end, planner
     trajectory = _joined(moves, loaded, _first_state(loaded, moves[0], events))
     verdict = verify(trajectory, [move.robot.limits for move in moves], [move.promise for move in moves])
-    verdict = _with_unit_hint(verdict, loaded)
+    if not verdict.passed:
+        from trajcli.planning.advice import with_tested_advice
+
+        verdict = _in_units(_with_unit_hint(with_tested_advice(verdict, moves, loaded.say), loaded), loaded)
     shown = tuple(replace(event, message=event.text(loaded.say), amounts={}) for event in events)
     return Plan(loaded, tuple(moves), trajectory, verdict, shown, poses)
 
@@ -235,10 +238,19 @@ def _unit_hint(loaded: LoadedJob) -> str | None:
 
 
 def _with_unit_hint(verdict: Verdict, loaded: LoadedJob) -> Verdict:
-    """Return the verdict with a hint to the units where a position is beyond its limit because of them."""
+    """Return the verdict with a hint to the units where a position is beyond its limit because of them.
+
+    Rates are then over their limits for the same reason.
+    """
     beyond = any(finding.kind == "position" for finding in verdict.findings)
     hint = _unit_hint(loaded) if beyond else None
     if hint is None:
         return verdict
-    findings = (replace(f, hint=hint) if f.kind == "position" else f for f in verdict.findings)
+    findings = (replace(f, hint=hint) if f.kind in QUANTITIES else f for f in verdict.findings)
+    return replace(verdict, findings=tuple(findings))
+
+
+def _in_units(verdict: Verdict, loaded: LoadedJob) -> Verdict:
+    """Return the verdict whose messages say their numbers in the units of the job."""
+    findings = (replace(f, message=f.text(loaded.say), amounts={}, unit=f.si_unit) for f in verdict.findings)
     return replace(verdict, findings=tuple(findings))

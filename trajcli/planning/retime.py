@@ -91,7 +91,8 @@ def smallest_stretch(move: PlannedMove, over: Sequence[Finding]) -> float | Prob
         move: From rest to rest its time is scaled; else it is planned again for each duration that is tried.
         over: Its findings of the limits of joints and tool.
     """
-    if move.at_rest:
+    follows = move.promise.ends is None and move.planner.proportional  # velocities at its ends are its own
+    if move.at_rest or follows:
         factors = [finding.factor for finding in over]
         if None in factors:
             return Problem("change the target, the start or the limit")

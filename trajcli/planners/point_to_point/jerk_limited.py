@@ -46,6 +46,7 @@ class JerkLimited(PointToPoint):
 
     continuity: ClassVar[Literal[1, 2]] = 2
     stops_anywhere: ClassVar[bool] = True
+    follows_jerk: ClassVar[bool] = True
 
     planner: Literal["jerk_limited"] = "jerk_limited"
     minimum_duration: MinimumDuration | None = None

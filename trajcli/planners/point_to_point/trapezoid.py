@@ -6,7 +6,8 @@ Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), sect
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar, Literal
+from collections.abc import Iterator
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -84,6 +85,11 @@ class Trapezoid(PointToPoint):
             text = "a trapezoid of given duration and velocity does not overshoot"
             raise refuse([(("overshoot",), text, "leave one of the three out")])
         return self
+
+    def lasting(self, duration: float) -> Iterator[tuple[str, Self]]:
+        """Yield what may be given so that it lasts `duration` seconds: not everything goes together."""
+        full = self.velocity is not None and self.acceleration is not None
+        return (pair for pair in super().lasting(duration) if not (full and pair[1].duration is not None))
 
     def plan(self, start: State, robot: Robot) -> Planned:
         """Return the move to the target.

@@ -340,6 +340,12 @@ class LawSpec(Model):
         """The law of this shape."""
         return LAWS[self.shape]
 
+    @property
+    def takes_any_duration(self) -> bool:
+        """Whether it may be given a duration beside its other fields."""
+        full = self.time_law.has_ramps and self.speed is not None and self.acceleration is not None
+        return self.time_law.takes_duration and not full
+
     @model_validator(mode="after")
     def _fits_shape(self) -> LawSpec:
         flaws: list[Flaw] = []
