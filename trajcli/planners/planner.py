@@ -208,6 +208,11 @@ class Planner(Model):
         given = [name for name in names if getattr(self, name) is not None]
         return self.model_copy(update={(given or names[::-1])[0]: duration})
 
+    def without_duration(self) -> tuple[float, Self] | None:
+        """Return the given duration, s, and the move that finds it itself; None where none is given."""
+        given: float | None = getattr(self, "duration", None)
+        return None if given is None else (given, self.model_copy(update={"duration": None}))
+
     def lasting(self, duration: float) -> Iterator[tuple[str, Self]]:
         """Yield what may be given to a move so that it lasts `duration` seconds, and the move with it."""
         given = getattr(self, "duration", None) is not None

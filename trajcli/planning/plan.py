@@ -120,9 +120,15 @@ def _events_of(pose: ResolvedPose | None, index: int | None) -> list[Event]:
 def _plan_move(loaded: LoadedJob, index: int, planner: Planner, start: State) -> PlannedMove:
     job = loaded.job
     robot = with_move_limits(loaded.robot, planner.limits, index)
-    planned = planner.plan(start, robot)
     over_limit = planner.when_over_limit or job.when_over_limit
-    move = PlannedMove(index, planner, start, robot, planned, over_limit)
+    try:
+        move = PlannedMove(index, planner, start, robot, planner.plan(start, robot), over_limit)
+    except PlanningError as error:
+        if over_limit != "slow":
+            raise
+        from trajcli.planning.retime import long_enough
+
+        move = long_enough(index, planner, start, robot, error)
     if robot.limits.tcp != _NO_TOOL_LIMITS:
         from trajcli.planning.retime import keep_tool_limits
 

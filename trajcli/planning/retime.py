@@ -10,9 +10,10 @@ from trajcli.checks.finding import Finding
 from trajcli.checks.verify import verify
 from trajcli.curves.operations import scale_time
 from trajcli.curves.smallest_feasible import smallest_feasible
-from trajcli.errors import Amount, Amounts, PlanningError, Problem
-from trajcli.kinematics.robot import QUANTITIES, ToolLimits
-from trajcli.planners.planner import Event, Planned, PlannedMove
+from trajcli.errors import Amount, Amounts, PlanningError, Problem, TrajcliError
+from trajcli.kinematics.robot import QUANTITIES, Robot, ToolLimits
+from trajcli.planners.planner import Event, Planned, PlannedMove, Planner
+from trajcli.trajectory import State
 
 LONGEST = 1e4
 """Times the planned duration: a move that needs more is not over its limit, it is wrong."""
@@ -69,6 +70,39 @@ def keep_tool_limits(move: PlannedMove) -> PlannedMove:
     return _stretched(move, factor, over, kind, remark)
 
 
+def long_enough(
+    index: int, planner: Planner, start: State, robot: Robot, error: PlanningError
+) -> PlannedMove:
+    """Return the move whose given duration is too short as fast as it can be, with an event.
+
+    Args:
+        index: Of the move.
+        planner: It refuses its duration.
+        start: Where the move begins.
+        robot: With the limits in force.
+        error: Of the planner.
+
+    Raises:
+        PlanningError: `error`, where its duration is not what is wrong.
+    """
+    given = planner.without_duration()
+    if given is None:
+        raise error
+    wanted, free = given
+    try:
+        planned = free.plan(start, robot)
+    except TrajcliError:
+        raise error from None
+    needed, why = planned.curve.duration, error.problems[0]
+    if needed <= wanted:
+        raise error
+    message = f"stretched {needed / wanted:.6g} times, from {{before}} to {{after}}: {why.message}"
+    amounts: Amounts = {**why.amounts, "before": Amount(wanted), "after": Amount(needed)}
+    event = Event("slowed", message, index, amounts)
+    planned = replace(planned, events=(event, *planned.events))
+    return PlannedMove(index, free, start, robot, planned, "slow", needed / wanted)
+
+
 def slow_to_limits(move: PlannedMove) -> PlannedMove:
     """Return the smallest stretch of the move that keeps its limits, with an event if it is one.
 
@@ -115,7 +149,7 @@ def _stretched(
     worst = max(over, key=lambda finding: finding.factor or 0.0)
     limit = worst.kind.removeprefix("tool_").replace("_", " ")
     message = (
-        f"stretched {slower.stretch:.6g} times, from {{before}} to {{after}}, "
+        f"stretched {slower.duration / move.duration:.6g} times, from {{before}} to {{after}}, "
         f"to keep the {limit} limit of {{whose}}{remark}"
     )
     amounts: Amounts = {

@@ -251,15 +251,15 @@ def _infeasible(
         order = 1 if error.reason == "speed" else 2
         given = (move.velocity or (0.0,) * 12)[joint] if order == 1 else _acceleration(move, robot, joint)
         amounts |= {
-            "low": Amount(error.low * size, order, joint),
-            "high": Amount(error.high * size, order, joint),
+            "low": Amount(error.low * size, order, joint, rounded="up"),
+            "high": Amount(error.high * size, order, joint, rounded="down"),
             "given": Amount(given, order, joint),
             "duration": Amount(move.duration or 0.0),
         }
     elif error.reason == "duration":
-        amounts |= {"low": Amount(error.low), "high": Amount(error.high)}
+        amounts |= {"low": Amount(error.low, rounded="up"), "high": Amount(error.high, rounded="down")}
     elif error.reason in ("too_fast", "too_slow"):
-        amounts["needed"] = Amount(error.low * size, 0, joint)
+        amounts["needed"] = Amount(error.low * size, 0, joint, rounded="up")
     return PlanningError(Problem(_message(error), _HINTS[error.reason], joint=name, amounts=amounts))
 
 

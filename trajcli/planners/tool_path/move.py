@@ -116,6 +116,11 @@ class ToolPathMove(Planner):
         "jerk_limited": {"law": {"shape": "jerk_limited"}},
     }
 
+    def without_duration(self) -> tuple[float, Self] | None:
+        """Return the duration of the law, s, and the move whose law finds it itself, if one is given."""
+        given, free = self.law.duration, self.law.model_copy(update={"duration": None})
+        return None if given is None else (given, self.model_copy(update={"law": free}))
+
     def lasting(self, duration: float) -> Iterator[tuple[str, Self]]:
         """Yield what the law may be given so that the move lasts `duration` seconds."""
         law = self.law
