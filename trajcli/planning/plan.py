@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -13,13 +13,21 @@ import numpy as np
 from trajcli.checks.tolerances import JUMP_ABSOLUTE
 from trajcli.checks.verify import Verdict, verify
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
-from trajcli.errors import Amount, Amounts, Place, PlanningError, TrajcliError
+from trajcli.errors import (
+    Amount,
+    Amounts,
+    MissingLimitError,
+    Place,
+    PlanningError,
+    Problem,
+    TrajcliError,
+)
 from trajcli.frozen import frozen
 from trajcli.job.limits import with_move_limits
 from trajcli.job.read import LoadedJob
 from trajcli.kinematics.robot import QUANTITIES, ToolLimits
 from trajcli.language.targets import Target
-from trajcli.planners.planner import Event, PlannedMove, Planner
+from trajcli.planners.planner import Event, PlannedMove, Planner, Resolve
 from trajcli.trajectory import State, Trajectory
 
 if TYPE_CHECKING:
@@ -56,23 +64,12 @@ def plan_job(loaded: LoadedJob) -> Plan:
         InputError: When a move loosens a limit, or lacks one it needs.
         PlanningError: When a move has no curve.
     """
-    moves: list[PlannedMove] = []
     poses: dict[int | None, ResolvedPose] = {}
-    resolve = partial(_resolved, loaded=loaded, poses=poses)
-    with _errors_at(loaded, loaded.document.place(("start",))):
-        state = resolve(loaded.job.start, np.zeros(len(loaded.robot.joints)), index=None).as_state()
+    moves = _plan_moves(loaded, poses)
     events = [*loaded.events, *_events_of(poses.get(None), None)]
-    before: Planner | None = None
-    for index, planner in enumerate(loaded.job.moves):
-        start = _handed_over(state, before, planner)
-        begun = sum(float(done.planned.curve.breaks[-1]) for done in moves)
-        with _errors_of(loaded, index, planner, begun):
-            reachable = planner.with_joint_targets(partial(resolve, index=index), state.position)
-            move = _plan_move(loaded, index, reachable, start)
-        moves.append(move)
-        events += _events_of(poses.get(index), index)
-        events += [replace(event, move=index) for event in move.planned.events]
-        state, before = move.planned.end, planner
+    for move in moves:
+        events += _events_of(poses.get(move.index), move.index)
+        events += [replace(event, move=move.index) for event in move.planned.events]
     trajectory = _joined(moves, loaded, _first_state(loaded, moves[0], events))
     verdict = verify(trajectory, [move.robot.limits for move in moves], [move.promise for move in moves])
     if not verdict.passed:
@@ -81,6 +78,66 @@ def plan_job(loaded: LoadedJob) -> Plan:
         verdict = _in_units(_with_unit_hint(with_tested_advice(verdict, moves, loaded.say), loaded), loaded)
     shown = tuple(replace(event, message=event.text(loaded.say), amounts={}) for event in events)
     return Plan(loaded, tuple(moves), trajectory, verdict, shown, poses)
+
+
+def _plan_moves(loaded: LoadedJob, poses: dict[int | None, ResolvedPose]) -> list[PlannedMove]:
+    """Return the moves of a job, and note how its poses are reached.
+
+    Raises:
+        MissingLimitError: With the limits that any of the moves lack: who adds them need not come again.
+        TrajcliError: Of the first move that has no curve.
+    """
+    moves: list[PlannedMove] = []
+    lacking: list[Problem] = []
+    resolve = partial(_resolved, loaded=loaded, poses=poses)
+    with _errors_at(loaded, loaded.document.place(("start",))):
+        state = resolve(loaded.job.start, np.zeros(len(loaded.robot.joints)), index=None).as_state()
+    before: Planner | None = None
+    for index, planner in enumerate(loaded.job.moves):
+        start = _handed_over(state, before, planner)
+        begun = sum(float(done.planned.curve.breaks[-1]) for done in moves)
+        try:
+            with _errors_of(loaded, index, planner, begun):
+                reachable = planner.with_joint_targets(partial(resolve, index=index), state.position)
+                move = _plan_move(loaded, index, reachable, start)
+            moves.append(move)
+            state = move.planned.end
+        except MissingLimitError as error:
+            lacking += error.problems
+            end = _declared_end(planner, partial(resolve, index=index), state)
+            if end is None:
+                break
+            state = end
+        except TrajcliError:
+            if not lacking:
+                raise
+            break
+        before = planner
+    if lacking:
+        raise MissingLimitError(*_without_repeats(lacking))
+    return moves
+
+
+def _declared_end(planner: Planner, resolve: Resolve, state: State) -> State | None:
+    """Return the state in which a move that could not be planned would end, where the job says it."""
+    target = planner.target
+    if target is None or not target.gives_joints_or_pose:
+        return None
+    try:
+        return resolve(target, state.position).as_state()
+    except TrajcliError:
+        return None
+
+
+def _without_repeats(problems: Sequence[Problem]) -> Iterator[Problem]:
+    """Yield the problems of moves without those that say of a later move what was said of one before."""
+    alike: dict[tuple[str, str | None], list[Problem]] = {}
+    for problem in problems:
+        said = problem.message.partition(": ")[2]
+        alike.setdefault((said, problem.hint), []).append(problem)
+    for first, *more in alike.values():
+        counted = f" (and {len(more)} more move{'s' * (len(more) > 1)} likewise)" if more else ""
+        yield replace(first, message=first.message + counted)
 
 
 def _resolved(
