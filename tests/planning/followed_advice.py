@@ -83,6 +83,12 @@ def _last(job: Job, move: Job, complaint: Complaint, match: re.Match[str]) -> An
     if complaint.hint[match.end() :].startswith(": say"):
         move["when_over_limit"] = "slow"
         return
+    if complaint.hint[match.end() :].startswith(", all its times alike"):
+        if "blend_durations" not in move and not any("time" in p for p in move.get("through", [])):
+            move["when_over_limit"] = "slow"  # which scales them
+            return
+        if "blend_durations" in move:
+            move["blend_durations"] *= factor
     points = [*move.get("through", []), *([move["to"]] if "to" in move else [])]
     if field:
         assert float(match[4]) == total
@@ -118,7 +124,9 @@ def _use(job: Job, move: Job, complaint: Complaint, match: re.Match[str]) -> Any
         return None
     through = "through" in move
     if through:
-        kept = {k: v for k, v in move.items() if k in ("through", "to", "duration", "when_over_limit", "limits")}
+        kept = {
+            k: v for k, v in move.items() if k in ("through", "to", "duration", "when_over_limit", "limits")
+        }
         rule = "continuous_acceleration" if "spline" in word else word
         new = {"planner": "spline", "rule": rule, **kept}
     else:
@@ -181,7 +189,12 @@ def _missing(job: Job, move: Job, complaint: Complaint, match: re.Match[str]) ->
 
 def _limit(job: Job, move: Job, complaint: Complaint, match: re.Match[str]) -> Any:
     """The limit is raised to the value that is reached."""
-    if complaint.joint is None or complaint.what not in ("position", "velocity", "acceleration", "jerk"):
+    finds_times = "through" in move and not any("time" in point for point in move["through"])
+    if (
+        finds_times
+        or complaint.joint is None
+        or complaint.what not in ("position", "velocity", "acceleration", "jerk")
+    ):
         return False
     loaded = job_from_text(json.dumps(job))
     joint = loaded.robot.joint_names.index(complaint.joint)

@@ -73,7 +73,7 @@ def _by_slowing(
     total = at_least(stretch * move.duration)
     field = _field_that_works(move, float(total))
     if field is None:
-        return stretch, f"{text} ({total} s)" + (f": say {_SLOW}" if alone else "")
+        return stretch, f"{text} ({total} s)" + (f": say {_SLOW}" if alone else ", all its times alike")
     where = "" if field == f"`duration: {total}`" else f": {field}"
     return stretch, f"{text} ({total} s{where})" + (f", or say {_SLOW}" if alone else "")
 
@@ -142,7 +142,7 @@ def _without_jerk_limit(move: PlannedMove, moves: Sequence[PlannedMove]) -> Iter
     own = move.planner.limits is not None and bool(move.planner.limits.jerk)
     for other in moves:
         free = replace(other.robot.limits, jerk=np.tile([-np.inf, np.inf], (len(other.robot.joints), 1)))
-        followed = other.planner.follows_jerk and other.duration > 0
+        followed = other.duration > 0 and (other.planner.follows_jerk or other.planner.finds_duration)
         if followed and _planned(other, other.planner, replace(other.robot, limits=free)) is None:
             return
     yield "say limits: {jerk: null}" + (" in the job and leave `jerk` out of the move's own" if own else "")
