@@ -30,6 +30,7 @@ class Place:
 
 
 _DIGITS = 9
+_FEW_DIGITS = 6
 _SHOWN = 1e-13  # relative: a number that misses by no more than rounding is shown as it is
 
 
@@ -62,13 +63,23 @@ class Amount:
         return f"{_towards(scale(self.value), self.rounded):.{_DIGITS}g}"
 
 
-def _towards(value: float, side: Literal["up", "down"] | None) -> float:
-    """Return a number rounded to the digits that are shown, up or down where it is another one then."""
-    nearest = float(f"{value:.{_DIGITS}g}")
+def at_least(value: float) -> str:
+    """Return a lower bound with six digits, rounded up where it is another number then."""
+    return f"{_towards(value, 'up', _FEW_DIGITS):.{_FEW_DIGITS}g}"
+
+
+def inward(value: float) -> Literal["up", "down"]:
+    """Return the side to which a number is rounded so that its magnitude does not become more."""
+    return "down" if value > 0 else "up"
+
+
+def _towards(value: float, side: Literal["up", "down"] | None, digits: int = _DIGITS) -> float:
+    """Return a number rounded to some digits, up or down where it is another one then."""
+    nearest = float(f"{value:.{digits}g}")
     wrong = nearest < value if side == "up" else nearest > value
     if side is None or not wrong or abs(nearest - value) <= _SHOWN * abs(value):
         return value
-    unit = 10.0 ** (math.floor(math.log10(abs(value))) + 1 - _DIGITS)
+    unit = 10.0 ** (math.floor(math.log10(abs(value))) + 1 - digits)
     return nearest + (unit if side == "up" else -unit)
 
 

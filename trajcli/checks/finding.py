@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from typing import Literal, overload
 
 import numpy as np
@@ -35,6 +35,7 @@ FindingKind = Literal[
     "branch",
 ]
 FindingMethod = Literal["exact", "bounded", "sampled"]
+_RATES = ("", "/s", "/s^2", "/s^3")
 
 
 @comparable
@@ -58,6 +59,7 @@ class Finding:
         hint: What would fix it.
         message: What is wrong, one sentence for people.
         amounts: Numbers and names that the message holds as `{name}`.
+        unit: Of value and limit, where the message has no amounts any more.
     """
 
     move: int | None
@@ -71,6 +73,15 @@ class Finding:
     hint: str | None = None
     message: str = ""
     amounts: Amounts = field(default_factory=dict)
+    unit: str | None = None
+
+    @property
+    def si_unit(self) -> str | None:
+        """Unit of value and limit, such as "rad/s"; None where they are no quantities."""
+        amount = self.amounts.get("value")
+        if not isinstance(amount, Amount):
+            return self.unit
+        return ("m" if amount.dimension == "length" else "rad") + _RATES[amount.order]
 
     def text(self, say: Callable[[Amount], str] = str) -> str:
         """Return the message with its amounts said by `say`."""
@@ -84,6 +95,16 @@ def joint_amounts(trajectory: Trajectory, joint: int, order: int, **values: floa
     )
     amounts = {name: Amount(value, order, joint, dimension) for name, value in values.items()}
     return {"joint": trajectory.joint_names[joint], **amounts}
+
+
+def excess_amounts(trajectory: Trajectory, joint: int, order: int, value: float, limit: float) -> Amounts:
+    """Return a joint's name, a value beyond its limit, and the limit, rounded so that both pass."""
+    amounts = dict(joint_amounts(trajectory, joint, order, value=value, limit=limit))
+    for name, raised in (("value", value > limit), ("limit", value < limit)):
+        amount = amounts[name]
+        if isinstance(amount, Amount):
+            amounts[name] = replace(amount, rounded="up" if raised else "down")
+    return amounts
 
 
 def at_time(time: float) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from trajcli.checks.finding import Finding, FindingKind, at_time, joint_amounts
+from trajcli.checks.finding import Finding, FindingKind, at_time, excess_amounts
 from trajcli.checks.tolerances import BORDER_UNITS, exceeds
 from trajcli.curves.extrema import Peaks, peaks_between
 from trajcli.curves.piecewise import Array
@@ -77,7 +77,7 @@ def _worst(
         time=when,
         factor=float(value / limit) ** (1 / order) if slower else None,
         message=f"the {kind} of {{joint}} reaches {{value}} {at_time(when)}, its limit is {{limit}}",
-        amounts=joint_amounts(trajectory, joint, order, value=float(value), limit=float(limit)),
+        amounts=excess_amounts(trajectory, joint, order, value=float(value), limit=float(limit)),
     )
 
 

@@ -126,7 +126,10 @@ def tool_finding(
     dimension: Literal["length", "angle"] = (
         "angle" if name.startswith("angular") or kind == "tool_orientation" else "length"
     )
-    amounts = {"value": Amount(value, order, None, dimension), "limit": Amount(limit, order, None, dimension)}
+    amounts = {
+        "value": Amount(value, order, None, dimension, "up"),
+        "limit": Amount(limit, order, None, dimension, "down"),
+    }
     when = span.start + time
     return Finding(
         move=span.index,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -12,8 +12,10 @@ from trajcli.checks.continuity import acceleration_steps, check_continuity
 from trajcli.checks.finding import AccelerationSteps, Finding
 from trajcli.checks.limits import check_limits, peaks_by_move
 from trajcli.checks.target import check_targets
+from trajcli.checks.tolerances import LIMIT_RELATIVE, TOOL_RELATIVE
 from trajcli.checks.waypoints import check_waypoints
 from trajcli.curves.extrema import Peaks
+from trajcli.errors import at_least
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import QUANTITIES, Limits, ToolLimits
 from trajcli.trajectory import Promise, Span, Trajectory
@@ -29,6 +31,7 @@ _TOOL_LIMITS = (
     "tool_jerk",
 )
 _NO_TOOL_LIMITS = ToolLimits()
+_PART = 0.25  # of that room: a third of it is a third power's
 _NO_HELP = "slowing down does not help"
 _SLOW = "say `when_over_limit: slow`"
 
@@ -117,11 +120,43 @@ def _in_order(
 ) -> tuple[Finding, ...]:
     """Return the findings by move and time, each with its remedy."""
     number = {span.index: k for k, span in enumerate(trajectory.spans)}
-    known = [(number.get(finding.move or 0, 0), finding) for finding in findings]
-    known.sort(key=lambda pair: (pair[0], pair[1].time))
+    of_span: dict[int, list[Finding]] = {}
+    for finding in findings:
+        of_span.setdefault(number.get(finding.move or 0, 0), []).append(finding)
     return tuple(
-        with_remedy(finding, trajectory, trajectory.spans[k], promises[k] if promises else Promise())
-        for k, finding in known
+        finding
+        for k in sorted(of_span)
+        for finding in _with_remedies(
+            sorted(of_span[k], key=lambda finding: finding.time),
+            trajectory,
+            trajectory.spans[k],
+            promises[k] if promises else Promise(),
+        )
+    )
+
+
+def _with_remedies(
+    findings: list[Finding], trajectory: Trajectory, span: Span, promise: Promise
+) -> Iterator[Finding]:
+    """Yield the findings of one move with what would fix them: one duration, long enough for all of them."""
+    factor = longest_factor(findings)
+    alone = all(finding.factor is not None for finding in findings)
+    smoother = next((f.hint for f in findings if f.kind == "acceleration_jump"), None)
+    for finding in findings:
+        known = finding
+        if finding.kind == "jerk" and smoother is not None:  # what joins the acceleration limits the jerk
+            known = replace(finding, hint=promise.remedies.get("acceleration_jump", smoother))
+        yield _with_remedy(known, trajectory, span, promise, factor, alone=alone)
+
+
+def longest_factor(findings: Sequence[Finding]) -> float | None:
+    """Return how many times longer a move must last for all of its findings that this helps; None for none.
+
+    The limits' own room for rounding is used, so that a factor is not shown above what is enough.
+    """
+    rooms = {"exact": LIMIT_RELATIVE, "bounded": TOOL_RELATIVE, "sampled": TOOL_RELATIVE}
+    return max(
+        (f.factor * (1 - rooms[f.method] * _PART) for f in findings if f.factor is not None), default=None
     )
 
 
@@ -191,7 +226,15 @@ def _unchecked(trajectory: Trajectory, limits_by_move: Sequence[Limits]) -> tupl
     )
 
 
-def with_remedy(finding: Finding, trajectory: Trajectory, span: Span, promise: Promise) -> Finding:
+def _with_remedy(
+    finding: Finding,
+    trajectory: Trajectory,
+    span: Span,
+    promise: Promise,
+    factor: float | None,
+    *,
+    alone: bool,
+) -> Finding:
     """Return the finding with what would fix it, where that is known.
 
     Args:
@@ -199,20 +242,30 @@ def with_remedy(finding: Finding, trajectory: Trajectory, span: Span, promise: P
         trajectory: The whole.
         span: Of the move that it is about.
         promise: What that move says of itself.
+        factor: How many times longer the move must last for all its limits; None where that does not help.
+        alone: Whether a longer move has no finding left: else `slow` is no answer.
     """
     hint = promise.remedies.get(finding.kind, finding.hint)
     if hint is None and (finding.kind in QUANTITIES or finding.kind in _TOOL_LIMITS):
-        hint = _by_slowing(finding, trajectory, span, promise)
+        hint = _by_slowing(finding, trajectory, span, promise, factor, alone=alone)
     return finding if hint == finding.hint else replace(finding, hint=hint)
 
 
-def _by_slowing(finding: Finding, trajectory: Trajectory, span: Span, promise: Promise) -> str:
-    """Return how much longer the move must last to keep a limit, or why that is no help."""
-    if finding.factor is None or promise.over_limit == "slow":
+def _by_slowing(
+    finding: Finding,
+    trajectory: Trajectory,
+    span: Span,
+    promise: Promise,
+    factor: float | None,
+    *,
+    alone: bool,
+) -> str:
+    """Return how much longer the move must last to keep its limits, or why that is no help."""
+    if finding.factor is None or factor is None or promise.over_limit == "slow":
         return f"{_NO_HELP}: change the target, the start or the limit"
     if promise.ends is None or all(state.at_rest for state in promise.ends):
-        longer = f"{finding.factor:.6g} times longer ({span.duration * finding.factor:.6g} s)"
-        return f"it must last {longer}" + (f", or {_SLOW}" if promise.over_limit else "")
+        longer = f"{at_least(factor)} times longer ({at_least(span.duration * factor)} s)"
+        return f"it must last {longer}" + (f", or {_SLOW}" if promise.over_limit and alone else "")
     if finding.joint is None:
         from trajcli.checks.tool_limits import tool_ends_over_limit
 

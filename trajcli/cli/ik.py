@@ -58,7 +58,7 @@ def run_ik(robot: str, words: Sequence[str], options: IkOptions) -> int:
         print_json(reports)
     elif reports:
         print_lines(_lines(arm, solutions, reports))
-    require_answer(arm, solutions, chosen, asked.configuration)
+    require_answer(arm, solutions, chosen, asked.configuration, target)
     return 0
 
 

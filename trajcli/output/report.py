@@ -13,7 +13,7 @@ from trajcli.checks.finding import Finding
 from trajcli.checks.verify import Verdict
 from trajcli.curves.extrema import Peaks
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.errors import Amount, PlanningError, Problem, VerificationError
+from trajcli.errors import PlanningError, Problem, VerificationError
 from trajcli.job.report import (
     BindingReport,
     EventReport,
@@ -35,6 +35,7 @@ from trajcli.job.report import (
     UncheckedToolReport,
     WaypointReport,
 )
+from trajcli.job.unit_hints import unit_hint
 from trajcli.kinematics.robot import QUANTITIES, JointType, Robot
 from trajcli.knots import knots_of
 from trajcli.planners.planner import PlannedMove
@@ -100,7 +101,6 @@ def _knots(trajectory: Trajectory) -> KnotsReport:
 
 
 def _finding(plan: Plan, finding: Finding) -> FindingReport:
-    amount = finding.amounts.get("value")
     return FindingReport(
         move=finding.move,
         joint=finding.joint,
@@ -112,9 +112,7 @@ def _finding(plan: Plan, finding: Finding) -> FindingReport:
         factor=finding.factor,
         hint=finding.hint,
         message=finding.text(plan.loaded.say),
-        unit=("m" if amount.dimension == "length" else "rad") + _RATES[amount.order]
-        if isinstance(amount, Amount)
-        else "",
+        unit=finding.si_unit or "",
     )
 
 
@@ -332,15 +330,28 @@ def verification_error(plan: Plan, *, every: bool = True) -> VerificationError:
     Args:
         plan: A plan that fails.
         every: Whether each finding is said; otherwise the worst of each move and kind, which tells how many
-            more there are.
+            more there are, and one for all that has the same cause.
     """
     findings = plan.verdict.findings
     if every:
         return VerificationError(*(_problem(plan, finding) for finding in findings))
-    alike: dict[tuple[int | None, str], list[Finding]] = {}
+    alike: dict[tuple[int | str | None, ...], list[Finding]] = {}
+    units = unit_hint(plan.loaded)
     for finding in findings:
-        alike.setdefault((finding.move, finding.kind), []).append(finding)
+        alike.setdefault(_cause(finding, units), []).append(finding)
     return VerificationError(*(_worst(plan, group) for group in alike.values()))
+
+
+def _cause(finding: Finding, units: str | None) -> tuple[int | str | None, ...]:
+    """Return what findings of one cause share: the move and kind, or numbers in other units than were meant.
+
+    Where the acceleration steps, its derivative has no bound: the limit of jerk is broken for one reason.
+    """
+    if finding.kind in QUANTITIES and finding.hint is not None and finding.hint == units:
+        return (finding.hint,)
+    if finding.kind in ("jerk", "acceleration_jump"):
+        return finding.move, finding.hint
+    return finding.move, finding.kind
 
 
 def _worst(plan: Plan, alike: Sequence[Finding]) -> Problem:
@@ -350,11 +361,15 @@ def _worst(plan: Plan, alike: Sequence[Finding]) -> Problem:
     return replace(problem, message=problem.message + more)
 
 
-def _excess(finding: Finding) -> float:
-    """Return how far a finding is beyond its limit: of positions the distance, else the part of the limit."""
+def _excess(finding: Finding) -> tuple[float, float]:
+    """Return how far a finding is beyond its limit: of positions the distance, else the part of the limit.
+
+    Of findings of one cause those about the position, or about steps, come first.
+    """
+    first = math.inf if finding.kind in ("position", "acceleration_jump") else 0.0
     if finding.kind == "position" or finding.limit == 0:
-        return abs(finding.value - finding.limit)
-    return abs(finding.value / finding.limit)
+        return first, abs(finding.value - finding.limit)
+    return first, abs(finding.value / finding.limit)
 
 
 def _problem(plan: Plan, finding: Finding) -> Problem:

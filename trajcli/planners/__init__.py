@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from importlib import import_module
 from typing import Annotated, Any
 
-from pydantic import Field, GetCoreSchemaHandler, TypeAdapter
+from pydantic import Field, GetCoreSchemaHandler, TypeAdapter, ValidationError
 from pydantic_core import CoreSchema, core_schema
 
 from trajcli.frozen import frozen
@@ -109,4 +109,26 @@ def moves_adapter(tags: Iterable[str]) -> TypeAdapter[list[Planner]]:
     return TypeAdapter(Annotated[list[Annotated[Planner, planner]], Field(min_length=1)])
 
 
-__all__ = ["ALSO_CALLED", "PLANNERS", "Planner", "moves_adapter"]
+def changed(planner: Planner, change: Mapping[str, Any]) -> Planner | None:
+    """Return a move with some fields changed, its `planner` perhaps among them; None where they do not fit.
+
+    Args:
+        planner: The move; fields that the other planner does not have are left out.
+        change: By name, in SI; a mapping changes fields of the model in that field.
+    """
+    fields = dict(change)
+    kind = PLANNERS[str(fields.pop("planner", planner.tag))]
+    known = set(kind.model_fields) & set(type(planner).model_fields) - {"planner"}
+    kept = {name: getattr(planner, name) for name in known}
+    try:
+        for name, value in fields.items():
+            if isinstance(value, Mapping):
+                inner: Any = kept[name]
+                given = {key: getattr(inner, key) for key in inner.model_fields_set}
+                fields[name] = type(inner)(**{**given, **value})
+        return kind(**{**kept, **fields})
+    except ValidationError:
+        return None
+
+
+__all__ = ["ALSO_CALLED", "PLANNERS", "Planner", "changed", "moves_adapter"]

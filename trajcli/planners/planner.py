@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.errors import Amount, Amounts, PlanningError, said
+from trajcli.errors import Amount, Amounts, PlanningError, Problem, said
 from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Robot
 from trajcli.language.limits import LimitsSpec
@@ -137,12 +137,20 @@ class Planner(Model):
             (acceleration). A step in the derivative after that is legal where the joint has no limit on it.
         one_shape: Whether all its motions between two positions of rest differ by their duration alone, so
             that a stretched one is still the fastest of its kind.
+        proportional: Whether another duration scales the times of all its parts alike, so that between given
+            velocities at its ends each position is linear in the duration.
+        follows_jerk: Whether it plans within the limits of jerk, and perhaps not without them.
+        smoother: Changes of its fields that make a move without steps in acceleration, each by the words that
+            ask for it; "planner" may be among them.
         limits: Tightens the job's limits for this move; applied before `plan` is called.
         when_over_limit: Overrides the job's; applied after `plan` was called.
     """
 
     continuity: ClassVar[Literal[1, 2]]
     one_shape: ClassVar[bool] = False
+    proportional: ClassVar[bool] = False
+    follows_jerk: ClassVar[bool] = False
+    smoother: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
 
     limits: Annotated[LimitsSpec | None, Field(description="Tighter limits for this move.")] = None
     when_over_limit: Annotated[
@@ -205,6 +213,20 @@ class Planner(Model):
         given = [name for name in names if getattr(self, name) is not None]
         return self.model_copy(update={(given or names[::-1])[0]: duration})
 
+    def without_duration(self) -> tuple[float, Self] | None:
+        """Return the given duration, s, and the move that finds it itself; None where none is given."""
+        given: float | None = getattr(self, "duration", None)
+        return None if given is None else (given, self.model_copy(update={"duration": None}))
+
+    def lasting(self, duration: float) -> Iterator[tuple[str, Self]]:
+        """Yield what may be given to a move so that it lasts `duration` seconds, and the move with it."""
+        given = getattr(self, "duration", None) is not None
+        if "duration" in type(self).model_fields:
+            yield f"`duration: {duration:.12g}`", self.model_copy(update={"duration": duration})
+        if "minimum_duration" in type(self).model_fields and not given:
+            longer = self.model_copy(update={"minimum_duration": duration})
+            yield f"`minimum_duration: {duration:.12g}`", longer
+
     def plan(self, start: State, robot: Robot) -> Planned:
         """Return the move that begins in `start` at t = 0.
 
@@ -231,6 +253,7 @@ class PlannedMove:
         planned: What the planner returned, stretched where that was asked for.
         over_limit: What is done where it is over its limits.
         stretch: How many times longer it lasts than its planner said.
+        not_slowed: Why no duration keeps its limits, where one was looked for in vain.
     """
 
     index: int
@@ -240,6 +263,7 @@ class PlannedMove:
     planned: Planned
     over_limit: WhenOverLimit = "error"
     stretch: float = 1.0
+    not_slowed: Problem | None = None
 
     @property
     def duration(self) -> float:

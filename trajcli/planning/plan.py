@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -13,13 +13,21 @@ import numpy as np
 from trajcli.checks.tolerances import JUMP_ABSOLUTE
 from trajcli.checks.verify import Verdict, verify
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
-from trajcli.errors import Amount, Amounts, Place, PlanningError, TrajcliError
+from trajcli.errors import (
+    Amount,
+    Amounts,
+    MissingLimitError,
+    Place,
+    PlanningError,
+    Problem,
+    TrajcliError,
+)
 from trajcli.frozen import frozen
 from trajcli.job.limits import with_move_limits
 from trajcli.job.read import LoadedJob
-from trajcli.kinematics.robot import ToolLimits
+from trajcli.kinematics.robot import QUANTITIES, ToolLimits
 from trajcli.language.targets import Target
-from trajcli.planners.planner import Event, PlannedMove, Planner
+from trajcli.planners.planner import Event, PlannedMove, Planner, Resolve
 from trajcli.progress import report_progress
 from trajcli.trajectory import State, Trajectory
 
@@ -63,30 +71,82 @@ def plan_job(loaded: LoadedJob) -> Plan:
         InputError: When a move loosens a limit, or lacks one it needs.
         PlanningError: When a move has no curve.
     """
-    moves: list[PlannedMove] = []
     poses: dict[int | None, ResolvedPose] = {}
+    moves = _plan_moves(loaded, poses)
+    events = [*loaded.events, *_events_of(poses.get(None), None)]
+    for move in moves:
+        events += _events_of(poses.get(move.index), move.index)
+        events += [replace(event, move=move.index) for event in move.planned.events]
+    trajectory = _joined(moves, loaded, _first_state(loaded, moves[0], events))
+    report_progress("checking the trajectory")
+    verdict = verify(trajectory, [move.robot.limits for move in moves], [move.promise for move in moves])
+    if not verdict.passed:
+        from trajcli.planning.advice import with_tested_advice
+
+        verdict = _in_units(_with_unit_hint(with_tested_advice(verdict, moves, loaded.say), loaded), loaded)
+    shown = tuple(replace(event, message=event.text(loaded.say), amounts={}) for event in events)
+    return Plan(loaded, tuple(moves), trajectory, verdict, shown, poses)
+
+
+def _plan_moves(loaded: LoadedJob, poses: dict[int | None, ResolvedPose]) -> list[PlannedMove]:
+    """Return the moves of a job, and note how its poses are reached.
+
+    Raises:
+        MissingLimitError: With the limits that any of the moves lack: who adds them need not come again.
+        TrajcliError: Of the first move that has no curve.
+    """
+    moves: list[PlannedMove] = []
+    lacking: list[Problem] = []
     resolve = partial(_resolved, loaded=loaded, poses=poses)
     with _errors_at(loaded, loaded.document.place(("start",))):
         state = resolve(loaded.job.start, np.zeros(len(loaded.robot.joints)), index=None).as_state()
-    events = [*loaded.events, *_events_of(poses.get(None), None)]
     before: Planner | None = None
     for index, planner in enumerate(loaded.job.moves):
         report_progress(f"planning move {index + 1} of {len(loaded.job.moves)} ({planner.tag})")
         start = _handed_over(state, before, planner)
         begun = sum(float(done.planned.curve.breaks[-1]) for done in moves)
-        with _errors_of(loaded, index, planner, begun):
-            reachable = planner.with_joint_targets(partial(resolve, index=index), state.position)
-            move = _plan_move(loaded, index, reachable, start)
-        moves.append(move)
-        events += _events_of(poses.get(index), index)
-        events += [replace(event, move=index) for event in move.planned.events]
-        state, before = move.planned.end, planner
-    trajectory = _joined(moves, loaded, _first_state(loaded, moves[0], events))
-    report_progress("checking the trajectory")
-    verdict = verify(trajectory, [move.robot.limits for move in moves], [move.promise for move in moves])
-    verdict = _with_unit_hint(verdict, loaded)
-    shown = tuple(replace(event, message=event.text(loaded.say), amounts={}) for event in events)
-    return Plan(loaded, tuple(moves), trajectory, verdict, shown, poses)
+        try:
+            with _errors_of(loaded, index, planner, begun):
+                reachable = planner.with_joint_targets(partial(resolve, index=index), state.position)
+                move = _plan_move(loaded, index, reachable, start)
+            moves.append(move)
+            state = move.planned.end
+        except MissingLimitError as error:
+            lacking += error.problems
+            end = _declared_end(planner, partial(resolve, index=index), state)
+            if end is None:
+                break
+            state = end
+        except TrajcliError:
+            if not lacking:
+                raise
+            break
+        before = planner
+    if lacking:
+        raise MissingLimitError(*_without_repeats(lacking))
+    return moves
+
+
+def _declared_end(planner: Planner, resolve: Resolve, state: State) -> State | None:
+    """Return the state in which a move that could not be planned would end, where the job says it."""
+    target = planner.target
+    if target is None or not target.gives_joints_or_pose:
+        return None
+    try:
+        return resolve(target, state.position).as_state()
+    except TrajcliError:
+        return None
+
+
+def _without_repeats(problems: Sequence[Problem]) -> Iterator[Problem]:
+    """Yield the problems of moves without those that say of a later move what was said of one before."""
+    alike: dict[tuple[str, str | None], list[Problem]] = {}
+    for problem in problems:
+        said = problem.message.partition(": ")[2]
+        alike.setdefault((said, problem.hint), []).append(problem)
+    for first, *more in alike.values():
+        counted = f" (and {len(more)} more move{'s' * (len(more) > 1)} likewise)" if more else ""
+        yield replace(first, message=first.message + counted)
 
 
 def _resolved(
@@ -126,9 +186,15 @@ def _events_of(pose: ResolvedPose | None, index: int | None) -> list[Event]:
 def _plan_move(loaded: LoadedJob, index: int, planner: Planner, start: State) -> PlannedMove:
     job = loaded.job
     robot = with_move_limits(loaded.robot, planner.limits, index)
-    planned = planner.plan(start, robot)
     over_limit = planner.when_over_limit or job.when_over_limit
-    move = PlannedMove(index, planner, start, robot, planned, over_limit)
+    try:
+        move = PlannedMove(index, planner, start, robot, planner.plan(start, robot), over_limit)
+    except PlanningError as error:
+        if over_limit != "slow":
+            raise
+        from trajcli.planning.retime import long_enough
+
+        move = long_enough(index, planner, start, robot, error)
     if robot.limits.tcp != _NO_TOOL_LIMITS:
         from trajcli.planning.retime import keep_tool_limits
 
@@ -253,10 +319,19 @@ def _unit_hint(loaded: LoadedJob) -> str | None:
 
 
 def _with_unit_hint(verdict: Verdict, loaded: LoadedJob) -> Verdict:
-    """Return the verdict with a hint to the units where a position is beyond its limit because of them."""
+    """Return the verdict with a hint to the units where a position is beyond its limit because of them.
+
+    Rates are then over their limits for the same reason.
+    """
     beyond = any(finding.kind == "position" for finding in verdict.findings)
     hint = _unit_hint(loaded) if beyond else None
     if hint is None:
         return verdict
-    findings = (replace(f, hint=hint) if f.kind == "position" else f for f in verdict.findings)
+    findings = (replace(f, hint=hint) if f.kind in QUANTITIES else f for f in verdict.findings)
+    return replace(verdict, findings=tuple(findings))
+
+
+def _in_units(verdict: Verdict, loaded: LoadedJob) -> Verdict:
+    """Return the verdict whose messages say their numbers in the units of the job."""
+    findings = (replace(f, message=f.text(loaded.say), amounts={}, unit=f.si_unit) for f in verdict.findings)
     return replace(verdict, findings=tuple(findings))

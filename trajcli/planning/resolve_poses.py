@@ -72,12 +72,13 @@ def resolve_pose(target: Target, robot: Robot, near: Array) -> tuple[Target, Res
 
 def _on_nearest_branch(target: Target, robot: Robot, near: Array) -> ResolvedPose:
     from trajcli.kinematics.inverse.solutions import check_reachable
-    from trajcli.kinematics.inverse.solve import solve
+    from trajcli.kinematics.inverse.solve import reached_if_turned, solve
     from trajcli.language.targets import ik_target
 
     wanted = ik_target(target)
     solutions = solve(robot, wanted, near)
-    check_reachable(robot, solutions)
+    turning_helps = bool(solutions.valid.any()) or reached_if_turned(robot, wanted)
+    check_reachable(robot, solutions, turning_helps=turning_helps)
     names = [str(name) for name in solutions.names]
     usable = solutions.within_limits & _of_configuration(
         target.configuration, names, robot, solutions.method.name

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from math import ceil
 
-import numpy as np
-
 from trajcli.checks.finding import Finding
-from trajcli.checks.limits import peaks_by_move
 from trajcli.checks.verify import verify
 from trajcli.curves.operations import scale_time
-from trajcli.curves.piecewise import Array
 from trajcli.curves.smallest_feasible import smallest_feasible
-from trajcli.errors import Amount, Amounts, PlanningError
-from trajcli.kinematics.robot import QUANTITIES, ToolLimits, share_of_limits
-from trajcli.planners.planner import Event, Planned, PlannedMove
+from trajcli.errors import Amount, Amounts, PlanningError, Problem, TrajcliError
+from trajcli.kinematics.robot import QUANTITIES, Robot, ToolLimits
+from trajcli.planners.planner import Event, Planned, PlannedMove, Planner
+from trajcli.trajectory import State
 
-_LONGEST = 1e4  # times the planned duration: a move that needs more is not over its limit, it is wrong
-_ROOM = 1e-10  # relative; a tenth of the tolerance of limits, so that rounding does not tip the later verdict
+LONGEST = 1e4
+"""Times the planned duration: a move that needs more is not over its limit, it is wrong."""
 _ONE_BY_ONE = 1  # factors tried at once: each costs a plan of its own
 _WHOLE = 1e-9  # of a period: what is this close to whole is whole
 _TRIES = 50
@@ -65,39 +63,84 @@ def keep_tool_limits(move: PlannedMove) -> PlannedMove:
     known = move.planned.tool is None and move.planner.finds_duration and move.duration > 0
     if not known or move.robot.limits.tcp == _NO_TOOL_LIMITS:
         return move
-    over = [finding for finding in _over_limit(move) if finding.joint is None]
-    factor = _smallest_stretch(move, over) if over else None
-    if factor is None:
+    over = [finding for finding in over_limit(move) if finding.joint is None]
+    factor = smallest_stretch(move, over) if over else None
+    if factor is None or isinstance(factor, Problem):
         return move
     exactly = move.planner.one_shape and move.at_rest
     kind, remark = ("within_tool_limits", "") if exactly else ("stretched", "; a faster motion may exist")
     return _stretched(move, factor, over, kind, remark)
 
 
+def long_enough(
+    index: int, planner: Planner, start: State, robot: Robot, error: PlanningError
+) -> PlannedMove:
+    """Return the move whose given duration is too short as fast as it can be, with an event.
+
+    Args:
+        index: Of the move.
+        planner: It refuses its duration.
+        start: Where the move begins.
+        robot: With the limits in force.
+        error: Of the planner.
+
+    Raises:
+        PlanningError: `error`, where its duration is not what is wrong.
+    """
+    given = planner.without_duration()
+    if given is None:
+        raise error
+    wanted, free = given
+    try:
+        planned = free.plan(start, robot)
+    except TrajcliError:
+        raise error from None
+    needed, why = planned.curve.duration, error.problems[0]
+    if needed <= wanted:
+        raise error
+    message = f"stretched {needed / wanted:.6g} times, from {{before}} to {{after}}: {why.message}"
+    amounts: Amounts = {**why.amounts, "before": Amount(wanted), "after": Amount(needed)}
+    event = Event("slowed", message, index, amounts)
+    planned = replace(planned, events=(event, *planned.events))
+    return PlannedMove(index, free, start, robot, planned, "slow", needed / wanted)
+
+
 def slow_to_limits(move: PlannedMove) -> PlannedMove:
     """Return the smallest stretch of the move that keeps its limits, with an event if it is one.
 
     Where slowing down does not help (a position limit, a boundary velocity over its limit), the move comes
-    back as it was: the verdict on the whole trajectory will say so.
+    back as it was, with the reason: the verdict on the whole trajectory will say so.
     """
-    over = _over_limit(move)
+    over = over_limit(move)
     if not over or move.duration == 0:
         return move
-    factor = _smallest_stretch(move, over)
-    return move if factor is None else _stretched(move, factor, over, "slowed")
+    factor = smallest_stretch(move, over)
+    if isinstance(factor, Problem):
+        return replace(move, not_slowed=factor)
+    return _stretched(move, factor, over, "slowed")
 
 
-def _smallest_stretch(move: PlannedMove, over: list[Finding]) -> float | None:
-    """Return the smallest factor by which a move that is over limits keeps them, if there is one."""
-    if not move.at_rest:
-        if move.robot.limits.tcp != _NO_TOOL_LIMITS:
-            from trajcli.checks.tool_limits import tool_ends_over_limit
+def smallest_stretch(move: PlannedMove, over: Sequence[Finding]) -> float | Problem:
+    """Return the smallest factor by which a move that is over limits keeps them, or why there is none.
 
-            if tool_ends_over_limit(move.robot, (move.start, move.planned.end)):
-                return None
-        return smallest_feasible(lambda factors: _excess(move, factors), 1.0, _LONGEST, block=_ONE_BY_ONE)
-    factors = [finding.factor for finding in over]
-    return None if None in factors else max(f for f in factors if f is not None)
+    Args:
+        move: From rest to rest its time is scaled; else it is planned again for each duration that is tried.
+        over: Its findings of the limits of joints and tool.
+    """
+    follows = move.promise.ends is None and move.planner.proportional  # velocities at its ends are its own
+    if move.at_rest or follows:
+        factors = [finding.factor for finding in over]
+        if None in factors:
+            return Problem("change the target, the start or the limit")
+        return max(f for f in factors if f is not None)
+    from trajcli.planning.slowing import StretchSearch, why_no_duration
+
+    reason = why_no_duration(move)
+    if reason is not None:
+        return reason
+    search = StretchSearch(move, with_duration)
+    factor = smallest_feasible(search.excess, 1.0, LONGEST, block=_ONE_BY_ONE)
+    return search.in_vain() if factor is None else factor
 
 
 def _stretched(
@@ -108,7 +151,7 @@ def _stretched(
     worst = max(over, key=lambda finding: finding.factor or 0.0)
     limit = worst.kind.removeprefix("tool_").replace("_", " ")
     message = (
-        f"stretched {slower.stretch:.6g} times, from {{before}} to {{after}}, "
+        f"stretched {slower.duration / move.duration:.6g} times, from {{before}} to {{after}}, "
         f"to keep the {limit} limit of {{whose}}{remark}"
     )
     amounts: Amounts = {
@@ -120,32 +163,10 @@ def _stretched(
     return replace(slower, planned=replace(slower.planned, events=(event, *slower.planned.events)))
 
 
-def _over_limit(move: PlannedMove) -> list[Finding]:
+def over_limit(move: PlannedMove) -> list[Finding]:
+    """Return the findings about a move alone that a longer duration may help against, and about positions."""
     findings = verify(move.alone(), [move.robot.limits], [move.promise]).findings
     return [f for f in findings if f.kind in QUANTITIES or f.factor is not None]
-
-
-def _excess(move: PlannedMove, factors: Array) -> Array:
-    """Return by how much of a limit the move is over its limits when stretched by each of the factors."""
-    return np.array([_excess_of(move, move.duration * factor) for factor in factors.tolist()])
-
-
-def _excess_of(move: PlannedMove, duration: float) -> float:
-    try:
-        longer = with_duration(move, duration)
-    except PlanningError:
-        return np.inf
-    alone = longer.alone()
-    (peaks,) = peaks_by_move(alone)
-    joints = float(share_of_limits([(p.low, p.high) for p in peaks], move.robot.limits)) - (1 + _ROOM)
-    if move.robot.limits.tcp == _NO_TOOL_LIMITS:
-        return joints
-    from trajcli.checks.tool_limits import limits_tool, share_of_tool_limits, tool_peaks
-
-    if not limits_tool(move.robot):
-        return joints
-    of_tool = tool_peaks(alone, alone.spans[0], move.robot)
-    return max(joints, share_of_tool_limits(move.robot.limits.tcp, of_tool) - 1)
 
 
 def align_to_period(move: PlannedMove, rate: float) -> PlannedMove:
@@ -157,12 +178,12 @@ def align_to_period(move: PlannedMove, rate: float) -> PlannedMove:
     if move.duration == 0:
         return move
     periods = max(1, ceil(move.duration * rate - _WHOLE))
-    was_over = bool(_over_limit(move))
+    was_over = bool(over_limit(move))
     for extra in range(_TRIES):
         wanted = (periods + extra) / rate
         longer = with_duration(move, wanted) if wanted != move.duration else move
         whole = abs(longer.duration - wanted) <= _WHOLE / rate
-        if whole and (was_over or not _over_limit(longer)):
+        if whole and (was_over or not over_limit(longer)):
             return longer
     raise PlanningError(
         f"{move.planner.tag} cannot last a whole number of periods at {rate:g} Hz within its limits",

@@ -16,7 +16,7 @@ from trajcli.kinematics.dexterity import RANK_TOLERANCE, characteristic_length
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.joint_turns import all_turns
 from trajcli.kinematics.inverse.solutions import Solutions, check_reachable
-from trajcli.kinematics.inverse.solve import solve
+from trajcli.kinematics.inverse.solve import reached_if_turned, solve
 from trajcli.kinematics.inverse.target import IkTarget, residual_jacobian
 from trajcli.kinematics.jacobian import jacobian
 from trajcli.kinematics.robot import Robot
@@ -108,7 +108,11 @@ def answer_reports(
 
 
 def require_answer(
-    arm: ArmInUnits, solutions: Solutions, chosen: Flags, configuration: Configuration | None
+    arm: ArmInUnits,
+    solutions: Solutions,
+    chosen: Flags,
+    configuration: Configuration | None,
+    target: IkTarget,
 ) -> None:
     """Do nothing when one of the chosen branches is within the limits.
 
@@ -128,7 +132,8 @@ def require_answer(
             hint=f"within the limits: {'; '.join(others)}" if others else "no other branch is inside either",
         )
     try:
-        check_reachable(arm.robot, solutions)
+        turning_helps = bool(solutions.valid.any()) or reached_if_turned(arm.robot, target)
+        check_reachable(arm.robot, solutions, turning_helps=turning_helps)
     except PlanningError as error:
         raise error.said_by(arm.say) from None
 

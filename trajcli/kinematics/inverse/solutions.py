@@ -139,8 +139,13 @@ def least_violation(solutions: Solutions, index: tuple[int, ...] = ()) -> Outsid
     return OutsideLimits(branch, joint, float(excess[branch, joint]), value)
 
 
-def check_reachable(robot: Robot, solutions: Solutions) -> None:
+def check_reachable(robot: Robot, solutions: Solutions, *, turning_helps: bool = True) -> None:
     """Do nothing when every target of a batch has a branch within the limits.
+
+    Args:
+        robot: The arm.
+        solutions: Of the targets.
+        turning_helps: Whether the targets fix coordinates of the orientation, without which they may be met.
 
     Raises:
         PlanningError: For the first target that has none: by how much it is out of reach, or which joint is
@@ -159,17 +164,19 @@ def check_reachable(robot: Robot, solutions: Solutions) -> None:
             "angle": Amount(float(f"{round(radians, 12):.6g}"), 0, None, "angle"),
         }
         message = f"{{robot}} cannot reach the pose{which}: it comes within {{distance}} and {{angle}}"
-        raise PlanningError(Problem(message, _hint_for(solutions), amounts=amounts))
+        raise PlanningError(
+            Problem(message, _hint_for(solutions, turning_helps=turning_helps), amounts=amounts)
+        )
     raise PlanningError(_problem(robot, solutions, index, which))
 
 
-def _hint_for(solutions: Solutions) -> str:
+def _hint_for(solutions: Solutions, *, turning_helps: bool) -> str:
     """Return what would make a pose reachable."""
     if solutions.fixed_axis is not None:
         return (
             f"no joint turns the {solutions.fixed_axis} axis of the tool: mean another one, with `tool_axis`"
         )
-    return "move the target, or leave coordinates of its orientation free"
+    return "move the target" + (", or leave coordinates of its orientation free" if turning_helps else "")
 
 
 def _problem(robot: Robot, solutions: Solutions, index: tuple[int, ...], which: str) -> Problem:

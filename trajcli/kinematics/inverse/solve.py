@@ -25,7 +25,7 @@ from trajcli.kinematics.inverse.self_motion import (
     self_motions,
 )
 from trajcli.kinematics.inverse.solutions import Solutions
-from trajcli.kinematics.inverse.target import IkTarget, pose_target
+from trajcli.kinematics.inverse.target import IkTarget, partial_target, pose_target
 from trajcli.kinematics.robot import Robot
 from trajcli.kinematics.serial_chain import configurations
 
@@ -69,6 +69,14 @@ def solve(
     return Solutions(
         answers.method, joints, valid[..., 0], closure, is_singular[..., 0], is_free, bounds, fixed
     )
+
+
+def reached_if_turned(robot: Robot, target: IkTarget) -> bool:
+    """Return whether one target is met where its orientation, if it fixes any of it, is left free."""
+    if target.orientation == "none":
+        return False
+    free = partial_target(target.flat().poses[0, :3, 3], fixed=target.position)
+    return bool(solve(robot, free).valid.any())
 
 
 def _answers(

@@ -15,7 +15,7 @@ from pydantic import Field
 
 from trajcli.curves.operations import along_line, coast_until, hold_until, merge_breaks
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.errors import Amount, Amounts, MissingLimitError, PlanningError, Problem
+from trajcli.errors import Amount, Amounts, MissingLimitError, PlanningError, Problem, inward
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import QUANTITIES, Limits, Robot
 from trajcli.language.targets import MinimumDuration
@@ -46,6 +46,7 @@ class JerkLimited(PointToPoint):
 
     continuity: ClassVar[Literal[1, 2]] = 2
     stops_anywhere: ClassVar[bool] = True
+    follows_jerk: ClassVar[bool] = True
 
     planner: Literal["jerk_limited"] = "jerk_limited"
     minimum_duration: MinimumDuration | None = None
@@ -291,7 +292,7 @@ def _end_problems(boundary: BoundaryProblem, joint: int) -> list[Problem]:
             amounts: Amounts = {
                 "joint": boundary.name,
                 "value": Amount(value, order, joint),
-                "limit": Amount(limit, order, joint),
+                "limit": Amount(limit, order, joint, rounded=inward(limit)),
             }
             hint = f"lower the end {QUANTITIES[order]}, or raise the limit"
             return [Problem(message, hint, joint=boundary.name, value=value, limit=limit, amounts=amounts)]
@@ -315,7 +316,7 @@ def _approach_problems(boundary: BoundaryProblem, joint: int) -> list[Problem]:
         "velocity": Amount(velocity, 1, joint),
         "acceleration": Amount(acceleration, 2, joint),
         "before": Amount(before, 1, joint),
-        "limit": Amount(limit, 1, joint),
+        "limit": Amount(limit, 1, joint, rounded=inward(limit)),
     }
     hint = "lower the end acceleration or velocity, or raise the velocity or jerk limit"
     return [Problem(message, hint, joint=boundary.name, value=before, limit=limit, amounts=amounts)]
@@ -346,7 +347,7 @@ def _require_common_law(
         amounts: Amounts = {
             "joint": name,
             "value": Amount(value, 1, joint),
-            "limit": Amount(limit, 1, joint),
+            "limit": Amount(limit, 1, joint, rounded=inward(limit)),
         }
         hint = "say `synchronize: time`"
         raise PlanningError(Problem(message, hint, joint=name, value=value, limit=limit, amounts=amounts))

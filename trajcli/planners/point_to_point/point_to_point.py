@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -26,6 +27,10 @@ class PointToPoint(Planner):
 
     imposes: ClassVar[int] = 2
     stops_anywhere: ClassVar[bool] = False
+    smoother: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "jerk_limited": {"planner": "jerk_limited"},
+        "quintic": {"planner": "quintic"},
+    }
 
     to: Annotated[NamedTarget, Field(description="The state in which the move ends, or the name of a point.")]
 

@@ -15,8 +15,8 @@ from trajcli.curves.extrema import piece_extremes
 from trajcli.curves.hermite import hermite_coefficients
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.curves.smallest_feasible import smallest_feasible
-from trajcli.errors import PlanningError, Problem
-from trajcli.kinematics.robot import Limits, Robot, share_of_limits
+from trajcli.errors import PlanningError, Problem, TrajcliError
+from trajcli.kinematics.robot import QUANTITIES, Limits, Robot, share_of_limits
 from trajcli.language.targets import Duration
 from trajcli.planners.boundary_states import missing_limit, same_state, standstill
 from trajcli.planners.planner import Planned
@@ -37,6 +37,7 @@ class PolynomialPlanner(PointToPoint):
     conditions: ClassVar[int]
 
     one_shape: ClassVar[bool] = True
+    proportional: ClassVar[bool] = True
 
     duration: Duration | None = None
 
@@ -78,7 +79,9 @@ def fastest_duration(planner: str, start: Array, end: Array, robot: Robot) -> fl
     lacking = np.flatnonzero(moving & ~bounded)
     if lacking.size:
         why = "to find its fastest duration"
-        raise missing_limit(planner, "velocity", lacking.tolist(), robot, why, "give the move a `duration`")
+        differ = (start[:, lacking] != end[:, lacking]).any(axis=1)
+        quantity = QUANTITIES[1 + int(differ.argmax())]  # with a bound on it, the least duration is known
+        raise missing_limit(planner, quantity, lacking.tolist(), robot, why, "give the move a `duration`")
     if not start[1:].any() and not end[1:].any():
         return _from_rest_to_rest(start, end, robot.limits)
     return _by_search(planner, start, end, robot)
@@ -114,9 +117,22 @@ def _by_search(planner: str, start: Array, end: Array, robot: Robot) -> float:
     duration = smallest_feasible(excess, low, high)
     if duration is None:
         message = f"no duration up to {high:.3g} s lets {planner} keep all limits between these states"
-        hint = "a boundary velocity or acceleration asks too much: lower it, or use jerk_limited"
-        raise PlanningError(Problem(message, hint))
+        hint = "a boundary velocity or acceleration asks too much: lower it"
+        raise PlanningError(Problem(message, hint + _or_jerk_limited(start, end, robot)))
     return duration
+
+
+def _or_jerk_limited(start: Array, end: Array, robot: Robot) -> str:
+    """Return the words that propose the fastest motion within the limits, where there is one."""
+    from trajcli.planners.point_to_point.jerk_limited import Request, plan_motion
+
+    still = np.zeros_like(start[0])
+    states = [State(*(rows[k] if k < len(rows) else still for k in range(3))) for rows in (start, end)]
+    try:
+        plan_motion(Request(states[0], states[1], "position", "time", 0.0), robot)
+    except TrajcliError:
+        return ""
+    return ", or use jerk_limited"
 
 
 def _least_duration(start: Array, end: Array, limits: Limits) -> float:

@@ -6,7 +6,8 @@ Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), sect
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar, Literal
+from collections.abc import Iterator
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -84,6 +85,11 @@ class Trapezoid(PointToPoint):
             text = "a trapezoid of given duration and velocity does not overshoot"
             raise refuse([(("overshoot",), text, "leave one of the three out")])
         return self
+
+    def lasting(self, duration: float) -> Iterator[tuple[str, Self]]:
+        """Yield what may be given so that it lasts `duration` seconds: not everything goes together."""
+        full = self.velocity is not None and self.acceleration is not None
+        return (pair for pair in super().lasting(duration) if not (full and pair[1].duration is not None))
 
     def plan(self, start: State, robot: Robot) -> Planned:
         """Return the move to the target.
@@ -245,15 +251,15 @@ def _infeasible(
         order = 1 if error.reason == "speed" else 2
         given = (move.velocity or (0.0,) * 12)[joint] if order == 1 else _acceleration(move, robot, joint)
         amounts |= {
-            "low": Amount(error.low * size, order, joint),
-            "high": Amount(error.high * size, order, joint),
+            "low": Amount(error.low * size, order, joint, rounded="up"),
+            "high": Amount(error.high * size, order, joint, rounded="down"),
             "given": Amount(given, order, joint),
             "duration": Amount(move.duration or 0.0),
         }
     elif error.reason == "duration":
-        amounts |= {"low": Amount(error.low), "high": Amount(error.high)}
+        amounts |= {"low": Amount(error.low, rounded="up"), "high": Amount(error.high, rounded="down")}
     elif error.reason in ("too_fast", "too_slow"):
-        amounts["needed"] = Amount(error.low * size, 0, joint)
+        amounts["needed"] = Amount(error.low * size, 0, joint, rounded="up")
     return PlanningError(Problem(_message(error), _HINTS[error.reason], joint=name, amounts=amounts))
 
 

@@ -340,6 +340,12 @@ class LawSpec(Model):
         """The law of this shape."""
         return LAWS[self.shape]
 
+    @property
+    def takes_any_duration(self) -> bool:
+        """Whether it may be given a duration beside its other fields."""
+        full = self.time_law.has_ramps and self.speed is not None and self.acceleration is not None
+        return self.time_law.takes_duration and not full
+
     @model_validator(mode="after")
     def _fits_shape(self) -> LawSpec:
         flaws: list[Flaw] = []
@@ -381,7 +387,7 @@ def law_bounds(
         return named, None
     named = named.with_each(bounds, lambda own, other: own if math.isfinite(own) else other)
     if math.isinf(named.by_order[1]):
-        raise _missing("acceleration", derivatives, planner, spec)
+        raise _missing(["acceleration"], derivatives, planner, spec)
     return replace(named, speed=math.inf), None
 
 
@@ -430,21 +436,25 @@ def _require(spec: LawSpec, bounds: PathBounds, derivatives: PathDerivatives, pl
     if not lacking and all(map(math.isinf, bounds.by_order)):
         lacking = ["speed"]
     if lacking:
-        raise _missing(lacking[0], derivatives, planner, spec)
+        raise _missing(lacking, derivatives, planner, spec)
 
 
-def _missing(name: str, derivatives: PathDerivatives, planner: str, spec: LawSpec) -> MissingLimitError:
-    """Return the error that asks for a bound."""
-    if name == "jerk" and not derivatives.moves:
+def _missing(
+    names: list[str], derivatives: PathDerivatives, planner: str, spec: LawSpec
+) -> MissingLimitError:
+    """Return the error that asks for bounds, for all that lack at once."""
+    if "jerk" in names and not derivatives.moves:
         message = f"a {spec.shape} law needs a jerk, and a rotation in place has no limit of it"
         return MissingLimitError(Problem(message, "use shape quintic or cycloidal"))
-    key = name if derivatives.moves else f"angular_{name}"
-    message = f"{planner} with a {spec.shape} law needs the {key.replace('_', ' ')} of the tool"
+    keys = [name if derivatives.moves else f"angular_{name}" for name in names]
+    said = " and ".join(", ".join(keys).replace("_", " ").rsplit(", ", 1))
+    message = f"{planner} with a {spec.shape} law needs the {said} of the tool"
     more = " or a `duration`" if spec.time_law.takes_duration else ""
     if spec.duration is not None:
         speed = "speed" if derivatives.moves else "angular_speed"
         message, more = f"{message}, or its {speed.replace('_', ' ')}", f" or `{speed}`"
-    hint = f"add `limits: {{tcp: {{{key}: ...}}}}` to the job, or `{key}`{more} to the `law`"
+    limits, own = ", ".join(f"{key}: ..." for key in keys), ", ".join(f"`{key}`" for key in keys)
+    hint = f"add `limits: {{tcp: {{{limits}}}}}` to the job, or {own}{more} to the `law`"
     return MissingLimitError(Problem(message, hint))
 
 

@@ -6,8 +6,8 @@ Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), sect
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field
@@ -110,6 +110,25 @@ class ToolPathMove(Planner):
     ] = "axis_angle"
     law: LawSpec = LawSpec()
     tolerance: ToleranceSpec = ToleranceSpec()
+
+    smoother: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "`law: {shape: quintic}`": {"law": {"shape": "quintic"}},
+        "jerk_limited": {"law": {"shape": "jerk_limited"}},
+    }
+
+    def without_duration(self) -> tuple[float, Self] | None:
+        """Return the duration of the law, s, and the move whose law finds it itself, if one is given."""
+        given, free = self.law.duration, self.law.model_copy(update={"duration": None})
+        return None if given is None else (given, self.model_copy(update={"law": free}))
+
+    def lasting(self, duration: float) -> Iterator[tuple[str, Self]]:
+        """Yield what the law may be given so that the move lasts `duration` seconds."""
+        law = self.law
+        names = ["duration"] if law.minimum_duration is None and law.takes_any_duration else []
+        names += ["minimum_duration"] if law.duration is None else []
+        for name in names:
+            longer = law.model_copy(update={name: duration})
+            yield f"`{name}: {duration:.12g}` under `law`", self.model_copy(update={"law": longer})
 
     @property
     def joins(self) -> Literal[1, 2]:

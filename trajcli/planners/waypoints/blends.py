@@ -356,7 +356,8 @@ def _too_slow(error: BlendAccelerationError, points: PointTable, robot: Robot) -
         f"the acceleration of {{joint}}, {{given}}, is too small for the blend inside the {where} segment: "
         "it takes {least}"
     )
-    given, least = (Amount(value, 2, error.joint) for value in (error.acceleration, error.least))
+    given = Amount(error.acceleration, 2, error.joint)
+    least = Amount(error.least, 2, error.joint, rounded="up")
     hint = "raise the acceleration, allow more time, or say `end_blends: centred`"
     amounts: Amounts = {"joint": name, "given": given, "least": least}
     return PlanningError(Problem(message, hint, joint=name, amounts=amounts))

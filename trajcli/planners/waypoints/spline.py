@@ -196,6 +196,7 @@ class Spline(ThroughPoints):
     """
 
     continuity: ClassVar[Literal[1, 2]] = 1
+    proportional: ClassVar[bool] = True
 
     planner: Literal["spline"] = "spline"
     rule: Annotated[
@@ -372,7 +373,10 @@ def _not_monotone(error: ShapeError, robot: Robot, *, given: bool) -> PlanningEr
     amounts: dict[str, Amount | str] = {"joint": name, "velocity": Amount(error.velocity, 1, joint)}
     if given:
         message += ", {low} to {high} would not"
-        amounts |= {"low": Amount(error.low, 1, joint), "high": Amount(error.high, 1, joint)}
+        amounts |= {
+            "low": Amount(error.low, 1, joint, rounded="up"),
+            "high": Amount(error.high, 1, joint, rounded="down"),
+        }
     hint = "change that velocity, or use another rule than shape_preserving"
     hint += "" if given else ", or give every waypoint a `time`"
     return PlanningError(Problem(message, hint, joint=name, amounts=amounts))

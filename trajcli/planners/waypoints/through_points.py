@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import pairwise
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,6 +78,10 @@ class ThroughPoints(Planner):
     """
 
     finds_times: ClassVar[bool] = False
+    smoother: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "spline with rule continuous_acceleration": {"planner": "spline", "rule": "continuous_acceleration"},
+        "quintic": {"planner": "spline", "rule": "quintic"},
+    }
 
     to: Annotated[
         NamedWaypoint | None,
@@ -201,6 +205,10 @@ class ThroughPoints(Planner):
             scaled["through"] = _at_times(self.through, factor)
             scaled["to"] = self.to and _at(self.to, factor)
         return self.model_copy(update=scaled)
+
+    def lasting(self, duration: float) -> Iterator[tuple[str, Self]]:
+        """Yield the move over another duration: where points have times, these are scaled."""
+        yield f"`duration: {duration:.12g}`", self.with_duration(duration)
 
     def waypoints(self, start: State, robot: Robot) -> PointTable:
         """Return the points as numbers; repeated ones are left out where nothing says when they are passed.

@@ -362,7 +362,7 @@ def _check_duration(wanted: float | None, fastest: float, points: PointTable) ->
         raise PlanningError(message, hint="leave `duration` and `align` out, or use spline")
     if wanted < fastest:
         message = "time_optimal needs {fastest}, it shall last {wanted}"
-        amounts = {"fastest": Amount(fastest), "wanted": Amount(wanted)}
+        amounts = {"fastest": Amount(fastest, rounded="up"), "wanted": Amount(wanted)}
         raise PlanningError(Problem(message, "leave `duration` out for the fastest", amounts=amounts))
 
 

@@ -1,0 +1,148 @@
+"""Advice on the findings about a plan: what it proposes was tried."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from trajcli.checks.finding import Finding
+from trajcli.checks.verify import Verdict, longest_factor, verify
+from trajcli.errors import Amount, Problem, TrajcliError, at_least
+from trajcli.kinematics.robot import QUANTITIES, Robot
+from trajcli.planners import changed
+from trajcli.planners.planner import PlannedMove, Planner
+from trajcli.planning.retime import over_limit, slow_to_limits, smallest_stretch
+
+Say = Callable[[Amount], str]
+
+_STEP = "acceleration_jump"
+_NO_HELP = "slowing down does not help"
+_SLOW = "`when_over_limit: slow`"
+
+
+def with_tested_advice(verdict: Verdict, moves: Sequence[PlannedMove], say: Say) -> Verdict:
+    """Return the verdict whose findings propose what was tried: durations, other planners, limits left out.
+
+    Args:
+        verdict: On the trajectory of all moves.
+        moves: In the order of the job.
+        say: Writes numbers in the units of the job.
+    """
+    findings: list[Finding] = []
+    for move in moves:
+        own = [finding for finding in verdict.findings if finding.move == move.index]
+        if own:
+            findings += _advised(own, move, moves, say)
+    return replace(verdict, findings=tuple(findings))
+
+
+def _advised(own: list[Finding], move: PlannedMove, moves: Sequence[PlannedMove], say: Say) -> list[Finding]:
+    """Return the findings of one move with their advice."""
+    if any(finding.kind == _STEP for finding in own):
+        hint = _without_steps(own, move, moves)
+        own = [replace(f, hint=hint) if f.kind in (_STEP, "jerk") else f for f in own]
+        alone = False
+    else:
+        alone = all(finding.factor is not None for finding in own)
+    slow = [f for f in own if f.factor is not None and not (f.kind == "jerk" and not alone)]
+    if not slow and move.not_slowed is None:
+        return own
+    factor, hint = _by_slowing(slow, move, say, alone=alone)
+    return [
+        replace(f, hint=hint, factor=factor if f.factor is not None else None)
+        if f in slow or (f.kind in QUANTITIES and f.kind != "jerk" and factor is None)
+        else f
+        for f in own
+    ]
+
+
+def _by_slowing(
+    slow: Sequence[Finding], move: PlannedMove, say: Say, *, alone: bool
+) -> tuple[float | None, str]:
+    """Return the factor by which a move keeps its limits, with the words that say so, or why none does."""
+    stretch: float | Problem | None = move.not_slowed
+    if stretch is None:
+        stretch = longest_factor(slow) if move.at_rest else smallest_stretch(move, over_limit(move))
+    if stretch is None or isinstance(stretch, Problem):
+        why = "change the target, the start or the limit" if stretch is None else stretch.text(say)
+        return None, f"{_NO_HELP}: {why}"
+    text = f"it must last {at_least(stretch)} times longer"
+    total = at_least(stretch * move.duration)
+    field = _field_that_works(move, float(total))
+    if field is None:
+        return stretch, f"{text} ({total} s)" + (f": say {_SLOW}" if alone else ", all its times alike")
+    where = "" if field == f"`duration: {total}`" else f": {field}"
+    return stretch, f"{text} ({total} s{where})" + (f", or say {_SLOW}" if alone else "")
+
+
+def _field_that_works(move: PlannedMove, duration: float) -> str | None:
+    """Return the field that makes the move last so long and keep its limits."""
+    for words, planner in move.planner.lasting(duration):
+        longer = _planned(move, planner)
+        if longer is not None and not over_limit(longer):
+            return words
+    return None
+
+
+def _planned(move: PlannedMove, planner: Planner, robot: Robot | None = None) -> PlannedMove | None:
+    """Return the move by another planner, or within other limits; None where that is not possible."""
+    arm = robot or move.robot
+    try:
+        planned = planner.plan(move.start, arm)
+    except TrajcliError:
+        return None
+    return replace(move, planner=planner, planned=planned, robot=arm)
+
+
+def _kinds(move: PlannedMove) -> set[str]:
+    """Return the kinds of findings about a move alone."""
+    return {f.kind for f in verify(move.alone(), [move.robot.limits], [move.promise]).findings}
+
+
+def _without_steps(own: Sequence[Finding], move: PlannedMove, moves: Sequence[PlannedMove]) -> str:
+    """Return what makes the acceleration join in a move, or at its border."""
+    parts, rough = [], move
+    if _STEP not in _kinds(move):
+        border = [f.time for f in own if f.kind == _STEP]
+        starts = float(np.sum([m.duration for m in moves[: move.index]]))
+        other = move.index + (1 if min(border) > starts + move.duration / 2 else -1)
+        if not 0 <= other < len(moves):
+            return next(f.hint for f in own if f.kind == _STEP) or ""
+        parts.append("let the moves meet without acceleration")
+        rough = moves[other]
+    words = _smoother(rough)
+    if words:
+        parts.append(f"use {words}" + ("" if rough is move else f" for move {rough.index}"))
+    parts += _without_jerk_limit(move, moves)
+    return ", or ".join(parts) or "lower the jerk by another target or start"
+
+
+def _smoother(move: PlannedMove) -> str:
+    """Return the planners, or fields, by which acceleration joins in the move: those that pass, if any do."""
+    tried = [(words, _changed(move, change)) for words, change in move.planner.smoother.items()]
+    smooth = [(words, other) for words, other in tried if other is not None and _STEP not in _kinds(other)]
+    fitting = [words for words, other in smooth if not _kinds(other)]
+    if fitting or move.over_limit == "slow":
+        return " or ".join(fitting or [words for words, _ in smooth])
+    slower = [words for words, other in smooth if not _kinds(slow_to_limits(other))]
+    return f"{' or '.join(slower)}, with {_SLOW}" if slower else " or ".join(words for words, _ in smooth)
+
+
+def _changed(move: PlannedMove, change: Mapping[str, Any]) -> PlannedMove | None:
+    """Return the move with other fields, which may be another planner's; None where that is not possible."""
+    other = changed(move.planner, change)
+    return None if other is None else _planned(move, other)
+
+
+def _without_jerk_limit(move: PlannedMove, moves: Sequence[PlannedMove]) -> Iterator[str]:
+    """Yield how the limit of jerk is left out, where every move can do without it."""
+    own = move.planner.limits is not None and bool(move.planner.limits.jerk)
+    for other in moves:
+        free = replace(other.robot.limits, jerk=np.tile([-np.inf, np.inf], (len(other.robot.joints), 1)))
+        followed = other.duration > 0 and (other.planner.follows_jerk or other.planner.finds_duration)
+        if followed and _planned(other, other.planner, replace(other.robot, limits=free)) is None:
+            return
+    yield "say limits: {jerk: null}" + (" in the job and leave `jerk` out of the move's own" if own else "")
