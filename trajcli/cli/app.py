@@ -118,6 +118,9 @@ def plan(
     ] = False,
     no_output: Annotated[bool, typer.Option("--no-output", help="Only judge: write no rows.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on stderr.")] = False,
+    si: Annotated[
+        bool, typer.Option("--si", help="Rows in rad and m, whatever units the job has: plain column names.")
+    ] = False,
     every: Annotated[
         bool, typer.Option("--all", help="Every finding, not only the worst of each move and kind.")
     ] = False,
@@ -127,7 +130,9 @@ def plan(
     from trajcli.cli.plan import PlanOptions, run_plan
 
     every = every or errors == "json"
-    options = PlanOptions(rate, output, report, resolved, digits, strict, reference, no_output, quiet, every)
+    options = PlanOptions(
+        rate, output, report, resolved, digits, strict, reference, no_output, quiet, every, si
+    )
     return run_plan(job, override, options)
 
 
