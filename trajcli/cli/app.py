@@ -141,13 +141,19 @@ def plan(
 def explain(
     job: JobFile,
     override: Overrides = [],  # noqa: B006
+    move: Annotated[
+        int | None, typer.Option("--move", metavar="N", help="Only this move, counted from 0.")
+    ] = None,
+    derivatives: Annotated[
+        bool, typer.Option("--derivatives", help="Also the polynomials of velocity and acceleration.")
+    ] = False,
     as_json: Json = False,
     errors: Errors = "text",
 ) -> int:
     """Say each move in words and formulas: polynomials, phases, peaks, branches, and how fast it could be."""
-    from trajcli.cli.explain import run_explain
+    from trajcli.cli.explain import ExplainOptions, run_explain
 
-    return run_explain(job, override, as_json=as_json)
+    return run_explain(job, override, ExplainOptions(move, derivatives, as_json))
 
 
 @app.command(epilog="Example: trajcli diff old.csv new.csv --atol 1e-9")
@@ -179,7 +185,8 @@ def diff(
 @guarded
 def schema(
     kind: Annotated[
-        Literal["job", "robot", "report"], typer.Argument(help="Which schema.", show_default=True)
+        Literal["job", "robot", "report", "explanation"],
+        typer.Argument(help="Which schema.", show_default=True),
     ] = "job",
     errors: Errors = "text",
 ) -> int:
