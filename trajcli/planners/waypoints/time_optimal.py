@@ -29,6 +29,7 @@ from trajcli.language.numbers import (
     Flaw,
     FlawError,
     ReadingContext,
+    number_schema,
     refuse,
     shown,
 )
@@ -191,7 +192,10 @@ class PathParameter(FieldType):
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of a name or a list."""
         return {
-            "anyOf": [{"enum": list(_NAMED)}, {"type": "array", "items": {"type": "number"}, "minItems": 2}]
+            "anyOf": [
+                {"enum": list(_NAMED)},
+                {"type": "array", "items": number_schema(Quantity("ratio")), "minItems": 2},
+            ]
         }
 
 
