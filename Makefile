@@ -51,6 +51,7 @@ schema: $(STAMP)  ## the committed JSON schemas
 	$(BIN)/trajcli schema job > schemas/job.schema.json
 	$(BIN)/trajcli schema robot > schemas/robot.schema.json
 	$(BIN)/trajcli schema report > schemas/report.schema.json
+	$(BIN)/trajcli schema explanation > schemas/explanation.schema.json
 
 docs: $(STAMP)  ## the reference pages that are generated from the models
 	$(BIN)/python -m docs.generate

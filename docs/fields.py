@@ -10,7 +10,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from docs.markdown import first_sentence, table
-from trajcli.job.model import Output, RobotSource, UnitsSpec
+from trajcli.job.model import Output, OutputUnits, RobotSource, UnitsSpec
 from trajcli.job.robot import JointModel
 from trajcli.language.limits import (
     UNLIMITED,
@@ -48,6 +48,7 @@ SECTIONS: dict[type, str] = {
     Scale: "[factors](#scale)",
     Target: "[state](#states)",
     Output: "[output](#output)",
+    OutputUnits: "[units of the columns](#units-of-the-columns)",
     JointModel: "[joint](#joints)",
     AxisAngleSpec: "[axis and angle](#axis-and-angle)",
     EulerSpec: "[Euler angles](#euler-angles)",

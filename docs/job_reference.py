@@ -12,7 +12,7 @@ from docs.markdown import ROOT, first_sentence, table
 from docs.planner_examples import EXAMPLES, LEFT_OUT, NOTES
 from docs.tool_path_reference import tool_path_sections
 from trajcli.columns import GROUPS, Group
-from trajcli.job.model import Job, Output, UnitsSpec
+from trajcli.job.model import Job, Output, OutputUnits, UnitsSpec
 from trajcli.job.robot import CATALOGUE, JointModel, RobotModel, catalogue_names
 from trajcli.job.yaml.load import read_document
 from trajcli.language.limits import LimitsSpec, Scale, ToolLimitsSpec
@@ -144,7 +144,7 @@ _MEANINGS: dict[Group, str] = {
 _COLUMNS = """\
 A group is written for all joints: `q` becomes `q1, q2, ...`. A column in SI units has its plain name;
 any other carries its unit: `q1_deg`, `qd1_deg` (deg/s), `q3_mm`, `x_mm`, `wx_deg` (deg/s). The columns
-are in the units of the job; quaternions have none.
+are in the [units](#units-of-the-columns) under `output`, else in those of the job; quaternions have none.
 
 The tcp is that of the robot with its base and tool: `pose`, `twist` and `twistd` need a robot with
 geometry. The quaternion begins with w >= 0 (where w is zero but for rounding, with the first other
@@ -154,6 +154,11 @@ component above zero) and never jumps to the other sign from one row to the next
 moves, also where the tool only rotates about the tcp.
 
 Rows stand at `start_time + k / rate`; the last row is exactly the end."""
+
+_OUTPUT_UNITS = """\
+`output: {units: {angle: rad, length: m}}` writes rows in SI from a job in degrees and millimetres, and so
+does `trajcli plan --si`, whatever the job says. Messages and explanations stay in the units of the job,
+reports in SI."""
 
 
 def job_reference() -> str:
@@ -179,6 +184,7 @@ def job_reference() -> str:
     for tag, planner in PLANNERS.items():
         parts += [f"### {tag}", *_planner(tag, planner)]
     parts += ["## Output", field_table(Output), "### Columns", _columns(), _COLUMNS]
+    parts += ["### Units of the columns", _OUTPUT_UNITS, field_table(OutputUnits)]
     return "\n\n".join(parts) + "\n"
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from pathlib import Path
-from xml.etree import ElementTree
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
@@ -190,7 +190,7 @@ def test_a_plan_saves_itself(tmp_path: Path) -> None:
 def test_a_notebook_draws_a_plan():
     plan = trajcli.plan(EXAMPLES / "cubic.yaml")
     picture = plan._repr_svg_()
-    root = ElementTree.fromstring(picture)
+    root = ET.fromstring(picture)
     assert root.tag == "{http://www.w3.org/2000/svg}svg"
     assert picture == trajcli.plan(EXAMPLES / "cubic.yaml")._repr_svg_()
 

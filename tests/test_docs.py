@@ -91,6 +91,7 @@ def test_every_planner_has_its_section_with_every_field(tag: str) -> None:
         ("## Robot", "RobotModel"),
         ("### Joints", "JointModel"),
         ("## Output", "Output"),
+        ("### Units of the columns", "OutputUnits"),
     ],
 )
 def test_every_field_has_its_line(heading: str, definition: str | None) -> None:
@@ -99,7 +100,16 @@ def test_every_field_has_its_line(heading: str, definition: str | None) -> None:
 
 
 def test_every_definition_of_the_schema_is_looked_at() -> None:
-    known = {"UnitsSpec", "Target", "LimitsSpec", "Scale", "RobotModel", "JointModel", "Output"}
+    known = {
+        "UnitsSpec",
+        "Target",
+        "LimitsSpec",
+        "Scale",
+        "RobotModel",
+        "JointModel",
+        "Output",
+        "OutputUnits",
+    }
     known |= {"AxisAngleSpec", "EulerSpec", "Configuration", "Waypoint"}
     known |= {"RelativeTarget", "RelativeWaypoint"}  # described in words
     known |= {"ToolLimitsSpec", "LawSpec", "ToleranceSpec", "Segment", "ArcFields"}

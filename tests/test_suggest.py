@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from trajcli.suggest import did_you_mean, nearest, valid_names
+from trajcli.suggest import did_you_mean, nearest, nearest_names, valid_names
 
 PLANNERS = ["cubic", "quintic", "septic", "jerk_limited", "hold"]
 
@@ -34,3 +34,10 @@ def test_valid_names() -> None:
     many = valid_names(f"p{i}" for i in range(40))
     assert many is not None
     assert many.endswith("p11 ... (28 more)")
+
+
+def test_the_nearest_names_are_told_however_far_they_are() -> None:
+    assert nearest_names("quintc", PLANNERS)[0] == "quintic"
+    assert nearest_names("cube", PLANNERS, 1) == ["cubic"]
+    assert len(nearest_names("xyz", PLANNERS)) == 3
+    assert set(nearest_names("?" * 10_000, PLANNERS, 9)) == set(PLANNERS)

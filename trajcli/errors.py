@@ -106,6 +106,8 @@ class Problem:
         value: The offending number, SI.
         limit: The bound it breaks, SI.
         amounts: Numbers and names that the message holds as `{name}`.
+        field: Where below the move the value stands that it is about, such as ("to",); None where it is about
+            no one value.
     """
 
     message: str
@@ -117,6 +119,7 @@ class Problem:
     value: float | None = None
     limit: float | None = None
     amounts: Amounts = field(default_factory=dict)
+    field: tuple[str | int, ...] | None = None
 
     def text(self, say: Callable[[Amount], str] = str) -> str:
         """Return the message with its amounts as `say` writes them."""

@@ -27,6 +27,14 @@ def nearest(name: str, names: Iterable[str]) -> str | None:
     return plain[near[0]] if near else None
 
 
+def nearest_names(name: str, names: Iterable[str], count: int = 3) -> list[str]:
+    """Return the valid names that are most like `name`, the nearest first, however little they are."""
+    from difflib import get_close_matches
+
+    plain = {_plain(valid): valid for valid in names}
+    return [plain[near] for near in get_close_matches(_plain(name[:_LONGEST]), plain, count, cutoff=0.0)]
+
+
 def did_you_mean(name: str, names: Iterable[str]) -> str | None:
     """Return the hint "did you mean 'x'?" for the nearest valid name, or None when none is near."""
     near = nearest(name, names)

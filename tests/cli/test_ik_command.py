@@ -181,7 +181,7 @@ BAD = [
     (["--pose", "{}"], "the target fixes nothing"),
     (["--pose", "{xyz: [0, 0]}"], "--pose:1:7: error: expected 3 numbers"),
     (["--pose", "{xyz: [0, 0, 1], configuration: {elbow: left}}"], "expected up or down"),
-    (["--pose", "{xyz: [0, 0, 1]}", "--tolerance", "0"], "--tolerance must be above 0"),
+    (["--pose", "{xyz: [0, 0, 1]}", "--tolerance", "0"], "--tolerance must be from 1e-12 to 1"),
     (["--pose", "{xyz: [0, 0, 1]}", "--near", "1"], "--near has 1 value, UR5e has 6 joints"),
     (["1"], "there is no place for 1"),
 ]
@@ -201,3 +201,16 @@ def test_text(arms, tmp_path: Path):
     assert out.startswith("2 answers for Planar 2R (deg), by planar 2R:\n")
     assert "(up)" in out
     assert "(down)" in out
+
+
+@pytest.mark.parametrize("name", ["ur5e", "panda", "puma560"])
+def test_the_bounds_of_tolerance(arms, name):
+    count = 7 if name == "panda" else 6
+    pose = arms.json("fk", "--robot", name, "--si", "--", *[0.3, -0.6, 0.4, -0.9, 0.5, 0.2, 0.1][:count])
+    said = f"{{matrix: {pose['matrix']}}}"
+    for tolerance in ("1e-12", "1"):
+        assert arms.call("ik", "--robot", name, "--si", "--pose", said, "--tolerance", tolerance).code == 0
+    for tolerance in ("0.99e-12", "1.01", "1e-300", "1e300", "nan", "-1"):
+        code, out, err = arms.call("ik", "--robot", name, "--si", "--pose", said, f"--tolerance={tolerance}")
+        assert (code, out) == (2, "")
+        assert "--tolerance must be from 1e-12 to 1" in err

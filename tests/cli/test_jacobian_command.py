@@ -116,3 +116,13 @@ def test_rows(arms):
     assert values[1, 3:].reshape(6, 2) == pytest.approx(np.array(one["jacobian"]), abs=1e-9)
     assert values[1, 1] == pytest.approx(one["manipulability"], abs=1e-9)
     assert arms.call("jacobian", "--robot", "planar2r", "--qd", "1", "2", "-", stdin=rows).code == 2
+
+
+def test_rows_that_look_like_degrees_are_remarked(arms):
+    rows = "q1,q2\n0.1,0.2\n-90,45\n0,90\n"
+    code, out, err = arms.call("jacobian", "--robot", "planar2r", "-", stdin=rows)
+    assert (code, len(out.splitlines())) == (0, 4)
+    assert err.count("\n") == 1
+    assert "-90 rad, more than two turns from zero" in err
+    for same in ("q1_deg,q2_deg\n-90,45\n", "q1,q2\n-1.5,0.7\n"):
+        assert arms.call("jacobian", "--robot", "planar2r", "-", stdin=same).err == ""

@@ -87,7 +87,7 @@ def test_diff(capfd: Capture) -> None:
     assert call(capfd, "diff", "-", "-").code == 2
 
 
-@pytest.mark.parametrize("kind", ["job", "robot", "report"])
+@pytest.mark.parametrize("kind", ["job", "robot", "report", "explanation"])
 def test_schema(kind: str, capfd: Capture) -> None:
     code, out, err = call(capfd, "schema", kind)
     assert (code, err) == (0, "")

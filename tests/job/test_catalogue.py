@@ -118,4 +118,13 @@ def test_load_robot_from_a_file(tmp_path: Path) -> None:
         load_robot(tmp_path / "none.yaml")
     with pytest.raises(InputError, match="the catalogue has no robot 'ur5'") as caught:
         load_robot("ur5")
-    assert caught.value.problems[0].hint == "did you mean 'ur5e'?"
+    hint = caught.value.problems[0].hint or ""
+    assert hint.startswith("did you mean 'ur5e'? `trajcli robots` lists all ")
+    with pytest.raises(InputError) as caught:
+        load_robot("xyzzy")
+    hint = caught.value.problems[0].hint or ""
+    names = catalogue_names()
+    near = hint.removeprefix("its nearest names are ").partition(";")[0].split(", ")
+    assert len(near) == 3
+    assert set(near) < set(names)
+    assert hint.endswith(f"; `trajcli robots` lists all {len(names)}")

@@ -154,6 +154,108 @@ def test_wrong_jobs_are_refused_by_schema_and_reader(change: dict[str, Any]) -> 
         job_from_text(json.dumps(plain))
 
 
+GOOD = {
+    "duration": ("moves", 0, "duration"),
+    "joints": ("start", "joints"),
+    "velocity": ("start", "velocity"),
+    "limit": ("limits", "velocity", "j2"),
+    "range": ("limits", "position", "j2", 1),
+    "rate": ("output", "rate"),
+    "start_time": ("output", "start_time"),
+    "xyz": ("points", "p", "xyz", 0),
+    "angle": ("points", "p", "euler", "angles", 1),
+    "a": ("robot", "joints", 1, "a"),
+    "theta": ("robot", "joints", 0, "theta"),
+    "jerk": ("robot", "joints", 0, "jerk"),
+    "tcp": ("limits", "tcp", "speed"),
+    "tool": ("tool", "xyz", 2),
+    "quaternion": ("tool", "quat_wxyz", 0),
+    "time": ("moves", 1, "through", 0, "time"),
+}
+"""Where a number stands in the job below."""
+FAR = {
+    "duration": (1.01e12, -1.01e12, 0.99e-12),
+    "joints": (1.01e15, -1.01e15),
+    "velocity": (1.01e33, -1.01e33),
+    "limit": (1.01e33, 0.99e-12),
+    "range": (1.01e15,),
+    "rate": (1.01e12, 0.99e-12),
+    "start_time": (1.01e12, -1.01e12),
+    "xyz": (1.01e15, -1.01e15),
+    "angle": (5.74e13, -5.74e13),
+    "a": (1.01e15, -1.01e15),
+    "theta": (5.74e13, -5.74e13),
+    "jerk": (1.01e33, 0.99e-12),
+    "tcp": (1.01e33, 0.99e-12),
+    "tool": (1.01e15,),
+    "quaternion": (1.01e12,),
+    "time": (1.01e12, 0.99e-12),
+}
+"""Beyond what the reader takes in the units that allow most."""
+NEAR = {
+    "duration": (0.99e12, 1.01e-12),
+    "joints": (0.99e12,),
+    "velocity": (0.99e30,),
+    "limit": (0.99e33, 1.01e-9),
+    "range": (0.99e15,),
+    "rate": (1.01e-12,),
+    "start_time": (0.99e12, -0.99e12),
+    "angle": (5.72e13, -5.72e13),
+    "a": (0.99e15, -0.99e15),
+    "theta": (5.72e13,),
+    "jerk": (5.72e31, 5.74e-11),
+    "tcp": (0.99e33, 1.01e-9),
+    "tool": (0.99e15,),
+}
+"""Within it, in a job in degrees and millimetres whose second joint slides."""
+
+
+def _with(number: Any, *path: Any) -> dict[str, Any]:
+    """A job in deg and mm with another number at a path."""
+    job: dict[str, Any] = {
+        "version": 1,
+        "units": {"angle": "deg", "length": "mm"},
+        "robot": {
+            "convention": "standard",
+            "joints": [{"theta": 0, "jerk": 9}, {"type": "prismatic", "a": 1, "position": [0, 1]}],
+        },
+        "tool": {"xyz": [0, 0, 1], "quat_wxyz": [1, 0, 0, 0]},
+        "limits": {"velocity": {"j2": 5}, "position": {"j2": [-5, 5]}, "tcp": {"speed": 5}},
+        "points": {"p": {"xyz": [1, 0, 0], "euler": {"sequence": "ZYZ", "angles": [0, 1, 2]}}},
+        "start": {"joints": 0, "velocity": 0},
+        "moves": [
+            {"planner": "quintic", "to": {"joints": [1, 2]}, "duration": 3},
+            {"planner": "spline", "through": [{"joints": 1, "time": 0.5}]},
+        ],
+        "output": {"rate": 100, "start_time": 0},
+    }
+    node: Any = job
+    for step in path[:-1]:
+        node = node[step]
+    assert path[-1] in node if isinstance(node, dict) else len(node) > path[-1]
+    node[path[-1]] = number
+    return job
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_numbers_that_no_robot_has_are_refused_by_schema_and_reader(name: str) -> None:
+    from trajcli.errors import InputError
+
+    for far in FAR[name]:
+        plain = _with(far, *GOOD[name])
+        assert flaws("job", plain), far
+        with pytest.raises(InputError):
+            job_from_text(json.dumps(plain))
+
+
+@pytest.mark.parametrize("name", NEAR)
+def test_numbers_within_the_bounds_are_accepted_by_schema_and_reader(name: str) -> None:
+    for near in NEAR[name]:
+        plain = _with(near, *GOOD[name])
+        assert flaws("job", plain) == [], near
+        job_from_text(json.dumps(plain))
+
+
 def _described(schema: Any, path: str = "") -> list[str]:
     """The properties without a description, of the schema or of what they refer to."""
     lacking = []

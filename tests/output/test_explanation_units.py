@@ -80,8 +80,19 @@ def both(job: str) -> tuple[Any, Any]:
     """Return the explanation of a job in mm and deg, and of the same job in SI; its numbers carry their units."""
     texts = [f"version: 1\n{units}{job}" for units in ("units: {angle: deg, length: mm}\n", "")]
     plans = [plan_job(job_from_text(text)) for text in texts]
-    user, si = (json.loads(explanation(plan).model_dump_json()) for plan in plans)
+    user, si = (json.loads(explanation(plan, derivatives=True).model_dump_json()) for plan in plans)
+    for part in polynomials_in(si):
+        part["in_pi"] = None  # of jobs in rad alone
     return user, si
+
+
+def polynomials_in(part: Any) -> Iterator[dict[str, Any]]:
+    """Yield each polynomial of an explanation."""
+    below = part.values() if isinstance(part, dict) else part if isinstance(part, list) else ()
+    if isinstance(part, dict) and "absolute" in part:
+        yield part
+    for each in below:
+        yield from polynomials_in(each)
 
 
 def unit_of(part: dict[str, Any], key: str, count: int) -> list[str] | None:
@@ -137,7 +148,8 @@ def test_every_number_is_in_the_units_of_the_job(name: str) -> None:
     expected = {
         "paths": "low high limit joints near point radius turn place angle pitch length advance center "
         "local absolute value bound wanted_speed deviation turned axis speed",
-        "joints": "low high limit joints missed beyond local absolute value size",
+        "joints": "low high limit joints missed beyond local absolute value size unshifted velocity acceleration "
+        "position coefficients",
     }
     assert set(expected[name].split()) <= seen
 

@@ -123,6 +123,9 @@ def plan(
     ] = False,
     no_output: Annotated[bool, typer.Option("--no-output", help="Only judge: write no rows.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on stderr.")] = False,
+    si: Annotated[
+        bool, typer.Option("--si", help="Rows in rad and m, whatever units the job has: plain column names.")
+    ] = False,
     every: Annotated[
         bool, typer.Option("--all", help="Every finding, not only the worst of each move and kind.")
     ] = False,
@@ -132,7 +135,9 @@ def plan(
     from trajcli.cli.plan import PlanOptions, run_plan
 
     every = every or errors == "json"
-    options = PlanOptions(rate, output, report, resolved, digits, strict, reference, no_output, quiet, every)
+    options = PlanOptions(
+        rate, output, report, resolved, digits, strict, reference, no_output, quiet, every, si
+    )
     return run_plan(job, override, options)
 
 
@@ -141,13 +146,19 @@ def plan(
 def explain(
     job: JobFile,
     override: Overrides = [],  # noqa: B006
+    move: Annotated[
+        int | None, typer.Option("--move", metavar="N", help="Only this move, counted from 0.")
+    ] = None,
+    derivatives: Annotated[
+        bool, typer.Option("--derivatives", help="Also the polynomials of velocity and acceleration.")
+    ] = False,
     as_json: Json = False,
     errors: Errors = "text",
 ) -> int:
     """Say each move in words and formulas: polynomials, phases, peaks, branches, and how fast it could be."""
-    from trajcli.cli.explain import run_explain
+    from trajcli.cli.explain import ExplainOptions, run_explain
 
-    return run_explain(job, override, as_json=as_json)
+    return run_explain(job, override, ExplainOptions(move, derivatives, as_json))
 
 
 @app.command(epilog="Example: trajcli diff old.csv new.csv --atol 1e-9")
@@ -225,7 +236,8 @@ def plot(
 @guarded
 def schema(
     kind: Annotated[
-        Literal["job", "robot", "report"], typer.Argument(help="Which schema.", show_default=True)
+        Literal["job", "robot", "report", "explanation"],
+        typer.Argument(help="Which schema.", show_default=True),
     ] = "job",
     errors: Errors = "text",
 ) -> int:

@@ -150,7 +150,8 @@ def ik(
         bool, typer.Option("--turns", help="Also every full turn of a joint that its limits allow.")
     ] = False,
     tolerance: Annotated[
-        float, typer.Option("--tolerance", metavar="TOL", help="What an answer may miss by, m and rad.")
+        float,
+        typer.Option("--tolerance", metavar="TOL", help="What an answer may miss by, m and rad: 1e-12 to 1."),
     ] = 1e-6,
     tool: Tool = None,
     units: ArmUnits = None,

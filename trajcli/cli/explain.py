@@ -6,7 +6,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from trajcli.cli.numbers import numbers
+from trajcli.cli.polynomials import amount, blend_lines, knot_lines, law_lines, polynomial_lines
 from trajcli.cli.progress import progress
+from trajcli.errors import InputError
+from trajcli.frozen import comparable
 from trajcli.job.read import load_job
 from trajcli.output.explain import explanation
 from trajcli.planning.plan import plan_job
@@ -19,22 +22,19 @@ if TYPE_CHECKING:
         ExplainedMove,
         ExplainedWaypoint,
         Explanation,
-        PolynomialReport,
         PoseReport,
         SegmentReport,
     )
     from trajcli.job.report import PeakReport, ToolReport
 
-_MOST_LAW_PIECES = 40  # pieces of a law that are listed
 _MOST_POINTS = 20  # points that are listed one by one
-_MOST_PIECES = 100  # of a joint that are listed
 _TIME_DECIMALS = 12
 _ZERO = 1e-9  # user units: a coordinate or an angle below that is rounding
 _ROUNDING = 1e-12  # in units of the job: what is missed by less is met
 _FITTED = 1e-9  # of the largest: rates of a joint that rests, where the arm follows its tool
-_CANCELS = 1e4  # times larger than what they add up to: of ten digits, six are left
 _REACHED = 0.999  # of the wanted speed
 _SYMBOLS = {"position": "q", "velocity": "qd", "acceleration": "qdd", "jerk": "qddd"}
+_SLOWER = {"position": "position", "velocity": "velocity", "acceleration": "velocity", "jerk": "acceleration"}
 _CORNERS = {
     "stop": "stops there",
     "overlap": "cut by overlapping in time",
@@ -51,7 +51,7 @@ def tool_lines(move: ExplainedMove) -> Iterator[str]:
     yield f"  path: {path.length:.9g} {path.unit}"
     yield from (f"    {_segment(segment)}" for segment in path.segments)
     yield from (f"    corner {n}: {_corner(corner)}" for n, corner in enumerate(path.corners, 1))
-    yield from _law(path.law)
+    yield from law_lines(path.law)
     yield from _speeds(tool, move.start)
 
 
@@ -80,15 +80,6 @@ def _corner(corner: CornerReport) -> str:
         return f"{where}: {_CORNERS[corner.kind]}"
     size = f"radius {corner.radius:.6g}, passes at {corner.deviation:.6g} {corner.unit}"
     return f"{where}: rounded, {size}"
-
-
-def _law(law: Sequence[PolynomialReport]) -> Iterator[str]:
-    if len(law) > _MOST_LAW_PIECES:
-        yield f"  s(t): {len(law)} pieces, listed by --json"
-        return
-    for piece in law:
-        when = f"{piece.start:.10g} <= t <= {piece.end:.10g}: " if len(law) > 1 else ""
-        yield f"  {when}s(t) = {polynomial_text(piece.absolute)}"
 
 
 def _speeds(tool: ToolReport, start: float) -> Iterator[str]:
@@ -156,9 +147,10 @@ def _points(points: Sequence[ExplainedWaypoint], joints: Sequence[str], origin: 
     for joint, name in enumerate(joints):
         missed = [value if value > _ROUNDING else 0.0 for value in (p.missed[joint] for p in points)]
         if any(missed):
-            listed = ", ".join(f"{value:.6g}" for value in missed[:_MOST_POINTS])
-            more = f", ... at most {max(missed):.6g}" if len(points) > _MOST_POINTS else ""
-            yield f"  {name} passes them at a distance of ({points[0].units[joint]}): {listed}{more}"
+            unit = points[0].units[joint]
+            listed = ", ".join(amount(value, unit, 6) for value in missed[:_MOST_POINTS])
+            more = f", ... at most {amount(max(missed), unit, 6)}" if len(points) > _MOST_POINTS else ""
+            yield f"  {name} passes them at a distance of ({unit}): {listed}{more}"
 
 
 def pose_lines(move: ExplainedMove) -> Iterator[str]:
@@ -202,17 +194,31 @@ def _choice(chosen: ChoiceReport, origin: str) -> str:
     return answers + (f"{count} have {named}; of these {nearest}" if count > 1 else f"1 has {named}")
 
 
-def run_explain(job: str, overrides: Sequence[str], *, as_json: bool) -> int:
-    """Print what there is to say about each move; return the exit code.
+@comparable
+class ExplainOptions:
+    """What the command line says beside the job; see `trajcli explain --help`."""
+
+    move: int | None = None
+    derivatives: bool = False
+    as_json: bool = False
+
+
+def run_explain(job: str, overrides: Sequence[str], options: ExplainOptions) -> int:
+    """Print what there is to say about each move, or about one; return the exit code.
 
     Raises:
         VerificationError: After printing, when the trajectory breaks a limit.
         TrajcliError: When there is nothing to explain.
     """
+    loaded = load_job(job, overrides)
+    count = len(loaded.job.moves)
+    if options.move is not None and not 0 <= options.move < count:
+        known = "its only move is 0" if count == 1 else f"its moves are 0 to {count - 1}"
+        raise InputError(f"--move {options.move}: {loaded.name} has no such move", hint=known)
     with progress():
-        plan = plan_job(load_job(job, overrides))
-        explained = explanation(plan)
-    text = explained.model_dump_json(indent=2) if as_json else "\n".join(_lines(explained))
+        plan = plan_job(loaded)
+        explained = explanation(plan, move=options.move, derivatives=options.derivatives)
+    text = explained.model_dump_json(indent=2) if options.as_json else "\n".join(_lines(explained, count))
     with standard_output() as out:
         out.write((text + "\n").encode())
     if not plan.verdict.passed:
@@ -222,77 +228,32 @@ def run_explain(job: str, overrides: Sequence[str], *, as_json: bool) -> int:
     return 0
 
 
-def _lines(explained: Explanation) -> Iterator[str]:
+def _lines(explained: Explanation, count: int) -> Iterator[str]:
     units = explained.units
     joints = ", ".join(f"q{i} = {name}" for i, name in enumerate(explained.joints, 1) if name != f"j{i}")
-    count = len(explained.moves)
-    moves = f"{count} move{'s' * (count != 1)}"
+    alone = f"move {explained.moves[0].index} of " if len(explained.moves) < count else ""
+    moves = f"{alone}{count} move{'s' * (count != 1)}"
     yield f"{explained.job} on {explained.robot}: {moves}, {explained.duration:.10g} s"
     yield f"angles in {units.angle}, lengths in {units.length}, t in s from the start of each move" + (
         f"; {joints}" if joints else ""
     )
-    for index, move in enumerate(explained.moves):
+    for move in explained.moves:
         yield ""
-        yield f"move {index}: {move.planner}, {move.duration:.10g} s, from t = {move.start:.10g} s"
+        yield f"move {move.index}: {move.planner}, {move.duration:.10g} s, from t = {move.start:.10g} s"
         yield from pose_lines(move)
         yield from waypoint_lines(move)
         yield from tool_lines(move)
-        yield from _polynomials(move)
+        yield from polynomial_lines(move)
+        yield from knot_lines(move)
+        yield from blend_lines(move)
         yield from _phases(move)
         yield from _peaks(move)
         yield from _speed(move)
-        yield from (f"  {event.kind}: {event.message}" for event in explained.events if event.move == index)
+        yield from (
+            f"  {event.kind}: {event.message}" for event in explained.events if event.move == move.index
+        )
     general = [event for event in explained.events if event.move is None]
     yield from (f"{event.kind}: {event.message}" for event in general)
-
-
-def _polynomials(move: ExplainedMove) -> Iterator[str]:
-    if move.closed_form is not None:
-        yield from (f"  q{i}(t) = {formula}" for i, formula in enumerate(move.closed_form.values(), 1))
-        return
-    joints = list(move.polynomials.values())
-    if move.path is not None:
-        degree = len(joints[0][0].local) - 1
-        yield f"  joints: {len(move.breaks) - 1} pieces of degree {degree}, listed by --json"
-        return
-    counts = {len(rows) for rows in joints}
-    if len(joints) > 1 and len(counts) == 1 and min(counts) > _MOST_PIECES:
-        yield f"  q1(t) .. q{len(joints)}(t): {min(counts)} pieces each, listed by --json"
-        return
-    for number, rows in enumerate(joints, 1):
-        if len(rows) > _MOST_PIECES:
-            yield f"  q{number}(t): {len(rows)} pieces, listed by --json"
-            continue
-        texts = [_in_powers(row) for row in rows]
-        if len(set(texts)) == 1:
-            yield f"  q{number}(t) = {texts[0]}"
-            continue
-        for row, text in zip(rows, texts, strict=True):
-            yield f"  {row.start:.10g} <= t <= {row.end:.10g}: q{number}(t) = {text}"
-
-
-def _in_powers(row: PolynomialReport) -> str:
-    """Return a polynomial in powers of t, or of (t - start) where the former would lose its digits."""
-    span = row.end - row.start
-    terms = max(abs(c) * span**power for power, c in enumerate(row.local))
-    cancelling = max(abs(c) * row.end**power for power, c in enumerate(row.absolute))
-    if cancelling <= _CANCELS * terms:
-        return polynomial_text(row.absolute)
-    return polynomial_text(row.local, f"(t - {row.start:.10g})")
-
-
-def polynomial_text(coefficients: Sequence[float], variable: str = "t") -> str:
-    """Return ascending coefficients as a textbook prints them: "20 + 90 t^2 - 60 t^3"."""
-    text = ""
-    for power, coefficient in enumerate(coefficients):
-        size = f"{abs(coefficient):.10g}"
-        if size == "0":
-            continue
-        factor = ("", variable, f"{variable}^{power}")[min(power, 2)]
-        term = factor if size == "1" and power else f"{size} {factor}".strip()
-        sign = "-" if coefficient < 0 else "+"
-        text += f" {sign} {term}" if text else ("-" if sign == "-" else "") + term
-    return text or "0"
 
 
 def _phases(move: ExplainedMove) -> Iterator[str]:
@@ -320,6 +281,8 @@ def _peaks(move: ExplainedMove) -> Iterator[str]:
         largest[peak.quantity] = max(largest.get(peak.quantity, 0.0), size)
     for peak in move.peaks:
         size, most = max(abs(peak.low), abs(peak.high)), largest[peak.quantity]
+        # a rate is rounding, too, where over the whole move it would hardly change what it is the rate of
+        most = max(most, largest[_SLOWER[peak.quantity]] / (move.duration or 1.0))
         nothing = (_ROUNDING if move.tool is None else _FITTED) * most
         if size <= nothing and peak.quantity != "position":
             continue
@@ -335,7 +298,7 @@ def _extent(peak: PeakReport, start: float, nothing: float) -> str:
     ends = []
     for end, time in ((peak.low, peak.low_time), (peak.high, peak.high_time)):
         value = end if abs(end) > nothing else 0.0
-        ends.append(f"{value:.9g} (t = {round(time - start, _TIME_DECIMALS):.6g})")
+        ends.append(f"{amount(value, peak.unit)} (t = {round(time - start, _TIME_DECIMALS):.6g})")
     return ends[0] if peak.low == peak.high else " .. ".join(ends)
 
 
@@ -343,14 +306,14 @@ def _limit(peak: PeakReport) -> str:
     low, high = peak.limit
     if low is None and high is None:
         return "no limit"
-    limits = f"limits {_bound(low)} .. {_bound(high)}"
+    limits = f"limits {_bound(low, peak.unit)} .. {_bound(high, peak.unit)}"
     if peak.used is None or peak.quantity == "position":
         return limits
     return f"{limits}, {100 * peak.used:.4g} % used"
 
 
-def _bound(bound: float | None) -> str:
-    return "unlimited" if bound is None else f"{bound:.9g}"
+def _bound(bound: float | None, unit: str) -> str:
+    return "unlimited" if bound is None else amount(bound, unit, beside=False)
 
 
 def _speed(move: ExplainedMove) -> Iterator[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -17,6 +16,9 @@ from trajcli.language.targets import ik_target
 from trajcli.queries.arm import ArmInUnits, LimitWatch, open_arm
 from trajcli.queries.inverse import answer_reports, find_answers, require_answer
 from trajcli.streams.decimals import Digits
+
+_FINEST = 1e-12  # m and rad: what rounding leaves of an exact answer is below
+_COARSEST = 1.0  # m and rad: an arm that misses by more has not answered
 
 
 @comparable
@@ -81,8 +83,10 @@ def _check(words: Sequence[str], options: IkOptions) -> None:
         )
     if bool(words) == (options.pose is not None):
         raise InputError("say either --pose POSE, or - to read poses from a CSV")
-    if not 0.0 < options.tolerance < math.inf:
-        raise InputError(f"--tolerance must be above 0, got {options.tolerance:.6g}")
+    if not _FINEST <= options.tolerance <= _COARSEST:
+        extent = f"from {_FINEST:g} to {_COARSEST:g} (m and rad)"
+        message = f"--tolerance must be {extent}, got {options.tolerance:.6g}"
+        raise InputError(message, hint="below is rounding, and what misses by more is no answer")
     given = {"--turns": options.turns, "--json": options.as_json}
     for name, value in given.items() if words else ():
         if value:

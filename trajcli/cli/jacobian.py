@@ -10,7 +10,7 @@ from trajcli.cli.outcome import print_json, print_lines, print_remark
 from trajcli.errors import InputError
 from trajcli.frozen import comparable
 from trajcli.kinematics.jacobian import ReferenceFrame
-from trajcli.queries.arm import ArmInUnits, beyond_two_turns, open_arm
+from trajcli.queries.arm import ArmInUnits, LimitWatch, beyond_two_turns, open_arm
 from trajcli.queries.jacobian import jacobian_report
 from trajcli.streams.whole_file import standard_output
 
@@ -88,7 +88,10 @@ def _stream(arm: ArmInUnits, options: JacobianOptions) -> int:
     for name, given in (("--json", options.as_json), ("--qd", options.rates is not None)):
         if given:
             raise InputError(f"{name} is for one configuration, rows from standard input become a CSV")
-    columns, blocks = jacobians_of(arm, open_rows("-"), options.frame)
+    watch = LimitWatch(arm.robot)
+    columns, blocks = jacobians_of(arm, open_rows("-"), options.frame, watch)
     with standard_output() as out:
         write_csv(blocks, columns, out)
+    if watch.remark is not None:
+        print_remark(watch.remark)
     return 0

@@ -40,6 +40,7 @@ class PlanOptions:
     no_output: bool = False
     quiet: bool = False
     every: bool = True
+    si: bool = False
 
 
 def run_plan(job: str, overrides: Sequence[str], options: PlanOptions) -> int:
@@ -49,7 +50,7 @@ def run_plan(job: str, overrides: Sequence[str], options: PlanOptions) -> int:
         TrajcliError: When anything is wrong; then no rows were written.
     """
     _check_options(options)
-    loaded = load_job(job, overrides, rate=options.rate)
+    loaded = load_job(job, overrides, rate=options.rate, si=options.si)
     _check_inputs_stay(loaded, options)
     if options.resolved is not None:
         _write_resolved(loaded, options.resolved)

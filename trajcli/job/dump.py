@@ -1,7 +1,7 @@
 """Resolved jobs as YAML: points instead of their names, limits in force, numbers in SI.
 
 Each number carries its SI unit with all its digits, so that reading the text gives the same job bit by bit.
-The job's own units are kept: they decide how rows are written.
+The job's own units are kept: they decide how rows are written, unless `output.units` does.
 """
 
 from __future__ import annotations

@@ -31,6 +31,34 @@ class PolynomialReport(ReportPart):
         Vector, MeasuredIn(), Field(description="Coefficients in powers of t - start, ascending.")
     ]
     absolute: Annotated[Vector, MeasuredIn(), Field(description="Coefficients in powers of t, ascending.")]
+    unshifted: Annotated[
+        Vector | None,
+        MeasuredIn(),
+        Field(
+            description="Coefficients in powers of t - origin: the times of the job. Null without a shift."
+        ),
+    ] = None
+    velocity: Annotated[
+        Vector | None,
+        MeasuredIn(),
+        Field(
+            description="Coefficients of the first derivative in powers of t, where asked for; unit per s."
+        ),
+    ] = None
+    acceleration: Annotated[
+        Vector | None,
+        MeasuredIn(),
+        Field(
+            description="Coefficients of the second derivative in powers of t, where asked for; unit per s^2."
+        ),
+    ] = None
+    in_pi: Annotated[
+        list[str | None] | None,
+        Field(
+            description="The coefficients `absolute` as multiples of pi, such as 3 pi/2; null for each that "
+            "is none, and for all where none is, or the unit is not rad."
+        ),
+    ] = None
     unit: UnitName
 
 
@@ -185,6 +213,34 @@ class ExplainedOutside(OutsideReport):
     time: MoveSeconds
 
 
+class KnotReport(ReportPart):
+    """A knot of a spline with virtual points: a point that it passes, or a virtual one."""
+
+    time: MoveSeconds
+    virtual: Annotated[bool, Field(description="Whether its position follows from the spline.")]
+    position: Annotated[Vector, MeasuredIn("units")]
+    velocity: Annotated[Vector, MeasuredIn("velocity_units")]
+    acceleration: Annotated[Vector, MeasuredIn("acceleration_units")]
+    units: list[str]
+    velocity_units: list[str]
+    acceleration_units: list[str]
+
+
+class BlendReport(ReportPart):
+    """A parabola that rounds a point, q(t) = b0 + b1 (t - t_k) + b2 (t - t_k)^2, in the times of the job.
+
+    Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.2.2.
+    """
+
+    index: Annotated[int, Field(description="Of the point among the waypoints, the start being 0.")]
+    joint: str
+    time: Annotated[float, Field(description="t_k, when the job would pass the point, s.")]
+    start: Annotated[float, Field(description="Where the parabola begins, s in the times of the job.")]
+    end: Annotated[float, Field(description="Where it ends, s in the times of the job.")]
+    coefficients: Annotated[Vector, MeasuredIn(), Field(description="b0, b1 and b2.")]
+    unit: UnitName
+
+
 class ExplainedMove(MoveReport):
     """One move, with its polynomials."""
 
@@ -194,6 +250,16 @@ class ExplainedMove(MoveReport):
     breaks: list[MoveSeconds]
     polynomials: Annotated[dict[str, list[PolynomialReport]], Field(description="By the name of the joint.")]
     closed_form: Annotated[dict[str, str] | None, Field(description="Formulas of which these are a fit.")]
+    closed_form_derivatives: Annotated[
+        dict[str, list[str]] | None,
+        Field(description="Of these formulas the first and second derivative, where asked for."),
+    ] = None
+    knots: Annotated[
+        list[KnotReport] | None, Field(description="Of a spline with virtual points; null for others.")
+    ] = None
+    blends: Annotated[
+        list[BlendReport] | None, Field(description="Parabolas about the points that they round.")
+    ] = None
     phases: list[PhaseReport]
     binding_phases: Annotated[bool, Field(description="Whether the phases say which limit binds.")]
     arrivals: Annotated[dict[str, float] | None, Field(description="Durations of each joint alone, s.")]

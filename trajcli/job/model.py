@@ -50,7 +50,7 @@ CATALOGUE_NAME = "a name of the catalogue"
 
 
 class UnitsSpec(Model):
-    """Units of plain numbers, and of the columns that are written."""
+    """Units of plain numbers."""
 
     angle: Annotated[Literal["rad", "deg"], Field(description="Unit of angles.")] = "rad"
     length: Annotated[Literal["m", "mm"], Field(description="Unit of lengths.")] = "m"
@@ -120,9 +120,23 @@ def _first_row(value: Mapping[str, Any], context: ReadingContext) -> dict[str, A
 Seconds = Annotated[float, Number(Quantity("time"), "Time, s.")]
 
 
+class OutputUnits(Model):
+    """Units of the columns that are written, where they are not those of the job."""
+
+    angle: Annotated[
+        Literal["rad", "deg"] | None, Field(description="Unit of angles; left out: the job's.")
+    ] = None
+    length: Annotated[
+        Literal["m", "mm"] | None, Field(description="Unit of lengths; left out: the job's.")
+    ] = None
+
+
 class Output(Model):
     """Which rows and columns are written."""
 
+    units: Annotated[
+        OutputUnits, Field(description="Units of the columns; what is left out is the job's.")
+    ] = OutputUnits()
     rate: Annotated[float, Number(Quantity("frequency"), "Rows per second, Hz.", above=0.0)] = 1000.0
     times: Annotated[
         tuple[Seconds, ...] | None, Field(min_length=1, description="Times of the rows instead of a rate, s.")

@@ -55,8 +55,14 @@ class LoadedJob:
 
     @property
     def units(self) -> Units:
-        """Units of the file, and of what is written."""
+        """Units of the file and of messages."""
         return self.job.units.as_units()
+
+    @property
+    def output_units(self) -> Units:
+        """Units of the rows that are written: those of the file, unless the job says others."""
+        given = self.job.output.units
+        return Units(given.angle or self.units.angle, given.length or self.units.length)
 
     def say(self, amount: Amount) -> str:
         """Return a number of a message in the job's units."""
@@ -80,25 +86,30 @@ class LoadedJob:
         return self.document.place(("moves", index))
 
 
-def load_job(path: str | Path, overrides: Sequence[str] = (), *, rate: str | None = None) -> LoadedJob:
+def load_job(
+    path: str | Path, overrides: Sequence[str] = (), *, rate: str | None = None, si: bool = False
+) -> LoadedJob:
     """Return the job of a file; `-` is standard input.
 
     Args:
         path: The file.
         overrides: Such as "moves.0.duration=3"; they replace what the file says, or add to it.
         rate: Replaces `output.rate`.
+        si: Whether rows are in rad and m, whatever `output.units` says.
 
     Raises:
         InputError: With every flaw of the file at once.
         FileError: When it cannot be read.
     """
-    if not overrides and rate is None:
+    if not overrides and rate is None and not si:
         return _load(read_document(str(path)))
     from trajcli.job.override import Setting, overridden, parse_setting
 
     settings = [parse_setting(text) for text in overrides]
     if rate is not None:
         settings.append(Setting(f"--rate {rate}", ("output", "rate"), rate))
+    if si:
+        settings.append(Setting("--si", ("output", "units"), "{angle: rad, length: m}"))
     return _load(overridden(read_document(str(path)), settings))
 
 

@@ -35,7 +35,7 @@ from trajcli.language.numbers import (
     written_number,
 )
 from trajcli.language.poses import Pose
-from trajcli.suggest import did_you_mean, nearest, valid_names
+from trajcli.suggest import did_you_mean, nearest, nearest_names
 from trajcli.units import Quantity, Units, joint_quantity
 
 CATALOGUE = Path(__file__).parent.parent / "catalogue"
@@ -291,7 +291,7 @@ def read_sheet(path: str) -> RobotSheet:
 
 
 def _no_robot(value: object, document: Document) -> Problem:
-    hint = f"the catalogue has {', '.join(catalogue_names())}"
+    hint = "such as ur5e: `trajcli robots` lists the names of the catalogue"
     if isinstance(value, int) and not isinstance(value, bool):
         hint = f"for {value} bare joints write {{joints: {value}}}"
     message = f"expected a robot's name, {{file: PATH}} or a robot, got {shown(value)}"
@@ -310,8 +310,10 @@ def _looks_like_a_path(name: str) -> bool:
     return "/" in name or "\\" in name or name.endswith((".yaml", ".yml"))
 
 
-def _suggestion(name: str, names: list[str]) -> str | None:
-    return did_you_mean(name, names) or valid_names(names, "its robots")
+def _suggestion(name: str, names: list[str]) -> str:
+    """Return which robots are meant, and how to see all."""
+    near = did_you_mean(name, names) or f"its nearest names are {', '.join(nearest_names(name, names))}"
+    return f"{near}{'' if near.endswith('?') else ';'} `trajcli robots` lists all {len(names)}"
 
 
 def _from_file_entry(value: Mapping[str, Any], document: Document) -> Robot:

@@ -1,13 +1,18 @@
-"""JSON Schemas of job, robot file and report, generated from their models."""
+"""JSON Schemas of job, robot file, report and explanation, generated from their models."""
 
 from __future__ import annotations
 
 import json
 from typing import Any, Literal
 
-SchemaKind = Literal["job", "robot", "report"]
+SchemaKind = Literal["job", "robot", "report", "explanation"]
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
-_TITLES = {"job": "trajcli job, version 1", "robot": "trajcli robot", "report": "trajcli verification report"}
+_TITLES = {
+    "job": "trajcli job, version 1",
+    "robot": "trajcli robot",
+    "report": "trajcli verification report",
+    "explanation": "trajcli explanation: what explain --json prints",
+}
 
 
 def schema_text(kind: SchemaKind) -> str:
@@ -16,8 +21,8 @@ def schema_text(kind: SchemaKind) -> str:
 
 
 def schema_of(kind: SchemaKind) -> dict[str, Any]:
-    """Return the JSON Schema of a job file, a robot file, or a report."""
-    schema = {"job": _job, "robot": _robot, "report": _report}[kind]()
+    """Return the JSON Schema of a job file, a robot file, a report, or an explanation."""
+    schema = {"job": _job, "robot": _robot, "report": _report, "explanation": _explanation}[kind]()
     return {"$schema": _DIALECT, **_without_titles(schema), "title": _TITLES[kind]}
 
 
@@ -77,6 +82,12 @@ def _report() -> dict[str, Any]:
     from trajcli.job.report import Report
 
     return Report.model_json_schema(mode="serialization")
+
+
+def _explanation() -> dict[str, Any]:
+    from trajcli.job.explanation import Explanation
+
+    return Explanation.model_json_schema()
 
 
 def _replaced(node: Any, old: dict[str, Any], new: dict[str, Any]) -> Any:  # noqa: ANN401

@@ -71,8 +71,9 @@ def written_bound(bound: LowerUpper, quantity: Quantity) -> list[float | str] | 
 
 
 def _bound_schema(order: int) -> JsonSchemaValue:
-    number = Number(Quantity("angle", order), "", above=0.0).json_schema()
-    signed = Number(Quantity("angle", order), "").json_schema()
+    # a length has the wider bounds: whether the joint slides is not known to a schema
+    number = Number(Quantity("length", order), "", above=0.0).json_schema()
+    signed = Number(Quantity("length", order), "").json_schema()
     pair = {"type": "array", "items": signed, "minItems": 2, "maxItems": 2}
     return {"anyOf": [number, pair, {"type": "null"}]}
 

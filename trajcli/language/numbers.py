@@ -80,6 +80,7 @@ class ReadingContext:
 
 
 SI = ReadingContext()
+_WHOLE = 1e-9  # a ratio that is a whole number but for rounding
 _BEYOND_ANY_ROBOT = "no robot has such a number: check its exponent and its unit"
 
 
@@ -140,6 +141,48 @@ def read_number(value: object, quantity: Quantity, units: Units) -> float:
     return within_bounds(float(value) * factor(quantity, units), value, quantity, units)
 
 
+def _largest(quantity: Quantity) -> float:
+    """Return the largest magnitude, SI, that a number of a quantity may have."""
+    if quantity.dimension in ("angle", "length"):
+        return LARGEST_RATE if quantity.order else LARGEST_POSITION
+    return LARGEST_OTHER
+
+
+def magnitude_schema(quantity: Quantity, *, positive: bool = False) -> JsonSchemaValue:
+    """Return the bounds of a plain number in a JSON schema, which does not know the units of the file.
+
+    They are those of the unit that allows most, the upper one rounded up to three digits.
+
+    Args:
+        quantity: What the number measures; a length, where it may be an angle or a length.
+        positive: Whether it must be above zero.
+    """
+    units = Units("deg", "mm")
+    most = _largest(quantity) / factor(quantity, units)
+    digit = 10.0 ** (math.floor(math.log10(most)) - 2)
+    most = math.ceil(most / digit - _WHOLE) * digit
+    return {"minimum": _least(quantity) if positive else -most, "maximum": most}
+
+
+def number_schema(quantity: Quantity, **stated: float) -> JsonSchemaValue:
+    """Return the JSON schema of a number, or of a string with its unit where the quantity has one.
+
+    Args:
+        quantity: What it measures.
+        stated: Bounds of its own, by their name in a schema.
+    """
+    bounds = magnitude_schema(quantity, positive=stated.get("exclusiveMinimum") == 0)
+    number = {"type": "number", **bounds, **stated}
+    if quantity.dimension == "ratio":
+        return number
+    return {"anyOf": [number, {"type": "string", "pattern": "^[-+.0-9]"}]}
+
+
+def _least(quantity: Quantity) -> float:
+    """Return the smallest number above zero, SI, that a number of a quantity may be."""
+    return SMALLEST_DISTANCE if _is_distance(quantity) else SMALLEST
+
+
 def within_bounds(number: float, value: object, quantity: Quantity, units: Units) -> float:
     """Return a number in SI, unless no robot has such.
 
@@ -154,10 +197,7 @@ def within_bounds(number: float, value: object, quantity: Quantity, units: Units
     Raises:
         FlawError: When it is too large.
     """
-    if quantity.dimension in ("angle", "length"):
-        most = LARGEST_RATE if quantity.order else LARGEST_POSITION
-    else:
-        most = LARGEST_OTHER
+    most = _largest(quantity)
     if abs(number) <= most:
         return number
     bound = f"{most / factor(quantity, units):.6g} {unit_name(quantity, units)}".rstrip()
@@ -170,7 +210,7 @@ def check_not_tiny(number: float, value: object, quantity: Quantity, units: Unit
     Raises:
         FlawError: When it is too small.
     """
-    least = SMALLEST_DISTANCE if _is_distance(quantity) else SMALLEST
+    least = _least(quantity)
     if 0 < number < least:
         bound = f"{least / factor(quantity, units):.6g} {unit_name(quantity, units)}".rstrip()
         raise FlawError(f"expected at least {bound}, got {shown(value)}", hint=_BEYOND_ANY_ROBOT)
@@ -270,10 +310,8 @@ class Number(FieldType):
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of a number or a string with its unit."""
         bounds = {"exclusiveMinimum": self.above, "minimum": self.at_least, "maximum": self.at_most}
-        number = {"type": "number", **{key: bound for key, bound in bounds.items() if bound is not None}}
-        if self.quantity.dimension == "ratio":
-            return number
-        return {"anyOf": [number, {"type": "string", "pattern": "^[-+.0-9]"}]}
+        stated = {key: bound for key, bound in bounds.items() if bound is not None}
+        return number_schema(self.quantity, **stated)
 
 
 class Model(BaseModel):

@@ -139,7 +139,8 @@ class PerJoint(FieldType):
 
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of one value for all joints, a list, or a mapping by joint name."""
-        one = Number(Quantity("angle", self.order), self.description, above=self.above).json_schema()
+        # a length has the wider bounds: which joints slide is not known to a schema
+        one = Number(Quantity("length", self.order), self.description, above=self.above).json_schema()
         return per_joint_schema(one)
 
 
@@ -169,4 +170,4 @@ class JointDistance(FieldType):
 
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of one number for all joints, a list, or a mapping by joint name."""
-        return per_joint_schema(Number(Quantity("angle"), "", at_least=0.0).json_schema())
+        return per_joint_schema(Number(Quantity("length"), "", at_least=0.0).json_schema())

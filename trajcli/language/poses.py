@@ -16,6 +16,7 @@ from trajcli.language.numbers import (
     FieldType,
     FlawError,
     ReadingContext,
+    number_schema,
     read_number,
     shown,
     written_number,
@@ -63,28 +64,33 @@ class Pose(FieldType):
 
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of a pose."""
-        number = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": "^[-+.0-9]"}]}
 
-        def numbers(count: int) -> JsonSchemaValue:
-            return {"type": "array", "items": number, "minItems": count, "maxItems": count}
+        def numbers(count: int, quantity: Quantity) -> JsonSchemaValue:
+            return {
+                "type": "array",
+                "items": number_schema(quantity),
+                "minItems": count,
+                "maxItems": count,
+            }
 
-        axis = {"anyOf": [{"enum": ["x", "y", "z"]}, numbers(3)]}
+        axis = {"anyOf": [{"enum": ["x", "y", "z"]}, numbers(3, _RATIO)]}
         euler = {
             "sequence": {"enum": list(SEQUENCES)},
             "frame": {"enum": ["current", "fixed"]},
-            "angles": numbers(3),
+            "angles": numbers(3, _ANGLE),
         }
-        rows = {"type": "array", "items": {"type": "array", "items": number, "minItems": 3, "maxItems": 4}}
+        entry = number_schema(_LENGTH)  # a ratio, or in the last column a length
+        rows = {"type": "array", "items": {"type": "array", "items": entry, "minItems": 3, "maxItems": 4}}
         described = {
-            "xyz": {**numbers(3), "description": "Position (length unit)."},
+            "xyz": {**numbers(3, _LENGTH), "description": "Position (length unit)."},
             "rpy": {
-                **numbers(3),
+                **numbers(3, _ANGLE),
                 "description": "Angles about the fixed axes x, y, z: R = Rz Ry Rx (angle unit).",
             },
-            "quat_wxyz": {**numbers(4), "description": "Unit quaternion, w first."},
-            "quat_xyzw": {**numbers(4), "description": "Unit quaternion, w last (ROS, scipy)."},
+            "quat_wxyz": {**numbers(4, _RATIO), "description": "Unit quaternion, w first."},
+            "quat_xyzw": {**numbers(4, _RATIO), "description": "Unit quaternion, w last (ROS, scipy)."},
             "rotvec": {
-                **numbers(3),
+                **numbers(3, _ANGLE),
                 "description": "Axis times angle, as rx, ry, rz of a UR pendant (angle unit).",
             },
             "matrix": {
@@ -93,7 +99,9 @@ class Pose(FieldType):
                 "maxItems": 4,
                 "description": "Rotation 3x3, or homogeneous 4x4.",
             },
-            "axis_angle": _object({"axis": axis, "angle": number}, "Rotation by an angle about an axis."),
+            "axis_angle": _object(
+                {"axis": axis, "angle": number_schema(_ANGLE)}, "Rotation by an angle about an axis."
+            ),
             "euler": _object(euler, "Euler angles about current or fixed axes.", "sequence", "angles"),
         }
         return {"type": "object", "properties": described, "additionalProperties": False}

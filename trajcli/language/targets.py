@@ -23,6 +23,7 @@ from trajcli.language.numbers import (
     Model,
     Number,
     ReadingContext,
+    number_schema,
     refuse,
     shown,
     written_number,
@@ -39,7 +40,6 @@ _ANGLE, _LENGTH, _RATIO = Quantity("angle"), Quantity("length"), Quantity("ratio
 _FAR = 1e9  # m: float64 tells there no micrometres any more
 _UPRIGHT = 1e-9  # rad: a pitch this close to a quarter turn is one
 AIMS = ("yaw", "pitch", "direction")
-_NUMBER: JsonSchemaValue = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": "^[-+.0-9]"}]}
 
 AxisName = Literal["x", "y", "z"]
 Row = tuple[float, ...]
@@ -69,7 +69,8 @@ class Numbers(FieldType):
 
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of the list."""
-        return {"type": "array", "items": _NUMBER, "minItems": self.count, "maxItems": self.count}
+        items = number_schema(self.quantity)
+        return {"type": "array", "items": items, "minItems": self.count, "maxItems": self.count}
 
 
 @comparable
@@ -96,7 +97,7 @@ class Direction(FieldType):
         return {
             "anyOf": [
                 {"enum": ["x", "y", "z"]},
-                {"type": "array", "items": _NUMBER, "minItems": 3, "maxItems": 3},
+                {"type": "array", "items": number_schema(_RATIO), "minItems": 3, "maxItems": 3},
             ]
         }
 
@@ -131,7 +132,8 @@ class Matrix(FieldType):
 
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of three or four rows."""
-        row = {"type": "array", "items": _NUMBER, "minItems": 3, "maxItems": 4}
+        entry = number_schema(_LENGTH)  # a ratio, or in the last column a length
+        row = {"type": "array", "items": entry, "minItems": 3, "maxItems": 4}
         return {"type": "array", "items": row, "minItems": 3, "maxItems": 4}
 
 

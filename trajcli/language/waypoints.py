@@ -16,6 +16,7 @@ from trajcli.language.numbers import (
     FlawError,
     Number,
     ReadingContext,
+    number_schema,
     refuse,
     shown,
 )
@@ -101,7 +102,11 @@ class PointsField:
         rows = {"type": "array", "items": PerJoint(0, "").json_schema(), "minItems": 1}
         table = {
             "positions": {**rows, "description": "Joint values, one row for each point."},
-            "times": {"type": "array", "items": {"type": "number"}, "description": "When, s from the start."},
+            "times": {
+                "type": "array",
+                "items": number_schema(_TIME),
+                "description": "When, s from the start.",
+            },
             "merge": keys["merge"],
         }
         inline = {"type": "object", "properties": table, "required": ["positions"]}

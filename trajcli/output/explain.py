@@ -1,7 +1,4 @@
-"""Explanation of a plan: its report in the units of the job, with polynomials, poses and paths.
-
-Polynomials stand as a textbook prints them: piece by piece, in local and absolute time.
-"""
+"""Explanation of a plan: its report in the units of the job, with polynomials, poses and paths."""
 
 from __future__ import annotations
 
@@ -10,11 +7,9 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from trajcli.columns import joint_factors
-from trajcli.curves.piecewise import Array, PiecewisePolynomial, taylor_shift
-from trajcli.geometry.rotation import Flags
+from trajcli.curves.piecewise import Array
 from trajcli.job.explanation import (
     ArcSegmentReport,
     ChoiceReport,
@@ -26,15 +21,14 @@ from trajcli.job.explanation import (
     LineSegmentReport,
     PathReport,
     PhaseReport,
-    PolynomialReport,
     PoseReport,
     RotationSegmentReport,
     ScrewSegmentReport,
     SegmentReport,
     UnitsReport,
-    polynomial_reports,
 )
 from trajcli.job.report import MoveReport, WaypointReport, in_units
+from trajcli.output.polynomials import blends_of, knots_of, polynomial_intervals, polynomials_of
 from trajcli.output.report import joint_units, report_of
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan
@@ -46,29 +40,38 @@ if TYPE_CHECKING:
     from trajcli.kinematics.following.motion import ToolMotion
     from trajcli.planning.resolve_poses import ResolvedPose
 
-_NOTHING = 1e-12  # of the largest term over the move: what is smaller came from rounding
-_SAME = 1e-9  # of the largest term: neighbouring pieces this close are one polynomial
 
+def explanation(plan: Plan, *, move: int | None = None, derivatives: bool = False) -> Explanation:
+    """Return what `trajcli explain` has to say, in the units of the job.
 
-def explanation(plan: Plan) -> Explanation:
-    """Return what `trajcli explain` has to say, in the units of the job."""
+    Args:
+        plan: The plan.
+        move: Index of the one move that is explained, with what is said of the job as a whole; None for all.
+        derivatives: Whether polynomials come with those of velocity and acceleration.
+    """
     units = plan.loaded.units
     report = in_units(report_of(plan, reference=True), units)
-    moves = tuple(_move(plan, index, report) for index, report in enumerate(report.moves))
+    wanted = range(len(plan.moves)) if move is None else [move]
+    moves = tuple(_move(plan, index, report.moves[index], derivatives=derivatives) for index in wanted)
+    said = {
+        name: [part for part in getattr(report, name) if part.move is None or part.move in wanted]
+        for name in ("findings", "events", "steps")
+    }
     return Explanation(
-        **{**report.__dict__, "moves": moves},
+        **{**report.__dict__, **said, "moves": moves},
         units=UnitsReport(angle=units.angle, length=units.length),
         joints=list(plan.trajectory.joint_names),
     )
 
 
-def _move(plan: Plan, index: int, report: MoveReport) -> ExplainedMove:
+def _move(plan: Plan, index: int, report: MoveReport, *, derivatives: bool) -> ExplainedMove:
     """Return what there is to say about a move.
 
     Args:
         plan: The whole.
         index: Number of the move among the moves.
         report: Of the move, in the units of the job.
+        derivatives: Whether polynomials come with those of velocity and acceleration.
     """
     move, units = plan.moves[index], plan.loaded.units
     names, planned = move.robot.joint_names, move.planned
@@ -78,8 +81,10 @@ def _move(plan: Plan, index: int, report: MoveReport) -> ExplainedMove:
         "from_pose": _pose(plan, None) if index == 0 else None,
         "to_pose": _pose(plan, index),
         "breaks": planned.curve.breaks.tolist(),
-        "polynomials": dict(zip(names, _polynomials(move, units), strict=True)),
-        "closed_form": _closed_form(move, units),
+        "polynomials": dict(zip(names, polynomials_of(move, units, derivatives=derivatives), strict=True)),
+        **_closed_form(move, units, derivatives=derivatives),
+        "knots": knots_of(move, units),
+        "blends": blends_of(move, units),
         "phases": [
             PhaseReport(
                 name=p.name, start=p.start, end=p.end, joint=None if p.joint is None else names[p.joint]
@@ -94,7 +99,7 @@ def _move(plan: Plan, index: int, report: MoveReport) -> ExplainedMove:
         and tuple(
             ExplainedOutside(**{**one.__dict__, "time": one.time - report.start}) for one in report.outside
         ),
-        "path": None if tool is None else _path(tool, units),
+        "path": None if tool is None else _path(tool, units, derivatives=derivatives),
     }
     return ExplainedMove(**{**report.__dict__, **own})
 
@@ -119,18 +124,23 @@ def _waypoints(
     )
 
 
-def _closed_form(move: PlannedMove, units: Units) -> dict[str, str] | None:
-    """Return the formula of each joint where the curve is the fit of one, else None."""
-    if move.planned.formula is None:
-        return None
+def _closed_form(move: PlannedMove, units: Units, *, derivatives: bool) -> dict[str, Any]:
+    """Return the formula of each joint, and those of its derivatives, where the curve is the fit of one."""
+    if move.planned.formulas is None:
+        return {"closed_form": None}
+    law, *rates = (text.replace("{T}", f"{move.duration:.10g}") for text in move.planned.formulas)
     factors = joint_factors(move.robot.joint_types, units)
     start = move.start.position / factors
     change = (move.planned.end.position - move.start.position) / factors
-    law = move.planned.formula.replace("{T}", f"{move.duration:.10g}")
-    return {
+    joints = list(zip(move.robot.joint_names, start.tolist(), change.tolist(), strict=True))
+    forms = {
         name: f"{q:.10g}" + (f" {'-' if dq < 0 else '+'} {abs(dq):.10g} ({law})" if dq else "")
-        for name, q, dq in zip(move.robot.joint_names, start, change, strict=True)
+        for name, q, dq in joints
     }
+    if not derivatives:
+        return {"closed_form": forms}
+    of_rates = {name: [f"{dq:.10g} {rate}" if dq else "0" for rate in rates] for name, _, dq in joints}
+    return {"closed_form": forms, "closed_form_derivatives": of_rates}
 
 
 def _pose(plan: Plan, index: int | None) -> PoseReport | None:
@@ -171,14 +181,15 @@ def _resolved(pose: ResolvedPose, plan: Plan) -> PoseReport:
     )
 
 
-def _path(tool: ToolMotion, units: Units) -> PathReport:
+def _path(tool: ToolMotion, units: Units, *, derivatives: bool) -> PathReport:
     """Return the path of a tool and the law along it, in the units of the job."""
     segments, corners = _drawing(tool)
     length = float(tool.law.piece_ends()[1][-1, 0])
     unit = "rad" if tool.pure_rotation else "m"
     path = in_units(PathReport(length=length, unit=unit, segments=segments, corners=corners, law=[]), units)
     scale = factor(Quantity("angle" if tool.pure_rotation else "length"), units)
-    law = polynomial_intervals(tool.law.breaks, tool.law.coefficients[:, :, 0] / scale, path.unit)
+    coefficients = tool.law.coefficients[:, :, 0] / scale
+    law = polynomial_intervals(tool.law.breaks, coefficients, path.unit, derivatives=derivatives)
     return path.model_copy(update={"law": law})
 
 
@@ -247,59 +258,3 @@ def _segment(curve: Any) -> SegmentReport:  # noqa: ANN401
 
 def _plain(vector: Array) -> list[float]:
     return [float(value) + 0.0 for value in vector]
-
-
-def _polynomials(move: PlannedMove, units: Units) -> list[list[PolynomialReport]]:
-    """Return the polynomials of each joint of a move, in order of time, in the units of the job."""
-    curve: PiecewisePolynomial = move.planned.curve
-    factors = joint_factors(move.robot.joint_types, units)
-    names = {"m": units.length, "rad": units.angle}
-    return [
-        polynomial_intervals(
-            curve.breaks,
-            curve.coefficients[:, :, joint] / factors[joint],
-            names[unit],
-            join=not move.planned.one_piece_per_interval,
-        )
-        for joint, unit in enumerate(joint_units(move.robot.joint_types))
-    ]
-
-
-def polynomial_intervals(
-    breaks: Array, coefficients: Array, unit: str, *, join: bool = True
-) -> list[PolynomialReport]:
-    """Return the polynomials of one component.
-
-    Args:
-        breaks: Shape (pieces + 1,).
-        coefficients: Shape (degree + 1, pieces), highest power first, local to each break.
-        unit: Of their values.
-        join: Whether equal neighbours become one.
-    """
-    starts, ends = breaks[:-1], breaks[1:]
-    local = _without_noise(coefficients[::-1].T, ends - starts)
-    absolute = _without_noise(taylor_shift(coefficients, -starts)[::-1].T, ends)
-    like = np.append(False, _equal(absolute[:-1], absolute[1:], ends[1:], 2 * _SAME))  # as the one before
-    firsts, lasts = [0], ends.tolist()
-    for piece in range(1, len(lasts)):
-        if not (join and like[piece] and _equal(absolute[firsts[-1]], absolute[piece], ends[piece], _SAME)):
-            firsts.append(piece)
-    afters = [*firsts[1:], len(lasts)]
-    columns = (starts[firsts].tolist(), local[firsts].tolist(), absolute[firsts].tolist(), afters)
-    return polynomial_reports(
-        {"start": start, "end": lasts[after - 1], "local": own, "absolute": whole, "unit": unit}
-        for start, own, whole, after in zip(*columns, strict=True)
-    )
-
-
-def _without_noise(coefficients: Array, durations: Array) -> Array:
-    """Return ascending coefficients (pieces, n) without those whose term over the duration is rounding."""
-    terms = np.abs(coefficients) * durations[:, None] ** np.arange(coefficients.shape[1])
-    return np.where(terms <= _NOTHING * terms.max(axis=1, keepdims=True), 0.0, coefficients)
-
-
-def _equal(a: Array, b: Array, durations: ArrayLike, same: float) -> Flags:
-    """Return whether polynomials (..., n) are equal as far as `same` of their largest term."""
-    powers = np.asarray(durations)[..., None] ** np.arange(a.shape[-1])
-    largest = (np.abs(a) * powers).max(axis=-1, keepdims=True)
-    return np.asarray((np.abs(a - b) * powers <= same * largest).all(axis=-1))

@@ -58,8 +58,10 @@ def write_rows(plan: Plan, grid: Grid, path: str | None, digits: Digits) -> None
     """
     loaded = plan.loaded
     groups = loaded.job.output.columns
-    columns = columns_of(groups, loaded.robot.joint_types, loaded.units)
-    rows = _counted(sample(plan.trajectory, grid, groups, loaded.units, robot=loaded.robot), grid.count)
+    columns = columns_of(groups, loaded.robot.joint_types, loaded.output_units)
+    rows = _counted(
+        sample(plan.trajectory, grid, groups, loaded.output_units, robot=loaded.robot), grid.count
+    )
     if path is not None and path != "-":
         write_verified(path, rows, columns, digits)
         return

@@ -38,12 +38,14 @@ class Phase:
         start: Seconds from the start of the move.
         end: Seconds from the start of the move.
         joint: Index of the joint it is about; None when it is about all of them.
+        point: Index of the point that it rounds, among the via points; None where it rounds none.
     """
 
     name: str
     start: float
     end: float
     joint: int | None = None
+    point: int | None = None
 
 
 @comparable
@@ -96,8 +98,9 @@ class Planned:
         tool: The reference motion of the tool, where the move follows a path of it.
         wanted_speed: Speed along the tool's path that is asked for, m/s, or rad/s where the tool turns in
             its place; None where none is.
-        formula: s(t) in words of mathematics with `{T}` for the duration, where the curve is a fit of
-            q0 + dq s(t) with another law than a polynomial.
+        formulas: s(t) in words of mathematics with `{T}` for the duration, where the curve is a fit of
+            q0 + dq s(t) with another law than a polynomial; behind it those of ds/dt and d2s/dt2.
+        virtual: Indices of the breaks of the curve that are virtual points of a spline.
         one_piece_per_interval: Whether equal polynomials that follow each other are one each, as between
             the points of a spline.
         binding_phases: Whether the phases say, one after the other, which limit binds.
@@ -118,7 +121,8 @@ class Planned:
     begins: State | None = None
     tool: ToolMotion | None = None
     wanted_speed: float | None = None
-    formula: str | None = None
+    formulas: tuple[str, str, str] | None = None
+    virtual: tuple[int, ...] = ()
     one_piece_per_interval: bool = False
     binding_phases: bool = False
     no_lower_bound: str | None = None

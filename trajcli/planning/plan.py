@@ -108,7 +108,8 @@ def _plan_moves(loaded: LoadedJob, poses: dict[int | None, ResolvedPose]) -> lis
         try:
             with _errors_of(loaded, index, planner, begun):
                 reachable = planner.with_joint_targets(partial(resolve, index=index), state.position)
-                move = _plan_move(loaded, index, reachable, start)
+                with _points_of_errors(loaded, index):
+                    move = _plan_move(loaded, index, reachable, start)
             moves.append(move)
             state = move.planned.end
         except MissingLimitError as error:
@@ -295,6 +296,26 @@ def _errors_of(loaded: LoadedJob, index: int, planner: Planner, begun: float) ->
             for problem in error.problems
         )
         raise type(error)(*problems) from None
+
+
+@contextmanager
+def _points_of_errors(loaded: LoadedJob, index: int) -> Iterator[None]:
+    """Give errors about a target of a move its place, or the name of its point and the place of that."""
+    try:
+        yield
+    except PlanningError as error:
+        raise type(error)(*(_about_point(loaded, index, problem) for problem in error.problems)) from None
+
+
+def _about_point(loaded: LoadedJob, index: int, problem: Problem) -> Problem:
+    if problem.field is None:
+        return problem
+    path = ("moves", index, *problem.field)
+    node = loaded.document.node(path)
+    if node is None or not isinstance(node.value, str) or node.value not in loaded.job.points:
+        return replace(problem, place=loaded.document.place(path))
+    place = loaded.document.place(("points", node.value))
+    return replace(problem.within(f"the point '{node.value}'"), place=place)
 
 
 @contextmanager

@@ -105,11 +105,19 @@ def _poses(
         yield np.hstack([inputs.times(block), poses[:, :3, 3] / arm.length_factor, quaternions])
 
 
-def jacobians_of(arm: ArmInUnits, rows: TableBlocks, frame: ReferenceFrame) -> Stream:
+def jacobians_of(
+    arm: ArmInUnits, rows: TableBlocks, frame: ReferenceFrame, watch: LimitWatch | None = None
+) -> Stream:
     """Return t, where there is one, measures and the Jacobian, row by row, for each row of joint values.
 
     All is in SI: manipulability; inverse_condition, the smallest over the largest singular value of the
     scaled Jacobian, zero where it loses rank; J11 to J6n.
+
+    Args:
+        arm: The arm.
+        rows: With a column for each joint.
+        frame: In whose axes the Jacobian stands.
+        watch: Sees the joint values as their rows are taken.
 
     Raises:
         InputError: As `poses_of`.
@@ -118,15 +126,21 @@ def jacobians_of(arm: ArmInUnits, rows: TableBlocks, frame: ReferenceFrame) -> S
     entries = [f"J{i}{j}" for i in range(1, 7) for j in range(1, len(arm.robot.joints) + 1)]
     time = [] if inputs.time is None else ["t"]
     columns = map(parse_column, [*time, "manipulability", "inverse_condition", *entries])
-    return Stream(tuple(columns), _jacobians(arm, rows, inputs, frame))
+    return Stream(tuple(columns), _jacobians(arm, rows, inputs, frame, watch))
 
 
 def _jacobians(
-    arm: ArmInUnits, rows: TableBlocks, inputs: _JointColumns, frame: ReferenceFrame
+    arm: ArmInUnits,
+    rows: TableBlocks,
+    inputs: _JointColumns,
+    frame: ReferenceFrame,
+    watch: LimitWatch | None,
 ) -> Iterator[Array]:
     for block in rows.blocks:
         q = inputs.values(block)
         refuse_far(q, rows.file)
+        if watch is not None:
+            watch.see(q, inputs.factors, inputs.units)
         measures = dexterity(arm.robot, q)
         entries = jacobian(arm.robot, q, frame).reshape(len(q), -1)
         columns = np.stack([measures.manipulability, 1.0 / measures.condition], axis=1)

@@ -179,6 +179,12 @@ class Arc(Smooth):
         """Signed radians for each metre of arc length."""
         return float(np.copysign(1.0 / self._metres, self.angle))
 
+    def s_of(self, position: Array) -> float:
+        """Return the arc length, m, at which the first turn passes a position (3,) on the circle."""
+        turned = _turned(self.start - self.center, position - self.center, self.axis)
+        turned = turned if self.angle > 0 else (_TURN - turned) % _TURN
+        return min(turned / abs(self.angle), 1.0) * self.length
+
     def evaluate(self, s: Array, side: Side = "right") -> Triple:
         """Return p, p', p'' as `PositionCurve` says; both sides are the same."""
         x, y = self._frame

@@ -16,7 +16,12 @@ from trajcli.planners.planner import Planned
 from trajcli.planners.point_to_point.point_to_point import PointToPoint
 from trajcli.trajectory import State
 
-FORMULA = "t/{T} - sin(2 pi t/{T})/(2 pi)"
+FORMULAS = (
+    "t/{T} - sin(2 pi t/{T})/(2 pi)",
+    "(1 - cos(2 pi t/{T}))/{T}",
+    "(2 pi/{T}^2) sin(2 pi t/{T})",
+)
+"""s(t) over the duration T and its first two derivatives, as they are printed."""
 
 
 class Cycloidal(PointToPoint):
@@ -47,7 +52,7 @@ class Cycloidal(PointToPoint):
             return standstill(end, self.duration or 0.0)
         displacement = end.position - start.position
         law = cycloid_law(self.duration or self._fastest(displacement, robot))
-        return Planned(along_line(start.position, displacement, law), end, law=law, formula=FORMULA)
+        return Planned(along_line(start.position, displacement, law), end, law=law, formulas=FORMULAS)
 
     def _fastest(self, displacement: Array, robot: Robot) -> float:
         """Return the shortest duration (s) in which all joints keep their limits."""

@@ -20,7 +20,7 @@ from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import Flaw, Model, Number, refuse
 from trajcli.language.points import NamedTarget
-from trajcli.language.targets import Direction, Numbers, Row
+from trajcli.language.targets import Direction, Numbers, Row, Target
 from trajcli.planners.planner import Event
 from trajcli.planners.tool_path.move import (
     PlannedPath,
@@ -89,7 +89,9 @@ class ArcMove(ToolPathMove, ArcFields):
         """Return the arc from the pose `before` (4, 4)."""
         target = arc_target(self, before, robot)
         arc = arc_of(self, before, target, robot)
-        return replace(path_to(arc, before, target, self.orientation, self.to), events=center_events([arc]))
+        planned = path_to(arc, before, target, self.orientation, self.to)
+        via = () if self.via is None else ((("via",), arc.s_of(_position(self.via, robot))),)
+        return replace(planned, events=center_events([arc]), targets=(*via, *planned.targets))
 
 
 def arc_target(fields: ArcFields, before: Array, robot: Robot) -> ToolTarget:
@@ -107,10 +109,14 @@ def arc_of(fields: ArcFields, before: Array, target: ToolTarget, robot: Robot) -
         return _by_angle(fields, before)
     start, end = before[:3, 3], target.pose[:3, 3]
     if fields.via is not None:
-        joints = fields.via.joints
-        via = fields.via.full_pose() if joints is None else forward(robot, np.array(joints))
-        return Arc.through(start, via[:3, 3], end)
+        return Arc.through(start, _position(fields.via, robot), end)
     return Arc.around(start, np.array(fields.center), end, fields.axis)
+
+
+def _position(target: Target, robot: Robot) -> Array:
+    """Return where the tcp is in a target, (3,)."""
+    pose = target.full_pose() if target.joints is None else forward(robot, np.array(target.joints))
+    return pose[:3, 3]
 
 
 def _by_angle(fields: ArcFields, before: Array) -> Arc:

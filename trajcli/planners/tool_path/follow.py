@@ -36,6 +36,10 @@ _REGULAR = 1e-3  # of the largest singular value: with more there is no singular
 _SLOPE = 1e-5  # of the whole: step of the difference that says how fast a joint would have to go
 
 
+class UnreachablePathError(PlanningError):
+    """The path leaves the arm's workspace."""
+
+
 @frozen
 class FollowingDiagnosis:
     """Explains what goes wrong along a path, or over the time of a motion.
@@ -127,7 +131,7 @@ class FollowingDiagnosis:
         if self._reached_with_free_roll(samples[~valid]):
             axis = self.reference(samples[:1], "left").tool_axis
             hint += f", or give only the `direction` of the tool's {axis} axis at the target"
-        return PlanningError(Problem(message, hint, amounts=amounts))
+        return UnreachablePathError(Problem(message, hint, amounts=amounts))
 
     def _reached_with_free_roll(self, samples: Array) -> bool:
         """Return whether the arm reaches the path at samples (k,) where the tool may roll about its axis."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -41,7 +42,13 @@ from trajcli.language.numbers import FieldPath, Flaw, Model, Number
 from trajcli.language.targets import Configuration, Target, ik_target
 from trajcli.planners.boundary_states import standstill, start_in_motion
 from trajcli.planners.planner import Event, Planned, Planner
-from trajcli.planners.tool_path.follow import JointMotion, diagnosis_of_motion, followed, followed_in_time
+from trajcli.planners.tool_path.follow import (
+    JointMotion,
+    UnreachablePathError,
+    diagnosis_of_motion,
+    followed,
+    followed_in_time,
+)
 from trajcli.planners.tool_path.law import LawSpec, law_along
 from trajcli.trajectory import State, resting
 from trajcli.units import Quantity
@@ -87,6 +94,7 @@ class PlannedPath:
         configuration: Names of the branch on which it shall arrive; None where they do not matter.
         events: What was conceded.
         overlap: The motion itself where segments overlap in time; None where the law makes it from the path.
+        targets: The fields of the move that name points of the path, each with its s, m or rad.
     """
 
     path: ToolPath
@@ -94,6 +102,7 @@ class PlannedPath:
     configuration: Configuration | None = None
     events: tuple[Event, ...] = ()
     overlap: ToolMotion | None = None
+    targets: tuple[tuple[FieldPath, float], ...] = ()
 
 
 class ToolPathMove(Planner):
@@ -161,7 +170,10 @@ class ToolPathMove(Planner):
         if planned.path.length == 0:
             check_arrival(planned, start.position, robot)
             return standstill(start, self.law.duration or self.law.minimum_duration or 0.0, REMEDIES)
-        joints = self._followed(planned, start.position, robot)
+        try:
+            joints = self._followed(planned, start.position, robot)
+        except UnreachablePathError as error:
+            raise _about_target(error, planned, robot) from None
         room = max(self.tolerance.position, self.tolerance.angle)
         diagnosis_of_motion(robot, joints.motion).refuse_limits(joints.curve, room)
         end = joints.curve.piece_ends()[1][-1]
@@ -189,6 +201,18 @@ class ToolPathMove(Planner):
         law, ruled_by = law_along(path, self.law, robot.limits.tcp, self.tag)
         motion = motion_along(path, law.law, law.breaks, tolerance, ruled_by)
         return JointMotion(followed(robot, path, start).by_time(motion), motion, law.phases)
+
+
+def _about_target(error: PlanningError, planned: PlannedPath, robot: Robot) -> PlanningError:
+    """Return the error of a path out of reach, with the field of the first target that is out of reach."""
+    from trajcli.kinematics.inverse.solve import solve
+
+    s = np.array([s for _, s in planned.targets])
+    if not s.size:
+        return PlanningError(*error.problems)
+    missed = ~solve(robot, planned.path.at_s(s, "left").target(), None).valid.any(axis=-1)
+    field = planned.targets[int(missed.argmax())][0] if missed.any() else None
+    return PlanningError(*(replace(problem, field=field) for problem in error.problems))
 
 
 def _wanted_speed(law: LawSpec, limits: ToolLimits, *, angular: bool) -> float | None:
@@ -383,4 +407,5 @@ def path_of_poses(
     """Return the path with what its target fixes; an orientation that follows from it is fixed whole."""
     fixed = "all" if orientation == "tangent" else target.orientation
     path = ToolPath(poses, target.position, fixed, target.tool_axis, (target.turn,))
-    return PlannedPath(path, target.joints, None if to is None else to.configuration)
+    configuration, targets = (None, ()) if to is None else (to.configuration, ((("to",), path.length),))
+    return PlannedPath(path, target.joints, configuration, targets=targets)

@@ -162,7 +162,18 @@ class PathMove(ToolPathMove):
         path = ToolPath(poses, last.position, fixed, last.tool_axis, turns, chain.progress)
         to = self.segments[-1].line or (self.segments[-1].arc and self.segments[-1].arc.to)
         events = (*center_events(curves), *(() if overlap else _radius_events(chain)))
-        planned = PlannedPath(path, last.joints, to.configuration if to else None, events)
+        ends = [*(corner.s for corner in chain.corners), path.length]
+        planned = PlannedPath(
+            path,
+            last.joints,
+            to.configuration if to else None,
+            events,
+            targets=tuple(
+                (("segments", k, "line") if segment.arc is None else ("segments", k, "arc", "to"), s)
+                for k, (segment, s) in enumerate(zip(self.segments, ends, strict=True))
+                if segment.arc is None or segment.arc.to is not None
+            ),
+        )
         if not overlap:
             return planned
         motion = overlapping_motion(before, curves, targets, self, robot.limits.tcp)

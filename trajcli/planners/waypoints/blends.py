@@ -329,7 +329,7 @@ def _phases(motion: Blended) -> tuple[Phase, ...]:
             if start > last:
                 phases.append(Phase("straight", last, start, owner))
             if end > start:
-                phases.append(Phase(f"blend {point}", start, end, owner))
+                phases.append(Phase(f"blend {point}", start, end, owner, point))
             last = max(last, end)
     return tuple(phases)
 

@@ -338,6 +338,7 @@ class Spline(ThroughPoints):
             begins=_beginning(curve) if self.rule in FREE_ENDS else None,
             events=points.events,
             one_piece_per_interval=True,
+            virtual=(1, curve.pieces - 1) if self.rule == "continuous_acceleration" else (),
             remedies=OPEN_END_REMEDIES if self.rule in FREE_ENDS else REMEDIES,
             virtual_points=_virtual(curve) if self.rule == "continuous_acceleration" else None,
         )

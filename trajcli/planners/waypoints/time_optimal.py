@@ -31,6 +31,7 @@ from trajcli.language.numbers import (
     Flaw,
     FlawError,
     ReadingContext,
+    number_schema,
     refuse,
     shown,
 )
@@ -193,7 +194,10 @@ class PathParameter(FieldType):
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of a name or a list."""
         return {
-            "anyOf": [{"enum": list(_NAMED)}, {"type": "array", "items": {"type": "number"}, "minItems": 2}]
+            "anyOf": [
+                {"enum": list(_NAMED)},
+                {"type": "array", "items": number_schema(Quantity("ratio")), "minItems": 2},
+            ]
         }
 
 
