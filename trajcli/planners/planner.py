@@ -102,6 +102,8 @@ class Planned:
         binding_phases: Whether the phases say, one after the other, which limit binds.
         no_lower_bound: Why nothing is known of the shortest duration between its end states.
         remedies: What would help against a finding, by its kind, where that depends on the method.
+        braking: How a start outside the velocity or acceleration limits is brought inside first: by each
+            joint, or by all on one line; None where it is not.
     """
 
     curve: PiecewisePolynomial
@@ -120,6 +122,7 @@ class Planned:
     binding_phases: bool = False
     no_lower_bound: str | None = None
     remedies: Mapping[str, str] = field(default_factory=dict)
+    braking: Literal["each", "line"] | None = None
 
 
 class Planner(Model):
@@ -258,6 +261,7 @@ class PlannedMove:
             self.over_limit,
             planned.remedies,
             self.planner.destination,
+            planned.braking,
         )
 
     def span(self, start: float, end: float) -> Span:

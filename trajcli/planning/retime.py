@@ -10,12 +10,14 @@ import numpy as np
 from trajcli.checks.finding import Finding
 from trajcli.checks.limits import peaks_by_move
 from trajcli.checks.verify import verify
+from trajcli.curves.extrema import Peaks
 from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import Array
 from trajcli.curves.smallest_feasible import smallest_feasible
 from trajcli.errors import Amount, Amounts, PlanningError
 from trajcli.kinematics.robot import QUANTITIES, ToolLimits, share_of_limits
 from trajcli.planners.planner import Event, Planned, PlannedMove
+from trajcli.trajectory import Trajectory
 
 _LONGEST = 1e4  # times the planned duration: a move that needs more is not over its limit, it is wrong
 _ROOM = 1e-10  # relative; a tenth of the tolerance of limits, so that rounding does not tip the later verdict
@@ -134,7 +136,7 @@ def _excess_of(move: PlannedMove, duration: float) -> float:
     except PlanningError:
         return np.inf
     alone = longer.alone()
-    (peaks,) = peaks_by_move(alone)
+    (peaks,) = _judged_peaks(alone, longer)
     joints = float(share_of_limits([(p.low, p.high) for p in peaks], move.robot.limits)) - (1 + _ROOM)
     if move.robot.limits.tcp == _NO_TOOL_LIMITS:
         return joints
@@ -144,6 +146,15 @@ def _excess_of(move: PlannedMove, duration: float) -> float:
         return joints
     of_tool = tool_peaks(alone, alone.spans[0], move.robot)
     return max(joints, share_of_tool_limits(move.robot.limits.tcp, of_tool) - 1)
+
+
+def _judged_peaks(alone: Trajectory, move: PlannedMove) -> list[tuple[Peaks, ...]]:
+    peaks = peaks_by_move(alone)
+    if move.planned.braking is None:
+        return peaks
+    from trajcli.checks.braking import judged_peaks
+
+    return judged_peaks(alone, [move.robot.limits], [move.promise], peaks)
 
 
 def align_to_period(move: PlannedMove, rate: float) -> PlannedMove:
