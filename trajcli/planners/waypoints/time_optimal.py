@@ -35,7 +35,7 @@ from trajcli.language.numbers import (
 from trajcli.language.per_joint import JointDistance
 from trajcli.language.poses import read_numbers
 from trajcli.language.recorded import Recorded
-from trajcli.planners.boundary_states import missing_limit, standstill
+from trajcli.planners.boundary_states import missing_limit, same_state, standstill
 from trajcli.planners.planner import Event, Phase, Planned, stretched
 from trajcli.planners.waypoints.spline import Rule, curve_through
 from trajcli.planners.waypoints.through_points import REMEDIES, PointTable, ThroughPoints
@@ -282,7 +282,7 @@ class TimeOptimal(ThroughPoints):
         points = self._untimed().waypoints(start, robot)
         moving = np.ptp(points.positions, axis=0) > 0
         if not moving.any():
-            return standstill(points.target, self.duration or 0.0, REMEDIES)
+            return self._in_one_point(start, points, robot)
         bounds = robot.limits.acceleration
         lacking = np.flatnonzero(moving & ~np.isfinite(bounds).all(axis=1))
         if lacking.size:
@@ -308,6 +308,27 @@ class TimeOptimal(ThroughPoints):
             binding_phases=True,
             remedies=REMEDIES,
         )
+
+    def _in_one_point(self, start: State, points: PointTable, robot: Robot) -> Planned:
+        """Return the move all of whose points are one.
+
+        Raises:
+            PlanningError: When the arm moves there, unless it has arrived already: no path leads back.
+        """
+        arrived = same_state(start, points.target) and not self.duration
+        if arrived or not points.rates.any():
+            return standstill(points.target, self.duration or 0.0, REMEDIES)
+        order, end = (int(k) for k in np.argwhere(points.rates[:, [0, -1]].any(axis=2))[0])
+        values = points.rates[order, [0, -1][end]]
+        joint = int(np.flatnonzero(values)[0])
+        message = (
+            f"{self.tag} {('starts', 'ends')[end]} with {{joint}} at {{value}}, but all its points are one: "
+            "no path leads out of a point and back to it"
+        )
+        hint = "give it a point between in `through`, or use jerk_limited"
+        value, name = float(values[joint]), robot.joint_names[joint]
+        amounts: Amounts = {"joint": name, "value": Amount(value, order + 1, joint)}
+        raise PlanningError(Problem(message, hint, joint=name, value=value, amounts=amounts))
 
     def _untimed(self) -> Self:
         """Return the move without the times of a recording: it is to be passed faster."""
