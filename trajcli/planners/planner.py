@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 Resolve = Callable[["Target", Array], "Target"]
 WhenOverLimit = Literal["error", "slow"]
-_REMARKS = ("refined", "within_tool_limits")  # kinds of events that concede nothing
+_REMARKS = ("refined", "within_tool_limits", "local_optimum")  # kinds of events that concede nothing
 _GIVEN = ("duration", "velocity", "acceleration", "deceleration", "timed")  # where they say how long it lasts
 _LITTLE = 1e-3  # relative: a law that is stretched by less still counts as the fastest
 

@@ -37,7 +37,7 @@ from trajcli.language.poses import read_numbers
 from trajcli.language.recorded import Recorded
 from trajcli.planners.boundary_states import missing_limit, same_state, standstill
 from trajcli.planners.planner import Event, Phase, Planned, stretched
-from trajcli.planners.waypoints.spline import Rule, curve_through
+from trajcli.planners.waypoints.spline_rules import Rule, curve_through
 from trajcli.planners.waypoints.through_points import REMEDIES, PointTable, ThroughPoints
 from trajcli.trajectory import State, ViaPoints
 from trajcli.units import Quantity
