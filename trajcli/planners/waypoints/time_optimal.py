@@ -17,6 +17,7 @@ from pydantic.json_schema import JsonSchemaValue
 from trajcli.curves.operations import scale_time, times_at
 from trajcli.curves.parabolic_blends.blends import blended
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.splines.hermite import parabola_velocities
 from trajcli.curves.splines.shape_preserving import ShapeError
 from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion, UnsettledSpeedError, time_optimal
 from trajcli.curves.time_optimal.passes import UnreachableSpeedError
@@ -92,13 +93,33 @@ def spline_through(rule: Rule, parameter: Parameter, points: PointTable, robot: 
             slopes[k] = chord
     rates = np.zeros_like(points.rates)
     rates[0, [0, -1]] = slopes
+    known = replace(points, rates=rates)
     try:
-        curve = curve_through(rule, replace(points, rates=rates), s)
+        curve = curve_through(rule, _bent_where_all_turn(known, s) if rule == "quintic" else known, s)
     except ShapeError as error:
         name = robot.joint_names[error.component]
         message = f"the velocity of {name} at the {error.end} point does not let the path be monotone there"
         raise PlanningError(Problem(message, "use rule not_a_knot", joint=name)) from None
     return JointPath(curve, s, np.zeros_like(q), (speeds[0], speeds[1]))
+
+
+def _bent_where_all_turn(points: PointTable, s: Array) -> PointTable:
+    """Return the points with the accelerations of parabolas where all joints turn back at once.
+
+    There the computed velocities and accelerations of a quintic vanish, and it would take infinite sd to
+    leave the point as fast as the joints can.
+    """
+    ends = points.rates[0, [0, -1]]
+    computed: Array = parabola_velocities(s, points.positions, *ends)
+    turning = np.logical_not(computed.any(axis=1))
+    turning[[0, -1]] = False
+    if not turning.any():
+        return points
+    slopes = np.diff(points.positions, axis=0) / np.diff(s)[:, None]
+    rates, given = points.rates.copy(), points.given.copy()
+    rates[1, 1:-1][turning[1:-1]] = (2 * np.diff(slopes, axis=0) / (s[2:] - s[:-2])[:, None])[turning[1:-1]]
+    given[1] = given[1] | turning
+    return replace(points, rates=rates, given=given)
 
 
 def _parameter_values(parameter: Parameter, points: PointTable) -> Array:
