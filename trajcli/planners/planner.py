@@ -190,6 +190,15 @@ class Planner(Model):
         """
         return self
 
+    def coming_from(self, origin: Target | None) -> Self:
+        """Return the planner that knows how the job gives the state in which the arm stands before it.
+
+        Args:
+            origin: The job's start, or the last target that a move before it names; None where that was
+                recorded, or left open.
+        """
+        return self
+
     def with_duration(self, duration: float) -> Self:
         """Return the planner of the same move over `duration` seconds.
 

@@ -62,17 +62,17 @@ def plan_job(loaded: LoadedJob) -> Plan:
     with _errors_at(loaded, loaded.document.place(("start",))):
         state = resolve(loaded.job.start, np.zeros(len(loaded.robot.joints)), index=None).as_state()
     events = [*loaded.events, *_events_of(poses.get(None), None)]
-    before: Planner | None = None
+    before, origin = None, loaded.job.start
     for index, planner in enumerate(loaded.job.moves):
         start = _handed_over(state, before, planner)
         begun = sum(float(done.planned.curve.breaks[-1]) for done in moves)
         with _errors_of(loaded, index, planner, begun):
             reachable = planner.with_joint_targets(partial(resolve, index=index), state.position)
-            move = _plan_move(loaded, index, reachable, start)
+            move = _plan_move(loaded, index, reachable.coming_from(origin), start)
         moves.append(move)
         events += _events_of(poses.get(index), index)
         events += [replace(event, move=index) for event in move.planned.events]
-        state, before = move.planned.end, planner
+        state, before, origin = move.planned.end, planner, planner.target or origin
     trajectory = _joined(moves, loaded, _first_state(loaded, moves[0], events))
     verdict = verify(trajectory, [move.robot.limits for move in moves], [move.promise for move in moves])
     verdict = _with_unit_hint(verdict, loaded)

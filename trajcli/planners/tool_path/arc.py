@@ -89,7 +89,7 @@ class ArcMove(ToolPathMove, ArcFields):
         """Return the arc from the pose `before` (4, 4)."""
         target = arc_target(self, before, robot)
         arc = arc_of(self, before, target, robot)
-        return replace(path_to(arc, before, target, self.orientation, self.to), events=center_events([arc]))
+        return replace(path_to(arc, before, target, self, self.to), events=center_events([arc]))
 
 
 def arc_target(fields: ArcFields, before: Array, robot: Robot) -> ToolTarget:
