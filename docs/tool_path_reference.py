@@ -40,9 +40,9 @@ path has one law from end to end, and its largest bend bounds the speed everywhe
 goes point by point.
 
 Limits of joints are not looked at when a law is made, only when the move is verified, except by
-`time_optimal`, which needs and keeps those of velocity and acceleration; nor is a turn that the target
-leaves free. Another move that is too fast is refused with the factor, or stretched by it:
-`when_over_limit: slow`. A rotation about the tcp has no limit of jerk.
+`time_optimal`, which needs and keeps those of velocity and acceleration. A turn that the target leaves free
+counts as the arm makes it, except where segments overlap. A move that is too fast is refused with the
+factor, or stretched by it: `when_over_limit: slow`. A rotation about the tcp has no limit of jerk.
 
 Along a bent path the tool also accelerates across. Of an acceleration in `limits.tcp`, 0.6 goes along the
 path and 0.8 across where a path is bent anywhere (`time_optimal` divides it point by point). The

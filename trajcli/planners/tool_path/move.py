@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
 import numpy as np
@@ -178,9 +179,12 @@ class ToolPathMove(Planner):
             from trajcli.planners.tool_path.time_optimal import fastest_along
 
             return fastest_along(followed(robot, path, start), self.law, tolerance, self.tag)
-        law, ruled_by = law_along(path, self.law, robot.limits.tcp, self.tag)
+        joints = None if path.orientation == "all" else followed(robot, path, start)
+        with nullcontext() if joints is None else joints.diagnosed():
+            known = path if joints is None else joints.executed
+            law, ruled_by = law_along(known, self.law, robot.limits.tcp, self.tag)
         motion = motion_along(path, law.law, law.breaks, tolerance, ruled_by)
-        return JointMotion(followed(robot, path, start).by_time(motion), motion, law.phases)
+        return JointMotion((joints or followed(robot, path, start)).by_time(motion), motion, law.phases)
 
 
 def _wanted_speed(law: LawSpec, limits: ToolLimits, *, angular: bool) -> float | None:
