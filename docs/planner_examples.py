@@ -110,7 +110,12 @@ With `synchronize: time` one law moves all joints, so the path is a straight lin
 is a run-up. Joints that move need limits on velocity, acceleration and jerk (a stop needs none on
 velocity). With `synchronize: time` all joints arrive together, in the shortest time in which every one
 of them can; with `phase` they follow one law and the path is a straight line in joint space, which the
-velocities and accelerations of start and target must not leave; with `none` each arrives by itself.""",
+velocities and accelerations of start and target must not leave; with `none` each arrives by itself.
+
+A start beyond a velocity or acceleration limit, or whose acceleration leads beyond one whatever is done, is
+refused. With `brake: true` it is brought inside first, as fast as possible, each joint by itself (with
+`synchronize: phase` all together); an event says so. Until then, and no longer, the limits that the start
+breaks do not count; all others do.""",
     "spline": """\
 `through` lists the [waypoints](#waypoints) between the start and `to`; without `to` its last point is the
 target. Either all of them have a `time` or none.

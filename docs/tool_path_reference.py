@@ -22,8 +22,14 @@ the position s on the path and the joint). Joints that a target leaves free are 
 
 `orientation` says how the tool turns along the path: `axis_angle` about one fixed axis by the shortest angle,
 evenly in s; `euler` evenly in the three angles in which the target is given (`euler` or `rpy`), from
-those of the start that are nearest to them; `fixed` not at all; `tangent` with the path, so that the tool
-keeps its attitude to it, as along a seam."""
+those of the start that are nearest to them (see below for angles beyond 180 deg); `fixed` not at all;
+`tangent` with the path, so that the tool keeps its attitude to it, as along a seam.
+
+Angles beyond 180 deg are meant as they are typed: with `orientation: euler` the tool turns from 0 to 270 deg
+by 270 deg, to 360 deg by a full turn, to -270 deg the other way round. They are counted from the angles in
+which the job's `start`, or the target of the move before, was typed (in the same sequence and frame); where
+these were not typed, from the angle of the start within 180 deg. From a start typed as 270 deg a target of 0
+is reached by 270 deg back, and one of 360 deg by 90 deg on."""
 
 _LAW = """\
 How s grows with time. Speeds, accelerations and the jerk that the law does not name are those of
@@ -34,9 +40,9 @@ path has one law from end to end, and its largest bend bounds the speed everywhe
 goes point by point.
 
 Limits of joints are not looked at when a law is made, only when the move is verified, except by
-`time_optimal`, which needs and keeps those of velocity and acceleration; nor is a turn that the target
-leaves free. Another move that is too fast is refused with the factor, or stretched by it:
-`when_over_limit: slow`. A rotation about the tcp has no limit of jerk.
+`time_optimal`, which needs and keeps those of velocity and acceleration. A turn that the target leaves free
+counts as the arm makes it, except where segments overlap. A move that is too fast is refused with the
+factor, or stretched by it: `when_over_limit: slow`. A rotation about the tcp has no limit of jerk.
 
 Along a bent path the tool also accelerates across. Of an acceleration in `limits.tcp`, 0.6 goes along the
 path and 0.8 across where a path is bent anywhere (`time_optimal` divides it point by point). The

@@ -12,7 +12,7 @@ from trajcli.job.read import LoadedJob, job_from_text
 from trajcli.kinematics.robot import Robot
 from trajcli.planners import PLANNERS, Planner
 from trajcli.planners.planner import Planned
-from trajcli.planners.waypoints.spline import IMPOSES
+from trajcli.planners.waypoints.spline_rules import IMPOSES
 from trajcli.trajectory import State
 
 Fields = dict[str, Any]

@@ -100,6 +100,8 @@ class Promise:
             can be asked for; None where it cannot.
         remedies: What would help against a finding, by its kind.
         destination: Where it ends; None where the job does not say it.
+        braking: How a start outside the velocity or acceleration limits is brought inside first, as fast as
+            possible: by each joint, or by all on one line; None where it is not.
     """
 
     via_points: ViaPoints | None = None
@@ -109,6 +111,7 @@ class Promise:
     over_limit: Literal["error", "slow"] | None = None
     remedies: Mapping[str, str] = field(default_factory=dict)
     destination: Destination | None = None
+    braking: Literal["each", "line"] | None = None
 
 
 @comparable

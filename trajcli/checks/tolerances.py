@@ -51,6 +51,9 @@ TARGET_ON_PATH = 2e-5
 # on top; their peaks are looked for between rows until they change by less than this.
 TOOL_RELATIVE = 1e-6
 
+# When a braking joint comes inside its limits is the root of a quadratic, of the rounding of its phases.
+BRAKING_RELATIVE = 1e-9
+
 
 def exceeds(value: ArrayLike, bound: ArrayLike) -> NDArray[np.bool_]:
     """Return whether values are above an upper bound by more than rounding; for a lower bound negate both.

@@ -94,7 +94,7 @@ def verify(
         ValueError: When there are more or fewer limits than spans.
     """
     peaks, tool_peaks = tuple(peaks_by_move(trajectory)), _tool_peaks(trajectory, promises)
-    findings = check_limits(trajectory, limits_by_move, peaks)
+    findings = check_limits(trajectory, limits_by_move, _judged(trajectory, limits_by_move, promises, peaks))
     findings += check_continuity(trajectory, limits_by_move, peaks)
     if promises is not None:
         findings += check_waypoints(trajectory, [promise.via_points for promise in promises])
@@ -113,6 +113,20 @@ def verify(
         ),
         unchecked_of_tool=_unchecked_of_tool(limits_by_move, promises, peaks),
     )
+
+
+def _judged(
+    trajectory: Trajectory,
+    limits_by_move: Sequence[Limits],
+    promises: Sequence[Promise] | None,
+    peaks: Sequence[tuple[Peaks, ...]],
+) -> Sequence[tuple[Peaks, ...]]:
+    """Return the extremes that count against the limits: all of them where no move brakes."""
+    if promises is None or all(promise.braking is None for promise in promises):
+        return peaks
+    from trajcli.checks.braking import judged_peaks
+
+    return judged_peaks(trajectory, limits_by_move, promises, peaks)
 
 
 def _in_order(

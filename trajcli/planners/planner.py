@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 Resolve = Callable[["Target", Array], "Target"]
 WhenOverLimit = Literal["error", "slow"]
-_REMARKS = ("refined", "within_tool_limits")  # kinds of events that concede nothing
+_REMARKS = ("refined", "within_tool_limits", "local_optimum")  # kinds of events that concede nothing
 _GIVEN = ("duration", "velocity", "acceleration", "deceleration", "timed")  # where they say how long it lasts
 _LITTLE = 1e-3  # relative: a law that is stretched by less still counts as the fastest
 
@@ -108,6 +108,8 @@ class Planned:
         remedies: What would help against a finding, by its kind, where that depends on the method.
         virtual_points: Points that the method adds to those that it is given.
         phase_plane: Of a time-optimal law: the law s(t), and what limits it.
+        braking: How a start outside the velocity or acceleration limits is brought inside first: by each
+            joint, or by all on one line; None where it is not.
     """
 
     curve: PiecewisePolynomial
@@ -129,6 +131,7 @@ class Planned:
     remedies: Mapping[str, str] = field(default_factory=dict)
     virtual_points: ViaPoints | None = None
     phase_plane: PhasePlane | None = None
+    braking: Literal["each", "line"] | None = None
 
 
 class Planner(Model):
@@ -201,6 +204,15 @@ class Planner(Model):
         Args:
             resolve: From a target, and joint values (n,) to be near to, to the same target by its joints.
             near: Joint values (n,) of where the arm comes from, rad or m.
+        """
+        return self
+
+    def coming_from(self, origin: Target | None) -> Self:
+        """Return the planner that knows how the job gives the state in which the arm stands before it.
+
+        Args:
+            origin: The job's start, or the last target that a move before it names; None where that was
+                recorded, or left open.
         """
         return self
 
@@ -291,6 +303,7 @@ class PlannedMove:
             self.over_limit,
             planned.remedies,
             self.planner.destination,
+            planned.braking,
         )
 
     def span(self, start: float, end: float) -> Span:

@@ -21,6 +21,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from trajcli.curves.braking import braking
 from trajcli.curves.phases import PhaseChain
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount, Amounts, PlanningError, Problem
@@ -43,6 +44,8 @@ class BoundaryProblem:
         bounds: Shape (3, 2), lower and upper, of velocity, acceleration and jerk; infinite ones are allowed.
             Of the two bounds of the jerk the smaller magnitude holds both ways.
         control: Whether the final position is imposed.
+        brake: Whether a start outside the bounds is brought inside first also under velocity control, where
+            ruckig bounds no velocity; under position control it always is.
     """
 
     name: str
@@ -50,6 +53,7 @@ class BoundaryProblem:
     final: tuple[float, float, float]
     bounds: Array
     control: Control = "position"
+    brake: bool = False
 
     @property
     def order(self) -> int:
@@ -316,21 +320,23 @@ def _call_ruckig(
     """Return ruckig's answer, or None when it fails."""
     import ruckig
 
+    lead = _lead(problem)
+    initial, waited = lead.states[-1, 1:].tolist(), lead.duration
     units = np.array([length_unit / time_unit**order for order in range(4)])
     wanted = ruckig.InputParameter(1)
     interfaces = ruckig.ControlInterface
     wanted.control_interface = interfaces.Position if problem.control == "position" else interfaces.Velocity
     wanted.current_position, wanted.target_position = [0.0], [problem.displacement / length_unit]
     lower, upper = (problem.bounds / units[1:, None]).T.tolist()
-    wanted.current_velocity = [problem.initial[1] / units[1]]
-    wanted.current_acceleration = [problem.initial[2] / units[2]]
+    wanted.current_velocity = [initial[0] / units[1]]
+    wanted.current_acceleration = [(*initial, 0.0)[1] / units[2]]
     wanted.target_velocity = [_inside(problem.final[1] / units[1], lower[0], upper[0])]
     wanted.target_acceleration = [_inside(problem.final[2] / units[2], lower[1], upper[1])]
     wanted.min_velocity, wanted.max_velocity = [lower[0]], [upper[0]]
     wanted.min_acceleration, wanted.max_acceleration = [lower[1]], [upper[1]]
     wanted.max_jerk = [min(-lower[2], upper[2])]
     if duration is not None:
-        wanted.minimum_duration = duration / time_unit
+        wanted.minimum_duration = max(duration - waited, 0.0) / time_unit
     answer = ruckig.Trajectory(1)
     try:
         result = ruckig.Ruckig(1).calculate(wanted, answer)
@@ -338,7 +344,18 @@ def _call_ruckig(
         return None
     if result not in (ruckig.Result.Working, ruckig.Result.Finished):
         return None
-    return _profile(problem, answer, time_unit, units)
+    return _profile(problem, answer, time_unit, units, lead)
+
+
+def _lead(problem: BoundaryProblem) -> PhaseChain:
+    """Return the phases that bring the start inside the bounds where ruckig does not do it."""
+    initial = np.array([0.0, *problem.initial[1:]])
+    phases: Sequence[tuple[float, float]] = ()
+    if problem.brake and problem.control == "velocity":
+        phases = braking(*problem.initial[1:], problem.bounds).phases
+        initial = initial[: problem.order]
+    times, constants = np.array(phases).reshape(-1, 2).T
+    return PhaseChain(initial, np.full_like(initial, np.nan), times, constants)
 
 
 def _inside(value: float, lower: float, upper: float) -> float:
@@ -347,17 +364,25 @@ def _inside(value: float, lower: float, upper: float) -> float:
     return inside if abs(value - inside) <= _ROUNDING * abs(value) else value
 
 
-def _profile(problem: BoundaryProblem, answer: Any, time_unit: float, units: Array) -> PhaseProfile:  # noqa: ANN401
+def _profile(
+    problem: BoundaryProblem,
+    answer: Any,  # noqa: ANN401
+    time_unit: float,
+    units: Array,
+    lead: PhaseChain,
+) -> PhaseProfile:
     """Return the phases of ruckig's answer in SI; those of length zero are left out."""
     profile, order = answer.profiles[0][0], problem.order
     parts = [(part.t, getattr(part, " vaj"[order])) for part in (profile.brake, profile, profile.accel)]
     phases = [
         [(t * time_unit, c * units[order]) for t, c in zip(*part, strict=False) if t > 0] for part in parts
     ]
+    phases[0] = [*zip(lead.durations.tolist(), lead.constants.tolist(), strict=True), *phases[0]]
     lengths, constants = np.array([phase for part in phases for phase in part]).reshape(-1, 2).T
     initial = np.array([0.0, *problem.initial[1:]])[:order]
     final = np.array([problem.displacement, *problem.final[1:]])[:order]
     if problem.control == "velocity":
         final[0] = np.nan
     chain = PhaseChain(initial, final, lengths, constants).with_cruises()
-    return PhaseProfile(problem.initial[0], chain, answer.duration * time_unit, len(phases[0]))
+    duration = answer.duration * time_unit + lead.duration
+    return PhaseProfile(problem.initial[0], chain, duration, len(phases[0]))

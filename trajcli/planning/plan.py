@@ -101,6 +101,7 @@ def _plan_moves(loaded: LoadedJob, poses: dict[int | None, ResolvedPose]) -> lis
     with _errors_at(loaded, loaded.document.place(("start",))):
         state = resolve(loaded.job.start, np.zeros(len(loaded.robot.joints)), index=None).as_state()
     before: Planner | None = None
+    origin: Target | None = loaded.job.start
     for index, planner in enumerate(loaded.job.moves):
         report_progress(f"planning move {index + 1} of {len(loaded.job.moves)} ({planner.tag})")
         start = _handed_over(state, before, planner)
@@ -109,7 +110,7 @@ def _plan_moves(loaded: LoadedJob, poses: dict[int | None, ResolvedPose]) -> lis
             with _errors_of(loaded, index, planner, begun):
                 reachable = planner.with_joint_targets(partial(resolve, index=index), state.position)
                 with _points_of_errors(loaded, index):
-                    move = _plan_move(loaded, index, reachable, start)
+                    move = _plan_move(loaded, index, reachable.coming_from(origin), start)
             moves.append(move)
             state = move.planned.end
         except MissingLimitError as error:
@@ -122,7 +123,7 @@ def _plan_moves(loaded: LoadedJob, poses: dict[int | None, ResolvedPose]) -> lis
             if not lacking:
                 raise
             break
-        before = planner
+        before, origin = planner, planner.target or origin
     if lacking:
         raise MissingLimitError(*_without_repeats(lacking))
     return moves

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from trajcli.checks.braking import judged_peaks
 from trajcli.checks.limits import peaks_by_move
 from trajcli.checks.tolerances import exceeds
 from trajcli.curves.piecewise import Array
@@ -28,6 +29,8 @@ def why_no_duration(move: PlannedMove) -> Problem | None:
             return Problem("the tool is too fast where the move starts or ends")
     if move.planned.begins is not None or move.planned.origin:
         return None  # where the curve begins and ends depends on its duration
+    if move.planned.braking is not None:
+        return None  # it may start outside its limits
     for state, verb in ((move.start, "starts"), (move.planned.end, "ends")):
         reason = _beyond(move, state, verb) or _no_room(move, state, verb)
         if reason is not None:
@@ -135,7 +138,7 @@ class StretchSearch:
         except PlanningError:
             return np.inf
         alone, robot = longer.alone(), longer.robot
-        (peaks,) = peaks_by_move(alone)
+        (peaks,) = judged_peaks(alone, [robot.limits], [longer.promise], peaks_by_move(alone))
         self._learn(factor, peaks[0].low, peaks[0].high)
         joints = float(share_of_limits([(p.low, p.high) for p in peaks], robot.limits)) - (1 + _ROOM)
         if robot.limits.tcp == _NO_TOOL_LIMITS:

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from trajcli.errors import InputError, PlanningError
 from trajcli.job.read import job_from_text
 from trajcli.planning.plan import Plan, plan_job
 
-PLANNERS = ("jerk_limited", "trapezoid", "cubic", "quintic", "septic", "spline")
+PLANNERS = ("jerk_limited", "trapezoid", "cubic", "quintic", "septic", "spline", "time_optimal")
 STATE = {"joints": [0.3, -0.2], "velocity": [0.5, 0.25]}
 NEXT = {"planner": "jerk_limited", "to": {"joints": [1.0, 0.0]}}
 
@@ -46,3 +47,33 @@ def test_the_next_move_goes_on_as_if_it_were_first(tag: str) -> None:
     assert both.verdict.passed
     t = np.linspace(0, alone.trajectory.duration, 50)
     np.testing.assert_array_equal(both.trajectory.curve.evaluate(t), alone.trajectory.curve.evaluate(t))
+
+
+@pytest.mark.parametrize("fields", [{}, {"path": "polyline"}, {"through": [{"joints": [0.3, -0.2]}]}])
+def test_time_optimal_names_the_joint_that_moves_where_no_path_leads_back(fields: dict[str, Any]) -> None:
+    with pytest.raises(PlanningError) as caught:
+        planned({"planner": "time_optimal", "to": {"joints": [0.3, -0.2]}, **fields})
+    assert "starts with j1 at 0.5 rad/s, but all its points are one" in str(caught.value)
+
+
+def test_jerk_limited_goes_where_time_optimal_cannot() -> None:
+    """What the hint of time_optimal says."""
+    plan = planned({"planner": "jerk_limited", "to": {"joints": [0.3, -0.2]}})
+    assert plan.verdict.passed
+    between = {"joints": [0.8, 0.05]}
+    assert planned({"planner": "spline", "through": [between], "to": {"joints": [0.3, -0.2]}}).verdict.passed
+
+
+@pytest.mark.parametrize("tag", ["cubic", "trapezoid", "time_optimal"])
+@pytest.mark.parametrize("velocity", [[0.5, 0.25], [0.0, 0.0]], ids=["moving", "resting"])
+def test_an_acceleration_at_the_start_is_refused_by_name(tag: str, velocity: list[float]) -> None:
+    state = {"joints": [0.3, -0.2], "velocity": velocity}
+    job = {
+        "version": 1,
+        "robot": {"joints": 2},
+        "limits": {"velocity": 1.0, "acceleration": 2.0},
+        "start": {**state, "acceleration": [0.7, 0.0]},
+        "moves": [{"planner": tag, "to": state}],
+    }
+    with pytest.raises(InputError, match=f"{tag} cannot start with an acceleration"):
+        plan_job(job_from_text(json.dumps(job)))

@@ -243,6 +243,7 @@ def _all_uses(family: CurveFamily, durations: Array, bounds: Array) -> Array:
     curve = family(durations)
     begins = np.concatenate([[0.0], np.cumsum(durations)[:-1]]) + 0.25 * durations.min()
     first = np.maximum.accumulate(np.searchsorted(curve.breaks, begins, "right") - 1)
+    first[0] = 0
     orders, parts = _orders(bounds), []
     extremes = piece_extremes(curve.coefficients, curve.lengths, orders)
     for order, (low, high) in zip(orders, extremes, strict=True):

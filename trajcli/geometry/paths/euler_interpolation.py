@@ -20,6 +20,9 @@ from trajcli.geometry.rotation import AXES, Array, Frame, rotation_about
 
 _TURN = 2.0 * np.pi
 _DIGITS = 9  # to which two triples must differ before one is nearer
+_HALF = 1e-9  # rad: half a turn is not beyond half a turn
+_LEAN = 1e-6  # rad
+_TYPED = 1e-6  # of an entry of a matrix: an arm stands where typed angles say, as near as its joints tell
 _MET = 1e-10  # of an entry of a matrix, by which a rotation is still met
 
 
@@ -163,6 +166,38 @@ def euler_interpolation(
     if progress is None:
         progress = SegmentProgress.even(float(np.linalg.norm(angles[-1] - angles[0])))
     return EulerInterpolation(angles, progress, sequence, frame, tuple(sorted(locked)))
+
+
+def beyond_half_a_turn(typed: Sequence[ArrayLike | None]) -> bool:
+    """Return whether any of the angles, rad, is larger than half a turn, so that whole turns are meant."""
+    rows = [np.abs(np.asarray(row, dtype=np.float64)).max() for row in typed if row is not None]
+    return max(rows, default=0.0) > np.pi + _HALF
+
+
+def angles_to_count_from(
+    rotation: Array, sequence: str, frame: Frame, target: ArrayLike, typed: ArrayLike | None = None
+) -> Array:
+    """Return the angles (3,), rad, of a start, from where angles beyond half a turn are counted.
+
+    Angles that were typed are these, whole turns included, where they give the rotation. Else an angle whose
+    target is beyond half a turn is read within half a turn, and any other nearest to its target.
+
+    Args:
+        rotation: Shape (3, 3).
+        sequence: Such as "ZYZ".
+        frame: Whether the axes move along.
+        target: The next angles that are typed, shape (3,), rad.
+        typed: Those of the start itself, shape (3,), rad; None where there are none.
+    """
+    if typed is not None and np.abs(matrix_from_euler(sequence, typed, frame) - rotation).max() <= _TYPED:
+        return np.asarray(typed, dtype=np.float64)
+    aim = np.asarray(target, dtype=np.float64)
+    far = np.abs(aim) > np.pi + _HALF
+    angles, locked = nearest_angles(rotation, sequence, frame, np.where(far, 0.0, aim))
+    if locked:
+        return angles
+    # half a turn at the start is on the side of the target, whatever rounding says
+    return nearest_angles(rotation, sequence, frame, np.where(far, np.copysign(_LEAN, aim), aim))[0]
 
 
 def nearest_angles(rotation: Array, sequence: str, frame: Frame, aim: Array) -> tuple[Array, bool]:

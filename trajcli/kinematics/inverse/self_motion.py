@@ -107,7 +107,7 @@ def one_per_self_motion(robot: Robot, joints: Array, valid: Flags, free: Flags, 
     offset = np.zeros(joints.shape) if near is None else joints - near[:, None]
     distance = np.abs(np.where(turning, offset - FULL * np.round(offset / FULL), offset)).max(axis=2)
     for i in np.flatnonzero((few & keep).any(axis=0)):
-        for j in range(i):
+        for j in np.flatnonzero(keep[:, :i].any(axis=0)):
             alike = few[:, i] & keep[:, i] & keep[:, j] & (free[:, i] == free[:, j]).all(axis=1)
             if not alike.any():
                 continue

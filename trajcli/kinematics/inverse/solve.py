@@ -17,7 +17,7 @@ from trajcli.kinematics.inverse.families.choose import method_for
 from trajcli.kinematics.inverse.families.method import IkMethod
 from trajcli.kinematics.inverse.families.screw_axes import PARALLEL, AxisGeometry, axis_geometry
 from trajcli.kinematics.inverse.joint_turns import beyond, choose_turns
-from trajcli.kinematics.inverse.numeric import SAME, distinct, recover_lost_solutions, search
+from trajcli.kinematics.inverse.numeric import distinct, recover_lost_solutions, search
 from trajcli.kinematics.inverse.self_motion import (
     freedom_of,
     nearest_on_self_motions,
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 TOLERANCE = 1e-9  # m and rad: what a branch may miss its target by
 _LAST = 1e6  # rad or m: sorts answers outside the limits behind all others
 _KEPT = 16  # answers of a numeric search that are kept, the nearest
+_SAME_ROOT = 2e-5  # rad or m: a double root is found so inexactly; halfway between both the target is met
 _SAME_POINT = 1e-3  # rad or m: nearest points of self-motion manifolds that are no further apart are one
 
 
@@ -176,6 +177,8 @@ def _by_closed_form(
     if len(rows):
         polish(robot, target, joints, closure, degenerate, rows)
         valid[:, rows] = closure[:, :, rows].max(axis=0) <= tolerance
+    if tolerance > TOLERANCE:  # branches that end where none meets the target exactly may be one
+        degenerate |= (valid & (closure.max(axis=0) > TOLERANCE)).any(axis=0)
     missed = np.flatnonzero(~valid.any(axis=0))
     if len(missed):
         closure[..., missed] = closures(robot, target.rows(missed), joints[..., missed])
@@ -194,7 +197,7 @@ def _by_search(
     valid = searched.met.T & (closures(robot, target, joints).max(axis=0) <= tolerance)
     choose_turns(robot, joints, None if near is None else near.T)
     aim = np.zeros((len(target.poses), len(joints))) if near is None else near
-    within = SAME
+    within = _SAME_ROOT
     if freedom:
         seeds, rows = np.nonzero(valid)
         moved = nearest_on_self_motions(robot, target.rows(rows), joints[:, seeds, rows].T, aim[rows])
@@ -208,6 +211,11 @@ def _by_search(
     order = np.argsort(np.where(valid, cost, 2 * _LAST + closure.sum(axis=0)), axis=0, kind="stable")
     joints, valid = _ordered(joints, order), _ordered(valid, order)
     valid = distinct(robot, joints.transpose(2, 1, 0), valid.T, within).T
+    crowded = np.flatnonzero(valid.sum(axis=0) > _KEPT)
+    if len(crowded) and not freedom:  # points of one family would leave no room for other answers
+        valid[:, crowded] = _one_of_each_family(
+            robot, target.rows(crowded), joints[:, :, crowded], valid[:, crowded], aim[crowded]
+        )
     last = np.argsort(~valid, axis=0, kind="stable")
     last = last[: max(1, min(_KEPT, int(valid.sum(axis=0).max(initial=0))))]
     joints, closure, valid = (
@@ -217,6 +225,15 @@ def _by_search(
     )
     suspect, free = np.ones(valid.shape[1], dtype=bool), np.zeros(len(joints), dtype=bool)
     return Answers(method, joints, closure, valid, suspect, free, freedom, closed_form=False)
+
+
+def _one_of_each_family(robot: Robot, target: IkTarget, joints: Array, valid: Flags, near: Array) -> Flags:
+    """Return valid answers (seeds, N), of joints (n, seeds, N), without further points of self-motions."""
+    poses_first = joints.transpose(2, 1, 0)
+    rows, seeds = np.nonzero(valid.T)
+    free = np.zeros(poses_first.shape, dtype=bool)
+    free[rows, seeds] = self_motions(robot, target.rows(rows), poses_first[rows, seeds]).free
+    return one_per_self_motion(robot, poses_first, valid.T, free, near).T
 
 
 def _ordered(array: NDArray[Any], order: NDArray[np.intp]) -> NDArray[Any]:
@@ -254,7 +271,7 @@ def _resolve_suspects(
         closure = closures(robot, some, joints.transpose(2, 1, 0))
         valid = distinct(robot, joints, valid & (closure.max(axis=0) <= tolerance).T)
         answers.closure[:, :, suspects] = closure
-    if answers.closed_form:
+    if not answers.freedom:
         valid = one_per_self_motion(robot, joints, valid, some_free, nearby)
     choose_turns(robot, joints.transpose(2, 1, 0), None if nearby is None else nearby.T)
     answers.joints[:, :, suspects], answers.valid[:, suspects] = joints.transpose(2, 1, 0), valid.T

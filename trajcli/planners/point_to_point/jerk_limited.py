@@ -13,6 +13,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from trajcli.curves.braking import braking
 from trajcli.curves.operations import along_line, coast_until, hold_until, merge_breaks
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount, Amounts, MissingLimitError, PlanningError, Problem, inward
@@ -57,6 +58,13 @@ class JerkLimited(PointToPoint):
             "space; none: each joint arrives by itself."
         ),
     ] = "time"
+    brake: Annotated[
+        bool,
+        Field(
+            description="Whether a start outside the velocity or acceleration limits is accepted, and "
+            "brought inside first, as fast as possible."
+        ),
+    ] = False
 
     def plan(self, start: State, robot: Robot) -> Planned:
         """Return the move to the target, or to its velocity where it has no joints.
@@ -71,6 +79,7 @@ class JerkLimited(PointToPoint):
             control="velocity" if self.to.joints is None else "position",
             synchronize=self.synchronize,
             minimum_duration=self.minimum_duration or 0.0,
+            brake=self.brake,
         )
         return plan_motion(request, robot)
 
@@ -94,6 +103,7 @@ class Request:
         control: Whether the position at the end is imposed.
         synchronize: "time": all arrive together; "phase": one law on a straight line; "none": each by itself.
         minimum_duration: Seconds; 0 for none.
+        brake: Whether a start outside the limits is brought inside.
     """
 
     start: State
@@ -101,6 +111,7 @@ class Request:
     control: Control
     synchronize: Literal["time", "phase", "none"]
     minimum_duration: float
+    brake: bool = False
 
 
 def plan_motion(request: Request, robot: Robot) -> Planned:
@@ -119,12 +130,58 @@ def plan_motion(request: Request, robot: Robot) -> Planned:
         planned = _each(request, boundaries)
     if planned.curve.duration == 0:
         planned = replace(planned, curve=instant(request.start))
+    planned = _with_braking(planned, request, boundaries)
     if request.control == "position":
         return planned
     end = State(planned.curve.piece_ends()[1][-1], request.end.velocity, request.end.acceleration)
     # to where a velocity is reached fastest, another path may lead a little faster
     reason = "the move leaves its end position open"
     return replace(planned, end=end, law=None, no_lower_bound=reason)
+
+
+def _with_braking(planned: Planned, request: Request, boundaries: Sequence[BoundaryProblem]) -> Planned:
+    """Return the motion with what it says of a start outside the limits."""
+    outside = [
+        (joint, order, boundary)
+        for joint, boundary in enumerate(boundaries)
+        for order in _orders_outside(boundary)
+    ]
+    if not outside:
+        return planned
+    if not request.brake:
+        hint = "say `brake: true` to bring the start inside first"
+        kinds = {QUANTITIES[order]: hint for _, order, _ in outside}
+        return replace(planned, remedies={**planned.remedies, **kinds})
+    events = [_braking_event(planned, boundary, joint, order) for joint, order, boundary in outside]
+    on_line = request.synchronize == "phase"
+    return replace(planned, events=(*planned.events, *events), braking="line" if on_line else "each")
+
+
+def _orders_outside(boundary: BoundaryProblem) -> list[int]:
+    """Return the derivatives, 1 and 2, whose bounds the start breaks, or cannot help to break."""
+    known = braking(*boundary.initial[1:], boundary.bounds)
+    return [order for order, time in ((1, known.velocity), (2, known.acceleration)) if time > 0]
+
+
+def _braking_event(planned: Planned, boundary: BoundaryProblem, joint: int, order: int) -> Event:
+    """Return the event of a start outside a limit."""
+    value, (low, high) = boundary.initial[order], boundary.bounds[order - 1].tolist()
+    if low <= value <= high:
+        value, what = braking(*boundary.initial[1:], boundary.bounds).fastest, "cannot but reach"
+    else:
+        what = "starts with"
+    brakes = [phase.end for phase in planned.phases if phase.name == "brake" and phase.joint in (joint, None)]
+    message = (
+        f"{{joint}} {what} {QUANTITIES[order]} {{value}}, beyond its limit {{limit}}: "
+        "it brakes until {time} from the start of the move"
+    )
+    amounts: Amounts = {
+        "joint": boundary.name,
+        "value": Amount(value, order, joint),
+        "limit": Amount(low if value < 0 else high, order, joint),
+        "time": Amount(max(brakes, default=0.0)),
+    }
+    return Event("braked", message, amounts=amounts)
 
 
 def _each(request: Request, boundaries: Sequence[BoundaryProblem]) -> Planned:
@@ -155,7 +212,7 @@ def _on_one_line(request: Request, boundaries: Sequence[BoundaryProblem], robot:
     length = 1.0 if displacement.any() else 0.0
     initial, final = (0.0, on_line[0], on_line[2]), (length, on_line[1], on_line[3])
     bounds = _bounds_along(direction, robot.limits)
-    boundary = BoundaryProblem("the common law", initial, final, bounds, request.control)
+    boundary = BoundaryProblem("the common law", initial, final, bounds, request.control, request.brake)
     _require_common_law(boundary, boundaries, direction, robot)
     alone = fastest(boundary)
     profile = fastest_of(boundary, least) if alone.duration < least else alone
@@ -173,7 +230,7 @@ def _boundaries(request: Request, robot: Robot) -> list[BoundaryProblem]:
     ]
     rows = zip(robot.joint_names, *states, bounds, strict=True)
     return [
-        BoundaryProblem(name, tuple(first), tuple(last), bound, request.control)
+        BoundaryProblem(name, tuple(first), tuple(last), bound, request.control, request.brake)
         for name, first, last, bound in rows
     ]
 

@@ -89,7 +89,7 @@ class ArcMove(ToolPathMove, ArcFields):
         """Return the arc from the pose `before` (4, 4)."""
         target = arc_target(self, before, robot)
         arc = arc_of(self, before, target, robot)
-        planned = path_to(arc, before, target, self.orientation, self.to)
+        planned = path_to(arc, before, target, self, self.to)
         via = () if self.via is None else ((("via",), arc.s_of(_position(self.via, robot))),)
         return replace(planned, events=center_events([arc]), targets=(*via, *planned.targets))
 

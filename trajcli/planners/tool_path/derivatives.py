@@ -12,6 +12,9 @@ from trajcli.frozen import comparable
 if TYPE_CHECKING:
     from trajcli.kinematics.following.tool_path import ToolPath
 
+_CLOSER, _HIGHEST, _BETWEEN = 4, 5, 9  # rounds, samples looked at closer in each, and how many there
+_EVEN = 1e-6  # of the first derivative, over the whole path: a turn that changes by less is even
+_SAFE = 1.0 + 1e-6  # times a peak that is looked for
 _SAMPLES = 257  # values of s at which the largest derivatives of the path are looked for
 
 
@@ -33,12 +36,35 @@ class PathDerivatives:
 
 
 def path_derivatives(path: ToolPath) -> PathDerivatives:
-    """Return the largest derivatives of a path, by sampling between its breaks."""
+    """Return the largest derivatives of a path, by sampling between its breaks.
+
+    How a tool turns about what its targets leave free has its peaks anywhere: these are looked for closer.
+    """
     s = distinct(np.concatenate([np.linspace(0.0, path.length, _SAMPLES), path.breaks]))
-    sides = [path.poses.evaluate(s, side) for side in ("left", "right")]
-    first, second = (np.stack([side[k] for side in sides]) for k in (1, 2))
+    first, second = _derivatives(path, s)
     turning, change = (largest_norm(rows[..., 3:]) for rows in (first, second))
+    if path.orientation != "all":
+        turning, change = (_peak(path, s, order) * _SAFE for order in (0, 1))
+        change = change if change * path.length > _EVEN * turning else 0.0
     return PathDerivatives(not path.poses.pure_rotation, largest_norm(second[..., :3]), turning, change)
+
+
+def _derivatives(path: ToolPath, s: Array) -> tuple[Array, Array]:
+    """Return X' and X'' at s (N,) from both sides, each (2, N, 6)."""
+    sides = [path.poses.evaluate(s, side) for side in ("left", "right")]
+    return np.stack([side[1] for side in sides]), np.stack([side[2] for side in sides])
+
+
+def _peak(path: ToolPath, s: Array, order: int) -> float:
+    """Return the largest norm of w' (order 0) or w'' (order 1), closer and closer around high samples."""
+    best = 0.0
+    for _ in range(_CLOSER):
+        sizes = np.linalg.norm(_derivatives(path, s)[order][..., 3:], axis=-1).max(axis=0)
+        best = max(best, float(sizes.max()))
+        highest = np.argsort(sizes)[-_HIGHEST:]
+        low, high = s[np.maximum(highest - 1, 0)], s[np.minimum(highest + 1, s.size - 1)]
+        s = np.unique(low + (high - low) * np.linspace(0.0, 1.0, _BETWEEN)[:, None])
+    return best
 
 
 def largest_norm(rows: Array) -> float:

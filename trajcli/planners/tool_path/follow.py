@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +16,7 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.frozen import frozen
 from trajcli.kinematics.dexterity import characteristic_length
+from trajcli.kinematics.following.executed import ExecutedPoses
 from trajcli.kinematics.following.follower import Follower, LostError, ReferenceAt, follower
 from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.kinematics.following.tolerance import Tolerance, probes, tolerance_ratio
@@ -230,6 +233,29 @@ class FollowedPath:
     path: ToolPath
     follower: Follower
     coarse: PiecewisePolynomial
+
+    @cached_property
+    def executed(self) -> ToolPath:
+        """The path as the tool follows it: with the turn that its targets leave free, where they do."""
+        if self.path.orientation == "all":
+            return self.path
+        return replace(self.path, poses=ExecutedPoses(self.path.poses, self.follower, self.coarse))
+
+    @contextmanager
+    def diagnosed(self) -> Iterator[None]:
+        """Say where and why the arm cannot follow where the joints are lost between their coarse values.
+
+        Raises:
+            PlanningError: Names the singularity.
+        """
+        try:
+            yield
+        except LostError as error:
+            diagnosis, most = (
+                diagnosis_on_path(self.robot, self.path, self.follower),
+                most_pieces(self.path.breaks),
+            )
+            raise diagnosis.unfit(float(error.s[0]), self.coarse.evaluate, most) from None
 
     def by_s(self, tolerance: Tolerance) -> PiecewisePolynomial:
         """Return q(s) within a tolerance.

@@ -55,8 +55,8 @@ class LineMove(ToolPathMove):
         target = tool_target(self.to, before, robot)
         start, end = before[:3, 3], target.pose[:3, 3]
         if np.linalg.norm(end - start) > SAME_POINT:
-            return path_to(Line(start, end), before, target, self.orientation, self.to)
-        turning = orientation_along(self.orientation, before[:3, :3], [target], None, None)
+            return path_to(Line(start, end), before, target, self, self.to)
+        turning = orientation_along(self.orientation, before[:3, :3], [target], None, None, self.origin)
         if turning.length <= _SAME_ANGLE:
             return _path_of_no_length(before, target, self.to)
         return path_of_poses(PoseCurve(Pivot(start, end, turning.length), turning), target, self.to)

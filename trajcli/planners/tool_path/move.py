@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, PrivateAttr
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount, Amounts, InputError, PlanningError, Problem
@@ -119,6 +120,13 @@ class ToolPathMove(Planner):
     ] = "axis_angle"
     law: LawSpec = LawSpec()
     tolerance: ToleranceSpec = ToleranceSpec()
+    _origin: Target | None = PrivateAttr(default=None)
+
+    def coming_from(self, origin: Target | None) -> Self:
+        """Return the planner that knows how the job gives the pose in which the arm stands before it."""
+        moved = self.model_copy()
+        moved._origin = origin  # noqa: SLF001 - its own kind
+        return moved
 
     smoother: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "`law: {shape: quintic}`": {"law": {"shape": "quintic"}},
@@ -143,6 +151,11 @@ class ToolPathMove(Planner):
     def joins(self) -> Literal[1, 2]:
         """Acceleration joins where the law begins and ends without any."""
         return self.law.time_law.continuity
+
+    @property
+    def origin(self) -> Target | None:
+        """How the job gives the pose in which the arm stands before the move; None where it does not."""
+        return self._origin
 
     def path_from(self, before: Array, robot: Robot) -> PlannedPath:
         """Return the path of the tool from the pose `before` (4, 4).
@@ -198,9 +211,12 @@ class ToolPathMove(Planner):
             from trajcli.planners.tool_path.time_optimal import fastest_along
 
             return fastest_along(followed(robot, path, start), self.law, tolerance, self.tag)
-        law, ruled_by = law_along(path, self.law, robot.limits.tcp, self.tag)
+        joints = None if path.orientation == "all" else followed(robot, path, start)
+        with nullcontext() if joints is None else joints.diagnosed():
+            known = path if joints is None else joints.executed
+            law, ruled_by = law_along(known, self.law, robot.limits.tcp, self.tag)
         motion = motion_along(path, law.law, law.breaks, tolerance, ruled_by)
-        return JointMotion(followed(robot, path, start).by_time(motion), motion, law.phases)
+        return JointMotion((joints or followed(robot, path, start)).by_time(motion), motion, law.phases)
 
 
 def _about_target(error: PlanningError, planned: PlannedPath, robot: Robot) -> PlanningError:
@@ -340,6 +356,7 @@ def orientation_along(
     targets: Sequence[ToolTarget],
     position: PositionCurve | None,
     progress: SegmentProgress | None,
+    origin: Target | None = None,
 ) -> OrientationCurve:
     """Return R(s) from the orientation at the start through those of the targets.
 
@@ -349,6 +366,7 @@ def orientation_along(
         targets: One for each segment.
         position: The path; None for a rotation alone.
         progress: How far each segment is done; None for a rotation alone: s is then the angle.
+        origin: How the job gives the start; None where it does not.
 
     Raises:
         InputError: When the targets do not give what the rule needs.
@@ -370,17 +388,27 @@ def orientation_along(
             raise PlanningError(message, hint="use axis_angle")
         return TangentOrientation(position, start)
     if how == "euler":
-        return _even_in_angles(rotations, targets, progress)
+        return _even_in_angles(rotations, targets, progress, origin)
     if progress is None:
         return AxisAngleOrientation.between(*rotations)
     return AxisAngleOrientation(rotations, progress)
 
 
 def _even_in_angles(
-    rotations: Array, targets: Sequence[ToolTarget], progress: SegmentProgress | None
+    rotations: Array,
+    targets: Sequence[ToolTarget],
+    progress: SegmentProgress | None,
+    origin: Target | None,
 ) -> OrientationCurve:
-    """Return R(s) that goes evenly in the angles in which the targets are given."""
-    from trajcli.geometry.paths.euler_interpolation import euler_interpolation
+    """Return R(s) that goes evenly in the angles in which the targets are given.
+
+    Angles beyond half a turn are meant as they are typed, and so are then those of the start.
+    """
+    from trajcli.geometry.paths.euler_interpolation import (
+        angles_to_count_from,
+        beyond_half_a_turn,
+        euler_interpolation,
+    )
 
     forms = {(typed[1], typed[2]) for target in targets if (typed := target.typed) is not None}
     if len(forms) != 1:
@@ -389,16 +417,22 @@ def _even_in_angles(
         raise InputError(message, hint="give each target `euler` of one sequence, or `rpy`")
     sequence, frame = forms.pop()
     known = [None, *(None if target.typed is None else target.typed[0] for target in targets)]
+    first = None if origin is None else _typed(origin)
+    started = None if first is None or first[1:] != (sequence, frame) else first[0]
+    if beyond_half_a_turn([started, *known]):
+        nearest = next(row for row in known if row is not None)
+        known[0] = angles_to_count_from(rotations[0], sequence, frame, nearest, started)  # type: ignore[arg-type]
     return euler_interpolation(rotations, progress, sequence, frame, known)  # type: ignore[arg-type]
 
 
 def path_to(
-    position: PositionCurve, before: Array, target: ToolTarget, orientation: Orientation, to: Target | None
+    position: PositionCurve, before: Array, target: ToolTarget, move: ToolPathMove, to: Target | None
 ) -> PlannedPath:
-    """Return the path along a curve from a pose (4, 4) to a target, which the job gives as `to`."""
+    """Return the path of a move along a curve from a pose (4, 4) to a target, which the job gives as `to`."""
     progress = SegmentProgress.even(position.length)
-    turning = orientation_along(orientation, before[:3, :3], [target], position, progress)
-    return path_of_poses(PoseCurve(position, turning), target, to, orientation)
+    start, how = before[:3, :3], move.orientation
+    turning = orientation_along(how, start, [target], position, progress, move.origin)
+    return path_of_poses(PoseCurve(position, turning), target, to, how)
 
 
 def path_of_poses(

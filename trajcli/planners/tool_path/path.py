@@ -152,7 +152,8 @@ class PathMove(ToolPathMove):
         if self.corner == "round":
             radii = [segment.radius or self.radius or 0.0 for segment in self.segments[:-1]]
         chain = join(curves, np.array(radii))
-        turning = orientation_along(self.orientation, before[:3, :3], targets, chain, chain.progress)
+        how, start = self.orientation, before[:3, :3]
+        turning = orientation_along(how, start, targets, chain, chain.progress, self.origin)
         poses = PoseCurve(chain, turning)
         if poses.jumps.size and not overlap:
             raise _jump(float(poses.jumps[0]))

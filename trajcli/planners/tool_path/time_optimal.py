@@ -40,6 +40,7 @@ _CORNERS = 16  # of the polygon inside the circle of accelerations
 _BETWEEN = 6  # times in a piece at which the limits of the tool are looked at, its ends included
 _STRETCHED = 1e-9
 _BESIDE = 1e-13  # of the length: so far before its end the last sample of an interval is
+_EVEN = 1e-6  # of the square of the turning: an axis that changes by less stays
 _NOTED = 1e-6  # relative: a smaller stretch is not worth an event
 
 
@@ -60,9 +61,11 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
     curve = joints.by_s(Tolerance(tolerance.position * _FINER, tolerance.angle * _FINER))
     _require_acceleration(curve, robot, planner)
     tcp = _limits(spec, robot.limits.tcp)
-    limits, of_tool = robot.limits, ToolConstraint(path, tcp)
-    solved = time_optimal(curve, limits.velocity, limits.acceleration, further=[of_tool])
-    remaining = _remaining_stretch(path, solved.law, tcp)
+    limits = robot.limits
+    with joints.diagnosed():
+        of_tool = ToolConstraint(joints.executed, tcp)
+        solved = time_optimal(curve, limits.velocity, limits.acceleration, further=[of_tool])
+        remaining = _remaining_stretch(joints.executed, solved.law, tcp)
     least = spec.minimum_duration or 0.0
     factor = max(remaining, least / solved.trajectory.duration)
     law, trajectory = (
@@ -188,6 +191,7 @@ def _rotation_rows(
     axis = first / np.where(turning > 0, turning, 1.0)[:, None]
     along = (second * axis).sum(axis=1)
     across = np.linalg.norm(second - axis * along[:, None], axis=1)
+    across = np.where(across > _EVEN * turning**2, across, 0.0)
     bent = bool(across.any())
     a = np.stack([turning, -turning], axis=1)
     b = np.stack([along, -along], axis=1)

@@ -1,4 +1,4 @@
-"""Splines through waypoints: the curve of each rule, and times at the points that the limits allow.
+"""Splines through waypoints, at times that are given or that the limits allow.
 
 Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.2.2; Biagiotti and
 Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), chapter 4.
@@ -6,34 +6,31 @@ Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), chapte
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Iterator
 from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from trajcli.curves.operations import times_at
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.curves.splines.cubic import clamped, natural, not_a_knot
-from trajcli.curves.splines.hermite import (
-    computed_accelerations,
-    computed_velocities,
-    cubic_through,
-    parabola_velocities,
-    quintic_through,
-)
-from trajcli.curves.splines.shape_preserving import ShapeError, shape_preserving
-from trajcli.curves.splines.time_allocation import fastest_durations
-from trajcli.curves.splines.virtual_points import continuous_acceleration, virtual_points
+from trajcli.curves.splines.shape_preserving import ShapeError
+from trajcli.curves.splines.virtual_points import virtual_points
 from trajcli.errors import Amount, PlanningError, Problem
 from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import FieldPath, Flaw, refuse
 from trajcli.language.recorded import Recorded
 from trajcli.language.targets import Numbers
 from trajcli.language.waypoints import Waypoint
-from trajcli.planners.boundary_states import missing_limit, same_state, standstill
-from trajcli.planners.planner import Planned
+from trajcli.planners.boundary_states import same_state, standstill
+from trajcli.planners.planner import Event, Planned
+from trajcli.planners.waypoints.spline_rules import (
+    FREE_ENDS,
+    IMPOSES,
+    INNER,
+    Rule,
+    curve_through,
+    fastest_spline_times,
+)
 from trajcli.planners.waypoints.through_points import (
     OPEN_END_REMEDIES,
     REMEDIES,
@@ -43,149 +40,6 @@ from trajcli.planners.waypoints.through_points import (
 )
 from trajcli.trajectory import State, ViaPoints
 from trajcli.units import Quantity
-
-Rule = Literal[
-    "imposed",
-    "computed",
-    "continuous_acceleration",
-    "natural",
-    "clamped",
-    "not_a_knot",
-    "quintic",
-    "shape_preserving",
-]
-FREE_ENDS: tuple[Rule, ...] = ("natural", "not_a_knot")
-IMPOSES: dict[Rule, int] = {
-    "imposed": 1,
-    "computed": 1,
-    "continuous_acceleration": 2,
-    "natural": 0,
-    "clamped": 1,
-    "not_a_knot": 0,
-    "quintic": 2,
-    "shape_preserving": 1,
-}
-"""Highest derivative that the ends impose."""
-_INNER = {"imposed": 1, "quintic": 2}  # the same of the points between
-_MANY = 32  # points from which on the fastest motion along a path says how they may be passed
-_LEAST = 1e-3  # of the mean duration: a piece between points that hardly differ begins with this much
-
-
-def curve_through(
-    rule: Rule, points: PointTable, times: Array, virtual_times: Sequence[float] | None = None
-) -> PiecewisePolynomial:
-    """Return the curve of a rule.
-
-    Args:
-        rule: Its name.
-        points: m of them.
-        times: Shape (m,), increasing, the first zero.
-        virtual_times: Of the two virtual points of continuous_acceleration.
-
-    Raises:
-        ShapeError: When an end velocity does not let shape_preserving be monotone.
-        ValueError: When a virtual time is outside its interval.
-    """
-    q, (first, last), (start, end) = points.positions, points.rates[0, [0, -1]], points.rates[1, [0, -1]]
-    match rule:
-        case "imposed":
-            return cubic_through(times, q, points.rates[0])
-        case "computed":
-            return cubic_through(times, q, computed_velocities(times, q, first, last))
-        case "continuous_acceleration":
-            return continuous_acceleration(times, q, (first, last), (start, end), virtual_times)
-        case "natural":
-            return natural(times, q, *_imposed(first, last))
-        case "not_a_knot":
-            return not_a_knot(times, q, *_imposed(first, last))
-        case "clamped":
-            return clamped(times, q, first, last)
-        case "shape_preserving":
-            return shape_preserving(times, q, first, last)
-        case _:
-            return _quintic(points, times)
-
-
-def _imposed(first: Array, last: Array) -> tuple[Array | None, Array | None]:
-    """Return the end velocities that are not zero: at a point at rest the rule decides."""
-    return first if first.any() else None, last if last.any() else None
-
-
-def _quintic(points: PointTable, times: Array) -> PiecewisePolynomial:
-    """Return the quintics; what a point does not give is computed."""
-    ends = points.rates[:, [0, -1]]
-    velocities = parabola_velocities(times, points.positions, *ends[0])
-    given = points.given.copy()
-    given[:, [0, -1]] = True
-    velocities = np.where(given[0][:, None], points.rates[0], velocities)
-    accelerations = computed_accelerations(times, velocities, *ends[1])
-    accelerations = np.where(given[1][:, None], points.rates[1], accelerations)
-    return quintic_through(times, points.positions, velocities, accelerations)
-
-
-def fastest_spline_times(rule: Rule, points: PointTable, robot: Robot) -> Array:
-    """Return the times (m,) of the fastest curve of a rule that keeps the limits, the first zero.
-
-    Raises:
-        MissingLimitError: When a moving joint has no limit at all.
-        PlanningError: When no durations keep the limits.
-    """
-    bounds = np.stack([robot.limits.of_order(order) for order in (1, 2, 3)])
-    guess, moving = _guess(points, bounds), np.ptp(points.positions, axis=0) > 0
-    lacking = np.flatnonzero(moving & ~np.isfinite(bounds).all(axis=2).any(axis=0))
-    quantity = "velocity"
-    if not guess.any() and not lacking.size:  # back to where it starts, and only velocities are limited
-        lacking, quantity = np.flatnonzero(points.rates.any(axis=(0, 1))), "acceleration"
-    if lacking.size:
-        why, also = "to find when it passes its points", "give every waypoint a `time`"
-        raise missing_limit("spline", quantity, lacking.tolist(), robot, why, also)
-
-    def family(durations: Array) -> PiecewisePolynomial:
-        return curve_through(rule, points, np.concatenate([[0.0], np.cumsum(durations)]))
-
-    durations = fastest_durations(family, guess, bounds, _path_durations(points.positions, robot))
-    if durations is None:
-        message = f"no times let rule {rule} pass these points within all limits"
-        hint = "an imposed velocity or acceleration asks too much: lower it, or give every waypoint a `time`"
-        raise PlanningError(Problem(message, hint))
-    return np.concatenate([[0.0], np.cumsum(durations)])
-
-
-def _guess(points: PointTable, bounds: Array) -> Array:
-    """Return the time that the slowest joint needs for each piece, if it could stop at every point.
-
-    Where it goes back to where it starts, this is the time that the rates of its ends need.
-    """
-    chords = np.abs(np.diff(points.positions, axis=0))
-    needed = np.zeros(len(chords))
-    for order, limits in enumerate(bounds, 1):
-        least = np.abs(limits).min(axis=1)
-        needed = np.maximum(needed, ((chords / least) ** (1 / order)).max(axis=1))
-        if not chords.any():
-            for below, rates in enumerate(np.abs(points.rates).max(axis=1)[: order - 1], 1):
-                needed = np.maximum(needed, ((rates / least) ** (1 / (order - below))).max())
-    return np.asarray(np.maximum(needed, _LEAST * needed.mean()))
-
-
-def _path_durations(positions: Array, robot: Robot) -> Iterator[Array]:
-    """Yield the durations of the fastest motion along a cubic through the points, if they are many.
-
-    Where points are dense, the time from one to the next with a stop at both says little of how fast they may
-    be passed.
-    """
-    moving = np.ptp(positions, axis=0) > 0
-    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1))])
-    limited = np.isfinite(robot.limits.acceleration[moving]).all()
-    if len(positions) <= _MANY or not limited or not (np.diff(s) > np.spacing(s[-1])).all():
-        return
-    from trajcli.curves.time_optimal.parameterization import time_optimal
-    from trajcli.curves.time_optimal.passes import UnlimitedSpeedError
-
-    with suppress(UnlimitedSpeedError):
-        law = time_optimal(not_a_knot(s, positions), robot.limits.velocity, robot.limits.acceleration).law
-        durations = np.diff(times_at(law, s))
-        if (durations > 0).all():
-            yield durations
 
 
 class Spline(ThroughPoints):
@@ -245,7 +99,7 @@ class Spline(ThroughPoints):
             if self.rule == "imposed" and point.velocity is None:
                 yield ("through", k), lacking, "give it a `velocity`, or use computed"
             for order, name in ((1, "velocity"), (2, "acceleration")):
-                if order > _INNER.get(self.rule, 0) and getattr(point, name) is not None:
+                if order > INNER.get(self.rule, 0) and getattr(point, name) is not None:
                     instead = "leave it out, or use quintic"
                     yield (
                         ("through", k, name),
@@ -329,30 +183,31 @@ class Spline(ThroughPoints):
             arrived = same_state(start, points.target) and (start.at_rest or not self.duration)
             if arrived or not points.rates.any():
                 return standstill(points.target, self.duration or 0.0, REMEDIES)
-        times = self._times_of(points, robot)
+        times, events = self._times_of(points, robot)
         curve = self._curve(points, times, robot)
         return Planned(
             curve,
             self._end(points, curve),
             via_points=via_points(points, times),
             begins=_beginning(curve) if self.rule in FREE_ENDS else None,
-            events=points.events,
+            events=(*points.events, *events),
             one_piece_per_interval=True,
             virtual=(1, curve.pieces - 1) if self.rule == "continuous_acceleration" else (),
             remedies=OPEN_END_REMEDIES if self.rule in FREE_ENDS else REMEDIES,
             virtual_points=_virtual(curve) if self.rule == "continuous_acceleration" else None,
         )
 
-    def _times_of(self, points: PointTable, robot: Robot) -> Array:
+    def _times_of(self, points: PointTable, robot: Robot) -> tuple[Array, tuple[Event, ...]]:
+        """Return when the points are passed, and what there is to say of times that are found."""
         if points.times is not None:
-            return points.times
+            return points.times, ()
         if self.duration and points.count == 2:
-            return np.array([0.0, self.duration])
+            return np.array([0.0, self.duration]), ()
         try:
-            times = fastest_spline_times(self.rule, points, robot)
+            times, events = fastest_spline_times(self.rule, points, robot)
         except ShapeError as error:
             raise _not_monotone(error, robot, given=False) from None
-        return times / times[-1] * self.duration if self.duration else times
+        return (times / times[-1] * self.duration, ()) if self.duration else (times, events)
 
     def _curve(self, points: PointTable, times: Array, robot: Robot) -> PiecewisePolynomial:
         try:

@@ -17,6 +17,7 @@ from pydantic.json_schema import JsonSchemaValue
 from trajcli.curves.operations import scale_time, times_at
 from trajcli.curves.parabolic_blends.blends import blended
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.splines.hermite import parabola_velocities
 from trajcli.curves.splines.shape_preserving import ShapeError
 from trajcli.curves.time_optimal.constraints import JointConstraint
 from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion, UnsettledSpeedError, time_optimal
@@ -38,9 +39,9 @@ from trajcli.language.numbers import (
 from trajcli.language.per_joint import JointDistance
 from trajcli.language.poses import read_numbers
 from trajcli.language.recorded import Recorded
-from trajcli.planners.boundary_states import missing_limit, standstill
+from trajcli.planners.boundary_states import missing_limit, same_state, standstill
 from trajcli.planners.planner import Event, Phase, Planned, stretched
-from trajcli.planners.waypoints.spline import Rule, curve_through
+from trajcli.planners.waypoints.spline_rules import Rule, curve_through
 from trajcli.planners.waypoints.through_points import REMEDIES, PointTable, ThroughPoints
 from trajcli.trajectory import State, ViaPoints
 from trajcli.units import Quantity
@@ -95,13 +96,33 @@ def spline_through(rule: Rule, parameter: Parameter, points: PointTable, robot: 
             slopes[k] = chord
     rates = np.zeros_like(points.rates)
     rates[0, [0, -1]] = slopes
+    known = replace(points, rates=rates)
     try:
-        curve = curve_through(rule, replace(points, rates=rates), s)
+        curve = curve_through(rule, _bent_where_all_turn(known, s) if rule == "quintic" else known, s)
     except ShapeError as error:
         name = robot.joint_names[error.component]
         message = f"the velocity of {name} at the {error.end} point does not let the path be monotone there"
         raise PlanningError(Problem(message, "use rule not_a_knot", joint=name)) from None
     return JointPath(curve, s, np.zeros_like(q), (speeds[0], speeds[1]))
+
+
+def _bent_where_all_turn(points: PointTable, s: Array) -> PointTable:
+    """Return the points with the accelerations of parabolas where all joints turn back at once.
+
+    There the computed velocities and accelerations of a quintic vanish, and it would take infinite sd to
+    leave the point as fast as the joints can.
+    """
+    ends = points.rates[0, [0, -1]]
+    computed: Array = parabola_velocities(s, points.positions, *ends)
+    turning = np.logical_not(computed.any(axis=1))
+    turning[[0, -1]] = False
+    if not turning.any():
+        return points
+    slopes = np.diff(points.positions, axis=0) / np.diff(s)[:, None]
+    rates, given = points.rates.copy(), points.given.copy()
+    rates[1, 1:-1][turning[1:-1]] = (2 * np.diff(slopes, axis=0) / (s[2:] - s[:-2])[:, None])[turning[1:-1]]
+    given[1] = given[1] | turning
+    return replace(points, rates=rates, given=given)
 
 
 def _parameter_values(parameter: Parameter, points: PointTable) -> Array:
@@ -288,7 +309,7 @@ class TimeOptimal(ThroughPoints):
         points = self._untimed().waypoints(start, robot)
         moving = np.ptp(points.positions, axis=0) > 0
         if not moving.any():
-            return standstill(points.target, self.duration or 0.0, REMEDIES)
+            return self._in_one_point(start, points, robot)
         bounds = robot.limits.acceleration
         lacking = np.flatnonzero(moving & ~np.isfinite(bounds).all(axis=1))
         if lacking.size:
@@ -326,6 +347,27 @@ class TimeOptimal(ThroughPoints):
         )
         joints = JointConstraint(path.curve, limits.velocity, limits.acceleration)
         return PhasePlane(motion.law, (joints,), path.curve.breaks, motion.stops, dimension)
+
+    def _in_one_point(self, start: State, points: PointTable, robot: Robot) -> Planned:
+        """Return the move all of whose points are one.
+
+        Raises:
+            PlanningError: When the arm moves there, unless it has arrived already: no path leads back.
+        """
+        arrived = same_state(start, points.target) and not self.duration
+        if arrived or not points.rates.any():
+            return standstill(points.target, self.duration or 0.0, REMEDIES)
+        order, end = (int(k) for k in np.argwhere(points.rates[:, [0, -1]].any(axis=2))[0])
+        values = points.rates[order, [0, -1][end]]
+        joint = int(np.flatnonzero(values)[0])
+        message = (
+            f"{self.tag} {('starts', 'ends')[end]} with {{joint}} at {{value}}, but all its points are one: "
+            "no path leads out of a point and back to it"
+        )
+        hint = "give it a point between in `through`, or use jerk_limited"
+        value, name = float(values[joint]), robot.joint_names[joint]
+        amounts: Amounts = {"joint": name, "value": Amount(value, order + 1, joint)}
+        raise PlanningError(Problem(message, hint, joint=name, value=value, amounts=amounts))
 
     def _untimed(self) -> Self:
         """Return the move without the times of a recording: it is to be passed faster."""

@@ -1,0 +1,125 @@
+"""What a start outside its limits excuses, and nothing more: each mutant of a braking move is found."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from trajcli.checks.verify import verify
+from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.kinematics.robot import Limits
+from trajcli.trajectory import Promise, Span, State, Trajectory
+
+_FREE = np.tile([-np.inf, np.inf], (2, 1))
+
+
+def _limits(velocity=1.0, acceleration=2.0, jerk=4.0):
+    both = [np.array([[-b, b]] * 2) for b in (velocity, acceleration, jerk)]
+    return Limits(_FREE, *both)
+
+
+def _motion(velocity, acceleration, phases):
+    """Return a trajectory of two joints: the first by its (duration, jerk), the second at rest."""
+    rows, p, v, a = [], 0.0, velocity, acceleration
+    for t, j in phases:
+        rows.append([j / 6, a / 2, v, p])
+        p, v, a = p + v * t + a * t**2 / 2 + j * t**3 / 6, v + a * t + j * t**2 / 2, a + j * t
+    coefficients = np.zeros((4, len(rows), 2))
+    coefficients[:, :, 0] = np.array(rows).T
+    breaks = np.cumsum([0.0, *(t for t, _ in phases)])
+    curve = PiecewisePolynomial(breaks, coefficients)
+    start = State(np.zeros(2), np.array([velocity, 0.0]), np.array([acceleration, 0.0]))
+    end = State(np.array([p, 0.0]), np.array([v, 0.0]), np.array([a, 0.0]))
+    span = Span(0, "jerk_limited", 0.0, float(breaks[-1]), 2)
+    return Trajectory(curve, ("a", "b"), ("revolute", "revolute"), (span,), start, end)
+
+
+def _findings(trajectory, limits, braking="each"):
+    promise = Promise(ends=(trajectory.start, trajectory.end), braking=braking)
+    return [(f.joint, f.kind) for f in verify(trajectory, [limits], [promise]).findings]
+
+
+# from 3 rad/s: down with jerk -4 to -2 rad/s^2 (0.5 s, to 2.5), held for 1/2 s (to 1.5), up with jerk 4 (to 1)
+_BRAKES = [(0.5, -4.0), (0.5, 0.0), (0.5, 4.0)]
+
+
+def test_fastest_braking_passes():
+    brakes = [(0.5, -4.0), (0.75, 0.0), (0.5, 4.0)]  # inside after 1.25 s, at 0.5 rad/s in the end
+    assert _findings(_motion(3.0, 0.0, brakes), _limits()) == []
+
+
+def test_without_the_promise_it_is_over_its_limit():
+    brakes = [(0.5, -4.0), (0.75, 0.0), (0.5, 4.0)]
+    assert _findings(_motion(3.0, 0.0, brakes), _limits(), braking=None) == [("a", "velocity")]
+
+
+@pytest.mark.parametrize(
+    ("brakes", "kind"),
+    [
+        ([(0.01, 0.0), (0.5, -4.0), (0.75, 0.0), (0.5, 4.0)], "velocity"),  # begins late
+        (_BRAKES, "velocity"),  # eases off too early: inside at 1.5 s instead of 1.25 s
+        ([(0.5, -3.9), (0.85, 0.0), (0.5, 3.9)], "velocity"),  # not with all its jerk
+        ([(0.1, 4.0), (0.6, -4.0), (1.0, 0.0), (0.5, 4.0)], "velocity"),  # faster first
+        ([(0.5, -4.4), (0.6, 0.0), (0.5, 4.4)], "jerk"),  # too much jerk
+        (
+            [(0.6, -4.0), (0.4, 0.0), (0.5, 4.0)],
+            "acceleration",
+        ),  # too much acceleration, which the start keeps
+        ([(0.5, -4.0), (0.75, 0.0), (0.5, 4.0), (0.5, 4.0), (0.5, -4.0)], "velocity"),  # outside once more
+    ],
+)
+def test_mutants_are_found(brakes, kind):
+    assert ("a", kind) in _findings(_motion(3.0, 0.0, brakes), _limits())
+
+
+def test_acceleration_outside_is_excused_until_it_is_inside():
+    assert _findings(_motion(0.0, 3.0, [(0.75, -4.0)]), _limits(velocity=9.0)) == []
+    slow = _motion(0.0, 3.0, [(0.8, -3.75)])
+    assert _findings(slow, _limits(velocity=9.0)) == [("a", "acceleration")]
+    rising = _motion(0.0, 3.0, [(0.01, 4.0), (0.76, -4.0)])
+    assert _findings(rising, _limits(velocity=9.0)) == [("a", "acceleration")]
+
+
+def test_start_within_its_limits_excuses_nothing():
+    leaves = _motion(0.9, 0.0, [(0.5, 4.0), (1.0, -4.0), (0.5, 4.0)])
+    assert ("a", "velocity") in _findings(leaves, _limits())
+
+
+def test_another_joint_is_not_excused():
+    moving = _motion(3.0, 0.0, [(0.5, -4.0), (0.75, 0.0), (0.5, 4.0)])
+    both = moving.curve.coefficients.copy()
+    both[:, :, 1] = 0.0
+    both[2, :, 1] = 1.1  # the second joint is over its limit, too, and does not brake
+    both[3, :, 1] = 1.1 * moving.curve.breaks[:-1]
+    curve = PiecewisePolynomial(moving.curve.breaks, both)
+    start = State(moving.start.position, np.array([3.0, 1.1]), np.zeros(2))
+    end = State(
+        np.array([moving.end.position[0], 1.1 * curve.end]),
+        np.array([moving.end.velocity[0], 1.1]),
+        np.zeros(2),
+    )
+    trajectory = Trajectory(curve, moving.joint_names, moving.joint_types, moving.spans, start, end)
+    assert _findings(trajectory, _limits()) == [("b", "velocity")]
+
+
+def test_on_a_line_all_brake_as_the_tightest_joint_can():
+    """The second joint has a tenth of the way and a twentieth of the jerk: together they brake half as hard."""
+    slower = [(0.5 * 2, -2.0), (0.5, 0.0), (1.0, 2.0)]  # -2 rad/s^2 after 1 s, at 2; inside after 1.5 s
+    motion = _motion(3.0, 0.0, slower)
+    both = motion.curve.coefficients.copy()
+    both[:, :, 1] = both[:, :, 0] / 10
+    curve = PiecewisePolynomial(motion.curve.breaks, both)
+    states = [
+        State(
+            *(
+                np.array([getattr(s, k)[0], getattr(s, k)[0] / 10])
+                for k in ("position", "velocity", "acceleration")
+            )
+        )
+        for s in (motion.start, motion.end)
+    ]
+    trajectory = Trajectory(curve, motion.joint_names, motion.joint_types, motion.spans, *states)
+    limits = _limits()
+    limits = Limits(_FREE, limits.velocity, limits.acceleration, np.array([[-4.0, 4.0], [-0.2, 0.2]]))
+    assert _findings(trajectory, limits, "line") == []
+    assert _findings(trajectory, limits, "each") == [("a", "velocity")]

@@ -1,0 +1,68 @@
+"""Turns that a target leaves free, under limits of the tool's angular speed: known to the law, not only judged."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tool_jobs import LEFT, planned
+
+from trajcli.kinematics.jacobian import tcp_twist
+
+LIMITS = {"velocity": 50.0, "acceleration": 2000.0, "jerk": None}
+START = {"xyz": [0.4, 0.1, 0.05], "rpy": [np.pi, 0, 0], "configuration": LEFT}
+SHAPES = ["trapezoid", "quintic", "cycloidal", "time_optimal"]
+
+
+def turning(made):
+    """Return the largest angular speed of the tool at many times, rad/s."""
+    curve = made.trajectory.curve
+    t = np.linspace(0, curve.end, 4001)
+    twist = tcp_twist(made.moves[0].robot, curve.evaluate(t), curve.evaluate(t, 1))
+    return float(np.linalg.norm(twist[:, 3:], axis=1).max())
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize(
+    "free",
+    [{"direction": [0, 0, -1]}, {"yaw": 0.0, "tool_axis": "x"}, {"pitch": 0.3, "tool_axis": "x"}],
+    ids=["direction", "yaw", "pitch"],
+)
+def test_law_keeps_the_angular_speed_of_a_turn_that_the_target_leaves_free(shape, free):
+    tcp = {"speed": 5.0, "acceleration": 100.0, "angular_speed": 0.3, "angular_acceleration": 3.0}
+    move = {"planner": "line", "to": {"xyz": [0.1, 0.5, 0.25], **free}, "law": {"shape": shape}}
+    made = planned("ur5e", START, move, limits={**LIMITS, "tcp": tcp})
+    assert not made.verdict.findings
+    assert turning(made) <= 0.3 * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("shape", ["trapezoid", "time_optimal"])
+def test_free_orientation_of_a_small_arm(shape):
+    """A planar arm whose targets are points turns as its geometry has it."""
+    joint = {"a": 0.5}
+    robot = {"name": "planar", "convention": "standard", "joints": [joint, joint]}
+    tcp = {"speed": 5.0, "acceleration": 100.0, "angular_speed": 0.5, "angular_acceleration": 5.0}
+    move = {"planner": "line", "to": {"xyz": [0.1, 0.6, 0]}, "law": {"shape": shape}}
+    made = planned(robot, {"joints": [0.1, 0.8]}, move, limits={**LIMITS, "tcp": tcp})
+    assert not made.verdict.findings
+    assert 0.4 < turning(made) <= 0.5 * (1 + 1e-6)
+
+
+def test_without_a_limit_of_turning_the_law_is_that_of_the_position():
+    tcp = {"speed": 0.1, "acceleration": 2.0}
+    move = {"planner": "line", "to": {"xyz": [0.4, 0.3, 0.05], "direction": [0, 0, -1]}}
+    made = planned("ur5e", START, move, limits={**LIMITS, "tcp": tcp})
+    assert made.trajectory.duration == pytest.approx(0.2 / 0.1 + 0.1 / 2.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("shape", ["trapezoid", "time_optimal"])
+def test_even_turn_has_the_whole_angular_acceleration(shape):
+    """A yaw that is imposed turns a planar arm evenly: at the middle of a triangle half of the turn is done."""
+    joint = {"a": 0.5}
+    robot = {"name": "planar", "convention": "standard", "joints": [joint, joint, {"a": 0.1}]}
+    tcp = {"speed": 50.0, "acceleration": 1000.0, "angular_speed": 50.0, "angular_acceleration": 0.5}
+    start = {"xyz": [0.6, 0.1, 0], "yaw": 0.0, "tool_axis": "x", "configuration": {"elbow": "up"}}
+    to = {"xyz": [0.4, 0.4, 0], "yaw": 1.0, "tool_axis": "x"}
+    move = {"planner": "line", "to": to, "law": {"shape": shape}}
+    made = planned(robot, start, move, limits={**LIMITS, "tcp": tcp})
+    assert not made.verdict.findings
+    assert made.trajectory.duration == pytest.approx(2 * (1.0 / 0.5) ** 0.5, rel=2e-3)
