@@ -12,6 +12,7 @@ from benchmarks.forward_kinematics import ROWS as PUMA
 from benchmarks.forward_kinematics import configurations
 
 POSES = 10**5
+ARMS_OF_SEVEN = 1000  # poses of an arm with seven joints
 FEW = 2000  # poses that an iterating solver is asked for
 UR5E = (  # d, a, alpha of the standard rows; m and rad
     (0.1625, 0.0, pi / 2),
@@ -63,12 +64,57 @@ def toolbox():
     return lambda: [ets.ik_LM(pose, tol=1e-12) for pose in poses], lambda found: [8.0] * 8
 
 
+def _panda_poses(count):
+    """Return poses (count, 4, 4) of a Panda's flange at joints (count, 7) within its limits."""
+    import numpy as np
+
+    from trajcli.job.robot import load_robot
+    from trajcli.kinematics.forward import forward
+
+    robot = load_robot("panda")
+    low, high = robot.limits.position.T
+    return robot, forward(robot, np.random.default_rng(1).uniform(low, high, (count, 7)))
+
+
+def panda_together():
+    """Prepare our solution of redundant poses, all of them at once."""
+    from trajcli.kinematics.inverse.solve import solve
+
+    robot, poses = _panda_poses(ARMS_OF_SEVEN)
+    return lambda: solve(robot, poses), lambda found: found.within_limits.any(axis=1)[::100]
+
+
+def panda_alone():
+    """Prepare our solution of redundant poses, one after another."""
+    from trajcli.kinematics.inverse.solve import solve
+
+    robot, poses = _panda_poses(ARMS_OF_SEVEN // 10)
+    return lambda: [solve(robot, pose) for pose in poses], lambda found: [
+        bool(answers.within_limits.any()) for answers in found[::10]
+    ]
+
+
+def toolbox_panda(count):
+    """Prepare Robotics Toolbox's Levenberg-Marquardt for a Panda, one answer each within the limits."""
+    import numpy as np
+    import roboticstoolbox as rtb
+
+    robot = rtb.models.DH.Panda()
+    ets = robot.ets()
+    low, high = robot.qlim
+    poses = ets.eval(np.random.default_rng(1).uniform(low, high, (count, 7)))
+    return lambda: [ets.ik_LM(pose, tol=1e-12) for pose in poses], lambda found: [1.0] * 10
+
+
 ours_puma, ours_ur5e, ours_few = (
     partial(_ours, PUMA, POSES),
     partial(_ours, UR5E, POSES),
     partial(_ours, PUMA, FEW),
 )
 eaik_puma, eaik_ur5e = partial(_eaik, PUMA), partial(_eaik, UR5E)
+
+toolbox_panda_together = partial(toolbox_panda, ARMS_OF_SEVEN)
+toolbox_panda_alone = partial(toolbox_panda, ARMS_OF_SEVEN // 10)
 
 
 def figures(peers: str | None, *, long: bool) -> list[Figure]:
@@ -82,6 +128,10 @@ def figures(peers: str | None, *, long: bool) -> list[Figure]:
     peer = Function(peers, module, "toolbox", peer=True)
     runs = compete({"ours": Function(sys.executable, module, "ours_few"), "peer": peer})
     found.append(_figure(f"inverse kinematics of {FEW} poses, puma", "Robotics Toolbox ik_LM", runs, 1 / 50))
+    for kind, count, goal in (("alone", ARMS_OF_SEVEN // 10, 7.0), ("together", ARMS_OF_SEVEN, 2.0)):
+        peer = Function(peers, module, f"toolbox_panda_{kind}", peer=True)
+        runs = compete({"ours": Function(sys.executable, module, f"panda_{kind}"), "peer": peer})
+        found.append(_figure(f"{count} poses of a Panda, {kind}", "Robotics Toolbox ik_LM", runs, goal))
     call = ["-m", "trajcli", "ik", "--robot", "ur5e", "--pose", _POSE]
     contestants = {
         "ours": Command([sys.executable, *call]),

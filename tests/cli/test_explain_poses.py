@@ -129,7 +129,7 @@ def test_seven_joints_are_free_but_not_singular(capfd: Capture) -> None:
     assert (told["branch"], told["singular"]) == ({}, False)
     assert told["rank"] == {"here": 6, "nearby": 6}
     assert np.linalg.norm(told["free_direction"]) == pytest.approx(1)
-    assert "numeric" in told["method"]
+    assert told["method"].startswith("joint 7 held")
 
 
 def test_a_start_may_be_a_pose(capfd: Capture) -> None:

@@ -93,7 +93,7 @@ def test_one_robot_as_data(arms):
     assert len(told["ik"]["branches"]) == 8
     assert told["ik"]["reason"]
     assert (told["mobility"], told["kind"]) == (6, "6R")
-    assert arms.json("robots", "panda")["ik"]["family"] == "numeric"
+    assert arms.json("robots", "panda")["ik"]["family"] == "joint 7 held"
 
 
 @pytest.mark.parametrize("name", catalogue_names())

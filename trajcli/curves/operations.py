@@ -46,14 +46,16 @@ def merge_breaks(curves: Sequence[PiecewisePolynomial]) -> PiecewisePolynomial:
     order = np.lexsort((owners, times))
     united, index_of = _united(times[order], owners[order], apart)
     breaks = np.concatenate([[start], united, [end]])
-    split = []
+    owners = owners[order]
+    split, offsets = [], []
     for owner, curve in enumerate(curves):
-        starts = np.concatenate([[0], 1 + index_of[owners[order] == owner]])
+        starts = np.concatenate([[0], 1 + index_of[owners == owner]])
         piece = np.searchsorted(starts, np.arange(breaks.size - 1), "right") - 1
-        offset = breaks[:-1] - curve.breaks[piece]
-        offset[0] = 0.0
-        split.append(taylor_shift(curve.coefficients[:, piece, :], offset[:, None]))
-    return PiecewisePolynomial(breaks, _stacked(split))
+        split.append(curve.coefficients[:, piece, :])
+        offsets.append(breaks[:-1] - curve.breaks[piece])
+        offsets[-1][0] = 0.0
+    columns = np.repeat(np.stack(offsets, axis=1), [curve.dimension for curve in curves], axis=1)
+    return PiecewisePolynomial(breaks, taylor_shift(_stacked(split), columns))
 
 
 def _united(times: Array, owners: np.ndarray, apart: float) -> tuple[Array, np.ndarray]:
@@ -73,7 +75,12 @@ def _united(times: Array, owners: np.ndarray, apart: float) -> tuple[Array, np.n
 def _stacked(coefficients: Sequence[Array]) -> Array:
     """Return coefficients (degree + 1, pieces, n_i) side by side, filled up to the highest degree."""
     rows = max(block.shape[0] for block in coefficients)
-    filled = [np.pad(block, ((rows - block.shape[0], 0), (0, 0), (0, 0))) for block in coefficients]
+    filled = [
+        np.concatenate([np.zeros((rows - block.shape[0], *block.shape[1:])), block])
+        if block.shape[0] < rows
+        else block
+        for block in coefficients
+    ]
     return np.concatenate(filled, axis=2)
 
 

@@ -9,8 +9,10 @@ given duration with few phases), the constants change too, a thousand times less
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
+from itertools import pairwise
 from math import factorial
 
 import numpy as np
@@ -23,6 +25,7 @@ _ROUNDS = 12
 _RELUCTANCE = 1e-3
 _WEAK = 1e-5  # changes of constants with less than this influence on the end are left alone
 _LARGEST_STEP = 0.5
+_FACTORIALS = [np.array([[float(factorial(k))] for k in range(order, -1, -1)]) for order in range(4)]
 _LEVEL = 1e-9  # of the peak: an acceleration below this in a phase without jerk means a cruise
 
 
@@ -56,65 +59,69 @@ class PhaseChain:
         return float(self.durations.sum())
 
     @cached_property
-    def _walk(self) -> tuple[Array, Array]:
-        """The states (k + 1, order) before each phase and at the end, and what cruises had instead of 0."""
+    def _walk(self) -> tuple[list[list[float]], list[float]]:
+        """The states before each phase and at the end, (k + 1, order), and what cruises had instead of 0."""
         state = self.initial.tolist()
-        rows, leftover = [], []
-        for k, (time, constant) in enumerate(
-            zip(self.durations.tolist(), self.constants.tolist(), strict=True)
-        ):
-            if k in self.cruising:
+        rows, leftover, cruising = [], [], self.cruising
+        phases = zip(self.durations.tolist(), self.constants.tolist(), strict=True)
+        for k, (time, constant) in enumerate(phases):
+            if k in cruising:
                 leftover.append(state[-1])
                 state[-1] = 0.0
             rows.append(state)
             state = _after(state, constant, time)
-        return np.array([*rows, state]), np.array(leftover)
+        rows.append(state)
+        return rows, leftover
 
     @property
     def states(self) -> Array:
         """Derivatives of order 0 to `order` - 1 before each phase and at the end, shape (k + 1, order)."""
-        return self._walk[0]
+        return np.array(self._walk[0])
 
     @cached_property
-    def peaks(self) -> Array:
-        """Largest magnitude of each derivative at the ends of phases and in the target, shape (order,)."""
-        peaks: Array = np.fmax(np.abs(self.states).max(axis=0), np.abs(self.final))
-        return peaks
+    def peaks(self) -> tuple[float, ...]:
+        """Largest magnitude of each derivative at the ends of phases and in the target."""
+        reached = [max(map(abs, values)) for values in zip(*self._walk[0], strict=True)]
+        wanted = self.final.tolist()
+        return tuple(abs(b) if abs(b) > a else a for a, b in zip(reached, wanted, strict=True))
 
     @cached_property
-    def _rounding(self) -> Array:
+    def _rounding(self) -> list[float]:
         """What rounding is relative to: the peaks, or what the next derivative's peak adds up to."""
-        sizes = self.peaks.copy()
+        sizes = list(self.peaks)
         if self.order > 1:
             sizes[0] = max(sizes[0], sizes[1] * self.duration)
         if self.order > 2:
             driving = [time for k, time in enumerate(self.durations.tolist()) if k not in self.cruising]
             sizes[1] = max(sizes[1], sizes[2] * math.fsum(driving))
-        sizes[sizes == 0] = 1.0
-        return sizes
+        return [size or 1.0 for size in sizes]
 
     def with_cruises(self) -> PhaseChain:
         """Return the motion with its cruises marked: phases without jerk and without acceleration."""
         if self.order < 3:
             return self
-        level = (np.abs(self.states[:-1, -1]) <= _LEVEL * self.peaks[-1]) & (self.constants == 0)
-        return replace(self, cruising=frozenset(np.flatnonzero(level).tolist()))
+        level, states = _LEVEL * self.peaks[-1], self._walk[0]
+        constants = enumerate(self.constants.tolist())
+        cruising = frozenset(k for k, constant in constants if not constant and abs(states[k][-1]) <= level)
+        if not cruising:
+            return self
+        return PhaseChain(self.initial, self.final, self.durations, self.constants, cruising)
 
     def defect(self, duration: float | None = None) -> float:
         """Return by how much the end misses its target (and `duration`, if given).
 
         Rates count relative to their peaks, the position relative to peak velocity times duration.
         """
-        sizes = np.where(self.peaks > 0, self.peaks, 1.0)
+        sizes = [peak if peak > 0 else 1.0 for peak in self.peaks]
         sizes[0] = self._rounding[0]
-        return float(np.abs(self._residual(sizes, duration)).max(initial=0.0))
+        return _largest(self._residual(sizes, duration))
 
     @property
     def coarseness(self) -> float:
         """What rounding a break does to the derivative below the last, relative to its peak."""
         if self.order < 3 or not self.peaks[1]:
             return 0.0
-        return float(np.spacing(self.duration) * self.peaks[2] / self.peaks[1])
+        return math.ulp(self.duration) * self.peaks[2] / self.peaks[1]
 
     def stretched(self, duration: float) -> PhaseChain:
         """Return the motion over the same positions in `duration`; boundary derivatives must be zero."""
@@ -128,7 +135,7 @@ class PhaseChain:
             duration: Kept exactly if given; else the duration is free.
         """
         best = self.corrected(1.0, 0.0, duration)
-        if best.defect(duration) > 10 * _GOAL and duration is not None:
+        if duration is not None and best.defect(duration) > 10 * _GOAL:
             other = self.corrected(1.0, _RELUCTANCE, duration)
             best = min(best, other, key=lambda chain: chain.defect(duration))
         return best
@@ -143,29 +150,32 @@ class PhaseChain:
         if not self.durations.size:
             return PiecewisePolynomial(np.zeros(2), np.full((1, 1, 1), position))
         breaks = _rounded_breaks(self.durations.tolist(), duration)
-        lengths = np.diff(breaks)
-        chain = replace(self, durations=lengths, constants=self.constants * self.durations / lengths)
+        lengths = np.array([end - start for start, end in pairwise(breaks)])
+        constants = self.constants * self.durations / lengths
+        chain = PhaseChain(self.initial, self.final, lengths, constants, self.cruising)
         chain = chain.corrected(0.0, 1.0, None)
-        rows = np.stack([chain.constants, *chain._landing_states().T[::-1]])  # noqa: SLF001
-        rows /= np.array([factorial(k) for k in range(self.order, -1, -1)])[:, None]
+        states = zip(*chain._landing_states(), strict=True)  # noqa: SLF001
+        rows = np.array([chain.constants.tolist(), *reversed(list(states))])
+        rows /= _FACTORIALS[self.order]
         rows[-1] += position
-        return PiecewisePolynomial(breaks, rows[:, :, None])
+        return PiecewisePolynomial(np.array(breaks), rows[:, :, None])
 
-    def _landing_states(self) -> Array:
+    def _landing_states(self) -> list[list[float]]:
         """Return the states before each phase, (k, order), shifted from the longest on to meet the end."""
         longest = int(self.durations.argmax())
-        states = self.states[:-1].tolist()
+        states = [list(state) for state in self._walk[0][:-1]]
         phases = list(zip(self.constants.tolist(), self.durations.tolist(), strict=True))
-        lowest = 1 if np.isnan(self.final[0]) else 0
+        final = self.final.tolist()
+        lowest = 1 if math.isnan(final[0]) else 0
         highest = 0 if longest in self.cruising else self.order - 2
         for level in [*range(highest, lowest - 1, -1), None]:
             end = self._walk_on(states, phases, longest)
             if level is not None:
-                states[longest][level + 1] += (float(self.final[level]) - end[level]) / phases[longest][1]
-        shifted = np.array(states)
+                states[longest][level + 1] += (final[level] - end[level]) / phases[longest][1]
         if lowest == 0:
-            shifted[longest + 1 :, 0] += self.final[0] - end[0]
-        return shifted
+            for state in states[longest + 1 :]:
+                state[0] += final[0] - end[0]
+        return states
 
     def _walk_on(
         self, states: list[list[float]], phases: list[tuple[float, float]], first: int
@@ -187,32 +197,38 @@ class PhaseChain:
             yield_constant: The same for the constants.
             duration: Kept if given.
         """
-        chain, best, scales = self, self, self._rounding
+        scales = self._rounding
+        if _largest(self._residual(scales, duration)) <= _GOAL:
+            return self
+        chain, best = self, self
         weights = np.repeat([yield_duration, yield_constant], self.durations.size)
         weak, least = None if yield_duration else _WEAK, np.inf
         for _ in range(_ROUNDS):
             residual = chain._residual(scales, duration)
-            miss = float(np.abs(residual).max(initial=0.0))
+            miss = _largest(residual)
             if miss < least:
                 best, least = chain, miss
             if miss <= _GOAL:
                 break
             matrix = chain._sensitivity(scales, duration) * weights
-            step = weights * np.linalg.lstsq(matrix, -residual, rcond=weak)[0]
+            step = weights * np.linalg.lstsq(matrix, -np.array(residual), rcond=weak)[0]
             change = 1 + np.clip(step, -_LARGEST_STEP, _LARGEST_STEP).reshape(2, -1)
             chain = replace(
                 chain, durations=chain.durations * change[0], constants=chain.constants * change[1]
             )
         return best
 
-    def _residual(self, scales: Array, duration: float | None) -> Array:
+    def _residual(self, scales: Sequence[float], duration: float | None) -> list[float]:
         """Return by how much the end, the cruises and the duration miss what they should be."""
         states, leftover = self._walk
-        miss = ((states[-1] - self.final) / scales)[~np.isnan(self.final)]
-        total = [] if duration is None else [self.duration / duration - 1]
-        return np.concatenate([miss, leftover / scales[-1], total])
+        ends = zip(states[-1], self.final.tolist(), scales, strict=True)
+        miss = [(value - wanted) / scale for value, wanted, scale in ends if wanted == wanted]
+        miss += [value / scales[-1] for value in leftover]
+        if duration is not None:
+            miss.append(self.duration / duration - 1)
+        return miss
 
-    def _sensitivity(self, scales: Array, duration: float | None) -> Array:
+    def _sensitivity(self, scales: Sequence[float], duration: float | None) -> Array:
         """Return the derivative of the residual by the relative changes of durations and constants."""
         count, order = self.durations.size, self.order
         by_change = np.zeros((order, 2 * count))
@@ -225,15 +241,20 @@ class PhaseChain:
                 by_change[-1] = 0.0
             flow = _flow(time, order)
             by_change = flow[:, :order] @ by_change
-            by_change[:, k] += np.append(self.states[k + 1][1:], constant) * time
+            by_change[:, k] += np.append(self._walk[0][k + 1][1:], constant) * time
             by_change[:, count + k] += flow[:, order] * constant
-        rows = [*(by_change / scales[:, None])[~np.isnan(self.final)], *at_cruises]
+        rows = [*(by_change / np.array(scales)[:, None])[~np.isnan(self.final)], *at_cruises]
         if duration is not None:
             rows.append(np.concatenate([self.durations / duration, np.zeros(count)]))
         return np.array(rows)
 
 
-def _rounded_breaks(durations: list[float], end: float) -> Array:
+def _largest(values: Sequence[float]) -> float:
+    """Return the largest magnitude; NaN where there is one, 0 where there is none."""
+    return math.nan if any(map(math.isnan, values)) else max(map(abs, values), default=0.0)
+
+
+def _rounded_breaks(durations: list[float], end: float) -> list[float]:
     """Return breaks from 0 to `end`: all phases but the longest last at least as long as given."""
     longest = durations.index(max(durations))
     before, after = [0.0], [end]
@@ -243,18 +264,19 @@ def _rounded_breaks(durations: list[float], end: float) -> Array:
     for length in durations[:longest:-1]:
         time = after[-1] - length
         after.append(time if after[-1] - time >= length else math.nextafter(time, -math.inf))
-    return np.array(before + after[::-1])
+    return before + after[::-1]
 
 
-def _after(state: list[float], constant: float, time: float) -> list[float]:
+def _after(state: Sequence[float], constant: float, time: float) -> list[float]:
     """Return the derivatives `time` later, when the one of order len(state) is constant."""
-    later = []
-    for order in range(len(state)):
-        value = constant
-        for power in range(len(state) - order, 0, -1):
-            value = state[order + power - 1] + value * time / power
-        later.append(value)
-    return later
+    if len(state) == 3:
+        x, v, a = state
+        x += (v + (a + constant * time / 3) * time / 2) * time
+        return [x, v + (a + constant * time / 2) * time, a + constant * time]
+    if len(state) == 2:
+        x, v = state
+        return [x + (v + constant * time / 2) * time, v + constant * time]
+    return [state[0] + constant * time]
 
 
 def _flow(time: float, order: int) -> Array:

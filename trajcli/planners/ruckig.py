@@ -16,12 +16,13 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
-from itertools import product
+from itertools import islice, product
 from typing import Any, Literal
 
 import numpy as np
 
 from trajcli.curves.braking import braking
+from trajcli.curves.double_s import DoubleS, double_s_of, fastest_double_s
 from trajcli.curves.phases import PhaseChain
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount, Amounts, PlanningError, Problem
@@ -121,8 +122,9 @@ class PhaseProfile:
 
     def _names(self) -> list[str]:
         chain, names = self.chain, []
+        states = chain.states.tolist()
         for k, constant in enumerate(chain.constants.tolist()):
-            velocity, acceleration, jerk = (*chain.states[k][1:].tolist(), constant, 0.0, 0.0)[:3]
+            velocity, acceleration, jerk = (*states[k][1:], constant, 0.0, 0.0)[:3]
             speed = chain.peaks[1] if chain.order > 1 else 1.0
             if k < self.braking:
                 names.append("brake")
@@ -141,6 +143,9 @@ _COARSE = 1e-11  # the same: what rounding times may do to the velocity
 _ROUNDING = 1e-12
 _ROOM = 2e-10  # relative; a fifth of the tolerance with which limits are verified
 _SHARES = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)  # of acceleration and jerk: given up in turn
+_COMMON = 1e6  # times larger or smaller than 1 in SI: beyond it closed forms may overflow
+_SHORT = 1e-6  # of the longest phase: a shorter one may be what rounding leaves of none
+_LONG = 1e-4  # of the longest phase: rounding the ends of such a phase changes its constant by 1e-11
 _MARGINS = (0.0, 1e-14, 1e-13, 5e-13)  # of the acceleration limits: tried in turn where ruckig finds nothing
 
 
@@ -153,13 +158,20 @@ def fastest(problem: BoundaryProblem) -> PhaseProfile:
     return _solve(problem, None)
 
 
-def fastest_of(problem: BoundaryProblem, duration: float) -> PhaseProfile:
+def fastest_of(
+    problem: BoundaryProblem, duration: float, quickest: PhaseProfile | None = None
+) -> PhaseProfile:
     """Return the motion that lasts `duration`, or longer where none lasts just that long.
+
+    Args:
+        problem: Boundary states and bounds.
+        duration: Seconds.
+        quickest: Its fastest motion, where that is known already.
 
     Raises:
         PlanningError: When there is none.
     """
-    return _solve(problem, duration)
+    return _solve(problem, duration, quickest)
 
 
 def together(
@@ -183,18 +195,26 @@ def together(
         for k, problem in enumerate(problems):
             if chosen[k].duration == duration:
                 continue
-            chosen[k] = profiles[k] if profiles[k].duration == duration else fastest_of(problem, duration)
+            chosen[k] = (
+                profiles[k]
+                if profiles[k].duration == duration
+                else fastest_of(problem, duration, profiles[k])
+            )
             if chosen[k].duration > duration:
                 duration, agreed = chosen[k].duration, False
     return chosen
 
 
-def _solve(problem: BoundaryProblem, duration: float | None) -> PhaseProfile:
+def _solve(
+    problem: BoundaryProblem, duration: float | None, quickest: PhaseProfile | None = None
+) -> PhaseProfile:
     if problem.steady or (problem.done and duration is None):
         return _steady(problem, duration or 0.0)
-    if problem.rests and duration is not None:
-        return _slowed(problem, fastest(problem), duration)
-    return _solved_by_ruckig(problem, duration)
+    if not problem.rests:
+        return _solved_by_ruckig(problem, duration)
+    if duration is not None:
+        return _slowed(problem, quickest or fastest(problem), duration)
+    return _double_s(problem, None) or _solved_by_ruckig(problem, None)
 
 
 def _slowed(problem: BoundaryProblem, quickest: PhaseProfile, duration: float) -> PhaseProfile:
@@ -203,14 +223,45 @@ def _slowed(problem: BoundaryProblem, quickest: PhaseProfile, duration: float) -
     Full jerk for a tiny displacement in a long time would make phases that are too short for the resolution
     of time; these, and what ruckig cannot do, are done by stretching the fastest motion.
     """
-    try:
-        profile = _solved_by_ruckig(problem, duration)
-    except PlanningError:
-        profile = None
+    profile = _double_s(problem, duration)
+    if profile is None:
+        with suppress(PlanningError):
+            profile = _solved_by_ruckig(problem, duration)
     if profile is not None and profile.chain.coarseness <= _COARSE:
         return profile
     longer = max(duration, quickest.duration)
     return PhaseProfile(quickest.position, quickest.chain.stretched(longer), longer)
+
+
+def _double_s(problem: BoundaryProblem, duration: float | None) -> PhaseProfile | None:
+    """Return a motion from rest to rest in closed form; None where its numbers are not of common size.
+
+    Nor where the bounds of acceleration differ by direction, or where a phase is so short that it may be
+    rounding.
+    """
+    displacement = problem.displacement
+    (lowest, highest), (low, high), jerks = problem.bounds.tolist()
+    sizes = abs(displacement), highest if displacement > 0 else -lowest, high, min(-jerks[0], jerks[1])
+    if low != -high or not all(1 / _COMMON < size < _COMMON for size in sizes):
+        return None
+    distance, velocity, acceleration, jerk = sizes
+    if duration is None:
+        found: DoubleS | None = fastest_double_s(distance, velocity, acceleration, jerk)
+    else:
+        found = double_s_of(distance, duration, acceleration, jerk) if duration < _COMMON else None
+    if found is None:
+        return None
+    lengths, constants = found.phases(math.copysign(jerk, displacement))
+    if min(lengths) < _SHORT * max(lengths):
+        return None
+    final = np.array([displacement, 0.0, 0.0])
+    cruise = frozenset([len(lengths) // 2]) if found.cruising else frozenset[int]()
+    chain = PhaseChain(np.zeros(3), final, np.array(lengths), np.array(constants), cruise)
+    profile = PhaseProfile(problem.initial[0], chain, chain.duration)
+    if duration is not None and duration < profile.duration * (1 - _ROUNDING):
+        return None
+    profile, miss = _corrected(profile, duration)
+    return profile if miss <= _EXACT and _within(profile, problem.bounds) else None
 
 
 def _solved_by_ruckig(problem: BoundaryProblem, duration: float | None) -> PhaseProfile:
@@ -229,11 +280,31 @@ def _solved_by_ruckig(problem: BoundaryProblem, duration: float | None) -> Phase
 
 
 def _within(profile: PhaseProfile, bounds: Array) -> bool:
-    """Return whether velocity, acceleration and jerk at the ends of phases keep the bounds."""
+    """Return whether velocity, acceleration and jerk at the ends of phases keep the bounds.
+
+    Where all phases are long, rounding their ends changes less than half of the room: their states tell.
+    """
+    if profile.chain.order == 3 and _clearly_within(profile.chain, bounds.tolist()):
+        return True
     curve, room = profile.curve(), _ROOM * np.abs(bounds)
     ends = np.array([np.ravel(curve.piece_ends(order)) for order in (1, 2, 3)])
     low, high = (bounds + np.where(np.isfinite(room), room, 0.0) * [-1.0, 1.0]).T[:, :, None]
     return bool(((low <= ends) & (ends <= high)).all())
+
+
+def _clearly_within(chain: PhaseChain, bounds: Sequence[Sequence[float]]) -> bool:
+    """Return whether all phases are long, and their states keep the bounds with half of the room."""
+    times = chain.durations.tolist()
+    if not times or min(times) < _LONG * max(times):
+        return False
+    _, velocities, accelerations = zip(*chain.states.tolist(), strict=True)
+    for values, (low, high) in zip(
+        (velocities, accelerations, chain.constants.tolist()), bounds, strict=True
+    ):
+        room = 1 + 0.5 * _ROOM
+        if not (low * room <= min(values) and max(values) <= high * room):
+            return False
+    return True
 
 
 def _with_less(problem: BoundaryProblem, part: float) -> BoundaryProblem:
@@ -289,9 +360,9 @@ def _corrected(answer: PhaseProfile, duration: float | None) -> tuple[PhaseProfi
     """Return the motion corrected to end in its target, and by how much it still misses it."""
     free = answer.chain.polished()
     if duration is None or (answer.duration > duration * (1 + 1e-12) and free.duration > duration):
-        return replace(answer, chain=free, duration=free.duration), free.defect()
+        return PhaseProfile(answer.position, free, free.duration, answer.braking), free.defect()
     kept = answer.chain.polished(duration)
-    return replace(answer, chain=kept, duration=duration), kept.defect(duration)
+    return PhaseProfile(answer.position, kept, duration, answer.braking), kept.defect(duration)
 
 
 def _units(problem: BoundaryProblem, duration: float | None) -> Iterator[tuple[float, float]]:
@@ -300,6 +371,7 @@ def _units(problem: BoundaryProblem, duration: float | None) -> Iterator[tuple[f
     Its tolerances are absolute, and it refuses durations above 7600. Units that are powers of two change
     nothing else. Those of the problem itself come first.
     """
+    yield 1.0, 1.0
     bounds = np.abs(problem.bounds).min(axis=1)
     change, distance = abs(problem.final[1] - problem.initial[1]), abs(problem.displacement)
     times = [
@@ -309,9 +381,8 @@ def _units(problem: BoundaryProblem, duration: float | None) -> Iterator[tuple[f
         (distance / bounds[2]) ** (1 / 3),
     ]
     time = 2.0 ** round(math.log2(duration or max(times) or 1.0))
-    for power in (0, 8, -8, 16, -16):
-        for time_unit in (1.0, time / 1024, time):
-            yield time_unit, 2.0**power
+    units = product((0, 8, -8, 16, -16), (1.0, time / 1024, time))
+    yield from ((time_unit, 2.0**power) for power, time_unit in islice(units, 1, None))
 
 
 def _call_ruckig(
@@ -321,17 +392,22 @@ def _call_ruckig(
     import ruckig
 
     lead = _lead(problem)
-    initial, waited = lead.states[-1, 1:].tolist(), lead.duration
-    units = np.array([length_unit / time_unit**order for order in range(4)])
+    initial = problem.initial[1:] if lead is None else (*lead.states[-1, 1:].tolist(), 0.0)
+    waited = 0.0 if lead is None else lead.duration
+    units = [length_unit / time_unit**order for order in range(4)]
+    _, velocity, acceleration, _ = units
+    lower, upper = (
+        [value / unit for value, unit in zip(values, units[1:], strict=True)]
+        for values in problem.bounds.T.tolist()
+    )
     wanted = ruckig.InputParameter(1)
     interfaces = ruckig.ControlInterface
     wanted.control_interface = interfaces.Position if problem.control == "position" else interfaces.Velocity
     wanted.current_position, wanted.target_position = [0.0], [problem.displacement / length_unit]
-    lower, upper = (problem.bounds / units[1:, None]).T.tolist()
-    wanted.current_velocity = [initial[0] / units[1]]
-    wanted.current_acceleration = [(*initial, 0.0)[1] / units[2]]
-    wanted.target_velocity = [_inside(problem.final[1] / units[1], lower[0], upper[0])]
-    wanted.target_acceleration = [_inside(problem.final[2] / units[2], lower[1], upper[1])]
+    wanted.current_velocity = [initial[0] / velocity]
+    wanted.current_acceleration = [initial[1] / acceleration]
+    wanted.target_velocity = [_inside(problem.final[1] / velocity, lower[0], upper[0])]
+    wanted.target_acceleration = [_inside(problem.final[2] / acceleration, lower[1], upper[1])]
     wanted.min_velocity, wanted.max_velocity = [lower[0]], [upper[0]]
     wanted.min_acceleration, wanted.max_acceleration = [lower[1]], [upper[1]]
     wanted.max_jerk = [min(-lower[2], upper[2])]
@@ -347,13 +423,12 @@ def _call_ruckig(
     return _profile(problem, answer, time_unit, units, lead)
 
 
-def _lead(problem: BoundaryProblem) -> PhaseChain:
-    """Return the phases that bring the start inside the bounds where ruckig does not do it."""
-    initial = np.array([0.0, *problem.initial[1:]])
-    phases: Sequence[tuple[float, float]] = ()
-    if problem.brake and problem.control == "velocity":
-        phases = braking(*problem.initial[1:], problem.bounds).phases
-        initial = initial[: problem.order]
+def _lead(problem: BoundaryProblem) -> PhaseChain | None:
+    """Return the phases that bring the start inside the bounds; None where ruckig does it, or none do."""
+    if not problem.brake or problem.control != "velocity":
+        return None
+    phases = braking(*problem.initial[1:], problem.bounds).phases
+    initial = np.array([0.0, *problem.initial[1:]])[: problem.order]
     times, constants = np.array(phases).reshape(-1, 2).T
     return PhaseChain(initial, np.full_like(initial, np.nan), times, constants)
 
@@ -368,8 +443,8 @@ def _profile(
     problem: BoundaryProblem,
     answer: Any,  # noqa: ANN401
     time_unit: float,
-    units: Array,
-    lead: PhaseChain,
+    units: Sequence[float],
+    lead: PhaseChain | None,
 ) -> PhaseProfile:
     """Return the phases of ruckig's answer in SI; those of length zero are left out."""
     profile, order = answer.profiles[0][0], problem.order
@@ -377,12 +452,13 @@ def _profile(
     phases = [
         [(t * time_unit, c * units[order]) for t, c in zip(*part, strict=False) if t > 0] for part in parts
     ]
-    phases[0] = [*zip(lead.durations.tolist(), lead.constants.tolist(), strict=True), *phases[0]]
+    if lead is not None:
+        phases[0] = [*zip(lead.durations.tolist(), lead.constants.tolist(), strict=True), *phases[0]]
     lengths, constants = np.array([phase for part in phases for phase in part]).reshape(-1, 2).T
     initial = np.array([0.0, *problem.initial[1:]])[:order]
     final = np.array([problem.displacement, *problem.final[1:]])[:order]
     if problem.control == "velocity":
         final[0] = np.nan
     chain = PhaseChain(initial, final, lengths, constants).with_cruises()
-    duration = answer.duration * time_unit + lead.duration
+    duration = answer.duration * time_unit + (0.0 if lead is None else lead.duration)
     return PhaseProfile(problem.initial[0], chain, duration, len(phases[0]))

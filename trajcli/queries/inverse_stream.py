@@ -26,7 +26,9 @@ from trajcli.streams.table import TableBlocks
 
 _AHEAD = 256  # rows that are looked at together at most, where one branch stays the nearest
 _FEW = 8  # rows that are looked at together at first
-_STAYS = 3  # rows on one branch before more are looked at together: poses at random do not stay
+_STAYS = 5  # rows on one branch, after which it is the only one that is followed
+_TOGETHER = 128  # rows whose branches are all compared with those of the rows before
+_HALF = 3.14159  # rad: closer than this no other turn is nearer
 _CLOSE = 0.2  # rad or m: a larger step may have missed a nearer answer, so all are sought
 _AXES, _QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
 
@@ -137,7 +139,10 @@ class _Follower:
             self._usable = self._solutions.within_limits
             alone = self._solutions.singular.any(axis=-1) | ~self._usable.any(axis=-1)
             self._alone: Flags = np.asarray(alone)
-            self._ahead, self._branch, self._stayed = _FEW, -1, 0
+            self._ahead, self._stays = _FEW, False
+            self._table, self._table_start = list[list[int]](), 0
+            self._bounds: list[list[float]] = widened(self._solutions.bounds).T.tolist()
+            self._turning_joints = np.flatnonzero(self._turning).tolist()
             self._prepare_turns(self._solutions)
 
     def _prepare_turns(self, solutions: Solutions) -> None:
@@ -165,17 +170,68 @@ class _Follower:
         if self._alone[row]:
             return self._solved_alone(row, last)[None]
         answers, branch = self._nearest(self._solutions, row, last)
-        self._stayed = self._stayed + 1 if branch == self._branch else 0
-        self._branch = branch
-        if self._stayed < _STAYS:
-            self._ahead = _FEW
+        if row + 1 == len(self._alone):
             return answers
-        more = self._on_one_branch(self._solutions, row + 1, answers[0]) if row + 1 < len(self._alone) else ()
-        if not len(more):
-            self._ahead = _FEW
-            return answers
-        self._ahead = min(2 * self._ahead, _AHEAD) if len(more) == self._ahead else _FEW
-        return np.concatenate([answers, more])
+        if self._stays:
+            more = self._on_one_branch(self._solutions, row + 1, answers[0])
+            self._stays = len(more) > 0
+            self._ahead = min(2 * self._ahead, _AHEAD) if len(more) == self._ahead else _FEW
+        else:
+            more = self._across_branches(self._solutions, row + 1, answers[0], branch)
+        return np.concatenate([answers, more]) if len(more) else answers
+
+    def _across_branches(self, solutions: Solutions, row: int, last: Array, branch: int) -> Array:
+        """Return the answers of some rows from `row` on, which start from a branch of the row before.
+
+        The answer that is nearest but for full turns is the nearest, where the turn next to the row before is
+        inside the limits. Plain numbers: arrays of six cost more than the work on them.
+        """
+        if not self._table_start <= row < self._table_start + len(self._table):
+            self._table, self._table_start = self._nearest_branches(solutions, row), row
+        answers: list[list[float]] = []
+        values, stayed, start = last.tolist(), 0, self._table_start
+        for k in range(row, start + len(self._table)):
+            if self._alone[k]:
+                break
+            nearest = self._table[k - start][branch]
+            turned = self._turned(solutions.joints[k, nearest].tolist(), values)
+            if turned is None:
+                rows, nearest = self._nearest(solutions, k, np.array(values))
+                turned = rows[0].tolist()
+            stayed = stayed + 1 if nearest == branch else 0
+            values, branch = turned, nearest
+            answers.append(values)
+            if stayed == _STAYS:
+                self._stays = True
+                break
+        return np.array(answers)
+
+    def _turned(self, joints: list[float], last: list[float]) -> list[float] | None:
+        """Return an answer in the turns next to the row before; None where one is outside its limits."""
+        low, high = self._bounds
+        for j in self._turning_joints:
+            gap = last[j] - joints[j]
+            if -_HALF < gap < _HALF:
+                continue
+            turn = round(gap / FULL)
+            joints[j] += FULL * turn
+            if not low[j] <= joints[j] <= high[j]:
+                return None
+        return joints
+
+    def _nearest_branches(self, solutions: Solutions, row: int) -> list[list[int]]:
+        """Return the nearest branch of some rows from `row` on, for each branch of the row before."""
+        joints = solutions.joints[row - 1 : row + _TOGETHER]
+        usable = self._usable[row : row + _TOGETHER]
+        farthest = np.zeros((len(usable), joints.shape[1], joints.shape[1]))  # (rows, from, to)
+        for values, turns in zip(np.moveaxis(joints, -1, 0), self._turning, strict=True):
+            gap = values[1:, None, :] - values[:-1, :, None]
+            if turns:
+                gap -= FULL * np.rint(gap * (1.0 / FULL))
+            np.maximum(farthest, np.abs(gap, out=gap), out=farthest)
+        farthest += np.where(usable, 0.0, np.inf)[:, None]
+        nearest: list[list[int]] = farthest.argmin(axis=2).tolist()
+        return nearest
 
     def _on_one_branch(self, solutions: Solutions, row: int, last: Array) -> Array:
         """Return the answers while one branch stays the nearest and inside the limits; maybe none."""

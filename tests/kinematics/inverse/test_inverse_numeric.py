@@ -47,7 +47,7 @@ def test_general_arms_are_solved_within_their_limits(name):
     robot = arm_named(name)
     _, poses = reachable(robot, np.random.default_rng(8), 10)
     found = solve(robot, poses)
-    assert method_for(robot).family == "numeric"
+    assert method_for(robot).family == ("numeric" if name in ("C-sawyer", "C-xarm6") else "joint 7 held")
     assert found.within_limits.any(axis=1).all()
     off = np.abs(forward(robot, found.joints) - poses[:, None]).max(axis=(-2, -1))
     assert off[found.valid].max() < 1e-9

@@ -12,7 +12,8 @@ from trajcli.curves.piecewise import Array
 from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.families.method import Branch, IkMethod
-from trajcli.kinematics.inverse.numeric import refine
+from trajcli.kinematics.inverse.link_products import poses_and_jacobians
+from trajcli.kinematics.inverse.numeric import FEW, refine
 from trajcli.kinematics.inverse.target import IkTarget, closure_of
 from trajcli.kinematics.robot import Robot
 
@@ -82,7 +83,10 @@ def closures(robot: Robot, target: IkTarget, joints: Array) -> Array:
     """Return how far joints (n, branches, N) are from flat targets, shape (2, branches, N)."""
     count, branches, poses = joints.shape
     repeated = target.rows(np.tile(np.arange(poses), branches))
-    closure = closure_of(repeated, forward(robot, joints.reshape(count, -1).T))
+    values = joints.reshape(count, -1).T
+    few = len(values) <= FEW and count > target.coordinates
+    poses_there = poses_and_jacobians(robot, values)[0] if few else forward(robot, values)
+    closure = closure_of(repeated, poses_there)
     return closure.T.reshape(2, branches, poses).copy()
 
 

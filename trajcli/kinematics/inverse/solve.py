@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -85,6 +86,8 @@ def _answers(
 ) -> Answers:
     """Return the answers of the method that fits the arm and the targets."""
     method = method_for(robot)
+    if method.held is not None:
+        return _by_held_joint(robot, method, target, near, tolerance)
     if method.solve is None:
         return _by_search(robot, method, target, near, tolerance)
     if fits(method, target, robot.base):
@@ -197,20 +200,75 @@ def _by_search(
     valid = searched.met.T & (closures(robot, target, joints).max(axis=0) <= tolerance)
     choose_turns(robot, joints, None if near is None else near.T)
     aim = np.zeros((len(target.poses), len(joints))) if near is None else near
-    within = _SAME_ROOT
     if freedom:
         seeds, rows = np.nonzero(valid)
         moved = nearest_on_self_motions(robot, target.rows(rows), joints[:, seeds, rows].T, aim[rows])
-        joints[:, seeds, rows], within = moved.T, _SAME_POINT
+        joints[:, seeds, rows] = moved.T
+    return _nearest_first(robot, method, target, aim, joints, valid, freedom, tolerance)
+
+
+def _by_held_joint(
+    robot: Robot, method: IkMethod, target: IkTarget, near: Array | None, tolerance: float
+) -> Answers:
+    """Return the answers of a redundant arm by the closed form that it has with its last joint held.
+
+    Where that has no answer within the limits, the search goes on from seeds.
+    """
+    if not target.whole:
+        return _by_search(robot, numeric_instead(method, target), target, near, tolerance)
+    from trajcli.kinematics.inverse.held_joint import points_by_held_joint
+
+    aim = np.zeros((len(target.poses), len(robot.joints))) if near is None else near
+    joints, valid = points_by_held_joint(robot, method, target, aim)
+    answers = _nearest_first(robot, method, target, aim, joints, valid, 1, tolerance)
+    inside = (beyond(answers.joints.T, robot.limits.position) == 0.0).all(axis=-1).T
+    rows = np.flatnonzero(~(answers.valid & inside).any(axis=0))
+    if len(rows):
+        nearby = None if near is None else near[rows]
+        searched = _by_search(robot, method, target.rows(rows), nearby, tolerance)
+        answers = _with_rows(answers, rows, searched)
+    return answers
+
+
+def _with_rows(answers: Answers, rows: NDArray[np.intp], others: Answers) -> Answers:
+    """Return the answers with those of some poses replaced."""
+    most = max(answers.valid.shape[0], others.valid.shape[0])
+    arrays = []
+    for name in ("joints", "closure", "valid"):
+        own, other = (getattr(some, name) for some in (answers, others))
+        own, other = (_filled(array, most) for array in (own, other))
+        own[..., rows] = other
+        arrays.append(own)
+    return replace(answers, joints=arrays[0], closure=arrays[1], valid=arrays[2])
+
+
+def _filled(array: NDArray[Any], branches: int) -> NDArray[Any]:
+    """Return (..., branches, N) with more branches: repetitions of the last, or none that are valid."""
+    missing = branches - array.shape[-2]
+    more = np.repeat(array[..., -1:, :], missing, axis=-2)
+    return np.concatenate([array, more & False if more.dtype == bool else more], axis=-2)
+
+
+def _nearest_first(
+    robot: Robot,
+    method: IkMethod,
+    target: IkTarget,
+    aim: Array,
+    joints: Array,
+    valid: Flags,
+    freedom: int,
+    tolerance: float,
+) -> Answers:
+    """Return joints (n, branches, N) that meet flat targets, the nearest to `aim` (N, n) first."""
     closure = closures(robot, target, joints)
-    valid &= closure.max(axis=0) <= tolerance
+    valid = valid & (closure.max(axis=0) <= tolerance)
     outside = (beyond(joints.T, robot.limits.position) != 0.0).any(axis=-1).T
     distance = np.abs(joints - aim.T[:, None])
     cost = np.square(distance).sum(axis=0) if freedom else distance.max(axis=0)
     cost = cost + np.where(outside, _LAST, 0.0)
     order = np.argsort(np.where(valid, cost, 2 * _LAST + closure.sum(axis=0)), axis=0, kind="stable")
     joints, valid = _ordered(joints, order), _ordered(valid, order)
-    valid = distinct(robot, joints.transpose(2, 1, 0), valid.T, within).T
+    valid = distinct(robot, joints.transpose(2, 1, 0), valid.T, _SAME_POINT if freedom else _SAME_ROOT).T
     crowded = np.flatnonzero(valid.sum(axis=0) > _KEPT)
     if len(crowded) and not freedom:  # points of one family would leave no room for other answers
         valid[:, crowded] = _one_of_each_family(

@@ -8,6 +8,7 @@ import numpy as np
 
 from trajcli.kinematics.dexterity import RANK_TOLERANCE, characteristic_length
 from trajcli.kinematics.inverse.families import planar, positioning, spherical_wrist, three_parallel
+from trajcli.kinematics.inverse.families.held_joint import without_last_joint
 from trajcli.kinematics.inverse.families.method import IkMethod
 from trajcli.kinematics.inverse.families.screw_axes import AxisGeometry, axis_geometry
 from trajcli.kinematics.jacobian import jacobian
@@ -36,7 +37,21 @@ def method_for(robot: Robot) -> IkMethod:
         method = match(arm)
         if method is not None and _every_joint_counts(robot, method):
             return method
-    return numeric_method(arm)
+    return _held_method(robot) or numeric_method(arm)
+
+
+def _held_method(robot: Robot) -> IkMethod | None:
+    """Return the method of seven joints whose first six have a closed form; None for other arms."""
+    held = without_last_joint(robot)
+    method = None if held is None else method_for(held)
+    if method is None or method.solve is None:
+        return None
+    last = robot.joint_names[-1]
+    reason = (
+        f"with {last} held {method.reason}; seven joints are more than the six coordinates of a pose: "
+        f"the answers are a family, whose points nearest to the given configuration are found by {last}"
+    )
+    return IkMethod(f"joint 7 held: {method.name}", "joint 7 held", (), reason, held=held)
 
 
 def _every_joint_counts(robot: Robot, method: IkMethod) -> bool:

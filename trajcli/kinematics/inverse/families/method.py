@@ -9,6 +9,7 @@ from typing import Literal
 from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.inverse.families.screw_axes import Displacement, Floats
 from trajcli.kinematics.inverse.families.subproblems import DegeneracyFlags, Value
+from trajcli.kinematics.robot import Robot
 
 Choice = Literal["shoulder", "elbow", "wrist"]
 Solver = Callable[[Displacement, DegeneracyFlags], Sequence[Value]]
@@ -42,6 +43,8 @@ class IkMethod:
         idle: A direction in the base along which the position does not matter to the closed form; None
             where all of it does.
         labels: Names of the solutions where one name may have several.
+        held: The arm without its last joint, where that has a closed form: one joint more than six is held
+            at sample values.
     """
 
     name: str
@@ -52,6 +55,7 @@ class IkMethod:
     needs: Literal["pose", "position"] = "pose"
     idle: Floats | None = None
     labels: tuple[Branch, ...] = ()
+    held: Robot | None = None
 
     @property
     def branches(self) -> tuple[Branch, ...]:

@@ -1,0 +1,139 @@
+"""Arms of seven joints whose first six have a closed form: recognised by axes, solved by the last joint."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from trajcli.geometry.rotation import exp
+from trajcli.job.robot import load_robot
+from trajcli.kinematics.forward import forward
+from trajcli.kinematics.inverse.families.choose import method_for
+from trajcli.kinematics.inverse.families.held_joint import poses_for_the_others, without_last_joint
+from trajcli.kinematics.inverse.link_products import poses_and_jacobians
+from trajcli.kinematics.inverse.numeric import search
+from trajcli.kinematics.inverse.self_motion import nearest_on_self_motions
+from trajcli.kinematics.inverse.solve import solve
+from trajcli.kinematics.inverse.target import pose_target
+from trajcli.kinematics.robot import Joint, Robot
+
+PANDA = load_robot("panda")
+READY = np.array([0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8])
+# the Panda's axes in standard rows, of other names, counted the other way in joints 2 and 7
+STANDARD = tuple(
+    Joint(f"axis {k}", d=d, a=a, alpha=alpha * np.pi / 2, sign=-1 if k in (2, 7) else 1)
+    for k, (d, a, alpha) in enumerate(
+        [
+            (0.333, 0.0, -1),
+            (0.0, 0.0, 1),
+            (0.316, 0.0825, 1),
+            (0.0, -0.0825, -1),
+            (0.384, 0.0, 1),
+            (0.0, 0.088, 1),
+            (0.107, 0.0, 0),
+        ],
+        1,
+    )
+)
+
+
+def moved(position: tuple[float, float, float], turn: tuple[float, float, float]) -> np.ndarray:
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = exp(np.array(turn)), position
+    return pose
+
+
+def random_joints(robot: Robot, count: int, seed: int = 1) -> np.ndarray:
+    low, high = robot.limits.position.T
+    return np.random.default_rng(seed).uniform(low, high, (count, 7))
+
+
+OTHER = replace(
+    PANDA,
+    name="nobody's",
+    convention="standard",
+    joints=STANDARD,
+    base=moved((0.1, 0.2, 0.3), (0.4, -0.2, 1.0)),
+    tool=moved((0.02, 0.0, 0.1), (0.1, 0.7, -0.3)),
+    limits=replace(PANDA.limits, position=np.tile([-2.9, 2.9], (7, 1))),
+)
+ARMS = {"panda": PANDA, "the same axes in other rows": OTHER}
+
+
+@pytest.mark.parametrize("robot", ARMS.values(), ids=ARMS)
+def test_the_geometry_is_recognised_by_its_axes(robot: Robot) -> None:
+    assert method_for(robot).family == "joint 7 held"
+
+
+def test_an_arm_whose_shoulder_does_not_meet_is_not_taken_for_one() -> None:
+    joints = list(PANDA.joints)
+    joints[1] = replace(joints[1], a=0.01)
+    assert method_for(replace(PANDA, joints=tuple(joints))).family == "numeric"
+
+
+@pytest.mark.parametrize("robot", ARMS.values(), ids=ARMS)
+def test_the_six_others_reach_what_is_left_of_the_pose(robot: Robot) -> None:
+    held, q = without_last_joint(robot), random_joints(robot, 20)
+    assert held is not None
+    left = poses_for_the_others(robot, forward(robot, q), q[:, -1])
+    np.testing.assert_allclose(forward(held, q[:, :-1]), left, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("robot", ARMS.values(), ids=ARMS)
+def test_poses_are_met_within_the_limits_and_their_joints_recovered(robot: Robot) -> None:
+    q = random_joints(robot, 100)
+    poses = forward(robot, q)
+    found = solve(robot, poses, q)
+    best = found.nearest(q)
+    assert (best >= 0).all()
+    np.testing.assert_allclose(found.joints[np.arange(100), best], q, rtol=0, atol=1e-9)
+    off = np.abs(forward(robot, found.joints) - poses[:, None]).max(axis=(-2, -1))
+    assert off[found.valid].max() < 1e-10
+    assert found.closure[found.valid].max() < 1e-10
+
+
+@pytest.mark.parametrize("robot", ARMS.values(), ids=ARMS)
+def test_no_seed_of_a_search_leads_nearer(robot: Robot) -> None:
+    poses = forward(robot, random_joints(robot, 6, seed=2))
+    target, near = pose_target(poses), np.broadcast_to(READY, (6, 7))
+    found = solve(robot, poses, READY)
+    gaps = np.square(found.joints - READY).sum(axis=-1)
+    ours = np.where(found.within_limits, gaps, np.inf).min(axis=1)
+    searched = search(robot, target, near)
+    rows, seeds = np.nonzero(searched.met)
+    ends = nearest_on_self_motions(robot, target.rows(rows), searched.joints[rows, seeds], near[rows])
+    theirs = np.square(ends - READY).sum(axis=1)
+    for row in range(6):
+        assert ours[row] <= theirs[rows == row].min() + 1e-9
+
+
+def test_a_pose_at_the_edge_of_the_limits_is_met() -> None:
+    low, high = PANDA.limits.position.T
+    ends = np.array([low, high, np.where(np.arange(7) % 2, low, high)])
+    poses = forward(PANDA, ends)
+    found = solve(PANDA, poses, ends)
+    assert found.within_limits.any(axis=1).all()
+
+
+def test_a_pose_out_of_reach_has_no_answer_and_says_how_far_it_is() -> None:
+    pose = forward(PANDA, READY)
+    pose[:3, 3] = [1.5, 0.0, 0.333]
+    found = solve(PANDA, pose, READY)
+    assert not found.valid.any()
+    assert found.shortfall[0] > 0.3
+
+
+@pytest.mark.parametrize("name", ["panda", "stanford", "cobra600", "irb120"])
+def test_products_of_matrices_agree_with_differences_of_poses(name: str) -> None:
+    robot = load_robot(name)
+    q = np.random.default_rng(3).uniform(-1.0, 1.0, (3, len(robot.joints)))
+    poses, slopes = poses_and_jacobians(robot, q)
+    np.testing.assert_allclose(poses, forward(robot, q), rtol=0, atol=1e-15 * 10)
+    for joint, step in enumerate(1e-6 * np.eye(len(robot.joints))):
+        change = (forward(robot, q + step) - forward(robot, q - step)) / 2e-6
+        np.testing.assert_allclose(slopes[:, :3, joint], change[:, :3, 3], rtol=0, atol=1e-8)
+        spin = change[:, :3, :3] @ np.swapaxes(poses[:, :3, :3], 1, 2)
+        turning = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
+        np.testing.assert_allclose(slopes[:, 3:, joint], turning, rtol=0, atol=1e-8)
