@@ -151,9 +151,8 @@ def test_a_file_that_fails_its_check_does_not_appear(tmp_path, monkeypatch, digi
     def off(rows, whole_numbers):
         return encode(rows + 1e-8 * (np.arange(rows.size).reshape(rows.shape) == 2345), whole_numbers)
 
-    name = f"encode_{digits}"
-    encode = getattr(csv, name)
-    monkeypatch.setattr(csv, name, off)
+    encode = csv.encoder_of(digits)
+    monkeypatch.setattr(csv, "encoder_of", lambda _: off)
     with pytest.raises(TrajcliError, match="read back says"):
         write_verified(tmp_path / "out.csv", blocks_of(table()), COLUMNS, digits)
     assert list(tmp_path.iterdir()) == []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from typing import BinaryIO
 
@@ -11,7 +11,7 @@ import numpy as np
 from trajcli.columns import Column, whole_number_columns
 from trajcli.curves.piecewise import Array
 from trajcli.errors import TrajcliError
-from trajcli.streams.decimals import Digits, NotFixedError, encode_fixed, encode_full, scan_fixed
+from trajcli.streams.decimals import Digits, NotFixedError, encode_fixed, scan_fixed
 from trajcli.streams.number_cells import scan_decimals
 
 _CHUNK = 1 << 18  # bytes read back at a time
@@ -40,7 +40,7 @@ def write_csv_blocks(
     rows: Iterable[Array], columns: Sequence[Column], out: BinaryIO, digits: Digits = "fixed"
 ) -> Iterator[Array]:
     """Write as `write_csv`, and yield each block as soon as its text has left for `out`."""
-    encode = encode_fixed if digits == "fixed" else encode_full
+    encode = encoder_of(digits)
     whole_numbers = whole_number_columns(columns)
     out.write(_header(columns).encode())
     written = 0
@@ -74,6 +74,16 @@ def verify_csv(
             _compare(blocks.take(len(block), count), block, columns, count, digits)
         count += len(block)
     blocks.expect_end(count)
+
+
+def encoder_of(digits: Digits) -> Callable[[Array, Sequence[int]], bytes]:
+    """Return the function that makes lines of rows (N, m), given which columns are whole numbers."""
+    if digits == "fixed":
+        return encode_fixed
+    # nobody else pays for the import
+    from trajcli.streams.shortest_digits import encode_full
+
+    return encode_full
 
 
 def _header(columns: Sequence[Column]) -> str:

@@ -203,7 +203,7 @@ def _long_scaled(units: _LongWords, decimals: NDArray[np.int64]) -> tuple[Array,
     power, power_rest = _POWERS[np.abs(decimals)], _POWER_RESTS[np.abs(decimals)]
     divided = decimals >= 0
     quotient = np.where(divided, high / power, high)
-    product, error = _exact_product(quotient, power)
+    product, error = exact_product(quotient, power)
     corrected = (high - product) - error + (low - quotient * power_rest)
     rest = np.where(divided, corrected / power, error + (low * power + high * power_rest))
     leading = np.where(divided, quotient, product)
@@ -215,8 +215,8 @@ def _long_scaled(units: _LongWords, decimals: NDArray[np.int64]) -> tuple[Array,
     return values, unsure
 
 
-def _exact_product(first: Array, second: Array) -> tuple[Array, Array]:
-    """Return the rounded product and its error, which together are exact."""
+def exact_product(first: Array, second: Array) -> tuple[Array, Array]:
+    """Return the rounded products (N,) and their errors, which together are exact."""
     product = first * second
     a, b = _halves(first), _halves(second)
     return product, ((a[0] * b[0] - product) + a[0] * b[1] + a[1] * b[0]) + a[1] * b[1]
