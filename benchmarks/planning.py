@@ -18,11 +18,16 @@ def figures(peers: str | None, *, long: bool) -> list[Figure]:
                 [sys.executable, "-m", "trajcli", "plan", f"{ROOT}/benchmarks/quintic.yaml"], compared=True
             ),
             "imports": Command([sys.executable, "-c", NEEDED]),
+            "unchecked": Command(
+                [sys.executable, f"{ROOT}/benchmarks/unchecked_script.py", f"{ROOT}/benchmarks/quintic.yaml"],
+                compared=True,
+            ),
             "script": Command([peers, f"{ROOT}/benchmarks/toolbox_script.py"], peer=True, compared=True),
         }
     )
     name, ours, script = "plan, whole process, 10001 x 19", runs["plan"].seconds, runs["script"]
     return [
         Figure(name, "import numpy, yaml, pydantic", ours, runs["imports"].seconds, 2.0),
+        Figure(name, "same imports and arithmetic", ours, runs["unchecked"].seconds, 1.4),
         Figure(name, "Robotics Toolbox jtraj + savetxt", ours, script.seconds, 1 / 6, skipped=script.skipped),
     ]

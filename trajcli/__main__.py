@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 
 FILE_FAILED, INTERRUPTED, PIPE_CLOSED = 4, 130, 141
 
+_REUSED = 1 << 24  # bytes: what is smaller is used anew when it has been freed
 _ENDING = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
@@ -47,6 +48,8 @@ def main() -> NoReturn:
         sys.modules[_NoPlugins.REAL] = _NoPlugins(_NoPlugins.REAL)
     # The many objects that imports make are no garbage: looking through them costs as much as a bare start.
     gc.set_threshold(100_000, 20, 20)
+    # Once such a block was freed, glibc keeps freed arrays for the next ones. None of it is touched.
+    bytes(_REUSED)
     _leave(_run())
 
 

@@ -151,9 +151,8 @@ def test_a_file_that_fails_its_check_does_not_appear(tmp_path, monkeypatch, digi
     def off(rows, whole_numbers):
         return encode(rows + 1e-8 * (np.arange(rows.size).reshape(rows.shape) == 2345), whole_numbers)
 
-    name = f"encode_{digits}"
-    encode = getattr(csv, name)
-    monkeypatch.setattr(csv, name, off)
+    encode = csv.encoder_of(digits)
+    monkeypatch.setattr(csv, "encoder_of", lambda _: off)
     with pytest.raises(TrajcliError, match="read back says"):
         write_verified(tmp_path / "out.csv", blocks_of(table()), COLUMNS, digits)
     assert list(tmp_path.iterdir()) == []
@@ -196,5 +195,5 @@ def test_memory_is_the_same_for_many_rows(tmp_path):
 
     peak(5000)  # fills the tables
     few, many = peak(200_000), peak(1_000_000)
-    assert many < 1.05 * few + 1e5
+    assert many < 1.05 * few + 1.5e6  # some blocks more or less wait for their comparison
     assert many < 15e6

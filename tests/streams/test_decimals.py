@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from trajcli.streams import decimals
-from trajcli.streams.decimals import encode_fixed, encode_full
+from trajcli.streams import decimals, shortest_digits
+from trajcli.streams.decimals import encode_fixed
+from trajcli.streams.shortest_digits import encode_full
 
 EXACT = Context(prec=400, rounding=ROUND_HALF_EVEN)
 
@@ -145,6 +146,35 @@ def test_full_digits_are_those_of_repr():
         -2.0,
     ]
     powers = [10.0**k for k in range(-30, 30)] + [2.0**k for k in range(-60, 70)]
-    values = np.concatenate([drawn[np.isfinite(drawn)], sized, edges, powers])
+    below = [np.nextafter(value, 0.0) for value in powers]
+    above = [np.nextafter(value, np.inf) for value in powers]
+    grids = (
+        [k / 1000 for k in range(3000)]
+        + [k / 4096 for k in range(3000)]
+        + [k + 0.5 for k in range(9990, 10010)]
+    )
+    rounded = [*np.round(sized, 3), *np.round(sized, 12)]
+    values = np.concatenate([drawn[np.isfinite(drawn)], sized, edges, powers, below, above, grids, rounded])
     values = values[: values.size // 2 * 2].reshape(-1, 2)
     assert encode_full(values) == "".join(f"{a!r},{b!r}\n" for a, b in values.tolist()).encode()
+
+
+def test_ordinary_values_are_encoded_by_whole_blocks(monkeypatch):
+    """Of smooth motions, slow ones and rest, hardly a cell is left to `repr`."""
+    t = np.arange(20_000) / 1000
+    rows = np.column_stack(
+        [t, np.sin(t), 1e-3 * np.cos(t), 1e-7 * np.sin(3 * t) ** 3, 900 * np.cos(t), 0 * t, t // 5]
+    )
+    asked = []
+    monkeypatch.setattr(
+        shortest_digits, "repr", lambda value: asked.append(value) or repr(value), raising=False
+    )
+    lines = encode_full(rows, (6,)).decode().splitlines()
+    assert lines == [",".join([*map(repr, row[:6]), str(int(row[6]))]) for row in rows.tolist()]
+    assert len(asked) < 1e-3 * rows.size
+
+
+def test_whole_numbers_of_any_size_have_no_decimals():
+    rows = np.array([[1.5, 9999.0], [-2.25, 10_000.0], [0.0, 1e15], [1.0, -0.0], [3.0, -17.0]])
+    assert encode_full(rows, (1,)) == b"1.5,9999\n-2.25,10000\n0.0,1000000000000000\n1.0,0\n3.0,-17\n"
+    assert encode_full(np.array([[1e300, 2.0]]), (0,)).decode() == f"{int(1e300)},2.0\n"

@@ -22,7 +22,15 @@ _FEW = 8  # rows a piece below which gathering coefficients beats a product for 
 
 
 def read_only(values: ArrayLike) -> Array:
-    """Return a contiguous float64 copy that cannot be written to."""
+    """Return a contiguous float64 copy that cannot be written to, or the array where it is one."""
+    if (
+        type(values) is np.ndarray
+        and values.dtype == np.float64
+        and values.base is None
+        and values.flags.c_contiguous
+        and not values.flags.writeable
+    ):
+        return values
     array = np.array(values, dtype=np.float64, order="C")
     array.flags.writeable = False
     return array

@@ -21,7 +21,8 @@ from trajcli.kinematics.inverse.solve import fits, solve
 from trajcli.kinematics.inverse.target import IkTarget, closure_of, partial_target
 from trajcli.queries.arm import ArmInUnits
 from trajcli.queries.forward import Stream, refuse_far
-from trajcli.streams.decimals import Digits, encode_fixed, encode_full
+from trajcli.streams.csv import encoder_of
+from trajcli.streams.decimals import Digits
 from trajcli.streams.table import TableBlocks
 
 _AHEAD = 256  # rows that are looked at together at most, where one branch stays the nearest
@@ -78,7 +79,7 @@ class EveryAnswer:
         Raises:
             InputError: When a row is wrong.
         """
-        encode = encode_fixed if digits == "fixed" else encode_full
+        encode = encoder_of(digits)
         joints = columns_of(("q",), self._arm.robot.joint_types, self._arm.units)
         done, header = 0, True
         for block in self._rows.blocks:
@@ -92,7 +93,7 @@ class EveryAnswer:
             rows, branches = np.nonzero(solutions.valid)
             inside = solutions.within_limits
             values = (
-                encode(solutions.joints[rows, branches] / self._arm.joint_factors).decode()
+                encode(solutions.joints[rows, branches] / self._arm.joint_factors, ()).decode()
                 if len(rows)
                 else ""
             )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from typing import BinaryIO
 
@@ -11,7 +11,7 @@ import numpy as np
 from trajcli.columns import Column, whole_number_columns
 from trajcli.curves.piecewise import Array
 from trajcli.errors import TrajcliError
-from trajcli.streams.decimals import Digits, NotFixedError, encode_fixed, encode_full, scan_fixed
+from trajcli.streams.decimals import Digits, NotFixedError, encode_fixed, scan_fixed
 from trajcli.streams.number_cells import scan_decimals
 
 _CHUNK = 1 << 18  # bytes read back at a time
@@ -40,7 +40,7 @@ def write_csv_blocks(
     rows: Iterable[Array], columns: Sequence[Column], out: BinaryIO, digits: Digits = "fixed"
 ) -> Iterator[Array]:
     """Write as `write_csv`, and yield each block as soon as its text has left for `out`."""
-    encode = encode_fixed if digits == "fixed" else encode_full
+    encode = encoder_of(digits)
     whole_numbers = whole_number_columns(columns)
     out.write(_header(columns).encode())
     written = 0
@@ -70,9 +70,20 @@ def verify_csv(
     blocks = _RowsReadBack(written, columns)
     count = 0
     for block in rows:
-        _compare(blocks.take(len(block), count), block, columns, count, digits)
+        if not (digits == "fixed" and blocks.skip(block)):
+            _compare(blocks.take(len(block), count), block, columns, count, digits)
         count += len(block)
     blocks.expect_end(count)
+
+
+def encoder_of(digits: Digits) -> Callable[[Array, Sequence[int]], bytes]:
+    """Return the function that makes lines of rows (N, m), given which columns are whole numbers."""
+    if digits == "fixed":
+        return encode_fixed
+    # nobody else pays for the import
+    from trajcli.streams.shortest_digits import encode_full
+
+    return encode_full
 
 
 def _header(columns: Sequence[Column]) -> str:
@@ -88,6 +99,7 @@ class _RowsReadBack:
         self._width = len(columns)
         self._whole_numbers = whole_number_columns(columns)
         self._left = np.empty((0, self._width))
+        self._text = b""  # read, but not yet as rows
 
     def _expect_names(self) -> None:
         """Refuse another first line than the columns' names."""
@@ -95,14 +107,31 @@ class _RowsReadBack:
         if header != _header(self._columns):
             raise TrajcliError(f"the file read back begins with {header!r} instead of the columns' names")
 
+    def skip(self, block: Array) -> bool:
+        """Return whether the next rows are surely those of `block`; then they are taken."""
+        # whoever writes to standard output does not pay for the import
+        from trajcli.streams.fixed_agreement import FixedLayout
+
+        if self._stream.tell() == 0:
+            self._expect_names()
+        if len(self._left) or self._text or len(block) == 0:
+            return False
+        layout = FixedLayout(block, self._whole_numbers)
+        self._text = self._stream.read(layout.size)
+        if not layout.agrees(self._text):
+            return False
+        self._text = b""
+        return True
+
     def _next(self) -> Array | None:
         """Return some rows more; None where the stream ends, for now."""
         if self._stream.tell() == 0:
             self._expect_names()
-        text = self._stream.read(_CHUNK)
+        text = self._text or self._stream.read(_CHUNK)
+        self._text = b""
         if not text:
             return None
-        text += self._stream.readline()
+        text += b"" if text.endswith(b"\n") else self._stream.readline()
         with suppress(NotFixedError):
             return scan_fixed(text, self._width, self._whole_numbers)
         if text.endswith(b"\n"):

@@ -38,8 +38,6 @@ _Bools = NDArray[np.bool_]
 _VALUES = 16384  # values encoded at a time: their words stay in the processor's cache
 _NARROW = 1e3  # whole parts below this and their sign fit into one word
 _WIDE = 1e7  # into two words
-_LARGEST_TINY = 1e-5  # below, the encoder of JSON writes an exponent, too
-_LEAST_PLAIN, _LARGEST_PLAIN = 1e-4, 1e16  # magnitudes from which and below which repr has no exponent
 
 
 def encode_fixed(rows: Array, whole_numbers: Sequence[int] = ()) -> bytes:
@@ -51,27 +49,6 @@ def encode_fixed(rows: Array, whole_numbers: Sequence[int] = ()) -> bytes:
     """
     step = max(1, _VALUES // rows.shape[1])
     return b"".join(_encode_block(rows[low : low + step], whole_numbers) for low in range(0, len(rows), step))
-
-
-def encode_full(rows: Array, whole_numbers: Sequence[int] = ()) -> bytes:
-    """Return the same with the fewest digits from which each float64 can be restored bit by bit."""
-    # shortest digits in compiled code, several times faster than repr; the digits are the same
-    from pydantic_core import to_json
-
-    magnitude, cells = np.abs(rows), rows.tolist()
-    tiny = (magnitude < _LEAST_PLAIN) & (magnitude > 0)
-    short = tiny & (magnitude < _LARGEST_TINY)  # an exponent of one digit, where repr has two: 1e-6, 1e-06
-    unlike = (tiny & ~short) | (magnitude >= _LARGEST_PLAIN)
-    for row, column in np.argwhere(unlike).tolist():
-        cells[row][column] = repr(cells[row][column])
-    for column in whole_numbers:
-        for line, value in zip(cells, rows[:, column].tolist(), strict=True):
-            line[column] = str(round(value))
-    text = to_json(cells)
-    for digit in b"6789" if short.any() else b"":
-        for end in b",]":
-            text = text.replace(b"e-%c%c" % (digit, end), b"e-0%c%c" % (digit, end))
-    return text.replace(b"],[", b"\n").translate(None, b'["]') + b"\n"
 
 
 def _encode_block(rows: Array, whole_numbers: Sequence[int]) -> bytes:

@@ -28,16 +28,19 @@ class StreamFormat:
         write: Writes blocks of rows, one by one, to a stream.
         write_blocks: The same, and yields each block when it has been written.
         verify: Reads a stream from its beginning, and raises TrajcliError where it does not hold these rows.
+        in_order: Whether the text of a block is final when it is written, and is read once and in order. Then
+            it is compared in memory, and the file by its checksum; otherwise the file is read block by block.
     """
 
     name: str
     write: Callable[[Iterable[Array], Sequence[Column], BinaryIO, Digits], None]
     write_blocks: Callable[[Iterable[Array], Sequence[Column], BinaryIO, Digits], Iterator[Array]]
     verify: Callable[[BinaryIO, Iterable[Array], Sequence[Column], Digits], None]
+    in_order: bool = False
 
 
 FORMATS: Mapping[str, StreamFormat] = {
-    ".csv": StreamFormat("CSV", write_csv, write_csv_blocks, verify_csv),
+    ".csv": StreamFormat("CSV", write_csv, write_csv_blocks, verify_csv, in_order=True),
 }
 DEFAULT = FORMATS[".csv"]
 """The format of standard output, of devices, and of files whose names tell no other."""
@@ -69,12 +72,12 @@ def write_verified(
     columns: Sequence[Column],
     digits: Digits = "fixed",
 ) -> None:
-    """Write a file that appears whole or not at all, and is read back before it does.
+    """Write a file that appears whole or not at all, and is compared with its rows before it does.
 
     Args:
-        path: The file; its ending names the format. A device or pipe is written to directly, and not read
-            back.
-        rows: Blocks of shape (N, m); each is written, and compared with what then stands in the file.
+        path: The file; its ending names the format. A device or pipe is written to directly, and not
+            compared.
+        rows: Blocks of shape (N, m); each is compared with its text, and the finished file with all text.
         columns: What the rows hold, in the units that the columns say.
         digits: Of numbers that are written as text: nine decimals, or as many as restore each bit.
 
@@ -88,6 +91,16 @@ def write_verified(
     with whole_file(path) as out:
         if not out.readable():
             stream_format.write(rows, columns, out, digits)
+            return
+        if stream_format.in_order:
+            # whoever writes no file does not pay for the import
+            from trajcli.streams.checked_file import write_and_compare
+
+            write_and_compare(
+                out,
+                lambda text: stream_format.write_blocks(rows, columns, text, digits),
+                lambda text, blocks: stream_format.verify(text, blocks, columns, digits),
+            )
             return
         with Path(out.name).open("rb") as back:
             flushed = _flushed(stream_format.write_blocks(rows, columns, out, digits), out)

@@ -11,7 +11,9 @@ floating-point technique for extending the available precision", Numerische Math
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +30,7 @@ _LARGEST_POWER = 60
 _POWERS = np.array([float(10**k) for k in range(_LARGEST_POWER + 1)])
 _POWER_RESTS = np.array([float(10**k - int(float(10**k))) for k in range(_LARGEST_POWER + 1)])
 _WHOLE_POWERS = 10 ** np.arange(_MOST_DIGITS + 1, dtype=np.uint64)
+_FEW = 16  # cells of a block without what the others have
 _SPLITTER = 2.0**27 + 1
 _RARE = 0.05  # the share of cells that are read one by one; above, there is nothing to gain
 
@@ -141,8 +144,9 @@ class _Cells:
     def exponents(self) -> tuple[NDArray[np.int64], _Bools]:
         """Return the powers of ten that are written behind the digits, and where they cannot be told."""
         exponents, wrong = np.zeros(self.ends.size, np.int64), np.zeros(self.ends.size, np.bool_)
-        having = np.flatnonzero(self.mantissa_ends < self.ends)
-        if having.size:
+        written = self.mantissa_ends < self.ends
+        if written.any():
+            having = slice(None) if written.all() else np.flatnonzero(written)
             starts, ends = self.mantissa_ends[having] + 1, self.ends[having]
             negative = self.buffer[starts] == ord("-")
             lengths = ends - starts - (negative | (self.buffer[starts] == ord("+")))
@@ -154,6 +158,9 @@ class _Cells:
 
     def _digits(self, ends: _Indices, lengths: _Indices) -> tuple[_LongWords, _Bools]:
         """Return the whole numbers in front of `ends`, and where they are none or 10^19 and more."""
+        if lengths.max(initial=0) <= 1:
+            digits = np.where(lengths == 1, self.buffer[ends - 1] ^ np.uint8(ord("0")), np.uint8(0))
+            return digits.astype(np.uint64), digits > 9
         total, wrong = eight_digits(self.words, ends, np.minimum(lengths, 8))
         for before in range(8, int(lengths.max(initial=0)), 8):
             some, bad = eight_digits(self.words, ends - before, np.clip(lengths - before, 0, 8))
@@ -179,8 +186,28 @@ def _positions(marks: _Bools, ends: _Indices, otherwise: _Indices) -> _Indices:
     if marked.size == ends.size and (marked < ends).all() and (marked[1:] > ends[:-1]).all():
         return marked
     positions = otherwise.copy()
-    positions[np.searchsorted(ends, marked)] = marked
+    positions[_owners(marked, ends)] = marked
     return positions
+
+
+def _owners(marked: _Indices, ends: _Indices) -> _Indices:
+    """Return the cell of each marked byte."""
+    without = ends.size - marked.size
+    if not 0 < without <= _FEW:
+        return np.searchsorted(ends, marked)
+    # Where a cell has at most one, each cell without one shifts all that follow by one more.
+    owners = np.arange(marked.size)
+    for shift in range(without):
+        passed = partial(lambda index, shift: marked[index] > ends[index + shift], shift=shift)
+        owners[bisect_left(range(marked.size), True, key=passed) :] += 1
+    own = ends[owners]
+    if (
+        (marked < own).all()
+        and (marked[1:] > own[:-1]).all()
+        and marked[0] > (ends[owners[0] - 1] if owners[0] else 0)
+    ):
+        return owners
+    return np.searchsorted(ends, marked)
 
 
 def _scaled(units: _LongWords, decimals: NDArray[np.int64]) -> tuple[Array, Sequence[int]]:
@@ -203,7 +230,7 @@ def _long_scaled(units: _LongWords, decimals: NDArray[np.int64]) -> tuple[Array,
     power, power_rest = _POWERS[np.abs(decimals)], _POWER_RESTS[np.abs(decimals)]
     divided = decimals >= 0
     quotient = np.where(divided, high / power, high)
-    product, error = _exact_product(quotient, power)
+    product, error = exact_product(quotient, power)
     corrected = (high - product) - error + (low - quotient * power_rest)
     rest = np.where(divided, corrected / power, error + (low * power + high * power_rest))
     leading = np.where(divided, quotient, product)
@@ -215,8 +242,8 @@ def _long_scaled(units: _LongWords, decimals: NDArray[np.int64]) -> tuple[Array,
     return values, unsure
 
 
-def _exact_product(first: Array, second: Array) -> tuple[Array, Array]:
-    """Return the rounded product and its error, which together are exact."""
+def exact_product(first: Array, second: Array) -> tuple[Array, Array]:
+    """Return the rounded products (N,) and their errors, which together are exact."""
     product = first * second
     a, b = _halves(first), _halves(second)
     return product, ((a[0] * b[0] - product) + a[0] * b[1] + a[1] * b[0]) + a[1] * b[1]

@@ -103,8 +103,14 @@ def cubics(times: Array, positions: Array, velocities: Array, acceleration: Arra
         velocities: The same.
         acceleration: At each knot, shape (m, n).
     """
-    jerk = np.diff(acceleration, axis=0) / np.diff(times)[:, None]
-    return PiecewisePolynomial(times, np.stack([jerk / 6, acceleration[:-1] / 2, velocities, positions]))
+    coefficients = np.empty((4, *positions.shape))
+    np.subtract(acceleration[1:], acceleration[:-1], out=coefficients[0])
+    coefficients[0] /= np.diff(times)[:, None]
+    coefficients[0] /= 6
+    np.divide(acceleration[:-1], 2, out=coefficients[1])
+    coefficients[2], coefficients[3] = velocities, positions
+    coefficients.flags.writeable = False  # the curve takes it without a copy
+    return PiecewisePolynomial(times, coefficients)
 
 
 @frozen
