@@ -87,6 +87,14 @@ def test_the_text_has_the_vector_that_the_slides_print(job: Path, capfd: Capture
     assert "t = 3, virtual: q = 2.875, qd = 0.375, qdd = -0.75" in out
 
 
+def test_joints_at_rest_have_no_knots_in_the_text(job: Path, capfd: Capture) -> None:
+    points = [{"joints": [2, 0], "time": 2}, {"joints": [3, 0], "time": 4}]
+    write(job, {"joints": [0, 0]}, {"planner": "spline", "through": points}, robot={"joints": 2})
+    out = call(capfd, "explain", job).out
+    assert "ddP1 = [2.25, -1.5, -0.75]" in out
+    assert "ddP2" not in out
+
+
 @of_kind("lspb_via")
 def test_parabolas_about_the_points_of_the_exercises(case: dict[str, Any], job: Path, capfd: Capture) -> None:
     given, expected = case["inputs"], case["expected"]

@@ -161,6 +161,8 @@ def knot_lines(move: ExplainedMove) -> Iterator[str]:
         yield f"  {len(move.knots)} knots, listed by --json"
         return
     for joint in range(len(move.joints)):
+        if not any(knot.velocity[joint] or knot.acceleration[joint] for knot in move.knots):
+            continue  # it rests
         yield f"  knots of q{joint + 1}, and ddP{joint + 1}, the accelerations at the inner ones:"
         for knot in move.knots:
             columns = (knot.position, knot.velocity, knot.acceleration)
