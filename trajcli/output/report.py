@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from trajcli.checks.finding import Finding
+from trajcli.checks.finding import AccelerationSteps, Finding
 from trajcli.checks.verify import Verdict
 from trajcli.curves.extrema import Peaks
 from trajcli.curves.piecewise import PiecewisePolynomial
@@ -78,7 +78,7 @@ def report_of(plan: Plan, *, reference: bool = False) -> Report:
         moves=tuple(_move(plan, index, reference=reference) for index in range(len(plan.moves))),
         findings=[_finding(plan, finding) for finding in verdict.findings],
         events=[EventReport(kind=e.kind, message=e.message, move=e.move) for e in plan.events],
-        steps=[StepReport(**vars(step), unit=units[step.joint]) for step in verdict.steps],
+        steps=_steps(verdict.steps, units),
         unchecked=[UncheckedReport(joint=joint, quantity=quantity) for joint, quantity in verdict.unchecked],
         unchecked_of_tool=[UncheckedToolReport(quantity=name) for name in verdict.unchecked_of_tool],
         knots=_knots(plan.trajectory) if verdict.passed else None,
@@ -98,6 +98,17 @@ def _knots(trajectory: Trajectory) -> KnotsReport:
             velocity_unit=units[1][missed.joints[1]],
         ),
     )
+
+
+def _steps(steps: AccelerationSteps, units: Mapping[str, str]) -> list[StepReport]:
+    """Return the fields of the reports of steps; there may be thousands, validated with the report."""
+    names = [steps.joint_names[joint] for joint in steps.joints.tolist()]
+    rows = zip(steps.moves.tolist(), names, steps.times.tolist(), steps.sizes.tolist(), strict=True)
+    fields = [
+        {"move": move, "joint": joint, "time": time, "size": size, "unit": units[joint]}
+        for move, joint, time, size in rows
+    ]
+    return cast("list[StepReport]", fields)
 
 
 def _finding(plan: Plan, finding: Finding) -> FindingReport:
