@@ -9,7 +9,6 @@ Source: the MCAP format specification, version 0 (https://mcap.dev/spec).
 from __future__ import annotations
 
 import struct
-import sys
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -169,10 +168,9 @@ class LogRecords:
             if len(content) < length:
                 raise self._truncated()
             return content
-        if length:
-            self._stream.seek(min(length, sys.maxsize) - 1, 1)
-            if not self._stream.read(1):
-                raise self._truncated()
+        if self._position + length > self._stream.seek(0, 2):
+            raise self._truncated()
+        self._stream.seek(self._position + length)
         self._position += length
         return b""
 
