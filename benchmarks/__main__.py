@@ -19,6 +19,7 @@ BENCHMARKS = (
     "planning",
     "help",
     "writing",
+    "logs",
     "reading",
     "evaluation",
     "forward_kinematics",

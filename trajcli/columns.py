@@ -113,6 +113,11 @@ def group_of(column: Column) -> str:
     return next((group for group, kinds in _COLUMNS.items() if column.kind in kinds), column.kind)
 
 
+def kinds_of(group: str) -> tuple[str, ...]:
+    """Return the kinds of the columns of a group that is not about joints; none for another name."""
+    return tuple(_COLUMNS.get(group, ()))
+
+
 def columns_of(groups: Sequence[Group], joint_types: Sequence[JointType], units: Units) -> tuple[Column, ...]:
     """Return every column of `groups`, in the order of the groups, joints from the base on.
 

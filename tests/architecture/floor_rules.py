@@ -28,7 +28,7 @@ FLOOR_OF = {room: level for level, floor in enumerate(FLOORS) for room in floor}
 HOMES = {
     "pydantic": ("language/", "planners/", "job/"),
     "pydantic_core": ("language/", "planners/", "job/", "streams/jsonl.py"),
-    "yaml": ("job/yaml/",),
+    "yaml": ("job/yaml/", "streams/ros_messages.py"),
     "typer": ("cli/",),
     "click": ("cli/",),
     "mcap": ("streams/",),
@@ -279,7 +279,7 @@ RULES = [
                 {"job/read.py": "from yaml import nodes\n", "curves/law.py": "import toppra.a\n"},
                 [
                     Offence("curves/law.py", "line 1 imports toppra: numpy only"),
-                    Offence("job/read.py", "line 1 imports yaml, which lives in job/yaml/"),
+                    Offence("job/read.py", "line 1 imports yaml, which lives in job/yaml/ and streams/ros_messages.py"),
                 ],
             )
         ],

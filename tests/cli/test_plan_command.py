@@ -143,8 +143,26 @@ def test_the_resolved_job(job: Path, capfd: Capture) -> None:
 
 WRONG_OPTIONS = [
     (("--no-output", "-o", "a.csv"), "--no-output and --output exclude each other"),
-    (("-o", "a.mcap"), "rows are written as CSV, not as .mcap"),
-    (("-o", "a.txt"), "rows are written as CSV, not as .txt"),
+    (("--no-output", "--format", "mcap"), "--no-output and --format exclude each other"),
+    (("--no-output", "--topics", "/x"), "--no-output and --topics exclude each other"),
+    (("-o", "a.txt"), "rows are written as CSV or MCAP, not as .txt"),
+    (("-o", "a.csv", "--format", "mcap"), "--format mcap contradicts the name of the file, a.csv"),
+    (("-o", "a.csv", "--epoch", "1"), "--epoch is about MCAP, and the rows are written as CSV"),
+    (("--compression", "lz4"), "--compression is about MCAP, and the rows are written as CSV"),
+    (("-o", "a.mcap", "--digits", "full"), "MCAP has no digits: it holds every bit"),
+    (
+        ("-o", "a.mcap", "--topics", "/tool_twits"),
+        "there is no topic '/tool_twits'\n  did you mean '/tool_twist'?",
+    ),
+    (
+        ("-o", "a.mcap", "--topics", "/tool_twist"),
+        "/tool_twist is about a tool, and robot robot has no geometry",
+    ),
+    (("-o", "a.mcap", "--epoch", "-1"), "expected seconds since 1970, got '-1'"),
+    (("-o", "a.mcap", "--epoch", "nan"), "expected seconds since 1970, got 'nan'"),
+    (("-o", "a.mcap", "--epoch", "3e9"), "expected seconds since 1970, got '3e9'"),
+    (("-o", "a.mcap", "--epoch", "3000000000"), "times of ROS 2 end at 2147483647 s"),
+    (("-o", "a.mcap", "--set", "output.start_time=-2"), "--epoch 2 or more makes that possible"),
     (("--report", "-"), "--report and the rows cannot both go to -"),
     (("-o", "a.csv", "--report", "./a.csv"), "--report and the rows cannot both go to ./a.csv"),
     (("--report", "a", "--resolved", "a"), "--resolved and --report cannot both go to a"),

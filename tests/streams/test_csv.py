@@ -11,7 +11,7 @@ from trajcli.columns import parse_column
 from trajcli.errors import FileError, TrajcliError
 from trajcli.streams import csv
 from trajcli.streams.csv import verify_csv, write_csv
-from trajcli.streams.formats import write_verified
+from trajcli.streams.formats import WriteOptions, write_verified
 
 NAMES = ["t", *(f"q{k}" for k in range(1, 6)), "move"]
 COLUMNS = [parse_column(name) for name in NAMES]
@@ -154,7 +154,7 @@ def test_a_file_that_fails_its_check_does_not_appear(tmp_path, monkeypatch, digi
     encode = csv.encoder_of(digits)
     monkeypatch.setattr(csv, "encoder_of", lambda _: off)
     with pytest.raises(TrajcliError, match="read back says"):
-        write_verified(tmp_path / "out.csv", blocks_of(table()), COLUMNS, digits)
+        write_verified(tmp_path / "out.csv", blocks_of(table()), COLUMNS, WriteOptions(digits))
     assert list(tmp_path.iterdir()) == []
 
 

@@ -21,7 +21,7 @@ ROWS = np.arange(6.0).reshape(2, 3)
     "path", ["out.csv", "OUT.CSV", "a.txt/o.csv", "-", "/dev/stdout", "/dev/null", "/dev/fd/63"]
 )
 def test_rows_are_csv_where_a_name_says_so_and_on_devices(path):
-    assert format_of(path) is FORMATS[".csv"] is DEFAULT
+    assert format_of(path) is FORMATS["csv"] is DEFAULT
 
 
 def test_a_pipe_needs_no_name(tmp_path):
@@ -31,46 +31,57 @@ def test_a_pipe_needs_no_name(tmp_path):
 
 def test_a_name_without_an_ending_is_refused(tmp_path):
     with pytest.raises(
-        InputError, match=r"^rows are written as CSV, not to a file without an ending, 'out'$"
+        InputError,
+        match=r"^rows are written as CSV or MCAP or JSON lines or a ROS message, not to a file without an ending, 'out'$",
     ):
         format_of(tmp_path / "a.csv" / "out")
 
 
-@pytest.mark.parametrize(
-    "ending", [".mcap", ".jsonl", ".json", ".yaml", ".YML", ".xlsx", ".parquet", ".txt", ".cvs"]
-)
+@pytest.mark.parametrize("ending", [".json", ".yml", ".xlsx", ".parquet", ".txt", ".cvs"])
 def test_a_name_of_another_format_is_refused(ending, tmp_path):
     with pytest.raises(InputError) as caught:
         write_verified(tmp_path / f"out{ending}", [ROWS], COLUMNS)
     (problem,) = caught.value.problems
-    assert problem.message == f"rows are written as CSV, not as {ending.lower()}"
-    assert problem.hint == "name the file .csv"
+    assert (
+        problem.message
+        == f"rows are written as CSV or MCAP or JSON lines or a ROS message, not as {ending.lower()}"
+    )
+    assert problem.hint == "name the file .csv or .mcap or .jsonl or .yaml"
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_format_is_one_entry(tmp_path, monkeypatch):
     seen = []
 
-    def write(rows, columns, out, digits):
+    def write(rows, columns, out, options):
         seen.append([(column.quantity, column.joint, column.factor) for column in columns])
         for block in rows:
             out.write(repr(block.tolist()).encode())
             yield block
 
-    def verify(written, rows, columns, digits):
+    def verify(written, rows, columns, options):
         for block in rows:
             assert written.read().decode() == repr(block.tolist())
 
-    monkeypatch.setattr(
-        formats, "FORMATS", {**FORMATS, ".jsonl": StreamFormat("JSON lines", lambda *_: None, write, verify)}
-    )
-    write_verified(tmp_path / "out.jsonl", [ROWS], COLUMNS)
-    assert (tmp_path / "out.jsonl").read_text() == repr(ROWS.tolist())
+    monkeypatch.setattr(formats, "FORMATS", {**FORMATS, "rows": StreamFormat("rows", write, verify)})
+    monkeypatch.setattr(formats, "ENDINGS", {".csv": ("csv",), ".rows": ("rows",)})
+    write_verified(tmp_path / "out.rows", [ROWS], COLUMNS)
+    assert (tmp_path / "out.rows").read_text() == repr(ROWS.tolist())
     assert [(quantity.dimension, joint) for quantity, joint, _ in seen[0]] == [
         ("time", None), ("angle", 0), ("length", 1),
     ]  # fmt: skip
     with pytest.raises(InputError) as caught:
         format_of("out.mcap")
     (problem,) = caught.value.problems
-    assert problem.message == "rows are written as CSV or JSON lines, not as .mcap"
-    assert problem.hint == "name the file .csv or .jsonl"
+    assert problem.message == "rows are written as CSV or rows, not as .mcap"
+    assert problem.hint == "name the file .csv or .rows"
+
+
+def test_a_format_that_is_asked_for_decides_what_a_name_leaves_open(tmp_path):
+    assert format_of("a.yaml") is FORMATS["ros"]
+    assert format_of("a.yaml", "ros-goal") is FORMATS["ros-goal"]
+    assert format_of(None, "jsonl") is format_of("-", "jsonl") is FORMATS["jsonl"]
+    assert format_of("/dev/stdout", "mcap") is FORMATS["mcap"]
+    with pytest.raises(InputError, match=r"--format ros contradicts the name of the file, a\.csv") as caught:
+        format_of("a.csv", "ros")
+    assert caught.value.problems[0].hint == "leave --format out, or name the file .yaml"

@@ -95,7 +95,16 @@ def plan(
     job: JobFile,
     output: Annotated[
         str | None,
-        typer.Option("--output", "-o", metavar="FILE", help="Write rows to FILE.csv instead of stdout."),
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="FILE.csv, .mcap, .jsonl or .yaml (a ROS message).",
+        ),
+    ] = None,
+    form: Annotated[
+        Literal["csv", "mcap", "jsonl", "ros", "ros-goal"] | None,
+        typer.Option("--format", help="Of stdout, and which message a .yaml holds.", show_default="csv"),
     ] = None,
     report: Annotated[
         str | None, typer.Option("--report", metavar="FILE", help="Write the verification report as JSON.")
@@ -109,8 +118,25 @@ def plan(
     rate: Annotated[str | None, typer.Option("--rate", metavar="HZ", help="Rows per second.")] = None,
     override: Overrides = [],  # noqa: B006
     digits: Annotated[
-        Literal["fixed", "full"], typer.Option("--digits", help="fixed: nine decimals; full: every bit.")
-    ] = "fixed",
+        Literal["fixed", "full"] | None,
+        typer.Option("--digits", help="fixed: nine decimals; full: every bit.", show_default="fixed"),
+    ] = None,
+    topics: Annotated[
+        str | None,
+        typer.Option(
+            "--topics",
+            metavar="/A,/B",
+            help="MCAP: topics beside the usual ones, /joint_trajectory_point or /tool_twist.",
+        ),
+    ] = None,
+    epoch: Annotated[
+        str | None,
+        typer.Option("--epoch", metavar="SECONDS", help="MCAP: time of the log at t = 0.", show_default="0"),
+    ] = None,
+    compression: Annotated[
+        Literal["zstd", "lz4", "none"] | None,
+        typer.Option("--compression", help="MCAP: of the messages.", show_default="zstd"),
+    ] = None,
     strict: Annotated[
         bool, typer.Option("--strict", help="Exit 1 when a concession (event) was made.")
     ] = False,
@@ -131,12 +157,28 @@ def plan(
     ] = False,
     errors: Errors = "text",
 ) -> int:
-    """Plan a job, verify it, and write its samples as CSV."""
+    """Plan a job, verify it, and write it: rows as CSV or JSON lines, a log, or a goal for a controller."""
     from trajcli.cli.plan import PlanOptions, run_plan
 
-    every = every or errors == "json"
+    log = None
+    if topics is not None or epoch is not None or compression is not None:
+        from trajcli.output.recording import LogOptions
+
+        log = LogOptions(topics, epoch, compression)
     options = PlanOptions(
-        rate, output, report, resolved, digits, strict, reference, no_output, quiet, every, si
+        rate=rate,
+        output=output,
+        report=report,
+        resolved=resolved,
+        form=form,
+        digits=digits,
+        log=log,
+        strict=strict,
+        reference=reference,
+        no_output=no_output,
+        quiet=quiet,
+        every=every or errors == "json",
+        si=si,
     )
     return run_plan(job, override, options)
 
@@ -164,8 +206,8 @@ def explain(
 @app.command(epilog="Example: trajcli diff old.csv new.csv --atol 1e-9")
 @guarded
 def diff(
-    a: Annotated[str, typer.Argument(metavar="A", help="A CSV file; - is standard input.")],
-    b: Annotated[str, typer.Argument(metavar="B", help="The CSV file to compare it with.")],
+    a: Annotated[str, typer.Argument(metavar="A", help="A CSV or MCAP file; - is CSV from standard input.")],
+    b: Annotated[str, typer.Argument(metavar="B", help="The file to compare it with.")],
     atol: Annotated[
         str,
         typer.Option(
@@ -178,12 +220,21 @@ def diff(
     resample: Annotated[
         bool, typer.Option("--resample", help="Interpolate B at the times of A when they differ.")
     ] = False,
+    topic: Annotated[
+        str | None,
+        typer.Option(
+            "--topic",
+            metavar="T",
+            help="MCAP: the topic, of JointState or JointTrajectory.",
+            show_default="/joint_states",
+        ),
+    ] = None,
     errors: Errors = "text",
 ) -> int:
-    """Compare two CSV files column by column. Exit 0: equal, 1: different, 2: cannot be compared."""
+    """Compare two files column by column. Exit 0: equal, 1: different, 2: cannot be compared."""
     from trajcli.cli.diff import run_diff
 
-    return run_diff(a, b, atol, rtol, resample=resample)
+    return run_diff(a, b, atol, rtol, resample=resample, topic=topic)
 
 
 @app.command(epilog="Example: trajcli plot examples/ur5e_pick.yaml -o pick.svg")

@@ -5,11 +5,11 @@ from __future__ import annotations
 from trajcli.cli.outcome import print_lines
 from trajcli.comparison.difference import compare, describe, parse_tolerances
 from trajcli.errors import InputError
-from trajcli.streams.table import read_csv
+from trajcli.streams.reading import is_log, read_table
 
 
-def run_diff(a: str, b: str, atol: str, rtol: str, *, resample: bool) -> int:
-    """Compare two CSV files and print what differs; return 0 when nothing does, else 1.
+def run_diff(a: str, b: str, atol: str, rtol: str, *, resample: bool, topic: str | None = None) -> int:
+    """Compare two files and print what differs; return 0 when nothing does, else 1.
 
     Raises:
         InputError: When they cannot be compared.
@@ -17,7 +17,9 @@ def run_diff(a: str, b: str, atol: str, rtol: str, *, resample: bool) -> int:
     """
     if a == b == "-":
         raise InputError("only one of the files can be standard input")
+    if topic is not None and not (is_log(a) or is_log(b)):
+        raise InputError("--topic is about MCAP, and neither file is one", hint="leave --topic out")
     tolerances = [parse_tolerances(text) if text else {} for text in (atol, rtol)]
-    difference = compare(read_csv(a), read_csv(b), *tolerances, resample=resample)
+    difference = compare(read_table(a, topic), read_table(b, topic), *tolerances, resample=resample)
     print_lines([describe(difference)])
     return 0 if difference.equal else 1

@@ -14,14 +14,16 @@ from trajcli.errors import InputError, Problem, VerificationError
 from trajcli.frozen import comparable
 from trajcli.job.read import LoadedJob, files_of, load_job
 from trajcli.kinematics.robot import QUANTITIES
-from trajcli.output.write import check_output_name, grid_of, write_rows, write_text
+from trajcli.output.write import grid_of, write_rows, write_text
 from trajcli.planners.planner import Event, PlannedMove
 from trajcli.planning.plan import Plan, plan_job
+from trajcli.streams.formats import FormatName, StreamFormat, format_of
 from trajcli.streams.whole_file import identity
 
 if TYPE_CHECKING:
     from trajcli.checks.tool_bound import ToolPeak
     from trajcli.job.report import MoveReport, PathReferenceReport, ReferenceReport
+    from trajcli.output.recording import LogOptions
 
 _STILL = 1e-9  # rad/s or m/s, below which a joint only rounds
 
@@ -34,7 +36,9 @@ class PlanOptions:
     output: str | None = None
     report: str | None = None
     resolved: str | None = None
-    digits: Literal["fixed", "full"] = "fixed"
+    form: FormatName | None = None
+    digits: Literal["fixed", "full"] | None = None
+    log: LogOptions | None = None
     strict: bool = False
     reference: bool = False
     no_output: bool = False
@@ -49,9 +53,13 @@ def run_plan(job: str, overrides: Sequence[str], options: PlanOptions) -> int:
     Raises:
         TrajcliError: When anything is wrong; then no rows were written.
     """
-    _check_options(options)
+    form = _check_options(options)
     loaded = load_job(job, overrides, rate=options.rate, si=options.si)
     _check_inputs_stay(loaded, options)
+    if options.log is not None:
+        from trajcli.output.recording import check_log_options
+
+        check_log_options(options.log, loaded.robot, loaded.job.output.start_time)
     if options.resolved is not None:
         _write_resolved(loaded, options.resolved)
     with progress(to_terminal=options.output in (None, "-") and not options.no_output):
@@ -62,13 +70,18 @@ def run_plan(job: str, overrides: Sequence[str], options: PlanOptions) -> int:
         grid = grid_of(plan)
         refusal = _refusal(plan, options)
         if refusal is None and not options.no_output:
-            write_rows(plan, grid, options.output, options.digits)
+            write_rows(plan, grid, options.output, options.digits or "fixed", form=form, log=options.log)
     if options.report is not None or options.reference:
         _report(plan, options)  # behind the rows: where it stands, they do
     if refusal is not None:
         raise refusal
     if not options.quiet:
-        _summarise(plan, grid.count, options)
+        _summarise(
+            plan,
+            grid.count,
+            options,
+            geometry_missing=form.content == "log" and loaded.robot.convention is None,
+        )
     return 0
 
 
@@ -91,11 +104,29 @@ def _problem(plan: Plan, event: Event) -> Problem:
     return Problem(f"{event.kind}: {event.message}", "leave --strict out to accept it", place, event.move)
 
 
-def _check_options(options: PlanOptions) -> None:
-    if options.output is not None:
-        if options.no_output:
-            raise InputError("--no-output and --output exclude each other", hint="leave one of them out")
-        check_output_name(options.output)
+def _check_options(options: PlanOptions) -> StreamFormat:
+    """Return the format of the output; refuse options that do not fit it, or each other."""
+    log = () if options.log is None else options.log.given
+    if options.no_output:
+        given = {"--output": options.output, "--format": options.form, **dict.fromkeys(log, "")}
+        for name in (name for name, value in given.items() if value is not None):
+            raise InputError(f"--no-output and {name} exclude each other", hint="leave one of them out")
+    form = format_of(options.output, options.form)
+    if log and form.content != "log":
+        hint = "write one with -o FILE.mcap, or with --format mcap to a pipe"
+        raise InputError(f"{log[0]} is about MCAP, and the rows are written as {form.name}", hint=hint)
+    if options.digits is not None and not form.decimals:
+        raise InputError(f"--digits is about CSV, {form.name} has every bit", hint="leave --digits out")
+    if options.rate is not None and form.content == "knots":
+        raise InputError(f"--rate is about rows, {form.name} has knots", hint="leave --rate out")
+    to_stream = options.output in (None, "-") and not options.no_output
+    if to_stream and not form.text and sys.stdout is not None and sys.stdout.isatty():
+        raise InputError(f"{form.name} is not written to a terminal", hint="name a file with -o")
+    _check_outputs(options)
+    return form
+
+
+def _check_outputs(options: PlanOptions) -> None:
     taken: dict[tuple[object, ...], str] = {}
     for name, path in _outputs(options):
         same = identity(path)
@@ -166,9 +197,11 @@ def _beside_toppra(move: MoveReport, other: PathReferenceReport) -> str:
     )
 
 
-def _summarise(plan: Plan, rows: int, options: PlanOptions) -> None:
-
+def _summarise(plan: Plan, rows: int, options: PlanOptions, *, geometry_missing: bool) -> None:
     print(summary(plan, rows=0 if options.no_output else rows), file=sys.stderr)  # noqa: T201
+    if geometry_missing:
+        text = "  the robot has no geometry: the log has no frames, no robot description and no tool path"
+        print(text, file=sys.stderr)  # noqa: T201
 
 
 def summary(plan: Plan, rows: int) -> str:

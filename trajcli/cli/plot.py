@@ -18,11 +18,11 @@ from trajcli.planning.plan import Plan, plan_job
 from trajcli.plots.choice import parse_quantities, split_names
 from trajcli.plots.picture import picture_of
 from trajcli.plots.write import format_of_picture, rendered
-from trajcli.streams.table import read_csv
+from trajcli.streams.reading import is_ros_message, read_table
 from trajcli.streams.whole_file import identity, standard_output, whole_file
 
 _OF_JOBS = (".yaml", ".yml", ".json")
-_OF_ROWS = (".csv", ".txt")
+_OF_ROWS = (".csv", ".txt", ".jsonl", ".mcap")
 _PEEKED = 4096  # bytes of standard input that are looked at
 
 
@@ -56,7 +56,7 @@ def run_plot(words: Sequence[str], overrides: Sequence[str], options: PlotOption
         )
     plan = None if job is None else _planned(job, overrides)
     _check_inputs_stay(plan, rows, target)
-    tables = [read_csv(name) for name in rows]
+    tables = [read_table(name) for name in rows]
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # where its caches are is nobody's concern
     with np.errstate(all="ignore"):  # what is not finite was found by the checks
         picture = picture_of(plan, tables, wanted, joints)
@@ -108,7 +108,7 @@ def _is_job(name: str) -> bool:
     """Return whether a file is a job: by its ending, else its first line; a pipe holds rows."""
     ending = Path(name).suffix.lower()
     if name != "-" and ending in _OF_JOBS + _OF_ROWS:
-        return ending in _OF_JOBS
+        return ending in _OF_JOBS and not is_ros_message(name)
     try:
         if name == "-":
             text = getattr(sys.stdin.buffer, "peek", bytes)(_PEEKED)

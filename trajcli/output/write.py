@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trajcli.columns import columns_of
+from trajcli.columns import Column, Group, columns_of
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.grids import Grid, ListedGrid, UniformGrid
@@ -14,8 +16,12 @@ from trajcli.planning.plan import Plan
 from trajcli.progress import report_progress
 from trajcli.samples import sample
 from trajcli.streams.decimals import Digits
-from trajcli.streams.formats import DEFAULT, format_of, write_verified
+from trajcli.streams.formats import Goal, StreamFormat, WriteOptions, format_of, write_verified
 from trajcli.streams.whole_file import standard_output, whole_file
+from trajcli.units import Units
+
+if TYPE_CHECKING:
+    from trajcli.output.recording import LogOptions
 
 
 def grid_of(plan: Plan) -> Grid:
@@ -34,16 +40,15 @@ def grid_of(plan: Plan) -> Grid:
         raise error.located(place=plan.loaded.document.place(("output", key))) from None
 
 
-def check_output_name(path: str) -> None:
-    """Refuse the name of a file of a format that is not written.
-
-    Raises:
-        InputError: When the ending is that of a format which is not written.
-    """
-    format_of(path)
-
-
-def write_rows(plan: Plan, grid: Grid, path: str | None, digits: Digits) -> None:
+def write_rows(
+    plan: Plan,
+    grid: Grid,
+    path: str | None,
+    digits: Digits,
+    *,
+    form: StreamFormat | None = None,
+    log: LogOptions | None = None,
+) -> None:
     """Write the rows to a file, which appears whole or not at all, or to standard output.
 
     Args:
@@ -51,22 +56,50 @@ def write_rows(plan: Plan, grid: Grid, path: str | None, digits: Digits) -> None
         grid: Where the rows stand.
         path: The file; None or "-" is standard output.
         digits: "fixed" for nine decimals, "full" for all bits.
+        form: The format; that of the file's name unless given.
+        log: What the command line says about a log.
 
     Raises:
+        InputError: When the log cannot be what the options say.
         FileError: When it cannot be written.
         BrokenPipeError: When the reader has closed the pipe.
     """
-    loaded = plan.loaded
-    groups = loaded.job.output.columns
-    columns = columns_of(groups, loaded.robot.joint_types, loaded.output_units)
-    rows = _counted(
-        sample(plan.trajectory, grid, groups, loaded.output_units, robot=loaded.robot), grid.count
-    )
+    form, loaded = form or format_of(path), plan.loaded
+    options = _write_options(plan, form, digits, log)
+    rows: Iterator[Array] = iter(())
+    columns: tuple[Column, ...] = ()
+    if form.content != "knots":
+        groups = tuple(loaded.job.output.columns) if form.content == "rows" else _groups_of_log(log)
+        units = Units() if form.si else loaded.output_units
+        columns = columns_of(groups, loaded.robot.joint_types, units)
+        rows = _counted(sample(plan.trajectory, grid, groups, units, robot=loaded.robot), grid.count)
     if path is not None and path != "-":
-        write_verified(path, rows, columns, digits)
+        write_verified(path, rows, columns, options, form)
         return
     with standard_output() as out:
-        DEFAULT.write(rows, columns, out, digits)
+        form.write(rows, columns, out, options)
+
+
+def _write_options(plan: Plan, form: StreamFormat, digits: Digits, log: LogOptions | None) -> WriteOptions:
+    """Return what the rows of a plan do not say in a format."""
+    if form.content == "knots":
+        from trajcli.knots import knots_of
+
+        names = plan.trajectory.joint_names
+        return WriteOptions(goal=cache(lambda: Goal(names, knots_of(plan.trajectory))))
+    if form.content == "log":
+        from trajcli.output.recording import LogOptions, check_log_options, recording_of
+
+        options = log or LogOptions()
+        check_log_options(options, plan.loaded.robot, plan.loaded.job.output.start_time)
+        return WriteOptions(recording=cache(lambda: recording_of(plan, options)))
+    return WriteOptions(digits)
+
+
+def _groups_of_log(log: LogOptions | None) -> tuple[Group, ...]:
+    """Return the columns that the messages of a log are made of."""
+    twist: tuple[Group, ...] = ("twist",) if log is not None and "/tool_twist" in log.names else ()
+    return ("t", "q", "qd", "qdd", *twist)
 
 
 def _counted(blocks: Iterator[Array], count: int) -> Iterator[Array]:
@@ -83,7 +116,8 @@ def write_plan(plan: Plan, path: str | None = None, digits: Digits = "fixed") ->
 
     Args:
         plan: The plan.
-        path: A CSV file, which appears whole or not at all; None or "-" is standard output.
+        path: A file, whose ending names the format, and which appears whole or not at all; None or "-" is
+            standard output.
         digits: "fixed" for nine decimals, "full" for all bits.
 
     Raises:
@@ -96,9 +130,7 @@ def write_plan(plan: Plan, path: str | None = None, digits: Digits = "fixed") ->
         from trajcli.output.report import verification_error
 
         raise verification_error(plan)
-    if path is not None:
-        check_output_name(path)
-    write_rows(plan, grid_of(plan), path, digits)
+    write_rows(plan, grid_of(plan), path, digits, form=format_of(path))
 
 
 def write_text(text: str, path: str) -> None:
