@@ -16,7 +16,7 @@ from trajcli.errors import InputError
 from trajcli.frozen import comparable
 from trajcli.job.read import files_of
 from trajcli.kinematics.robot import Robot
-from trajcli.knots import knots_of
+from trajcli.knots import Knots, knots_of
 from trajcli.planning.plan import Plan
 from trajcli.streams.mcap.recording import AttachedFile, Compression, LinkFrames, LoggedPath, Recording
 from trajcli.suggest import did_you_mean, valid_names
@@ -89,24 +89,26 @@ def recording_of(plan: Plan, options: LogOptions) -> Recording:
     Args:
         plan: A verified plan.
         options: They were checked.
+
+    Raises:
+        InputError: When the log would end later than its times can say.
     """
     loaded, trajectory = plan.loaded, plan.trajectory
     geometric = loaded.robot.convention is not None
-    frames = _frames(loaded.robot, trajectory) if geometric else None
+    frames, knots = _frames(loaded.robot, trajectory) if geometric else None, knots_of(trajectory)
     job = _job_text(plan).encode()
     attachments = [
         AttachedFile("job.yaml", "application/yaml", job),
-        AttachedFile("report.json", "application/json", _report(plan).encode()),
+        AttachedFile("report.json", "application/json", _report(plan, knots).encode()),
     ]
     if frames is not None:
         attachments.append(AttachedFile("robot.urdf", "application/xml", frames.urdf.encode()))
-    start_time = loaded.job.output.start_time
     return Recording(
         joint_names=trajectory.joint_names,
-        origin=_origin(options, start_time),
+        origin=_origin(options, loaded.job.output.start_time, trajectory.duration),
         epoch=_epoch(options),
         duration=round(trajectory.duration * _PER_SECOND),
-        knots=knots_of(trajectory),
+        knots=knots,
         frames=frames,
         path=_path(loaded.robot, trajectory) if geometric else None,
         attachments=tuple(attachments),
@@ -128,8 +130,8 @@ def _epoch(options: LogOptions) -> int:
     return int((Decimal(options.epoch) * _PER_SECOND).to_integral_value())
 
 
-def _origin(options: LogOptions, start_time: float) -> int:
-    """Return the time of the log when the motion starts, ns."""
+def _origin(options: LogOptions, start_time: float, duration: float = 0.0) -> int:
+    """Return the time of the log when the motion starts, ns; that of its end must be possible, too."""
     epoch = _epoch(options)
     origin = epoch + round(start_time * _PER_SECOND)
     if origin < 0:
@@ -137,10 +139,11 @@ def _origin(options: LogOptions, start_time: float) -> int:
             f"a log begins at 0 s or later, and output.start_time is {start_time:g} s",
             hint=f"--epoch {-start_time:g} or more makes that possible",
         )
-    if origin > _LATEST * _PER_SECOND:
+    end = origin / _PER_SECOND + duration
+    if end > _LATEST:
         raise InputError(
-            f"the log would begin at {origin / _PER_SECOND:.12g} s, and times of ROS 2 end at {_LATEST} s",
-            hint="give --epoch in seconds",
+            f"the log would reach {end:.12g} s, and times of ROS 2 end at {_LATEST} s",
+            hint="give --epoch in seconds, and small enough for the whole motion",
         )
     return origin
 
@@ -155,10 +158,10 @@ def _job_text(plan: Plan) -> str:
     return "\n".join(document.lines)
 
 
-def _report(plan: Plan) -> str:
+def _report(plan: Plan, knots: Knots) -> str:
     from trajcli.output.report import report_of
 
-    return report_of(plan).model_dump_json(indent=2) + "\n"
+    return report_of(plan, knots=knots).model_dump_json(indent=2) + "\n"
 
 
 def _metadata(plan: Plan, job: bytes, options: LogOptions) -> Mapping[str, str]:

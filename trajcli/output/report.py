@@ -37,7 +37,7 @@ from trajcli.job.report import (
 )
 from trajcli.job.unit_hints import unit_hint
 from trajcli.kinematics.robot import QUANTITIES, JointType, Robot
-from trajcli.knots import knots_of
+from trajcli.knots import Knots, knots_of
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.lower_bound import NoBound, fastest_duration
 from trajcli.planning.plan import Plan
@@ -60,12 +60,13 @@ def joint_units(joint_types: tuple[JointType, ...], order: int = 0) -> list[str]
     return [("m" if kind == "prismatic" else "rad") + _RATES[order] for kind in joint_types]
 
 
-def report_of(plan: Plan, *, reference: bool = False) -> Report:
+def report_of(plan: Plan, *, reference: bool = False, knots: Knots | None = None) -> Report:
     """Return the report of a plan, in SI.
 
     Args:
         plan: The plan.
         reference: Whether each move is compared with ruckig's bound.
+        knots: Those of its trajectory, where they are known.
     """
     verdict = plan.verdict
     units = dict(zip(plan.trajectory.joint_names, joint_units(plan.trajectory.joint_types, 2), strict=True))
@@ -81,12 +82,11 @@ def report_of(plan: Plan, *, reference: bool = False) -> Report:
         steps=_steps(verdict.steps, units),
         unchecked=[UncheckedReport(joint=joint, quantity=quantity) for joint, quantity in verdict.unchecked],
         unchecked_of_tool=[UncheckedToolReport(quantity=name) for name in verdict.unchecked_of_tool],
-        knots=_knots(plan.trajectory) if verdict.passed else None,
+        knots=_knots(plan.trajectory, knots or knots_of(plan.trajectory)) if verdict.passed else None,
     )
 
 
-def _knots(trajectory: Trajectory) -> KnotsReport:
-    knots = knots_of(trajectory)
+def _knots(trajectory: Trajectory, knots: Knots) -> KnotsReport:
     missed = knots.deviation
     units = [joint_units(trajectory.joint_types, order) for order in (0, 1)]
     return KnotsReport(

@@ -223,6 +223,10 @@ def test_other_files_and_topics_are_named(tmp_path: Path, pick_log: Path) -> Non
 def test_messages_that_do_not_belong_together_are_refused(tmp_path: Path) -> None:
     cases = {
         "other joints": [state(0, [1.0, 2, 3]), state(1, [1.0, 2, 3], names="abc")],
+        "other joints or quantities than the first": [
+            state(0, [1.0, 2, 3]),
+            state(1, [1.0, 2, 3], names=["a", "b", "çc"]),
+        ],
         "3 joints": [state(0, [1.0, 2.0])],
         "other joints or quantities": [state(0, [1.0, 2, 3]), state(1, [1.0, 2, 3], [1.0, 2, 3])],
         "is nan": [state(0, [1.0, np.nan, 3])],

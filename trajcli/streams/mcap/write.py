@@ -34,7 +34,7 @@ METADATA = "trajcli"
 
 Encoder = Callable[[memoryview], bytes | memoryview]
 
-_LEVEL = 1  # of zstd: three times as fast as the usual 3, for files a twentieth larger
+_LEVEL = 1  # of zstd: measured, 1.6 times as fast as the usual 3, for files 8 % larger
 
 
 def write_mcap_blocks(
