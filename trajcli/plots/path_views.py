@@ -10,8 +10,9 @@ from trajcli.plots.legend import LIMIT_COLOUR, WAYPOINT, style_of
 from trajcli.plots.panel import PathViews
 
 _LEAST, _MOST = 2.1, 3.2  # width of a view, inches
-_VIEW_TICKS, _SPACE_TICKS = 4, 4
-_SPACE = 0.82  # of the view in space is its box: numbers and labels stand outside of it
+_VIEW_TICKS, _SPACE_TICKS = 4, 3
+_SPACE = 0.8  # of the view in space is its box: numbers and labels stand outside of it
+_SPACE_PADS = (3, 5, 6)  # of the labels, points
 _SHIFT = 0.3  # of that view to the left, inches
 
 
@@ -90,7 +91,8 @@ def _draw_space(
         axis.set_ticks(*ticks_of((low + inner, high - inner), _SPACE_TICKS))
         axis.set_label_text(f"{'xyz'[side]} [{views.unit}]", fontsize=SMALL)
         axis.set_tick_params(labelsize=SMALL, pad=0)
-        axis.labelpad = -2
+        axis.set_rotate_label(False)
+        axis.labelpad = _SPACE_PADS[side]
 
 
 def _views_columns(width: float) -> int:
