@@ -176,7 +176,6 @@ def test_only_what_is_needed_is_imported(here: Path) -> None:
     assert "matplotlib.figure" in modules
     unneeded = {
         "matplotlib.pyplot",
-        "mpl_toolkits.mplot3d",
         "matplotlib.backends.backend_pdf",
         "scipy",
         "toppra",
