@@ -118,6 +118,25 @@ def test_the_check_of_overlaps_can_fail(two: Plan, monkeypatch: pytest.MonkeyPat
     assert overlaps(picture_of(two))
 
 
+def test_many_moves_have_no_borders_and_many_waypoints_are_small() -> None:
+    def drawn_with(count: int) -> tuple[set[str], set[str], float]:
+        moves = "".join(
+            f"  - {{planner: quintic, to: {{joints: [{k % 2 + 1}]}}, duration: 1}}\n" for k in range(count)
+        )
+        job = f"version: 1\nrobot: {{joints: 1}}\nstart: {{joints: [0]}}\nmoves:\n{moves}"
+        picture = picture_of(plan_job(job_from_text(job)), quantities=["q"])
+        figure, _ = drawn(picture)
+        lines = artists(picture)
+        texts = {text.get_text() for text in figure.findobj(Text)}
+        return set(lines), texts, lines["panel0-waypoints"].get_markersize()
+
+    few, words, large = drawn_with(30)
+    many, no_words, small = drawn_with(90)
+    assert "panel0-borders" in few - many
+    assert "border of moves" in words - no_words
+    assert small < large / 2
+
+
 def artists(picture: Picture) -> dict[str, Line2D]:
     figure, _ = drawn(picture)
     return {line.get_gid(): line for line in figure.findobj(Line2D) if line.get_gid()}

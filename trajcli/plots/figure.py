@@ -28,9 +28,11 @@ from trajcli.plots.legend import (
     FINDING,
     LIMIT,
     LIMIT_COLOUR,
+    MOST_BORDERS,
     VIRTUAL_POINT,
     WAYPOINT,
     Legend,
+    marker_style,
     style_of,
 )
 from trajcli.plots.panel import MoveBorders, Panel, PanelBlock, Picture
@@ -153,7 +155,7 @@ def _draw_block(
 
 
 def _draw_borders(frame: PanelFrame, borders: MoveBorders) -> None:
-    if borders.times.size > 2:
+    if 2 < borders.times.size <= MOST_BORDERS:
         frame.uprights(borders.times[1:-1], "borders", **BORDER)
 
 
@@ -194,7 +196,7 @@ def _draw_marks(frame: PanelFrame, panel: Panel) -> None:
         (seen, "findings", FINDING),
     ):
         if points.size:
-            frame.plot(points[:, 0], points[:, 1], part, **style)
+            frame.plot(points[:, 0], points[:, 1], part, **marker_style(style, len(points)))
 
 
 def _plane_view(panel: Panel) -> tuple[float, float]:

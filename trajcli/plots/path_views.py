@@ -6,7 +6,7 @@ import numpy as np
 
 from trajcli.plots.axes import ticks_of
 from trajcli.plots.frame import AXIS, BELOW, NORMAL, SMALL, TITLE, PanelFrame, Sheet, left_of, panel_width
-from trajcli.plots.legend import LIMIT_COLOUR, WAYPOINT, style_of
+from trajcli.plots.legend import LIMIT_COLOUR, WAYPOINT, marker_style, style_of
 from trajcli.plots.panel import PathViews
 
 _LEAST, _MOST = 2.1, 3.2  # width of a view, inches
@@ -53,7 +53,12 @@ def _draw_side(
     for source, trace in views.traces:
         frame.plot(trace[:, first], trace[:, second], f"source{source}", **style_of(source))
     if views.waypoints.size:
-        frame.plot(views.waypoints[:, first], views.waypoints[:, second], "waypoints", **WAYPOINT)
+        frame.plot(
+            views.waypoints[:, first],
+            views.waypoints[:, second],
+            "waypoints",
+            **marker_style(WAYPOINT, len(views.waypoints)),
+        )
     (x, x_names), (y, y_names) = (ticks_of(ranges[side], _VIEW_TICKS) for side in (first, second))
     frame.outline(x, y)
     frame.x_axis(x, x_names, f"{'xyz'[first]} [{views.unit}]")
@@ -83,7 +88,7 @@ def _draw_space(
     for source, trace in views.traces:
         axes.plot(*trace.T, gid=f"space-source{source}", **style_of(source))
     if views.waypoints.size:
-        axes.plot(*views.waypoints.T, gid="space-waypoints", **WAYPOINT)
+        axes.plot(*views.waypoints.T, gid="space-waypoints", **marker_style(WAYPOINT, len(views.waypoints)))
     axes.set(xlim=ranges[0], ylim=ranges[1], zlim=ranges[2])
     for side, axis in enumerate((axes.xaxis, axes.yaxis, axes.zaxis)):
         low, high = ranges[side]
