@@ -29,6 +29,7 @@ BENCHMARKS = (
     "operational",
     "long_path",
     "jerk_limited",
+    "plotting",
 )
 OURS = ("trajcli", "numpy", "pydantic", "pyyaml", "typer")
 THEIRS = ("roboticstoolbox-python", "eaik", "toppra", "numpy", "scipy")

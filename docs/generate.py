@@ -1,4 +1,4 @@
-"""Write what the documents take from the code: the reference pages, and the outputs of shown commands.
+"""Write what the documents take from the code: reference pages, outputs of shown commands, pictures.
 
 Run by `make docs`; a test checks that it has been run.
 """
@@ -12,6 +12,7 @@ from docs.cli_reference import cli_reference
 from docs.console import renewed
 from docs.job_reference import job_reference
 from docs.markdown import ROOT, blocks, documents
+from docs.pictures import FOLDER, PAGE, pictures
 
 PAGES = {"docs/job-reference.md": job_reference, "docs/cli-reference.md": cli_reference}
 
@@ -27,6 +28,8 @@ def main() -> None:
         _write(ROOT / name, page())
     for document in filter(shows_commands, documents()):
         _write(document, renewed(document.read_text(encoding="utf-8")))
+    for name, picture in pictures(PAGE.read_text(encoding="utf-8")).items():
+        _write(FOLDER / name, picture)
 
 
 def _write(path: Path, text: str) -> None:

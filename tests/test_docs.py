@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 from docs.console import agrees, commands, renewed
 from docs.generate import PAGES, shows_commands
 from docs.markdown import ROOT, Block, anchors, blocks, documents, links
+from docs.pictures import FOLDER, PAGE, pictures, words_of
 from trajcli.cli.app import app
 from trajcli.job.read import job_from_text
 from trajcli.job.robot import read_robot_file
@@ -213,3 +214,19 @@ def test_commands_that_set_up_the_project_are_not_run() -> None:
 def test_commands_are_told_from_their_output() -> None:
     block = Block("console", None, "$ a\nb\nc\n$ d\n", 0)
     assert commands(block) == [("a", "b\nc\n"), ("d", "")]
+
+
+def test_pictures_are_those_that_the_page_makes() -> None:
+    made = pictures(text_of(PAGE))
+    assert {link for link in links(text_of(PAGE)) if link.endswith(".svg")} == {f"pictures/{n}" for n in made}
+    for name, picture in made.items():
+        stored = text_of(FOLDER / name)
+        assert words_of(picture) == words_of(stored), f"{name}: run `make docs`, and look at what it changed"
+        assert abs(len(picture) - len(stored)) < 0.05 * len(stored)  # the digits of other processors
+    assert sorted(path.name for path in FOLDER.iterdir()) == sorted(made)
+
+
+def test_a_picture_of_other_numbers_is_another_picture() -> None:
+    stored = text_of(FOLDER / "failed.svg")
+    assert words_of(stored.replace(">40</text>", ">50</text>")) != words_of(stored)
+    assert ("qd [deg/s]", "") in words_of(stored)

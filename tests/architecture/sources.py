@@ -117,8 +117,7 @@ def the_sources() -> Sources:
     """Return trajcli as it stands on disk."""
     house, tests = ROOT / HOUSE, ROOT / "tests"
     texts = {path.relative_to(house).as_posix(): path.read_text("utf-8") for path in house.rglob("*.py")}
-    files = (path.relative_to(tests) for path in tests.rglob("*") if path.is_file())
-    folders = {path.parent.as_posix() for path in files if "__pycache__" not in path.parts} - {"."}
+    folders = {path.relative_to(tests).parent.as_posix() for path in tests.rglob("*.py")} - {"."}
     return Sources(texts, folders)
 
 

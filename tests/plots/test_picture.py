@@ -138,6 +138,36 @@ def test_the_phase_plane_of_a_move_along_a_path_has_its_speed_as_limit(example: 
     np.testing.assert_allclose(trace.y[[0, -1]], 0.0, atol=1e-12)
 
 
+def test_where_the_curvature_jumps_the_limit_of_the_phase_plane_steps_upright(example: Example) -> None:
+    picture = picture_of(example("time_optimal"), quantities=["phase"])
+    smooth, rounded = panels(picture).values()
+
+    def steps(panel: Panel) -> np.ndarray:
+        (limit,) = panel.limits
+        upright = np.abs(np.diff(limit[:, 1])) > 0.3 * limit[:-1, 1]
+        return np.diff(limit[:, 0])[upright]
+
+    assert steps(rounded).tolist() == [0.0] * 6  # into and out of each of three parabolas
+    assert steps(smooth).size == 0
+
+
+@pytest.mark.parametrize("slower", ["", "output: {align: true, rate: 7}"])
+def test_marks_and_planes_follow_a_move_that_is_stretched(slower: str) -> None:
+    head = "version: 1\nrobot: {joints: [{velocity: 1, acceleration: 2}]}\nstart: {joints: [0]}\nmoves:\n"
+    moves = "  - {planner: spline, through: [{joints: [2]}], to: {joints: [3]}}\n"
+    moves += "  - {planner: time_optimal, through: [{joints: [1]}], to: {joints: [0]}}\n"
+    plan = plan_job(job_from_text(head + moves + slower))
+    shown = panels(picture_of(plan))
+    curve, panel = plan.trajectory.curve, shown["j1: position"]
+    for marks in (panel.waypoints, panel.virtual_points):
+        np.testing.assert_allclose(curve.evaluate(marks[:, 0])[:, 0], marks[:, 1], atol=1e-6)
+    assert panel.virtual_points.shape == (2, 2)
+    plane = plan.moves[1].planned.phase_plane
+    assert plane is not None
+    assert plane.law.duration == pytest.approx(plan.moves[1].duration, rel=1e-12)
+    assert (plan.trajectory.duration * 7 % 1 < 1e-9) == bool(slower)
+
+
 def test_sharp_corners_take_the_limit_of_the_phase_plane_to_zero() -> None:
     plan = plan_job(
         job_from_text(

@@ -16,8 +16,9 @@ _HALF = 0.5  # the same where only the limit on one side is near
 _MARGIN = 0.06  # of the view, around what is in it
 _LEAST = 1e-9  # of the largest value, or units: a smaller range is rounding, and not to be blown up
 _AT_REST = 1e-6  # of a limit: what moves less rests, as far as a picture can show
-_MOST_DIGITS = 6
-_FIXED = (1e-4, 1e6)  # from this step, and below this number, ticks are written without an exponent
+_MOST_DIGITS = 9
+_FIXED = (1e-4, 1e7)  # from this step, and below this number, ticks are written without an exponent
+_CUT = "\N{HORIZONTAL ELLIPSIS}"
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 
 
@@ -106,16 +107,21 @@ def shortened(text: str, size: float, width: float) -> str:
     """Return a text that is no wider than `width` inches; what is left out is marked."""
     if text_width(text, size) <= width:
         return text
-    for length in range(len(text) - 1, 0, -1):
-        if text_width(text[:length] + "\N{HORIZONTAL ELLIPSIS}", size) <= width:
-            return text[:length] + "\N{HORIZONTAL ELLIPSIS}"
-    return ""
+    room, longest = width - text_width(_CUT, size), 0
+    step = 1 << (len(text) - 1).bit_length()
+    while step:  # the width grows with the length
+        if longest + step < len(text) and text_width(text[: longest + step], size) <= room:
+            longest += step
+        step >>= 1
+    return text[:longest] + _CUT if longest else ""
 
 
 def upright_labels(
     names: Sequence[str], middles: Array, widths: Array, size: float
-) -> tuple[bool, list[int]]:
-    """Return whether names must stand upright above their intervals, and the indices of those with room.
+) -> tuple[bool, list[tuple[int, float]]]:
+    """Return whether names must stand upright above their intervals, and index and middle of those with room.
+
+    Where upright names would stand on each other, they are moved apart; of too many some are left out.
 
     Args:
         names: Of the intervals.
@@ -127,10 +133,13 @@ def upright_labels(
         text_width(name, size) + size / 72 <= width for name, width in zip(names, widths, strict=True)
     )
     if level:
-        return False, list(range(len(names)))
-    line, kept, last = 1.5 * size / 72, [], -np.inf
-    for index in np.flatnonzero(widths > 0):
-        if middles[index] - last >= line:
-            kept.append(int(index))
-            last = middles[index]
-    return True, kept
+        return False, list(enumerate(middles.tolist()))
+    line, end = 1.5 * size / 72, float(middles[-1] + 0.5 * widths[-1])
+    shown = np.flatnonzero(widths > 0)
+    most = max(int((end - float(middles[0] - 0.5 * widths[0])) / line), 1)
+    if shown.size > most:
+        shown = shown[np.linspace(0, shown.size - 1, most).astype(np.intp)]
+    steps = line * np.arange(shown.size)
+    at = np.maximum.accumulate(middles[shown] - steps)  # no nearer than a line to the one before
+    at = np.minimum(at, end - 0.5 * line - steps[-1]) + steps
+    return True, list(zip(shown.tolist(), at.tolist(), strict=True))

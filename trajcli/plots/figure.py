@@ -28,9 +28,11 @@ from trajcli.plots.legend import (
     FINDING,
     LIMIT,
     LIMIT_COLOUR,
+    MOST_BORDERS,
     VIRTUAL_POINT,
     WAYPOINT,
     Legend,
+    marker_style,
     style_of,
 )
 from trajcli.plots.panel import MoveBorders, Panel, PanelBlock, Picture
@@ -41,6 +43,7 @@ _HEAD, _LINE = 0.4, 0.2
 _FLAT, _TALL, _PLANE = 1.1, 1.5, 2.6
 _FEW_ROWS = 4
 _X_TICKS, _Y_TICKS = 5, 5
+_BOLD = 0.8  # of the width of a bold text is that of a plain one, at least
 
 
 def figure_of(picture: Picture) -> Any:  # noqa: ANN401
@@ -50,7 +53,7 @@ def figure_of(picture: Picture) -> Any:  # noqa: ANN401
     layout = _Layout(picture)
     figure = Figure(figsize=(layout.width, layout.height))
     sheet = Sheet(figure, layout.width, layout.height)
-    title = shortened(picture.title, LARGE, 0.9 * (layout.width - 0.4))
+    title = shortened(picture.title, LARGE, _BOLD * (layout.width - 0.4))
     sheet.text(0.2, 0.12, title, LARGE, va="top", weight="bold")
     layout.legend.draw(sheet, _HEAD)
     top, number = _HEAD + layout.legend.height, 0
@@ -109,10 +112,10 @@ def _strip(block: PanelBlock, borders: MoveBorders | None, width: float) -> floa
     upright, kept = _named(block, borders, width)
     if not upright:
         return _LINE
-    return max((text_width(borders.names[index], SMALL) for index in kept), default=0.0) + 0.12
+    return max((text_width(borders.names[index], SMALL) for index, _ in kept), default=0.0) + 0.12
 
 
-def _named(block: PanelBlock, borders: MoveBorders, width: float) -> tuple[bool, list[int]]:
+def _named(block: PanelBlock, borders: MoveBorders, width: float) -> tuple[bool, list[tuple[int, float]]]:
     """Return whether the names of moves stand upright, and which have room."""
     low, high = _time_range(block, borders)
     edges = (borders.times - low) * (width / (high - low))
@@ -152,17 +155,16 @@ def _draw_block(
 
 
 def _draw_borders(frame: PanelFrame, borders: MoveBorders) -> None:
-    if borders.times.size > 2:
+    if 2 < borders.times.size <= MOST_BORDERS:
         frame.uprights(borders.times[1:-1], "borders", **BORDER)
 
 
-def _draw_names(frame: PanelFrame, borders: MoveBorders, named: tuple[bool, list[int]]) -> None:
+def _draw_names(frame: PanelFrame, borders: MoveBorders, named: tuple[bool, list[tuple[int, float]]]) -> None:
     """Write the names of moves above a frame, each over the middle of its interval."""
     upright, kept = named
-    for index in kept:
-        middle = frame.across(0.5 * float(borders.times[index : index + 2].sum()))
+    for index, middle in kept:
         options = {"rotation": 90 if upright else 0, "ha": "center", "va": "bottom", "color": GREY}
-        frame.sheet.text(middle, frame.top - 0.9 * TITLE, borders.names[index], SMALL, **options)
+        frame.sheet.text(frame.left + middle, frame.top - 0.9 * TITLE, borders.names[index], SMALL, **options)
 
 
 def _draw_panel(frame: PanelFrame, panel: Panel, note: str, *, numbered: bool) -> None:
@@ -194,7 +196,7 @@ def _draw_marks(frame: PanelFrame, panel: Panel) -> None:
         (seen, "findings", FINDING),
     ):
         if points.size:
-            frame.plot(points[:, 0], points[:, 1], part, **style)
+            frame.plot(points[:, 0], points[:, 1], part, **marker_style(style, len(points)))
 
 
 def _plane_view(panel: Panel) -> tuple[float, float]:

@@ -40,6 +40,10 @@ FINDING: Mapping[str, Any] = {
     "markeredgecolor": "white",
 }
 
+MOST_BORDERS = 80
+"""Of moves in a panel that are drawn; more of them would hide everything else."""
+
+_MOST_LARGE, _SMALL_MARKER = 60, 1.5  # so many markers of a panel are large; of more each is this small
 _SAMPLE, _GAP, _INDENT = 0.32, 0.65, 0.2  # of the legend, inches
 _LONGEST = 3.0  # of a name, inches
 _LINE = 0.2  # height of a row, inches
@@ -50,6 +54,12 @@ def style_of(source: int) -> dict[str, Any]:
     round_number, index = divmod(source, len(COLOURS))
     dashes = DASHES[(index + round_number) % len(DASHES)]
     return {"color": COLOURS[index], "linestyle": dashes, "linewidth": 1.2 if source == 0 else 1.0}
+
+
+def marker_style(style: Mapping[str, Any], count: int) -> dict[str, Any]:
+    """Return the style of markers, which are smaller where there are many."""
+    small = {"markersize": _SMALL_MARKER, "markeredgewidth": 0.4} if count > _MOST_LARGE else {}
+    return {**style, **small}
 
 
 class Legend:
@@ -82,7 +92,7 @@ def _entries(picture: Picture) -> Iterator[tuple[str, Mapping[str, Any]]]:
     for index, name in enumerate(picture.sources):
         yield shortened(name, NORMAL, _LONGEST), style_of(index)
     timed = any(block.over_time for block in picture.blocks)
-    many = picture.borders is not None and picture.borders.times.size > 2
+    many = picture.borders is not None and 2 < picture.borders.times.size <= MOST_BORDERS
     points = picture.views is not None and picture.views.waypoints.size > 0
     kinds: tuple[tuple[str, bool, Mapping[str, Any]], ...] = (
         ("limit", any(np.isfinite(line[:, 1]).any() for panel in panels for line in panel.limits), LIMIT),

@@ -6,12 +6,13 @@ import numpy as np
 
 from trajcli.plots.axes import ticks_of
 from trajcli.plots.frame import AXIS, BELOW, NORMAL, SMALL, TITLE, PanelFrame, Sheet, left_of, panel_width
-from trajcli.plots.legend import LIMIT_COLOUR, WAYPOINT, style_of
+from trajcli.plots.legend import LIMIT_COLOUR, WAYPOINT, marker_style, style_of
 from trajcli.plots.panel import PathViews
 
 _LEAST, _MOST = 2.1, 3.2  # width of a view, inches
-_VIEW_TICKS, _SPACE_TICKS = 4, 4
-_SPACE = 0.82  # of the view in space is its box: numbers and labels stand outside of it
+_VIEW_TICKS, _SPACE_TICKS = 4, 3
+_SPACE = 0.8  # of the view in space is its box: numbers and labels stand outside of it
+_SPACE_PADS = (3, 5, 6)  # of the labels, points
 _SHIFT = 0.3  # of that view to the left, inches
 
 
@@ -52,7 +53,12 @@ def _draw_side(
     for source, trace in views.traces:
         frame.plot(trace[:, first], trace[:, second], f"source{source}", **style_of(source))
     if views.waypoints.size:
-        frame.plot(views.waypoints[:, first], views.waypoints[:, second], "waypoints", **WAYPOINT)
+        frame.plot(
+            views.waypoints[:, first],
+            views.waypoints[:, second],
+            "waypoints",
+            **marker_style(WAYPOINT, len(views.waypoints)),
+        )
     (x, x_names), (y, y_names) = (ticks_of(ranges[side], _VIEW_TICKS) for side in (first, second))
     frame.outline(x, y)
     frame.x_axis(x, x_names, f"{'xyz'[first]} [{views.unit}]")
@@ -82,7 +88,7 @@ def _draw_space(
     for source, trace in views.traces:
         axes.plot(*trace.T, gid=f"space-source{source}", **style_of(source))
     if views.waypoints.size:
-        axes.plot(*views.waypoints.T, gid="space-waypoints", **WAYPOINT)
+        axes.plot(*views.waypoints.T, gid="space-waypoints", **marker_style(WAYPOINT, len(views.waypoints)))
     axes.set(xlim=ranges[0], ylim=ranges[1], zlim=ranges[2])
     for side, axis in enumerate((axes.xaxis, axes.yaxis, axes.zaxis)):
         low, high = ranges[side]
@@ -90,7 +96,8 @@ def _draw_space(
         axis.set_ticks(*ticks_of((low + inner, high - inner), _SPACE_TICKS))
         axis.set_label_text(f"{'xyz'[side]} [{views.unit}]", fontsize=SMALL)
         axis.set_tick_params(labelsize=SMALL, pad=0)
-        axis.labelpad = -2
+        axis.set_rotate_label(False)
+        axis.labelpad = _SPACE_PADS[side]
 
 
 def _views_columns(width: float) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -74,7 +75,9 @@ def picture_of(
         blocks.append(_phase_block(motion))
     return Picture(
         _title(motion, records),
-        tuple(([] if plan is None else [plan.loaded.name]) + [record.table.file for record in records]),
+        tuple(
+            ([] if plan is None else [plan.loaded.name]) + _names([record.table.file for record in records])
+        ),
         tuple(blocks),
         maker.views() if PATH in drawn else None,
         None if motion is None else motion.borders,
@@ -131,11 +134,18 @@ def _impossible(motion: PlannedMotion | None, records: Sequence[RecordedMotion])
 
 def _title(motion: PlannedMotion | None, records: Sequence[RecordedMotion]) -> str:
     if motion is None:
-        return ", ".join(record.table.file for record in records)
+        more = len(records) - 1
+        return records[0].table.file + (f" and {more} more file{'s' * (more > 1)}" if more else "")
     plan = motion.plan
     count = len(plan.verdict.findings)
     verdict = "verified" if plan.verdict.passed else f"NOT VERIFIED, {count} finding{'s' * (count != 1)}"
     return f"{plan.loaded.name}: {verdict}, {plan.trajectory.duration:.6g} s"
+
+
+def _names(files: Sequence[str]) -> list[str]:
+    """Return how a legend calls files: without their folders where that tells them apart."""
+    short = [Path(file).name for file in files]
+    return short if len(set(short)) == len(set(files)) else list(files)
 
 
 class _Maker:

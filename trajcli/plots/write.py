@@ -65,11 +65,7 @@ def format_of_picture(path: str | None, given: str | None) -> str:
 
 
 def rendered(picture: Picture, kind: str) -> bytes:
-    """Return the bytes of a picture in one of `PICTURE_FORMATS`; the same for the same picture.
-
-    Raises:
-        InputError: When it would be too large for a PNG.
-    """
+    """Return the bytes of a picture in one of `PICTURE_FORMATS`; the same for the same picture."""
     import matplotlib as mpl
 
     with mpl.rc_context(settings()):
