@@ -17,7 +17,7 @@ FLOORS = (
     ("planners", "checks", "streams"),
     ("job",),
     ("planning", "comparison", "queries"),
-    ("output",),
+    ("output", "player"),
     ("cli",),
     ("",),  # trajcli/__init__.py, the public face
     ("__main__",),
