@@ -27,6 +27,7 @@ BENCHMARKS = (
     "through_points",
     "operational",
     "long_path",
+    "viewing",
 )
 OURS = ("trajcli", "numpy", "pydantic", "pyyaml", "typer")
 THEIRS = ("roboticstoolbox-python", "eaik", "toppra", "numpy", "scipy")

@@ -345,16 +345,18 @@ def test_a_file_without_a_robot_has_plots_only(view: Callable[..., Any], tmp_pat
     assert viewed.messages == []
 
 
-@pytest.mark.parametrize("moves", ["[{planner: hold, duration: 0}]", "[{planner: hold, duration: 1}]"])
-def test_a_motion_of_no_length(view: Callable[..., Any], tmp_path: Path, moves: str) -> None:
-    text = PANDA[: PANDA.index("moves:")] + f"moves: {moves}\n"
+def test_a_motion_of_no_length(view: Callable[..., Any], tmp_path: Path) -> None:
+    text = (
+        PANDA[: PANDA.index("moves:")]
+        + "moves: [{planner: jerk_limited, to: {joints: [0, -30, 0, -120, 0, 90, 0]}, limits: {jerk: 100, acceleration: 100}}]\n"
+    )
     viewed = view(written(tmp_path, planned(text)))
     for key in ("ArrowRight", "End", "Space", "Home", "j"):
         viewed.page.keyboard.press(key)
     viewed.page.wait_for_timeout(200)
     assert viewed.messages == []
     assert viewed.page.locator(".plot:visible canvas").count() == 4
-    assert viewed.page.locator(".now").inner_text() in ("0.000", "0.017", "0.050")
+    assert viewed.page.locator(".now").inner_text() == "0.000"
 
 
 def test_without_webgl_there_are_plots(chromium: Any, pick: Path) -> None:
