@@ -12,7 +12,8 @@ export function unpack({ values, width, low, high }, count) {
       const at = width * (column * count + row);
       let level = 0;
       for (let k = width - 1; k >= 0; k -= 1) level = 256 * level + packed[at + k];
-      return least + step * level;
+      const value = least + step * level;
+      return Math.abs(value) <= step / 2 ? 0 : value; // rest is rest
     });
   });
 }

@@ -1,6 +1,7 @@
 // Plots of the joints over time: linked to each other and to the clock, with limits, moves and findings.
 import uPlot from 'uplot';
 import { element } from './dom.js';
+import { seconds, significant } from './numbers.js';
 
 const NAMES = { q: 'Position', qd: 'Velocity', qdd: 'Acceleration', qddd: 'Jerk' };
 const SYMBOLS = { q: 'q', qd: 'q\u0307', qdd: 'q\u0308', qddd: 'q\u20db' };
@@ -30,7 +31,9 @@ export class Plots {
 
   card(quantity) {
     const room = element('div.plot-room');
-    const heading = element('h3', {}, `${NAMES[quantity]} `, element('span.symbol', { text: SYMBOLS[quantity] }));
+    const limit = this.scene.limits.some(({ bounds }) => bounds[ORDERS.indexOf(quantity)].flat().some((bound) => bound !== null));
+    const key = limit ? [element('span.limit-key', { text: 'limit' })] : [];
+    const heading = element('h3', {}, element('span', {}, `${NAMES[quantity]} `, element('span.symbol', { text: SYMBOLS[quantity] })), ...key);
     const card = element('section.plot', { 'aria-label': `${NAMES[quantity]} of the joints over time` }, heading, room);
     this.holder.append(card);
     return { quantity, card, room, order: ORDERS.indexOf(quantity) };
@@ -97,6 +100,7 @@ export class Plots {
         hooks: {
           drawAxes: [(plot) => this.drawBorders(plot)],
           draw: [(plot) => this.drawLimits(plot, order), (plot) => this.drawFindings(plot, order)],
+          setCursor: [(plot) => this.showValues(card, plot)],
           setSelect: [(plot) => (this.zoomed = plot.select.width > 0)],
           setScale: [(plot, key) => key === 'x' && this.followZoom(plot)],
         },
@@ -106,8 +110,27 @@ export class Plots {
     );
     card.last = last;
     card.cursor = element('div.playhead');
-    card.plot.over.append(card.cursor);
+    card.values = element('div.values', { hidden: true });
+    card.plot.over.append(card.cursor, card.values);
     this.listen(card);
+  }
+
+  /** Show the values under the pointer, beside it; in the plot that it is over. */
+  showValues({ values, order }, plot) {
+    const { left, idx } = plot.cursor;
+    values.hidden = !(left >= 0 && idx !== null && idx !== undefined && plot.over.matches(':hover'));
+    if (values.hidden) return;
+    const lines = this.shown(order).map((joint) => {
+      const name = element('span.value-name', { text: this.scene.joints[joint].name });
+      const mark = element('span.swatch');
+      mark.style.background = this.theme.joint(joint).color;
+      return element('div', {}, mark, name, element('b', { text: significant(plot.data[joint + 1][idx], 4) }));
+    });
+    const row = plot.data[0][idx];
+    values.replaceChildren(element('div.value-time', { text: `${seconds(row)} s, ${this.unitsOf(order).join(' and ')}` }), ...lines);
+    const beyond = left > plot.over.clientWidth / 2;
+    values.style.left = beyond ? 'auto' : `${left + 12}px`;
+    values.style.right = beyond ? `${plot.over.clientWidth - left + 12}px` : 'auto';
   }
 
   timeRange(low, high) {

@@ -26,6 +26,8 @@ export class Stage {
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
+    this.renderer.domElement.setAttribute('aria-label', 'The arm in space');
+    this.renderer.domElement.setAttribute('role', 'img');
     holder.prepend(this.renderer.domElement);
     this.scene = new Scene();
     this.camera = new PerspectiveCamera(38, 1, 0.01, 100);

@@ -3,6 +3,8 @@ import { SPEEDS } from './clock.js';
 import { ICONS, element, icon } from './dom.js';
 import { seconds } from './numbers.js';
 
+const MOST_MARKS = 400;
+
 export class Transport {
   constructor(scene, clock) {
     this.clock = clock;
@@ -41,7 +43,7 @@ export class Transport {
       move.style.width = `calc(${part(end)} - ${part(start)})`;
       return move;
     });
-    const marks = scene.findings.map(({ time, message }) => {
+    const marks = scene.findings.slice(0, MOST_MARKS).map(({ time, message }) => {
       const mark = element('div.mark', { title: message });
       mark.style.left = part(time);
       return mark;

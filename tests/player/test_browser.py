@@ -209,6 +209,28 @@ def test_plots_hold_the_curves_on_both_sides_of_breaks(view: Callable[..., Any],
         assert rows == pytest.approx(sides, abs=1e-4 * high)
 
 
+def test_a_joint_at_rest_has_no_velocity(view: Callable[..., Any], pick: Path) -> None:
+    hold = planned(PICK).trajectory.spans[2]
+    values = "t => ['qd', 'qdd'].flatMap(name => trajcli.motion.values[name].map((_, joint) => trajcli.motion.value(name, joint, t)))"
+    assert view(pick).page.evaluate(values, (hold.start + hold.end) / 2) == [0] * 12
+
+
+def test_the_values_under_the_pointer_are_shown(view: Callable[..., Any], pick: Path) -> None:
+    page = view(pick).page
+    plot = page.locator(".u-over").nth(1)
+    box = plot.bounding_box()
+    page.mouse.move(box["x"] + 0.75 * box["width"], box["y"] + 30)
+    shown = page.locator(".values:visible")
+    assert shown.count() == 1
+    lines = shown.inner_text().split()
+    time = float(lines[0])
+    curve = planned(PICK).trajectory.curve
+    assert time == pytest.approx(0.75 * curve.end, abs=0.03)
+    assert float(lines[-1].replace("\N{MINUS SIGN}", "-")) == pytest.approx(
+        np.rad2deg(curve.evaluate(time, 1)[-1]), rel=0.01
+    )
+
+
 def test_findings_seek_to_their_time(view: Callable[..., Any], refused: tuple[Path, Plan]) -> None:
     file, plan = refused
     viewed = view(file)
@@ -222,7 +244,7 @@ def test_findings_seek_to_their_time(view: Callable[..., Any], refused: tuple[Pa
 
 def test_the_jerk_is_shown_when_asked_for(view: Callable[..., Any], pick: Path) -> None:
     page = view(pick).page
-    assert page.locator(".plot:visible h3").all_inner_texts() == [
+    assert page.locator(".plot:visible h3 > :first-child").all_inner_texts() == [
         "Position q",
         "Velocity q̇",
         "Acceleration q̈",
