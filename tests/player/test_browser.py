@@ -332,11 +332,14 @@ def test_the_arm_and_the_curves_are_drawn(
     view: Callable[..., Any], pick: Path, size: str, scheme: str
 ) -> None:
     page = view(pick, *SIZES[size], color_scheme=scheme).page
+    page.evaluate(
+        "for (const e of document.querySelectorAll('.viewport div')) e.hidden = true"
+    )  # buttons, legend
     page.wait_for_timeout(300)
     view_in_space = pixels(page.locator(".viewport").screenshot())
     red, green, blue = np.moveaxis(view_in_space, 2, 0)
-    joints = (blue > 1.5 * red) & (blue > green) & (blue > 90)
-    assert 0.003 < joints.mean() < 0.2  # the balls at the joints
+    joints = (blue > 2 * red) & (blue > 1.35 * green) & (blue > 110)
+    assert 0.007 < joints.mean() < 0.1  # the balls at the joints; without them 0.001 to 0.004 has such a blue
     assert 0.4 < (np.abs(view_in_space - view_in_space[-1, -1]).max(axis=2) < 25).mean() < 0.97  # background
     plot = pixels(page.locator(".plot-room").first.screenshot())
     colorful = np.ptp(plot, axis=2) > 60
@@ -347,9 +350,10 @@ def test_the_picture_of_the_documents_is_what_is_drawn(chromium: Any) -> None:
     require_module("PIL")
     now, then = pixels(screenshot(chromium)), pixels(PICTURE)
     assert now.shape == then.shape
-    assert np.abs(now - then).mean() < 8, (
-        "run `make picture`, and look at it"
-    )  # fonts differ from machine to machine
+    # Fonts, and the rounding of a graphics card, differ from machine to machine: cells of 20 pixels are compared.
+    now, then = (each.reshape(38, 20, 60, 20, 3).mean(axis=(1, 3)) for each in (now, then))
+    assert np.abs(now - then).max() < 40, "run `make picture`, and look at it"
+    assert np.abs(now - then).mean() < 3, "run `make picture`, and look at it"
 
 
 def test_a_file_without_a_robot_has_plots_only(view: Callable[..., Any], tmp_path: Path) -> None:
