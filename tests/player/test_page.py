@@ -165,3 +165,15 @@ def test_a_robot_without_geometry_says_so() -> None:
     scene = scene_of_plan(plan_job(load_job(ROOT / "examples/cubic.yaml")))
     assert scene["robot"] is None
     assert "Denavit-Hartenberg" in scene["no_geometry"]
+
+
+def test_ten_seconds_full_of_jumps_fit() -> None:
+    """A time-optimal path of twelve joints: its acceleration jumps, and its points are many."""
+    text = job(12).partition("moves:")[0].replace("velocity: 90", "velocity: 90, acceleration: 400")
+    points = ", ".join(f"{{joints: {[(41 * k + 29 * m) % 80 - 40 for k in range(12)]}}}" for m in range(13))
+    plan = plan_job(
+        job_from_text(f"{text}moves: [{{planner: time_optimal, through: [{points}]}}]\n", "chain.yaml")
+    )
+    assert 9 < plan.trajectory.duration < 12
+    assert len(plan.verdict.steps) > 1000
+    assert len(page_of(scene_of_plan(plan))) <= 800_000

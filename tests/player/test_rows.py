@@ -82,7 +82,7 @@ def test_of_very_many_jumps_the_largest_have_rows() -> None:
     velocity[400:] += 5
     positions = np.append(0, np.cumsum(velocity * 1e-3))[:-1]
     rows = rows_of_curve(PiecewisePolynomial(breaks, np.stack([velocity, positions])[:, :, None]), [], [])
-    assert rows.times.size < 100
+    assert rows.times.size <= 61 + 2 * 30  # half a jump a frame
     assert (rows.times == breaks[400]).sum() == 2
 
 

@@ -18,7 +18,8 @@ ORDERS = ("q", "qd", "qdd", "qddd")
 
 _BYTES = {"q": 3}  # of a packed number, else 2: an arm is drawn to a tenth of a micrometre, a plot to a pixel
 _SEEN = 1e-3  # of the largest magnitude of a derivative: a smaller jump cannot be seen in a plot
-_JUMPS = 0.25  # jumps a frame, at most: of more the largest are kept
+_BYTES_A_FRAME = 140.0  # what a frame may take, so that ten seconds of any arm fit into 0.8 MB
+_JUMPS = (0.05, 0.5)  # jumps a frame, at most, of an arm of many joints and of few: the largest are kept
 
 
 @frozen
@@ -55,7 +56,9 @@ def rows_of_curve(curve: PiecewisePolynomial, borders: Sequence[float], extra: S
         extra: Times that have a row, such as those of findings, s.
     """
     frames = frame_times(curve.start, curve.end)
-    jumps = _visible_jumps(curve, np.array(borders), most=int(_JUMPS * frames.size) + len(borders))
+    jumps = _visible_jumps(
+        curve, np.array(borders), most=int(_jumps_a_frame(curve.dimension) * frames.size) + len(borders)
+    )
     single = np.append(frames, np.clip(extra, curve.start, curve.end))
     single = distinct(single[~_among(single, jumps)])
     times = np.concatenate([single, jumps, jumps])
@@ -65,6 +68,12 @@ def rows_of_curve(curve: PiecewisePolynomial, borders: Sequence[float], extra: S
     both = [curve.evaluate_orders(times, range(len(ORDERS)), side=side) for side in ("left", "right")]
     values = np.where(after[:, None, None], both[1], both[0])
     return Rows(times, {name: values[:, k] for k, name in enumerate(ORDERS)})
+
+
+def _jumps_a_frame(joints: int) -> float:
+    bytes_of_row = 16 + sum(_BYTES.get(name, 2) for name in ORDERS) * joints  # 16: time, tool, its speed
+    least, most = _JUMPS
+    return min(max(0.5 * (_BYTES_A_FRAME / bytes_of_row - 1), least), most)
 
 
 def _visible_jumps(curve: PiecewisePolynomial, borders: Array, most: int) -> Array:
@@ -97,7 +106,7 @@ def rows_of_samples(times: Array, values: Mapping[str, Array]) -> tuple[Rows, ND
         values: As in `Rows`.
     """
     wanted = frame_times(float(times[0]), float(times[-1]))
-    if times.size <= 2 * wanted.size:
+    if times.size <= (1 + 2 * _jumps_a_frame(values["q"].shape[1])) * wanted.size:
         return Rows(times, values), np.arange(times.size)
     marked = np.zeros(times.size, dtype=bool)
     marked[np.searchsorted(times, wanted).clip(0, times.size - 1)] = True

@@ -19,8 +19,8 @@ from trajcli.units import Quantity, Units, factor, joint_quantity, unit_name
 from trajcli.version import __version__
 
 _SUPERSCRIPTS = str.maketrans({"2": "²", "3": "³"})
-_MOST_WAYPOINTS = 200
-_MOST_STEPS = 500
+_MOST_WAYPOINTS = 40
+_MOST_STEPS = 100
 _SAME = 1e-4  # rad or m: waypoints that are nearer than this are one
 _MADE_BY = f"Made by trajcli {__version__}"
 
