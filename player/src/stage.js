@@ -201,7 +201,7 @@ export class Stage {
     this.camera.position.copy(center).addScaledVector(direction, distance);
     this.camera.lookAt(center);
     this.camera.updateMatrixWorld(true);
-    const [across, up] = [1 - 2 * Math.min(0.12, 40 / this.holder.clientWidth), 1 - 2 * Math.min(0.18, 60 / this.holder.clientHeight)];
+    const [across, up] = [1 - 2 * Math.min(0.13, 75 / this.holder.clientWidth), 1 - 2 * Math.min(0.18, 70 / this.holder.clientHeight)];
     return this.points.every((point) => {
       const { x, y, z } = point.clone().project(this.camera);
       return Math.abs(x) <= across && Math.abs(y) <= up && z < 1;
