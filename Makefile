@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 PEERS := .venv-peers
 EXTRAS ?= dev  # dev,viewers: also what the tests of viewers need
 
-.PHONY: setup demo check format lint types test soak bench golden schema docs clean
+.PHONY: setup demo check format lint types test soak bench golden schema docs player picture clean
 
 setup: $(STAMP)
 
@@ -55,6 +55,13 @@ schema: $(STAMP)  ## the committed JSON schemas
 
 docs: $(STAMP)  ## the reference pages that are generated from the models
 	$(BIN)/python -m docs.generate
+
+player:  ## the script and the style of `trajcli view`, from player/: needs node 20 and npm
+	npm --prefix player ci --no-audit --no-fund
+	npm --prefix player run build
+
+picture: $(STAMP)  ## the picture of the player in the documents: needs Chromium, and setup with EXTRAS=dev,viewers
+	$(BIN)/python -m docs.player_picture
 
 clean:
 	rm -rf $(VENV) $(PEERS) .mypy_cache .ruff_cache .pytest_cache .hypothesis ur5e_pick.csv ur5e_pick.report.json

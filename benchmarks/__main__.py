@@ -30,6 +30,7 @@ BENCHMARKS = (
     "long_path",
     "jerk_limited",
     "plotting",
+    "viewing",
 )
 OURS = ("trajcli", "numpy", "pydantic", "pyyaml", "typer")
 THEIRS = ("roboticstoolbox-python", "eaik", "toppra", "numpy", "scipy")

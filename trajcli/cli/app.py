@@ -30,6 +30,7 @@ _OTHER_NAMES = {
     **dict.fromkeys(("new", "create", "start", "example"), "trajcli init"),
     **dict.fromkeys(("show", "describe", "info"), "trajcli explain JOB"),
     **dict.fromkeys(("draw", "graph", "picture", "chart"), "trajcli plot JOB"),
+    **dict.fromkeys(("player", "animate", "animation", "html"), "trajcli view JOB -o view.html"),
     "report": "trajcli plan JOB --report FILE",
     "help": "trajcli --help",
     "version": "trajcli --version",
@@ -281,6 +282,37 @@ def plot(
 
     every = every or errors == "json"
     return run_plot(files, override, PlotOptions(output, kind, quantities, tuple(joints), quiet, every))
+
+
+@app.command(epilog="Example: trajcli view examples/ur5e_pick.yaml -o view.html")
+@guarded
+def view(
+    source: Annotated[
+        str, typer.Argument(metavar="JOB|FILE", help="A job, or a CSV file of samples; - is standard input.")
+    ],
+    output: Annotated[
+        str | None,
+        typer.Option("--output", "-o", metavar="FILE", help="Write the page to FILE.html instead of stdout."),
+    ] = None,
+    compress: Annotated[
+        bool, typer.Option("--compress", help="Half the size, for browsers since 2023.")
+    ] = False,
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            "--robot",
+            "-r",
+            metavar="NAME|FILE|JOB",
+            help="The arm of a CSV file: of the catalogue, a robot file, or a job.",
+        ),
+    ] = None,
+    override: Overrides = [],  # noqa: B006
+    errors: Errors = "text",
+) -> int:
+    """Write a page that plays the motion: the arm in 3D with linked plots, in one file for any browser."""
+    from trajcli.cli.view import ViewOptions, run_view
+
+    return run_view(source, override, ViewOptions(output, compress, robot))
 
 
 @app.command(epilog="Example: trajcli schema job")

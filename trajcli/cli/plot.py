@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from trajcli.cli.outcome import print_remark
+from trajcli.cli.progress import progress
 from trajcli.errors import InputError
 from trajcli.frozen import comparable
 from trajcli.job.read import files_of, load_job
@@ -18,11 +19,10 @@ from trajcli.planning.plan import Plan, plan_job
 from trajcli.plots.choice import parse_quantities, split_names
 from trajcli.plots.picture import picture_of
 from trajcli.plots.write import format_of_picture, rendered
-from trajcli.streams.reading import is_ros_message, read_table
+from trajcli.streams.reading import holds_motion, read_table
 from trajcli.streams.whole_file import identity, standard_output, whole_file
 
 _OF_JOBS = (".yaml", ".yml", ".json")
-_OF_ROWS = (".csv", ".txt", ".jsonl", ".mcap")
 _PEEKED = 4096  # bytes of standard input that are looked at
 
 
@@ -71,7 +71,7 @@ def run_plot(words: Sequence[str], overrides: Sequence[str], options: PlotOption
 
 
 def _planned(job: str, overrides: Sequence[str]) -> Plan:
-    with np.errstate(all="ignore"):
+    with progress(), np.errstate(all="ignore"):
         return plan_job(load_job(job, overrides))
 
 
@@ -107,8 +107,8 @@ def _sorted_out(files: Sequence[str], overrides: Sequence[str]) -> tuple[str | N
 def _is_job(name: str) -> bool:
     """Return whether a file is a job: by its ending, else its first line; a pipe holds rows."""
     ending = Path(name).suffix.lower()
-    if name != "-" and ending in _OF_JOBS + _OF_ROWS:
-        return ending in _OF_JOBS and not is_ros_message(name)
+    if name != "-" and (ending in _OF_JOBS or holds_motion(name)):
+        return not holds_motion(name)
     try:
         if name == "-":
             text = getattr(sys.stdin.buffer, "peek", bytes)(_PEEKED)

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from trajcli.streams.ros_messages import JointMessage
 
 _ALL_DECIMALS = 17  # of a float64
+ENDINGS_OF_ROWS = (".csv", ".txt", ".jsonl", ".mcap")
+_YAML = (".yaml", ".yml")
 _HEAD = 1 << 16  # bytes of a YAML file that are looked at
 _JOINT_NAMES = re.compile(rb"^[ \t-]*joint_names[ \t]*:", re.MULTILINE)
 _MCAP = b"\x89MCAP0\r\n"
@@ -40,7 +42,7 @@ def read_table(path: str | Path, topic: str | None = None) -> Table:
         from trajcli.streams.mcap.read import read_mcap
 
         return _table(read_mcap(path, topic))
-    if ending in (".yaml", ".yml"):
+    if ending in _YAML:
         from trajcli.streams.ros_messages import read_ros_yaml
 
         return _table(read_ros_yaml(path))
@@ -54,6 +56,12 @@ def read_table(path: str | Path, topic: str | None = None) -> Table:
 def is_log(path: str | Path) -> bool:
     """Return whether a file is read as MCAP."""
     return str(path).lower().endswith(".mcap") or _begins_as_mcap(path)
+
+
+def holds_motion(path: str | Path) -> bool:
+    """Return whether a file is one of rows or messages by its name or first bytes, and no job."""
+    ending = Path(str(path)).suffix.lower()
+    return ending in ENDINGS_OF_ROWS or is_log(path) or (ending in _YAML and is_ros_message(path))
 
 
 def is_ros_message(path: str | Path) -> bool:

@@ -1,0 +1,125 @@
+// The page of `trajcli view`: its parts, and what they have to do with each other.
+import { Clock } from './clock.js';
+import { ICONS, element, icon } from './dom.js';
+import { helpDialog, listenToKeys } from './keyboard.js';
+import { Motion } from './motion.js';
+import { JointTable, findingPanels, reportPanels } from './panels.js';
+import { Plots } from './plots.js';
+import { Stage } from './stage.js';
+import { Theme } from './theme.js';
+import { Transport } from './timeline.js';
+
+const PARTS = [['ghosts', 'Ghosts', 'Ghosts of the arm at waypoints (g)'], ['frames', 'Frames', 'Frames of the links (f)'], ['trace', 'Path', 'Path of the tool (t)'], ['grid', 'Grid', 'Grid (r)']];
+const VIEWS = [['corner', '0'], ['front', '1'], ['side', '2'], ['top', '3']];
+
+function toggle(label, title, pressed, onchange) {
+  const button = element('button.chip', { type: 'button', title, 'aria-pressed': pressed, text: label, onclick: () => {
+    const now = button.getAttribute('aria-pressed') !== 'true';
+    button.setAttribute('aria-pressed', now);
+    onchange(now);
+  } });
+  return button;
+}
+
+function header(scene, theme, dialog) {
+  const round = (name, label, onclick) => element('button.round', { type: 'button', 'aria-label': label, title: label, onclick }, icon(...ICONS[name]));
+  const facts = element('span.facts', { text: scene.subtitle });
+  return element('header', {},
+    element('div.title', {}, element('h1', { text: scene.title }), facts),
+    element(`span.verdict.${scene.verdict.state}`, { text: scene.verdict.text }),
+    round('theme', 'Dark or light (d)', () => theme.toggle()),
+    round('help', 'Help (?)', () => dialog.showModal()));
+}
+
+/** Return the view in space with its buttons; or why there is none. */
+function viewport(scene, motion, theme) {
+  const holder = element('div.viewport');
+  const without = (reason) => {
+    holder.classList.add('empty');
+    holder.replaceChildren(element('p', { text: reason }));
+    return { holder };
+  };
+  if (!scene.robot) return without(scene.no_geometry);
+  try {
+    const stage = new Stage(holder, scene, motion, theme);
+    const chips = PARTS.map(([part, label, title]) => [part, toggle(label, title, part !== 'frames', (on) => stage.show(part, on))]);
+    const reset = element('button.chip.reset', { type: 'button', title: 'See everything (0)', 'aria-label': 'See everything', onclick: () => stage.look('corner') }, icon(...ICONS.reset));
+    const cell = element('span.cell', { text: `grid ${Number((stage.cell * scene.length.scale).toPrecision(3))} ${scene.length.unit}` });
+    holder.append(element('div.chips', {}, ...chips.map(([, chip]) => chip), reset), element('div.legend', {}, stage.trace.legend, cell));
+    return { holder, stage, chips: Object.fromEntries(chips) };
+  } catch (error) {
+    return without(`This browser does not draw in three dimensions (${error.message}): plots only.`);
+  }
+}
+
+function keysOf(clock, scene, { stage, chips }, theme, dialog, jerk) {
+  const move = (step) => {
+    const starts = scene.moves.map(({ start }) => start);
+    const next = step > 0 ? starts.find((start) => start > clock.time + 1e-9) : starts.findLast((start) => start < clock.time - 1e-9);
+    clock.seek(next ?? (step > 0 ? clock.end : clock.start));
+  };
+  const actions = {
+    ' ': () => clock.toggle(),
+    ArrowLeft: (event) => clock.step(event.shiftKey ? -10 : -1),
+    ArrowRight: (event) => clock.step(event.shiftKey ? 10 : 1),
+    ArrowUp: () => move(-1),
+    ArrowDown: () => move(1),
+    Home: () => clock.seek(clock.start),
+    End: () => clock.seek(clock.end),
+    '+': () => clock.faster(1),
+    '=': () => clock.faster(1),
+    '-': () => clock.faster(-1),
+    l: () => {
+      clock.loop = !clock.loop;
+      clock.changed();
+    },
+    d: () => theme.toggle(),
+    j: () => jerk?.click(),
+    '?': () => dialog.showModal(),
+  };
+  if (stage) {
+    for (const [view, key] of VIEWS) actions[key] = () => stage.look(view);
+    for (const [key, part] of [['g', 'ghosts'], ['f', 'frames'], ['t', 'trace'], ['r', 'grid']]) actions[key] = () => chips[part].click();
+  }
+  return actions;
+}
+
+function start(scene) {
+  const theme = new Theme();
+  const motion = new Motion(scene);
+  const clock = new Clock(motion.start, motion.end);
+  const dialog = helpDialog();
+  const view = viewport(scene, motion, theme);
+  const plots = new Plots(scene, motion, clock, theme);
+  const table = new JointTable(scene, motion, plots, clock, theme);
+  const limits = toggle('All limits', 'Zoom out until every limit can be seen', false, (on) => plots.setAllLimits(on));
+  const jerk = plots.hasJerk ? toggle('Jerk', 'Plot of the jerk (j)', false, (on) => plots.showJerk(on)) : undefined;
+  const bar = element('div.bar', {}, element('h2', { text: 'Joints' }), element('div.chips', {}, limits, ...(jerk ? [jerk] : [])));
+  const side = element('aside', {}, ...findingPanels(scene, clock), bar, table.element, plots.holder, ...reportPanels(scene, clock), element('footer', { text: scene.made_by }));
+  document.body.classList.toggle('flat', !view.stage);
+  document.body.append(header(scene, theme, dialog), element('main', {}, view.holder, new Transport(scene, clock).element), side, dialog);
+  plots.rebuild();
+  if (view.stage) {
+    clock.listen(() => view.stage.seek(clock.time));
+    view.stage.resize();
+    view.stage.look('corner');
+  }
+  listenToKeys(keysOf(clock, scene, view, theme, dialog, jerk));
+  clock.seek(clock.start);
+  globalThis.trajcli = {
+    clock,
+    motion,
+    plots,
+    stage: view.stage,
+    seek: (time) => clock.seek(time),
+    joints: (time) => motion.joints(time),
+    /** Seek to a time, and return where the tcp stands as it is drawn, m. */
+    toolPosition: (time) => {
+      clock.seek(time);
+      return view.stage?.arm.toolPosition().toArray();
+    },
+  };
+  requestAnimationFrame(() => requestAnimationFrame(() => (globalThis.trajcli.ready = true)));
+}
+
+start(JSON.parse(document.getElementById('scene').textContent));

@@ -1,0 +1,92 @@
+// What is known of the motion: findings, events, moves, and the joints now.
+import { element } from './dom.js';
+import { aligned, seconds } from './numbers.js';
+
+const FEW = 60; // lines of a list that are made at once
+
+/** Return a list whose lines seek to their time. */
+function list(items, clock, kind) {
+  const line = ({ time, message, hint, label }) =>
+    element('li', {}, element(`button.line.${kind}`, { type: 'button', onclick: () => clock.seek(time) },
+      element('span.when', { text: `${seconds(time)} s` }),
+      element('span.what', {}, label ? element('b', { text: `${label} ` }) : '', message, hint ? element('span.hint', { text: hint }) : '')));
+  const made = element('ul.lines', {}, ...items.slice(0, FEW).map(line));
+  if (items.length > FEW) {
+    const more = element('button.more', { type: 'button', text: `${items.length - FEW} more`, onclick: () => {
+      more.remove();
+      made.append(...items.slice(FEW).map(line));
+    } });
+    return element('div', {}, made, more);
+  }
+  return made;
+}
+
+function section(title, count, content, open = true) {
+  const heading = element('summary', {}, element('h2', { text: title }), element('span.count', { text: count }));
+  return element('details.panel', { open }, heading, content);
+}
+
+/** Return the section of the findings: what comes first; nothing where there are none. */
+export function findingPanels({ findings }, clock) {
+  return findings.length ? [section('Findings', findings.length, list(findings, clock, 'bad'))] : [];
+}
+
+/** Return the sections of events, notes, moves and steps; those without lines are left out. */
+export function reportPanels(scene, clock) {
+  const panels = [];
+  const { events, steps, moves, notes } = scene;
+  if (events.length) panels.push(section('Events', events.length, list(events, clock, 'event')));
+  if (notes.length) panels.push(section('Notes', notes.length, element('ul.notes', {}, ...notes.map((text) => element('li', { text })))));
+  const lines = moves.map(({ start, label, detail }) => ({ time: start, label, message: detail }));
+  if (lines.length) panels.push(section('Moves', lines.length, list(lines, clock, 'move-line')));
+  if (steps.length) panels.push(section('Steps in acceleration', steps.length, list(steps, clock, 'step'), false));
+  return panels;
+}
+
+/** The joints: their names, which show and hide their curves, and their values now. */
+export class JointTable {
+  constructor(scene, motion, plots, clock, theme) {
+    Object.assign(this, { scene, motion, clock, theme });
+    const quantities = motion.quantities.filter((name) => name !== 'qddd');
+    this.largest = Object.fromEntries(quantities.map((name) => [name, motion.values[name].map((_, joint) => {
+      const alike = motion.values[name].filter((_, other) => scene.joints[other].units[0] === scene.joints[joint].units[0]);
+      const { scale } = scene.joints[joint];
+      return Math.max(...alike.map((values) => values.reduce((most, value) => Math.max(most, Math.abs(value * scale)), 0)));
+    })]));
+    const symbols = { q: 'q', qd: 'q\u0307', qdd: 'q\u0308' };
+    const mixed = new Set(scene.joints.map((joint) => joint.units[0])).size > 1;
+    const head = element('tr', {}, element('th', { scope: 'col', text: 'joint' }), ...quantities.map((name, order) =>
+      element('th', { scope: 'col' }, element('span.symbol', { text: symbols[name] }), mixed ? '' : ` ${scene.joints[0].units[order]}`)));
+    this.cells = [];
+    const rows = scene.joints.map((joint, index) => {
+      const swatch = element('span.swatch');
+      const button = element('button.joint', { type: 'button', 'aria-pressed': true, title: 'Show or hide its curves', onclick: () => {
+        plots.toggleJoint(index);
+        button.setAttribute('aria-pressed', !plots.hidden.has(index));
+      } }, swatch, element('span', { text: joint.name }), mixed ? element('span.unit', { text: joint.units[0] }) : '');
+      const cells = quantities.map((name) => ({ name, index, node: element('td') }));
+      this.cells.push(...cells);
+      return { swatch, row: element('tr', {}, element('th', { scope: 'row' }, button), ...cells.map(({ node }) => node)) };
+    });
+    this.swatches = rows.map(({ swatch }) => swatch);
+    this.element = element('div.joints', {}, element('table', {}, element('thead', {}, head), element('tbody', {}, ...rows.map(({ row }) => row))));
+    theme.listen(() => this.paint());
+    clock.listen(() => this.update());
+    this.paint();
+    this.update();
+  }
+
+  paint() {
+    this.swatches.forEach((swatch, index) => {
+      const { color, dash } = this.theme.joint(index);
+      swatch.style.background = dash.length ? `repeating-linear-gradient(to right, ${color} 0 5px, transparent 5px 8px)` : color;
+    });
+  }
+
+  update() {
+    for (const { name, index, node } of this.cells) {
+      const { scale } = this.scene.joints[index];
+      node.textContent = aligned(this.motion.value(name, index, this.clock.time) * scale, this.largest[name][index]);
+    }
+  }
+}

@@ -1,0 +1,281 @@
+// Plots of the joints over time: linked to each other and to the clock, with limits, moves and findings.
+import uPlot from 'uplot';
+import { element } from './dom.js';
+import { seconds, significant } from './numbers.js';
+
+const NAMES = { q: 'Position', qd: 'Velocity', qdd: 'Acceleration', qddd: 'Jerk' };
+const SYMBOLS = { q: 'q', qd: 'q\u0307', qdd: 'q\u0308', qddd: 'q\u20db' };
+const ORDERS = ['q', 'qd', 'qdd', 'qddd'];
+const NEAR = 1.6; // times the range of the curves: a limit that is nearer is always in view
+const HEIGHT = { beside: 168, alone: 240 }; // of a plot, px: beside the view in space, or without one
+
+export class Plots {
+  /**
+   * @param {object} scene What the page shows.
+   * @param {Motion} motion The motion of the joints.
+   * @param {Clock} clock What a click seeks with.
+   * @param {Theme} theme The colours.
+   */
+  constructor(scene, motion, clock, theme) {
+    Object.assign(this, { scene, motion, clock, theme });
+    this.hidden = new Set();
+    this.allLimits = false;
+    this.height = HEIGHT[scene.robot ? 'beside' : 'alone'];
+    this.holder = element('div.plots');
+    this.cards = motion.quantities.map((quantity) => this.card(quantity));
+    this.showJerk(false);
+    theme.listen(() => this.rebuild());
+    clock.listen(() => this.moveCursors());
+    new ResizeObserver(() => this.resize()).observe(this.holder);
+  }
+
+  card(quantity) {
+    const room = element('div.plot-room');
+    const limit = this.scene.limits.some(({ bounds }) => bounds[ORDERS.indexOf(quantity)].flat().some((bound) => bound !== null));
+    const key = limit ? [element('span.limit-key', { text: 'limit' })] : [];
+    const heading = element('h3', {}, element('span', {}, `${NAMES[quantity]} `, element('span.symbol', { text: SYMBOLS[quantity] })), ...key);
+    const card = element('section.plot', { 'aria-label': `${NAMES[quantity]} of the joints over time` }, heading, room);
+    this.holder.append(card);
+    return { quantity, card, room, order: ORDERS.indexOf(quantity) };
+  }
+
+  /** Draw all plots anew: colours, ranges or joints have changed. */
+  rebuild() {
+    for (const card of this.cards) {
+      card.plot?.destroy();
+      card.plot = undefined;
+      if (!card.card.hidden) this.draw(card);
+    }
+    this.moveCursors();
+  }
+
+  showJerk(visible) {
+    for (const card of this.cards) if (card.quantity === 'qddd') card.card.hidden = !visible;
+    this.rebuild();
+  }
+
+  get hasJerk() {
+    return this.cards.some((card) => card.quantity === 'qddd');
+  }
+
+  toggleJoint(index) {
+    if (!this.hidden.delete(index)) this.hidden.add(index);
+    this.rebuild();
+  }
+
+  setAllLimits(all) {
+    this.allLimits = all;
+    this.rebuild();
+  }
+
+  /** Return the index of the unit: joints of another unit have an axis of their own, at the right. */
+  unitsOf(order) {
+    return [...new Set(this.scene.joints.map((joint) => joint.units[order]))];
+  }
+
+  draw(card) {
+    const { quantity, room, order } = card;
+    const { joints } = this.scene;
+    const units = this.unitsOf(order);
+    const width = Math.max(room.clientWidth, 120);
+    const data = [this.motion.times, ...joints.map(({ scale }, joint) => Array.from(this.motion.values[quantity][joint], (value) => value * scale))];
+    const series = joints.map((joint, index) => {
+      const { color, dash } = this.theme.joint(index);
+      return { label: joint.name, scale: joint.units[order], stroke: color, dash, width: 1.7, pxAlign: 0, points: { show: false }, show: !this.hidden.has(index) };
+    });
+    const scales = Object.fromEntries(units.map((unit) => [unit, { range: () => this.range(data, order, unit) }]));
+    const axis = { stroke: this.theme.css('--muted'), font: '11px system-ui, sans-serif', labelFont: '11px system-ui, sans-serif', grid: { stroke: this.theme.css('--rule'), width: 1 }, ticks: { show: false } };
+    const axes = units.map((unit, k) => ({ ...axis, scale: unit, side: k ? 1 : 3, size: 52, label: unit, labelSize: 14, labelGap: 0, grid: { ...axis.grid, show: k === 0 }, values: ticksOf('') }));
+    const last = this.cards.filter((other) => !other.card.hidden).at(-1) === card;
+    card.plot = new uPlot(
+      {
+        width,
+        height: this.height,
+        padding: [8, units.length > 1 ? 0 : 20, 0, 0],
+        legend: { show: false },
+        cursor: { sync: { key: 'trajcli' }, y: false, points: { size: 6 }, drag: { x: true, y: false, dist: 6 }, dataIdx: nearest },
+        scales: { x: { time: false, range: (plot, low, high) => this.timeRange(low, high) }, ...scales },
+        axes: [{ ...axis, size: 26, gap: 3, space: 56, values: ticksOf(' s') }, ...axes],
+        series: [{}, ...series],
+        hooks: {
+          drawAxes: [(plot) => this.drawBorders(plot)],
+          draw: [(plot) => this.drawLimits(plot, order), (plot) => this.drawFindings(plot, order)],
+          setCursor: [(plot) => this.showValues(card, plot)],
+          setSelect: [(plot) => (this.zoomed = plot.select.width > 0)],
+          setScale: [(plot, key) => key === 'x' && this.followZoom(plot)],
+        },
+      },
+      data,
+      room,
+    );
+    card.last = last;
+    card.cursor = element('div.playhead');
+    card.values = element('div.values', { hidden: true });
+    card.plot.over.append(card.cursor, card.values);
+    this.listen(card);
+  }
+
+  /** Show the values under the pointer, beside it; in the plot that it is over. */
+  showValues({ values, order }, plot) {
+    const { left, idx } = plot.cursor;
+    values.hidden = !(left >= 0 && idx !== null && idx !== undefined && plot.over.matches(':hover'));
+    if (values.hidden) return;
+    const lines = this.shown(order).map((joint) => {
+      const name = element('span.value-name', { text: this.scene.joints[joint].name });
+      const mark = element('span.swatch');
+      mark.style.background = this.theme.joint(joint).color;
+      return element('div', {}, mark, name, element('b', { text: significant(plot.data[joint + 1][idx], 4) }));
+    });
+    const row = plot.data[0][idx];
+    values.replaceChildren(element('div.value-time', { text: `${seconds(row)} s, ${this.unitsOf(order).join(' and ')}` }), ...lines);
+    const beyond = left > plot.over.clientWidth / 2;
+    values.style.left = beyond ? 'auto' : `${left + 12}px`;
+    values.style.right = beyond ? `${plot.over.clientWidth - left + 12}px` : 'auto';
+  }
+
+  timeRange(low, high) {
+    const { start, end } = this.motion;
+    return low === null || high - low < 1e-9 ? [start, end > start ? end : start + 1] : [low, high];
+  }
+
+  /** A click seeks; dragging zooms, and a double click shows everything. */
+  listen({ plot }) {
+    let down = 0;
+    plot.over.addEventListener('pointerdown', (event) => (down = event.clientX));
+    plot.over.addEventListener('click', (event) => {
+      if (Math.abs(event.clientX - down) < 6) this.clock.seek(plot.posToVal(event.offsetX, 'x'));
+    });
+  }
+
+  /** Show the same interval of time in all plots. */
+  followZoom(from) {
+    if (this.following) return;
+    this.following = true;
+    const { min, max } = from.scales.x;
+    for (const { plot } of this.cards) {
+      if (plot && plot !== from && (plot.scales.x.min !== min || plot.scales.x.max !== max)) plot.setScale('x', { min, max });
+    }
+    this.following = false;
+    requestAnimationFrame(() => this.moveCursors());
+  }
+
+  /** Return the range of an axis: of the curves in view, and of the limits that are near, or of all limits. */
+  range(data, order, unit) {
+    let [low, high] = [Infinity, -Infinity];
+    const shown = this.shown(order, unit);
+    for (const joint of shown) for (const value of data[joint + 1]) [low, high] = [Math.min(low, value), Math.max(high, value)];
+    if (low > high) return [-1, 1];
+    const room = Math.max(high - low, Math.max(Math.abs(low), Math.abs(high)) * (order ? 1 : 0.1), 1e-6);
+    const [least, most] = this.allLimits ? [-Infinity, Infinity] : [(low + high) / 2 - (NEAR * room) / 1.6, (low + high) / 2 + (NEAR * room) / 1.6];
+    for (const { value } of this.limits(order, shown)) {
+      if (value >= least && value <= most) [low, high] = [Math.min(low, value), Math.max(high, value)];
+    }
+    const margin = 0.06 * Math.max(high - low, 1e-6);
+    return [low - margin, high + margin];
+  }
+
+  shown(order, unit) {
+    return this.scene.joints.flatMap((joint, index) => (this.hidden.has(index) || (unit && joint.units[order] !== unit) ? [] : [index]));
+  }
+
+  /** Return the limits of joints: value, interval of time, joints that have it. */
+  limits(order, joints) {
+    const lines = new Map();
+    for (const { start, end, bounds } of this.scene.limits) {
+      for (const joint of joints) {
+        for (const bound of bounds[order][joint]) {
+          if (bound === null) continue;
+          const { scale, units } = this.scene.joints[joint];
+          const key = [start, bound * scale, units[order]].join();
+          if (!lines.has(key)) lines.set(key, { value: bound * scale, start, end, unit: units[order], joints: [] });
+          lines.get(key).joints.push(joint);
+        }
+      }
+    }
+    return [...lines.values()];
+  }
+
+  drawLimits(plot, order) {
+    const { ctx, bbox } = plot;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    ctx.lineWidth = 1.25 * devicePixelRatio;
+    ctx.setLineDash([5 * devicePixelRatio, 4 * devicePixelRatio]);
+    for (const { value, start, end, unit, joints } of this.limits(order, this.shown(order))) {
+      ctx.strokeStyle = joints.length > 1 ? this.theme.css('--limit') : this.theme.joint(joints[0]).color;
+      const y = plot.valToPos(value, unit, true);
+      ctx.beginPath();
+      ctx.moveTo(plot.valToPos(start, 'x', true), y);
+      ctx.lineTo(plot.valToPos(end, 'x', true), y);
+      ctx.stroke();
+    }
+    ctx.restore();
+  }
+
+  drawBorders(plot) {
+    const { ctx, bbox } = plot;
+    ctx.save();
+    ctx.strokeStyle = this.theme.css('--border');
+    ctx.lineWidth = devicePixelRatio;
+    for (const { start } of this.scene.moves.slice(1)) {
+      const x = Math.round(plot.valToPos(start, 'x', true));
+      if (x <= bbox.left || x >= bbox.left + bbox.width) continue;
+      ctx.beginPath();
+      ctx.moveTo(x, bbox.top);
+      ctx.lineTo(x, bbox.top + bbox.height);
+      ctx.stroke();
+    }
+    ctx.restore();
+  }
+
+  /** Mark where a limit is broken by a triangle on the curve. */
+  drawFindings(plot, order) {
+    const { ctx } = plot;
+    const size = 5 * devicePixelRatio;
+    ctx.save();
+    ctx.fillStyle = this.theme.css('--bad');
+    for (const { time, order: of, joint, value } of this.scene.findings) {
+      if (of !== order || joint === null || this.hidden.has(joint)) continue;
+      const { scale, units } = this.scene.joints[joint];
+      const [x, y] = [plot.valToPos(time, 'x', true), plot.valToPos(value * scale, units[order], true)];
+      ctx.beginPath();
+      ctx.arc(x, y, size, 0, 2 * Math.PI);
+      ctx.fill();
+    }
+    ctx.restore();
+  }
+
+  moveCursors() {
+    const { time } = this.clock;
+    for (const { plot, cursor } of this.cards) {
+      if (!plot) continue;
+      const x = plot.valToPos(time, 'x');
+      cursor.hidden = !(x >= -0.5 && x <= plot.over.clientWidth + 0.5);
+      cursor.style.transform = `translateX(${x}px)`;
+    }
+  }
+
+  resize() {
+    for (const { plot, room } of this.cards) {
+      const width = room.clientWidth;
+      if (plot && width > 0 && width !== plot.width) plot.setSize({ width, height: this.height });
+    }
+    this.moveCursors();
+  }
+}
+
+/** Return a function that writes the values of ticks with a unit behind, with as many decimals as they need. */
+function ticksOf(unit) {
+  return (_plot, ticks, _axis, _space, step) => {
+    const decimals = Math.min(Math.max(-Math.floor(Math.log10(step) + 1e-9), 0), 9);
+    return ticks.map((tick) => `${tick.toFixed(decimals)}${unit}`.replace('-', '\u2212'));
+  };
+}
+
+/** Return the row that the cursor shows: of two rows of one time the later one. */
+function nearest(plot, series, index) {
+  const times = plot.data[0];
+  return times[index + 1] === times[index] ? index + 1 : index;
+}

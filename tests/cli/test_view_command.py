@@ -1,0 +1,168 @@
+"""`trajcli view`: its files, its exit codes, and what it refuses."""
+
+from __future__ import annotations
+
+import os
+import pty
+import subprocess
+from pathlib import Path
+
+import pytest
+from running import COMMAND, FAST, JOB, call, run
+
+CSV = "t,q1_deg,q2_deg\n0,0,0\n0.5,10,20\n1,20,10\n"
+TWO = """\
+version: 1
+robot: {convention: standard, joints: [{a: 0.5}, {a: 0.3}]}
+start: {joints: [0, 0]}
+moves: [{planner: cubic, to: {joints: [1, 1]}, duration: 1}]
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    for name, text in {"job.yaml": JOB, "fast.yaml": FAST, "two.yaml": TWO, "rows.csv": CSV}.items():
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+def test_a_job_has_its_page(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    done = call(capfd, "view", "two.yaml", "-o", "view.html")
+    page = (folder / "view.html").read_bytes()
+    assert (done.code, done.out) == (0, "")
+    assert done.err == f"two: verified, 1 s, view.html ({len(page) / 1e6:.2f} MB)\n"
+    assert page.startswith(b"<!doctype html>")
+    assert page.endswith(b"</html>\n")
+    assert call(capfd, "view", "two.yaml").out.encode() == page
+    assert call(capfd, "view", "two.yaml", "-o", "-").out.encode() == page
+
+
+def test_compressed_is_less_than_half(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    for name, options in (("plain.html", []), ("small.htm", ["--compress"])):
+        assert call(capfd, "view", "two.yaml", "-o", name, *options).code == 0
+    sizes = [(folder / name).stat().st_size for name in ("plain.html", "small.htm")]
+    assert 2 * sizes[1] < sizes[0]
+
+
+def test_a_job_that_does_not_verify_is_shown_and_exits_as_plan_does(
+    folder: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    refused = call(capfd, "plan", "fast.yaml", "--no-output")
+    done = call(capfd, "view", "fast.yaml", "-o", "view.html")
+    assert done.code == refused.code == 1
+    assert done.err.endswith(refused.err)
+    assert "not verified, view.html" in done.err
+    assert b'"state":"violated"' in (folder / "view.html").read_bytes()
+
+
+def test_a_job_without_a_curve_has_no_page(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    done = call(
+        capfd,
+        "view",
+        "two.yaml",
+        "--set",
+        "moves.0.planner=trapezoid",
+        "--set",
+        "moves.0.velocity=0.1",
+        "-o",
+        "view.html",
+    )
+    assert done.code == 3
+    assert not (folder / "view.html").exists()
+
+
+def test_overrides_count(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    done = call(capfd, "view", "two.yaml", "--set", "moves.0.duration=2.5", "-o", "view.html")
+    assert "verified, 2.5 s" in done.err
+
+
+def test_a_file_of_samples(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    done = call(capfd, "view", "rows.csv", "-o", "view.html")
+    assert (done.code, done.err.split(", view.html")[0]) == (0, "rows.csv: not judged, 3 rows · 1 s")
+    assert b"--robot" in (folder / "view.html").read_bytes()
+    done = call(capfd, "view", "rows.csv", "--robot", "two.yaml", "-o", "view.html")
+    assert "not judged, robot · 3 rows" in done.err
+    assert b'"robot":{"rows":[{"theta":0.0' in (folder / "view.html").read_bytes()
+
+
+def test_samples_from_standard_input(folder: Path) -> None:
+    done = run("view", "-", "--robot", "planar2r", "-o", "view.html", stdin=CSV)
+    assert (done.code, done.out) == (0, "")
+    assert (folder / "view.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["view", "rows.csv", "-r", "ur5e", "-o", "v.html"], "expected q1 to q6 of UR5e"),
+        (["view", "rows.csv", "-r", "ur5", "-o", "v.html"], "did you mean"),
+        (["view", "rows.csv", "-r", "cylindrical", "-o", "v.html"], "has the joint columns"),
+        (["view", "rows.csv", "--set", "a=1", "-o", "v.html"], "--set is for jobs"),
+        (["view", "job.yaml", "-o", "v.csv"], "a page is HTML"),
+        (["view", "job.yaml", "-o", "v"], "a page is HTML"),
+        (["view", "nothing.csv", "-o", "v.html"], "cannot read nothing.csv"),
+        (["view", "nothing.yaml", "-o", "v.html"], "nothing.yaml"),
+    ],
+)
+def test_what_is_refused(
+    folder: Path, capfd: pytest.CaptureFixture[str], words: list[str], text: str
+) -> None:
+    done = call(capfd, *words)
+    assert done.code == (4 if "nothing" in text else 2)
+    assert text in done.err
+    assert not list(folder.glob("v*"))
+
+
+@pytest.mark.parametrize(
+    ("rows", "text"),
+    [
+        ("q1,q2\n1,2\n", "has no column 't'"),
+        ("t,x\n0,1\n", "has the joint columns none"),
+        ("t,q1,q3\n0,1,2\n", "has the joint columns q1, q3, expected q1, q2, ..."),
+        ("t,q1\n0,1\n1,2\n1,3\n", "rows.csv:4:1: error: the time 1 s follows 1 s"),
+        ("t,q1\n0,nan\n", "expected a finite number"),
+        ("t,q1\n0,1e300\n", "expected a magnitude of at most"),
+        ("", "is empty"),
+    ],
+)
+def test_files_that_are_no_motion(
+    folder: Path, capfd: pytest.CaptureFixture[str], rows: str, text: str
+) -> None:
+    (folder / "rows.csv").write_text(rows)
+    done = call(capfd, "view", "rows.csv", "-o", "view.html")
+    assert done.code == 2
+    assert text in done.err
+
+
+def test_units_must_fit_the_kinds_of_joints(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    (folder / "rows.csv").write_text("t,q1_deg,q2_deg,q3_deg\n0,1,2,3\n")
+    done = call(capfd, "view", "rows.csv", "-r", "rrp", "-o", "view.html")
+    assert done.code == 2
+    assert "the column 'q3_deg' of rows.csv is no length" in done.err
+
+
+def test_inputs_stay(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    (folder / "job.html").write_text(TWO)
+    done = call(capfd, "view", "job.html", "-o", "./job.html")
+    assert done.code == 2
+    assert "would overwrite job.html" in done.err
+    assert (folder / "job.html").read_text() == TWO
+
+
+def test_a_terminal_gets_a_hint_and_no_page(folder: Path) -> None:
+    leader, follower = pty.openpty()
+    try:
+        done = subprocess.run(
+            [*COMMAND, "view", "two.yaml"],
+            stdout=follower,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+    finally:
+        os.close(follower)
+        os.close(leader)
+    assert done.returncode == 2
+    assert "say where it goes: -o view.html" in done.stderr

@@ -1,0 +1,106 @@
+"""`trajcli view`: a page that shows the motion of a job or of a file, for any browser."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from trajcli.cli.outcome import print_remark
+from trajcli.cli.progress import progress
+from trajcli.errors import InputError
+from trajcli.frozen import comparable
+from trajcli.player.page import page_of
+from trajcli.streams.reading import holds_motion
+from trajcli.streams.whole_file import identity, is_special, standard_output, whole_file
+
+_ENDINGS = (".html", ".htm")
+
+
+@comparable
+class ViewOptions:
+    """What the command line says beside the source; see `trajcli view --help`."""
+
+    output: str | None = None
+    compress: bool = False
+    robot: str | None = None
+
+
+def run_view(source: str, overrides: Sequence[str], options: ViewOptions) -> int:
+    """Write the page of a job or of a CSV file; return the exit code.
+
+    A job that plans and does not verify has its page, too, and the error after it.
+
+    Raises:
+        TrajcliError: When anything is wrong.
+    """
+    _check_output(options.output)
+    if options.robot is not None or holds_motion(source):
+        return _view_file(source, overrides, options)
+    return _view_job(source, overrides, options)
+
+
+def _view_job(source: str, overrides: Sequence[str], options: ViewOptions) -> int:
+    from trajcli.job.read import files_of, load_job
+    from trajcli.planning.plan import plan_job
+    from trajcli.player.scene import scene_of_plan
+
+    loaded = load_job(source, overrides)
+    _check_inputs_stay(options.output, [path for _, path in files_of(loaded.document)])
+    with progress(), np.errstate(all="ignore"):  # what is not finite is for the checks to find
+        plan = plan_job(loaded)
+    page = page_of(scene_of_plan(plan), compress=options.compress)
+    _write(page, options.output)
+    if plan.verdict.passed:
+        print_remark(
+            f"{loaded.name}: verified, {plan.trajectory.duration:.6g} s{_where(page, options.output)}"
+        )
+        return 0
+    from trajcli.output.report import verification_error
+
+    print_remark(f"{loaded.name}: not verified{_where(page, options.output)}; the page shows the findings")
+    raise verification_error(plan, every=False)
+
+
+def _view_file(source: str, overrides: Sequence[str], options: ViewOptions) -> int:
+    from trajcli.player.recorded import scene_of_file
+
+    if overrides:
+        raise InputError("--set is for jobs, and this is a file of samples", hint="leave it out")
+    _check_inputs_stay(options.output, [source])
+    scene = scene_of_file(source, options.robot)
+    page = page_of(scene, compress=options.compress)
+    _write(page, options.output)
+    print_remark(f"{scene['title']}: not judged, {scene['subtitle']}{_where(page, options.output)}")
+    return 0
+
+
+def _check_output(path: str | None) -> None:
+    """Refuse to print a page on a terminal, and names that promise something else."""
+    if path is None or path == "-":
+        if sys.stdout is not None and sys.stdout.isatty():
+            raise InputError("a page is not printed on a terminal", hint="say where it goes: -o view.html")
+    elif not (path.lower().endswith(_ENDINGS) or is_special(path)):
+        name = Path(path).name
+        raise InputError(
+            f"a page is HTML, and '{name}' is the name of something else", hint="name it like view.html"
+        )
+
+
+def _check_inputs_stay(output: str | None, inputs: Sequence[str]) -> None:
+    same = None if output is None or output == "-" else identity(output)
+    for path in inputs:
+        if same is not None and same == identity(path, 0):
+            raise InputError(f"the page to {output} would overwrite {path}", hint="name another file")
+
+
+def _write(page: bytes, path: str | None) -> None:
+    with standard_output() if path is None or path == "-" else whole_file(path) as out:
+        out.write(page)
+
+
+def _where(page: bytes, path: str | None) -> str:
+    size = f"{len(page) / 1e6:.2f} MB"
+    return f", {size}" if path is None or path == "-" else f", {path} ({size})"

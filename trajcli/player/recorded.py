@@ -1,0 +1,174 @@
+"""Scene of a file of samples: joint values that were written before, shown and not judged."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajcli.columns import Column, parse_column
+from trajcli.curves.piecewise import Array
+from trajcli.errors import InputError, Place, Problem, utf8
+from trajcli.kinematics.robot import JointType, Robot
+from trajcli.player.rows import ORDERS, Rows, rows_of_samples
+from trajcli.player.scene import geometry_of, joints_in_units, limits_of, waypoints_of
+from trajcli.queries.arm import open_sheet
+from trajcli.queries.forward import refuse_far
+from trajcli.streams.reading import read_table
+from trajcli.streams.table import Table
+from trajcli.units import AngleUnit, LengthUnit, Units, joint_quantity
+from trajcli.version import __version__
+
+_NO_ROBOT = "A file of joint values says nothing of the arm: name it with --robot to see it move."
+_PLAIN_UNITS = ["rad or m", "rad/s or m/s", "rad/s² or m/s²", "rad/s³ or m/s³"]
+_SUFFIXES: dict[str | None, JointType] = {"deg": "revolute", "mm": "prismatic"}
+
+
+def scene_of_file(source: str, robot_name: str | None = None) -> dict[str, Any]:
+    """Return the scene of a file with columns t, q1.. and perhaps qd1.., qdd1.., qddd1.., move.
+
+    Args:
+        source: Its path; "-" is standard input.
+        robot_name: The arm: of the catalogue, a robot file, or a job.
+
+    Raises:
+        InputError: When a column is missing or does not fit the robot, a time does not increase, or there is
+            no such robot.
+        FileError: When a file cannot be read.
+    """
+    robot = None if robot_name is None else open_sheet(robot_name).robot
+    table = read_table(source)
+    columns = [parse_column(name) for name in table.names]
+    times = _times(table)
+    values = _joint_values(table, columns, robot)
+    rows, kept = rows_of_samples(times, values)
+    units, moves = _units_of(columns), _moves(table)
+    facts = [f"{times.size} row{'s' * (times.size != 1)}", f"{times[-1] - times[0]:.6g} s"]
+    waypoints = [(float(times[row]), values["q"][row]) for row in _ends(moves, times.size)]
+    limits = [] if robot is None else [(float(times[0]), float(times[-1]), robot.limits)]
+    return {
+        "version": 1,
+        "title": utf8(Path(table.file).name),
+        "subtitle": " · ".join(facts if robot is None else [robot.name, *facts]),
+        "verdict": {"state": "unjudged", "text": "not judged"},
+        "made_by": f"Made by trajcli {__version__}",
+        "joints": _joints(columns, robot, units),
+        **geometry_of(robot, rows, units, _NO_ROBOT),
+        "rows": rows.packed(),
+        "moves": [_move(label, times[low], times[high]) for label, low, high in moves],
+        "limits": limits_of(limits),
+        "waypoints": waypoints_of(waypoints) if robot is not None and robot.convention else [],
+        **{key: [] for key in ("findings", "events", "steps")},
+        "notes": list(_notes(rows, kept, times)),
+    }
+
+
+def _times(table: Table) -> Array:
+    """Return the times (N,), s."""
+    if "t" not in table.names:
+        raise InputError(
+            f"{table.file} has no column 't'", hint=f"its columns are {', '.join(table.names[:12])}"
+        )
+    times = table.column("t")
+    wrong = np.flatnonzero(np.diff(times) <= 0)
+    if len(wrong):
+        row = int(wrong[0]) + 1
+        place = Place(table.file, row + 2, 1, "")
+        text = f"the time {times[row]:.12g} s follows {times[row - 1]:.12g} s, expected times that increase"
+        raise InputError(Problem(text, f"row {row + 1} of the file", place))
+    return times
+
+
+def _of_kind(columns: Sequence[Column], kind: str) -> list[Column]:
+    return sorted((c for c in columns if c.kind == kind and c.joint is not None), key=lambda c: c.joint or 0)
+
+
+def _joint_values(table: Table, columns: Sequence[Column], robot: Robot | None) -> dict[str, Array]:
+    """Return the positions, and what derivatives the file has of all joints, each (N, n), SI."""
+    joints = _joint_count(table, columns, robot)
+    values = {}
+    for name in ORDERS:
+        found = _of_kind(columns, name)
+        if [column.joint for column in found] == list(range(joints)):
+            if robot is not None:
+                _check_units(table, found, robot)
+            each = np.stack([table.column(column.name) * column.factor for column in found], axis=1)
+            values[name] = each
+    refuse_far(values["q"], table.file)
+    return values
+
+
+def _joint_count(table: Table, columns: Sequence[Column], robot: Robot | None) -> int:
+    """Return the number of joints, whose positions the file must hold."""
+    found = _of_kind(columns, "q")
+    numbers = [column.joint for column in found]
+    count = len(found) if robot is None else len(robot.joints)
+    if numbers != list(range(count)) or not count:
+        wanted = "q1, q2, ..." if robot is None else f"q1 to q{count} of {robot.name}, once each"
+        listed = ", ".join(column.name for column in found) or "none"
+        raise InputError(
+            f"{table.file} has the joint columns {listed}, expected {wanted}",
+            hint=f"its columns are {', '.join(table.names[:12])}",
+        )
+    return count
+
+
+def _check_units(table: Table, columns: Sequence[Column], robot: Robot) -> None:
+    """Refuse degrees of a prismatic joint, and millimetres of a revolute one."""
+    for column, kind, name in zip(columns, robot.joint_types, robot.joint_names, strict=True):
+        dimension = joint_quantity(kind).dimension
+        if column.quantity is not None and column.quantity.dimension != dimension:
+            text = f"the column '{column.name}' of {table.file} is no {dimension}, and {name} is {kind}"
+            raise InputError(text, hint=f"name another robot than {robot.name}, or another column")
+
+
+def _joints(columns: Sequence[Column], robot: Robot | None, units: Units) -> list[dict[str, Any]]:
+    """Return names and units of the joints; where no robot says their kind, a plain name leaves both open."""
+    if robot is not None:
+        return joints_in_units(robot.joint_names, robot.joint_types, units)
+    found = _of_kind(columns, "q")
+    names = [f"q{number}" for number in range(1, len(found) + 1)]
+    shown = joints_in_units(names, [_SUFFIXES.get(column.unit, "revolute") for column in found], units)
+    plain = {"units": _PLAIN_UNITS, "scale": 1.0}
+    return [joint if column.unit else {**joint, **plain} for joint, column in zip(shown, found, strict=True)]
+
+
+def _units_of(columns: Sequence[Column]) -> Units:
+    suffixes = {column.unit for column in columns}
+    angle: AngleUnit = "deg" if "deg" in suffixes else "rad"
+    length: LengthUnit = "mm" if "mm" in suffixes else "m"
+    return Units(angle, length)
+
+
+def _moves(table: Table) -> list[tuple[str, int, int]]:
+    """Return label, first and last row of each move; none where the file does not say."""
+    if "move" not in table.names:
+        return []
+    index = table.column("move")
+    borders: list[int] = (np.flatnonzero(np.diff(index) != 0) + 1).tolist()
+    starts = [0, *borders]
+    return [
+        (f"{index[low]:g}", low, high) for low, high in zip(starts, [*borders, len(index) - 1], strict=True)
+    ]
+
+
+def _ends(moves: Sequence[tuple[str, int, int]], count: int) -> list[int]:
+    """Return the rows of waypoints: where moves meet, or the two ends of the file."""
+    return [0, *(high for _, _, high in moves)] if moves else [0, count - 1]
+
+
+def _move(label: str, start: float, end: float) -> dict[str, Any]:
+    text = {"index": label, "label": f"move {label}", "detail": f"{end - start:.6g} s"}
+    return {"start": float(start), "end": float(end), **text}
+
+
+def _notes(rows: Rows, kept: NDArray[np.intp], times: Array) -> list[str]:
+    notes = ["A file of samples: its limits and its continuity were not judged."]
+    if "qd" not in rows.values:
+        notes.append("The file has no velocities: the speed of the tool is that between its rows.")
+    if kept.size < times.size:
+        notes.append(f"Drawn are {kept.size} of {times.size} rows, the extremes of each column among them.")
+    return notes

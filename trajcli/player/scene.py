@@ -1,0 +1,250 @@
+"""Scene of a planned job: what a page shows of its arm, its motion, its limits and its verdict."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from trajcli.checks.finding import Finding
+from trajcli.curves.piecewise import Array
+from trajcli.kinematics.robot import QUANTITIES, JointType, Limits, Robot
+from trajcli.planners.planner import PlannedMove
+from trajcli.planning.plan import Plan
+from trajcli.player.rows import ORDERS, Rows, packed, rows_of_curve
+from trajcli.trajectory import Span
+from trajcli.units import Quantity, Units, factor, joint_quantity, unit_name
+from trajcli.version import __version__
+
+_SUPERSCRIPTS = str.maketrans({"2": "²", "3": "³"})
+_MOST_WAYPOINTS = 40
+_MOST_STEPS = 100
+_SAME = 1e-4  # rad or m: waypoints that are nearer than this are one
+_MADE_BY = f"Made by trajcli {__version__}"
+
+
+def scene_of_plan(plan: Plan) -> dict[str, Any]:
+    """Return the scene of a plan, verified or not, as the player reads it: SI, and the units to show."""
+    loaded, trajectory, verdict = plan.loaded, plan.trajectory, plan.verdict
+    spans = [span for span in trajectory.spans if span.duration > 0]
+    rows = rows_of_curve(
+        trajectory.curve, [span.start for span in spans], [finding.time for finding in verdict.findings]
+    )
+    count = len(verdict.findings)
+    state, text = ("verified", "verified") if verdict.passed else ("violated", _counted(count, "finding"))
+    moves = _counted(len(plan.moves), "move")
+    names, types = trajectory.joint_names, trajectory.joint_types
+    return {
+        "version": 1,
+        "title": loaded.name,
+        "subtitle": f"{loaded.robot.name} · {moves} · {trajectory.duration:.6g} s",
+        "verdict": {"state": state, "text": text},
+        "made_by": _MADE_BY,
+        "joints": joints_in_units(names, types, loaded.units),
+        **geometry_of(loaded.robot, rows, loaded.units),
+        "rows": rows.packed(),
+        "moves": [_move(plan, k) for k in range(len(plan.moves))],
+        "limits": limits_of([(s.start, s.end, plan.moves[s.index].robot.limits) for s in spans]),
+        "waypoints": waypoints_of([*_waypoints(plan)]) if loaded.robot.convention else [],
+        "findings": [_finding(plan, finding) for finding in verdict.findings],
+        "events": [_event(plan, event.move, event.message) for event in plan.events],
+        "steps": [_step(plan, k) for k in range(min(len(verdict.steps), _MOST_STEPS))],
+        "notes": list(_notes(plan)),
+    }
+
+
+def joints_in_units(names: Sequence[str], types: Sequence[JointType], units: Units) -> list[dict[str, Any]]:
+    """Return the name of each joint, its units by order of the derivative, and how many make one in SI."""
+    return [
+        {
+            "name": name,
+            "units": [
+                unit_name(joint_quantity(kind, order), units).translate(_SUPERSCRIPTS).replace("^", "")
+                for order in range(len(ORDERS))
+            ],
+            "scale": 1 / factor(joint_quantity(kind), units),
+        }
+        for name, kind in zip(names, types, strict=True)
+    ]
+
+
+def geometry_of(robot: Robot | None, rows: Rows, units: Units, reason: str = "") -> dict[str, Any]:
+    """Return what is drawn in space: the arm's table and the path of its tool; or why nothing is.
+
+    Args:
+        robot: The arm; None where there is none.
+        rows: Its motion.
+        units: To be shown.
+        reason: Why there is no arm.
+    """
+    if robot is None or robot.convention is None:
+        if robot is not None:
+            reason = (
+                f"{robot.name} has bare joints: without Denavit-Hartenberg rows there is nothing to draw."
+            )
+        return {"robot": None, "no_geometry": f"{reason} The plots show its motion."}
+    length = Quantity("length")
+    ranges = np.array([rows.values["q"].min(axis=0), rows.values["q"].max(axis=0)]).T.tolist()
+    table = [
+        {
+            **{key: getattr(joint, key) for key in ("theta", "d", "a", "alpha", "sign")},
+            "prismatic": joint.type == "prismatic",
+            "modified": robot.convention == "modified",
+            "range": between,
+        }
+        for joint, between in zip(robot.joints, ranges, strict=True)
+    ]
+    return {
+        "robot": {"rows": table, "base": robot.base.tolist(), "tool": robot.tool.tolist()},
+        "length": {"unit": unit_name(length, units), "scale": 1 / factor(length, units)},
+        "tool": _tool(robot, rows, units),
+    }
+
+
+def _tool(robot: Robot, rows: Rows, units: Units) -> dict[str, Any]:
+    from trajcli.kinematics.forward import forward
+
+    positions = forward(robot, rows.values["q"])[:, :3, 3]
+    speed = Quantity("length", 1)
+    return {
+        "positions": packed(positions.T),
+        "speeds": packed(_speeds(robot, rows, positions)[None]),
+        "unit": unit_name(speed, units),
+        "scale": 1 / factor(speed, units),
+    }
+
+
+def _speeds(robot: Robot, rows: Rows, positions: Array) -> Array:
+    """Return the speed of the tcp on each row, (N,), m/s; from its positions where no rates are known."""
+    from trajcli.kinematics.jacobian import tcp_twist
+
+    if "qd" in rows.values:
+        twist = tcp_twist(robot, rows.values["q"], rows.values["qd"])
+        return np.asarray(np.linalg.norm(twist[:, :3], axis=1))
+    if rows.times.size < 2:
+        return np.zeros(rows.times.size)
+    return np.asarray(np.linalg.norm(np.gradient(positions, rows.times, axis=0), axis=1))
+
+
+def limits_of(parts: Sequence[tuple[float, float, Limits]]) -> list[dict[str, Any]]:
+    """Return the limits in force by interval of time, SI, null where there is none; equal neighbours are one.
+
+    Args:
+        parts: Start, end and limits of each interval, s.
+    """
+    intervals: list[dict[str, Any]] = []
+    for start, end, limits in parts:
+        bounds = [_finite(limits.of_order(order)) for order in range(len(QUANTITIES))]
+        if intervals and intervals[-1]["bounds"] == bounds:
+            intervals[-1]["end"] = end
+        else:
+            intervals.append({"start": start, "end": end, "bounds": bounds})
+    return intervals
+
+
+def _finite(bounds: Array) -> list[list[float | None]]:
+    return [[value if math.isfinite(value) else None for value in pair] for pair in bounds.tolist()]
+
+
+def waypoints_of(points: Sequence[tuple[float, Array]]) -> list[dict[str, Any]]:
+    """Return points of a motion, those that are equal once; of very many every so manyth.
+
+    Args:
+        points: Time, s, and joint values (n,), SI, of each.
+    """
+    distinct: dict[tuple[float, ...], dict[str, Any]] = {}
+    for time, joints in points:
+        key = tuple(np.rint(joints / _SAME).tolist())
+        distinct.setdefault(key, {"time": time, "joints": joints.tolist()})
+    kept = list(distinct.values())
+    return kept[:: math.ceil(len(kept) / _MOST_WAYPOINTS) or 1]
+
+
+def _waypoints(plan: Plan) -> Iterator[tuple[float, Array]]:
+    """Yield the start, the points that moves pass, and their ends."""
+    curve = plan.trajectory.curve
+    yield 0.0, curve.evaluate(0.0)
+    for move, span in zip(plan.moves, plan.trajectory.spans, strict=True):
+        points = move.planned.via_points
+        for time in [] if points is None else points.times.tolist():
+            at = min(max(span.start + time, span.start), span.end)
+            yield at, curve.evaluate(min(at, curve.end))
+        yield span.end, curve.evaluate(min(span.end, curve.end), side="left")
+
+
+def _move(plan: Plan, index: int) -> dict[str, Any]:
+    move, span = plan.moves[index], plan.trajectory.spans[index]
+    detail = f"{span.planner}, {span.duration:.6g} s{_tightest(plan, move, index)}"
+    return {**_interval(span), "index": span.index, "label": f"move {span.index}", "detail": detail}
+
+
+def _interval(span: Span) -> dict[str, float]:
+    return {"start": span.start, "end": span.end}
+
+
+def _tightest(plan: Plan, move: PlannedMove, index: int) -> str:
+    """Return which limit of the joints' rates is used most, and how much of it; empty where there is none."""
+    parts = []
+    for order in range(1, len(QUANTITIES)):
+        extremes, bounds = plan.verdict.peaks[index][order], move.robot.limits.of_order(order)
+        used = np.maximum(extremes.low / bounds[:, 0], extremes.high / bounds[:, 1])
+        joint = int(used.argmax())
+        parts.append((float(used[joint]), QUANTITIES[order], move.robot.joint_names[joint]))
+    used_most, quantity, name = max(parts)
+    return f"; {quantity} of {name} uses {100 * used_most:.3g} % of its limit" if used_most > 0 else ""
+
+
+def _finding(plan: Plan, finding: Finding) -> dict[str, Any]:
+    names = plan.trajectory.joint_names
+    of_limit = finding.kind in QUANTITIES
+    return {
+        "time": finding.time,
+        "joint": names.index(finding.joint) if finding.joint in names else None,
+        "order": QUANTITIES.index(finding.kind) if of_limit else None,
+        "value": finding.value,
+        "label": "" if finding.move is None else f"move {finding.move}:",
+        "message": finding.text(plan.loaded.say),
+        "hint": finding.hint,
+    }
+
+
+def _event(plan: Plan, move: int | None, message: str) -> dict[str, Any]:
+    time = 0.0 if move is None else plan.trajectory.spans[move].start
+    return {"time": time, "label": "" if move is None else f"move {move}:", "message": message}
+
+
+def _step(plan: Plan, index: int) -> dict[str, Any]:
+    step, trajectory = plan.verdict.steps[index], plan.trajectory
+    quantity = joint_quantity(trajectory.joint_types[trajectory.joint_names.index(step.joint)], 2)
+    size = step.size / factor(quantity, plan.loaded.units)
+    unit = unit_name(quantity, plan.loaded.units).translate(_SUPERSCRIPTS).replace("^", "")
+    return {"time": step.time, "label": f"{step.joint}:", "message": f"by {size:.4g} {unit}"}
+
+
+def _notes(plan: Plan) -> Iterator[str]:
+    """Yield what was not judged."""
+    verdict, every = plan.verdict, set(plan.trajectory.joint_names)
+    unlimited: Mapping[str, set[str]] = {
+        quantity: {joint for joint, what in verdict.unchecked if what == quantity} for quantity in QUANTITIES
+    }
+    parts = [
+        quantity if joints == every else f"{quantity} of {', '.join(sorted(joints))}"
+        for quantity, joints in unlimited.items()
+        if joints
+    ]
+    if parts:
+        yield f"Without a limit, not checked: {', '.join(parts)}."
+    if verdict.unchecked_of_tool:
+        names = ", ".join(name.replace("_", " ") for name in verdict.unchecked_of_tool)
+        yield f"Limited, but not checked in every move: {names} of the tool."
+    if verdict.sampled:
+        moves = ", ".join(map(str, verdict.sampled[:20])) + (", ..." if len(verdict.sampled) > 20 else "")
+        yield f"On samples only: distance from the path and branch, moves {moves}."
+    if len(verdict.steps) > _MOST_STEPS:
+        yield f"Of {len(verdict.steps)} steps in acceleration the first {_MOST_STEPS} are listed."
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}{'s' * (count != 1)}"
