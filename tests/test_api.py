@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 import trajcli
 from trajcli.api import _is_yaml
+from trajcli.streams.reading import read_table
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"
@@ -185,6 +186,18 @@ def test_a_plan_saves_itself(tmp_path: Path) -> None:
         wrong.save(tmp_path / "wrong.csv")
     assert [file.name for file in tmp_path.iterdir()] == ["rows.csv"]
     assert plan.report().verdict == "verified"
+
+
+@pytest.mark.parametrize("ending", ["csv", "mcap", "jsonl", "yaml"])
+def test_a_plan_saves_itself_in_every_format(ending: str, tmp_path: Path) -> None:
+    plan = trajcli.plan(EXAMPLES / "ur5e_pick.yaml")
+    plan.save(tmp_path / f"rows.{ending}", digits="full")
+    table = read_table(tmp_path / f"rows.{ending}")
+    t = table.column("t")
+    for joint in range(6):
+        name, factor = (f"q{joint + 1}_deg", np.pi / 180) if ending == "csv" else (f"q{joint + 1}", 1.0)
+        expected = plan.trajectory(np.minimum(t, plan.trajectory.duration))[:, joint]
+        np.testing.assert_allclose(table.column(name) * factor, expected, atol=1e-8)
 
 
 def test_a_notebook_draws_a_plan():
