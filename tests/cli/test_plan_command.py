@@ -145,11 +145,11 @@ WRONG_OPTIONS = [
     (("--no-output", "-o", "a.csv"), "--no-output and --output exclude each other"),
     (("--no-output", "--format", "mcap"), "--no-output and --format exclude each other"),
     (("--no-output", "--topics", "/x"), "--no-output and --topics exclude each other"),
-    (("-o", "a.txt"), "rows are written as CSV or MCAP, not as .txt"),
+    (("-o", "a.txt"), "rows are written as CSV or MCAP or JSON lines or a ROS message, not as .txt"),
     (("-o", "a.csv", "--format", "mcap"), "--format mcap contradicts the name of the file, a.csv"),
     (("-o", "a.csv", "--epoch", "1"), "--epoch is about MCAP, and the rows are written as CSV"),
     (("--compression", "lz4"), "--compression is about MCAP, and the rows are written as CSV"),
-    (("-o", "a.mcap", "--digits", "full"), "MCAP has no digits: it holds every bit"),
+    (("-o", "a.mcap", "--digits", "full"), "--digits is about CSV, MCAP has every bit"),
     (
         ("-o", "a.mcap", "--topics", "/tool_twits"),
         "there is no topic '/tool_twits'\n  did you mean '/tool_twist'?",

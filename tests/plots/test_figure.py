@@ -14,12 +14,12 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
-from conftest import EXAMPLES, TWO, many_joints
 from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.image import imread
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
+from picture_jobs import EXAMPLES, TWO, many_joints
 
 from trajcli.errors import InputError
 from trajcli.job.read import job_from_text

@@ -215,7 +215,7 @@ def test_what_suits_a_job(example: Example) -> None:
 
 @pytest.mark.parametrize(("count", "columns"), [(1, 1), (2, 2), (3, 4), (12, 4)])
 def test_rows_are_quantities_for_few_joints_and_joints_for_many(count: int, columns: int) -> None:
-    from conftest import many_joints
+    from picture_jobs import many_joints
 
     (block,) = picture_of(plan_job(job_from_text(many_joints(count)))).blocks
     assert block.columns == columns

@@ -13,7 +13,7 @@ from trajcli.columns import Column, parse_column
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Place, Problem, utf8
 from trajcli.kinematics.robot import JointType, Robot
-from trajcli.player.rows import ORDERS, Rows, rows_of_samples
+from trajcli.player.rows import ORDERS, DrawnRows, rows_of_samples
 from trajcli.player.scene import geometry_of, joints_in_units, limits_of, waypoints_of
 from trajcli.queries.arm import open_sheet
 from trajcli.queries.forward import refuse_far
@@ -165,7 +165,7 @@ def _move(label: str, start: float, end: float) -> dict[str, Any]:
     return {"start": float(start), "end": float(end), **text}
 
 
-def _notes(rows: Rows, kept: NDArray[np.intp], times: Array) -> list[str]:
+def _notes(rows: DrawnRows, kept: NDArray[np.intp], times: Array) -> list[str]:
     notes = ["A file of samples: its limits and its continuity were not judged."]
     if "qd" not in rows.values:
         notes.append("The file has no velocities: the speed of the tool is that between its rows.")

@@ -23,7 +23,7 @@ _JUMPS = (0.05, 0.5)  # jumps a frame, at most, of an arm of many joints and of 
 
 
 @frozen
-class Rows:
+class DrawnRows:
     """Joint values and their derivatives on rows of times; where a derivative jumps, two rows have one time.
 
     Attributes:
@@ -47,7 +47,7 @@ def frame_times(start: float, end: float) -> Array:
     return distinct(np.append(frames, end))
 
 
-def rows_of_curve(curve: PiecewisePolynomial, borders: Sequence[float], extra: Sequence[float]) -> Rows:
+def rows_of_curve(curve: PiecewisePolynomial, borders: Sequence[float], extra: Sequence[float]) -> DrawnRows:
     """Return the rows of a curve: of its frames, both sides of its jumps, and of some times more.
 
     Args:
@@ -67,7 +67,7 @@ def rows_of_curve(curve: PiecewisePolynomial, borders: Sequence[float], extra: S
     times, after = times[order], after[order]
     both = [curve.evaluate_orders(times, range(len(ORDERS)), side=side) for side in ("left", "right")]
     values = np.where(after[:, None, None], both[1], both[0])
-    return Rows(times, {name: values[:, k] for k, name in enumerate(ORDERS)})
+    return DrawnRows(times, {name: values[:, k] for k, name in enumerate(ORDERS)})
 
 
 def _jumps_a_frame(joints: int) -> float:
@@ -98,22 +98,22 @@ def _among(values: Array, members: Array) -> NDArray[np.bool_]:
     return np.asarray(nearest == values)
 
 
-def rows_of_samples(times: Array, values: Mapping[str, Array]) -> tuple[Rows, NDArray[np.intp]]:
+def rows_of_samples(times: Array, values: Mapping[str, Array]) -> tuple[DrawnRows, NDArray[np.intp]]:
     """Return rows of a file that are enough for a page, and their indices: every row, where they are few.
 
     Args:
         times: Shape (N,), s, strictly increasing.
-        values: As in `Rows`.
+        values: As in `DrawnRows`.
     """
     wanted = frame_times(float(times[0]), float(times[-1]))
     if times.size <= (1 + 2 * _jumps_a_frame(values["q"].shape[1])) * wanted.size:
-        return Rows(times, values), np.arange(times.size)
+        return DrawnRows(times, values), np.arange(times.size)
     marked = np.zeros(times.size, dtype=bool)
     marked[np.searchsorted(times, wanted).clip(0, times.size - 1)] = True
     for each in values.values():
         marked[each.argmin(axis=0)] = marked[each.argmax(axis=0)] = True
     kept = np.flatnonzero(marked)
-    return Rows(times[kept], {name: each[kept] for name, each in values.items()}), kept
+    return DrawnRows(times[kept], {name: each[kept] for name, each in values.items()}), kept
 
 
 def packed(columns: Array, width: int = 2) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.kinematics.robot import QUANTITIES, JointType, Limits, Robot
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan
-from trajcli.player.rows import ORDERS, Rows, packed, rows_of_curve
+from trajcli.player.rows import ORDERS, DrawnRows, packed, rows_of_curve
 from trajcli.trajectory import Span
 from trajcli.units import Quantity, Units, factor, joint_quantity, unit_name
 from trajcli.version import __version__
@@ -70,7 +70,7 @@ def joints_in_units(names: Sequence[str], types: Sequence[JointType], units: Uni
     ]
 
 
-def geometry_of(robot: Robot | None, rows: Rows, units: Units, reason: str = "") -> dict[str, Any]:
+def geometry_of(robot: Robot | None, rows: DrawnRows, units: Units, reason: str = "") -> dict[str, Any]:
     """Return what is drawn in space: the arm's table and the path of its tool; or why nothing is.
 
     Args:
@@ -103,7 +103,7 @@ def geometry_of(robot: Robot | None, rows: Rows, units: Units, reason: str = "")
     }
 
 
-def _tool(robot: Robot, rows: Rows, units: Units) -> dict[str, Any]:
+def _tool(robot: Robot, rows: DrawnRows, units: Units) -> dict[str, Any]:
     from trajcli.kinematics.forward import forward
 
     positions = forward(robot, rows.values["q"])[:, :3, 3]
@@ -116,7 +116,7 @@ def _tool(robot: Robot, rows: Rows, units: Units) -> dict[str, Any]:
     }
 
 
-def _speeds(robot: Robot, rows: Rows, positions: Array) -> Array:
+def _speeds(robot: Robot, rows: DrawnRows, positions: Array) -> Array:
     """Return the speed of the tcp on each row, (N,), m/s; from its positions where no rates are known."""
     from trajcli.kinematics.jacobian import tcp_twist
 
