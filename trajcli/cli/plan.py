@@ -76,12 +76,9 @@ def run_plan(job: str, overrides: Sequence[str], options: PlanOptions) -> int:
     if refusal is not None:
         raise refusal
     if not options.quiet:
-        _summarise(
-            plan,
-            grid.count,
-            options,
-            geometry_missing=form.content == "log" and loaded.robot.convention is None,
-        )
+        written = 0 if options.no_output or form.content == "knots" else grid.count
+        missing = form.content == "log" and loaded.robot.convention is None
+        _summarise(plan, written, geometry_missing=missing)
     return 0
 
 
@@ -197,8 +194,8 @@ def _beside_toppra(move: MoveReport, other: PathReferenceReport) -> str:
     )
 
 
-def _summarise(plan: Plan, rows: int, options: PlanOptions, *, geometry_missing: bool) -> None:
-    print(summary(plan, rows=0 if options.no_output else rows), file=sys.stderr)  # noqa: T201
+def _summarise(plan: Plan, rows: int, *, geometry_missing: bool) -> None:
+    print(summary(plan, rows), file=sys.stderr)  # noqa: T201
     if geometry_missing:
         text = "  the robot has no geometry: the log has no frames, no robot description and no tool path"
         print(text, file=sys.stderr)  # noqa: T201
