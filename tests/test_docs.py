@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
+import sys
 from pathlib import Path
 
 import pytest
 import yaml
 from typer.testing import CliRunner
 
-from docs.console import agrees, commands, renewed
+from docs.console import agrees, commands, renewed, run
 from docs.generate import PAGES, shows_commands
 from docs.markdown import ROOT, Block, anchors, blocks, documents, links
 from trajcli.cli.app import app
@@ -208,6 +209,27 @@ def test_a_command_that_fails_must_say_so() -> None:
 def test_commands_that_set_up_the_project_are_not_run() -> None:
     text = "```console\n$ make no-such-target\n```\n"
     assert renewed(text) == text
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "trajcli plan job.yaml --digits full",
+        "trajcli plan nothing.yaml; echo $?",
+        "cat job.yaml | trajcli explain - | tail -n 3",
+        "cd inside && trajcli plan ../job.yaml -o rows.csv && cat rows.csv",
+        "trajcli plan job.yaml | true; echo ${PIPESTATUS[0]}",
+        "NO_COLOR= trajcli --help",
+    ],
+)
+def test_commands_of_documents_are_those_of_the_command_line(command: str, tmp_path: Path) -> None:
+    (tmp_path / "job.yaml").write_text(
+        "version: 1\nrobot: {joints: 1}\nstart: {joints: [0]}\n"
+        "moves: [{planner: cubic, to: {joints: [1]}, duration: 1}]\noutput: {rate: 2}\n"
+    )
+    (tmp_path / "inside").mkdir()
+    cold = command.replace("trajcli", str(Path(sys.executable).parent / "trajcli"))
+    assert run(command, tmp_path) == run(cold, tmp_path)
 
 
 def test_commands_are_told_from_their_output() -> None:
