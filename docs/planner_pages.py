@@ -16,9 +16,9 @@ WISHES = {
     ),
     "quintic": (
         "the same, softly: accelerations at both ends are yours",
-        "every hundredth of a second counts",
+        "it shall be as fast as possible",
     ),
-    "septic": ("softer still: no jerk at the ends, nothing that makes the load swing", "limits are tight"),
+    "septic": ("softer still: the jerk begins and ends at zero", "limits are tight"),
     "cycloidal": (
         "from rest to rest with an acceleration that is a sine, as cams do it",
         "the arm is moving",
@@ -87,12 +87,18 @@ def planner_table() -> str:
     parts = [_INTRODUCTION]
     for chapter, (heading, about) in _CHAPTERS.items():
         rows = [
-            [wish, f"[`{name}`](planners/{name}.md)", str(PLANNERS[name].continuity), reason]
+            [wish, f"[`{name}`](planners/{name}.md)", _continuity(name, chapter), reason]
             for name, (wish, reason) in WISHES.items()
             if chapter in PLANNERS[name].__module__.split(".")
         ]
         parts += [f"## {heading}", about, table(["you want", "planner", "continuity", "not where"], rows)]
     return "\n\n".join([*parts, _END]) + "\n"
+
+
+def _continuity(name: str, chapter: str) -> str:
+    if name == "spline":
+        return "1 or 2, by rule"
+    return "1 or 2, by law" if chapter == "tool_path" else str(PLANNERS[name].continuity)
 
 
 def planner_page(name: str) -> str:
