@@ -4,9 +4,9 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 PEERS := .venv-peers
-EXTRAS ?= dev  # dev,viewers: also what the tests of viewers need
+EXTRAS ?= dev  # dev,docs,viewers: also what the tests of viewers and of the site need
 
-.PHONY: setup demo check format lint types test soak bench golden schema docs player picture clean
+.PHONY: setup demo check format lint types test soak bench golden schema docs player picture site clean
 
 setup: $(STAMP)
 
@@ -53,7 +53,7 @@ schema: $(STAMP)  ## the committed JSON schemas
 	$(BIN)/trajcli schema report > schemas/report.schema.json
 	$(BIN)/trajcli schema explanation > schemas/explanation.schema.json
 
-docs: $(STAMP)  ## the reference pages that are generated from the models
+docs: $(STAMP)  ## pages that are generated from the models, outputs of shown commands, and pictures
 	$(BIN)/python -m docs.generate
 
 player:  ## the script and the style of `trajcli view`, from player/: needs node 20 and npm
@@ -63,5 +63,10 @@ player:  ## the script and the style of `trajcli view`, from player/: needs node
 picture: $(STAMP)  ## the picture of the player in the documents: needs Chromium, and setup with EXTRAS=dev,viewers
 	$(BIN)/python -m docs.player_picture
 
+site: $(STAMP)  ## the documents as a site in site/, dead links refused
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[docs]'
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet
+	@echo "open site/index.html"
+
 clean:
-	rm -rf $(VENV) $(PEERS) .mypy_cache .ruff_cache .pytest_cache .hypothesis ur5e_pick.csv ur5e_pick.report.json
+	rm -rf $(VENV) $(PEERS) site .mypy_cache .ruff_cache .pytest_cache .hypothesis ur5e_pick.csv ur5e_pick.report.json

@@ -3,6 +3,8 @@
 A line that begins with `$ ` is a command for bash; what follows is its output, standard error included.
 A line `...` of the output stands for any number of lines. A command must succeed; one that shall not says
 `; echo $?`. Blocks that set up the project itself, with make, git or pip, are not run.
+
+A picture that a command draws and the document shows, from a folder `pictures`, is kept as it was drawn.
 """
 
 from __future__ import annotations
@@ -13,7 +15,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-from docs.markdown import ROOT, Block, blocks
+from docs.markdown import ROOT, Block, blocks, links
+from docs.warm import warm_commands
+from trajcli.frozen import frozen
 
 _SET_UP = ("make", "git", "pip")
 _PROMPT = "$ "
@@ -21,8 +25,21 @@ _ANYTHING = "..."
 _SECONDS = 60
 
 
-def renewed(document: str) -> str:
-    """Return a document with the outputs of its commands as they are now.
+@frozen
+class Outcome:
+    """What the commands of a document make.
+
+    Attributes:
+        text: The document with their outputs as they are now.
+        pictures: The pictures that it shows, as its commands draw them, by the names of their files.
+    """
+
+    text: str
+    pictures: dict[str, bytes]
+
+
+def outcome(document: str) -> Outcome:
+    """Run the commands of a document.
 
     Raises:
         RuntimeError: When a command fails that does not say so.
@@ -37,7 +54,24 @@ def renewed(document: str) -> str:
             if block.language == "console" and not _sets_up(block):
                 result += document[done : block.start] + _renewed_block(block, folder)
                 done = block.start + len(block.text)
-    return result + document[done:]
+        pictures = {path.name: path.read_bytes() for path in sorted(folder.glob("*.svg"))}
+    kept = {name: content for name, content in pictures.items() if name in shown(document)}
+    return Outcome(result + document[done:], kept)
+
+
+def renewed(document: str) -> str:
+    """Return a document with the outputs of its commands as they are now.
+
+    Raises:
+        RuntimeError: When a command fails that does not say so.
+    """
+    return outcome(document).text
+
+
+def shown(document: str) -> set[str]:
+    """Return the names of the pictures that a document shows."""
+    paths = [Path(link) for link in links(document)]
+    return {path.name for path in paths if path.parent.name == "pictures" and path.suffix == ".svg"}
 
 
 def commands(block: Block) -> list[tuple[str, str]]:
@@ -57,7 +91,7 @@ def run(command: str, folder: Path) -> str:
     Raises:
         RuntimeError: When it fails.
     """
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    path = os.pathsep.join((str(warm_commands()), str(Path(sys.executable).parent), os.environ["PATH"]))
     done = subprocess.run(  # noqa: S603
         ["bash", "-c", command],  # noqa: S607
         cwd=folder,

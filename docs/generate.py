@@ -1,4 +1,4 @@
-"""Write what the documents take from the code: reference pages, outputs of shown commands, pictures.
+"""Write what the documents take from the code: reference pages, outputs of shown commands, and pictures.
 
 Run by `make docs`; a test checks that it has been run.
 """
@@ -6,15 +6,24 @@ Run by `make docs`; a test checks that it has been run.
 from __future__ import annotations
 
 import sys
+from functools import partial
 from pathlib import Path
 
 from docs.cli_reference import cli_reference
-from docs.console import renewed
+from docs.console import outcome
 from docs.job_reference import job_reference
 from docs.markdown import ROOT, blocks, documents
-from docs.pictures import FOLDER, PAGE, pictures
+from docs.planner_pages import planner_page, planner_table
+from docs.svg_comparison import is_current
+from trajcli.planners import PLANNERS
 
-PAGES = {"docs/job-reference.md": job_reference, "docs/cli-reference.md": cli_reference}
+PAGES = {
+    "docs/job-reference.md": job_reference,
+    "docs/cli-reference.md": cli_reference,
+    "docs/planners.md": planner_table,
+    **{f"docs/planners/{name}.md": partial(planner_page, name) for name in PLANNERS},
+}
+PICTURES = ROOT / "docs/pictures"
 
 
 def shows_commands(document: Path) -> bool:
@@ -27,9 +36,11 @@ def main() -> None:
     for name, page in PAGES.items():
         _write(ROOT / name, page())
     for document in filter(shows_commands, documents()):
-        _write(document, renewed(document.read_text(encoding="utf-8")))
-    for name, picture in pictures(PAGE.read_text(encoding="utf-8")).items():
-        _write(FOLDER / name, picture)
+        made = outcome(document.read_text(encoding="utf-8"))
+        _write(document, made.text)
+        for picture, content in made.pictures.items():
+            if not is_current(PICTURES / picture, content):
+                _write(PICTURES / picture, content.decode())
 
 
 def _write(path: Path, text: str) -> None:

@@ -213,7 +213,7 @@ def _planner(tag: str, planner: type[Planner]) -> Iterator[str]:
         yield f"Source: {' '.join(source.split())}"
     yield f"```yaml\n{EXAMPLES[tag]}```"
     used = [f"[{path.name}](../examples/{path.name})" for path in _examples_of(tag)]
-    yield f"Used in {', '.join(used)}."
+    yield f"Curves, guarantees and a worked exercise: [{tag}](planners/{tag}.md). Used in {', '.join(used)}."
 
 
 def _examples_of(tag: str) -> list[Path]:

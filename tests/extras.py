@@ -9,10 +9,10 @@ import pytest
 _ALL = os.environ.get("TRAJCLI_TEST_EXTRAS") == "all"
 
 
-def require_module(name: str) -> None:
-    """Skip the test where a Python module of the extra `viewers` is not installed."""
+def require_module(name: str, extra: str = "viewers") -> None:
+    """Skip the test where a Python module of an extra is not installed."""
     if importlib.util.find_spec(name) is None:
-        _absent(f"the module {name}: pip install 'trajcli[viewers]'")
+        _absent(f"the module {name}: pip install 'trajcli[{extra}]'")
 
 
 def require_program(*names: str) -> str:

@@ -1,0 +1,152 @@
+"""The documents as a site: every page is there, links and pictures lead somewhere, a dead link fails the build."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote
+
+import pytest
+
+from docs.markdown import ROOT, documents
+from docs.site_hook import FROM_ROOT, for_site
+from tests.extras import require_module
+
+PAGES = {"index.md", "contributing.md", "tutorial.md", "planners/cubic.md", "adr/0001-a.md", "adr/0002-b.md"}
+REPOSITORY = "https://example.org/trajcli/"
+
+
+@pytest.mark.parametrize(
+    ("page", "written", "alone", "published"),
+    [
+        ("index.md", "[a](docs/tutorial.md)", "[a](tutorial.md)", None),
+        ("index.md", "![a b](docs/planners/cubic.md)", "![a b](planners/cubic.md)", None),
+        ("index.md", "[a](docs/adr/)", "[a](adr/0001-a.md)", None),
+        ("index.md", "[`a`](CONTRIBUTING.md#set-up)", "[`a`](contributing.md#set-up)", None),
+        ("tutorial.md", "[a](../README.md)", "[a](index.md)", None),
+        ("tutorial.md", "[a](#limits) [b](https://x.org/y.md)", "[a](#limits) [b](https://x.org/y.md)", None),
+        ("planners/cubic.md", "[a](../tutorial.md#b)", "[a](../tutorial.md#b)", None),
+        ("planners/cubic.md", "[a](../../README.md)", "[a](../index.md)", None),
+        (
+            "planners/cubic.md",
+            "[a](nothing.md)",
+            "a",
+            "[a](https://example.org/trajcli/blob/HEAD/docs/planners/nothing.md)",
+        ),
+        (
+            "tutorial.md",
+            "[a](../examples/b.yaml)",
+            "a",
+            "[a](https://example.org/trajcli/blob/HEAD/examples/b.yaml)",
+        ),
+        (
+            "index.md",
+            "a [b [c]](LICENSE) d",
+            "a b [c] d",
+            "a [b [c]](https://example.org/trajcli/blob/HEAD/LICENSE) d",
+        ),
+        ("index.md", "```yaml a.yaml\nb\n```", '```yaml title="a.yaml"\nb\n```', None),
+        ("index.md", "```yaml\n[a](LICENSE)\n```", "```yaml\n[a](LICENSE)\n```", None),
+        ("index.md", "a\n* b\n* c\n", "a\n\n* b\n* c\n", None),
+        ("index.md", "1. a\n   b\n", "1. a\n    b\n", None),
+    ],
+)
+def test_documents_of_the_repository_fit_the_site(
+    page: str, written: str, alone: str, published: str | None
+) -> None:
+    assert for_site(written, page, None, PAGES) == alone
+    assert for_site(written, page, REPOSITORY, PAGES) == (published or alone)
+
+
+def build(config: Path, site: Path) -> subprocess.CompletedProcess[str]:
+    require_module("mkdocs", "docs")
+    require_module("material", "docs")
+    return subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--config-file", config, "--site-dir", site],
+        env={**os.environ, "NO_MKDOCS_2_WARNING": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+class Page(HTMLParser):
+    """What a page of the site links to, and what can be linked to in it."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.links: list[str] = []
+        self.loaded: list[str] = []
+        self.anchors: set[str] = set()
+        self.text = ""
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        values = {name: value for name, value in attrs if value}
+        self.links += [values[name] for name in ("href", "src") if name in values]
+        if tag != "a":
+            self.loaded += [values[name] for name in ("href", "src") if name in values]
+        self.anchors |= {values[name] for name in ("id", "name") if name in values}
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> dict[Path, Page]:
+    folder = tmp_path_factory.mktemp("site")
+    done = build(ROOT / "mkdocs.yml", folder)
+    assert done.returncode == 0, done.stderr
+    assert "WARNING" not in done.stderr
+    return {path: Page(path) for path in folder.rglob("*.html") if path.name != "404.html"}
+
+
+def test_every_document_is_a_page(site: dict[Path, Page]) -> None:
+    root = next(path.parent for path in site if path.name == "index.html")
+    names = {
+        FROM_ROOT.get(name, name.removeprefix("docs/"))
+        for name in (p.relative_to(ROOT).as_posix() for p in documents())
+    }
+    assert {path.relative_to(root).as_posix() for path in site} == {
+        f"{name.removesuffix('.md')}.html" for name in names
+    }
+    nav = site[root / "index.html"].links
+    assert {name.removesuffix(".md") + ".html" for name in names} <= set(nav)
+
+
+def test_links_of_the_site_lead_somewhere(site: dict[Path, Page]) -> None:
+    dead = []
+    for path, page in site.items():
+        for link in page.links:
+            file, _, anchor = unquote(link).partition("#")
+            if "://" in file or file.startswith(("mailto:", "data:")):
+                continue
+            target = (path.parent / file).resolve() if file else path
+            known = target.exists() and (not anchor or target not in site or anchor in site[target].anchors)
+            dead += [] if known else [(path.name, link)]
+    assert dead == []
+
+
+def test_the_site_loads_nothing_from_elsewhere(site: dict[Path, Page]) -> None:
+    assert {link for page in site.values() for link in page.loaded if "://" in link} == set()
+
+
+def test_pages_are_read_as_they_are_meant(site: dict[Path, Page]) -> None:
+    for path, page in site.items():
+        assert "](" not in page.text, path  # links were understood as such
+        assert "```" not in page.text, path
+
+
+def test_a_dead_link_and_a_page_without_a_line_in_nav_fail_the_build(tmp_path: Path) -> None:
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs/index.md").write_text("# a\n[b](nothing.md) [c](#nowhere)\n")
+    (tmp_path / "docs/forgotten.md").write_text("# d\n")
+    config = f"INHERIT: {ROOT}/mkdocs.yml\nhooks: []\nnav:\n  - index.md\n"
+    (tmp_path / "mkdocs.yml").write_text(config)
+    done = build(tmp_path / "mkdocs.yml", tmp_path / "site")
+    assert done.returncode != 0
+    for word in ("nothing.md", "#nowhere", "forgotten.md"):
+        assert word in done.stderr
