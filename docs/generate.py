@@ -12,8 +12,13 @@ from docs.cli_reference import cli_reference
 from docs.console import renewed
 from docs.job_reference import job_reference
 from docs.markdown import ROOT, blocks, documents
+from docs.robots_page import robots_page
 
-PAGES = {"docs/job-reference.md": job_reference, "docs/cli-reference.md": cli_reference}
+PAGES = {
+    "docs/job-reference.md": job_reference,
+    "docs/cli-reference.md": cli_reference,
+    "docs/robots.md": robots_page,
+}
 
 
 def shows_commands(document: Path) -> bool:
