@@ -14,6 +14,7 @@ from docs.console import outcome
 from docs.job_reference import job_reference
 from docs.markdown import ROOT, blocks, documents
 from docs.planner_pages import planner_page, planner_table
+from docs.robots_page import robots_page
 from docs.svg_comparison import is_current
 from trajcli.planners import PLANNERS
 
@@ -21,6 +22,7 @@ PAGES = {
     "docs/job-reference.md": job_reference,
     "docs/cli-reference.md": cli_reference,
     "docs/planners.md": planner_table,
+    "docs/robots.md": robots_page,
     **{f"docs/planners/{name}.md": partial(planner_page, name) for name in PLANNERS},
 }
 PICTURES = ROOT / "docs/pictures"

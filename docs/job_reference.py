@@ -13,7 +13,7 @@ from docs.planner_examples import EXAMPLES, LEFT_OUT, NOTES
 from docs.tool_path_reference import tool_path_sections
 from trajcli.columns import GROUPS, Group
 from trajcli.job.model import Job, Output, OutputUnits, UnitsSpec
-from trajcli.job.robot import CATALOGUE, JointModel, RobotModel, catalogue_names
+from trajcli.job.robot import JointModel, RobotModel
 from trajcli.job.yaml.load import read_document
 from trajcli.language.limits import LimitsSpec, Scale, ToolLimitsSpec
 from trajcli.language.numbers import MAX_JOINTS
@@ -70,7 +70,7 @@ duration, times or rates of its own is stretched to them, with an event. All mov
 one along the path; in joint space it is not judged, and the summary says so."""
 
 _ROBOT = f"""\
-Under `robot` stands the name of a robot of the [catalogue](#catalogue), `{{file: PATH}}` (relative to
+Under `robot` stands the name of a robot of the [catalogue](robots.md), `{{file: PATH}}` (relative to
 the job's folder), or the robot itself. `joints: 6` means six bare revolute joints `j1` to `j6`: no
 geometry, no limits, and enough for every move on this page. A robot has 1 to {MAX_JOINTS} joints. A
 robot file holds the same mapping, with its own `units`."""
@@ -177,7 +177,6 @@ def job_reference() -> str:
     parts += ["### Limits of the tool", _TOOL_LIMITS, field_table(ToolLimitsSpec)]
     parts += ["## Robot", _ROBOT, field_table(RobotModel)]
     parts += ["### Joints", _JOINTS, field_table(JointModel), "### Poses", _POSES]
-    parts += ["### Catalogue", _catalogue()]
     parts += ["## Moves", _MOVES.rstrip(), _common_fields()]
     parts += tool_path_sections()
     parts += ["## Planners"]
@@ -242,14 +241,3 @@ def _continuity(planner: type[Planner]) -> str:
 
 def _columns() -> str:
     return table(["group", "columns"], [[f"`{group}`", _MEANINGS[group]] for group in GROUPS])
-
-
-def _catalogue() -> str:
-    rows = []
-    for name in catalogue_names():
-        robot = read_document(str(CATALOGUE / f"{name}.yaml")).plain()
-        count = len(robot["joints"])
-        rows.append(
-            [f"`{name}`", robot["name"], str(count), robot["note"], robot["source"], robot["licence"]]
-        )
-    return table(["name", "robot", "joints", "note", "source", "licence"], rows)

@@ -22,11 +22,12 @@ def test_the_list(arms):
     code, out, err = arms.call("robots")
     head, *lines = out.splitlines()
     assert (code, err) == (0, "")
-    assert head.split() == ["name", "joints", "kind", "reach", "(m)", "units", "source"]
+    assert head.split() == ["name", "joints", "kind", "reach", "(m)", "units", "origin", "robot"]
     assert [line.split()[0] for line in lines] == catalogue_names()
     told = arms.json("robots")
     assert [row["name"] for row in told] == catalogue_names()
-    assert {"name", "title", "joints", "kind", "reach", "units", "source"} == set(told[0])
+    keys = {"name", "title", "joints", "kind", "reach", "units", "source"}
+    assert keys | {"maker", "origin", "date", "limits", "ik", "closed_form"} == set(told[0])
     kinds = {row["name"]: (row["joints"], row["kind"]) for row in told}
     assert kinds["panda"] == (7, "7R")
     assert kinds["stanford"] == (6, "RRPRRR")
@@ -36,7 +37,7 @@ def test_the_list(arms):
 def test_the_list_says_the_units_of_each_file(arms):
     out = arms.call("robots").out
     head, *lines = out.splitlines()
-    start, end = head.index("units"), head.index("source")
+    start, end = head.index("units"), head.index("origin")
     for row, line in zip(arms.json("robots"), lines, strict=True):
         units = yaml.safe_load((CATALOGUE / f"{row['name']}.yaml").read_text("utf-8"))["units"]
         assert line[start:end].strip() == f"{units['angle']}, {units['length']}"
@@ -44,6 +45,39 @@ def test_the_list_says_the_units_of_each_file(arms):
         assert row["units"] == units
     assert {line[start:end].strip() for line in lines} == {"deg, m", "rad, m"}
     assert max(map(len, out.splitlines())) <= 100
+
+
+CHOSEN = [  # by hand from docs/robots.md
+    (["--kind", "7r"], {"fr3", "gen3", "iiwa14", "iiwa7", "panda", "sawyer", "xarm7"}),
+    (["--kind", "RRPR"], {"cobra600", "scara", "sg650"}),
+    (["--kind", "RRRRR", "--maker", "studio"], {"so100", "so101"}),
+    (["--kind", "textbook", "--joints", 2], {"planar2r", "planar2r_equal", "rp"}),
+    (["--kind", "real", "--joints", 4], {"cobra600", "sg650"}),
+    (["--maker", "kuka", "--joints", 7], {"iiwa14", "iiwa7"}),
+    (["--search", "AGILUS"], {"kr3_r540", "kr6_r700", "kr6_r900", "kr10_r1100"}),
+    (["--search", "scorbot"], {"scorbot", "scorbot_er4u"}),
+    (["--joints", 9], set()),
+]
+
+
+@pytest.mark.parametrize(("words", "names"), CHOSEN, ids=[" ".join(map(str, row[0])) for row in CHOSEN])
+def test_chosen_robots(arms, words, names):
+    assert {row["name"] for row in arms.json("robots", *words)} == names
+    code, out, err = arms.call("robots", *words)
+    assert (code, {line.split()[0] for line in out.splitlines()[1:]}) == (0, names)
+    assert ("no robot of the catalogue" in err) == (not names)
+
+
+def test_the_list_says_where_robots_come_from(arms):
+    told = {row["name"]: row for row in arms.json("robots")}
+    assert (told["ur5e"]["maker"], told["ur5e"]["origin"]) == ("Universal Robots", "real")
+    assert (told["elbow"]["maker"], told["elbow"]["origin"]) == (None, "textbook")
+    assert told["panda"]["limits"] == ["position", "velocity", "acceleration", "jerk"]
+    assert told["elbow"]["limits"] == []
+    assert [told[name]["closed_form"] for name in ("ur5e", "iiwa7", "xarm6")] == [True, True, False]
+    card = arms.json("robots", "kr16_2")
+    assert (card["maker"], card["origin"], card["date"]) == ("KUKA", "real", "2026-11")
+    assert "maker: KUKA\norigin: real\n" in arms.call("robots", "kr16_2").out
 
 
 REACH = {  # by hand: stretched arms
@@ -61,7 +95,7 @@ def test_reach(arms):
     assert arms.json("robots", "rrp")["reach"] == {"sampled": None, "bound": None}
 
 
-@pytest.mark.parametrize("name", ["ur5e", "panda", "stanford", "cobra600", "scorbot", "irb120"])
+@pytest.mark.parametrize("name", ["ur5e", "panda", "stanford_scheinman", "cobra600", "scorbot", "irb120"])
 def test_no_configuration_reaches_further(arms, name):
     robot, reach = load_robot(name), arms.json("robots", name)["reach"]
     draws = np.random.default_rng(1)
@@ -138,7 +172,12 @@ def test_a_file_of_the_user(arms, tmp_path):
 
 
 BAD = [
-    (["ur5"], 2, "did you mean 'ur5e'?"),
+    (["ur5ee"], 2, "did you mean 'ur5e'?"),
+    (["--kind", "6S"], 2, "the catalogue has 4R, 5R, 6R, 7R, PPP, "),
+    (["--kind", "txtbook"], 2, "did you mean 'textbook'?"),
+    (["--maker", "kukaa"], 2, "did you mean 'KUKA'?"),
+    (["--joints", "0"], 2, "--joints"),
+    (["ur5e", "--joints", "6"], 2, "ur5e is one robot"),
     (["no.yaml"], 4, "there is no file 'no.yaml'"),
     (["--yaml"], 2, "--yaml prints the file of one robot"),
     (["ur5e", "--yaml", "--json"], 2, "exclude each other"),

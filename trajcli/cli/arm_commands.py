@@ -21,6 +21,7 @@ from trajcli.cli.options import (
     RobotName,
     Si,
     Tool,
+    robot_names,
 )
 from trajcli.cli.outcome import guarded
 
@@ -254,7 +255,27 @@ def pose(
 def robots(
     name: Annotated[
         str | None,
-        typer.Argument(metavar="NAME|FILE", help="One robot, or a job's; without it all are listed."),
+        typer.Argument(
+            metavar="NAME|FILE",
+            help="One robot, or a job's; without it all are listed.",
+            autocompletion=robot_names,
+        ),
+    ] = None,
+    kind: Annotated[
+        str | None,
+        typer.Option(
+            "--kind", metavar="KIND", help="List those with joints such as 6R or RRPR; real; textbook."
+        ),
+    ] = None,
+    joints: Annotated[
+        int | None, typer.Option("--joints", metavar="N", min=1, help="List those with that many joints.")
+    ] = None,
+    maker: Annotated[
+        str | None,
+        typer.Option("--maker", metavar="TEXT", help="List those of a maker; part of the name will do."),
+    ] = None,
+    search: Annotated[
+        str | None, typer.Option("--search", metavar="TEXT", help="List those with this in their names.")
     ] = None,
     as_yaml: Annotated[
         bool, typer.Option("--yaml", help="Print the robot's file, to start a new one from.")
@@ -267,15 +288,23 @@ def robots(
 ) -> int:
     """List the catalogue, or show a robot: DH table, limits, reach, inverse kinematics, source."""
     from trajcli.cli.robots import run_robots
+    from trajcli.queries.robot_card import Selection
 
-    return run_robots(name, as_yaml=as_yaml, as_urdf=as_urdf, as_json=as_json)
+    selection = Selection(kind, joints, maker, search)
+    return run_robots(name, selection, as_yaml=as_yaml, as_urdf=as_urdf, as_json=as_json)
 
 
 @guarded
 def mobility(
     robot: Annotated[
         str | None,
-        typer.Option("--robot", "-r", metavar="NAME|FILE", help="The open chain of a robot, or of a job's."),
+        typer.Option(
+            "--robot",
+            "-r",
+            metavar="NAME|FILE",
+            help="The open chain of a robot, or of a job's.",
+            autocompletion=robot_names,
+        ),
     ] = None,
     links: Annotated[
         int | None, typer.Option("--links", metavar="N", help="Number of links, the frame counted.")

@@ -6,6 +6,15 @@ from typing import Annotated, Literal
 
 import typer
 
+
+def robot_names(incomplete: str) -> list[str]:
+    """Return the names of the catalogue that begin so, for the shell; no robot is read for that."""
+    from pathlib import Path
+
+    folder = Path(__file__).parent.parent / "catalogue"
+    return sorted(path.stem for path in folder.glob("*.yaml") if path.stem.startswith(incomplete))
+
+
 JobFile = Annotated[str, typer.Argument(metavar="JOB", help="The job file; - is standard input.")]
 Overrides = Annotated[
     list[str],
@@ -23,6 +32,7 @@ RobotName = Annotated[
         "-r",
         metavar="NAME|FILE",
         help="A robot of the catalogue, a robot file, or a job: its robot, base and tool.",
+        autocompletion=robot_names,
     ),
 ]
 Tool = Annotated[

@@ -7,18 +7,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from trajcli.cli.numbers import number, numbers, table_lines
-from trajcli.cli.outcome import print_json, print_lines
+from trajcli.cli.outcome import print_json, print_lines, print_remark
 from trajcli.errors import InputError
 from trajcli.job.robot import catalogue_names
 from trajcli.queries.arm import open_sheet
-from trajcli.queries.robot_card import robot_card, robot_row
+from trajcli.queries.robot_card import Selection, robot_card, robot_row, selected
 
-_WIDTH, _SOURCE = 100, 48  # columns of a paragraph, and of a source in the list
+_WIDTH, _CALLED = 100, 35  # columns of a paragraph, and of a robot's own name in the list
 _DH = ("theta", "d", "a", "alpha", "beta")
 _LIMITS = ("position", "velocity", "acceleration", "jerk")
 
 
-def run_robots(name: str | None, *, as_yaml: bool, as_urdf: bool, as_json: bool) -> int:
+def run_robots(name: str | None, selection: Selection, *, as_yaml: bool, as_urdf: bool, as_json: bool) -> int:
     """Print the catalogue, or what there is to say about one robot; return the exit code.
 
     Raises:
@@ -27,12 +27,11 @@ def run_robots(name: str | None, *, as_yaml: bool, as_urdf: bool, as_json: bool)
     """
     _check_forms(name, {"--yaml": as_yaml, "--urdf": as_urdf, "--json": as_json})
     if name is None:
-        rows = [robot_row(each, open_sheet(each)) for each in catalogue_names()]
-        if as_json:
-            print_json(rows)
-        else:
-            print_lines(_list_lines(rows))
-        return 0
+        return _print_list(selection, as_json=as_json)
+    if selection != Selection():
+        raise InputError(
+            f"--kind, --joints, --maker and --search choose from the list, and {name} is one robot"
+        )
     sheet = open_sheet(name)
     if as_yaml:
         if sheet.text is None:
@@ -60,8 +59,21 @@ def _check_forms(name: str | None, forms: Mapping[str, bool]) -> None:
         raise InputError(f"{asked[0]} prints the file of one robot", hint=hint)
 
 
+def _print_list(selection: Selection, *, as_json: bool) -> int:
+    """Print the robots of the catalogue that are selected."""
+    sheets = selected(((each, open_sheet(each)) for each in catalogue_names()), selection)
+    rows = [robot_row(*each) for each in sheets]
+    if as_json:
+        print_json(rows)
+    elif rows:
+        print_lines(_list_lines(rows))
+    else:
+        print_remark("no robot of the catalogue is like that; `trajcli robots` lists all")
+    return 0
+
+
 def _list_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    head = ["name", "joints", "kind", "reach (m)", "units", "source"]
+    head = ["name", "joints", "kind", "reach (m)", "units", "origin", "robot"]
     cells = [
         [
             row["name"],
@@ -69,16 +81,23 @@ def _list_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
             row["kind"],
             "unlimited" if row["reach"] is None else f"{row['reach']:.3f}",
             f"{row['units']['angle']}, {row['units']['length']}",
-            textwrap.shorten(row["source"] or "-", _SOURCE, placeholder=" ..."),
+            row["origin"] or "-",
+            textwrap.shorten(_called(row), _CALLED, placeholder=" ..."),
         ]
         for row in rows
     ]
     yield from table_lines([head, *cells], "")
 
 
+def _called(row: Mapping[str, Any]) -> str:
+    """Return the maker and the name of a robot, the maker only once."""
+    maker, title = row["maker"] or "", str(row["title"])
+    return title if title.startswith(maker) else f"{maker} {title}"
+
+
 def _card_lines(card: Mapping[str, Any]) -> Iterator[str]:
     yield f"{card['title']}: {card['kind']}"
-    for key in ("source", "licence", "note"):
+    for key in ("maker", "origin", "source", "date", "licence", "note"):
         if card[key]:
             yield from textwrap.wrap(f"{key}: {card[key]}", _WIDTH, subsequent_indent="  ")
     angle, length = card["units"]["angle"], card["units"]["length"]

@@ -108,6 +108,12 @@ class RobotModel(Model):
     source: Annotated[str | None, Field(description="Where the numbers come from.")] = None
     licence: Annotated[str | None, Field(description="Licence of the source.")] = None
     note: Annotated[str | None, Field(description="What a user should know about the numbers.")] = None
+    maker: Annotated[str | None, Field(description="Who builds the robot.")] = None
+    origin: Annotated[
+        Literal["real", "textbook"] | None,
+        Field(description="A robot that is built, or an example of a text."),
+    ] = None
+    date: Annotated[str | None, Field(description="When the source was read, such as 2026-11.")] = None
     convention: Annotated[
         Literal["standard", "modified"] | None,
         Field(description="Whose DH rows the joints are; modified: a and alpha belong to the link before."),
@@ -192,6 +198,9 @@ class RobotSheet:
         licence: Of the source.
         note: What a user should know about the numbers.
         text: The file as it stands; None where the robot is that of a job.
+        maker: Who builds the robot.
+        origin: Whether it is built (real) or stands in a text (textbook).
+        date: When the source was read.
     """
 
     robot: Robot
@@ -200,6 +209,9 @@ class RobotSheet:
     licence: str | None
     note: str | None
     text: str | None
+    maker: str | None = None
+    origin: str | None = None
+    date: str | None = None
 
 
 def catalogue_names() -> list[str]:
@@ -287,7 +299,8 @@ def read_sheet(path: str) -> RobotSheet:
     )
     model = _validated({"name": utf8(Path(path).stem), **plain}, document, (), units)
     text = "\n".join(document.lines)
-    return RobotSheet(model.as_robot(), units, model.source, model.licence, model.note, text)
+    said = (model.source, model.licence, model.note, text, model.maker, model.origin, model.date)
+    return RobotSheet(model.as_robot(), units, *said)
 
 
 def _no_robot(value: object, document: Document) -> Problem:

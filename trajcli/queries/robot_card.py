@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from trajcli.curves.piecewise import Array
+from trajcli.errors import InputError
 from trajcli.frozen import comparable
 from trajcli.job.robot import RobotSheet
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.families.choose import method_for
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.queries.pose import pose_view
+from trajcli.suggest import did_you_mean
 from trajcli.units import Quantity, factor, joint_quantity, to_user
 
 # Measured: within 2e-4 of what ten times as many draws find, for every robot of the catalogue.
@@ -70,20 +73,95 @@ def _furthest(robot: Robot, ranges: Array) -> float:
     return float(np.linalg.norm(forward(robot, best)[:, :3, 3] - robot.base[:3, 3], axis=1).max())
 
 
-def robot_row(name: str, sheet: RobotSheet) -> dict[str, Any]:
-    """Return {name, title, joints, kind, reach, units, source} of a robot.
+@comparable
+class Selection:
+    """Which robots of the catalogue are meant; what is None chooses nothing.
 
-    The reach is in m, null where unlimited; `units` are those of the robot's file.
+    Attributes:
+        kind: The joints from the base on, such as "6R" or "RRPR", or an origin: "real", "textbook".
+        joints: How many there are.
+        maker: Part of the maker's name, in letters of any case.
+        text: Part of the name in the catalogue or of the robot's own name, in letters of any case.
     """
-    reach = reach_of(sheet.robot)
+
+    kind: str | None = None
+    joints: int | None = None
+    maker: str | None = None
+    text: str | None = None
+
+
+ORIGINS = ("real", "textbook")
+
+
+def selected(sheets: Iterable[tuple[str, RobotSheet]], selection: Selection) -> list[tuple[str, RobotSheet]]:
+    """Return the robots that a selection means, by their names in the catalogue.
+
+    Raises:
+        InputError: When no robot has that kind, or no maker that name.
+    """
+    everyone = list(sheets)
+    _check_selection([sheet for _, sheet in everyone], selection)
+    return [(name, sheet) for name, sheet in everyone if _is_selected(name, sheet, selection)]
+
+
+def _check_selection(sheets: list[RobotSheet], selection: Selection) -> None:
+    """Refuse a kind and a maker that no robot has."""
+    kinds = sorted({kind_of(sheet.robot) for sheet in sheets}) + list(ORIGINS)
+    if selection.kind is not None and _letters(selection.kind) not in map(_letters, kinds):
+        hint = did_you_mean(selection.kind, kinds) or f"the catalogue has {', '.join(kinds)}"
+        raise InputError(f"the catalogue has no robot of the kind '{selection.kind}'", hint=hint)
+    makers = sorted({sheet.maker for sheet in sheets if sheet.maker})
+    part = (selection.maker or "").casefold()
+    if not any(part in maker.casefold() for maker in makers):
+        hint = did_you_mean(part, makers) or f"makers are {', '.join(makers)}"
+        raise InputError(f"the catalogue has no robot of a maker '{selection.maker}'", hint=hint)
+
+
+def _is_selected(name: str, sheet: RobotSheet, selection: Selection) -> bool:
+    kinds = (_letters(kind_of(sheet.robot)), sheet.origin)
+    return (
+        (selection.kind is None or _letters(selection.kind) in kinds)
+        and (selection.joints is None or len(sheet.robot.joints) == selection.joints)
+        and (not selection.maker or selection.maker.casefold() in (sheet.maker or "").casefold())
+        and (selection.text or "").casefold() in f"{name}\n{sheet.robot.name}".casefold()
+    )
+
+
+def _letters(kind: str) -> str:
+    """Return a kind letter by letter: "6r" as "RRRRRR"; any other word in small letters."""
+    count, letter = kind[:-1], kind[-1:].upper()
+    if count.isascii() and count.isdigit() and len(count) <= 2 and letter in ("R", "P"):
+        return letter * int(count)
+    return kind.upper() if kind and set(kind.upper()) <= {"R", "P"} else kind.casefold()
+
+
+def robot_row(name: str, sheet: RobotSheet) -> dict[str, Any]:
+    """Return what a list says of a robot.
+
+    The reach is in m, null where unlimited; `units` are those of the robot's file; `limits` are the
+    quantities that are limited for some joint; `ik` is the method, `closed_form` whether it is no search.
+    """
+    robot, reach = sheet.robot, reach_of(sheet.robot)
+    limited = [
+        quantity
+        for order, quantity in enumerate(QUANTITIES)
+        if np.isfinite(robot.limits.of_order(order)).any()
+    ]
+    method = None if robot.convention is None else method_for(robot)
     return {
         "name": name,
-        "title": sheet.robot.name,
-        "joints": len(sheet.robot.joints),
-        "kind": kind_of(sheet.robot),
+        "title": robot.name,
+        "joints": len(robot.joints),
+        "kind": kind_of(robot),
         "reach": None if reach is None else _finite(reach.sampled),
         "units": asdict(sheet.units),
+        "maker": sheet.maker,
+        "origin": sheet.origin,
+        "limits": limited,
+        "ik": method and method.name,
+        "closed_form": method and method.family != "numeric",
         "source": sheet.source,
+        "date": sheet.date,
     }
 
 
@@ -95,7 +173,10 @@ def robot_card(name: str, sheet: RobotSheet) -> dict[str, Any]:
         "name": name,
         "title": robot.name,
         "kind": kind_of(robot),
+        "maker": sheet.maker,
+        "origin": sheet.origin,
         "source": sheet.source,
+        "date": sheet.date,
         "licence": sheet.licence,
         "note": sheet.note,
         "units": asdict(units),

@@ -1,0 +1,69 @@
+"""Completion in the shell: what the script of `--install-completion` asks for, and what it gets.
+
+Oracle: the files of the catalogue.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from trajcli.job.robot import catalogue_names
+
+
+def completed(*words: str) -> list[str]:
+    """Return what bash is offered for the last word."""
+    asked = {
+        "_TRAJCLI_COMPLETE": "complete_bash",
+        "COMP_WORDS": " ".join(words),
+        "COMP_CWORD": str(len(words) - 1),
+    }
+    command = [str(Path(sys.executable).with_name("trajcli"))]
+    done = subprocess.run(command, env=os.environ | asked, capture_output=True, text=True, check=True)
+    assert done.stderr == ""
+    return done.stdout.split()
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("robots",),
+        ("fk", "--robot"),
+        ("ik", "-r"),
+        ("jacobian", "--robot"),
+        ("mobility", "--robot"),
+    ],
+    ids=" ".join,
+)
+def test_names_of_robots_complete(words: tuple[str, ...]) -> None:
+    beginning = {name for name in catalogue_names() if name.startswith("ur")}
+    assert len(beginning) > 5
+    assert set(completed("trajcli", *words, "ur")) == beginning
+    assert completed("trajcli", *words, "kr16") == ["kr16_2"]
+    assert completed("trajcli", *words, "no_such") == []
+
+
+def test_commands_complete() -> None:
+    assert completed("trajcli", "rob") == ["robots"]
+
+
+def test_completion_is_installed(tmp_path: Path) -> None:
+    command = [str(Path(sys.executable).with_name("trajcli")), "--install-completion", "bash"]
+    done = subprocess.run(
+        command, env=os.environ | {"HOME": str(tmp_path)}, capture_output=True, text=True, check=True
+    )
+    assert "completion installed" in done.stdout
+    assert "_TRAJCLI_COMPLETE=complete_bash" in (tmp_path / ".bash_completions/trajcli.sh").read_text("utf-8")
+
+
+def test_completion_reads_no_robot() -> None:
+    code = (
+        "import sys; from trajcli.cli.options import robot_names; names = robot_names('ur5');"
+        "print(*names, 'pydantic' in sys.modules and 'trajcli.job.robot' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["ur5", "ur5e", "False"]
