@@ -22,6 +22,7 @@ BENCHMARKS = (
     "reading",
     "evaluation",
     "forward_kinematics",
+    "urdf",
     "inverse_kinematics",
     "time_optimal",
     "through_points",
