@@ -23,6 +23,7 @@ BENCHMARKS = (
     "reading",
     "evaluation",
     "forward_kinematics",
+    "urdf",
     "inverse_kinematics",
     "time_optimal",
     "through_points",

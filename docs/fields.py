@@ -12,6 +12,7 @@ from pydantic.fields import FieldInfo
 from docs.markdown import first_sentence, table
 from trajcli.job.model import Output, OutputUnits, RobotSource, UnitsSpec
 from trajcli.job.robot import JointModel
+from trajcli.language.dynamics import EffortBound, FrictionSpec, LinkSpec
 from trajcli.language.limits import (
     UNLIMITED,
     Bounds,
@@ -50,6 +51,8 @@ SECTIONS: dict[type, str] = {
     Output: "[output](#output)",
     OutputUnits: "[units of the columns](#units-of-the-columns)",
     JointModel: "[joint](#joints)",
+    FrictionSpec: "[friction](#friction)",
+    LinkSpec: "[link](#link)",
     AxisAngleSpec: "[axis and angle](#axis-and-angle)",
     EulerSpec: "[Euler angles](#euler-angles)",
     Configuration: "[configuration](#configuration)",
@@ -123,6 +126,7 @@ def _reader_form(reader: FieldType) -> str:
         Direction: "`x` or `y` or `z` or a list of 3 numbers",
         Matrix: "3 rows of 3 numbers, or 4 of 4",
         JointBound: "[bound](#bounds)",
+        EffortBound: "[bound](#bounds), N m or N",
         Pose: "[pose](#poses)",
         RobotSource: "[robot](#robot)",
         JointDistance: f"number at least 0, {_BY_JOINT}",

@@ -15,6 +15,7 @@ from trajcli.columns import GROUPS, Group
 from trajcli.job.model import Job, Output, OutputUnits, UnitsSpec
 from trajcli.job.robot import JointModel, RobotModel
 from trajcli.job.yaml.load import read_document
+from trajcli.language.dynamics import FrictionSpec, LinkSpec
 from trajcli.language.limits import LimitsSpec, Scale, ToolLimitsSpec
 from trajcli.language.numbers import MAX_JOINTS
 from trajcli.language.poses import SEQUENCES
@@ -70,15 +71,24 @@ duration, times or rates of its own is stretched to them, with an event. All mov
 one along the path; in joint space it is not judged, and the summary says so."""
 
 _ROBOT = f"""\
-Under `robot` stands the name of a robot of the [catalogue](robots.md), `{{file: PATH}}` (relative to
-the job's folder), or the robot itself. `joints: 6` means six bare revolute joints `j1` to `j6`: no
-geometry, no limits, and enough for every move on this page. A robot has 1 to {MAX_JOINTS} joints. A
-robot file holds the same mapping, with its own `units`."""
+Under `robot` stands the name of a robot of the [catalogue](robots.md), `{{file: PATH}}` or
+`{{urdf: PATH}}` (relative to the job's folder), or the robot itself. Beside `urdf` may stand `root` and
+`tip`, the links between which the chain is taken, and `exact: true`, which keeps angles near right ones as
+they are: see [Bring your arm in](urdf.md).
+
+`joints: 6` means six bare revolute joints `j1` to `j6`: no geometry, no limits, and enough for every move on
+this page. A robot has 1 to {MAX_JOINTS} joints. A robot file holds the same mapping, with its own `units`."""
 
 _JOINTS = """\
 With standard rows the pose of a link is Rz(theta) Tz(d) Tx(a) Rx(alpha); with modified rows it is
 Rx(alpha) Tx(a) Rz(theta) Tz(d). The joint's value q is added: theta + sign q for a revolute joint, d +
 sign q for a prismatic one."""
+
+_DYNAMICS = """\
+Effort, friction, rotor and link are read, checked and kept: `trajcli urdf` and `--resolved` write them.
+Nothing is planned or judged by them yet. They are in SI whatever the units of the file, but for the centre of
+mass, which is a length. An inertia that no solid has is refused: a mass not above zero, a principal moment
+below zero, or one above the sum of the two others."""
 
 _POSES = f"""\
 A pose is a mapping with a position `xyz: [x, y, z]` and at most one orientation; what it leaves out is
@@ -176,7 +186,10 @@ def job_reference() -> str:
     parts += ["### Scale", first_sentence(Scale.__doc__), field_table(Scale), "### Bounds", _BOUNDS]
     parts += ["### Limits of the tool", _TOOL_LIMITS, field_table(ToolLimitsSpec)]
     parts += ["## Robot", _ROBOT, field_table(RobotModel)]
-    parts += ["### Joints", _JOINTS, field_table(JointModel), "### Poses", _POSES]
+    parts += ["### Joints", _JOINTS, field_table(JointModel)]
+    parts += ["### Dynamics of a joint", _DYNAMICS]
+    parts += ["#### Friction", field_table(FrictionSpec), "#### Link", field_table(LinkSpec)]
+    parts += ["### Poses", _POSES]
     parts += ["## Moves", _MOVES.rstrip(), _common_fields()]
     parts += tool_path_sections()
     parts += ["## Planners"]

@@ -178,6 +178,8 @@ def test_every_planner_has_its_section_with_every_field(tag: str) -> None:
         ("### Arcs", "ArcFields"),
         ("## Robot", "RobotModel"),
         ("### Joints", "JointModel"),
+        ("#### Friction", "FrictionSpec"),
+        ("#### Link", "LinkSpec"),
         ("## Output", "Output"),
         ("### Units of the columns", "OutputUnits"),
     ],
@@ -198,7 +200,7 @@ def test_every_definition_of_the_schema_is_looked_at() -> None:
         "Output",
         "OutputUnits",
     }
-    known |= {"AxisAngleSpec", "EulerSpec", "Configuration", "Waypoint"}
+    known |= {"FrictionSpec", "LinkSpec", "AxisAngleSpec", "EulerSpec", "Configuration", "Waypoint"}
     known |= {"RelativeTarget", "RelativeWaypoint"}  # described in words
     known |= {"ToolLimitsSpec", "LawSpec", "ToleranceSpec", "Segment", "ArcFields"}
     others = {name for name, definition in SCHEMA["$defs"].items() if "properties" in definition} - known

@@ -174,7 +174,7 @@ def plan(job: str | Path | Mapping[str, Any] | LoadedJob, *, overrides: Sequence
 
 
 def load_robot(name: str | Path) -> Arm:
-    """Return a robot of the catalogue by its name, or of a robot file by its path.
+    """Return a robot of the catalogue by its name, or of a robot file or a URDF by its path.
 
     Raises:
         InputError: When the catalogue has no such robot, or with every flaw of the file.

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from trajcli.errors import FileError, InputError
+from trajcli.job.dump import dump_job
 from trajcli.job.read import LoadedJob, job_from_text, load_job
+from trajcli.kinematics.robot import Friction, LinkInertia
 from trajcli.planners.point_to_point.point_to_point import Hold
 from trajcli.planners.point_to_point.polynomial import Quintic
 from trajcli.planners.point_to_point.trapezoid import Trapezoid
@@ -235,3 +238,58 @@ def test_poses_in_every_form(form: str) -> None:
     expected = [[0, -1, 0, 0.001], [1, 0, 0, 0.002], [0, 0, 1, 0.003], [0, 0, 0, 1]]
     assert robot.tool == pytest.approx(np.array(expected), abs=1e-15)
     assert np.array_equal(robot.base, np.eye(4))
+
+
+DYNAMIC = """\
+version: 1
+units: {angle: deg, length: mm}
+robot:
+  joints:
+    - {effort: 30, friction: {coulomb: 1.5, viscous: 0.25}, rotor: 0.1,
+       link: {mass: 2, com: [10, 0, -5], inertia: [1, 2, 2.5, 0.1, 0, 0]}}
+    - {effort: [-5, 7]}
+    - {effort: null}
+start: {joints: 0}
+moves: [{planner: hold, duration: 1}]
+"""
+
+
+def test_dynamics_of_joints_are_in_si_but_for_the_centre_of_mass() -> None:
+    first, second, third = job_from_text(DYNAMIC).robot.joints
+    assert first.effort == (-30, 30)
+    assert first.friction == Friction(1.5, 0.25)
+    assert first.rotor == 0.1
+    assert first.link == LinkInertia(2.0, (0.01, 0.0, -0.005), (1, 2, 2.5, 0.1, 0, 0))
+    assert second.effort == (-5, 7)
+    assert third.effort == (-math.inf, math.inf)
+    assert third.friction == Friction()
+    assert third.link is None
+    again = job_from_text(dump_job(job_from_text(DYNAMIC)))
+    assert again.robot.joints == (first, second, third)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("mass: 2,", "mass: 0,", "expected a number above 0, got 0"),
+        ("mass: 2,", "mass: -1,", "expected a number above 0, got -1"),
+        ("mass: 2, ", "", "`mass` is missing"),
+        ("[1, 2, 2.5, 0.1, 0, 0]", "[1, 2, -0.1, 0, 0, 0]", "no solid has a negative moment of inertia"),
+        ("[1, 2, 2.5, 0.1, 0, 0]", "[1, 1, 1, 2, 0, 0]", "no solid has a negative moment of inertia"),
+        ("[1, 2, 2.5, 0.1, 0, 0]", "[1, 2, 3.1, 0, 0, 0]", "above the sum of the two others"),
+        ("[1, 2, 2.5, 0.1, 0, 0]", "[1, 2, 3]", "expected 6 numbers, got 3 values"),
+        ("com: [10, 0, -5]", "com: 3", "expected 3 numbers, got 3"),
+        ("coulomb: 1.5", "coulomb: -1", "expected a number at least 0, got -1"),
+        ("rotor: 0.1", "rotor: -0.1", "expected a number at least 0, got -0.1"),
+        ("effort: 30", "effort: 0", "expected a number above 0 (N m or N)"),
+        ("[-5, 7]", "[5, 7]", "got [5, 7]"),
+        ("[-5, 7]", "[-5, 6, 7]", "got [-5, 6, 7]"),
+    ],
+)
+def test_impossible_dynamics_are_refused(old: str, new: str, message: str) -> None:
+    assert old in DYNAMIC
+    with pytest.raises(InputError, match=re.escape(message)) as refused:
+        job_from_text(DYNAMIC.replace(old, new))
+    place = refused.value.problems[0].place
+    assert place is not None
+    assert place.line in (5, 6, 7)

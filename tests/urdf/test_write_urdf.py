@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import subprocess
 import sys
-import xml.etree.ElementTree as ET
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from independent_reader import ReadBack
 from scipy.spatial.transform import Rotation
 
 from trajcli.errors import InputError
@@ -18,38 +18,6 @@ from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import Joint, Limits, Robot, unlimited
 from trajcli.urdf.chain import chain_of
 from trajcli.urdf.write import UNLIMITED, urdf_of
-
-
-class ReadBack:
-    """What a reader of URDF that knows nothing of DH tables makes of a text."""
-
-    def __init__(self, text: str) -> None:
-        self.root = ET.fromstring(text)
-        self.by_child = {joint.find("child").get("link"): joint for joint in self.root.iter("joint")}
-        self.links = [link.get("name") for link in self.root.iter("link")]
-        self.moving = {j.get("name"): j for j in self.root.iter("joint") if j.get("type") != "fixed"}
-
-    def pose(self, element: ET.Element) -> np.ndarray:
-        matrix = np.eye(4)
-        origin = element.find("origin")
-        matrix[:3, 3] = [float(value) for value in origin.get("xyz").split()]
-        r, p, y = (float(value) for value in origin.get("rpy").split())
-        matrix[:3, :3] = Rotation.from_euler("xyz", [r, p, y]).as_matrix()  # lower case: about fixed axes
-        return matrix
-
-    def forward(self, values: dict[str, float], link: str = "tool0") -> np.ndarray:
-        if link not in self.by_child:
-            return np.eye(4)
-        joint = self.by_child[link]
-        moved = np.eye(4)
-        if joint.get("type") != "fixed":
-            axis = np.array([float(value) for value in joint.find("axis").get("xyz").split()])
-            value = values[joint.get("name")]
-            if joint.get("type") == "prismatic":
-                moved[:3, 3] = axis * value
-            else:
-                moved[:3, :3] = Rotation.from_rotvec(axis * value).as_matrix()
-        return self.forward(values, joint.find("parent").get("link")) @ self.pose(joint) @ moved
 
 
 def random_values(robot: Robot, seed: int, count: int = 20) -> np.ndarray:

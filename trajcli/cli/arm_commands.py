@@ -96,10 +96,11 @@ def sorted_words(args: list[str], takes: Mapping[str, int]) -> list[str]:
 
 
 def register(app: typer.Typer) -> None:
-    """Add the commands fk, ik, jacobian, pose, robots and mobility."""
+    """Add the commands fk, ik, jacobian, pose, robots, urdf and mobility."""
     for command in (fk, ik, jacobian, pose):
         app.command(cls=NumbersCommand, epilog=f"Example: {_EXAMPLES[command.__name__]}")(command)
     app.command(epilog="Example: trajcli robots ur5e")(robots)
+    app.command(epilog="Example: trajcli urdf arm.urdf -o robot.yaml")(urdf)
     app.command(epilog="Example: trajcli mobility --links 4 --joints 1x4 --space planar")(mobility)
 
 
@@ -292,6 +293,37 @@ def robots(
 
     selection = Selection(kind, joints, maker, search)
     return run_robots(name, selection, as_yaml=as_yaml, as_urdf=as_urdf, as_json=as_json)
+
+
+@guarded
+def urdf(
+    file: Annotated[str, typer.Argument(metavar="FILE", help="The URDF; - is standard input.")],
+    root: Annotated[
+        str | None,
+        typer.Option("--root", metavar="LINK", help="Where the chain begins; else the outermost link."),
+    ] = None,
+    tip: Annotated[
+        str | None,
+        typer.Option(
+            "--tip", metavar="LINK", help="Where it ends, the tcp; else the longest chain without a gripper."
+        ),
+    ] = None,
+    exact: Annotated[
+        bool, typer.Option("--exact", help="Keep angles within 1e-3 rad of right angles as they are.")
+    ] = False,
+    soft: Annotated[
+        bool, typer.Option("--soft", help="Tighten ranges to the soft limits of <safety_controller>.")
+    ] = False,
+    output: Annotated[
+        str | None,
+        typer.Option("--output", "-o", metavar="FILE", help="Write the robot file instead of printing it."),
+    ] = None,
+    errors: Errors = "text",
+) -> int:
+    """Make a robot file of a URDF: DH table, base, tool, limits, inertias. What was decided is on stderr."""
+    from trajcli.cli.urdf import UrdfOptions, run_urdf
+
+    return run_urdf(file, UrdfOptions(root, tip, exact, soft, output))
 
 
 @guarded

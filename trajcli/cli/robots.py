@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from trajcli.cli.numbers import number, numbers, table_lines
 from trajcli.cli.outcome import print_json, print_lines, print_remark
 from trajcli.errors import InputError
-from trajcli.job.robot import catalogue_names
+from trajcli.job.robot import catalogue_names, is_urdf
 from trajcli.queries.arm import open_sheet
 from trajcli.queries.robot_card import Selection, robot_card, robot_row, selected
 
@@ -34,6 +35,10 @@ def run_robots(name: str | None, selection: Selection, *, as_yaml: bool, as_urdf
         )
     sheet = open_sheet(name)
     if as_yaml:
+        if sheet.text is None and is_urdf(name):
+            from trajcli.job.dump import dump_robot
+
+            sheet = replace(sheet, text=dump_robot(sheet))
         if sheet.text is None:
             hint = f"`trajcli plan {name} --no-output --resolved FILE` writes the job with its robot"
             raise InputError(f"{name} is a job, and no robot file", hint=hint)

@@ -19,7 +19,7 @@ import numpy as np
 
 from trajcli.errors import InputError
 from trajcli.job.read import LoadedJob
-from trajcli.job.robot import robot_as_mapping
+from trajcli.job.robot import RobotSheet, robot_as_mapping
 from trajcli.kinematics.robot import Robot
 from trajcli.language.limits import ToolLimitsSpec
 from trajcli.language.numbers import ReadingContext
@@ -53,6 +53,18 @@ def dump_job(loaded: LoadedJob) -> str:
     if job.output.times is not None:
         ordered["output"].pop("rate")
     return "\n".join(_block(_without_empty(ordered))) + "\n"
+
+
+def dump_robot(sheet: RobotSheet) -> str:
+    """Return a robot as a robot file in rad and m, which reads as the same robot bit by bit.
+
+    Limits of the tool are not part of it: they belong to jobs.
+    """
+    written = robot_as_mapping(sheet.robot, plain=True)
+    beside = {key: getattr(sheet, key) for key in ("source", "licence", "note")}
+    head = {"name": written.pop("name"), "units": {"angle": "rad", "length": "m"}}
+    given = {key: text for key, text in beside.items() if text is not None}
+    return "\n".join(_block({**head, **given, **written})) + "\n"
 
 
 def mapping_text(mapping: Mapping[str, Any]) -> str:

@@ -64,7 +64,7 @@ class UnitsSpec(Model):
 class RobotSource(FieldType):
     """A robot, with which the loader has replaced what names it."""
 
-    description: str = "Name of a catalogue robot, {file: PATH}, or the robot itself."
+    description: str = "Name of a catalogue robot, {file: PATH}, {urdf: PATH}, or the robot itself."
 
     def read(self, value: Any, context: ReadingContext) -> Robot:  # noqa: ANN401
         """Return the robot."""
@@ -73,10 +73,21 @@ class RobotSource(FieldType):
         raise FlawError(f"expected a robot, got {shown(value)}")
 
     def json_schema(self) -> JsonSchemaValue:
-        """Return the schema of the three forms."""
-        file = {"type": "object", "properties": {"file": {"type": "string"}}, "required": ["file"]}
+        """Return the schema of the four forms."""
+        file = {"file": {"type": "string", "description": "A robot file or a URDF, relative to the job."}}
+        urdf = {
+            "urdf": {"type": "string", "description": "A URDF, relative to the job."},
+            "root": {"type": "string", "description": "Link where the chain begins; else the outermost."},
+            "tip": {"type": "string", "description": "Link where the chain ends: the tcp; else chosen."},
+            "exact": {"type": "boolean", "description": "Keep angles near right ones as they are."},
+        }
         inline = {"$comment": ROBOT_DEFINITION}
-        return {"anyOf": [{"$comment": CATALOGUE_NAME}, {**file, "additionalProperties": False}, inline]}
+        return {"anyOf": [{"$comment": CATALOGUE_NAME}, _keys(file, "file"), _keys(urdf, "urdf"), inline]}
+
+
+def _keys(properties: JsonSchemaValue, needed: str) -> JsonSchemaValue:
+    shape = {"type": "object", "properties": properties, "required": [needed]}
+    return {**shape, "additionalProperties": False}
 
 
 class _FirstRow:

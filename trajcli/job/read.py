@@ -17,7 +17,7 @@ from trajcli.frozen import frozen
 from trajcli.job.limits import looser_bounds, looser_problem, looser_tool_bounds, with_job_limits
 from trajcli.job.messages import problems_of
 from trajcli.job.model import Job, UnitsSpec
-from trajcli.job.robot import find_robot
+from trajcli.job.robot import RobotSheet, find_sheet
 from trajcli.job.yaml.document import Node
 from trajcli.job.yaml.load import Document, parse_document, read_document
 from trajcli.kinematics.robot import Robot, unlimited
@@ -129,8 +129,9 @@ def files_of(document: Document) -> Iterator[tuple[str, str]]:
     folder = Path() if standard else Path(document.file).parent
     root = document.plain()
     robot, moves = root.get("robot"), root.get("moves")
-    if isinstance(robot, Mapping) and isinstance(robot.get("file"), str):
-        yield "the robot's file", str(folder / robot["file"])
+    for key in ("file", "urdf"):
+        if isinstance(robot, Mapping) and isinstance(robot.get(key), str):
+            yield "the robot's file", str(folder / robot[key])
     for move in moves if isinstance(moves, list) else []:
         through = move.get("through") if isinstance(move, Mapping) else None
         if isinstance(through, Mapping) and isinstance(through.get("csv"), str):
@@ -141,12 +142,13 @@ def _load(document: Document) -> LoadedJob:
     plain = dict(document.plain())
     units = _units(plain.get("units"))
     problems: list[Problem] = []
-    robot: Robot | None = None
+    sheet: RobotSheet | None = None
     if "robot" in plain:
         try:
-            robot = find_robot(plain["robot"], document, units)
+            sheet = find_sheet(plain["robot"], document, units)
         except InputError as error:
             problems += error.problems
+    robot = None if sheet is None else sheet.robot
     given = {"robot": robot or _UNREAD} if "robot" in plain else {}
     context = ReadingContext(units, points=_points(plain.get("points")))
     if robot is not None:
@@ -161,6 +163,8 @@ def _load(document: Document) -> LoadedJob:
     mounted = {key: pose for key in ("base", "tool") if (pose := getattr(job, key)) is not None}
     effective, events = with_job_limits(replace(robot, **mounted), job.limits)
     name = job.name or ("stdin" if document.file in ("-", "<stdin>") else utf8(Path(document.file).stem))
+    if sheet is not None and sheet.concession is not None:
+        events = [Event("angles_snapped", sheet.concession), *events]
     loaded = LoadedJob(job, name, effective, document, tuple(events))
     flaws = [*_loosened_by_moves(loaded), *_loosened_tool_limits(loaded), *_columns_without_geometry(loaded)]
     if flaws:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import (
@@ -18,13 +18,14 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
-from trajcli.errors import FileError, InputError, Problem, utf8
+from trajcli.errors import FileError, InputError, Place, Problem, utf8
 from trajcli.frozen import frozen
 from trajcli.job.messages import problems_of
 from trajcli.job.model import UnitsSpec
 from trajcli.job.yaml.load import Document, read_document
 from trajcli.kinematics.robot import QUANTITIES, Joint, Limits, Robot
-from trajcli.language.limits import UNLIMITED, JointBound, LowerUpper, written_bound
+from trajcli.language.dynamics import EffortBound, FrictionSpec, LinkSpec, written_dynamics
+from trajcli.language.limits import UNLIMITED, JointBound, LowerUpper
 from trajcli.language.numbers import (
     MAX_JOINTS,
     Model,
@@ -38,8 +39,12 @@ from trajcli.language.poses import Pose
 from trajcli.suggest import did_you_mean, nearest, nearest_names
 from trajcli.units import Quantity, Units, joint_quantity
 
+if TYPE_CHECKING:
+    from trajcli.urdf.robot import UrdfRobot
+
 CATALOGUE = Path(__file__).parent.parent / "catalogue"
 
+_URDF_ENDINGS = (".urdf", ".xacro", ".xml")
 _ANGLE, _LENGTH = Quantity("angle"), Quantity("length")
 _DH = {"theta": _ANGLE, "d": _LENGTH, "a": _LENGTH, "alpha": _ANGLE, "beta": _ANGLE}
 
@@ -66,6 +71,21 @@ class JointModel(Model):
         UNLIMITED
     )
     jerk: Annotated[LowerUpper, JointBound(3, "Jerk limit, or [lower, upper], per s^3.")] = UNLIMITED
+    effort: Annotated[
+        LowerUpper, EffortBound("Torque or force limit, or [lower, upper], N m or N; kept, not yet judged.")
+    ] = UNLIMITED
+    friction: Annotated[FrictionSpec, Field(description="Friction; kept, not yet used.")] = FrictionSpec()
+    rotor: Annotated[
+        float,
+        Number(
+            Quantity("ratio"),
+            "Motor's inertia reflected to the joint, kg m^2; kept, not yet used.",
+            at_least=0.0,
+        ),
+    ] = 0.0
+    link: Annotated[
+        LinkSpec | None, Field(description="Mass and inertia of the link behind; kept, not yet used.")
+    ] = None
 
     @model_validator(mode="before")
     @classmethod
@@ -154,7 +174,20 @@ class RobotModel(Model):
     def as_robot(self) -> Robot:
         """Return the robot that this describes."""
         joints = tuple(
-            Joint(name, m.type, m.theta, m.d, m.a, m.alpha, m.sign, m.beta)
+            Joint(
+                name,
+                m.type,
+                m.theta,
+                m.d,
+                m.a,
+                m.alpha,
+                m.sign,
+                m.beta,
+                m.effort,
+                m.friction.as_friction(),
+                m.rotor,
+                None if m.link is None else m.link.as_inertia(),
+            )
             for name, m in zip(self.joint_names(), self.joints, strict=True)
         )
         position, *rates = (np.array([getattr(m, quantity) for m in self.joints]) for quantity in QUANTITIES)
@@ -164,27 +197,47 @@ class RobotModel(Model):
         )
 
 
-def robot_as_mapping(robot: Robot) -> dict[str, Any]:
-    """Return a robot as it may stand under `robot` in a job of any units, to be read bit by bit."""
+def robot_as_mapping(robot: Robot, *, plain: bool = False) -> dict[str, Any]:
+    """Return a robot as it may stand under `robot` in a job, to be read bit by bit.
+
+    Args:
+        robot: Any.
+        plain: Whether numbers are without units, for a file in rad and m; else they carry theirs, for a job
+            of any units.
+    """
+    say: Callable[[float, Quantity], float | str] = _plain_number if plain else written_number
     described = robot.convention is not None
     keys = {"convention": robot.convention} if described else {}
-    joints = [_joint_as_mapping(robot, index, described=described) for index in range(len(robot.joints))]
+    joints = [_joint_as_mapping(robot, index, say, described=described) for index in range(len(robot.joints))]
     poses = {key: getattr(robot, key) for key in ("base", "tool")}
     turned = {key: pose for key, pose in poses.items() if not np.array_equal(pose, np.eye(4))}
-    written = {key: Pose("").write(pose, ReadingContext()) for key, pose in turned.items()}
+    written = {
+        key: {"xyz": [say(x, _LENGTH) for x in pose[:3, 3].tolist()], "matrix": pose[:3, :3].tolist()}
+        for key, pose in turned.items()
+    }
     return {"name": robot.name, **keys, "joints": joints, **written}
 
 
-def _joint_as_mapping(robot: Robot, index: int, *, described: bool) -> dict[str, Any]:
+def _plain_number(value: float, quantity: Quantity) -> float:
+    del quantity
+    return value
+
+
+def _joint_as_mapping(
+    robot: Robot, index: int, say: Callable[[float, Quantity], float | str], *, described: bool
+) -> dict[str, Any]:
     joint = robot.joints[index]
     keys = [key for key in _DH if key != "beta" or joint.beta] if described else []
-    row = {key: written_number(getattr(joint, key), _DH[key]) for key in keys}
+    row = {key: say(getattr(joint, key), _DH[key]) for key in keys}
     bounds = [robot.limits.of_order(order)[index].tolist() for order in range(len(QUANTITIES))]
     limits = {
-        quantity: written_bound((low, high), joint_quantity(joint.type, order))
+        quantity: None
+        if (low, high) == UNLIMITED
+        else [say(end, joint_quantity(joint.type, order)) for end in (low, high)]
         for order, (quantity, (low, high)) in enumerate(zip(QUANTITIES, bounds, strict=True))
     }
-    return {"name": joint.name, "type": joint.type, **row, "sign": joint.sign, **limits}
+    dynamics = written_dynamics(joint, say)
+    return {"name": joint.name, "type": joint.type, **row, "sign": joint.sign, **limits, **dynamics}
 
 
 @frozen
@@ -197,10 +250,11 @@ class RobotSheet:
         source: Where the numbers come from; None where the file does not say, as below.
         licence: Of the source.
         note: What a user should know about the numbers.
-        text: The file as it stands; None where the robot is that of a job.
+        text: The file as it stands; None where the robot is that of a job, or of a URDF.
         maker: Who builds the robot.
         origin: Whether it is built (real) or stands in a text (textbook).
         date: When the source was read.
+        concession: What was given up in reading it, for an event; None where nothing was.
     """
 
     robot: Robot
@@ -212,6 +266,7 @@ class RobotSheet:
     maker: str | None = None
     origin: str | None = None
     date: str | None = None
+    concession: str | None = None
 
 
 def catalogue_names() -> list[str]:
@@ -219,11 +274,11 @@ def catalogue_names() -> list[str]:
     return sorted(path.stem for path in CATALOGUE.glob("*.yaml"))
 
 
-def find_robot(value: Any, document: Document, units: Units) -> Robot:  # noqa: ANN401
-    """Return the robot that stands under `robot` in a job.
+def find_sheet(value: Any, document: Document, units: Units) -> RobotSheet:  # noqa: ANN401
+    """Return the sheet of the robot that stands under `robot` in a job.
 
     Args:
-        value: A name, {file: PATH} (relative to the job's folder), or the robot itself.
+        value: A name, {file: PATH} or {urdf: PATH} (relative to the job's folder), or the robot itself.
         document: The job's.
         units: The job's, in force for a robot that stands in the job.
 
@@ -233,6 +288,8 @@ def find_robot(value: Any, document: Document, units: Units) -> Robot:  # noqa: 
     """
     if isinstance(value, str):
         return _from_catalogue(value, document)
+    if isinstance(value, Mapping) and "urdf" in value and "file" not in value:
+        return _from_urdf_entry(value, document)
     if isinstance(value, Mapping) and "file" in value:
         return _from_file_entry(value, document)
     if not isinstance(value, Mapping):
@@ -243,13 +300,15 @@ def find_robot(value: Any, document: Document, units: Units) -> Robot:  # noqa: 
             raise InputError(
                 Problem("a robot inside a job uses the job's units", "leave `units` out here", place)
             )
-        if "joints" not in value and nearest(key, ["file", *RobotModel.model_fields]) == "file":
-            raise InputError(Problem(f"unknown key '{key}'", "did you mean 'file'?", place))
-    return _validated(value, document, ("robot",), units).as_robot()
+        near = nearest(key, ["file", "urdf", *RobotModel.model_fields])
+        if "joints" not in value and near in ("file", "urdf"):
+            raise InputError(Problem(f"unknown key '{key}'", f"did you mean '{near}'?", place))
+    robot = _validated(value, document, ("robot",), units).as_robot()
+    return RobotSheet(robot, units, None, None, None, None)
 
 
 def load_robot(name: str | Path) -> Robot:
-    """Return a robot of the catalogue by its name, or the robot of a file by its path.
+    """Return a robot of the catalogue by its name, or the robot of a robot file or a URDF by its path.
 
     Raises:
         InputError: When the catalogue has no such robot, or with every flaw of the file.
@@ -259,7 +318,7 @@ def load_robot(name: str | Path) -> Robot:
 
 
 def load_sheet(name: str | Path) -> RobotSheet:
-    """Return the sheet of a robot of the catalogue by its name, or of a robot file by its path.
+    """Return the sheet of a robot of the catalogue by its name, or of a robot file or a URDF by its path.
 
     Raises:
         InputError: When the catalogue has no such robot, or with every flaw of the file.
@@ -268,7 +327,7 @@ def load_sheet(name: str | Path) -> RobotSheet:
     names = catalogue_names()
     if str(name) in names:
         return read_sheet(str(CATALOGUE / f"{name}.yaml"))
-    if isinstance(name, Path) or _looks_like_a_path(name):
+    if isinstance(name, Path) or _looks_like_a_path(name) or is_urdf(name):
         return read_sheet(str(name))
     raise InputError(f"the catalogue has no robot '{name}'", hint=_suggestion(name, names))
 
@@ -283,13 +342,50 @@ def read_robot_file(path: str) -> Robot:
     return read_sheet(path).robot
 
 
+def is_urdf(path: str | Path) -> bool:
+    """Return whether the name of a file ends as that of a URDF, or of XML."""
+    return str(path).lower().endswith(_URDF_ENDINGS)
+
+
+def read_urdf(
+    path: str,
+    *,
+    root: str | None = None,
+    tip: str | None = None,
+    exact: bool = False,
+    soft: bool = False,
+) -> UrdfRobot:
+    """Return the robot of a URDF, with what was decided in reading it; see `robot_of_urdf`.
+
+    Raises:
+        InputError: When the file is no URDF, or has no such chain.
+        FileError: When it cannot be read.
+    """
+    from trajcli.job.yaml.source import read_bytes
+    from trajcli.urdf.read import MAX_BYTES
+    from trajcli.urdf.robot import robot_of_urdf
+
+    return robot_of_urdf(read_bytes(path, MAX_BYTES), path, root=root, tip=tip, exact=exact, soft=soft)
+
+
+def urdf_sheet(path: str, read: UrdfRobot) -> RobotSheet:
+    """Return the sheet of a robot that was read from a URDF."""
+    note = "; ".join(read.remarks)
+    return RobotSheet(read.robot, Units(), utf8(Path(path).name), None, note, None, concession=read.snapping)
+
+
 def read_sheet(path: str) -> RobotSheet:
-    """Return the sheet of a robot file.
+    """Return the sheet of a robot file, or of a URDF.
 
     Raises:
         InputError: With every flaw of the file.
         FileError: When it cannot be read.
     """
+    if is_urdf(path):
+        try:
+            return urdf_sheet(path, read_urdf(path))
+        except InputError as error:
+            raise error.located(place=Place(path, 1, 1)) from None
     document = read_document(path)
     plain = document.plain()
     spec = plain.get("units") if isinstance(plain.get("units"), Mapping) else {}
@@ -303,19 +399,46 @@ def read_sheet(path: str) -> RobotSheet:
     return RobotSheet(model.as_robot(), units, *said)
 
 
+def _from_urdf_entry(value: Mapping[str, Any], document: Document) -> RobotSheet:
+    kinds: dict[str, tuple[type, str]] = {
+        "urdf": (str, "a path"),
+        "root": (str, "the name of a link"),
+        "tip": (str, "the name of a link"),
+        "exact": (bool, "true or false"),
+    }
+    for key, given in value.items():
+        if key not in kinds:
+            hint = did_you_mean(key, kinds) or "beside `urdf` stand root, tip and exact"
+            place = document.place(("robot", key), key=True)
+            raise InputError(Problem(f"unknown key '{key}' beside `urdf`", hint, place))
+        kind, wanted = kinds[key]
+        if not isinstance(given, kind):
+            place = document.place(("robot", key))
+            raise InputError(Problem(f"expected {wanted}, got {shown(given)}", None, place))
+    path = str(_folder_of(document) / value["urdf"])
+    try:
+        return urdf_sheet(path, read_urdf(path, **{key: value[key] for key in value if key != "urdf"}))
+    except FileError as error:
+        raise error.located(place=document.place(("robot", "urdf"))) from None
+    except InputError as error:
+        fields = [problem.field for problem in error.problems if problem.field is not None]
+        raise error.located(place=document.place(("robot", *(fields[0] if fields else ("urdf",))))) from None
+
+
 def _no_robot(value: object, document: Document) -> Problem:
     hint = "such as ur5e: `trajcli robots` lists the names of the catalogue"
     if isinstance(value, int) and not isinstance(value, bool):
         hint = f"for {value} bare joints write {{joints: {value}}}"
-    message = f"expected a robot's name, {{file: PATH}} or a robot, got {shown(value)}"
+    message = f"expected a robot's name, {{file: PATH}}, {{urdf: PATH}} or a robot, got {shown(value)}"
     return Problem(message, hint, document.place(("robot",)))
 
 
-def _from_catalogue(name: str, document: Document) -> Robot:
+def _from_catalogue(name: str, document: Document) -> RobotSheet:
     names = catalogue_names()
     if name in names:
-        return read_robot_file(str(CATALOGUE / f"{name}.yaml"))
+        return read_sheet(str(CATALOGUE / f"{name}.yaml"))
     hint = f"a file is named by {{file: {name}}}" if _looks_like_a_path(name) else _suggestion(name, names)
+    hint = f"a URDF is named by {{urdf: {name}}}" if is_urdf(name) else hint
     raise InputError(Problem(f"the catalogue has no robot '{name}'", hint, document.place(("robot",))))
 
 
@@ -329,7 +452,12 @@ def _suggestion(name: str, names: list[str]) -> str:
     return f"{near}{'' if near.endswith('?') else ';'} `trajcli robots` lists all {len(names)}"
 
 
-def _from_file_entry(value: Mapping[str, Any], document: Document) -> Robot:
+def _folder_of(document: Document) -> Path:
+    """Return the folder from which the paths in a document count."""
+    return Path.cwd() if document.file in ("-", "<stdin>") else Path(document.file).parent
+
+
+def _from_file_entry(value: Mapping[str, Any], document: Document) -> RobotSheet:
     extra = [key for key in value if key != "file"]
     if extra:
         place = document.place(("robot", extra[0]), key=True)
@@ -338,9 +466,8 @@ def _from_file_entry(value: Mapping[str, Any], document: Document) -> Robot:
     if not isinstance(value["file"], str):
         place = document.place(("robot", "file"))
         raise InputError(Problem(f"expected a path, got {shown(value['file'])}", None, place))
-    folder = Path.cwd() if document.file in ("-", "<stdin>") else Path(document.file).parent
     try:
-        return read_robot_file(str(folder / value["file"]))
+        return read_sheet(str(_folder_of(document) / value["file"]))
     except FileError as error:
         raise error.located(place=document.place(("robot", "file"))) from None
 

@@ -9,13 +9,65 @@ from typing import Literal
 import numpy as np
 
 from trajcli.curves.piecewise import Array, read_only
+from trajcli.errors import InputError
 from trajcli.frozen import comparable, frozen
 
 JointType = Literal["revolute", "prismatic"]
 Convention = Literal["standard", "modified"]
 QUANTITIES = ("position", "velocity", "acceleration", "jerk")
 
+_INERTIA_ROUNDING = 1e-6  # of the largest moment: files have some six digits
 _SMALL_POSITION = 1e-3  # rad or m: what goes beyond a position bound smaller than this is relative to this
+
+
+@comparable
+class Friction:
+    """Friction of a joint: coulomb sign(qd) + viscous qd opposes it.
+
+    Attributes:
+        coulomb: N m or N, at least 0.
+        viscous: N m s/rad or N s/m, at least 0.
+    """
+
+    coulomb: float = 0.0
+    viscous: float = 0.0
+
+
+@comparable
+class LinkInertia:
+    """Mass of a link and how it is spread; in SI whatever the units of a file.
+
+    Attributes:
+        mass: kg, above 0.
+        com: Centre of mass in the frame of the link's row, m.
+        inertia: ixx, iyy, izz, ixy, ixz, iyz about the centre of mass in the axes of that frame, kg m^2: the
+            tensor's own entries, products with their sign.
+
+    Raises:
+        InputError: When no rigid solid has them.
+    """
+
+    mass: float
+    com: tuple[float, float, float]
+    inertia: tuple[float, float, float, float, float, float]
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.mass < inf:
+            raise InputError(f"expected a mass above 0 kg, got {self.mass:g}")
+        xx, yy, zz, xy, xz, yz = self.inertia
+        if not np.isfinite((*self.com, *self.inertia)).all():
+            raise InputError("expected finite numbers for the centre of mass and the inertia")
+        moments = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])).tolist()
+        room = _INERTIA_ROUNDING * max(map(abs, moments))
+        shown = ", ".join(f"{moment:.6g}" for moment in moments)
+        if moments[0] < -room:
+            raise InputError(f"no solid has a negative moment of inertia: the principal ones are {shown}")
+        if moments[2] > moments[0] + moments[1] + room:
+            raise InputError(
+                "no solid has a moment of inertia above the sum of the two others: "
+                f"the principal ones are {shown}",
+                hint="check signs and units (kg m^2), and that it is about the centre of mass",
+            )
 
 
 @comparable
@@ -32,6 +84,12 @@ class Joint:
         sign: 1 or -1: the direction in which the joint counts.
         beta: Angle about y behind alpha, rad: where two axes are almost parallel, d would be far off and
             depend on the last digit of alpha without it.
+        effort: Lowest and highest torque or force, N m or N; infinite where it is not known.
+        friction: Of the joint.
+        rotor: Inertia of the motor as the joint feels it, kg m^2 (kg for a slide).
+        link: Mass and inertia of the link behind the joint, with all that is fixed to it; None where unknown.
+
+    Effort, friction, rotor and link are kept for inverse dynamics; nothing is judged by them yet.
 
     Source: Hayati, Robot arm geometric link parameter estimation, IEEE CDC (1983), for beta.
     """
@@ -44,6 +102,10 @@ class Joint:
     alpha: float = 0.0
     sign: int = 1
     beta: float = 0.0
+    effort: tuple[float, float] = (-inf, inf)
+    friction: Friction = Friction()
+    rotor: float = 0.0
+    link: LinkInertia | None = None
 
 
 @comparable

@@ -14,7 +14,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount, InputError
 from trajcli.frozen import comparable, frozen
 from trajcli.job.inline import inline_number, inline_pose
-from trajcli.job.robot import RobotSheet, catalogue_names, load_sheet
+from trajcli.job.robot import RobotSheet, catalogue_names, is_urdf, load_sheet
 from trajcli.job.yaml.load import read_document
 from trajcli.kinematics.inverse.joint_turns import beyond
 from trajcli.kinematics.robot import Robot
@@ -115,7 +115,7 @@ def open_sheet(name: str) -> RobotSheet:
         InputError: When there is no such robot, or with every flaw of the file.
         FileError: When the file cannot be read.
     """
-    if name in catalogue_names() or not Path(name).is_file():
+    if name in catalogue_names() or not Path(name).is_file() or is_urdf(name):
         return load_sheet(name)
     if not {"robot", "moves"} & read_document(name).plain().keys():
         return load_sheet(Path(name))

@@ -20,7 +20,7 @@ from trajcli.kinematics.robot import Joint, Robot
 
 WORLD, FIRST_LINK, TOOL = "world", "base_link", "tool0"
 
-_Step = tuple[Literal["turn z", "slide z", "turn x", "slide x"], float]
+_Step = tuple[Literal["turn z", "slide z", "turn x", "slide x", "turn y"], float]
 
 
 @frozen
@@ -126,7 +126,7 @@ def chain_of(robot: Robot) -> UrdfChain:
 
 def _cut(joint: Joint, *, modified: bool) -> tuple[tuple[_Step, ...], tuple[_Step, ...]]:
     """Return the fixed steps of a row before the joint's variable and behind it."""
-    screw: tuple[_Step, ...] = (("slide x", joint.a), ("turn x", joint.alpha))
+    screw: tuple[_Step, ...] = (("slide x", joint.a), ("turn x", joint.alpha), ("turn y", joint.beta))
     turn: _Step = ("turn z", joint.theta)
     slide: _Step = ("slide z", joint.d)
     before: tuple[_Step, ...] = (turn,) if joint.type == "revolute" else (turn, slide)

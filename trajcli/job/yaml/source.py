@@ -29,18 +29,22 @@ _WIDE_MARKS = (  # the marks of UTF-32 first: UTF-16's little-endian one is the 
 )
 
 
-def read_bytes(path: str) -> bytes:
+def read_bytes(path: str, most: int = MAX_BYTES) -> bytes:
     """Return the content of a file, or of standard input for `-`.
+
+    Args:
+        path: The file.
+        most: How many bytes it may have.
 
     Raises:
         FileError: When it is missing or cannot be read.
-        InputError: When it is longer than `MAX_BYTES`.
+        InputError: When it is longer.
     """
     if path == "-":
-        return _read_stdin()
+        return _read_stdin(most)
     try:
         with Path(path).open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
+            data = file.read(most + 1)
         size = max(Path(path).stat().st_size, len(data))
     except FileNotFoundError:
         raise FileError(f"there is no file '{path}'") from None
@@ -51,22 +55,22 @@ def read_bytes(path: str) -> bytes:
     except (OSError, ValueError) as error:  # ValueError: a NUL byte in the path
         reason = getattr(error, "strerror", None) or error
         raise FileError(f"'{path}' cannot be read: {reason}") from None
-    return _bounded(data, path, size)
+    return _bounded(data, path, size, most)
 
 
-def _read_stdin() -> bytes:
+def _read_stdin(most: int) -> bytes:
     try:
-        data = sys.stdin.buffer.read(MAX_BYTES + 1)
+        data = sys.stdin.buffer.read(most + 1)
     except (OSError, ValueError, AttributeError) as error:  # closed, or absent: then sys.stdin is None
         raise FileError(f"standard input cannot be read: {error}") from None
-    return _bounded(data, STDIN, len(data))
+    return _bounded(data, STDIN, len(data), most)
 
 
-def _bounded(data: bytes, file: str, size: int) -> bytes:
-    if len(data) <= MAX_BYTES:
+def _bounded(data: bytes, file: str, size: int, most: int = MAX_BYTES) -> bytes:
+    if len(data) <= most:
         return data
-    known = f"{size / 1e6:.1f} MB long" if size > MAX_BYTES + 1 else f"longer than {MAX_BYTES / 1e6:g} MB"
-    message = f"the file is {known}; at most {MAX_BYTES / 1e6:g} MB ({MAX_BYTES} bytes) are read"
+    known = f"{size / 1e6:.1f} MB long" if size > most + 1 else f"longer than {most / 1e6:g} MB"
+    message = f"the file is {known}; at most {most / 1e6:g} MB ({most} bytes) are read"
     raise InputError(Problem(message, place=Place(file, 1, 1)))
 
 

@@ -1,0 +1,52 @@
+"""Robot files from URDF on the command line: `trajcli urdf`."""
+
+from __future__ import annotations
+
+from trajcli.cli.outcome import print_lines, print_remark
+from trajcli.errors import InputError, Place
+from trajcli.frozen import comparable
+from trajcli.job.dump import dump_robot
+from trajcli.job.robot import read_urdf, urdf_sheet
+from trajcli.streams.whole_file import identity, whole_file
+
+
+@comparable
+class UrdfOptions:
+    """What the command line says; see `trajcli urdf --help`."""
+
+    root: str | None = None
+    tip: str | None = None
+    exact: bool = False
+    soft: bool = False
+    output: str | None = None
+
+
+def run_urdf(file: str, options: UrdfOptions) -> int:
+    """Print or write the robot file of a URDF, and what was decided on the way to it; return the exit code.
+
+    Raises:
+        InputError: When the file is no URDF, has no such chain, or would be overwritten.
+        FileError: When it cannot be read, or the robot file not written.
+    """
+    name = "<stdin>" if file == "-" else file
+    try:
+        read = read_urdf(file, root=options.root, tip=options.tip, exact=options.exact, soft=options.soft)
+    except InputError as error:
+        raise error.located(place=Place(name, 1, 1)) from None
+    text = dump_robot(urdf_sheet(name, read))
+    if options.output in (None, "-"):
+        print_lines([text.rstrip("\n")])
+    else:
+        _write(text, file, str(options.output))
+    for remark in read.remarks:
+        print_remark(f"{name}: {remark}")
+    return 0
+
+
+def _write(text: str, file: str, output: str) -> None:
+    """Write the robot file, whole or not at all."""
+    same = identity(output)
+    if same is not None and file != "-" and same == identity(file, 0):
+        raise InputError(f"the robot file to {output} would overwrite the URDF", hint="name another file")
+    with whole_file(output) as out:
+        out.write(text.encode())
