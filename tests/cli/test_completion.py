@@ -53,9 +53,9 @@ def test_commands_complete() -> None:
 
 def test_completion_is_installed(tmp_path: Path) -> None:
     command = [str(Path(sys.executable).with_name("trajcli")), "--install-completion", "bash"]
-    done = subprocess.run(
-        command, env=os.environ | {"HOME": str(tmp_path)}, capture_output=True, text=True, check=True
-    )
+    # a test has no shell around it that typer could find by itself
+    asked = {"HOME": str(tmp_path), "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}
+    done = subprocess.run(command, env=os.environ | asked, capture_output=True, text=True, check=True)
     assert "completion installed" in done.stdout
     assert "_TRAJCLI_COMPLETE=complete_bash" in (tmp_path / ".bash_completions/trajcli.sh").read_text("utf-8")
 

@@ -138,7 +138,7 @@ def test_full_digits_are_lossless(arms):
 
 
 BAD_CALLS = [
-    (["--robot", "ur5", *HOME], 2, "did you mean 'ur5e'?"),
+    (["--robot", "ur5ee", *HOME], 2, "did you mean 'ur5e'?"),
     (["--robot", "none.yaml", *HOME], 4, "there is no file 'none.yaml'"),
     (["--robot", "ur5e", "1", "2"], 2, "q has 2 values, UR5e has 6 joints"),
     (["--robot", "ur5e", *HOME[:5], "nan"], 2, "q of wrist_3_joint: expected a number (deg), got nan"),
