@@ -214,3 +214,11 @@ def test_inertia_and_friction_do_not_change_the_geometry() -> None:
     )
     q = np.linspace(-1, 1, 6)
     assert np.array_equal(forward(robot, q), forward(bare, q))
+
+
+@pytest.mark.parametrize("name", ["ur5", "panda"])
+def test_efforts_and_friction_are_written_back(name: str) -> None:
+    robot = model(name).robot
+    back = read(urdf_of(robot)).robot
+    assert [joint.effort for joint in back.joints] == [joint.effort for joint in robot.joints]
+    assert [joint.friction for joint in back.joints] == [joint.friction for joint in robot.joints]

@@ -117,10 +117,12 @@ def test_inertia_of_links_that_are_fixed_together() -> None:
 
 
 def test_a_turned_inertia() -> None:
-    origin = '<origin xyz="0 0 0.1" rpy="0 0 1.5707963267948966"/>'
+    origin = '<origin xyz="0 0 0.1" rpy="0 0 0.5"/>'
     link = arm("", link=inertial(1, 1, 2, 2.5, origin=origin)).robot.joints[0].link
     assert link is not None
-    assert link.inertia == pytest.approx((2, 1, 2.5, 0, 0, 0), abs=1e-15)
+    c, s = np.cos(0.5), np.sin(0.5)  # R diag(1, 2, 2.5) R'
+    wanted = (c * c + 2 * s * s, s * s + 2 * c * c, 2.5, -c * s, 0, 0)
+    assert link.inertia == pytest.approx(wanted, abs=1e-15)
     assert link.com == pytest.approx((0, 0, 0.1))
 
 

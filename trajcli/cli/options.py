@@ -31,7 +31,7 @@ RobotName = Annotated[
         "--robot",
         "-r",
         metavar="NAME|FILE",
-        help="A robot of the catalogue, a robot file, or a job: its robot, base and tool.",
+        help="A robot of the catalogue, a robot file, a URDF, or a job: its robot, base and tool.",
         autocompletion=robot_names,
     ),
 ]

@@ -361,11 +361,12 @@ def read_urdf(
         InputError: When the file is no URDF, or has no such chain.
         FileError: When it cannot be read.
     """
-    from trajcli.job.yaml.source import read_bytes
+    from trajcli.job.yaml.source import STDIN, read_bytes
     from trajcli.urdf.read import MAX_BYTES
     from trajcli.urdf.robot import robot_of_urdf
 
-    return robot_of_urdf(read_bytes(path, MAX_BYTES), path, root=root, tip=tip, exact=exact, soft=soft)
+    name = STDIN if path == "-" else path
+    return robot_of_urdf(read_bytes(path, MAX_BYTES), name, root=root, tip=tip, exact=exact, soft=soft)
 
 
 def urdf_sheet(path: str, read: UrdfRobot) -> RobotSheet:

@@ -91,12 +91,17 @@ def _moving(joint: UrdfJoint, parent: str, robot: Robot, number: int) -> Iterato
     kind = "prismatic" if joint.prismatic else "continuous" if endless else "revolute"
     # one number stands for both directions: the smaller one is safe
     velocity = _bounded(float(np.abs(robot.limits.velocity[number]).min()))
+    known = min(map(abs, robot.joints[number].effort))
+    effort = "0" if known == np.inf else repr(known)
     span = "" if endless else f'lower="{_bounded(low)!r}" upper="{_bounded(high)!r}" '
     yield f'  <joint name="{_escaped(joint.name)}" type="{kind}">'
     yield f'    <parent link="{parent}"/><child link="{joint.link}"/>'
     yield f"    {_origin(joint.origin)}"
     yield f'    <axis xyz="0 0 {joint.sign}"/>'
-    yield f'    <limit {span}effort="0" velocity="{velocity!r}"/>'
+    yield f'    <limit {span}effort="{effort}" velocity="{velocity!r}"/>'
+    friction = robot.joints[number].friction
+    if friction.coulomb or friction.viscous:
+        yield f'    <dynamics damping="{friction.viscous!r}" friction="{friction.coulomb!r}"/>'
     yield "  </joint>"
 
 
