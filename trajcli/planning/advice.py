@@ -51,8 +51,13 @@ def _advised(own: list[Finding], move: PlannedMove, moves: Sequence[PlannedMove]
     if not slow and move.not_slowed is None:
         return own
     factor, hint = _by_slowing(slow, move, say, alone=alone)
+    remedies = move.planned.remedies if factor is None else {}
     return [
-        replace(f, hint=hint, factor=factor if f.factor is not None else None)
+        replace(
+            f,
+            hint=remedies.get(f.kind, hint),
+            factor=factor if f.factor is not None else None,
+        )
         if f in slow or (f.kind in QUANTITIES and f.kind != "jerk" and factor is None)
         else f
         for f in own
