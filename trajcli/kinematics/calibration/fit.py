@@ -27,7 +27,6 @@ _MOST_STEPS = 100
 _SMALLEST_STEP = 1e-13  # of a step in the scaled parameters, m
 _ENOUGH = 1e-13  # relative decrease of the cost that is rounding
 _FIRST_DAMPING, _MOST_DAMPING = 1e-4, 1e8  # of the squared largest singular value
-_SCALE_PER_MEDIAN = 1.5  # the median of six normal residuals' norm to their 95 % quantile
 _SMALLEST_SCALE = 1e-12  # m: exact data have no noise to measure a loss by
 _SAME_SCALE = 0.01
 _MOST_SCALES = 20
@@ -42,13 +41,13 @@ class Options:
     Attributes:
         length: Metres that count like a radian.
         loss: Of each measurement's weighted residual.
-        loss_scale: Where the loss leaves the square, m, or deviations where these are known; None: 1.5 times
-            the median of the residuals.
+        loss_scale: Where the loss leaves the square, over the median of the measurements' residuals: 1.5 is
+            about the 95 % quantile where all six coordinates are measured with normal noise.
     """
 
     length: float
     loss: Loss = "linear"
-    loss_scale: float | None = None
+    loss_scale: float = 1.5
 
 
 @frozen
@@ -62,7 +61,7 @@ class Fit:
         released: How many combinations that are not determined at the nominal parameters were released.
         iterations: Accepted steps.
         weights: Of each measurement by the loss, shape (N,): 1 where it is linear.
-        loss_scale: That was used; None where the loss is linear.
+        loss_scale: Where the loss left the square, m, or deviations where these are known; None: nowhere.
     """
 
     robot: Robot
@@ -109,9 +108,7 @@ def calibrate(
 class _Problem:
     """Weighted residuals of a robot, and their cost."""
 
-    def __init__(
-        self, measurements: Measurements, parameters: Sequence[Parameter], options: Options
-    ) -> None:
+    def __init__(self, measurements: Measurements, parameters: Sequence[Parameter], options: Options) -> None:
         self.measurements, self.parameters, self.options = measurements, parameters, options
         self.weights = measurements.weights(options.length)
 
@@ -128,6 +125,11 @@ class _Problem:
         jacobian *= self.weights[:, :, None]
         return missed * self.weights, jacobian
 
+    def loss_scale(self, robot: Robot) -> float:
+        """Return where the loss of a robot's residuals leaves the square."""
+        norms = np.linalg.norm(self.rows(robot)[0], axis=1)
+        return max(self.options.loss_scale * float(np.median(norms)), _SMALLEST_SCALE)
+
     def beyond_chance(self, fit: Fit, trial: Fit) -> bool:
         """Return whether released combinations take away more of the squares than noise lets them."""
         before, after = (
@@ -138,28 +140,20 @@ class _Problem:
         freedom = sum(self.measurements.counts) - trial.span.shape[1]
         variance = after / freedom if freedom > 0 and self.measurements.deviations is None else 1.0
         enough = _SMALLEST_SCALE**2 * sum(self.measurements.counts)  # exact data have no variance
-        return freedom > 0 and before - after > max(added * _BEYOND_CHANCE * variance, enough)
+        return bool(freedom > 0 and before - after > max(added * _BEYOND_CHANCE * variance, enough))
 
 
 def _converged(problem: _Problem, fit: Fit) -> Fit:
     """Return the fit that no step improves; the scale of a robust loss follows the residuals' median."""
-    options, robust = problem.options, problem.options.loss != "linear"
-    scale = options.loss_scale
+    if problem.options.loss == "linear":
+        return _descended(problem, fit, None)
+    scale = problem.loss_scale(fit.robot)
     for _ in range(_MOST_SCALES):
-        if robust and options.loss_scale is None:
-            last = scale
-            scale = _median_scale(problem.rows(fit.robot)[0])
-            if last is not None and abs(scale - last) <= _SAME_SCALE * last:
-                break
-        fit = _descended(problem, fit, scale)
-        if not robust or options.loss_scale is not None:
+        fit = replace(_descended(problem, fit, scale), loss_scale=scale)
+        last, scale = scale, problem.loss_scale(fit.robot)
+        if abs(scale - last) <= _SAME_SCALE * last:
             break
-    return replace(fit, loss_scale=scale if robust else None)
-
-
-def _median_scale(residuals: Array) -> float:
-    norms = np.linalg.norm(residuals, axis=1)
-    return max(_SCALE_PER_MEDIAN * float(np.median(norms)), _SMALLEST_SCALE)
+    return fit
 
 
 def _descended(problem: _Problem, fit: Fit, scale: float | None) -> Fit:
@@ -191,9 +185,9 @@ def _descended(problem: _Problem, fit: Fit, scale: float | None) -> Fit:
 def _step(residuals: Array, jacobian: Array, weights: Array, span: Array, damping: float) -> Array:
     """Return the step (r,) in the coordinates of the span."""
     root = np.sqrt(weights)[:, None]
-    rows = (jacobian.reshape(-1, jacobian.shape[2]) @ span).reshape(*residuals.shape, -1)
+    rows = np.asarray(jacobian.reshape(-1, jacobian.shape[2]) @ span).reshape(*residuals.shape, -1)
     joined = np.concatenate([rows, residuals[:, :, None]], axis=2) * root[:, :, None]
-    triangle = np.linalg.qr(joined.reshape(-1, joined.shape[2]), mode="r")
+    triangle = np.asarray(np.linalg.qr(joined.reshape(-1, joined.shape[2]), mode="r"))
     left, values, right = np.linalg.svd(triangle[:, :-1], full_matrices=False)
     bound = max(float(values.max(initial=0.0)), np.finfo(np.float64).tiny)
     ratio = values / bound

@@ -1,4 +1,4 @@
-"""Identifiability of parameters: the rank of the identification Jacobian, and combinations it cannot tell apart.
+"""Identifiability of parameters: rank of the identification Jacobian, and combinations that it cannot tell.
 
 The rank is that of the Jacobian at the nominal parameters, its columns scaled to unit length: singular values
 below 1e-8 of the largest count as zero.
@@ -85,13 +85,13 @@ def identifiability(jacobian: Array, parameters: Sequence[Parameter], length: fl
 def _combinations(
     kernel: Array, parameters: Sequence[Parameter], length: float
 ) -> tuple[tuple[Share, ...], ...]:
-    """Return the combinations (k, p) of a kernel with few parameters each, sorted by their first parameter."""
+    """Return the combinations (k, p) of a kernel with few parameters each, sorted by their first."""
     units = np.array([1.0 if parameter.angular else length for parameter in parameters])
     reduced = _reduced(kernel / units) * units
     combinations = []
     for row in reduced:
         weights = row / np.linalg.norm(row)
-        kept = np.flatnonzero(np.abs(row / units) > _NO_WEIGHT * np.abs(row / units).max())
+        kept = np.flatnonzero(np.abs(row / units) > _NO_WEIGHT * np.abs(row / units).max()).tolist()
         weights = weights * np.sign(weights[kept[0]])
         combinations.append(tuple(Share(parameters[i], float(weights[i])) for i in kept))
     order = [[parameters.index(share.parameter) for share in shares] for shares in combinations]

@@ -11,6 +11,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
 from trajcli.kinematics.calibration.parameters import Parameter
 from trajcli.kinematics.calibration.sensitivity import identification_jacobian
+from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.target import IkTarget, closure_of, residual_jacobian, residuals
 from trajcli.kinematics.robot import Robot
 
@@ -78,8 +79,6 @@ class Measurements:
 
     def root_mean_squares(self, robot: Robot) -> tuple[float | None, float | None]:
         """Return the root mean squares of the distance, m, and of the angle, rad; None where none counts."""
-        from trajcli.kinematics.forward import forward
-
         poses = forward(robot, self.joints)
         squares: tuple[list[Array], list[Array]] = ([], [])
         for kind in self.kinds:

@@ -111,6 +111,9 @@ def _named(robot: Robot, word: str) -> tuple[Parameter, ...]:
     if word in ("all", "dh"):
         listed = all_parameters(robot)
         return listed if word == "all" else tuple(each for each in listed if each.joint is not None)
+    if word in names and word in _FRAMES:
+        hint = f"name its numbers, such as {word}.theta or {word}.x"
+        raise InputError(f"--free: '{word}' is a joint of {robot.name} and its {word}", hint=hint)
     if word in names:
         return row_parameters(robot, names.index(word))
     if word in _FRAMES:
@@ -125,7 +128,8 @@ def _named(robot: Robot, word: str) -> tuple[Parameter, ...]:
     known += [f"{each}.{key}" for each in _FRAMES for key in POSE]
     forms = "all, dh, base, tool, a joint, or such as " + f"{names[0]}.theta and base.x"
     raise InputError(
-        f"--free: {robot.name} has no parameter '{word}'", hint=did_you_mean(word, known) or f"expected {forms}"
+        f"--free: {robot.name} has no parameter '{word}'",
+        hint=did_you_mean(word, known) or f"expected {forms}",
     )
 
 

@@ -105,7 +105,7 @@ def _variances(weighted: Array, leverage: Array, fit: Fit, measurements: Measure
     if freedom.sum() <= _FREEDOM:
         return None
     pooled = squares.sum() / freedom.sum()
-    return np.where(freedom > _FREEDOM, squares / np.maximum(freedom, _FREEDOM), pooled)
+    return np.asarray(np.where(freedom > _FREEDOM, squares / np.maximum(freedom, _FREEDOM), pooled))
 
 
 def _noise(
@@ -124,9 +124,7 @@ def _correlations(
     """Return the largest correlations of parameters that are known."""
     usable = [i for i, each in enumerate(known) if each and deviations[i] > 0]
     pairs = (
-        Correlation(
-            parameters[i], parameters[j], float(covariance[i, j] / (deviations[i] * deviations[j]))
-        )
+        Correlation(parameters[i], parameters[j], float(covariance[i, j] / (deviations[i] * deviations[j])))
         for i, j in combinations(usable, 2)
     )
     large = [pair for pair in pairs if abs(pair.value) >= WORTH_MENTIONING]
