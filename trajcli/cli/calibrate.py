@@ -18,7 +18,7 @@ from trajcli.frozen import comparable
 from trajcli.job.inline import inline_number
 from trajcli.kinematics.calibration.fit import Loss, Options
 from trajcli.kinematics.calibration.measuring_plan import MeasuredPart, MeasuringPlan
-from trajcli.kinematics.calibration.parameters import Parameter
+from trajcli.kinematics.calibration.parameters import ArmParameter
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.queries.arm import ArmInUnits, open_arm, open_sheet
 from trajcli.queries.calibration import (
@@ -179,7 +179,7 @@ def _residual_lines(arm: ArmInUnits, report: dict[str, Any]) -> Iterator[str]:
 
 def _combination_lines(arm: ArmInUnits, combinations: Sequence[Sequence[dict[str, Any]]]) -> Iterator[str]:
     if combinations:
-        yield "not identifiable, kept as they are (changes that leave every measured number, rad and m):"
+        yield "not identifiable, nominal but for steps of least norm (changes, rad and m, that nobody sees):"
     for shares in combinations:
         if len(shares) == 1:
             yield f"  {shares[0]['joint']}.{shares[0]['name']}"
@@ -214,7 +214,7 @@ def _csv(arm: ArmInUnits, joints: Array) -> bytes:
     return out.getvalue()
 
 
-def _summary(plan: MeasuringPlan, parameters: Sequence[Parameter], count: int) -> str:
+def _summary(plan: MeasuringPlan, parameters: Sequence[ArmParameter], count: int) -> str:
     return (
         f"{count} configurations tell {plan.seen.rank} of {len(parameters)} parameters or combinations: "
         f"O1 {plan.index:.4g}, condition {plan.condition:.4g}"

@@ -16,8 +16,7 @@ from trajcli.geometry.rotation import QUATERNION_DEFECT, matrix_from_quaternion
 from trajcli.job.messages import problems_of
 from trajcli.job.recording import joint_columns
 from trajcli.job.yaml.document import Document
-from trajcli.job.yaml.load import parse_document
-from trajcli.job.yaml.source import read_bytes
+from trajcli.job.yaml.load import read_document
 from trajcli.kinematics.calibration.measurements import MeasuredKind, Measurements
 from trajcli.kinematics.inverse.target import IkTarget, partial_target
 from trajcli.kinematics.robot import Robot
@@ -121,7 +120,7 @@ def read_configurations(path: str, robot: Robot, units: Units) -> Array:
 
 
 def _open_list(path: str, robot: Robot, units: Units) -> tuple[Document, ReadingContext]:
-    document = parse_document(read_bytes(path), path, any_root=True)
+    document = read_document(path, any_root=True)
     content = document.root.value
     if not isinstance(content, list) or not content:
         got = "an empty list" if isinstance(content, list) else shown(document.plain())

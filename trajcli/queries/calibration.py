@@ -28,20 +28,26 @@ from trajcli.kinematics.calibration.measuring_plan import (
 )
 from trajcli.kinematics.calibration.parameters import (
     PARALLEL,
-    Parameter,
+    ArmParameter,
     parallel_rows,
     parse_parameters,
     values_of,
 )
 from trajcli.kinematics.calibration.uncertainty import Uncertainty, uncertainty
 from trajcli.kinematics.dexterity import characteristic_length
-from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.robot import Joint, Robot
 from trajcli.queries.arm import ArmInUnits
-from trajcli.units import Quantity, Units, factor
+from trajcli.units import Dimension, Quantity, Units, factor
 from trajcli.version import __version__
 
+_ROW: dict[str, Dimension] = {
+    "theta": "angle",
+    "d": "length",
+    "a": "length",
+    "alpha": "angle",
+    "beta": "angle",
+}
 _UNMOVED = 1e-9  # rad or m: what a joint that stands still may differ by
-_SMALL_WEIGHT = 0.5  # of a measurement in a robust loss: below it is named
 
 
 @frozen
@@ -62,7 +68,7 @@ class Calibration:
     arm: ArmInUnits
     file: str
     measurements: Measurements
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[ArmParameter, ...]
     options: Options
     fit: Fit
     known: Uncertainty
@@ -106,7 +112,11 @@ def calibration_of(arm: ArmInUnits, file: str, free: str, options: Options | Non
 
 
 def _remarks(
-    robot: Robot, measurements: Measurements, parameters: Sequence[Parameter], attainable: int, fit: Fit
+    robot: Robot,
+    measurements: Measurements,
+    parameters: Sequence[ArmParameter],
+    attainable: int,
+    fit: Fit,
 ) -> Iterator[str]:
     still = np.ptp(measurements.joints, axis=0) <= _UNMOVED
     names = [name for name, stands in zip(robot.joint_names, still, strict=True) if stands]
@@ -169,8 +179,8 @@ def calibration_report(calibration: Calibration) -> dict[str, Any]:
 
 
 def outliers(calibration: Calibration) -> list[int]:
-    """Return the measurements, counted from 1, that a robust loss gives less than half of their weight."""
-    return [int(row) + 1 for row in np.flatnonzero(calibration.fit.weights < _SMALL_WEIGHT)]
+    """Return the measurements, counted from 1, that a robust loss finds far off."""
+    return [row + 1 for row in calibration.fit.outliers]
 
 
 def _residuals(
@@ -196,11 +206,11 @@ def _share(share: Share) -> dict[str, Any]:
     return {**_named(share.parameter), "weight": share.weight}
 
 
-def _named(parameter: Parameter) -> dict[str, Any]:
+def _named(parameter: ArmParameter) -> dict[str, Any]:
     return {"joint": parameter.owner, "name": parameter.name}
 
 
-def _unit(parameter: Parameter) -> str:
+def _unit(parameter: ArmParameter) -> str:
     return "rad" if parameter.angular else "m"
 
 
@@ -217,16 +227,8 @@ def calibrated_text(calibration: Calibration, sheet: RobotSheet) -> str:
         plain = parse_document(sheet.text, sheet.robot.name).plain()
     plain = {"name": robot.name, **plain}
     plain["note"] = " ".join(filter(None, [sheet.note, _note(calibration)]))
-    for joint, row, old in zip(plain["joints"], robot.joints, sheet.robot.joints, strict=True):
-        for key, quantity in (
-            ("theta", "angle"),
-            ("d", "length"),
-            ("a", "length"),
-            ("alpha", "angle"),
-            ("beta", "angle"),
-        ):
-            if getattr(row, key) != getattr(old, key):
-                joint[key] = _in_units(getattr(row, key), quantity, sheet.units)
+    rows = zip(plain["joints"], robot.joints, sheet.robot.joints, strict=True)
+    plain["joints"] = [_written_row(joint, row, old, sheet.units) for joint, row, old in rows]
     for key in ("base", "tool"):
         pose = getattr(robot, key)
         if not np.array_equal(pose, getattr(sheet.robot, key)):
@@ -236,7 +238,19 @@ def calibrated_text(calibration: Calibration, sheet: RobotSheet) -> str:
     return mapping_text(plain)
 
 
-def _in_units(value: float, dimension: Any, units: Units) -> float:  # noqa: ANN401
+def _written_row(written: dict[str, Any], row: Joint, old: Joint, units: Units) -> dict[str, Any]:
+    """Return a joint of a file with the numbers of its row that have changed, in front of its limits."""
+    changed = {
+        key: _in_units(getattr(row, key), quantity, units)
+        for key, quantity in _ROW.items()
+        if getattr(row, key) != getattr(old, key)
+    }
+    merged = {**written, **changed}
+    front = [key for key in ("name", "type", *_ROW) if key in merged]
+    return {key: merged[key] for key in [*front, *(key for key in merged if key not in front)]}
+
+
+def _in_units(value: float, dimension: Dimension, units: Units) -> float:
     return value / factor(Quantity(dimension), units)
 
 
@@ -258,7 +272,7 @@ def _note(calibration: Calibration) -> str:
 
 def planned_measurements(
     arm: ArmInUnits, count: int, free: str, length: float | None, file: str | None, part: MeasuredPart
-) -> tuple[Array, MeasuringPlan, tuple[Parameter, ...]]:
+) -> tuple[Array, MeasuringPlan, tuple[ArmParameter, ...]]:
     """Return joint values (count, n), rad or m, to measure at, what they tell, and of which parameters.
 
     Args:
@@ -282,7 +296,7 @@ def planned_measurements(
 
 
 def plan_report(
-    arm: ArmInUnits, joints: Array, plan: MeasuringPlan, parameters: Sequence[Parameter]
+    arm: ArmInUnits, joints: Array, plan: MeasuringPlan, parameters: Sequence[ArmParameter]
 ) -> dict[str, Any]:
     """Return a plan of measurements for programs; joint values in rad and m."""
     return {

@@ -18,7 +18,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.calibration.identifiability import Identifiability, identifiability
 from trajcli.kinematics.calibration.measurements import Measurements
-from trajcli.kinematics.calibration.parameters import Parameter, shifted
+from trajcli.kinematics.calibration.parameters import ArmParameter, shifted
 from trajcli.kinematics.robot import Robot
 
 Loss = Literal["linear", "huber", "cauchy"]
@@ -29,6 +29,7 @@ _ENOUGH = 1e-13  # relative decrease of the cost that is rounding
 _FIRST_DAMPING, _MOST_DAMPING = 1e-4, 1e8  # of the squared largest singular value
 _SMALLEST_SCALE = 1e-12  # m: exact data have no noise to measure a loss by
 _SAME_SCALE = 0.01
+_OUTLIER = 3.0  # over the scale of the loss
 _MOST_SCALES = 20
 _BEYOND_CHANCE = 30.0  # of F, the decrease for each released combination over the variance: 5.5 deviations
 _STABLE = 5  # changes of rank at most
@@ -62,6 +63,7 @@ class Fit:
         iterations: Accepted steps.
         weights: Of each measurement by the loss, shape (N,): 1 where it is linear.
         loss_scale: Where the loss left the square, m, or deviations where these are known; None: nowhere.
+        outliers: Indices of measurements whose residual is more than three times that.
     """
 
     robot: Robot
@@ -71,10 +73,11 @@ class Fit:
     iterations: int
     weights: Array
     loss_scale: float | None
+    outliers: tuple[int, ...]
 
 
 def calibrate(
-    robot: Robot, measurements: Measurements, parameters: Sequence[Parameter], options: Options
+    robot: Robot, measurements: Measurements, parameters: Sequence[ArmParameter], options: Options
 ) -> Fit:
     """Return the robot whose tool is nearest to the measured poses.
 
@@ -93,7 +96,7 @@ def calibrate(
     """
     problem = _Problem(measurements, parameters, options)
     seen = problem.seen(robot)
-    fit = _converged(problem, Fit(robot, seen, seen.basis, 0, 0, np.ones(len(measurements.joints)), None))
+    fit = _converged(problem, Fit(robot, seen, seen.basis, 0, 0, np.ones(len(measurements.joints)), None, ()))
     for _ in range(_STABLE):
         now = problem.seen(fit.robot)
         if now.rank <= fit.span.shape[1]:
@@ -108,7 +111,9 @@ def calibrate(
 class _Problem:
     """Weighted residuals of a robot, and their cost."""
 
-    def __init__(self, measurements: Measurements, parameters: Sequence[Parameter], options: Options) -> None:
+    def __init__(
+        self, measurements: Measurements, parameters: Sequence[ArmParameter], options: Options
+    ) -> None:
         self.measurements, self.parameters, self.options = measurements, parameters, options
         self.weights = measurements.weights(options.length)
 
@@ -127,8 +132,11 @@ class _Problem:
 
     def loss_scale(self, robot: Robot) -> float:
         """Return where the loss of a robot's residuals leaves the square."""
-        norms = np.linalg.norm(self.rows(robot)[0], axis=1)
-        return max(self.options.loss_scale * float(np.median(norms)), _SMALLEST_SCALE)
+        return max(self.options.loss_scale * float(np.median(self.norms(robot))), _SMALLEST_SCALE)
+
+    def norms(self, robot: Robot) -> Array:
+        """Return the length (N,) of each measurement's weighted residual."""
+        return np.asarray(np.linalg.norm(self.rows(robot)[0], axis=1))
 
     def beyond_chance(self, fit: Fit, trial: Fit) -> bool:
         """Return whether released combinations take away more of the squares than noise lets them."""
@@ -153,7 +161,8 @@ def _converged(problem: _Problem, fit: Fit) -> Fit:
         last, scale = scale, problem.loss_scale(fit.robot)
         if abs(scale - last) <= _SAME_SCALE * last:
             break
-    return fit
+    far = problem.norms(fit.robot) > _OUTLIER * scale
+    return replace(fit, outliers=tuple(np.flatnonzero(far).tolist()))
 
 
 def _descended(problem: _Problem, fit: Fit, scale: float | None) -> Fit:

@@ -16,7 +16,7 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import comparable, frozen
-from trajcli.kinematics.calibration.parameters import Parameter
+from trajcli.kinematics.calibration.parameters import ArmParameter
 
 RANK_TOLERANCE = 1e-8
 """Of the largest singular value; below it a combination of parameters counts as unidentifiable."""
@@ -35,7 +35,7 @@ class Share:
         weight: By how much it changes, rad or m.
     """
 
-    parameter: Parameter
+    parameter: ArmParameter
     weight: float
 
 
@@ -59,7 +59,7 @@ class Identifiability:
     combinations: tuple[tuple[Share, ...], ...]
 
 
-def identifiability(jacobian: Array, parameters: Sequence[Parameter], length: float) -> Identifiability:
+def identifiability(jacobian: Array, parameters: Sequence[ArmParameter], length: float) -> Identifiability:
     """Return what rows of measurements determine.
 
     Args:
@@ -83,7 +83,7 @@ def identifiability(jacobian: Array, parameters: Sequence[Parameter], length: fl
 
 
 def _combinations(
-    kernel: Array, parameters: Sequence[Parameter], length: float
+    kernel: Array, parameters: Sequence[ArmParameter], length: float
 ) -> tuple[tuple[Share, ...], ...]:
     """Return the combinations (k, p) of a kernel with few parameters each, sorted by their first."""
     units = np.array([1.0 if parameter.angular else length for parameter in parameters])

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
-from trajcli.kinematics.calibration.parameters import Parameter
+from trajcli.kinematics.calibration.parameters import ArmParameter
 from trajcli.kinematics.calibration.sensitivity import identification_jacobian
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.target import IkTarget, closure_of, residual_jacobian, residuals
@@ -56,7 +56,7 @@ class Measurements:
             return np.broadcast_to([1.0, 1.0, 1.0, length, length, length], (len(self.joints), 6))
         return np.repeat(1.0 / self.deviations, 3, axis=1)
 
-    def differences(self, robot: Robot, parameters: Sequence[Parameter]) -> tuple[Array, Array]:
+    def differences(self, robot: Robot, parameters: Sequence[ArmParameter]) -> tuple[Array, Array]:
         """Return the residuals (N, 6), measured less computed, and their Jacobian (N, 6, p) by parameters.
 
         Position comes first; what was not measured is zero. Residuals of orientation are rotation vectors

@@ -24,7 +24,7 @@ from trajcli.errors import InputError
 from trajcli.frozen import frozen
 from trajcli.kinematics.calibration.identifiability import Identifiability, identifiability
 from trajcli.kinematics.calibration.measurements import MeasuredKind, Measurements
-from trajcli.kinematics.calibration.parameters import Parameter
+from trajcli.kinematics.calibration.parameters import ArmParameter
 from trajcli.kinematics.calibration.sensitivity import identification_jacobian
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import Robot
@@ -84,7 +84,7 @@ def random_candidates(robot: Robot, count: int = CANDIDATES) -> Array:
 
 
 def attainable_rank(
-    robot: Robot, measurements: Measurements, parameters: Sequence[Parameter], length: float
+    robot: Robot, measurements: Measurements, parameters: Sequence[ArmParameter], length: float
 ) -> int:
     """Return the rank that measurements of the same kinds would have at configurations all over.
 
@@ -107,7 +107,7 @@ def attainable_rank(
 def measuring_plan(
     robot: Robot,
     candidates: Array,
-    parameters: Sequence[Parameter],
+    parameters: Sequence[ArmParameter],
     count: int,
     length: float,
     part: MeasuredPart = "pose",
@@ -134,8 +134,8 @@ def measuring_plan(
     _check_counts(count, candidates, rows.shape[1], seen, part)
     chosen = _chosen((rows.reshape(-1, len(parameters)) @ seen.basis).reshape(*rows.shape[:2], -1), count)
     units = np.array([1.0 if parameter.angular else length for parameter in parameters])
-    told = rows[chosen].reshape(-1, len(parameters)) * units
-    values = np.linalg.svd(told, compute_uv=False)[: seen.rank]
+    scaled = rows[chosen].reshape(-1, len(parameters)) * units
+    values = np.linalg.svd(scaled, compute_uv=False)[: seen.rank]
     final = identifiability(rows[chosen].reshape(-1, len(parameters)), parameters, length)
     smallest = float(values[-1])
     index = float(np.exp(np.log(values).mean()) / np.sqrt(count))

@@ -33,7 +33,7 @@ _FRAMES = ("base", "tool")
 
 
 @comparable
-class Parameter:
+class ArmParameter:
     """One number of a robot.
 
     Attributes:
@@ -55,7 +55,7 @@ class Parameter:
         return f"{self.owner}.{self.name}"
 
 
-def all_parameters(robot: Robot) -> tuple[Parameter, ...]:
+def all_parameters(robot: Robot) -> tuple[ArmParameter, ...]:
     """Return every parameter, from the base to the tool; beta for d in rows between almost parallel axes.
 
     Between parallel axes the common normal can lie anywhere, and the d of a row jumps with the last digit of
@@ -67,10 +67,10 @@ def all_parameters(robot: Robot) -> tuple[Parameter, ...]:
     return (*_pose_parameters("base"), *rows, *_pose_parameters("tool"))
 
 
-def row_parameters(robot: Robot, joint: int) -> tuple[Parameter, ...]:
+def row_parameters(robot: Robot, joint: int) -> tuple[ArmParameter, ...]:
     """Return the four parameters of a joint's row: theta, d, a, alpha, or beta in the place of d."""
     names = ("theta", "beta", "a", "alpha") if joint in parallel_rows(robot) else ROW[:4]
-    return tuple(Parameter(robot.joints[joint].name, name, joint) for name in names)
+    return tuple(ArmParameter(robot.joints[joint].name, name, joint) for name in names)
 
 
 def parallel_rows(robot: Robot) -> tuple[int, ...]:
@@ -84,11 +84,11 @@ def parallel_rows(robot: Robot) -> tuple[int, ...]:
     return tuple(row for row, cosine in zip(rows, cosines, strict=True) if abs(cosine) >= np.cos(PARALLEL))
 
 
-def _pose_parameters(owner: str) -> tuple[Parameter, ...]:
-    return tuple(Parameter(owner, name) for name in POSE)
+def _pose_parameters(owner: str) -> tuple[ArmParameter, ...]:
+    return tuple(ArmParameter(owner, name) for name in POSE)
 
 
-def parse_parameters(robot: Robot, text: str) -> tuple[Parameter, ...]:
+def parse_parameters(robot: Robot, text: str) -> tuple[ArmParameter, ...]:
     """Return the parameters that a text such as `all` or `j1.theta,j2.a,tool` names, in the robot's order.
 
     A joint's name alone means the four numbers of its row, `base` and `tool` alone their six, `dh` all rows.
@@ -96,7 +96,7 @@ def parse_parameters(robot: Robot, text: str) -> tuple[Parameter, ...]:
     Raises:
         InputError: When there is no such parameter, or one stands twice.
     """
-    chosen: list[Parameter] = []
+    chosen: list[ArmParameter] = []
     for word in (part.strip() for part in text.split(",")):
         for parameter in _named(robot, word):
             if parameter in chosen:
@@ -105,7 +105,7 @@ def parse_parameters(robot: Robot, text: str) -> tuple[Parameter, ...]:
     return tuple(sorted(chosen, key=lambda parameter: _order(robot, parameter)))
 
 
-def _named(robot: Robot, word: str) -> tuple[Parameter, ...]:
+def _named(robot: Robot, word: str) -> tuple[ArmParameter, ...]:
     """Return the parameters that one word means."""
     names = robot.joint_names
     if word in ("all", "dh"):
@@ -120,9 +120,9 @@ def _named(robot: Robot, word: str) -> tuple[Parameter, ...]:
         return _pose_parameters(word)
     owner, _, name = word.rpartition(".")
     if owner in names and name in ROW:
-        return (Parameter(owner, name, names.index(owner)),)
+        return (ArmParameter(owner, name, names.index(owner)),)
     if owner in _FRAMES and name in POSE:
-        return (Parameter(owner, name),)
+        return (ArmParameter(owner, name),)
     known = ["all", "dh", *_FRAMES, *names]
     known += [f"{each}.{key}" for each in names for key in ROW]
     known += [f"{each}.{key}" for each in _FRAMES for key in POSE]
@@ -133,13 +133,13 @@ def _named(robot: Robot, word: str) -> tuple[Parameter, ...]:
     )
 
 
-def _order(robot: Robot, parameter: Parameter) -> tuple[int, int]:
+def _order(robot: Robot, parameter: ArmParameter) -> tuple[int, int]:
     if parameter.joint is not None:
         return parameter.joint, ROW.index(parameter.name)
     return -1 if parameter.owner == "base" else len(robot.joints), POSE.index(parameter.name)
 
 
-def shifted(robot: Robot, parameters: Sequence[Parameter], change: Array) -> Robot:
+def shifted(robot: Robot, parameters: Sequence[ArmParameter], change: Array) -> Robot:
     """Return the robot with each parameter changed by an amount (p,), rad or m; turns multiply."""
     joints = list(robot.joints)
     frames = {owner: np.zeros(6) for owner in _FRAMES}
@@ -160,7 +160,7 @@ def _moved(pose: Array, step: Array) -> Array:
     return build(exp(step[3:]) @ pose[:3, :3], pose[:3, 3] + step[:3])
 
 
-def values_of(robot: Robot, nominal: Robot, parameters: Sequence[Parameter]) -> Array:
+def values_of(robot: Robot, nominal: Robot, parameters: Sequence[ArmParameter]) -> Array:
     """Return the values (p,) of the parameters, rad and m; turns are counted from the nominal robot's."""
     frames = {owner: _six(getattr(robot, owner), getattr(nominal, owner)) for owner in _FRAMES}
     return np.array(

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from trajcli.curves.piecewise import Array
-from trajcli.kinematics.calibration.parameters import POSE, Parameter
+from trajcli.kinematics.calibration.parameters import POSE, ArmParameter
 from trajcli.kinematics.columns import ZERO, VectorEntries, cross, minus
 from trajcli.kinematics.robot import Robot
 from trajcli.kinematics.serial_chain import Link, MovingFrame, configurations, links_of
@@ -25,7 +25,7 @@ _WORLD: tuple[VectorEntries, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0
 
 
 def identification_jacobian(
-    robot: Robot, q: ArrayLike, parameters: Sequence[Parameter]
+    robot: Robot, q: ArrayLike, parameters: Sequence[ArmParameter]
 ) -> tuple[Array, Array]:
     """Return the poses T_world_tcp (N, 4, 4), and how they change with the parameters, (N, 6, p), in world.
 

@@ -17,7 +17,7 @@ from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.calibration.fit import Fit, Options
 from trajcli.kinematics.calibration.identifiability import identifiability
 from trajcli.kinematics.calibration.measurements import Measurements
-from trajcli.kinematics.calibration.parameters import Parameter
+from trajcli.kinematics.calibration.parameters import ArmParameter
 
 WORTH_MENTIONING = 0.9
 """Magnitude of a correlation from which on it is reported."""
@@ -30,8 +30,8 @@ _FREEDOM = 0.5  # of one kind of residual, below which both kinds are taken toge
 class Correlation:
     """Two parameters whose errors go together: -1 to 1."""
 
-    first: Parameter
-    second: Parameter
+    first: ArmParameter
+    second: ArmParameter
     value: float
 
 
@@ -53,7 +53,7 @@ class Uncertainty:
 
 
 def uncertainty(
-    fit: Fit, measurements: Measurements, parameters: Sequence[Parameter], options: Options
+    fit: Fit, measurements: Measurements, parameters: Sequence[ArmParameter], options: Options
 ) -> Uncertainty:
     """Return the uncertainty of a fit.
 
@@ -86,8 +86,8 @@ def uncertainty(
 
 
 def _undetermined(
-    fit: Fit, jacobian: Array, parameters: Sequence[Parameter], options: Options
-) -> set[Parameter]:
+    fit: Fit, jacobian: Array, parameters: Sequence[ArmParameter], options: Options
+) -> set[ArmParameter]:
     """Return the parameters of combinations that the fit leaves undetermined."""
     seen = fit.nominal
     if fit.released:
@@ -119,7 +119,7 @@ def _noise(
 
 
 def _correlations(
-    covariance: Array, deviations: Array, known: Sequence[bool], parameters: Sequence[Parameter]
+    covariance: Array, deviations: Array, known: Sequence[bool], parameters: Sequence[ArmParameter]
 ) -> tuple[Correlation, ...]:
     """Return the largest correlations of parameters that are known."""
     usable = [i for i, each in enumerate(known) if each and deviations[i] > 0]
