@@ -23,6 +23,7 @@ BENCHMARKS = (
     "evaluation",
     "forward_kinematics",
     "inverse_kinematics",
+    "calibration",
     "time_optimal",
     "through_points",
     "operational",

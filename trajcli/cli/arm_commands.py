@@ -99,7 +99,7 @@ def register(app: typer.Typer) -> None:
     for command in (fk, ik, jacobian, pose):
         app.command(cls=NumbersCommand, epilog=f"Example: {_EXAMPLES[command.__name__]}")(command)
     app.command(epilog="Example: trajcli robots ur5e")(robots)
-    app.command(epilog="Example: trajcli calibrate -r ur5e measured.csv -o calibrated.yaml")(calibrate)
+    app.command(epilog="Example: trajcli calibrate -r ur5e --plan 20")(calibrate)
     app.command(epilog="Example: trajcli mobility --links 4 --joints 1x4 --space planar")(mobility)
 
 

@@ -34,6 +34,7 @@ from trajcli.streams.whole_file import identity, whole_file
 from trajcli.units import Quantity
 
 _FEW = 12  # names in a line
+_DECIMALS = {"rad": 8, "m": 8, "deg": 6, "mm": 5}  # of a parameter: finer than anything is measured
 
 
 @comparable
@@ -154,8 +155,9 @@ def _rows(calibration: Calibration) -> Iterator[list[str]]:
     for row in calibration_report(calibration)["parameters"]:
         unit, per = _unit(calibration.arm, row["unit"])
         values = [row["nominal"], row["value"], row["value"] - row["nominal"]]
+        cells = (number(round(value / per, _DECIMALS[unit])) for value in values)
         deviation = "-" if row["std"] is None else f"{row['std'] / per:.3g}"
-        yield [f"{row['joint']}.{row['name']}", unit, *(number(value / per) for value in values), deviation]
+        yield [f"{row['joint']}.{row['name']}", unit, *cells, deviation]
 
 
 def _unit(arm: ArmInUnits, unit: str) -> tuple[str, float]:
@@ -179,7 +181,7 @@ def _residual_lines(arm: ArmInUnits, report: dict[str, Any]) -> Iterator[str]:
 
 def _combination_lines(arm: ArmInUnits, combinations: Sequence[Sequence[dict[str, Any]]]) -> Iterator[str]:
     if combinations:
-        yield "not identifiable, nominal but for steps of least norm (changes, rad and m, that nobody sees):"
+        yield "not identifiable (changes, rad and m, that no measurement sees; nothing changed along them):"
     for shares in combinations:
         if len(shares) == 1:
             yield f"  {shares[0]['joint']}.{shares[0]['name']}"
