@@ -246,6 +246,30 @@ def test_a_joint_that_never_moved_is_named(arms, spatial, tmp_path):
     assert any("the configurations tell" in remark for remark in report["remarks"])
 
 
+def test_wrong_units_are_remarked(arms, planar, tmp_path):
+    items = [
+        {
+            "joints": np.degrees(item["joints"]).tolist(),
+            "pose": {"xyz": [900 * item["pose"]["xyz"][0], None, 0]},
+        }
+        for item in headings()
+    ]
+    report = arms.json("calibrate", "-r", planar, "--free", "j1.a,base.x", listed(tmp_path, items))
+    assert any("more than two turns" in remark for remark in report["remarks"])
+    assert any("more than its own length" in remark for remark in report["remarks"])
+
+
+def test_steps_that_do_not_come_to_rest_are_remarked(arms, planar, tmp_path, monkeypatch):
+    from trajcli.kinematics.calibration import fit
+
+    file = listed(tmp_path, list(headings()))
+    assert arms.json("calibrate", "-r", planar, "--free", FREE, file)["converged"] is True
+    monkeypatch.setattr(fit, "_MOST_STEPS", 1)
+    report = arms.json("calibrate", "-r", planar, "--free", FREE, file)
+    assert report["converged"] is False
+    assert any("come to rest" in remark for remark in report["remarks"])
+
+
 POSE = {"xyz": [0.4, 0.1, 0.3]}
 WRONG = [
     ([], "empty list"),

@@ -322,6 +322,7 @@ def calibrate(
     ] = None,
     tool: Tool = None,
     units: ArmUnits = None,
+    si: Si = False,
     as_json: Json = False,
     errors: Errors = "text",
 ) -> int:
@@ -334,7 +335,7 @@ def calibrate(
     """
     from trajcli.cli.calibrate import CalibrateOptions, run_calibrate
 
-    options = CalibrateOptions(free, output, scale, loss, loss_scale, plan, measure, tool, units, as_json)
+    options = CalibrateOptions(free, output, scale, loss, loss_scale, plan, measure, tool, units, si, as_json)
     return run_calibrate(robot, file, options)
 
 

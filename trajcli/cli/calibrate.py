@@ -50,6 +50,7 @@ class CalibrateOptions:
     measure: MeasuredPart | None = None
     tool: str | None = None
     units: str | None = None
+    si: bool = False
     as_json: bool = False
 
 
@@ -60,7 +61,7 @@ def run_calibrate(robot: str, file: str | None, options: CalibrateOptions) -> in
         InputError: When robot, parameters, measurements or options are not as they should be.
         FileError: When a file cannot be read or written.
     """
-    arm = open_arm(robot, options.tool, units=options.units)
+    arm = open_arm(robot, options.tool, units=options.units, si=options.si)
     _check(robot, file, options)
     length = _scale(arm, options)
     if options.plan is not None:

@@ -36,7 +36,7 @@ from trajcli.kinematics.calibration.parameters import (
 from trajcli.kinematics.calibration.uncertainty import Uncertainty, uncertainty
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.robot import Joint, Robot
-from trajcli.queries.arm import ArmInUnits
+from trajcli.queries.arm import ArmInUnits, beyond_two_turns
 from trajcli.units import Dimension, Quantity, Units, factor
 from trajcli.version import __version__
 
@@ -107,8 +107,25 @@ def calibration_of(arm: ArmInUnits, file: str, free: str, options: Options | Non
         )
     fit = calibrate(robot, measurements, parameters, chosen)
     known = uncertainty(fit, measurements, parameters, chosen)
-    remarks = tuple(_remarks(robot, measurements, parameters, attainable, fit))
+    remarks = (
+        *_remarks_on_units(arm, measurements),
+        *_remarks(robot, measurements, parameters, attainable, fit),
+    )
     return Calibration(arm, file, measurements, parameters, chosen, fit, known, remarks)
+
+
+def _remarks_on_units(arm: ArmInUnits, measurements: Measurements) -> Iterator[str]:
+    """Yield what wrong units, or poses in another frame, look like."""
+    units = [arm.joint_unit(joint) for joint in range(len(arm.robot.joints))]
+    turns = beyond_two_turns(arm.robot, measurements.joints, units)
+    if turns is not None:
+        yield turns
+    length, (missed, _) = characteristic_length(arm.robot), measurements.root_mean_squares(arm.robot)
+    if missed is not None and missed > length:
+        yield (
+            f"the nominal arm misses positions by {missed:.4g} m, more than its own length, {length:.4g} m: "
+            "check units, the order of joints, and in which frame the poses are"
+        )
 
 
 def _remarks(
@@ -136,6 +153,8 @@ def _remarks(
         angle = np.degrees(PARALLEL)
         listed_rows = ", ".join(swapped)
         yield f"axes within {angle:g} deg of parallel: beta instead of d in the row of {listed_rows}"
+    if not fit.converged:
+        yield f"the steps have not come to rest after {fit.iterations}: do not trust the numbers"
     if fit.released:
         yield (
             f"{fit.released} combination{'s' * (fit.released > 1)} of parameters that cannot be told apart "
@@ -165,6 +184,7 @@ def calibration_report(calibration: Calibration) -> dict[str, Any]:
             for key, value in (("before", before), ("after", after))
         },
         "iterations": fit.iterations,
+        "converged": fit.converged,
         "scale": options.length,
         "noise": dict(zip(("position", "angle"), known.noise, strict=True)),
         "correlations": [

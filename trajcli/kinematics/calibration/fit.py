@@ -64,6 +64,7 @@ class Fit:
         weights: Of each measurement by the loss, shape (N,): 1 where it is linear.
         loss_scale: Where the loss left the square, m, or deviations where these are known; None: nowhere.
         outliers: Indices of measurements whose residual is more than three times that.
+        converged: Whether the last steps came to rest.
     """
 
     robot: Robot
@@ -74,6 +75,7 @@ class Fit:
     weights: Array
     loss_scale: float | None
     outliers: tuple[int, ...]
+    converged: bool
 
 
 def calibrate(
@@ -96,7 +98,9 @@ def calibrate(
     """
     problem = _Problem(measurements, parameters, options)
     seen = problem.seen(robot)
-    fit = _converged(problem, Fit(robot, seen, seen.basis, 0, 0, np.ones(len(measurements.joints)), None, ()))
+    fit = _converged(
+        problem, Fit(robot, seen, seen.basis, 0, 0, np.ones(len(measurements.joints)), None, (), True)
+    )
     for _ in range(_STABLE):
         now = problem.seen(fit.robot)
         if now.rank <= fit.span.shape[1]:
@@ -170,14 +174,15 @@ def _descended(problem: _Problem, fit: Fit, scale: float | None) -> Fit:
     robot, damping, loss = fit.robot, 0.0, problem.options.loss
     residuals, jacobian = problem.rows(robot)
     cost, weights = _cost(residuals, loss, scale)
-    iterations = fit.iterations
+    iterations, converged = fit.iterations, False
     for _ in range(_MOST_STEPS):
         step = _step(residuals, jacobian, weights, fit.span, damping)
         trial = shifted(robot, problem.parameters, fit.span @ step)
         next_residuals, next_jacobian = problem.rows(trial)
         next_cost, next_weights = _cost(next_residuals, loss, scale)
         if not next_cost <= cost:
-            if damping > _MOST_DAMPING or np.abs(step).max(initial=0.0) <= _SMALLEST_STEP:
+            converged = damping > _MOST_DAMPING or np.abs(step).max(initial=0.0) <= _SMALLEST_STEP
+            if converged:
                 break
             damping = max(_FIRST_DAMPING, 10.0 * damping)
             continue
@@ -186,9 +191,10 @@ def _descended(problem: _Problem, fit: Fit, scale: float | None) -> Fit:
         residuals, jacobian = next_residuals, next_jacobian
         damping = 0.0 if damping <= _FIRST_DAMPING else 0.1 * damping
         iterations += 1
-        if decrease <= _ENOUGH * cost or np.abs(step).max(initial=0.0) <= _SMALLEST_STEP:
+        converged = decrease <= _ENOUGH * cost or np.abs(step).max(initial=0.0) <= _SMALLEST_STEP
+        if converged:
             break
-    return replace(fit, robot=robot, iterations=iterations, weights=weights)
+    return replace(fit, robot=robot, iterations=iterations, weights=weights, converged=bool(converged))
 
 
 def _step(residuals: Array, jacobian: Array, weights: Array, span: Array, damping: float) -> Array:
