@@ -25,6 +25,7 @@ BENCHMARKS = (
     "forward_kinematics",
     "urdf",
     "inverse_kinematics",
+    "calibration",
     "time_optimal",
     "through_points",
     "operational",

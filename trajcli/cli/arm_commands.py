@@ -96,11 +96,12 @@ def sorted_words(args: list[str], takes: Mapping[str, int]) -> list[str]:
 
 
 def register(app: typer.Typer) -> None:
-    """Add the commands fk, ik, jacobian, pose, robots, urdf and mobility."""
+    """Add the commands fk, ik, jacobian, pose, robots, urdf, calibrate and mobility."""
     for command in (fk, ik, jacobian, pose):
         app.command(cls=NumbersCommand, epilog=f"Example: {_EXAMPLES[command.__name__]}")(command)
     app.command(epilog="Example: trajcli robots ur5e")(robots)
     app.command(epilog="Example: trajcli urdf arm.urdf -o robot.yaml")(urdf)
+    app.command(epilog="Example: trajcli calibrate -r ur5e --plan 20")(calibrate)
     app.command(epilog="Example: trajcli mobility --links 4 --joints 1x4 --space planar")(mobility)
 
 
@@ -324,6 +325,73 @@ def urdf(
     from trajcli.cli.urdf import UrdfOptions, run_urdf
 
     return run_urdf(file, UrdfOptions(root, tip, exact, soft, output))
+
+
+@guarded
+def calibrate(
+    robot: RobotName,
+    file: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="FILE",
+            help="Measured poses: a YAML list of {joints, pose}, or a CSV, - on stdin; candidates of --plan.",
+        ),
+    ] = None,
+    free: Annotated[
+        str,
+        typer.Option(
+            "--free",
+            metavar="all|NAME,...",
+            help="Parameters: all, dh, base, tool, a joint, or such as j1.theta,j2.d,base.x,tool.rz.",
+        ),
+    ] = "all",
+    output: Annotated[
+        str | None,
+        typer.Option("--output", "-o", metavar="FILE", help="The corrected robot's file; a plan's CSV."),
+    ] = None,
+    scale: Annotated[
+        str | None,
+        typer.Option(
+            "--scale", metavar="L", help="Length that counts like a radian; else all lengths of the arm."
+        ),
+    ] = None,
+    loss: Annotated[
+        Literal["linear", "huber", "cauchy"],
+        typer.Option("--loss", help="How a measurement far off counts: squared, or less."),
+    ] = "linear",
+    loss_scale: Annotated[
+        float | None,
+        typer.Option(
+            "--loss-scale",
+            metavar="K",
+            help="Times the median residual: what is beyond counts less; 1.5 if left out.",
+        ),
+    ] = None,
+    plan: Annotated[
+        int | None,
+        typer.Option("--plan", metavar="N", help="Propose N configurations to measure, as CSV or JSON."),
+    ] = None,
+    measure: Annotated[
+        Literal["pose", "position"] | None,
+        typer.Option("--measure", help="What --plan expects to be measured; pose if left out."),
+    ] = None,
+    tool: Tool = None,
+    units: ArmUnits = None,
+    si: Si = False,
+    as_json: Json = False,
+    errors: Errors = "text",
+) -> int:
+    """Find the parameters of an arm from measured poses: DH rows, base and tool.
+
+    What the measurements cannot tell keeps its nominal value, and is named. JSON is in rad and m.
+
+    Exit codes: 0 done; 2 robot, parameters or measurements are wrong, or too few; 4 a file cannot be read or
+    written.
+    """
+    from trajcli.cli.calibrate import CalibrateOptions, run_calibrate
+
+    options = CalibrateOptions(free, output, scale, loss, loss_scale, plan, measure, tool, units, si, as_json)
+    return run_calibrate(robot, file, options)
 
 
 @guarded

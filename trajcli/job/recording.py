@@ -59,12 +59,7 @@ def _placed(problem: Problem) -> str:
 
 
 def _recorded(table: Table, robot: Robot) -> Recorded:
-    positions = np.stack([_joint(table, robot, joint) for joint in range(len(robot.joints))], axis=1)
-    if np.abs(positions).max(initial=0.0) > LARGEST_POSITION:
-        most = f"{LARGEST_POSITION:g} rad or m"
-        raise InputError(
-            f"{table.file}: a value is larger than {most}", hint="check its exponent and its unit"
-        )
+    positions = joint_columns(table, robot)
     if "t" not in table.names:
         _refuse_other_times(table)
         return Recorded(positions, file=table.file)
@@ -78,6 +73,21 @@ def _recorded(table: Table, robot: Robot) -> Recorded:
             hint="remove the rows that repeat a time, or the column t: times are then found from the limits",
         )
     return Recorded(positions, times, table.file)
+
+
+def joint_columns(table: Table, robot: Robot) -> Array:
+    """Return the values of all joints (N, n), rad or m, from columns such as q1, q2_deg or a joint's name.
+
+    Raises:
+        InputError: When a joint has no column or two, one of another unit, or a value that no robot has.
+    """
+    positions = np.stack([_joint(table, robot, joint) for joint in range(len(robot.joints))], axis=1)
+    if np.abs(positions).max(initial=0.0) > LARGEST_POSITION:
+        most = f"{LARGEST_POSITION:g} rad or m"
+        raise InputError(
+            f"{table.file}: a value is larger than {most}", hint="check its exponent and its unit"
+        )
+    return positions
 
 
 def _refuse_other_times(table: Table) -> None:

@@ -87,14 +87,18 @@ class _TooDeepError(Exception):
     """Ends the walk."""
 
 
-def read_document(path: str) -> Document:
+def read_document(path: str, *, any_root: bool = False) -> Document:
     """Return the document of a YAML file; `-` is standard input.
+
+    Args:
+        path: Of the file.
+        any_root: Whether the whole may be something else than a mapping.
 
     Raises:
         InputError: With every problem of the file, each with its place.
         FileError: When it is missing or cannot be read.
     """
-    return parse_document(read_bytes(path), STDIN if path == "-" else path)
+    return parse_document(read_bytes(path), STDIN if path == "-" else path, any_root=any_root)
 
 
 def parse_document(data: bytes | str, file: str, *, any_root: bool = False) -> Document:

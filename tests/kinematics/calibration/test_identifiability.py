@@ -1,0 +1,124 @@
+"""Rank and combinations that cannot be told apart, against an SVD of differences and against the poses themselves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from arms import arm, configurations
+from product_of_rows import difference_jacobian, pose_of
+
+from trajcli.errors import InputError
+from trajcli.kinematics.calibration.identifiability import identifiability
+from trajcli.kinematics.calibration.parameters import all_parameters, parallel_rows, parse_parameters
+from trajcli.kinematics.calibration.sensitivity import identification_jacobian
+
+FREE = {
+    "all": "all",
+    "d": ",".join(f"j{i}.{name}" for i in (1, 2, 3, 4) for name in ("theta", "d", "a", "alpha")),
+}
+
+
+def seen(robot, text, q, part):
+    parameters = parse_parameters(robot, text)
+    jacobian = identification_jacobian(robot, q, parameters)[1][:, : 3 if part == "position" else 6]
+    return identifiability(jacobian.reshape(-1, len(parameters)), parameters, 1.0), parameters
+
+
+def seen_part(pose, part):
+    return pose[:3, 3] if part == "position" else pose
+
+
+def difference_rank(robot, q, parameters, part):
+    """Return the rank of the differences, where there is a gap a thousand times as wide."""
+    rows = difference_jacobian(robot, q, parameters, 1e-4)[:, : 3 if part == "position" else 6]
+    flat = rows.reshape(-1, len(parameters))
+    lengths = np.linalg.norm(flat, axis=0)
+    values = np.linalg.svd(flat / np.where(lengths > 1e-6, lengths, 1.0), compute_uv=False) / max(
+        1.0, lengths.max()
+    )
+    rank = int(np.count_nonzero(values > 1e-5))
+    assert values[rank - 1] > 1e-3
+    assert (values[rank:] < 1e-6).all()
+    return rank
+
+
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+@pytest.mark.parametrize("part", ["pose", "position"])
+@pytest.mark.parametrize("free", FREE)
+@pytest.mark.parametrize("name", ["ur", "puma", "scara"])
+def test_the_rank_is_that_of_differences_and_combinations_change_no_measurement(name, free, part, convention):
+    robot, rng = arm(name, convention), np.random.default_rng(3)
+    q = configurations(robot, 40, rng)
+    told, parameters = seen(robot, FREE[free], q, part)
+    assert told.rank == difference_rank(robot, q, parameters, part)
+    assert told.rank + len(told.combinations) == len(parameters)
+    for shares in told.combinations:
+        for row in q[:8]:
+            plain = seen_part(pose_of(robot, row, {}), part)
+            for step in (1e-5, -1e-5):
+                moved = pose_of(robot, row, {share.parameter: step * share.weight for share in shares})
+                assert np.abs(seen_part(moved, part) - plain).max() < 1e-8  # a real change would be 1e-5
+        norm = np.linalg.norm([share.weight for share in shares])
+        assert norm == pytest.approx(1.0)
+
+
+def named(told):
+    return [{str(share.parameter) for share in shares} for shares in told.combinations]
+
+
+def test_parallel_axes_are_named_where_d_is_free():
+    robot = arm("ur")
+    q = configurations(robot, 40, np.random.default_rng(1))
+    told, _ = seen(robot, "j1.d,j2.d,j3.d,j4.d,j2.a", q, "pose")
+    assert named(told) == [{"j2.d", "j3.d"}, {"j2.d", "j4.d"}]
+    assert [share.weight for share in told.combinations[0]] == pytest.approx([0.5**0.5, -(0.5**0.5)])
+
+
+def test_hayatis_tilt_leaves_four_redundancies_less():
+    # 6R: four numbers a row and twelve of base and tool, of which 4 n + 6 are told (Mooring, Roth and Driels)
+    for name in ("ur", "puma"):
+        for convention in ("standard", "modified"):
+            robot = arm(name, convention)
+            told, parameters = seen(robot, "all", configurations(robot, 40, np.random.default_rng(1)), "pose")
+            assert (len(parameters), told.rank) == (36, 30)
+
+
+def test_orientation_of_base_and_wrist_at_positions_only():
+    robot = arm("puma")
+    told, _ = seen(
+        robot, "tool,j6.theta,j6.alpha", configurations(robot, 40, np.random.default_rng(1)), "position"
+    )
+    assert [{"tool.rx"}, {"tool.ry"}, {"tool.rz"}] == named(told)[-3:]
+    assert told.rank == 3
+
+
+def test_a_joint_that_never_moves_counts_with_its_neighbour():
+    robot = arm("puma")
+    q = configurations(robot, 40, np.random.default_rng(1))
+    q[:, 1] = 0.4
+    told, _ = seen(robot, "j1,j2,j3", q, "pose")
+    free, _ = seen(robot, "j1,j2,j3", configurations(robot, 40, np.random.default_rng(1)), "pose")
+    assert told.rank < free.rank
+    assert any("j2.theta" in names for names in named(told))
+
+
+@pytest.mark.parametrize(("convention", "rows"), [("standard", (1, 2)), ("modified", (2, 3))])
+def test_parallel_rows_by_convention(convention, rows):
+    robot = arm("ur", convention)
+    assert parallel_rows(robot) == rows
+    names = [str(parameter) for parameter in all_parameters(robot)]
+    for row in range(6):
+        assert (f"j{row + 1}.beta" in names) == (row in rows)
+        assert (f"j{row + 1}.d" in names) == (row not in rows)
+
+
+@pytest.mark.parametrize("text", ["j7.a", "j1.b", "base.theta", "", "all,j1.a", "j1.a,j1.a", "tool.z,tool"])
+def test_unknown_and_doubled_parameters_are_refused(text):
+    with pytest.raises(InputError):
+        parse_parameters(arm("puma"), text)
+
+
+def test_the_nearest_name_is_proposed():
+    with pytest.raises(InputError) as caught:
+        parse_parameters(arm("puma"), "j1.tetha")
+    assert "j1.theta" in str(caught.value.problems[0].hint)

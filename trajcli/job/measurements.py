@@ -1,0 +1,283 @@
+"""Measurements of a tool's pose in files: YAML, a list of joints and pose; or CSV, a row for each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Annotated, Any, TypeVar
+
+import numpy as np
+from pydantic import BaseModel, ValidationError
+
+from trajcli.columns import GROUPS, Column, group_of, parse_column
+from trajcli.curves.piecewise import Array
+from trajcli.errors import InputError, Problem, TrajcliError
+from trajcli.geometry.rotation import QUATERNION_DEFECT, matrix_from_quaternion
+from trajcli.job.messages import problems_of
+from trajcli.job.recording import joint_columns
+from trajcli.job.yaml.document import Document
+from trajcli.job.yaml.load import read_document
+from trajcli.kinematics.calibration.measurements import MeasuredKind, Measurements
+from trajcli.kinematics.inverse.target import IkTarget, partial_target
+from trajcli.kinematics.robot import Robot
+from trajcli.language.numbers import LARGEST_POSITION, Model, Number, ReadingContext, shown
+from trajcli.language.targets import JointPositions, PoseFields, ik_target
+from trajcli.streams.table import Table, read_csv
+from trajcli.suggest import did_you_mean
+from trajcli.units import Quantity, Units
+
+M = TypeVar("M", bound=BaseModel)
+_AXES, _QUATERNION, _DEVIATIONS = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("position", "angle")
+_OWN = tuple(f"sigma_{name}" for name in _DEVIATIONS)
+_YAML = (".yaml", ".yml", ".json")
+_MOST_PROBLEMS = 10
+
+
+class DeviationSpec(Model):
+    """Standard deviations of a measurement."""
+
+    position: (
+        Annotated[float, Number(Quantity("length"), "Of each coordinate (length unit).", above=0.0)] | None
+    ) = None
+    angle: Annotated[float, Number(Quantity("angle"), "About each axis (angle unit).", above=0.0)] | None = (
+        None
+    )
+
+
+class MeasurementSpec(Model):
+    """A pose, or a part of one, measured at known joint values."""
+
+    joints: JointPositions
+    pose: PoseFields
+    sigma: DeviationSpec | None = None
+
+
+class ConfigurationSpec(Model):
+    """Joint values where a pose could be measured."""
+
+    joints: JointPositions
+    pose: PoseFields | None = None
+    sigma: DeviationSpec | None = None
+
+
+def read_measurements(path: str, robot: Robot, units: Units) -> Measurements:
+    """Return the measurements of a file: YAML by its ending, otherwise CSV; `-` is a CSV on standard input.
+
+    A YAML file is a list of {joints, pose, sigma?}; what a pose leaves out was not measured, nor is a
+    coordinate of its xyz that is null. A CSV has q1 .., some of x, y, z, all or none of qw qx qy qz, and
+    maybe sigma_position, sigma_angle.
+
+    Args:
+        path: Of the file.
+        robot: Its joints.
+        units: Of the plain numbers of a YAML file.
+
+    Raises:
+        InputError: With every flaw of the file.
+        FileError: When it cannot be read.
+    """
+    if not path.lower().endswith(_YAML):
+        return _from_table(read_csv(path), robot)
+    document, context = _open_list(path, robot, units)
+    joints, targets, deviations, problems = [], [], [], list[Problem]()
+    for index, item in enumerate(document.plain()):
+        try:
+            spec, fixed = _measurement(item, document, index, context)
+            targets.append(_target(spec, fixed, document, index))
+            joints.append(spec.joints)
+            deviations.append(None if spec.sigma is None else (spec.sigma.position, spec.sigma.angle))
+        except InputError as error:
+            problems += error.problems
+    if problems:
+        raise InputError(*problems[:_MOST_PROBLEMS])
+    places = [document.place((index,)) for index in range(len(targets))]
+    flaw = next(_flaws_of_deviations(deviations, targets), None)
+    if flaw is not None:
+        raise InputError(Problem(flaw[1], flaw[2], places[flaw[0]]))
+    known = None if deviations[0] is None else np.array([[a or 1.0, b or 1.0] for a, b in deviations])  # type: ignore[misc]
+    return Measurements(np.array(joints), tuple(_kinds(targets)), known)
+
+
+def read_configurations(path: str, robot: Robot, units: Units) -> Array:
+    """Return joint values (N, n), rad or m, of a file with or without measured poses.
+
+    Raises:
+        InputError: With every flaw of the file.
+        FileError: When it cannot be read.
+    """
+    if not path.lower().endswith(_YAML):
+        return joint_columns(read_csv(path), robot)
+    document, context = _open_list(path, robot, units)
+    rows, problems = [], list[Problem]()
+    for index, item in enumerate(document.plain()):
+        try:
+            rows.append(_validated(ConfigurationSpec, item, document, index, context).joints)
+        except InputError as error:
+            problems += error.problems
+    if problems:
+        raise InputError(*problems[:_MOST_PROBLEMS])
+    return np.array(rows)
+
+
+def _open_list(path: str, robot: Robot, units: Units) -> tuple[Document, ReadingContext]:
+    document = read_document(path, any_root=True)
+    content = document.root.value
+    if not isinstance(content, list) or not content:
+        got = "an empty list" if isinstance(content, list) else shown(document.plain())
+        hint = "such as `- {joints: [0, 0.5], pose: {xyz: [0.4, 0.1, 0.3]}}`"
+        raise InputError(Problem(f"expected a list of measurements, got {got}", hint, document.place(())))
+    return document, ReadingContext(units, robot.joint_names, robot.joint_types)
+
+
+def _validated(
+    model: type[M],
+    item: Any,  # noqa: ANN401
+    document: Document,
+    index: int,
+    context: ReadingContext,
+) -> M:
+    try:
+        return model.model_validate(item, context=context)
+    except ValidationError as error:
+        raise InputError(*problems_of(error, model, document, (index,))) from None
+
+
+def _measurement(
+    item: Any,  # noqa: ANN401
+    document: Document,
+    index: int,
+    context: ReadingContext,
+) -> tuple[MeasurementSpec, tuple[bool, bool, bool] | None]:
+    """Return a measurement, and which coordinates of xyz were measured where one is null."""
+    pose = item.get("pose") if isinstance(item, Mapping) else None
+    xyz = pose.get("xyz") if isinstance(pose, Mapping) else None
+    if not (isinstance(xyz, list) and len(xyz) == 3 and None in xyz) or pose is None:
+        return _validated(MeasurementSpec, item, document, index, context), None
+    x, y, z = (entry is not None for entry in xyz)
+    if not (x or y or z):
+        message = "no coordinate of xyz was measured"
+        raise InputError(Problem(message, "leave xyz out", document.place((index, "pose", "xyz"))))
+    filled = {**item, "pose": {**pose, "xyz": [0.0 if entry is None else entry for entry in xyz]}}
+    return _validated(MeasurementSpec, filled, document, index, context), (x, y, z)
+
+
+def _target(
+    spec: MeasurementSpec, fixed: tuple[bool, bool, bool] | None, document: Document, index: int
+) -> IkTarget:
+    if spec.pose.configuration is not None:
+        at = document.place((index, "pose", "configuration"), key=True)
+        raise InputError(Problem("a measured pose has no configuration: it has joints", "leave it out", at))
+    at = document.place((index, "pose"))
+    if not spec.pose.gives_pose:
+        raise InputError(Problem("the pose says nothing", "such as {xyz: [0.4, 0, 0.3]}", at))
+    try:
+        target = ik_target(spec.pose)
+    except TrajcliError as error:
+        raise InputError(*(replace(problem, place=at) for problem in error.problems)) from None
+    return target if fixed is None else replace(target, position=fixed)
+
+
+def _kinds(targets: Sequence[IkTarget]) -> Iterator[MeasuredKind]:
+    """Yield the measurements that fix the same coordinates, together."""
+    by_kind: dict[tuple[Any, ...], list[int]] = {}
+    for index, target in enumerate(targets):
+        axis = None if target.orientation in ("all", "none") else target.tool_axis
+        by_kind.setdefault((target.position, target.orientation, axis), []).append(index)
+    for rows in by_kind.values():
+        poses, aims = (np.stack([getattr(targets[row], name) for row in rows]) for name in ("poses", "aims"))
+        yield MeasuredKind(np.array(rows), replace(targets[rows[0]], poses=poses, aims=aims))
+
+
+def _flaws_of_deviations(
+    deviations: Sequence[tuple[float | None, float | None] | None], targets: Sequence[IkTarget]
+) -> Iterator[tuple[int, str, str]]:
+    """Yield the measurements that lack a deviation which others have, or their own part needs."""
+    if not any(deviations):
+        return
+    for index, (given, target) in enumerate(zip(deviations, targets, strict=True)):
+        needed = any(target.position), target.orientation != "none"
+        for name, value, wanted in zip(_DEVIATIONS, given or (None, None), needed, strict=True):
+            if wanted and value is None:
+                message = f"measurement {index + 1} has no standard deviation of its {name}"
+                yield index, message, f"give `sigma: {{{name}: ...}}` to all measurements, or to none"
+
+
+def _from_table(table: Table, robot: Robot) -> Measurements:
+    columns = {name: parse_column(name) for name in table.names}
+    _refuse_unknown(table, columns, robot)
+    joints = joint_columns(table, robot)
+    axes = [_values(table, columns, name) for name in _AXES]
+    turns = [_values(table, columns, name) for name in _QUATERNION]
+    missing = [name for name, values in zip(_QUATERNION, turns, strict=True) if values is None]
+    if 0 < len(missing) < len(_QUATERNION):
+        raise InputError(f"{table.file}: a quaternion has qw, qx, qy, qz: there is no {', '.join(missing)}")
+    measured = [values is not None for values in axes]
+    if missing and not any(measured):
+        hint = "a measured position has some of x, y, z; an orientation qw, qx, qy, qz"
+        raise InputError(f"{table.file}: there are no columns of a measured pose", hint=hint)
+    zero = np.zeros(len(joints))
+    position = np.stack([zero if values is None else values for values in axes], axis=1)
+    if np.abs(position).max() > LARGEST_POSITION:
+        hint = "check its exponent and its unit"
+        raise InputError(f"{table.file}: a position is larger than {LARGEST_POSITION:g} m", hint=hint)
+    rotation = None if missing else _rotations(np.stack([v for v in turns if v is not None], axis=1), table)
+    x, y, z = measured
+    target = partial_target(position, fixed=(x, y, z), rotation=rotation)
+    deviations = _table_deviations(table, columns, any(measured), rotation is not None)
+    return Measurements(joints, (MeasuredKind(np.arange(len(joints)), target),), deviations)
+
+
+def _refuse_unknown(table: Table, columns: Mapping[str, Column], robot: Robot) -> None:
+    """Refuse a name that is no column of ours: it may be a misspelt one."""
+    known = [*(f"q{i + 1}" for i in range(len(robot.joints))), *_AXES, *_QUATERNION, *_OWN]
+    for name, column in columns.items():
+        ours = group_of(column) in GROUPS or column.kind in (*_OWN, *robot.joint_names)
+        if not ours and column.joint is None:
+            hint = did_you_mean(name, known) or f"the columns are {', '.join(known)}, with _deg or _mm"
+            raise InputError(f"{table.file}: there is no column '{name}'", hint=hint)
+
+
+def _values(table: Table, columns: Mapping[str, Column], kind: str) -> Array | None:
+    """Return the values (N,) of one kind in SI; None where there is no such column."""
+    names = [name for name, column in columns.items() if column.kind == kind and column.joint is None]
+    if not names:
+        return None
+    if len(names) > 1:
+        raise InputError(f"{table.file}: {names[0]} and {names[1]} are columns of the same number")
+    unit = columns[names[0]].unit
+    allowed = {"sigma_angle": "deg", **dict.fromkeys((*_AXES, "sigma_position"), "mm")}.get(kind)
+    if unit not in (None, allowed):
+        hint = f"call it {kind}" + (f" (SI) or {kind}_{allowed}" if allowed else "")
+        raise InputError(f"{table.file}: the column {names[0]} cannot be in {unit}", hint=hint)
+    return np.asarray(table.column(names[0]) * columns[names[0]].factor)
+
+
+def _rotations(quaternions: Array, table: Table) -> Array:
+    length = np.linalg.norm(quaternions, axis=1)
+    wrong = np.flatnonzero(np.abs(length - 1.0) > QUATERNION_DEFECT)
+    if wrong.size:
+        row = int(wrong[0])
+        hint = f"the allowed difference is {QUATERNION_DEFECT:g}; the columns are qw, qx, qy, qz"
+        text = f"{table.file}, row {row + 1}: the quaternion has length {length[row]:.6g} instead of 1"
+        raise InputError(text, hint=hint)
+    return matrix_from_quaternion(quaternions)
+
+
+def _table_deviations(
+    table: Table, columns: Mapping[str, Column], position: bool, orientation: bool
+) -> Array | None:
+    """Return the deviations (N, 2) of a table; None where it has none."""
+    found = [_values(table, columns, name) for name in _OWN]
+    if all(values is None for values in found):
+        return None
+    deviations = np.ones((len(table.columns), 2))
+    for index, (values, wanted) in enumerate(zip(found, (position, orientation), strict=True)):
+        if values is None and wanted:
+            hint = "give both of them, or none"
+            raise InputError(f"{table.file}: there is no column {_OWN[index]}", hint=hint)
+        if values is not None and not (values > 0).all():
+            row = int(np.flatnonzero(values <= 0)[0])
+            raise InputError(f"{table.file}, row {row + 1}: {_OWN[index]} must be above 0")
+        if values is not None:
+            deviations[:, index] = values
+    return deviations

@@ -1,0 +1,1 @@
+"""Kinematic calibration: Denavit-Hartenberg parameters, base and tool from measured poses."""
