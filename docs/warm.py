@@ -11,6 +11,7 @@ import atexit
 import json
 import os
 import pkgutil
+import select
 import shutil
 import socket
 import subprocess
@@ -57,8 +58,9 @@ def warm_commands() -> Path:
     client.chmod(0o755)
     command = [sys.executable, "-m", "docs.warm", address]
     environment = {**os.environ, **_ONE_THREAD}
-    quiet = subprocess.DEVNULL
-    server = subprocess.Popen(command, cwd=ROOT, env=environment, stdin=quiet, stdout=quiet)  # noqa: S603
+    server = subprocess.Popen(  # noqa: S603
+        command, cwd=ROOT, env=environment, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL
+    )
     atexit.register(_end, server)
     _await(Path(address), server)
     return folder
@@ -90,13 +92,16 @@ def _serve(address: str) -> None:
         listener.bind(f"{address}.new")
         listener.listen(16)
         Path(f"{address}.new").rename(address)
-        while True:
+        while not select.select([listener, sys.stdin], [], [])[0].count(
+            sys.stdin
+        ):  # closed: its user has gone
             caller, _ = listener.accept()
             if os.fork() == 0:
                 listener.close()
                 _answer(caller)
             caller.close()
             _collect()
+    shutil.rmtree(Path(address).parent, ignore_errors=True)
 
 
 def _collect() -> None:
