@@ -15,7 +15,7 @@ from trajcli.columns import GROUPS, Group
 from trajcli.job.model import Job, Output, OutputUnits, UnitsSpec
 from trajcli.job.robot import CATALOGUE, JointModel, RobotModel, catalogue_names
 from trajcli.job.yaml.load import read_document
-from trajcli.language.limits import LimitsSpec, Scale, ToolLimitsSpec
+from trajcli.language.limits import LimitsSpec, Scale, ToolLimitsSpec, VelocityByPosition
 from trajcli.language.numbers import MAX_JOINTS
 from trajcli.language.poses import SEQUENCES
 from trajcli.language.targets import AxisAngleSpec, Configuration, EulerSpec, Target
@@ -79,6 +79,15 @@ _JOINTS = """\
 With standard rows the pose of a link is Rz(theta) Tz(d) Tx(a) Rx(alpha); with modified rows it is
 Rx(alpha) Tx(a) Rz(theta) Tz(d). The joint's value q is added: theta + sign q for a revolute joint, d +
 sign q for a prismatic one."""
+
+_BY_POSITION = """\
+A joint that is the distance x before the end of its range may move towards that end with at most
+max(0, sqrt(2 d x) - o), and away from it as its `velocity` says: a joint that brakes with the deceleration d
+then stops before the end. Nearer than o^2 / (2 d) it may not move towards the end at all. The Franka FR3
+aborts a motion that exceeds such limits. The joint needs `position`: the range in force says where it ends.
+The factor `velocity` under `scale` scales this limit, too. It is verified for all t, from the roots of
+polynomials; moves that find their duration themselves keep it: `time_optimal` by its law, others by the
+smallest stretch, with an event."""
 
 _POSES = f"""\
 A pose is a mapping with a position `xyz: [x, y, z]` and at most one orientation; what it leaves out is
@@ -176,7 +185,8 @@ def job_reference() -> str:
     parts += ["### Scale", first_sentence(Scale.__doc__), field_table(Scale), "### Bounds", _BOUNDS]
     parts += ["### Limits of the tool", _TOOL_LIMITS, field_table(ToolLimitsSpec)]
     parts += ["## Robot", _ROBOT, field_table(RobotModel)]
-    parts += ["### Joints", _JOINTS, field_table(JointModel), "### Poses", _POSES]
+    parts += ["### Joints", _JOINTS, field_table(JointModel)]
+    parts += ["### Velocity by position", _BY_POSITION, field_table(VelocityByPosition), "### Poses", _POSES]
     parts += ["### Catalogue", _catalogue()]
     parts += ["## Moves", _MOVES.rstrip(), _common_fields()]
     parts += tool_path_sections()

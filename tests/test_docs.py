@@ -90,6 +90,7 @@ def test_every_planner_has_its_section_with_every_field(tag: str) -> None:
         ("### Arcs", "ArcFields"),
         ("## Robot", "RobotModel"),
         ("### Joints", "JointModel"),
+        ("### Velocity by position", "VelocityByPosition"),
         ("## Output", "Output"),
         ("### Units of the columns", "OutputUnits"),
     ],
@@ -110,7 +111,7 @@ def test_every_definition_of_the_schema_is_looked_at() -> None:
         "Output",
         "OutputUnits",
     }
-    known |= {"AxisAngleSpec", "EulerSpec", "Configuration", "Waypoint"}
+    known |= {"VelocityByPosition", "AxisAngleSpec", "EulerSpec", "Configuration", "Waypoint"}
     known |= {"RelativeTarget", "RelativeWaypoint"}  # described in words
     known |= {"ToolLimitsSpec", "LawSpec", "ToleranceSpec", "Segment", "ArcFields"}
     others = {name for name, definition in SCHEMA["$defs"].items() if "properties" in definition} - known

@@ -159,7 +159,10 @@ def _load(document: Document) -> LoadedJob:
     if problems or robot is None:
         raise InputError(*sorted(problems, key=_position))
     mounted = {key: pose for key in ("base", "tool") if (pose := getattr(job, key)) is not None}
-    effective, events = with_job_limits(replace(robot, **mounted), job.limits)
+    try:
+        effective, events = with_job_limits(replace(robot, **mounted), job.limits)
+    except InputError as error:
+        raise error.said_by(str).located(place=document.place(("limits", "position"))) from None
     name = job.name or ("stdin" if document.file in ("-", "<stdin>") else utf8(Path(document.file).stem))
     loaded = LoadedJob(job, name, effective, document, tuple(events))
     flaws = [*_loosened_by_moves(loaded), *_loosened_tool_limits(loaded), *_columns_without_geometry(loaded)]

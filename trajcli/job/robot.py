@@ -24,7 +24,7 @@ from trajcli.job.messages import problems_of
 from trajcli.job.model import UnitsSpec
 from trajcli.job.yaml.load import Document, read_document
 from trajcli.kinematics.robot import QUANTITIES, Joint, Limits, Robot
-from trajcli.language.limits import UNLIMITED, JointBound, LowerUpper, written_bound
+from trajcli.language.limits import UNLIMITED, JointBound, LowerUpper, VelocityByPosition, written_bound
 from trajcli.language.numbers import (
     MAX_JOINTS,
     Model,
@@ -66,6 +66,14 @@ class JointModel(Model):
         UNLIMITED
     )
     jerk: Annotated[LowerUpper, JointBound(3, "Jerk limit, or [lower, upper], per s^3.")] = UNLIMITED
+
+    velocity_by_position: Annotated[
+        VelocityByPosition | None,
+        Field(
+            description="Velocity limit near the position limits: |v| <= max(0, sqrt(2 d x) - o), x before "
+            "the limit ahead."
+        ),
+    ] = None
 
     @model_validator(mode="before")
     @classmethod
@@ -135,6 +143,11 @@ class RobotModel(Model):
                 )
                 raise refuse([(where, f"joint names must be unique, '{name}' stands twice", None)])
             names.append(name)
+        for index, joint in enumerate(joints):
+            if joint.velocity_by_position is not None and joint.position == UNLIMITED:
+                text = f"velocity_by_position of {names[index]} needs its position limits"
+                hint = "give the joint `position: [lower, upper]`"
+                raise refuse([(("joints", index, "velocity_by_position"), text, hint)])
         described = [joint for joint in joints if any(key in joint.model_fields_set for key in _DH)]
         if described and self.convention is None:
             text = "joints with theta, d, a, alpha or beta need a `convention`"
@@ -152,10 +165,11 @@ class RobotModel(Model):
             for name, m in zip(self.joint_names(), self.joints, strict=True)
         )
         position, *rates = (np.array([getattr(m, quantity) for m in self.joints]) for quantity in QUANTITIES)
+        near = [m.velocity_by_position for m in self.joints]
+        by_position = np.array([(np.inf, 0.0) if m is None else (m.deceleration, m.offset) for m in near])
+        limits = Limits(position, rates[0], rates[1], rates[2], velocity_by_position=by_position)
         base, tool = (np.eye(4) if pose is None else pose for pose in (self.base, self.tool))
-        return Robot(
-            self.name, joints, Limits(position, rates[0], rates[1], rates[2]), self.convention, base, tool
-        )
+        return Robot(self.name, joints, limits, self.convention, base, tool)
 
 
 def robot_as_mapping(robot: Robot) -> dict[str, Any]:
@@ -178,7 +192,13 @@ def _joint_as_mapping(robot: Robot, index: int, *, described: bool) -> dict[str,
         quantity: written_bound((low, high), joint_quantity(joint.type, order))
         for order, (quantity, (low, high)) in enumerate(zip(QUANTITIES, bounds, strict=True))
     }
-    return {"name": joint.name, "type": joint.type, **row, "sign": joint.sign, **limits}
+    rates = robot.limits.velocity_by_position[index].tolist()
+    near = {
+        name: written_number(value, joint_quantity(joint.type, order))
+        for name, order, value in (("deceleration", 2, rates[0]), ("offset", 1, rates[1]))
+    }
+    by_position = {"velocity_by_position": near} if np.isfinite(rates[0]) else {}
+    return {"name": joint.name, "type": joint.type, **row, "sign": joint.sign, **limits, **by_position}
 
 
 @frozen

@@ -95,6 +95,44 @@ class JointBound(FieldType):
 
 
 @comparable
+class JointRate(FieldType):
+    """A magnitude of a derivative of one joint's position, whose type is the first of the context."""
+
+    order: int
+    description: str
+    positive: bool = True
+
+    def read(self, value: Any, context: ReadingContext) -> float:  # noqa: ANN401
+        """Return the number in SI."""
+        quantity = context.joint_quantity(0, self.order)
+        size = read_number(value, quantity, context.units)
+        if size < 0 or (self.positive and size == 0):
+            raise FlawError(f"expected a number {self.rule}, got {shown(value)}")
+        check_not_tiny(size, value, quantity, context.units)
+        return size
+
+    @property
+    def rule(self) -> str:
+        """What the number must be, in words."""
+        return "above 0" if self.positive else "at least 0"
+
+    def json_schema(self) -> JsonSchemaValue:
+        """Return the schema of a number or a string with its unit."""
+        bound = {"above": 0.0} if self.positive else {"at_least": 0.0}
+        return Number(Quantity("length", self.order), "", **bound).json_schema()
+
+
+class VelocityByPosition(Model):
+    """A limit of velocity that depends on the distance to the position limit ahead."""
+
+    deceleration: Annotated[float, JointRate(2, "d (angle or length unit per s^2).")]
+    offset: Annotated[
+        float,
+        JointRate(1, "o, taken off the velocity (angle or length unit per s).", positive=False),
+    ] = 0.0
+
+
+@comparable
 class Bounds(FieldType):
     """One bound for all joints, a list, or a mapping by joint name; None where a joint is left out."""
 
