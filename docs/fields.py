@@ -15,6 +15,7 @@ from trajcli.job.robot import JointModel
 from trajcli.language.limits import (
     UNLIMITED,
     Bounds,
+    JobLimitsSpec,
     JointBound,
     JointRate,
     LimitsSpec,
@@ -47,6 +48,7 @@ from trajcli.units import Quantity, Units, unit_name
 SECTIONS: dict[type, str] = {
     UnitsSpec: "[units](#units)",
     LimitsSpec: "[limits](#limits)",
+    JobLimitsSpec: "[limits](#limits)",
     Scale: "[factors](#scale)",
     Target: "[state](#states)",
     Output: "[output](#output)",

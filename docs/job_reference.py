@@ -15,7 +15,7 @@ from trajcli.columns import GROUPS, Group
 from trajcli.job.model import Job, Output, OutputUnits, UnitsSpec
 from trajcli.job.robot import CATALOGUE, JointModel, RobotModel, catalogue_names
 from trajcli.job.yaml.load import read_document
-from trajcli.language.limits import LimitsSpec, Scale, ToolLimitsSpec, VelocityByPosition
+from trajcli.language.limits import JobLimitsSpec, Scale, ToolLimitsSpec, VelocityByPosition
 from trajcli.language.numbers import MAX_JOINTS
 from trajcli.language.poses import SEQUENCES
 from trajcli.language.targets import AxisAngleSpec, Configuration, EulerSpec, Target
@@ -61,7 +61,23 @@ joint a pair, name it: `{j1: [-90, 120]}`."""
 _LIMITS = """\
 A job's `limits` replace the robot's, then `scale` multiplies them. A limit that is looser than the
 robot's is allowed, and reported as an event. A move's `limits` apply to that move only, and can only
-tighten."""
+tighten; a `file` is of the job alone."""
+
+_MOVEIT = """\
+`limits: {file: joint_limits.yaml}` takes the limits of a MoveIt package as they are, in rad, m and s whatever
+the units of the job. They stand under `joint_limits`, which may lie under `robot_description_planning`
+and `ros__parameters`.
+
+| key of a joint | meaning |
+|---|---|
+| `min_position`, `max_position` | range; an end that is left out is the robot's |
+| `max_velocity`, `max_acceleration`, `max_jerk` | magnitude |
+| `max_deceleration` | negative, as for Pilz' planners: with the acceleration it makes the pair [deceleration, acceleration], by direction |
+| `has_position_limits`, `has_velocity_limits`, ... | false: unlimited; true: the value must be there; without it a value counts |
+
+Other keys of a joint are ignored (effort, PID, soft limits, `angle_wraparound`), but for misspelt ones. Joints that
+the robot does not have and scaling factors are ignored, with an event; joints that the file leaves out keep the
+robot's limits, with an event. Whatever else stands under `limits` wins, joint by joint: `scale` multiplies last."""
 
 _TOOL_LIMITS = """\
 Speeds and accelerations of the tcp, in world. They hold in every move of an arm with geometry: the laws of
@@ -181,8 +197,9 @@ def job_reference() -> str:
     parts += ["### Configuration", _CONFIGURATION, field_table(Configuration)]
     parts += ["### Waypoints", _WAYPOINTS, field_table(Waypoint, {"joints": "a pose instead"})]
     parts += ["## Values by joint", _VALUES]
-    parts += ["## Limits", _LIMITS, field_table(LimitsSpec)]
+    parts += ["## Limits", _LIMITS, field_table(JobLimitsSpec)]
     parts += ["### Scale", first_sentence(Scale.__doc__), field_table(Scale), "### Bounds", _BOUNDS]
+    parts += ["### Limits of MoveIt", _MOVEIT]
     parts += ["### Limits of the tool", _TOOL_LIMITS, field_table(ToolLimitsSpec)]
     parts += ["## Robot", _ROBOT, field_table(RobotModel)]
     parts += ["### Joints", _JOINTS, field_table(JointModel)]

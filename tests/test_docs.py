@@ -81,7 +81,7 @@ def test_every_planner_has_its_section_with_every_field(tag: str) -> None:
         ("## Units", "UnitsSpec"),
         ("## States", "Target"),
         ("### Waypoints", "Waypoint"),
-        ("## Limits", "LimitsSpec"),
+        ("## Limits", "JobLimitsSpec"),
         ("### Scale", "Scale"),
         ("### Limits of the tool", "ToolLimitsSpec"),
         ("### Law", "LawSpec"),
@@ -111,7 +111,7 @@ def test_every_definition_of_the_schema_is_looked_at() -> None:
         "Output",
         "OutputUnits",
     }
-    known |= {"VelocityByPosition", "AxisAngleSpec", "EulerSpec", "Configuration", "Waypoint"}
+    known |= {"VelocityByPosition", "JobLimitsSpec", "AxisAngleSpec", "EulerSpec", "Configuration", "Waypoint"}
     known |= {"RelativeTarget", "RelativeWaypoint"}  # described in words
     known |= {"ToolLimitsSpec", "LawSpec", "ToleranceSpec", "Segment", "ArcFields"}
     others = {name for name, definition in SCHEMA["$defs"].items() if "properties" in definition} - known

@@ -21,6 +21,7 @@ from trajcli.job.robot import find_robot
 from trajcli.job.yaml.document import Node
 from trajcli.job.yaml.load import Document, parse_document, read_document
 from trajcli.kinematics.robot import Robot, unlimited
+from trajcli.language.limits import JobLimitsSpec, LimitsSpec
 from trajcli.language.numbers import FieldPath, ReadingContext
 from trajcli.language.recorded import Recorded
 from trajcli.language.targets import PoseFields, Target
@@ -131,6 +132,9 @@ def files_of(document: Document) -> Iterator[tuple[str, str]]:
     robot, moves = root.get("robot"), root.get("moves")
     if isinstance(robot, Mapping) and isinstance(robot.get("file"), str):
         yield "the robot's file", str(folder / robot["file"])
+    limits = root.get("limits")
+    if isinstance(limits, Mapping) and isinstance(limits.get("file"), str):
+        yield "the file of limits", str(folder / limits["file"])
     for move in moves if isinstance(moves, list) else []:
         through = move.get("through") if isinstance(move, Mapping) else None
         if isinstance(through, Mapping) and isinstance(through.get("csv"), str):
@@ -159,16 +163,29 @@ def _load(document: Document) -> LoadedJob:
     if problems or robot is None:
         raise InputError(*sorted(problems, key=_position))
     mounted = {key: pose for key in ("base", "tool") if (pose := getattr(job, key)) is not None}
+    limits, noted = _with_limits_file(job.limits, document, robot)
     try:
-        effective, events = with_job_limits(replace(robot, **mounted), job.limits)
+        effective, events = with_job_limits(replace(robot, **mounted), limits)
     except InputError as error:
         raise error.said_by(str).located(place=document.place(("limits", "position"))) from None
     name = job.name or ("stdin" if document.file in ("-", "<stdin>") else utf8(Path(document.file).stem))
-    loaded = LoadedJob(job, name, effective, document, tuple(events))
+    loaded = LoadedJob(job, name, effective, document, (*noted, *events))
     flaws = [*_loosened_by_moves(loaded), *_loosened_tool_limits(loaded), *_columns_without_geometry(loaded)]
     if flaws:
         raise InputError(*sorted(flaws, key=_position))
     return loaded
+
+
+def _with_limits_file(
+    spec: JobLimitsSpec | None, document: Document, robot: Robot
+) -> tuple[LimitsSpec | None, tuple[Event, ...]]:
+    """Return the limits of a job with those of the file that it names, and what there is to note about it."""
+    if spec is None or spec.file is None:
+        return spec, ()
+    from trajcli.job.moveit_limits import read_moveit_limits
+
+    of_file = read_moveit_limits(spec.file, document, robot)
+    return of_file.under(spec), of_file.events
 
 
 def _texts(node: Node | None) -> Iterator[str]:

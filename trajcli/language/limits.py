@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any
 
+from pydantic import Field
 from pydantic.json_schema import JsonSchemaValue
 
 from trajcli.frozen import comparable
@@ -234,3 +235,16 @@ class LimitsSpec(Model, defer_build=False):  # made once, not for each planner t
     def of_order(self, order: int) -> tuple[LowerUpper | None, ...]:
         """Return the bounds of a derivative, of order 0 (position) to 3 (jerk); empty where none is given."""
         return getattr(self, QUANTITIES[order])  # type: ignore[no-any-return]
+
+
+class JobLimitsSpec(LimitsSpec):
+    """Limits of a job, which may stand in a file of MoveIt's."""
+
+    file: Annotated[
+        str | None,
+        Field(
+            strict=True,
+            min_length=1,
+            description="MoveIt's joint_limits.yaml, relative to the job's folder; other keys win over it.",
+        ),
+    ] = None
