@@ -72,12 +72,13 @@ and `ros__parameters`.
 |---|---|
 | `min_position`, `max_position` | range; an end that is left out is the robot's |
 | `max_velocity`, `max_acceleration`, `max_jerk` | magnitude |
-| `max_deceleration` | negative, as for Pilz' planners: with the acceleration it makes the pair [deceleration, acceleration], by direction |
-| `has_position_limits`, `has_velocity_limits`, ... | false: unlimited; true: the value must be there; without it a value counts |
+| `max_deceleration` | negative (Pilz): with the acceleration it makes the pair of limits, by direction |
+| `has_velocity_limits`, ... | false: unlimited; true: the value must be there; left out: a value counts |
 
-Other keys of a joint are ignored (effort, PID, soft limits, `angle_wraparound`), but for misspelt ones. Joints that
-the robot does not have and scaling factors are ignored, with an event; joints that the file leaves out keep the
-robot's limits, with an event. Whatever else stands under `limits` wins, joint by joint: `scale` multiplies last."""
+Other keys of a joint are ignored (effort, PID, soft limits, `angle_wraparound`), but for misspelt ones.
+Joints that the robot does not have and scaling factors are ignored, with an event; joints that the file
+leaves out keep the robot's limits, with an event. Whatever else stands under `limits` wins, joint by joint;
+`scale` multiplies last."""
 
 _TOOL_LIMITS = """\
 Speeds and accelerations of the tcp, in world. They hold in every move of an arm with geometry: the laws of

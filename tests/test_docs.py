@@ -111,7 +111,14 @@ def test_every_definition_of_the_schema_is_looked_at() -> None:
         "Output",
         "OutputUnits",
     }
-    known |= {"VelocityByPosition", "JobLimitsSpec", "AxisAngleSpec", "EulerSpec", "Configuration", "Waypoint"}
+    known |= {
+        "VelocityByPosition",
+        "JobLimitsSpec",
+        "AxisAngleSpec",
+        "EulerSpec",
+        "Configuration",
+        "Waypoint",
+    }
     known |= {"RelativeTarget", "RelativeWaypoint"}  # described in words
     known |= {"ToolLimitsSpec", "LawSpec", "ToleranceSpec", "Segment", "ArcFields"}
     others = {name for name, definition in SCHEMA["$defs"].items() if "properties" in definition} - known

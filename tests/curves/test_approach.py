@@ -34,7 +34,7 @@ def sampled_use(curve: PiecewisePolynomial, limits: ApproachLimits, count: int =
     return np.where(np.abs(v) > 0, np.abs(v) / np.maximum(bound, ROOM), 0.0).max(axis=0)
 
 
-@settings(max_examples=60)
+@settings(max_examples=60, deadline=None)
 @given(seed=st.integers(0, 10**6))
 def test_the_use_is_the_largest_of_all_times(seed: int) -> None:
     curve, limits = wild(seed)
@@ -49,7 +49,7 @@ def test_the_use_is_the_largest_of_all_times(seed: int) -> None:
         assert curve.evaluate(use.time, 1)[use.component] == pytest.approx(use.velocity, rel=1e-9)
 
 
-@settings(max_examples=30)
+@settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 10**6))
 def test_a_motion_that_is_stretched_by_its_use_uses_all_of_the_limit(seed: int) -> None:
     curve, limits = wild(seed)
@@ -60,7 +60,7 @@ def test_a_motion_that_is_stretched_by_its_use_uses_all_of_the_limit(seed: int) 
             assert other.used == pytest.approx(1.0, abs=1e-9)
 
 
-@settings(max_examples=20)
+@settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 10**6))
 def test_uses_of_pieces_are_those_of_each_piece_alone(seed: int) -> None:
     curve, limits = wild(seed)
@@ -97,10 +97,37 @@ def test_near_to_a_bound_only_the_motion_towards_it_counts() -> None:
     )
     (use,) = approach_uses(towards.breaks, towards.coefficients, limits)
     assert use.used > 1e6
-    assert (use.limit, use.distance < 0.04, use.velocity > 0) == (0.0, True, True)
+    assert (use.limit, use.distance <= 0.04 + 1e-12, use.velocity > 0) == (0.0, True, True)
 
 
 def test_rest_uses_nothing_wherever_it_is() -> None:
     limits = ApproachLimits(np.array([[-1.0, 1.0]]), np.array([2.0]), np.array([0.4]))
     (use,) = approach_uses(np.array([0.0, 1.0]), np.array([[[0.999]]]), limits)
     assert use.used == 0.0
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_lines_and_parabolas_have_uses_too(degree: int) -> None:
+    """At constant speed the use is largest where the bound is nearest; further powers are zero."""
+    limits = ApproachLimits(np.array([[-1.0, 1.0]]), np.array([2.0]), np.array([0.1]))
+    line = np.zeros((degree + 1, 1, 1))
+    line[-2:, 0, 0] = 0.5, 0.2
+    (use,) = approach_uses(np.array([0.0, 1.0]), line, limits)
+    assert use.used == pytest.approx(0.5 / (np.sqrt(2 * 2.0 * 0.3) - 0.1), rel=1e-9)
+    uses, _ = uses_of_pieces(line, np.ones(1), limits, 0.0)
+    assert uses.max() == pytest.approx(use.used)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.2])
+def test_behind_a_bound_nothing_may_move_on(offset: float) -> None:
+    """A motion that turns back a little behind its bound passes it at speed, also where no offset is given."""
+    limits = ApproachLimits(np.array([[-1.0, 1.0]]), np.array([8.0]), np.array([offset]))
+    parabola = np.array([-0.5, 1.0, 0.501])[:, None, None]  # up to 1.001 at t = 1
+    (use,) = approach_uses(np.array([0.0, 2.0]), parabola, limits)
+    assert use.used > 1e4
+    assert use.limit < 1e-6
+    assert use.distance < offset**2 / 16 + 1e-9
+    inside = parabola.copy()
+    inside[-1] = 0.4
+    (use,) = approach_uses(np.array([0.0, 2.0]), inside, limits)
+    assert use.used < 1

@@ -111,6 +111,7 @@ def approach_uses(breaks: Array, coefficients: Array, limits: ApproachLimits) ->
             -float(horner(derivative_coefficients(polynomial, 1), t)),
         )
         bound = float(allowed_speed(np.array(distance), d[column], o[column])) - ROOM
+        bound = bound if bound > ROOM else 0.0
         sign = -1.0 if end else 1.0
         use = (float(both[piece, end]), sign * speed, sign * bound, distance, float(breaks[piece] + t))
         found.append(ApproachUse(component, *use))
@@ -187,15 +188,20 @@ def _largest_ratio(
 
 def _raised(distances: Array, lengths: Array, limit: Sequence[Array], known: Array) -> tuple[Array, Array]:
     """Return the uses (a,) of single pieces, raised from those `known`, and when they are."""
-    used, times = known.copy(), np.zeros_like(known)
-    live = np.arange(known.size)
+    crossings = _crossings(distances, lengths, limit)
+    ratio, times = _largest_ratio(distances, -derivative_coefficients(distances, 1), crossings, limit)
+    used = np.maximum(known, ratio)
+    live = np.flatnonzero(used < _HOPELESS)
+    if not live.size:
+        return used, times
     for _ in range(_STEPS):
         x, length = distances[:, live], lengths[live]
         d, o = (each[live] for each in limit)
         speeds = -derivative_coefficients(x, 1)
         excess = _excess(x, speeds / used[live], d, o)
         (turns,) = critical_points(excess[:, :, None], length, (0,))
-        ratio, when = _largest_ratio(x, speeds, np.clip(turns[:, :, 0], 0.0, length), (d, o))
+        inside = np.concatenate([np.clip(turns[:, :, 0], 0.0, length), length[None]])
+        ratio, when = _largest_ratio(x, speeds, inside, (d, o))
         more = ratio > used[live]
         going = ratio > used[live] * (1.0 + _SETTLED)
         used[live[more]], times[live[more]] = ratio[more], when[more]
@@ -203,6 +209,21 @@ def _raised(distances: Array, lengths: Array, limit: Sequence[Array], known: Arr
         if not live.size:
             break
     return used, times
+
+
+def _crossings(distances: Array, lengths: Array, limit: Sequence[Array]) -> Array:
+    """Return points (k, a) of pieces, among them all at which the distance is the least that lets one move.
+
+    Who comes nearer than that is on its course to the bound there; what is fastest behind it may be nowhere
+    else a candidate.
+    """
+    deceleration, offset = limit
+    shifted = distances.copy()
+    shifted[-1] -= offset**2 / (2.0 * deceleration)
+    powers = np.arange(len(shifted), 0, -1, dtype=np.float64)
+    whole = np.concatenate([shifted / powers[:, None], np.zeros((1, shifted.shape[1]))])
+    (inside,) = critical_points(whole[:, :, None], lengths, (0,))
+    return np.concatenate([np.clip(inside[:, :, 0], 0.0, lengths), lengths[None]])
 
 
 def _excess(distances: Array, speeds: Array, deceleration: Array, offset: Array) -> Array:
