@@ -16,10 +16,13 @@ from trajcli.language.dynamics import EffortBound, FrictionSpec, LinkSpec
 from trajcli.language.limits import (
     UNLIMITED,
     Bounds,
+    JobLimitsSpec,
     JointBound,
+    JointRate,
     LimitsSpec,
     Scale,
     ToolLimitsSpec,
+    VelocityByPosition,
 )
 from trajcli.language.numbers import FieldType, Number
 from trajcli.language.per_joint import JointDistance, PerJoint
@@ -46,6 +49,7 @@ from trajcli.units import Quantity, Units, unit_name
 SECTIONS: dict[type, str] = {
     UnitsSpec: "[units](#units)",
     LimitsSpec: "[limits](#limits)",
+    JobLimitsSpec: "[limits](#limits)",
     Scale: "[factors](#scale)",
     Target: "[state](#states)",
     Output: "[output](#output)",
@@ -58,6 +62,7 @@ SECTIONS: dict[type, str] = {
     Configuration: "[configuration](#configuration)",
     Waypoint: "[waypoint](#waypoints)",
     ToolLimitsSpec: "[limits of the tool](#limits-of-the-tool)",
+    VelocityByPosition: "[by position](#velocity-by-position)",
     LawSpec: "[law](#law)",
     ToleranceSpec: "[tolerance](#tolerance)",
     Segment: "[segments](#segments)",
@@ -115,6 +120,8 @@ def _form(field: FieldInfo) -> str:
 def _reader_form(reader: FieldType) -> str:
     if isinstance(reader, Number):
         return _number_form(reader)
+    if isinstance(reader, JointRate):
+        return f"number {reader.rule}"
     if isinstance(reader, PerJoint):
         above = "" if reader.above is None else f" above {reader.above:g}"
         return f"number{above}, {_BY_JOINT}"
@@ -169,7 +176,7 @@ def _type_form(annotation: Any) -> str:  # noqa: ANN401
 
 def _unit(field: FieldInfo) -> str:
     reader = field_type(field)
-    if isinstance(reader, PerJoint | Bounds | JointBound):
+    if isinstance(reader, PerJoint | Bounds | JointBound | JointRate):
         return "joint" + ("", "/s", "/s^2", "/s^3")[reader.order]
     if isinstance(reader, Number | Numbers):
         return _quantity_unit(reader.quantity)

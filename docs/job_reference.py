@@ -16,7 +16,7 @@ from trajcli.job.model import Job, Output, OutputUnits, UnitsSpec
 from trajcli.job.robot import JointModel, RobotModel
 from trajcli.job.yaml.load import read_document
 from trajcli.language.dynamics import FrictionSpec, LinkSpec
-from trajcli.language.limits import LimitsSpec, Scale, ToolLimitsSpec
+from trajcli.language.limits import JobLimitsSpec, Scale, ToolLimitsSpec, VelocityByPosition
 from trajcli.language.numbers import MAX_JOINTS
 from trajcli.language.poses import SEQUENCES
 from trajcli.language.targets import AxisAngleSpec, Configuration, EulerSpec, Target
@@ -62,7 +62,24 @@ joint a pair, name it: `{j1: [-90, 120]}`."""
 _LIMITS = """\
 A job's `limits` replace the robot's, then `scale` multiplies them. A limit that is looser than the
 robot's is allowed, and reported as an event. A move's `limits` apply to that move only, and can only
-tighten."""
+tighten; a `file` is of the job alone."""
+
+_MOVEIT = """\
+`limits: {file: joint_limits.yaml}` takes the limits of a MoveIt package as they are, in rad, m and s whatever
+the units of the job. They stand under `joint_limits`, which may lie under `robot_description_planning`
+and `ros__parameters`.
+
+| key of a joint | meaning |
+|---|---|
+| `min_position`, `max_position` | range; an end that is left out is the robot's |
+| `max_velocity`, `max_acceleration`, `max_jerk` | magnitude |
+| `max_deceleration` | negative (Pilz): with the acceleration it makes the pair of limits, by direction |
+| `has_velocity_limits`, ... | false: unlimited; true: the value must be there; left out: a value counts |
+
+Other keys of a joint are ignored (effort, PID, soft limits, `angle_wraparound`), but for misspelt ones.
+Joints that the robot does not have and scaling factors are ignored, with an event; joints that the file
+leaves out keep the robot's limits, with an event. Whatever else stands under `limits` wins, joint by joint;
+`scale` multiplies last."""
 
 _TOOL_LIMITS = """\
 Speeds and accelerations of the tcp, in world. They hold in every move of an arm with geometry: the laws of
@@ -89,6 +106,14 @@ Effort, friction, rotor and link are read, checked and kept: `trajcli urdf` and 
 Nothing is planned or judged by them yet. They are in SI whatever the units of the file, but for the centre of
 mass, which is a length. An inertia that no solid has is refused: a mass not above zero, a principal moment
 below zero, or one above the sum of the two others."""
+_BY_POSITION = """\
+A joint that is the distance x before the end of its range may move towards that end with at most
+max(0, sqrt(2 d x) - o), and away from it as its `velocity` says: a joint that brakes with the deceleration d
+then stops before the end. Nearer than o^2 / (2 d) it may not move towards the end at all. The Franka FR3
+aborts a motion that exceeds such limits. The joint needs `position`: the range in force says where it ends.
+The factor `velocity` under `scale` scales this limit, too. It is verified for all t, from the roots of
+polynomials; moves that find their duration themselves keep it: `time_optimal` by its law, others by the
+smallest stretch, with an event."""
 
 _POSES = f"""\
 A pose is a mapping with a position `xyz: [x, y, z]` and at most one orientation; what it leaves out is
@@ -182,11 +207,13 @@ def job_reference() -> str:
     parts += ["### Configuration", _CONFIGURATION, field_table(Configuration)]
     parts += ["### Waypoints", _WAYPOINTS, field_table(Waypoint, {"joints": "a pose instead"})]
     parts += ["## Values by joint", _VALUES]
-    parts += ["## Limits", _LIMITS, field_table(LimitsSpec)]
+    parts += ["## Limits", _LIMITS, field_table(JobLimitsSpec)]
     parts += ["### Scale", first_sentence(Scale.__doc__), field_table(Scale), "### Bounds", _BOUNDS]
+    parts += ["### Limits of MoveIt", _MOVEIT]
     parts += ["### Limits of the tool", _TOOL_LIMITS, field_table(ToolLimitsSpec)]
     parts += ["## Robot", _ROBOT, field_table(RobotModel)]
     parts += ["### Joints", _JOINTS, field_table(JointModel)]
+    parts += ["### Velocity by position", _BY_POSITION, field_table(VelocityByPosition)]
     parts += ["### Dynamics of a joint", _DYNAMICS]
     parts += ["#### Friction", field_table(FrictionSpec), "#### Link", field_table(LinkSpec)]
     parts += ["### Poses", _POSES]

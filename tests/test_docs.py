@@ -169,7 +169,7 @@ def test_every_planner_has_its_section_with_every_field(tag: str) -> None:
         ("## Units", "UnitsSpec"),
         ("## States", "Target"),
         ("### Waypoints", "Waypoint"),
-        ("## Limits", "LimitsSpec"),
+        ("## Limits", "JobLimitsSpec"),
         ("### Scale", "Scale"),
         ("### Limits of the tool", "ToolLimitsSpec"),
         ("### Law", "LawSpec"),
@@ -180,6 +180,7 @@ def test_every_planner_has_its_section_with_every_field(tag: str) -> None:
         ("### Joints", "JointModel"),
         ("#### Friction", "FrictionSpec"),
         ("#### Link", "LinkSpec"),
+        ("### Velocity by position", "VelocityByPosition"),
         ("## Output", "Output"),
         ("### Units of the columns", "OutputUnits"),
     ],
@@ -200,7 +201,16 @@ def test_every_definition_of_the_schema_is_looked_at() -> None:
         "Output",
         "OutputUnits",
     }
-    known |= {"FrictionSpec", "LinkSpec", "AxisAngleSpec", "EulerSpec", "Configuration", "Waypoint"}
+    known |= {
+        "FrictionSpec",
+        "LinkSpec",
+        "VelocityByPosition",
+        "JobLimitsSpec",
+        "AxisAngleSpec",
+        "EulerSpec",
+        "Configuration",
+        "Waypoint",
+    }
     known |= {"RelativeTarget", "RelativeWaypoint"}  # described in words
     known |= {"ToolLimitsSpec", "LawSpec", "ToleranceSpec", "Segment", "ArcFields"}
     others = {name for name, definition in SCHEMA["$defs"].items() if "properties" in definition} - known

@@ -13,8 +13,9 @@ import pytest
 
 from trajcli.cli.frames import problem_as_json, render_problem
 from trajcli.errors import Amount, Problem, TrajcliError, said
+from trajcli.job.dump import robot_as_mapping
 from trajcli.job.read import job_from_text
-from trajcli.job.robot import load_robot, robot_as_mapping
+from trajcli.job.robot import load_robot
 from trajcli.output.report import report_of, verification_error
 from trajcli.planning.plan import plan_job
 

@@ -9,7 +9,6 @@ import pytest
 
 from trajcli.errors import InputError
 from trajcli.kinematics.robot import Friction, LinkInertia
-from trajcli.urdf.limits import VelocityByPosition
 from trajcli.urdf.robot import UrdfRobot, robot_of_urdf
 
 
@@ -78,10 +77,12 @@ def test_soft_limits_count_on_request() -> None:
     assert "no soft limits" in arm('<limit upper="1" velocity="1"/>', soft=True).notes[0]
 
 
-def test_velocity_limits_by_position_are_read_and_said_not_to_be_taken_over() -> None:
-    found = arm('<position_based_velocity_limits velocity_offset="0.3" deceleration_limit="6"/>')
-    assert found.velocity_by_position == (VelocityByPosition(6.0, 0.3),)
-    assert any("not taken over" in note for note in found.notes)
+def test_velocity_limits_by_position_are_those_of_the_robot() -> None:
+    near = '<position_based_velocity_limits velocity_offset="0.3" deceleration_limit="6"/>'
+    found = arm(f'<limit lower="-2" upper="2" velocity="1"/>{near}')
+    assert found.robot.limits.velocity_by_position.tolist() == [[6.0, 0.3]]
+    endless = arm(near).robot.limits  # no range, no end to be near to
+    assert not np.isfinite(endless.velocity_by_position[:, 0]).any()
     with pytest.raises(InputError, match="deceleration_limit above 0"):
         arm('<position_based_velocity_limits velocity_offset="0.3" deceleration_limit="0"/>')
 

@@ -19,6 +19,7 @@ FindingKind = Literal[
     "velocity",
     "acceleration",
     "jerk",
+    "velocity_by_position",
     "position_jump",
     "velocity_jump",
     "acceleration_jump",
@@ -36,6 +37,8 @@ FindingKind = Literal[
 ]
 FindingMethod = Literal["exact", "bounded", "sampled"]
 _RATES = ("", "/s", "/s^2", "/s^3")
+LIMITS_OF_JOINTS = ("position", "velocity", "acceleration", "jerk", "velocity_by_position")
+"""Kinds of findings about limits of joints."""
 
 
 @comparable

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trajcli.checks.continuity import acceleration_steps, check_continuity
-from trajcli.checks.finding import AccelerationSteps, Finding
+from trajcli.checks.finding import LIMITS_OF_JOINTS, AccelerationSteps, Finding
 from trajcli.checks.limits import check_limits, peaks_by_move
 from trajcli.checks.target import check_targets
 from trajcli.checks.tolerances import LIMIT_RELATIVE, TOOL_RELATIVE
@@ -22,6 +22,7 @@ from trajcli.trajectory import Promise, Span, Trajectory
 
 if TYPE_CHECKING:
     from trajcli.checks.tool_bound import ToolPeak
+    from trajcli.curves.approach import ApproachUse
 
 _TOOL_LIMITS = (
     "tool_speed",
@@ -51,6 +52,8 @@ class Verdict:
             without geometry, and of the jerk in joint space.
         sampled: Moves along a path: the distance from it and the branch are judged on rows alone, which is no
             proof of what lies between them.
+        by_position: For each span where joints use most of their limits of velocity by position, one for each
+            joint that has such, times on the curve.
     """
 
     findings: tuple[Finding, ...]
@@ -60,6 +63,7 @@ class Verdict:
     tool_peaks: tuple[Mapping[str, ToolPeak] | None, ...] = ()
     unchecked_of_tool: tuple[str, ...] = ()
     sampled: tuple[int, ...] = ()
+    by_position: tuple[tuple[ApproachUse, ...], ...] = ()
 
     def __repr__(self) -> str:
         worst = [f"{found.kind} of {found.joint or 'the tool'}" for found in self.findings[:2]]
@@ -95,6 +99,11 @@ def verify(
     """
     peaks, tool_peaks = tuple(peaks_by_move(trajectory)), _tool_peaks(trajectory, promises)
     findings = check_limits(trajectory, limits_by_move, _judged(trajectory, limits_by_move, promises, peaks))
+    by_position = _by_position(trajectory, limits_by_move)
+    if any(by_position):
+        from trajcli.checks.velocity_by_position import check_velocity_by_position
+
+        findings += check_velocity_by_position(trajectory, by_position)
     findings += check_continuity(trajectory, limits_by_move, peaks)
     if promises is not None:
         findings += check_waypoints(trajectory, [promise.via_points for promise in promises])
@@ -112,7 +121,20 @@ def verify(
             if promise.tool is not None
         ),
         unchecked_of_tool=_unchecked_of_tool(limits_by_move, promises, peaks),
+        by_position=by_position,
     )
+
+
+def _by_position(
+    trajectory: Trajectory, limits_by_move: Sequence[Limits]
+) -> tuple[tuple[ApproachUse, ...], ...]:
+    """Return for each span where joints use most of their limits of velocity by position."""
+    if not any(limits.has_velocity_by_position for limits in limits_by_move):
+        return ((),) * len(trajectory.spans)
+    from trajcli.checks.velocity_by_position import velocity_by_position_uses
+
+    pairs = zip(trajectory.spans, limits_by_move, strict=True)
+    return tuple(velocity_by_position_uses(trajectory, span, limits) for span, limits in pairs)
 
 
 def _judged(
@@ -260,7 +282,7 @@ def _with_remedy(
         alone: Whether a longer move has no finding left: else `slow` is no answer.
     """
     hint = promise.remedies.get(finding.kind, finding.hint)
-    if hint is None and (finding.kind in QUANTITIES or finding.kind in _TOOL_LIMITS):
+    if hint is None and (finding.kind in LIMITS_OF_JOINTS or finding.kind in _TOOL_LIMITS):
         hint = _by_slowing(finding, trajectory, span, promise, factor, alone=alone)
     return finding if hint == finding.hint else replace(finding, hint=hint)
 
@@ -292,6 +314,12 @@ def _by_slowing(
 
 def _ends_over_limit(finding: Finding, joint: int, promise: Promise) -> bool:
     """Return whether the joint is over its limit where the move declares to begin or to end."""
+    if finding.kind == "velocity_by_position":
+        from trajcli.checks.velocity_by_position import ends_over_velocity_by_position
+
+        return promise.robot is not None and (
+            ends_over_velocity_by_position(promise.robot.limits, promise.ends or ()) is not None
+        )
     order = QUANTITIES.index(finding.kind)
     rates = [(state.velocity, state.acceleration)[order - 1] for state in promise.ends or () if order < 3]
     ends = [float(values[joint]) for values in rates]

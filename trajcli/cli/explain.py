@@ -248,6 +248,7 @@ def _lines(explained: Explanation, count: int) -> Iterator[str]:
         yield from blend_lines(move)
         yield from _phases(move)
         yield from _peaks(move)
+        yield from _by_position(move)
         yield from _speed(move)
         yield from (
             f"  {event.kind}: {event.message}" for event in explained.events if event.move == move.index
@@ -289,6 +290,18 @@ def _peaks(move: ExplainedMove) -> Iterator[str]:
         nothing = max(_ROUNDING * size, nothing if move.tool else 0.0)
         extent = f"{_extent(peak, move.start, nothing)} {peak.unit}; {_limit(peak)}"
         yield f"    {peak.joint} {_SYMBOLS[peak.quantity]}: {extent}"
+
+
+def _by_position(move: ExplainedMove) -> Iterator[str]:
+    for use in move.velocity_by_position or ():
+        if use.used > _ROUNDING:
+            velocity, limit = amount(use.velocity, use.unit), amount(use.limit, use.unit, beside=False)
+            where = f"{amount(use.distance, use.distance_unit)} {use.distance_unit} before its position limit"
+            when = f"t = {round(use.time - move.start, _TIME_DECIMALS):.6g}"
+            yield (
+                f"    {use.joint} qd by position: {velocity} {use.unit} ({when}), {where}; limit {limit}, "
+                f"{100 * use.used:.4g} % used"
+            )
 
 
 def _extent(peak: PeakReport, start: float, nothing: float) -> str:

@@ -237,7 +237,8 @@ def _where(move: int | None) -> str:
 def _tightest(plan: Plan) -> str:
     best, text = 0.0, ""
     verdict = plan.verdict
-    for move, extremes, of_tool in zip(plan.moves, verdict.peaks, verdict.tool_peaks, strict=True):
+    of_moves = zip(plan.moves, verdict.peaks, verdict.tool_peaks, verdict.by_position, strict=True)
+    for move, extremes, of_tool, by_position in of_moves:
         for order in (1, 2, 3):
             bounds = move.robot.limits.of_order(order)
             used = np.maximum(extremes[order].low / bounds[:, 0], extremes[order].high / bounds[:, 1])
@@ -246,6 +247,10 @@ def _tightest(plan: Plan) -> str:
                 best = float(used[joint])
                 name = move.robot.joint_names[joint]
                 text = f"{QUANTITIES[order]} of {name} in move {move.index}, {100 * best:.4g} % used"
+        for use in by_position:
+            if use.used > best * (1 + 1e-9):
+                best, name = use.used, move.robot.joint_names[use.component]
+                text = f"velocity by position of {name} in move {move.index}, {100 * best:.4g} % used"
         speed, name = _tool_speed(move) if of_tool is None else _tool_in_joint_space(move, of_tool)
         if speed > best * (1 + 1e-6):
             best, text = speed, f"{name} of the tool in move {move.index}, {100 * speed:.4g} % used"

@@ -116,6 +116,10 @@ def _card_lines(card: Mapping[str, Any]) -> Iterator[str]:
     yield ""
     yield f"limits ({angle} or {length}, per s, s^2, s^3):"
     yield from table_lines([["joint", *_LIMITS], *map(_limit_row, card["joints"])])
+    near = [joint for joint in card["joints"] if "velocity_by_position" in joint]
+    if near:
+        yield "velocity by position, at most sqrt(2 d x) - o with x to the limit ahead:"
+        yield from table_lines([["joint", "d", "o"], *map(_by_position_row, near)])
     for key, name in (("base", "base in world"), ("tool", "tool in the flange")):
         pose = card[key]
         if any(pose["xyz"]) or any(pose["rpy"]):
@@ -140,6 +144,11 @@ def _with_q(offset: str, sign: int) -> str:
 
 def _limit_row(joint: Mapping[str, Any]) -> list[str]:
     return [joint["name"], *(_range(joint[key]) for key in _LIMITS)]
+
+
+def _by_position_row(joint: Mapping[str, Any]) -> list[str]:
+    near = joint["velocity_by_position"]
+    return [joint["name"], number(near["deceleration"]), number(near["offset"])]
 
 
 def _range(bounds: Sequence[float | None] | None) -> str:

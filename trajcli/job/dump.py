@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import re
 import unicodedata
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict
 from math import isfinite, isnan
 from pathlib import PurePath
@@ -19,10 +19,12 @@ import numpy as np
 
 from trajcli.errors import InputError
 from trajcli.job.read import LoadedJob
-from trajcli.job.robot import RobotSheet, robot_as_mapping
-from trajcli.kinematics.robot import Robot
-from trajcli.language.limits import ToolLimitsSpec
-from trajcli.language.numbers import ReadingContext
+from trajcli.job.robot import DH_ROW, RobotSheet
+from trajcli.kinematics.robot import QUANTITIES, Robot
+from trajcli.language.dynamics import written_dynamics
+from trajcli.language.limits import UNLIMITED, ToolLimitsSpec
+from trajcli.language.numbers import ReadingContext, written_number
+from trajcli.units import Quantity, joint_quantity
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _YAML_WORDS = {"null", "true", "false"}
@@ -65,6 +67,58 @@ def dump_robot(sheet: RobotSheet) -> str:
     head = {"name": written.pop("name"), "units": {"angle": "rad", "length": "m"}}
     given = {key: text for key, text in beside.items() if text is not None}
     return "\n".join(_block({**head, **given, **written})) + "\n"
+
+
+def robot_as_mapping(robot: Robot, *, plain: bool = False) -> dict[str, Any]:
+    """Return a robot as it may stand under `robot` in a job, to be read bit by bit.
+
+    Args:
+        robot: Any.
+        plain: Whether numbers are without units, for a file in rad and m; else they carry theirs, for a job
+            of any units.
+    """
+    say: Callable[[float, Quantity], float | str] = _plain_number if plain else written_number
+    described = robot.convention is not None
+    keys = {"convention": robot.convention} if described else {}
+    joints = [_joint_as_mapping(robot, index, say, described=described) for index in range(len(robot.joints))]
+    poses = {key: getattr(robot, key) for key in ("base", "tool")}
+    turned = {key: pose for key, pose in poses.items() if not np.array_equal(pose, np.eye(4))}
+    written = {
+        key: {
+            "xyz": [say(x, Quantity("length")) for x in pose[:3, 3].tolist()],
+            "matrix": pose[:3, :3].tolist(),
+        }
+        for key, pose in turned.items()
+    }
+    return {"name": robot.name, **keys, "joints": joints, **written}
+
+
+def _plain_number(value: float, quantity: Quantity) -> float:
+    del quantity
+    return value
+
+
+def _joint_as_mapping(
+    robot: Robot, index: int, say: Callable[[float, Quantity], float | str], *, described: bool
+) -> dict[str, Any]:
+    joint = robot.joints[index]
+    keys = [key for key in DH_ROW if key != "beta" or joint.beta] if described else []
+    row = {key: say(getattr(joint, key), DH_ROW[key]) for key in keys}
+    bounds = [robot.limits.of_order(order)[index].tolist() for order in range(len(QUANTITIES))]
+    limits = {
+        quantity: None
+        if (low, high) == UNLIMITED
+        else [say(end, joint_quantity(joint.type, order)) for end in (low, high)]
+        for order, (quantity, (low, high)) in enumerate(zip(QUANTITIES, bounds, strict=True))
+    }
+    rates = robot.limits.velocity_by_position[index].tolist()
+    near = {
+        name: say(value, joint_quantity(joint.type, order))
+        for name, order, value in (("deceleration", 2, rates[0]), ("offset", 1, rates[1]))
+    }
+    by_position = {"velocity_by_position": near} if np.isfinite(rates[0]) else {}
+    described_by = {**row, "sign": joint.sign, **limits, **by_position, **written_dynamics(joint, say)}
+    return {"name": joint.name, "type": joint.type, **described_by}
 
 
 def mapping_text(mapping: Mapping[str, Any]) -> str:

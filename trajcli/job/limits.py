@@ -11,7 +11,7 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount, InputError, Problem
 from trajcli.kinematics.robot import QUANTITIES, Limits, Robot, ToolLimits
-from trajcli.language.limits import LimitsSpec
+from trajcli.language.limits import UNLIMITED, LimitsSpec
 from trajcli.planners.planner import Event
 
 _ROUNDING = 1e-12  # relative: a limit that differs by less was meant to be the same, in another unit
@@ -36,6 +36,13 @@ def with_job_limits(robot: Robot, spec: LimitsSpec | None) -> tuple[Robot, list[
     """Return the robot with the job's limits in force, and an event for each looser than the robot's."""
     if spec is None:
         return robot, []
+    unlimited = [index for index, bound in enumerate(spec.position) if bound == UNLIMITED]
+    for joint in unlimited:
+        if np.isfinite(robot.limits.velocity_by_position[joint, 0]):
+            name = robot.joint_names[joint]
+            message = "{joint} has velocity_by_position, which needs its position limits"
+            hint = "leave its `position` out under `limits`"
+            raise InputError(Problem(message, hint, joint=name, amounts={"joint": name}))
     events = []
     for quantity, joint, amounts in looser_bounds(robot, spec):
         message = f"the job's {quantity} limit of {{joint}} is looser than the robot's: "
@@ -87,7 +94,10 @@ def _with_limits(robot: Robot, spec: LimitsSpec) -> Robot:
         name: _replaced(robot.limits.of_order(order), spec, order) * getattr(spec.scale, name, 1.0)
         for order, name in enumerate(QUANTITIES)
     }
-    return dataclasses.replace(robot, limits=Limits(**rows, tcp=_tool_limits(robot.limits.tcp, spec)))
+    k = spec.scale.velocity  # k (sqrt(2 d x) - o) is the same limit with k^2 d and k o
+    by_position = robot.limits.velocity_by_position * [k**2, k]
+    tcp = _tool_limits(robot.limits.tcp, spec)
+    return dataclasses.replace(robot, limits=Limits(**rows, tcp=tcp, velocity_by_position=by_position))
 
 
 def _tool_limits(before: ToolLimits, spec: LimitsSpec) -> ToolLimits:

@@ -25,7 +25,7 @@ from pydantic_core import CoreSchema, core_schema
 from trajcli.columns import Group
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import Robot
-from trajcli.language.limits import LimitsSpec
+from trajcli.language.limits import JobLimitsSpec
 from trajcli.language.numbers import (
     AT_KEY,
     FieldType,
@@ -225,9 +225,7 @@ class Job(Model):
         ]
         | None
     ) = None
-    limits: Annotated[LimitsSpec | None, Field(description="Replaces the robot's limits, then scales.")] = (
-        None
-    )
+    limits: Annotated[JobLimitsSpec | None, Field(description="Replace the robot's, then scale.")] = None
     points: dict[str, NamedTarget] = Field(default_factory=dict, description="Named states.")
     start: Annotated[
         NamedTarget,

@@ -21,6 +21,7 @@ from trajcli.job.robot import RobotSheet, find_sheet
 from trajcli.job.yaml.document import Node
 from trajcli.job.yaml.load import Document, parse_document, read_document
 from trajcli.kinematics.robot import Robot, unlimited
+from trajcli.language.limits import JobLimitsSpec, LimitsSpec
 from trajcli.language.numbers import FieldPath, ReadingContext
 from trajcli.language.recorded import Recorded
 from trajcli.language.targets import PoseFields, Target
@@ -132,6 +133,9 @@ def files_of(document: Document) -> Iterator[tuple[str, str]]:
     for key in ("file", "urdf"):
         if isinstance(robot, Mapping) and isinstance(robot.get(key), str):
             yield "the robot's file", str(folder / robot[key])
+    limits = root.get("limits")
+    if isinstance(limits, Mapping) and isinstance(limits.get("file"), str):
+        yield "the file of limits", str(folder / limits["file"])
     for move in moves if isinstance(moves, list) else []:
         through = move.get("through") if isinstance(move, Mapping) else None
         if isinstance(through, Mapping) and isinstance(through.get("csv"), str):
@@ -161,15 +165,31 @@ def _load(document: Document) -> LoadedJob:
     if problems or robot is None:
         raise InputError(*sorted(problems, key=_position))
     mounted = {key: pose for key in ("base", "tool") if (pose := getattr(job, key)) is not None}
-    effective, events = with_job_limits(replace(robot, **mounted), job.limits)
+    limits, noted = _with_limits_file(job.limits, document, robot)
+    try:
+        effective, events = with_job_limits(replace(robot, **mounted), limits)
+    except InputError as error:
+        raise error.said_by(str).located(place=document.place(("limits", "position"))) from None
     name = job.name or ("stdin" if document.file in ("-", "<stdin>") else utf8(Path(document.file).stem))
     if sheet is not None and sheet.concession is not None:
         events = [Event("angles_snapped", sheet.concession), *events]
-    loaded = LoadedJob(job, name, effective, document, tuple(events))
+    loaded = LoadedJob(job, name, effective, document, (*noted, *events))
     flaws = [*_loosened_by_moves(loaded), *_loosened_tool_limits(loaded), *_columns_without_geometry(loaded)]
     if flaws:
         raise InputError(*sorted(flaws, key=_position))
     return loaded
+
+
+def _with_limits_file(
+    spec: JobLimitsSpec | None, document: Document, robot: Robot
+) -> tuple[LimitsSpec | None, tuple[Event, ...]]:
+    """Return the limits of a job with those of the file that it names, and what there is to note about it."""
+    if spec is None or spec.file is None:
+        return spec, ()
+    from trajcli.job.files.moveit_limits import read_moveit_limits
+
+    of_file = read_moveit_limits(spec.file, document, robot)
+    return of_file.under(spec), of_file.events
 
 
 def _texts(node: Node | None) -> Iterator[str]:
@@ -183,7 +203,7 @@ def _texts(node: Node | None) -> Iterator[str]:
 
 def _recorded(document: Document, robot: Robot, path: str) -> Recorded:
     """Return the recording of a path; jobs without one do not pay for the import."""
-    from trajcli.job.recording import read_recording
+    from trajcli.job.files.recording import read_recording
 
     return read_recording(path, document, robot)
 

@@ -112,11 +112,26 @@ class PeakReport(ReportPart):
     unit: UnitName
 
 
+class ByPositionReport(ReportPart):
+    """Where a joint uses most of its limit of velocity by position in one move."""
+
+    joint: str
+    used: Annotated[float, Field(description="Largest part of the limit that is used.")]
+    velocity: Annotated[float, MeasuredIn(), Field(description="There, SI.")]
+    limit: Annotated[float, MeasuredIn(), Field(description="There, with the sign of the velocity, SI.")]
+    unit: UnitName
+    distance: Annotated[
+        float, MeasuredIn("distance_unit"), Field(description="To the position limit ahead, SI.")
+    ]
+    distance_unit: UnitName
+    time: Annotated[float, Field(description="Where it is, seconds from the start of the trajectory.")]
+
+
 class BindingReport(ReportPart):
     """The limit that a move uses most."""
 
     joint: str
-    quantity: JointQuantity
+    quantity: JointQuantity | Literal["velocity_by_position"]
     used: Annotated[float, Field(description="Part of the bound that is used: 1 is all of it.")]
 
 
@@ -253,6 +268,9 @@ class MoveReport(ReportPart):
     ]
     stretch: Annotated[float, Field(description="How many times longer it lasts than its planner said.")]
     peaks: list[PeakReport]
+    velocity_by_position: Annotated[
+        list[ByPositionReport] | None, Field(description="Null where no joint has such a limit.")
+    ] = None
     binding: BindingReport | None
     waypoints: Annotated[
         tuple[WaypointReport, ...] | None,

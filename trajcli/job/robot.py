@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -24,8 +24,8 @@ from trajcli.job.messages import problems_of
 from trajcli.job.model import UnitsSpec
 from trajcli.job.yaml.load import Document, read_document
 from trajcli.kinematics.robot import QUANTITIES, Joint, Limits, Robot
-from trajcli.language.dynamics import EffortBound, FrictionSpec, LinkSpec, written_dynamics
-from trajcli.language.limits import UNLIMITED, JointBound, LowerUpper
+from trajcli.language.dynamics import EffortBound, FrictionSpec, LinkSpec
+from trajcli.language.limits import UNLIMITED, JointBound, LowerUpper, VelocityByPosition
 from trajcli.language.numbers import (
     MAX_JOINTS,
     Model,
@@ -33,11 +33,10 @@ from trajcli.language.numbers import (
     ReadingContext,
     refuse,
     shown,
-    written_number,
 )
 from trajcli.language.poses import Pose
 from trajcli.suggest import did_you_mean, nearest, nearest_names
-from trajcli.units import Quantity, Units, joint_quantity
+from trajcli.units import Quantity, Units
 
 if TYPE_CHECKING:
     from trajcli.urdf.robot import UrdfRobot
@@ -46,7 +45,7 @@ CATALOGUE = Path(__file__).parent.parent / "catalogue"
 
 _URDF_ENDINGS = (".urdf", ".xacro", ".xml")
 _ANGLE, _LENGTH = Quantity("angle"), Quantity("length")
-_DH = {"theta": _ANGLE, "d": _LENGTH, "a": _LENGTH, "alpha": _ANGLE, "beta": _ANGLE}
+DH_ROW = {"theta": _ANGLE, "d": _LENGTH, "a": _LENGTH, "alpha": _ANGLE, "beta": _ANGLE}
 
 
 class JointModel(Model):
@@ -85,6 +84,14 @@ class JointModel(Model):
     ] = 0.0
     link: Annotated[
         LinkSpec | None, Field(description="Mass and inertia of the link behind; kept, not yet used.")
+    ] = None
+
+    velocity_by_position: Annotated[
+        VelocityByPosition | None,
+        Field(
+            description="Velocity limit near the position limits: |v| <= max(0, sqrt(2 d x) - o), x before "
+            "the limit ahead."
+        ),
     ] = None
 
     @model_validator(mode="before")
@@ -161,7 +168,12 @@ class RobotModel(Model):
                 )
                 raise refuse([(where, f"joint names must be unique, '{name}' stands twice", None)])
             names.append(name)
-        described = [joint for joint in joints if any(key in joint.model_fields_set for key in _DH)]
+        for index, joint in enumerate(joints):
+            if joint.velocity_by_position is not None and joint.position == UNLIMITED:
+                text = f"velocity_by_position of {names[index]} needs its position limits"
+                hint = "give the joint `position: [lower, upper]`"
+                raise refuse([(("joints", index, "velocity_by_position"), text, hint)])
+        described = [joint for joint in joints if any(key in joint.model_fields_set for key in DH_ROW)]
         if described and self.convention is None:
             text = "joints with theta, d, a, alpha or beta need a `convention`"
             raise refuse([((), text, "say `convention: standard` or `convention: modified`")])
@@ -191,53 +203,11 @@ class RobotModel(Model):
             for name, m in zip(self.joint_names(), self.joints, strict=True)
         )
         position, *rates = (np.array([getattr(m, quantity) for m in self.joints]) for quantity in QUANTITIES)
+        near = [m.velocity_by_position for m in self.joints]
+        by_position = np.array([(np.inf, 0.0) if m is None else (m.deceleration, m.offset) for m in near])
+        limits = Limits(position, rates[0], rates[1], rates[2], velocity_by_position=by_position)
         base, tool = (np.eye(4) if pose is None else pose for pose in (self.base, self.tool))
-        return Robot(
-            self.name, joints, Limits(position, rates[0], rates[1], rates[2]), self.convention, base, tool
-        )
-
-
-def robot_as_mapping(robot: Robot, *, plain: bool = False) -> dict[str, Any]:
-    """Return a robot as it may stand under `robot` in a job, to be read bit by bit.
-
-    Args:
-        robot: Any.
-        plain: Whether numbers are without units, for a file in rad and m; else they carry theirs, for a job
-            of any units.
-    """
-    say: Callable[[float, Quantity], float | str] = _plain_number if plain else written_number
-    described = robot.convention is not None
-    keys = {"convention": robot.convention} if described else {}
-    joints = [_joint_as_mapping(robot, index, say, described=described) for index in range(len(robot.joints))]
-    poses = {key: getattr(robot, key) for key in ("base", "tool")}
-    turned = {key: pose for key, pose in poses.items() if not np.array_equal(pose, np.eye(4))}
-    written = {
-        key: {"xyz": [say(x, _LENGTH) for x in pose[:3, 3].tolist()], "matrix": pose[:3, :3].tolist()}
-        for key, pose in turned.items()
-    }
-    return {"name": robot.name, **keys, "joints": joints, **written}
-
-
-def _plain_number(value: float, quantity: Quantity) -> float:
-    del quantity
-    return value
-
-
-def _joint_as_mapping(
-    robot: Robot, index: int, say: Callable[[float, Quantity], float | str], *, described: bool
-) -> dict[str, Any]:
-    joint = robot.joints[index]
-    keys = [key for key in _DH if key != "beta" or joint.beta] if described else []
-    row = {key: say(getattr(joint, key), _DH[key]) for key in keys}
-    bounds = [robot.limits.of_order(order)[index].tolist() for order in range(len(QUANTITIES))]
-    limits = {
-        quantity: None
-        if (low, high) == UNLIMITED
-        else [say(end, joint_quantity(joint.type, order)) for end in (low, high)]
-        for order, (quantity, (low, high)) in enumerate(zip(QUANTITIES, bounds, strict=True))
-    }
-    dynamics = written_dynamics(joint, say)
-    return {"name": joint.name, "type": joint.type, **row, "sign": joint.sign, **limits, **dynamics}
+        return Robot(self.name, joints, limits, self.convention, base, tool)
 
 
 @frozen

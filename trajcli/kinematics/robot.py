@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import field
 from math import inf
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from trajcli.curves.piecewise import Array, read_only
 from trajcli.errors import InputError
 from trajcli.frozen import comparable, frozen
+
+if TYPE_CHECKING:
+    from trajcli.curves.approach import ApproachLimits
 
 JointType = Literal["revolute", "prismatic"]
 Convention = Literal["standard", "modified"]
@@ -127,6 +131,11 @@ class ToolLimits:
     angular_acceleration: float = inf
 
 
+def _not_by_position() -> Array:
+    """Return what stands for limits of velocity by position where no joint has one."""
+    return np.empty((0, 2))
+
+
 @frozen
 class Limits:
     """Lower and upper bounds by joint; an infinite one means unlimited, and is not checked.
@@ -137,6 +146,8 @@ class Limits:
         acceleration: Shape (n, 2), per second squared; lower < 0 < upper.
         jerk: Shape (n, 2), per second cubed; lower < 0 < upper.
         tcp: Of the tool.
+        velocity_by_position: Shape (n, 2): d, per second squared, infinite for no such limit, and o, per
+            second, of |v| <= max(0, sqrt(2 d x) - o) at the distance x from the position limit ahead.
     """
 
     position: Array
@@ -144,6 +155,7 @@ class Limits:
     acceleration: Array
     jerk: Array
     tcp: ToolLimits = ToolLimits()
+    velocity_by_position: Array = field(default_factory=_not_by_position)
 
     def __post_init__(self) -> None:
         for index, name in enumerate(QUANTITIES):
@@ -156,10 +168,34 @@ class Limits:
                     f"{name} limits: lower must be below {'0 and 0 below upper' if index else 'upper'}"
                 )
             object.__setattr__(self, name, bounds)
+        object.__setattr__(self, "velocity_by_position", self._checked_by_position())
+
+    def _checked_by_position(self) -> Array:
+        """Return the limits of velocity by position, one row for each joint."""
+        given, n = self.velocity_by_position, len(self.position)
+        rows = read_only(given if len(given) else np.tile([np.inf, 0.0], (n, 1)))
+        if rows.shape != (n, 2) or not ((rows[:, 0] > 0) & (rows[:, 1] >= 0) & (rows[:, 1] < np.inf)).all():
+            raise ValueError("velocity_by_position: expected n rows of a deceleration above 0 and an offset")
+        if not np.isfinite(self.position[np.isfinite(rows[:, 0])]).all():
+            raise ValueError("velocity_by_position needs position limits")
+        return rows
 
     def __repr__(self) -> str:
         limited = [name for name in QUANTITIES if np.isfinite(getattr(self, name)).any()]
         return f"Limits({len(self.position)} joints: {', '.join(limited) or 'none'})"
+
+    @property
+    def has_velocity_by_position(self) -> bool:
+        """Whether the velocity of some joint is limited by its position."""
+        return bool(np.isfinite(self.velocity_by_position[:, 0]).any())
+
+    @property
+    def approach(self) -> ApproachLimits:
+        """The limits of velocity by position, as those of an approach to the ends of the ranges."""
+        from trajcli.curves.approach import ApproachLimits
+
+        deceleration, offset = self.velocity_by_position.T
+        return ApproachLimits(self.position, deceleration, offset)
 
     def of_order(self, order: int) -> Array:
         """Return the bounds (n, 2) of the derivative of the given order, 0 (position) to 3 (jerk)."""

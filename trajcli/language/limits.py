@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any
 
+from pydantic import Field
 from pydantic.json_schema import JsonSchemaValue
 
 from trajcli.frozen import comparable
@@ -92,6 +93,44 @@ class JointBound(FieldType):
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of a magnitude, a pair or null."""
         return _bound_schema(self.order)
+
+
+@comparable
+class JointRate(FieldType):
+    """A magnitude of a derivative of one joint's position, whose type is the first of the context."""
+
+    order: int
+    description: str
+    positive: bool = True
+
+    def read(self, value: Any, context: ReadingContext) -> float:  # noqa: ANN401
+        """Return the number in SI."""
+        quantity = context.joint_quantity(0, self.order)
+        size = read_number(value, quantity, context.units)
+        if size < 0 or (self.positive and size == 0):
+            raise FlawError(f"expected a number {self.rule}, got {shown(value)}")
+        check_not_tiny(size, value, quantity, context.units)
+        return size
+
+    @property
+    def rule(self) -> str:
+        """What the number must be, in words."""
+        return "above 0" if self.positive else "at least 0"
+
+    def json_schema(self) -> JsonSchemaValue:
+        """Return the schema of a number or a string with its unit."""
+        bound = {"above": 0.0} if self.positive else {"at_least": 0.0}
+        return Number(Quantity("length", self.order), "", **bound).json_schema()
+
+
+class VelocityByPosition(Model):
+    """A limit of velocity that depends on the distance to the position limit ahead."""
+
+    deceleration: Annotated[float, JointRate(2, "d (angle or length unit per s^2).")]
+    offset: Annotated[
+        float,
+        JointRate(1, "o, taken off the velocity (angle or length unit per s).", positive=False),
+    ] = 0.0
 
 
 @comparable
@@ -196,3 +235,16 @@ class LimitsSpec(Model, defer_build=False):  # made once, not for each planner t
     def of_order(self, order: int) -> tuple[LowerUpper | None, ...]:
         """Return the bounds of a derivative, of order 0 (position) to 3 (jerk); empty where none is given."""
         return getattr(self, QUANTITIES[order])  # type: ignore[no-any-return]
+
+
+class JobLimitsSpec(LimitsSpec):
+    """Limits of a job, which may stand in a file of MoveIt's."""
+
+    file: Annotated[
+        str | None,
+        Field(
+            strict=True,
+            min_length=1,
+            description="MoveIt's joint_limits.yaml, relative to the job's folder; other keys win over it.",
+        ),
+    ] = None

@@ -16,6 +16,7 @@ from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.errors import PlanningError, Problem, VerificationError
 from trajcli.job.report import (
     BindingReport,
+    ByPositionReport,
     EventReport,
     FindingReport,
     KnotsDeviation,
@@ -138,6 +139,10 @@ def _move(plan: Plan, index: int, *, reference: bool) -> MoveReport:
     used = [peak for peak in peaks if peak.used is not None and peak.quantity != "position"]
     most = max(used, key=lambda peak: peak.used or 0.0, default=None)
     binding = most and BindingReport(joint=most.joint, quantity=most.quantity, used=most.used or 0.0)
+    near = _by_position(plan, index)
+    nearest = max(near, key=lambda use: use.used or 0.0, default=None)
+    if nearest is not None and (binding is None or nearest.used > (binding.used or 0.0)):
+        binding = BindingReport(joint=nearest.joint, quantity="velocity_by_position", used=nearest.used)
     return MoveReport(
         index=span.index,
         planner=span.planner,
@@ -147,6 +152,7 @@ def _move(plan: Plan, index: int, *, reference: bool) -> MoveReport:
         continuity=span.continuity,
         stretch=move.stretch,
         peaks=peaks,
+        velocity_by_position=near or None,
         binding=binding,
         waypoints=_waypoints(move, span),
         outside=_outside(move, plan.verdict, index),
@@ -174,6 +180,25 @@ def _peak(move: PlannedMove, joint: int, order: int, peaks: Peaks) -> PeakReport
         used=max(0.0, *parts) if parts else None,
         unit=joint_units(move.robot.joint_types[joint : joint + 1], order)[0],
     )
+
+
+def _by_position(plan: Plan, index: int) -> list[ByPositionReport]:
+    """Return where the joints of a move use most of their limits of velocity by position."""
+    names, types = plan.trajectory.joint_names, plan.trajectory.joint_types
+    units, lengths = joint_units(types, 1), joint_units(types)
+    return [
+        ByPositionReport(
+            joint=names[use.component],
+            used=use.used,
+            velocity=use.velocity,
+            limit=use.limit,
+            unit=units[use.component],
+            distance=use.distance,
+            distance_unit=lengths[use.component],
+            time=use.time - plan.trajectory.curve.start,
+        )
+        for use in plan.verdict.by_position[index]
+    ]
 
 
 def _waypoints(move: PlannedMove, span: Span) -> tuple[WaypointReport, ...] | None:

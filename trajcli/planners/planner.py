@@ -24,9 +24,15 @@ if TYPE_CHECKING:
 
 Resolve = Callable[["Target", Array], "Target"]
 WhenOverLimit = Literal["error", "slow"]
-_REMARKS = ("refined", "within_tool_limits", "local_optimum")  # kinds of events that concede nothing
+_REMARKS = (
+    "refined",
+    "within_tool_limits",
+    "within_velocity_by_position",
+    "local_optimum",
+)  # kinds of events that concede nothing
 _GIVEN = ("duration", "velocity", "acceleration", "deceleration", "timed")  # where they say how long it lasts
-_LITTLE = 1e-3  # relative: a law that is stretched by less still counts as the fastest
+LITTLE = 1e-3
+"""Relative: a law that is stretched by less still counts as the fastest."""
 
 
 @comparable
@@ -77,7 +83,7 @@ class Event:
 def stretched(factor: float) -> Event:
     """Return the event of a time-optimal law that lasts `factor` times longer than it was computed."""
     text = f"stretched {factor:.9g} times to keep all limits between grid points"
-    return Event("stretched" if factor > 1 + _LITTLE else "refined", text)
+    return Event("stretched" if factor > 1 + LITTLE else "refined", text)
 
 
 @frozen

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from trajcli.checks.finding import Finding
+from trajcli.checks.finding import LIMITS_OF_JOINTS, Finding
 from trajcli.checks.verify import Verdict, longest_factor, verify
 from trajcli.errors import Amount, Problem, TrajcliError, at_least
-from trajcli.kinematics.robot import QUANTITIES, Robot
+from trajcli.kinematics.robot import Robot
 from trajcli.planners import changed
 from trajcli.planners.planner import PlannedMove, Planner
 from trajcli.planning.retime import over_limit, slow_to_limits, smallest_stretch
@@ -54,7 +54,7 @@ def _advised(own: list[Finding], move: PlannedMove, moves: Sequence[PlannedMove]
     remedies = {} if factor is not None else move.planned.remedies
     return [
         replace(f, hint=remedies.get(f.kind, hint), factor=factor if f.factor is not None else None)
-        if f in slow or (f.kind in QUANTITIES and f.kind != "jerk" and factor is None)
+        if f in slow or (f.kind in LIMITS_OF_JOINTS and f.kind != "jerk" and factor is None)
         else f
         for f in own
     ]

@@ -197,10 +197,10 @@ def _plan_move(loaded: LoadedJob, index: int, planner: Planner, start: State) ->
         from trajcli.planning.retime import long_enough
 
         move = long_enough(index, planner, start, robot, error)
-    if robot.limits.tcp != _NO_TOOL_LIMITS:
-        from trajcli.planning.retime import keep_tool_limits
+    if robot.limits.tcp != _NO_TOOL_LIMITS or robot.limits.has_velocity_by_position:
+        from trajcli.planning.retime import keep_further_limits
 
-        move = keep_tool_limits(move)
+        move = keep_further_limits(move)
     if over_limit == "slow":
         from trajcli.planning.retime import slow_to_limits
 

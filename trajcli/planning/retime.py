@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import ceil
 
-from trajcli.checks.finding import Finding
+from trajcli.checks.finding import LIMITS_OF_JOINTS, Finding
 from trajcli.checks.verify import verify
 from trajcli.curves.operations import scale_time
 from trajcli.curves.smallest_feasible import smallest_feasible
 from trajcli.errors import Amount, Amounts, PlanningError, Problem, TrajcliError
-from trajcli.kinematics.robot import QUANTITIES, Robot, ToolLimits
-from trajcli.planners.planner import Event, Planned, PlannedMove, Planner
+from trajcli.kinematics.robot import Robot, ToolLimits
+from trajcli.planners.planner import LITTLE, Event, Planned, PlannedMove, Planner
 from trajcli.trajectory import State
 
 LONGEST = 1e4
@@ -21,6 +21,7 @@ _ONE_BY_ONE = 1  # factors tried at once: each costs a plan of its own
 _WHOLE = 1e-9  # of a period: what is this close to whole is whole
 _TRIES = 50
 _NO_TOOL_LIMITS = ToolLimits()
+_BY_POSITION = "velocity_by_position"
 
 
 def with_duration(move: PlannedMove, duration: float) -> PlannedMove:
@@ -54,22 +55,33 @@ def _scaled(planned: Planned, factor: float) -> Planned:
     )
 
 
-def keep_tool_limits(move: PlannedMove) -> PlannedMove:
-    """Return the move in joint space, where it finds its duration itself, within the limits of the tool.
+def keep_further_limits(move: PlannedMove) -> PlannedMove:
+    """Return the move, where it finds its duration itself, within limits that its planner does not know.
 
-    It is stretched by the smallest factor that does it, with an event. Planners in joint space know limits of
-    joints alone, and a limit that is in force says how fast a move may be, whichever it is.
+    These are the limits of the tool for moves in joint space, and those of velocity by position for all. It
+    is stretched by the smallest factor that does it, with an event: a limit that is in force says how fast a
+    move may be, whichever it is.
     """
-    known = move.planned.tool is None and move.planner.finds_duration and move.duration > 0
-    if not known or move.robot.limits.tcp == _NO_TOOL_LIMITS:
+    finds = move.planner.finds_duration and move.planner.without_duration() is None and move.duration > 0
+    limits = move.robot.limits
+    if not finds or (limits.tcp == _NO_TOOL_LIMITS and not limits.has_velocity_by_position):
         return move
-    over = [finding for finding in over_limit(move) if finding.joint is None]
+    in_joint_space = move.planned.tool is None
+    over = [
+        finding
+        for finding in over_limit(move)
+        if (finding.joint is None and in_joint_space) or finding.kind == _BY_POSITION
+    ]
     factor = smallest_stretch(move, over) if over else None
     if factor is None or isinstance(factor, Problem):
         return move
-    exactly = move.planner.one_shape and move.at_rest
-    kind, remark = ("within_tool_limits", "") if exactly else ("stretched", "; a faster motion may exist")
-    return _stretched(move, factor, over, kind, remark)
+    by_position = any(finding.kind == _BY_POSITION for finding in over)
+    if by_position and factor <= 1 + LITTLE:
+        return _stretched(move, factor, over, "refined")
+    if move.planner.one_shape and move.at_rest:
+        kind = "within_velocity_by_position" if by_position else "within_tool_limits"
+        return _stretched(move, factor, over, kind)
+    return _stretched(move, factor, over, "stretched", "; a faster motion may exist")
 
 
 def long_enough(
@@ -166,7 +178,7 @@ def _stretched(
 def over_limit(move: PlannedMove) -> list[Finding]:
     """Return the findings about a move alone that a longer duration may help against, and about positions."""
     findings = verify(move.alone(), [move.robot.limits], [move.promise]).findings
-    return [f for f in findings if f.kind in QUANTITIES or f.factor is not None]
+    return [f for f in findings if f.kind in LIMITS_OF_JOINTS or f.factor is not None]
 
 
 def align_to_period(move: PlannedMove, rate: float) -> PlannedMove:

@@ -32,7 +32,7 @@ def why_no_duration(move: PlannedMove) -> Problem | None:
     if move.planned.braking is not None:
         return None  # it may start outside its limits
     for state, verb in ((move.start, "starts"), (move.planned.end, "ends")):
-        reason = _beyond(move, state, verb) or _no_room(move, state, verb)
+        reason = _beyond(move, state, verb) or _too_near(move, state, verb) or _no_room(move, state, verb)
         if reason is not None:
             return reason
     return None
@@ -54,6 +54,26 @@ def _beyond(move: PlannedMove, state: State, verb: str) -> Problem | None:
             message = f"{{joint}} {verb} with {QUANTITIES[order]} {{value}}, its limit is {{limit}}"
             return Problem(message, amounts=amounts)
     return None
+
+
+def _too_near(move: PlannedMove, state: State, verb: str) -> Problem | None:
+    """Return that a joint is too fast for its distance from its limit where the move starts, or ends."""
+    if not move.robot.limits.has_velocity_by_position:
+        return None
+    from trajcli.checks.velocity_by_position import ends_over_velocity_by_position
+
+    joint = ends_over_velocity_by_position(move.robot.limits, [state])
+    if joint is None:
+        return None
+    velocity = float(state.velocity[joint])
+    bound = move.robot.limits.approach.bounds(state.position)[int(velocity > 0)]
+    amounts: Amounts = {
+        "joint": move.robot.joint_names[joint],
+        "value": Amount(velocity, 1, joint),
+        "limit": Amount(float(bound[joint]), 1, joint),
+    }
+    message = f"{{joint}} {verb} with {{value}}; so near to its position limit at most {{limit}} is allowed"
+    return Problem(message, amounts=amounts)
 
 
 def _no_room(move: PlannedMove, state: State, verb: str) -> Problem | None:
@@ -141,6 +161,11 @@ class StretchSearch:
         (peaks,) = judged_peaks(alone, [robot.limits], [longer.promise], peaks_by_move(alone))
         self._learn(factor, peaks[0].low, peaks[0].high)
         joints = float(share_of_limits([(p.low, p.high) for p in peaks], robot.limits)) - (1 + _ROOM)
+        if robot.limits.has_velocity_by_position:
+            from trajcli.checks.velocity_by_position import velocity_by_position_uses
+
+            uses = velocity_by_position_uses(alone, alone.spans[0], robot.limits)
+            joints = max([joints, *(use.used - (1 + _ROOM) for use in uses)])
         if robot.limits.tcp == _NO_TOOL_LIMITS:
             return joints
         from trajcli.checks.tool_limits import limits_tool, share_of_tool_limits, tool_peaks

@@ -18,6 +18,7 @@ from trajcli.trajectory import ViaPoints
 JOINT_KINDS = {
     "position": 0,
     "velocity": 1,
+    "velocity_by_position": 1,
     "acceleration": 2,
     "jerk": 3,
     "position_jump": 0,
@@ -86,9 +87,31 @@ class PlannedMotion:
 
     def joint_limits(self, joint: int, order: int) -> tuple[Array, Array]:
         """Return the lines (m, 2) of the lower and the upper limit in force; NaN where there is none."""
+        if order == 1 and any(np.isfinite(m.robot.limits.velocity_by_position[joint, 0]) for m in self.moves):
+            return self._limits_by_position(joint)
         bounds = np.array([move.robot.limits.of_order(order)[joint] for move in self.moves])
         low, high = (self._steps(side / self.display.joint_factor(joint)) for side in bounds.T)
         return low, high
+
+    def _limits_by_position(self, joint: int) -> tuple[Array, Array]:
+        """Return the lines (m, 2) of a joint's velocity limits, narrowed by where it is on the trajectory."""
+        curve, scale = self.plan.trajectory.curve, self.display.joint_factor(joint)
+        piece, local = local_times(curve)
+        times = np.minimum(curve.breaks[piece] + local, curve.breaks[piece + 1])
+        positions = curve.evaluate(times)
+        spans = np.array([span.end for span in self.plan.trajectory.spans[:-1]]) + curve.start
+        owner = np.searchsorted(spans, times, "right")
+        low, high = np.empty(times.size), np.empty(times.size)
+        for k, move in enumerate(self.moves):
+            rows, limits = owner == k, move.robot.limits
+            bounds = limits.approach.bounds(positions[rows])
+            low[rows] = np.maximum(bounds[0][:, joint], limits.velocity[joint, 0])
+            high[rows] = np.minimum(bounds[1][:, joint], limits.velocity[joint, 1])
+        lines = [
+            np.stack(thinned(times + self.offset, np.where(np.isfinite(side), side, np.nan) / scale), axis=1)
+            for side in (low, high)
+        ]
+        return lines[0], lines[1]
 
     def tool_limit(self, angular: bool) -> Array:
         """Return the line (m, 2) of the limit of the tool's speed."""

@@ -12,9 +12,9 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, utf8
 from trajcli.frozen import frozen
 from trajcli.geometry.euler import rpy_from_matrix
-from trajcli.job.dump import mapping_text
+from trajcli.job.dump import mapping_text, robot_as_mapping
 from trajcli.job.measurements import read_configurations, read_measurements
-from trajcli.job.robot import RobotSheet, robot_as_mapping
+from trajcli.job.robot import RobotSheet
 from trajcli.job.yaml.load import parse_document
 from trajcli.kinematics.calibration.fit import Fit, Options, calibrate
 from trajcli.kinematics.calibration.identifiability import Identifiability, Share

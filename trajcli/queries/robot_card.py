@@ -211,6 +211,11 @@ def _joint_card(sheet: RobotSheet, index: int) -> dict[str, Any]:
         scale = factor(joint_quantity(joint.type, order), units)
         low, high = (sheet.robot.limits.of_order(order)[index] / scale).tolist()
         limits[quantity] = [_finite(low), _finite(high)] if np.isfinite([low, high]).any() else None
+    rates = sheet.robot.limits.velocity_by_position[index]
+    if np.isfinite(rates[0]):
+        scales = [factor(joint_quantity(joint.type, order), units) for order in (2, 1)]
+        both = zip(("deceleration", "offset"), (rates / scales).tolist(), strict=True)
+        limits["velocity_by_position"] = {name: _finite(value) for name, value in both}
     described = table if sheet.robot.convention is not None else {}
     return {"name": joint.name, "type": joint.type, **described, "sign": joint.sign, **limits}
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
-from trajcli.frozen import comparable, frozen
+from trajcli.frozen import frozen
 from trajcli.geometry.euler import matrix_from_rpy
 from trajcli.kinematics.robot import Friction, LinkInertia
 from trajcli.urdf.read import Element, JointElement, UrdfDocument
@@ -30,19 +30,6 @@ _XYZ, _PRODUCTS = (0.0, 0.0, 0.0), ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 _UNLIMITED = (-inf, inf)
 
 
-@comparable
-class VelocityByPosition:
-    """How fast a joint may be near the end of its range: |v| <= max(0, sqrt(2 d (distance to the end)) - o).
-
-    Attributes:
-        deceleration: d, rad/s^2 or m/s^2.
-        offset: o, rad/s or m/s.
-    """
-
-    deceleration: float
-    offset: float
-
-
 @frozen
 class JointProperties:
     """What a URDF says about a joint beside its geometry; bounds are (lower, upper), SI.
@@ -54,7 +41,8 @@ class JointProperties:
         jerk: Of URDF 1.2, as the acceleration.
         effort: N m or N.
         friction: Of the joint.
-        velocity_by_position: Franka's `<position_based_velocity_limits>`; None for other robots.
+        velocity_by_position: Deceleration and offset of Franka's `<position_based_velocity_limits>`: |v| at
+            most max(0, sqrt(2 d (distance to the end)) - o). An infinite d where there are none.
         notes: What was taken as unknown, and why.
     """
 
@@ -64,7 +52,7 @@ class JointProperties:
     jerk: tuple[float, float]
     effort: tuple[float, float]
     friction: Friction
-    velocity_by_position: VelocityByPosition | None
+    velocity_by_position: tuple[float, float]
     notes: tuple[str, ...]
 
 
@@ -193,10 +181,10 @@ def _friction(document: UrdfDocument, joint: JointElement) -> Friction:
     return Friction(*values)
 
 
-def _velocity_by_position(document: UrdfDocument, joint: JointElement) -> VelocityByPosition | None:
+def _velocity_by_position(document: UrdfDocument, joint: JointElement) -> tuple[float, float]:
     element = joint.element.first("position_based_velocity_limits")
     if element is None:
-        return None
+        return inf, 0.0
     deceleration = document.number(element, "deceleration_limit")
     offset = document.number(element, "velocity_offset") or 0.0
     if deceleration is None or not 0.0 < deceleration < inf or not 0.0 <= offset < inf:
@@ -204,7 +192,7 @@ def _velocity_by_position(document: UrdfDocument, joint: JointElement) -> Veloci
             f"joint '{joint.name}': expected a deceleration_limit above 0 and a velocity_offset of at least 0"
         )
         raise document.refused(message, element)
-    return VelocityByPosition(deceleration, offset)
+    return deceleration, offset
 
 
 def link_inertia(

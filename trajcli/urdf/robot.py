@@ -19,7 +19,6 @@ from trajcli.kinematics.robot import Joint, Limits, LinkInertia, Robot
 from trajcli.urdf.dh import AxisInChain, DhTable, dh_table
 from trajcli.urdf.limits import (
     JointProperties,
-    VelocityByPosition,
     joint_properties,
     link_inertia,
     origin_of,
@@ -66,7 +65,6 @@ class UrdfRobot:
         tip: Name of the link where it ends: the tcp.
         other_tips: Links in which the tree ends too.
         snapped: Angles that were taken as whole numbers of right angles.
-        velocity_by_position: Franka's limits by joint, which the robot cannot hold; None where it has none.
         notes: What was taken as unknown, left out, or is not taken over.
     """
 
@@ -75,7 +73,6 @@ class UrdfRobot:
     tip: str
     other_tips: tuple[str, ...]
     snapped: tuple[SnappedAngle, ...]
-    velocity_by_position: tuple[VelocityByPosition | None, ...]
     notes: tuple[str, ...]
 
     @property
@@ -149,12 +146,8 @@ def robot_of_urdf(
     notes = [note for each in properties for note in each.notes]
     inertias = _inertias(document, path, origins, table, notes)
     robot = _robot(document, moving, table, properties, inertias)
-    by_position = tuple(each.velocity_by_position for each in properties)
-    if any(by_position):
-        names = [joint.name for joint, limit in zip(moving, by_position, strict=True) if limit]
-        notes.append(f"velocity limits by position of {', '.join(names)} are in the file, and not taken over")
     snapped = () if exact else tuple(_snapped(document, path, origins, properties))
-    return UrdfRobot(robot, path.root, path.tip, path.other_tips, snapped, by_position, tuple(notes))
+    return UrdfRobot(robot, path.root, path.tip, path.other_tips, snapped, tuple(notes))
 
 
 def _angles(document: UrdfDocument, joint: JointElement) -> tuple[Array, Array]:
@@ -213,13 +206,16 @@ def _robot(
         np.array([getattr(each, quantity) for each in properties])
         for quantity in ("position", "velocity", "acceleration", "jerk")
     )
-    limits = _limits(document, (position, velocity, acceleration, jerk))
+    bounded = np.isfinite(position).all(axis=1)
+    near = np.array([each.velocity_by_position for each in properties])
+    by_position = np.where(bounded[:, None], near, (np.inf, 0.0))  # there is no end to be near to
+    limits = _limits(document, (position, velocity, acceleration, jerk), by_position)
     return Robot(document.name, joints, limits, "standard", table.base, table.tool)
 
 
-def _limits(document: UrdfDocument, bounds: tuple[Array, Array, Array, Array]) -> Limits:
+def _limits(document: UrdfDocument, bounds: tuple[Array, Array, Array, Array], by_position: Array) -> Limits:
     try:
-        return Limits(*bounds)
+        return Limits(*bounds, velocity_by_position=by_position)
     except ValueError as error:
         raise InputError(Problem(str(error), place=Place(document.file, 1, 1))) from None
 

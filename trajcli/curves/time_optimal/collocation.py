@@ -59,7 +59,9 @@ class CollocationRows:
         cap[1:] = np.minimum(cap[1:], self.cap[1:] / velocity**2)
         C, less = self.C.copy(), 1.0 - 1.0 / acceleration
         for block in blocks(self.distances.size):
-            C[:, block] = np.maximum(C[:, block] - self._at_rest(block) * less[block], 0.0)
+            at_rest = self._at_rest(block)
+            at_rest[np.isinf(at_rest)] = 0.0  # no bound stays none
+            C[:, block] = np.maximum(C[:, block] - at_rest * less[block], 0.0)
         return replace(self, C=C, cap=cap)
 
     def sdd_ranges(self, x: Array, relaxed: float = 0.0) -> tuple[tuple[Array, Array], tuple[Array, Array]]:

@@ -17,6 +17,7 @@ from typing import Protocol
 
 import numpy as np
 
+from trajcli.curves.approach import ApproachLimits, uses_of_pieces
 from trajcli.curves.bernstein import control_points
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, derivative_coefficients, horner
 from trajcli.curves.time_optimal.time_law import LawPieces, blocks
@@ -24,6 +25,8 @@ from trajcli.frozen import frozen
 
 _KINK = 1e-9  # of the largest derivative of a joint: a jump above it is a corner
 _ROUNDING = 1e-13  # of the largest derivative of all joints: the same, where one hardly moves
+_NEARLY = 0.999  # of an approach limit: what uses less is not looked at closely
+_MOST = 1e3  # excess that is told: limits lowered by more would be rounding
 _SAMPLES = 9  # of a speed limit within an interval, both ends included
 
 
@@ -154,6 +157,38 @@ class SpeedConstraint:
         limits = self.limit(horner(law.coefficients, samples).reshape(-1)).reshape(sd.shape)
         used = (sd / limits).max(axis=0)
         return np.stack([used, np.zeros_like(used)])
+
+
+@frozen
+class ApproachConstraint:
+    """Limits of the velocities with which joints approach the ends of their ranges; the excess is exact.
+
+    Attributes:
+        path: q(s) with n joints.
+        limits: Of the joints.
+    """
+
+    path: PiecewisePolynomial
+    limits: ApproachLimits
+
+    def rows(self, s: Array, side: Side) -> ConstraintRows:
+        """Return no rows, and for each direction in which a joint moves its limit as cap, at points (p,)."""
+        position, first = self.path.evaluate_orders(s, (0, 1), side=side).transpose(1, 0, 2)
+        low, high = self.limits.bounds(position)
+        nothing = np.empty((s.size, 0))
+        with np.errstate(divide="ignore", over="ignore"):
+            rate = np.maximum(first / high, first / low).max(axis=1)
+            return ConstraintRows(nothing, nothing, nothing, rate**-2.0)
+
+    def excess(self, law: LawPieces) -> Array:
+        """Return what is used of the limits in each piece, and zeros for acceleration, (2, N)."""
+        excess = np.zeros((2, law.durations.size))
+        for block in blocks(law.durations.size):
+            pieces = law.chosen(block)
+            q = pieces.along(self.path).transpose(0, 2, 1)
+            uses, _ = uses_of_pieces(q, pieces.durations, self.limits, _NEARLY)
+            excess[0, block] = np.minimum(uses.max(axis=1, initial=0.0), _MOST)
+        return excess
 
 
 def is_at_rest(path: PiecewisePolynomial) -> tuple[bool, bool]:

@@ -30,6 +30,7 @@ from trajcli.kinematics.following.motion import motion_along
 from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.robot import Robot, ToolLimits
+from trajcli.planners.approach_limits import approach_constraints
 from trajcli.planners.boundary_states import missing_limit
 from trajcli.planners.planner import Event, Phase, stretched
 from trajcli.planners.tool_path.follow import FollowedPath, JointMotion
@@ -63,8 +64,8 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
     tcp = _limits(spec, robot.limits.tcp)
     limits = robot.limits
     with joints.diagnosed():
-        of_tool = ToolConstraint(joints.executed, tcp)
-        solved = time_optimal(curve, limits.velocity, limits.acceleration, further=[of_tool])
+        further = (ToolConstraint(joints.executed, tcp), *approach_constraints(curve, robot))
+        solved = time_optimal(curve, limits.velocity, limits.acceleration, further=further)
         remaining = _remaining_stretch(joints.executed, solved.law, tcp)
     least = spec.minimum_duration or 0.0
     factor = max(remaining, least / solved.trajectory.duration)
@@ -85,7 +86,7 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
     joint_constraint = JointConstraint(curve, limits.velocity, limits.acceleration)
     breaks = distinct(np.concatenate([curve.breaks, path.breaks]))
     dimension: Literal["length", "angle"] = "angle" if path.poses.pure_rotation else "length"
-    plane = PhasePlane(law, (joint_constraint, of_tool), breaks, solved.stops, dimension)
+    plane = PhasePlane(law, (joint_constraint, *further), breaks, solved.stops, dimension)
     kept = tuple(events if solved.refinements else events[1:])
     return JointMotion(trajectory, motion, tuple(phases), kept, plane)
 

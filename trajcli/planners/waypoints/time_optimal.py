@@ -39,6 +39,7 @@ from trajcli.language.numbers import (
 from trajcli.language.per_joint import JointDistance
 from trajcli.language.poses import read_numbers
 from trajcli.language.recorded import Recorded
+from trajcli.planners.approach_limits import approach_constraints
 from trajcli.planners.boundary_states import missing_limit, same_state, standstill
 from trajcli.planners.planner import Event, Phase, Planned, stretched
 from trajcli.planners.waypoints.spline_rules import Rule, curve_through
@@ -346,7 +347,8 @@ class TimeOptimal(ThroughPoints):
             "ratio" if not alike else "length" if "prismatic" in kinds else "angle"
         )
         joints = JointConstraint(path.curve, limits.velocity, limits.acceleration)
-        return PhasePlane(motion.law, (joints,), path.curve.breaks, motion.stops, dimension)
+        constraints = (joints, *approach_constraints(path.curve, robot))
+        return PhasePlane(motion.law, constraints, path.curve.breaks, motion.stops, dimension)
 
     def _in_one_point(self, start: State, points: PointTable, robot: Robot) -> Planned:
         """Return the move all of whose points are one.
@@ -383,6 +385,7 @@ class TimeOptimal(ThroughPoints):
 
 def _solved(path: JointPath, robot: Robot) -> TimeOptimalMotion:
     limits = robot.limits
+    further = approach_constraints(path.curve, robot)
     try:
         return time_optimal(
             path.curve,
@@ -390,6 +393,7 @@ def _solved(path: JointPath, robot: Robot) -> TimeOptimalMotion:
             limits.acceleration,
             start_velocity=path.speeds[0],
             end_velocity=path.speeds[1],
+            further=further,
         )
     except UnreachableSpeedError as error:
         share = error.allowed / error.speed

@@ -1,0 +1,133 @@
+"""Speeds of approach against dense samples, and against motions whose use of the limit is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from trajcli.curves.approach import ROOM, ApproachLimits, approach_uses, uses_of_pieces
+from trajcli.curves.hermite import hermite_pieces
+from trajcli.curves.operations import scale_time
+from trajcli.curves.piecewise import PiecewisePolynomial
+
+BREAKS = np.array([0.0, 1.0, 2.2, 3.0])
+
+
+def wild(seed: int) -> tuple[PiecewisePolynomial, ApproachLimits]:
+    """Return a curve of quintics through random states, and limits that it uses in part."""
+    rng = np.random.default_rng(seed)
+    states = rng.normal(size=(3, 4, 2))
+    curve = hermite_pieces(BREAKS, states)
+    q = curve.evaluate(np.linspace(0, 3, 3001))
+    low, high = q.min(axis=0) - rng.uniform(0.05, 0.5, 2), q.max(axis=0) + rng.uniform(0.05, 0.5, 2)
+    return curve, ApproachLimits(np.stack([low, high], axis=1), rng.uniform(2, 20, 2), np.full(2, 0.2))
+
+
+def sampled_use(curve: PiecewisePolynomial, limits: ApproachLimits, count: int = 60_001) -> np.ndarray:
+    """Return the largest v / (sqrt(2 d x) - o) of each component, by its definition at many times."""
+    t = np.linspace(curve.start, curve.end, count)
+    q, v = curve.evaluate(t), curve.evaluate(t, 1)
+    ahead = np.where(v > 0, limits.position[:, 1] - q, q - limits.position[:, 0])
+    bound = np.sqrt(2 * limits.deceleration * ahead) - limits.offset
+    return np.where(np.abs(v) > 0, np.abs(v) / np.maximum(bound, ROOM), 0.0).max(axis=0)
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_the_use_is_the_largest_of_all_times(seed: int) -> None:
+    curve, limits = wild(seed)
+    for use, sampled in zip(
+        approach_uses(curve.breaks, curve.coefficients, limits), sampled_use(curve, limits), strict=True
+    ):
+        if sampled > 1e6:
+            assert use.used > 1e6
+            continue
+        assert sampled * (1 - 1e-12) <= use.used <= sampled * (1 + 1e-3)
+        assert use.used == pytest.approx(use.velocity / use.limit, rel=1e-6)
+        assert curve.evaluate(use.time, 1)[use.component] == pytest.approx(use.velocity, rel=1e-9)
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_a_motion_that_is_stretched_by_its_use_uses_all_of_the_limit(seed: int) -> None:
+    curve, limits = wild(seed)
+    for use in approach_uses(curve.breaks, curve.coefficients, limits):
+        if 1e-3 < use.used < 1e4:
+            longer = scale_time(curve, use.used)
+            other = approach_uses(longer.breaks, longer.coefficients, limits)[use.component]
+            assert other.used == pytest.approx(1.0, abs=1e-9)
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_uses_of_pieces_are_those_of_each_piece_alone(seed: int) -> None:
+    curve, limits = wild(seed)
+    uses, _ = uses_of_pieces(curve.coefficients, curve.lengths, limits, 0.0)
+    for k in range(curve.pieces):
+        alone = PiecewisePolynomial(curve.breaks[k : k + 2], curve.coefficients[:, k : k + 1])
+        for use in approach_uses(alone.breaks, alone.coefficients, limits):
+            of_piece = max(uses[k, use.component], uses[k, use.component + 2])
+            assert min(of_piece, 1e8) == pytest.approx(min(use.used, 1e8), rel=1e-9)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_braking_with_the_deceleration_of_the_limit_uses_all_of_it_everywhere(sign: float) -> None:
+    """With o = 0 the motion x = d (T - t)^2 / 2 has v = sqrt(2 d x): a hundredth of a per cent more is over."""
+    d, duration = 3.0, 0.8
+    for factor, over in ((1.0, False), (1.0001, True)):
+        x = 0.5 * d * factor**2 * np.array([1.0, -2 * duration, duration**2])
+        q = -sign * x
+        q[-1] += sign * 2.0
+        limits = ApproachLimits(np.array([[-2.0, 2.0]]), np.array([d]), np.zeros(1))
+        (use,) = approach_uses(np.array([0.0, duration]), q[:, None, None], limits)
+        assert use.used == pytest.approx(factor, rel=1e-9)
+        assert bool(use.used > 1 + 1e-9) is over
+        assert np.sign(use.velocity) == np.sign(use.limit) == sign
+
+
+def test_near_to_a_bound_only_the_motion_towards_it_counts() -> None:
+    limits = ApproachLimits(np.array([[-1.0, 1.0]]), np.array([2.0]), np.array([0.4]))  # zone: 0.04
+    away = hermite_pieces(np.array([0.0, 2.0]), np.array([[[0.99], [0.5]], [[0.0], [0.0]], [[0.0], [0.0]]]))
+    (use,) = approach_uses(away.breaks, away.coefficients, limits)
+    assert 0 < use.used < 1
+    towards = hermite_pieces(
+        np.array([0.0, 2.0]), np.array([[[0.5], [0.97]], [[0.0], [0.0]], [[0.0], [0.0]]])
+    )
+    (use,) = approach_uses(towards.breaks, towards.coefficients, limits)
+    assert use.used > 1e6
+    assert (use.limit, use.distance <= 0.04 + 1e-12, use.velocity > 0) == (0.0, True, True)
+
+
+def test_rest_uses_nothing_wherever_it_is() -> None:
+    limits = ApproachLimits(np.array([[-1.0, 1.0]]), np.array([2.0]), np.array([0.4]))
+    (use,) = approach_uses(np.array([0.0, 1.0]), np.array([[[0.999]]]), limits)
+    assert use.used == 0.0
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_lines_and_parabolas_have_uses_too(degree: int) -> None:
+    """At constant speed the use is largest where the bound is nearest; further powers are zero."""
+    limits = ApproachLimits(np.array([[-1.0, 1.0]]), np.array([2.0]), np.array([0.1]))
+    line = np.zeros((degree + 1, 1, 1))
+    line[-2:, 0, 0] = 0.5, 0.2
+    (use,) = approach_uses(np.array([0.0, 1.0]), line, limits)
+    assert use.used == pytest.approx(0.5 / (np.sqrt(2 * 2.0 * 0.3) - 0.1), rel=1e-9)
+    uses, _ = uses_of_pieces(line, np.ones(1), limits, 0.0)
+    assert uses.max() == pytest.approx(use.used)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.2])
+def test_behind_a_bound_nothing_may_move_on(offset: float) -> None:
+    """A motion that turns back a little behind its bound passes it at speed, also where no offset is given."""
+    limits = ApproachLimits(np.array([[-1.0, 1.0]]), np.array([8.0]), np.array([offset]))
+    parabola = np.array([-0.5, 1.0, 0.501])[:, None, None]  # up to 1.001 at t = 1
+    (use,) = approach_uses(np.array([0.0, 2.0]), parabola, limits)
+    assert use.used > 1e4
+    assert use.limit < 1e-6
+    assert use.distance < offset**2 / 16 + 1e-9
+    inside = parabola.copy()
+    inside[-1] = 0.4
+    (use,) = approach_uses(np.array([0.0, 2.0]), inside, limits)
+    assert use.used < 1

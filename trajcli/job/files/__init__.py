@@ -1,0 +1,1 @@
+"""Files that a job names beside its robot: recordings, limits of MoveIt."""
