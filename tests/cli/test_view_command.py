@@ -96,7 +96,7 @@ def test_samples_from_standard_input(folder: Path) -> None:
     ("words", "text"),
     [
         (["view", "rows.csv", "-r", "ur5e", "-o", "v.html"], "expected q1 to q6 of UR5e"),
-        (["view", "rows.csv", "-r", "ur5", "-o", "v.html"], "did you mean"),
+        (["view", "rows.csv", "-r", "ur5ee", "-o", "v.html"], "did you mean"),
         (["view", "rows.csv", "-r", "cylindrical", "-o", "v.html"], "has the joint columns"),
         (["view", "rows.csv", "--set", "a=1", "-o", "v.html"], "--set is for jobs"),
         (["view", "job.yaml", "-o", "v.csv"], "a page is HTML"),
