@@ -118,8 +118,8 @@ def test_init_does_not_overwrite(capfd: Capture) -> None:
 
 def test_every_command_is_in_the_readme() -> None:
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    kinematic = {"fk", "ik", "jacobian", "pose", "robots"}
-    assert set(COMMANDS) == kinematic | {"diff", "explain", "init", "plan", "schema"}
+    kinematic = {"fk", "ik", "jacobian", "pose", "robots", "urdf", "mobility"}
+    assert set(COMMANDS) == kinematic | {"diff", "explain", "init", "plan", "plot", "schema"}
     assert [name for name in COMMANDS if f"trajcli {name}" not in readme] == []
 
 
