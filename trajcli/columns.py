@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from trajcli.curves.piecewise import Array
-from trajcli.errors import InputError
+from trajcli.errors import InputError, TrajcliError
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import JointType
 from trajcli.units import (
@@ -166,6 +166,25 @@ def group_factors(group: str, units: Units) -> Array:
 def whole_number_columns(columns: Iterable[Column]) -> tuple[int, ...]:
     """Return the indices of the columns that are written without decimals."""
     return tuple(index for index, column in enumerate(columns) if column.whole_numbers)
+
+
+def require_finite(rows: Array, columns: Sequence[Column], before: int) -> None:
+    """Refuse rows with a value that is not finite.
+
+    Args:
+        rows: Shape (N, m).
+        columns: What they hold.
+        before: How many rows came before them.
+
+    Raises:
+        TrajcliError: With the column, the value and the row of the first.
+    """
+    finite = np.isfinite(rows)
+    if not finite.all():
+        row, index = np.argwhere(~finite)[0]
+        raise TrajcliError(
+            f"{columns[index].name} is {rows[row, index]} in row {before + row}; nothing of it is written"
+        )
 
 
 def _factors(quantities: Iterable[Quantity], units: Units) -> Array:

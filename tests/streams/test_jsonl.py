@@ -61,7 +61,7 @@ def test_every_group_has_its_key():
 def test_a_value_that_is_not_finite_is_refused():
     rows = random_rows(6)
     rows[5, 2] = np.nan
-    with pytest.raises(TrajcliError, match=r"row 5, column q2: nan is not finite"):
+    with pytest.raises(TrajcliError, match=r"q2 is nan in row 5"):
         written(rows)
 
 

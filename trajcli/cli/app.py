@@ -244,7 +244,7 @@ def plot(
     files: Annotated[
         list[str],
         typer.Argument(
-            metavar="JOB|FILE...", help="A job, CSV files, or files to draw over a job; - is stdin."
+            metavar="JOB|FILE...", help="A job, files of rows or messages, or such over a job; - is stdin."
         ),
     ],
     output: Annotated[
@@ -288,7 +288,8 @@ def plot(
 @guarded
 def view(
     source: Annotated[
-        str, typer.Argument(metavar="JOB|FILE", help="A job, or a CSV file of samples; - is standard input.")
+        str,
+        typer.Argument(metavar="JOB|FILE", help="A job, or a file of rows or messages; - is standard input."),
     ],
     output: Annotated[
         str | None,
@@ -303,7 +304,7 @@ def view(
             "--robot",
             "-r",
             metavar="NAME|FILE|JOB",
-            help="The arm of a CSV file: of the catalogue, a robot file, or a job.",
+            help="The arm of a file: of the catalogue, a robot file, a URDF, or a job.",
         ),
     ] = None,
     override: Overrides = [],  # noqa: B006

@@ -81,7 +81,7 @@ def _files_and_joints(words: Sequence[str], joints: Sequence[str]) -> tuple[list
         return list(words), ()
     files = [word for word in words if word == "-" or Path(word).exists() or Path(word).suffix]
     if not files:
-        raise InputError("there is no file to plot", hint="name a job or a CSV file before --joints")
+        raise InputError("there is no file to plot", hint="name a job or a file of rows before --joints")
     return files, (*joints, *(word for word in words if word not in files))
 
 

@@ -29,7 +29,7 @@ class ViewOptions:
 
 
 def run_view(source: str, overrides: Sequence[str], options: ViewOptions) -> int:
-    """Write the page of a job or of a CSV file; return the exit code.
+    """Write the page of a job or of a file of rows; return the exit code.
 
     A job that plans and does not verify has its page, too, and the error after it.
 

@@ -8,7 +8,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from trajcli.columns import Column, whole_number_columns
+from trajcli.columns import Column, require_finite, whole_number_columns
 from trajcli.curves.piecewise import Array
 from trajcli.errors import TrajcliError
 from trajcli.streams.decimals import Digits, NotFixedError, encode_fixed, scan_fixed
@@ -45,7 +45,7 @@ def write_csv_blocks(
     out.write(_header(columns).encode())
     written = 0
     for block in rows:
-        _require_finite(block, columns, written)
+        require_finite(block, columns, written)
         out.write(encode(block, whole_numbers))
         written += len(block)
         yield block
@@ -179,13 +179,4 @@ def _compare(read: Array, rows: Array, columns: Sequence[Column], before: int, d
         raise TrajcliError(
             f"the file read back says {read[row, index]!r} in row {before + row} of {columns[index].name}, "
             f"where the curve is {rows[row, index]!r}"
-        )
-
-
-def _require_finite(block: Array, columns: Sequence[Column], before: int) -> None:
-    finite = np.isfinite(block)
-    if not finite.all():
-        row, index = np.argwhere(~finite)[0]
-        raise TrajcliError(
-            f"{columns[index].name} is {block[row, index]} in row {before + row}; nothing of it is written"
         )

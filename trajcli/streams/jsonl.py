@@ -13,7 +13,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from trajcli.columns import JOINT_ORDERS, Column, group_of, kinds_of
+from trajcli.columns import JOINT_ORDERS, Column, group_of, kinds_of, require_finite
 from trajcli.curves.piecewise import Array
 from trajcli.errors import FileError, InputError, Place, Problem, TrajcliError
 from trajcli.frozen import frozen
@@ -55,7 +55,7 @@ def write_jsonl_blocks(rows: Iterable[Array], columns: Sequence[Column], out: Bi
     keys = _keys(columns)
     written = 0
     for block in rows:
-        _require_finite(block, columns, written)
+        require_finite(block, columns, written)
         lines = (to_json({key.name: key.of(row) for key in keys}) for row in block.tolist())
         out.write(b"".join(line + b"\n" for line in lines))
         written += len(block)
@@ -117,15 +117,6 @@ def _keys(columns: Sequence[Column]) -> tuple[_Key, ...]:
             alone = group == column.kind and column.joint is None
             keys.append(_Key(group, index, index + 1, alone, column.whole_numbers))
     return tuple(keys)
-
-
-def _require_finite(block: Array, columns: Sequence[Column], before: int) -> None:
-    wrong = np.argwhere(~np.isfinite(block))
-    if wrong.size:
-        row, column = wrong[0]
-        raise TrajcliError(
-            f"row {before + row}, column {columns[column].name}: {block[row, column]} is not finite"
-        )
 
 
 def read_jsonl(path: str | Path) -> Table:
