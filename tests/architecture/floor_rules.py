@@ -16,7 +16,7 @@ FLOORS = (
     ("language",),
     ("planners", "checks", "streams", "urdf"),
     ("job",),
-    ("planning", "comparison", "queries"),
+    ("planning", "comparison", "queries", "consumers"),
     ("output", "plots", "player"),
     ("cli", "api"),
     ("",),  # trajcli/__init__.py, the public face
