@@ -17,6 +17,7 @@ FLOORS = (
     ("planners", "checks", "streams", "urdf"),
     ("job",),
     ("planning", "comparison", "queries", "consumers"),
+    ("judge",),
     ("output", "plots", "player"),
     ("cli", "api"),
     ("",),  # trajcli/__init__.py, the public face
