@@ -16,6 +16,7 @@ import numpy as np
 from trajcli.consumers.breach import RuleCheck, when
 from trajcli.curves.approach import ApproachLimits
 from trajcli.curves.piecewise import Array
+from trajcli.errors import at_least
 from trajcli.streams.recorded_motion import RecordedMotion
 
 __all__ = ["Differences", "EffortRate", "RoundingNoise", "VelocityTowardsEnds"]
@@ -111,7 +112,11 @@ class Differences(_AtPeriod):
             if rounded:
                 text += f", and the decimals of the file alone make up to {noise[joint]:.4g}"
             slower = None if rounded else float(abs(value) / bound) ** (1 / order)
-            hint = "write more decimals" if rounded else f"make the motion {slower:.4g} times longer"
+            hint = (
+                "write more decimals"
+                if rounded
+                else f"make the motion {at_least(slower or 1.0)} times longer"
+            )
             return {
                 "kind": name,
                 "value": value,

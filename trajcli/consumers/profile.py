@@ -20,7 +20,7 @@ from trajcli.suggest import did_you_mean, valid_names
 PROFILES = Path(__file__).parent.parent / "profiles"
 """Folder of the profiles that come with trajcli."""
 
-Severity = Literal["necessary", "recommended"]
+RuleSeverity = Literal["necessary", "recommended"]
 _SEVERITIES = ("necessary", "recommended")
 _HEAD = {"title": str, "interpolation": str, "note": str, "sources": dict, "rules": list}
 _RULE = ("id", "check", "severity", "text", "parameters", "source")
@@ -58,7 +58,7 @@ class ConsumerRule:
 
     id: str
     check: str | None
-    severity: Severity
+    severity: RuleSeverity
     text: str
     parameters: Mapping[str, Any]
     source: Source
