@@ -14,7 +14,7 @@ import typer
 import typer.core
 
 from trajcli.cli.arm_commands import register
-from trajcli.cli.options import Errors, JobErrors, JobFile, Json, Overrides
+from trajcli.cli.options import Errors, JobErrors, JobFile, Json, Overrides, profile_words
 from trajcli.cli.outcome import guarded
 
 _JUDGE = "trajcli plan JOB --no-output"
@@ -327,6 +327,24 @@ def view(
     from trajcli.cli.view import ViewOptions, run_view
 
     return run_view(source, override, ViewOptions(output, compress, robot))
+
+
+@app.command(epilog="Example: trajcli profiles ros-jtc")
+@guarded
+def profiles(
+    name: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="NAME", help="One consumer; without it all are listed.", autocompletion=profile_words
+        ),
+    ] = None,
+    as_json: Json = False,
+    errors: Errors = "text",
+) -> int:
+    """List the consumers whose rules are known, or the rules of one, with their sources."""
+    from trajcli.cli.profiles import run_profiles
+
+    return run_profiles(name, as_json=as_json)
 
 
 @app.command(epilog="Example: trajcli schema job")
