@@ -19,10 +19,9 @@ from trajcli.checks.finding import at_time
 from trajcli.checks.tolerances import JUMP_ABSOLUTE, JUMP_RELATIVE, exceeds
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
-from trajcli.judge.finding import JudgedFinding, JudgedKind
+from trajcli.judge.finding import JudgedFinding, JudgedKind, Worst
 from trajcli.judge.intervals import Intervals, JointAxes
 from trajcli.judge.rounding import stated_errors
-from trajcli.judge.worst import Worst
 from trajcli.kinematics.robot import Limits
 
 _ISOLATED = 4.0  # times the changes beside it: a motion that merely is fast changes from row to row alike

@@ -12,20 +12,19 @@ from numpy.typing import NDArray
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Problem
 from trajcli.frozen import frozen
-from trajcli.judge.approach import judge_velocity_by_position
 from trajcli.judge.consistency import changes_of, judge_consistency
-from trajcli.judge.ends import judge_end, judge_start
-from trajcli.judge.finding import JudgedFinding, Judgement, worst_first
+from trajcli.judge.ends import judge_end, judge_order_of_stamps, judge_start
+from trajcli.judge.finding import JudgedFinding, Judgement, Worst, worst_first
 from trajcli.judge.intervals import BESIDE, Intervals, JointAxes
-from trajcli.judge.limits import judge_limits
+from trajcli.judge.limits import judge_limits, judge_velocity_by_position
 from trajcli.judge.reconstruction import Interpolation, chosen_interpolation
-from trajcli.judge.stamps import Stamps, UnfitError, judge_order_of_stamps
-from trajcli.judge.worst import Worst
+from trajcli.judge.stamps import Stamps, UnfitError
 from trajcli.kinematics.robot import Limits, Robot
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 from trajcli.trajectory import State
 
 if TYPE_CHECKING:
+    from trajcli.judge.consumer import ConsumerJudge
     from trajcli.judge.tool import ToolJudge
 
 JUDGED_ROWS = 16384
@@ -46,7 +45,8 @@ class Requirements:
         start: The state in which it shall begin; None where nobody says.
         start_tolerance: How near, rad or m by joint, shape (n,).
         end: The state in which it shall end; None where nobody says.
-        tool: Judges the tool; None for an arm without geometry.
+        tool: Makes the judge of the tool; None for an arm without geometry.
+        consumer: Makes the judge by the rules of a consumer; None for none.
     """
 
     robot: Robot
@@ -56,6 +56,7 @@ class Requirements:
     start_tolerance: Array | None = None
     end: State | None = None
     tool: Callable[[], ToolJudge] | None = None
+    consumer: Callable[[], ConsumerJudge] | None = None
 
 
 def judge_motion(blocks: Callable[[], Iterable[RecordedMotion]], requirements: Requirements) -> Judgement:
@@ -122,7 +123,8 @@ class MotionJudge:
         self._first_state: _Rows | None = None
         self._resolution: Resolution | None = None
         self._source: str | None = None
-        self._tool = requirements.tool() if requirements.tool is not None else None
+        self._tool = None if requirements.tool is None else requirements.tool()
+        self._consumer = None if requirements.consumer is None else requirements.consumer()
 
     def see(self, block: RecordedMotion) -> None:
         """Judge more rows.
@@ -134,6 +136,8 @@ class MotionJudge:
         if self._stamps is None:
             self._begin(block)
         self._count += len(block.t)
+        if self._consumer is not None:
+            self._consumer.take(block)
         rows = self._taken(block)
         if not rows.t.size:
             return
@@ -159,6 +163,9 @@ class MotionJudge:
         if self._tool is not None:
             findings += self._tool.findings()
         notes = [*_note_on_stamps(stamps), *(() if self._tool is None else self._tool.notes)]
+        if self._consumer is not None:
+            of_consumer, unjudged = self._consumer.result()
+            findings, notes = [*findings, *of_consumer], [*notes, *unjudged]
         period = stamps.lattice.period if stamps.lattice is not None and stamps.regular else None
         hinted = [_with_hint(finding, self._axes) for finding in findings]
         return Judgement(
