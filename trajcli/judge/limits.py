@@ -31,6 +31,9 @@ DENSE = 0.0100001
 _UNRESOLVED, _UNRESOLVED_LAST = 0.2, 1.5
 """Of the jump of the highest derivative times powers of the length: how far a piece may go beyond a motion
 that changes its law once between two rows (0.143 and 1.5 at most)."""
+_CURVED = 0.1
+"""Likewise of the jump of the derivative after that: how far a piece bends beside a motion that bends on
+(1/12 at most)."""
 _MANY = 20000  # pieces and joints over a limit from which on only the worst of them are looked at closely
 
 
@@ -175,7 +178,8 @@ class _Side:
         length = self.window.lengths[found.piece]
         below = self.level - self.order
         share = _UNRESOLVED if below else _UNRESOLVED_LAST
-        explained = share * length**below * self.window.jumps[found.piece, found.joint]
+        highest, beyond = (jumps[found.piece, found.joint] for jumps in self.window.jumps)
+        explained = share * length**below * highest + _CURVED * length ** (below + 1) * beyond
         return np.asarray((length <= DENSE) & (found.value - found.bound <= explained + error))
 
     def _finding(
