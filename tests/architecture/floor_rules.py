@@ -18,6 +18,7 @@ FLOORS = (
     ("job",),
     ("planning", "comparison", "queries"),
     ("output", "plots", "player"),
+    ("batch",),
     ("cli", "api"),
     ("",),  # trajcli/__init__.py, the public face
     ("__main__",),
