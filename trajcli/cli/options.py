@@ -15,6 +15,14 @@ def robot_names(incomplete: str) -> list[str]:
     return sorted(path.stem for path in folder.glob("*.yaml") if path.stem.startswith(incomplete))
 
 
+def profile_words(incomplete: str) -> list[str]:
+    """Return the names of consumers' profiles that begin so, for the shell; none is read for that."""
+    from pathlib import Path
+
+    folder = Path(__file__).parent.parent / "profiles"
+    return sorted(path.stem for path in folder.glob("*.yaml") if path.stem.startswith(incomplete))
+
+
 JobFile = Annotated[str, typer.Argument(metavar="JOB", help="The job file; - is standard input.")]
 Overrides = Annotated[
     list[str],
