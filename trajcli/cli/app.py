@@ -139,7 +139,8 @@ def plan(
         typer.Option("--compression", help="MCAP: of the messages.", show_default="zstd"),
     ] = None,
     strict: Annotated[
-        bool, typer.Option("--strict", help="Exit 1 when a concession (event) was made.")
+        bool,
+        typer.Option("--strict", help="Exit 1 when there is an event: a concession, or a warning of --for."),
     ] = False,
     reference: Annotated[
         bool,

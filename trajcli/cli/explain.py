@@ -237,6 +237,7 @@ def _lines(explained: Explanation, count: int) -> Iterator[str]:
     yield f"angles in {units.angle}, lengths in {units.length}, t in s from the start of each move" + (
         f"; {joints}" if joints else ""
     )
+    noted = [*explained.events, *explained.remarks]
     for move in explained.moves:
         yield ""
         yield f"move {move.index}: {move.planner}, {move.duration:.10g} s, from t = {move.start:.10g} s"
@@ -250,10 +251,8 @@ def _lines(explained: Explanation, count: int) -> Iterator[str]:
         yield from _peaks(move)
         yield from _by_position(move)
         yield from _speed(move)
-        yield from (
-            f"  {event.kind}: {event.message}" for event in explained.events if event.move == move.index
-        )
-    general = [event for event in explained.events if event.move is None]
+        yield from (f"  {event.kind}: {event.message}" for event in noted if event.move == move.index)
+    general = [event for event in noted if event.move is None]
     yield from (f"{event.kind}: {event.message}" for event in general)
 
 

@@ -119,12 +119,9 @@ def _refusal(plan: Plan, options: PlanOptions) -> VerificationError | None:
         from trajcli.output.report import verification_error
 
         return verification_error(plan, every=options.every)
-    conceded = [event for event in plan.events if event.concedes]
-    return (
-        VerificationError(*(_problem(plan, event) for event in conceded))
-        if options.strict and conceded
-        else None
-    )
+    if options.strict and plan.events:
+        return VerificationError(*(_problem(plan, event) for event in plan.events))
+    return None
 
 
 def _problem(plan: Plan, event: Event) -> Problem:
@@ -256,7 +253,9 @@ def summary(plan: Plan, rows: int) -> str:
         first = plan.verdict.steps[0]
         more = f" and {len(plan.verdict.steps) - 1} more" if len(plan.verdict.steps) > 1 else ""
         lines.append(f"  the acceleration steps: {first.joint} at t = {first.time:.6g} s{more}")
-    lines += [f"  {event.kind}: {_where(event.move)}{event.message}" for event in plan.events]
+    lines += [
+        f"  {event.kind}: {_where(event.move)}{event.message}" for event in (*plan.events, *plan.remarks)
+    ]
     return "\n".join(lines)
 
 

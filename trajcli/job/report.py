@@ -420,7 +420,10 @@ class Report(ReportPart):
     duration: ReportSeconds
     moves: tuple[MoveReport, ...]
     findings: list[FindingReport]
-    events: list[EventReport]
+    events: Annotated[list[EventReport], Field(description="Concessions, which `--strict` refuses.")]
+    remarks: Annotated[
+        list[EventReport], Field(description="How curves were computed, where that is worth a word.")
+    ] = []
     steps: list[StepReport]
     unchecked: list[UncheckedReport]
     unchecked_of_tool: list[UncheckedToolReport] = []

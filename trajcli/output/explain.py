@@ -55,7 +55,7 @@ def explanation(plan: Plan, *, move: int | None = None, derivatives: bool = Fals
     moves = tuple(_move(plan, index, report.moves[index], derivatives=derivatives) for index in wanted)
     said = {
         name: [part for part in getattr(report, name) if part.move is None or part.move in wanted]
-        for name in ("findings", "events", "steps")
+        for name in ("findings", "events", "remarks", "steps")
     }
     return Explanation(
         **{**report.__dict__, **said, "moves": moves},

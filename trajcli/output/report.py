@@ -80,6 +80,7 @@ def report_of(plan: Plan, *, reference: bool = False, knots: Knots | None = None
         moves=tuple(_move(plan, index, reference=reference) for index in range(len(plan.moves))),
         findings=[_finding(plan, finding) for finding in verdict.findings],
         events=[EventReport(kind=e.kind, message=e.message, move=e.move) for e in plan.events],
+        remarks=[EventReport(kind=e.kind, message=e.message, move=e.move) for e in plan.remarks],
         steps=_steps(verdict.steps, units),
         unchecked=[UncheckedReport(joint=joint, quantity=quantity) for joint, quantity in verdict.unchecked],
         unchecked_of_tool=[UncheckedToolReport(quantity=name) for name in verdict.unchecked_of_tool],

@@ -47,6 +47,7 @@ class Plan:
         trajectory: All of them, joined.
         verdict: Of the checks.
         events: Concessions, in order of the moves; the job's own first.
+        remarks: How curves were computed, where that is worth a word; in the same order.
         poses: How poses are reached, by the index of the move that goes there, or None for the job's start.
     """
 
@@ -56,6 +57,7 @@ class Plan:
     verdict: Verdict
     events: tuple[Event, ...]
     poses: Mapping[int | None, ResolvedPose]
+    remarks: tuple[Event, ...] = ()
 
     def __repr__(self) -> str:
         moves, duration = len(self.moves), self.trajectory.duration
@@ -85,7 +87,9 @@ def plan_job(loaded: LoadedJob) -> Plan:
 
         verdict = _in_units(_with_unit_hint(with_tested_advice(verdict, moves, loaded.say), loaded), loaded)
     shown = tuple(replace(event, message=event.text(loaded.say), amounts={}) for event in events)
-    return Plan(loaded, tuple(moves), trajectory, verdict, shown, poses)
+    conceded = tuple(event for event in shown if event.concedes)
+    remarks = tuple(event for event in shown if not event.concedes)
+    return Plan(loaded, tuple(moves), trajectory, verdict, conceded, poses, remarks)
 
 
 def _plan_moves(loaded: LoadedJob, poses: dict[int | None, ResolvedPose]) -> list[PlannedMove]:
