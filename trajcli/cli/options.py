@@ -33,6 +33,13 @@ Overrides = Annotated[
 Errors = Annotated[
     Literal["text", "json"], typer.Option("--errors", help="How errors are written to stderr.")
 ]
+JobErrors = Annotated[
+    Literal["text", "json", "github", "junit", "sarif"],
+    typer.Option(
+        "--errors",
+        help="How errors are written to stderr: for people, for programs, or for continuous integration.",
+    ),
+]
 RobotName = Annotated[
     str,
     typer.Option(

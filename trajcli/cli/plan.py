@@ -12,6 +12,7 @@ from trajcli.cli.progress import progress
 from trajcli.curves.extrema import peaks
 from trajcli.errors import InputError, Problem, VerificationError
 from trajcli.frozen import comparable
+from trajcli.grids import Grid
 from trajcli.job.read import LoadedJob, files_of, load_job
 from trajcli.kinematics.robot import QUANTITIES
 from trajcli.output.write import grid_of, write_rows, write_text
@@ -56,6 +57,16 @@ def run_plan(job: str, overrides: Sequence[str], options: PlanOptions) -> int:
     Raises:
         TrajcliError: When anything is wrong; then no rows were written.
     """
+    plan_and_write(job, overrides, options)
+    return 0
+
+
+def plan_and_write(job: str, overrides: Sequence[str], options: PlanOptions) -> Plan:
+    """Plan, judge and write a job; return the plan, which verifies.
+
+    Raises:
+        TrajcliError: When anything is wrong; then no rows were written.
+    """
     form = _check_options(options)
     profile = _profile(options)
     loaded = load_job(job, overrides, rate=options.rate, si=options.si)
@@ -74,11 +85,7 @@ def run_plan(job: str, overrides: Sequence[str], options: PlanOptions) -> int:
         grid = grid_of(plan)
         refusal, judged = _refusal(plan, options), None
         if refusal is None and profile is not None:
-            from trajcli.output.consumer import judge_as_written, refusal_of
-
-            digits, log = options.digits or "fixed", options.log
-            judged = judge_as_written(plan, grid, profile, form, digits=digits, log=log)
-            refusal = refusal_of(plan, judged, strict=options.strict)
+            judged, refusal = _judged(plan, grid, profile, form, options)
         if refusal is None and not options.no_output:
             write_rows(plan, grid, options.output, options.digits or "fixed", form=form, log=options.log)
     if options.report is not None or options.reference:
@@ -91,7 +98,7 @@ def run_plan(job: str, overrides: Sequence[str], options: PlanOptions) -> int:
         _summarise(plan, written, geometry_missing=missing)
         if judged is not None:
             _summarise_consumer(judged)
-    return 0
+    return plan
 
 
 def _profile(options: PlanOptions) -> Profile | None:
@@ -101,6 +108,17 @@ def _profile(options: PlanOptions) -> Profile | None:
     from trajcli.consumers.judgement import load_profile
 
     return load_profile(options.consumer)
+
+
+def _judged(
+    plan: Plan, grid: Grid, profile: Profile, form: StreamFormat, options: PlanOptions
+) -> tuple[ProfileJudgement, VerificationError | None]:
+    """Return what the rows do against the rules of their consumer, and why they are not written."""
+    from trajcli.output.consumer import judge_as_written, refusal_of
+
+    digits = options.digits or "fixed"
+    judged = judge_as_written(plan, grid, profile, form, digits=digits, log=options.log)
+    return judged, refusal_of(plan, judged, strict=options.strict)
 
 
 def _summarise_consumer(judged: ProfileJudgement) -> None:
@@ -126,7 +144,8 @@ def _refusal(plan: Plan, options: PlanOptions) -> VerificationError | None:
 
 def _problem(plan: Plan, event: Event) -> Problem:
     place = None if event.move is None else plan.loaded.place_of_move(event.move)
-    return Problem(f"{event.kind}: {event.message}", "leave --strict out to accept it", place, event.move)
+    hint = "leave --strict out to accept it"
+    return Problem(f"{event.kind}: {event.message}", hint, place, event.move, kind=event.kind)
 
 
 def _check_options(options: PlanOptions) -> StreamFormat:

@@ -25,7 +25,7 @@ from trajcli.errors import (
 from trajcli.frozen import frozen
 from trajcli.job.limits import with_move_limits
 from trajcli.job.read import LoadedJob
-from trajcli.kinematics.robot import QUANTITIES, ToolLimits
+from trajcli.kinematics.robot import QUANTITIES, Robot, ToolLimits
 from trajcli.language.targets import Target
 from trajcli.planners.planner import Event, PlannedMove, Planner, Resolve
 from trajcli.progress import report_progress
@@ -190,8 +190,27 @@ def _events_of(pose: ResolvedPose | None, index: int | None) -> list[Event]:
 
 
 def _plan_move(loaded: LoadedJob, index: int, planner: Planner, start: State) -> PlannedMove:
-    job = loaded.job
     robot = with_move_limits(loaded.robot, planner.limits, index)
+    return plan_move_within(loaded, index, planner, start, robot)
+
+
+def plan_move_within(
+    loaded: LoadedJob, index: int, planner: Planner, start: State, robot: Robot
+) -> PlannedMove:
+    """Return a move of a job, planned, and retimed as the job asks for.
+
+    Args:
+        loaded: The job.
+        index: Of the move.
+        planner: Of the move, its target by joints.
+        start: State in which it begins.
+        robot: With the limits in force.
+
+    Raises:
+        InputError: When it lacks a limit.
+        PlanningError: When it has no curve.
+    """
+    job = loaded.job
     over_limit = planner.when_over_limit or job.when_over_limit
     try:
         move = PlannedMove(index, planner, start, robot, planner.plan(start, robot), over_limit)
