@@ -333,24 +333,6 @@ def check(
 register_file_commands(app)
 
 
-@app.command(epilog="Example: trajcli schema job")
-@guarded
-def schema(
-    kind: Annotated[
-        Literal["job", "robot", "report", "explanation"],
-        typer.Argument(help="Which schema.", show_default=True),
-    ] = "job",
-    errors: Errors = "text",
-) -> int:
-    """Print a JSON Schema, for completion and checking in an editor."""
-    from trajcli.job.schema import schema_text
-    from trajcli.streams.whole_file import standard_output
-
-    with standard_output() as out:
-        out.write(schema_text(kind).encode())
-    return 0
-
-
 @app.command(epilog="Example: trajcli init job.yaml")
 @guarded
 def init(

@@ -1,4 +1,4 @@
-"""Commands about files of motions and their pictures, and about those who take them.
+"""Commands about files of motions and their pictures, those who take them, and schemas.
 
 Only typer is imported here: `--help` must stay fast.
 """
@@ -14,11 +14,12 @@ from trajcli.cli.outcome import guarded
 
 
 def register_file_commands(app: typer.Typer) -> None:
-    """Add the commands diff, plot, view and profiles."""
+    """Add the commands diff, plot, view, profiles and schema."""
     app.command(epilog="Example: trajcli diff old.csv new.csv --atol 1e-9")(diff)
     app.command(epilog="Example: trajcli plot examples/ur5e_pick.yaml -o pick.svg")(plot)
     app.command(epilog="Example: trajcli view examples/ur5e_pick.yaml -o view.html")(view)
     app.command(epilog="Example: trajcli profiles ros-jtc")(profiles)
+    app.command(epilog="Example: trajcli schema job")(schema)
 
 
 @guarded
@@ -145,3 +146,20 @@ def profiles(
     from trajcli.cli.profiles import run_profiles
 
     return run_profiles(name, as_json=as_json)
+
+
+@guarded
+def schema(
+    kind: Annotated[
+        Literal["job", "robot", "report", "explanation"],
+        typer.Argument(help="Which schema.", show_default=True),
+    ] = "job",
+    errors: Errors = "text",
+) -> int:
+    """Print a JSON Schema, for completion and checking in an editor."""
+    from trajcli.job.schema import schema_text
+    from trajcli.streams.whole_file import standard_output
+
+    with standard_output() as out:
+        out.write(schema_text(kind).encode())
+    return 0
