@@ -220,13 +220,19 @@ def explain(
     derivatives: Annotated[
         bool, typer.Option("--derivatives", help="Also the polynomials of velocity and acceleration.")
     ] = False,
+    sensitivity: Annotated[
+        bool,
+        typer.Option(
+            "--sensitivity", help="What each limit that is 10 % higher would save: plans the moves anew."
+        ),
+    ] = False,
     as_json: Json = False,
     errors: Errors = "text",
 ) -> int:
     """Say each move in words and formulas: polynomials, phases, peaks, branches, and how fast it could be."""
     from trajcli.cli.explain import ExplainOptions, run_explain
 
-    return run_explain(job, override, ExplainOptions(move, derivatives, as_json))
+    return run_explain(job, override, ExplainOptions(move, derivatives, sensitivity, as_json))
 
 
 @app.command(epilog="Example: trajcli check goal.yaml --robot ur5e --limits limits.yaml")

@@ -1,7 +1,9 @@
 """Sensitivity of durations to limits: for how long each limit binds, and what a higher one would save.
 
 A limit binds where the motion is within a millionth of it, for which the roots of polynomials say the times.
-What a higher one saves is found by planning the move with it.
+A time-optimal law is at a limit all the time, at points of its grid exactly and between them a little below:
+there its switching structure says which one binds. What a higher one saves is found by planning the move
+with it.
 """
 
 from __future__ import annotations
@@ -9,6 +11,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
@@ -37,11 +40,13 @@ class TimeAtLimit:
         joint: Index.
         order: 1 for velocity, 2 acceleration, 3 jerk.
         seconds: For how long, in either direction.
+        method: "exact": from roots; "phases": from the switching structure of a time-optimal law.
     """
 
     joint: int
     order: int
     seconds: float
+    method: Literal["exact", "phases"] = "exact"
 
 
 @comparable
@@ -71,6 +76,8 @@ def times_at_limits(move: PlannedMove, peaks: Sequence[Peaks] | None = None) -> 
         peaks: Of position and its three derivatives over the move, where they are known: what is below its
             limits needs no roots.
     """
+    if move.planned.binding_phases:
+        return _times_of_phases(move)
     curve, found = move.planned.curve, []
     for order in (1, 2, 3):
         bounds = move.robot.limits.of_order(order)
@@ -92,6 +99,20 @@ def times_at_limits(move: PlannedMove, peaks: Sequence[Peaks] | None = None) -> 
             if each > 0
         ]
     return tuple(sorted(found, key=lambda one: -one.seconds))
+
+
+def _times_of_phases(move: PlannedMove) -> tuple[TimeAtLimit, ...]:
+    """Return for how long limits of joints bind by the phases of the move."""
+    seconds: dict[tuple[int, int], float] = {}
+    for phase in move.planned.phases:
+        quantity = phase.name.split()[0]
+        if phase.joint is not None and quantity in QUANTITIES:
+            key = phase.joint, QUANTITIES.index(quantity)
+            seconds[key] = seconds.get(key, 0.0) + phase.end - phase.start
+    times = [
+        TimeAtLimit(joint, order, each, "phases") for (joint, order), each in seconds.items() if each > 0
+    ]
+    return tuple(sorted(times, key=lambda one: -one.seconds))
 
 
 def _at_limit(bounds: Array, peaks: Peaks) -> list[int]:
