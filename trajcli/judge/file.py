@@ -75,6 +75,7 @@ class _Given:
     notes: tuple[str, ...] = ()
     loaded: LoadedJob | None = None
     plan: Plan | None = None
+    shown: Units | None = None
 
 
 def check_file(source: str, options: CheckOptions) -> CheckedFile:
@@ -153,9 +154,11 @@ def _given(options: CheckOptions) -> _Given:
     if options.limits is None:
         return _Given(sheet.robot, sheet.units, ())
     from trajcli.job.limits_file import with_limits_file
+    from trajcli.queries.arm import parse_units
 
-    robot, events = with_limits_file(sheet.robot, options.limits, sheet.units)
-    return _Given(robot, sheet.units, tuple(event.text() for event in events if event.concedes))
+    units = parse_units(options.units or "")  # as in a job: rad and m, unless somebody says others
+    robot, events = with_limits_file(sheet.robot, options.limits, units)
+    return _Given(robot, sheet.units, tuple(event.text() for event in events if event.concedes), shown=units)
 
 
 def _of_job(path: str) -> _Given:
@@ -177,7 +180,8 @@ def _of_job(path: str) -> _Given:
 def _shown_units(options: CheckOptions, given: _Given) -> Units:
     from trajcli.queries.arm import parse_units
 
-    return given.units if options.units is None else parse_units(options.units, given.units)
+    known = given.shown or given.units
+    return known if options.units is None else parse_units(options.units, known)
 
 
 def _requirements(
