@@ -14,6 +14,7 @@ import typer
 import typer.core
 
 from trajcli.cli.arm_commands import register
+from trajcli.cli.file_commands import register as register_files
 from trajcli.cli.options import Errors, JobErrors, JobFile, Json, Overrides, profile_words, robot_names
 from trajcli.cli.outcome import guarded
 
@@ -21,7 +22,7 @@ _JUDGE = "trajcli plan JOB --no-output"
 _OTHER_NAMES = {
     **dict.fromkeys(("validate", "verify", "lint", "test"), _JUDGE),
     **dict.fromkeys(("run", "simulate", "sample", "generate", "execute", "trajectory"), "trajcli plan JOB"),
-    **dict.fromkeys(("convert", "transform", "rotation", "quaternion", "euler"), "trajcli pose STEP..."),
+    **dict.fromkeys(("transform", "rotation", "quaternion", "euler"), "trajcli pose STEP..."),
     **dict.fromkeys(("forward", "forward-kinematics"), "trajcli fk"),
     **dict.fromkeys(("inverse", "inverse-kinematics", "solve"), "trajcli ik"),
     "kinematics": "trajcli fk, trajcli ik or trajcli jacobian",
@@ -197,51 +198,6 @@ def plan(
     return run_gate([job, *others], override, options, errors)
 
 
-@app.command(epilog="Example: trajcli batch examples/cubic.yaml examples/quintic.yaml -o rows")
-@guarded
-def batch(
-    jobs: Annotated[
-        list[str], typer.Argument(metavar="JOB|DIR...", help="Job files, and folders with job files.")
-    ],
-    output: Annotated[
-        str | None,
-        typer.Option(
-            "--output", "-o", metavar="DIR", help="Where the rows go; else beside each job, under its name."
-        ),
-    ] = None,
-    count: Annotated[
-        str | None, typer.Option("-j", metavar="N", help="Processes at a time; else one a core.")
-    ] = None,
-    form: Annotated[
-        Literal["csv", "mcap", "jsonl", "ros", "ros-goal"], typer.Option("--format", help="Of the rows.")
-    ] = "csv",
-    force: Annotated[bool, typer.Option("--force", help="Plan unchanged jobs, too.")] = False,
-    timeout: Annotated[
-        str | None,
-        typer.Option("--timeout", metavar="SECONDS", help="For each job; 0 for no end.", show_default="600"),
-    ] = None,
-    engine: Annotated[
-        Literal["processes", "dask"],
-        typer.Option("--engine", help="Processes of this machine, or the workers of a Dask cluster."),
-    ] = "processes",
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            "--scheduler",
-            metavar="ADDRESS",
-            help="Of the cluster, such as tcp://10.0.0.5:8786; else that of Dask's configuration.",
-        ),
-    ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on stderr.")] = False,
-    errors: Errors = "text",
-) -> int:
-    """Plan many jobs, and write each; unchanged ones are skipped. Prints a line of JSON for each job."""
-    from trajcli.cli.batch import BatchOptions, run_batch
-
-    options = BatchOptions(output, count, form, force, timeout, engine, scheduler, quiet)
-    return run_batch(jobs, options)
-
-
 @app.command(epilog="Example: trajcli explain examples/cubic.yaml")
 @guarded
 def explain(
@@ -361,40 +317,6 @@ def check(
         start_tolerance=start_tolerance,
     )
     return run_check(file, options, form, strict=strict)
-
-
-@app.command(epilog="Example: trajcli diff old.csv new.csv --atol 1e-9")
-@guarded
-def diff(
-    a: Annotated[str, typer.Argument(metavar="A", help="A CSV or MCAP file; - is CSV from standard input.")],
-    b: Annotated[str, typer.Argument(metavar="B", help="The file to compare it with.")],
-    atol: Annotated[
-        str,
-        typer.Option(
-            "--atol", metavar="TOL", help="Absolute tolerance: 1e-9, or by column: q=1e-9,qd1=1e-6."
-        ),
-    ] = "",
-    rtol: Annotated[
-        str, typer.Option("--rtol", metavar="TOL", help="Relative tolerance, in the same form.")
-    ] = "",
-    resample: Annotated[
-        bool, typer.Option("--resample", help="Interpolate B at the times of A when they differ.")
-    ] = False,
-    topic: Annotated[
-        str | None,
-        typer.Option(
-            "--topic",
-            metavar="T",
-            help="MCAP: the topic, of JointState or JointTrajectory.",
-            show_default="/joint_states",
-        ),
-    ] = None,
-    errors: Errors = "text",
-) -> int:
-    """Compare two files column by column. Exit 0: equal, 1: different, 2: cannot be compared."""
-    from trajcli.cli.diff import run_diff
-
-    return run_diff(a, b, atol, rtol, resample=resample, topic=topic)
 
 
 @app.command(epilog="Example: trajcli plot examples/ur5e_pick.yaml -o pick.svg")
@@ -525,6 +447,7 @@ def init(
 
 
 register(app)
+register_files(app)
 
 
 def run() -> None:
