@@ -213,5 +213,5 @@ def test_rows_with_nine_decimals_verify_as_they_are_written(tmp_path: Path) -> N
 
 @pytest.mark.parametrize("names", [(None, None), ("a.yaml", "ur5e")])
 def test_limits_are_of_a_job_or_of_a_robot(names: tuple[str | None, str | None]) -> None:
-    with pytest.raises(InputError, match="limits|exclude"):
+    with pytest.raises(InputError, match=r"limits|exclude"):
         kept_limits(*names)

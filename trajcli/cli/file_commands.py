@@ -1,4 +1,4 @@
-"""Commands about files: comparison, batches of jobs, tools that make one motion of another.
+"""Commands about files of motions and their pictures, those who take them, and schemas.
 
 Only typer is imported here: `--help` must stay fast.
 """
@@ -9,54 +9,20 @@ from typing import Annotated, Literal
 
 import typer
 
-from trajcli.cli.options import Errors, robot_names
+from trajcli.cli.options import Errors, Json, Overrides, profile_words
 from trajcli.cli.outcome import guarded
 
-_EXAMPLES = {
-    "diff": "trajcli diff old.csv new.csv --atol 1e-9",
-    "batch": "trajcli batch examples/cubic.yaml examples/quintic.yaml -o rows",
-    "retime": "trajcli retime rows.csv --job examples/cubic.yaml -o slower.csv",
-    "resample": "trajcli resample rows.csv --rate 500 -o coarse.csv",
-    "concat": "trajcli concat rows.csv back.csv -o both.csv",
-    "reverse": "trajcli reverse rows.csv -o back.csv",
-    "slice": "trajcli slice rows.csv --from 0.25 --to 0.75 -o part.csv",
-    "convert": "trajcli convert rows.csv -o rows.mcap",
-}
 
-Source = Annotated[
-    str, typer.Argument(metavar="FILE", help="CSV, MCAP, ROS messages, JSON lines, .npy; - is stdin.")
-]
-Output = Annotated[
-    str | None,
-    typer.Option(
-        "--output", "-o", metavar="OUT", help="OUT.csv, .mcap, .jsonl or .yaml; else CSV to stdout."
-    ),
-]
-Form = Annotated[
-    Literal["csv", "mcap", "jsonl", "ros", "ros-goal"] | None,
-    typer.Option("--format", help="Of stdout, and which message a .yaml holds.", show_default="csv"),
-]
-Columns = Annotated[
-    str | None,
-    typer.Option("--columns", metavar="MAP", help="What columns are: t=timestamp,q=target_q,qd=target_qd."),
-]
-FileUnits = Annotated[
-    str | None, typer.Option("--units", metavar="UNITS", help="Of columns that name none, such as deg,mm.")
-]
-Topic = Annotated[str | None, typer.Option("--topic", metavar="T", help="MCAP: the topic.")]
-Field = Annotated[
-    str | None, typer.Option("--field", metavar="F", help="Of messages with several states: the one meant.")
-]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Nothing on stderr but errors.")]
+def register_file_commands(app: typer.Typer) -> None:
+    """Add the commands diff, plot, view, profiles and schema."""
+    app.command(epilog="Example: trajcli diff old.csv new.csv --atol 1e-9")(diff)
+    app.command(epilog="Example: trajcli plot examples/ur5e_pick.yaml -o pick.svg")(plot)
+    app.command(epilog="Example: trajcli view examples/ur5e_pick.yaml -o view.html")(view)
+    app.command(epilog="Example: trajcli profiles ros-jtc")(profiles)
+    app.command(epilog="Example: trajcli schema job")(schema)
 
 
-def register(app: typer.Typer) -> None:
-    """Add these commands to an application."""
-    for command in (diff, batch, retime, resample, concat, reverse, cut, convert):
-        name = "slice" if command is cut else command.__name__
-        app.command(name, epilog=f"Example: {_EXAMPLES[name]}")(guarded(command))
-
-
+@guarded
 def diff(
     a: Annotated[str, typer.Argument(metavar="A", help="A CSV or MCAP file; - is CSV from standard input.")],
     b: Annotated[str, typer.Argument(metavar="B", help="The file to compare it with.")],
@@ -89,181 +55,111 @@ def diff(
     return run_diff(a, b, atol, rtol, resample=resample, topic=topic)
 
 
-def batch(
-    jobs: Annotated[
-        list[str], typer.Argument(metavar="JOB|DIR...", help="Job files, and folders with job files.")
+@guarded
+def plot(
+    files: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="JOB|FILE...", help="A job, files of rows or messages, or such over a job; - is stdin."
+        ),
     ],
     output: Annotated[
         str | None,
         typer.Option(
-            "--output", "-o", metavar="DIR", help="Where the rows go; else beside each job, under its name."
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="FILE.svg, .png or .pdf; - is stdout. Else the first name's stem with .svg, in this folder.",
         ),
     ] = None,
-    count: Annotated[
-        str | None, typer.Option("-j", metavar="N", help="Processes at a time; else one a core.")
+    kind: Annotated[
+        Literal["svg", "png", "pdf"] | None, typer.Option("--format", help="Where no name says it; else svg.")
     ] = None,
-    form: Annotated[
-        Literal["csv", "mcap", "jsonl", "ros", "ros-goal"], typer.Option("--format", help="Of the rows.")
-    ] = "csv",
-    force: Annotated[bool, typer.Option("--force", help="Plan unchanged jobs, too.")] = False,
-    timeout: Annotated[
-        str | None,
-        typer.Option("--timeout", metavar="SECONDS", help="For each job; 0 for no end.", show_default="600"),
-    ] = None,
-    engine: Annotated[
-        Literal["processes", "dask"],
-        typer.Option("--engine", help="Processes of this machine, or the workers of a Dask cluster."),
-    ] = "processes",
-    scheduler: Annotated[
+    quantities: Annotated[
         str | None,
         typer.Option(
-            "--scheduler",
-            metavar="ADDRESS",
-            help="Of the cluster, such as tcp://10.0.0.5:8786; else that of Dask's configuration.",
+            "--quantities",
+            metavar="LIST",
+            help="Some of q,qd,qdd,qddd,tool,path,phase; else those that suit the job.",
         ),
     ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on stderr.")] = False,
+    joints: Annotated[
+        list[str], typer.Option("--joints", metavar="NAME...", help="Only these, as a,b or a b; else all.")
+    ] = [],  # noqa: B006
+    override: Overrides = [],  # noqa: B006
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Do not say what was written.")] = False,
+    every: Annotated[
+        bool, typer.Option("--all", help="Every finding, not only the worst of each move and kind.")
+    ] = False,
     errors: Errors = "text",
 ) -> int:
-    """Plan many jobs, and write each; unchanged ones are skipped. Prints a line of JSON for each job."""
-    from trajcli.cli.batch import BatchOptions, run_batch
+    """Draw joints, tool and phase plane with limits. Exit 1: one is broken, and the picture shows where."""
+    from trajcli.cli.plot import PlotOptions, run_plot
 
-    options = BatchOptions(output, count, form, force, timeout, engine, scheduler, quiet)
-    return run_batch(jobs, options)
+    every = every or errors == "json"
+    return run_plot(files, override, PlotOptions(output, kind, quantities, tuple(joints), quiet, every))
 
 
-def retime(
-    file: Source,
-    job: Annotated[
-        str | None, typer.Option("--job", "-j", metavar="JOB", help="The job whose limits are kept.")
+@guarded
+def view(
+    source: Annotated[
+        str,
+        typer.Argument(metavar="JOB|FILE", help="A job, or a file of rows or messages; - is standard input."),
+    ],
+    output: Annotated[
+        str | None,
+        typer.Option("--output", "-o", metavar="FILE", help="Write the page to FILE.html instead of stdout."),
     ] = None,
+    compress: Annotated[
+        bool, typer.Option("--compress", help="Half the size, for browsers since 2023.")
+    ] = False,
     robot: Annotated[
         str | None,
         typer.Option(
             "--robot",
             "-r",
-            metavar="NAME|FILE",
-            help="The arm whose limits are kept.",
-            autocompletion=robot_names,
+            metavar="NAME|FILE|JOB",
+            help="The arm of a file: of the catalogue, a robot file, a URDF, or a job.",
         ),
     ] = None,
-    fastest: Annotated[
-        bool, typer.Option("--fastest", help="Also faster: over the shortest time that keeps the limits.")
-    ] = False,
-    per_move: Annotated[
-        bool, typer.Option("--per-move", help="A factor for each move, by the column `move`.")
-    ] = False,
-    output: Output = None,
-    form: Form = None,
-    columns: Columns = None,
-    units: FileUnits = None,
-    topic: Topic = None,
-    field: Field = None,
-    quiet: Quiet = False,
+    override: Overrides = [],  # noqa: B006
     errors: Errors = "text",
 ) -> int:
-    """Stretch a motion by the smallest factor that keeps the limits, and say the factor, joint and limit."""
-    from trajcli.cli.edit import EditOptions, run_retime
+    """Write a page that plays the motion: the arm in 3D with linked plots, in one file for any browser."""
+    from trajcli.cli.view import ViewOptions, run_view
 
-    options = EditOptions(output, form, columns, units, topic, field, quiet)
-    return run_retime(file, (job, robot), options, fastest=fastest, per_move=per_move)
-
-
-def resample(
-    file: Source,
-    rate: Annotated[str, typer.Option("--rate", metavar="HZ", help="Rows per second.")],
-    output: Output = None,
-    form: Form = None,
-    columns: Columns = None,
-    units: FileUnits = None,
-    topic: Topic = None,
-    field: Field = None,
-    quiet: Quiet = False,
-    errors: Errors = "text",
-) -> int:
-    """Write a motion at rows of another rate, on the curve through its rows."""
-    from trajcli.cli.edit import EditOptions, run_resample
-
-    options = EditOptions(output, form, columns, units, topic, field, quiet)
-    return run_resample(file, rate, options)
+    return run_view(source, override, ViewOptions(output, compress, robot))
 
 
-def concat(
-    files: Annotated[
-        list[str],
-        typer.Argument(metavar="FILE...", help="Motions, each of which begins where the last ends."),
-    ],
-    output: Output = None,
-    form: Form = None,
-    columns: Columns = None,
-    units: FileUnits = None,
-    topic: Topic = None,
-    field: Field = None,
-    quiet: Quiet = False,
-    errors: Errors = "text",
-) -> int:
-    """Join motions one after the other, in the columns and units of the first; their states must agree."""
-    from trajcli.cli.edit import EditOptions, run_concat
-
-    options = EditOptions(output, form, columns, units, topic, field, quiet)
-    return run_concat(files, options)
-
-
-def reverse(
-    file: Source,
-    output: Output = None,
-    form: Form = None,
-    columns: Columns = None,
-    units: FileUnits = None,
-    topic: Topic = None,
-    field: Field = None,
-    quiet: Quiet = False,
-    errors: Errors = "text",
-) -> int:
-    """Write a motion that goes back over the same time."""
-    from trajcli.cli.edit import EditOptions, run_reverse
-
-    options = EditOptions(output, form, columns, units, topic, field, quiet)
-    return run_reverse(file, options)
-
-
-def cut(
-    file: Source,
-    first: Annotated[
-        str | None, typer.Option("--from", metavar="T", help="Time of the file, s; else its start.")
+@guarded
+def profiles(
+    name: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="NAME", help="One consumer; without it all are listed.", autocompletion=profile_words
+        ),
     ] = None,
-    last: Annotated[
-        str | None, typer.Option("--to", metavar="T", help="Time of the file, s; else its end.")
-    ] = None,
-    output: Output = None,
-    form: Form = None,
-    columns: Columns = None,
-    units: FileUnits = None,
-    topic: Topic = None,
-    field: Field = None,
-    quiet: Quiet = False,
+    as_json: Json = False,
     errors: Errors = "text",
 ) -> int:
-    """Write the part of a motion between two times, with a row at each of them."""
-    from trajcli.cli.edit import EditOptions, run_slice
+    """List the consumers whose rules are known, or the rules of one, with their sources."""
+    from trajcli.cli.profiles import run_profiles
 
-    options = EditOptions(output, form, columns, units, topic, field, quiet)
-    return run_slice(file, first, last, options)
+    return run_profiles(name, as_json=as_json)
 
 
-def convert(
-    file: Source,
-    output: Output = None,
-    form: Form = None,
-    columns: Columns = None,
-    units: FileUnits = None,
-    topic: Topic = None,
-    field: Field = None,
-    quiet: Quiet = False,
+@guarded
+def schema(
+    kind: Annotated[
+        Literal["job", "robot", "report", "explanation"],
+        typer.Argument(help="Which schema.", show_default=True),
+    ] = "job",
     errors: Errors = "text",
 ) -> int:
-    """Write a motion in another format."""
-    from trajcli.cli.edit import EditOptions, run_convert
+    """Print a JSON Schema, for completion and checking in an editor."""
+    from trajcli.job.schema import schema_text
+    from trajcli.streams.whole_file import standard_output
 
-    options = EditOptions(output, form, columns, units, topic, field, quiet)
-    return run_convert(file, options)
+    with standard_output() as out:
+        out.write(schema_text(kind).encode())
+    return 0

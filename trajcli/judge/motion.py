@@ -144,6 +144,8 @@ class MotionJudge:
             block = _joined(self._waiting)
             self._begin(block)
         self._see(block)
+        if self._kept is not None:
+            self._judge(self._kept.t.size - 1 - BESIDE, ends=False)
 
     def _see(self, block: RecordedMotion) -> None:
         rows = self._taken(block)
@@ -152,7 +154,6 @@ class MotionJudge:
         self._kept = rows if self._kept is None else self._kept.followed_by(rows)
         if self._first_state is None:
             self._first_state = rows.part(slice(0, 1))
-        self._judge(self._kept.t.size - 1 - BESIDE, ends=False)
 
     def judgement(self) -> Judgement:
         """Return what there is to say of all rows.
