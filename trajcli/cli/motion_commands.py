@@ -22,28 +22,28 @@ _EXAMPLES = {
     "convert": "trajcli convert rows.csv -o rows.mcap",
 }
 
-Source = Annotated[
+MotionSource = Annotated[
     str, typer.Argument(metavar="FILE", help="CSV, MCAP, ROS messages, JSON lines, .npy; - is stdin.")
 ]
-Output = Annotated[
+MotionOutput = Annotated[
     str | None,
     typer.Option(
         "--output", "-o", metavar="OUT", help="OUT.csv, .mcap, .jsonl or .yaml; else CSV to stdout."
     ),
 ]
-Form = Annotated[
+MotionForm = Annotated[
     Literal["csv", "mcap", "jsonl", "ros", "ros-goal"] | None,
     typer.Option("--format", help="Of stdout, and which message a .yaml holds.", show_default="csv"),
 ]
-Columns = Annotated[
+ColumnMap = Annotated[
     str | None,
     typer.Option("--columns", metavar="MAP", help="What columns are: t=timestamp,q=target_q,qd=target_qd."),
 ]
 FileUnits = Annotated[
     str | None, typer.Option("--units", metavar="UNITS", help="Of columns that name none, such as deg,mm.")
 ]
-Topic = Annotated[str | None, typer.Option("--topic", metavar="T", help="MCAP: the topic.")]
-Field = Annotated[
+TopicName = Annotated[str | None, typer.Option("--topic", metavar="T", help="MCAP: the topic.")]
+FieldName = Annotated[
     str | None, typer.Option("--field", metavar="F", help="Of messages with several states: the one meant.")
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Nothing on stderr but errors.")]
@@ -102,7 +102,7 @@ def batch(
 
 
 def retime(
-    file: Source,
+    file: MotionSource,
     job: Annotated[
         str | None, typer.Option("--job", "-j", metavar="JOB", help="The job whose limits are kept.")
     ] = None,
@@ -122,12 +122,12 @@ def retime(
     per_move: Annotated[
         bool, typer.Option("--per-move", help="A factor for each move, by the column `move`.")
     ] = False,
-    output: Output = None,
-    form: Form = None,
-    columns: Columns = None,
+    output: MotionOutput = None,
+    form: MotionForm = None,
+    columns: ColumnMap = None,
     units: FileUnits = None,
-    topic: Topic = None,
-    field: Field = None,
+    topic: TopicName = None,
+    field: FieldName = None,
     quiet: Quiet = False,
     errors: Errors = "text",
 ) -> int:
@@ -139,14 +139,14 @@ def retime(
 
 
 def resample(
-    file: Source,
+    file: MotionSource,
     rate: Annotated[str, typer.Option("--rate", metavar="HZ", help="Rows per second.")],
-    output: Output = None,
-    form: Form = None,
-    columns: Columns = None,
+    output: MotionOutput = None,
+    form: MotionForm = None,
+    columns: ColumnMap = None,
     units: FileUnits = None,
-    topic: Topic = None,
-    field: Field = None,
+    topic: TopicName = None,
+    field: FieldName = None,
     quiet: Quiet = False,
     errors: Errors = "text",
 ) -> int:
@@ -162,12 +162,12 @@ def concat(
         list[str],
         typer.Argument(metavar="FILE...", help="Motions, each of which begins where the last ends."),
     ],
-    output: Output = None,
-    form: Form = None,
-    columns: Columns = None,
+    output: MotionOutput = None,
+    form: MotionForm = None,
+    columns: ColumnMap = None,
     units: FileUnits = None,
-    topic: Topic = None,
-    field: Field = None,
+    topic: TopicName = None,
+    field: FieldName = None,
     quiet: Quiet = False,
     errors: Errors = "text",
 ) -> int:
@@ -179,13 +179,13 @@ def concat(
 
 
 def reverse(
-    file: Source,
-    output: Output = None,
-    form: Form = None,
-    columns: Columns = None,
+    file: MotionSource,
+    output: MotionOutput = None,
+    form: MotionForm = None,
+    columns: ColumnMap = None,
     units: FileUnits = None,
-    topic: Topic = None,
-    field: Field = None,
+    topic: TopicName = None,
+    field: FieldName = None,
     quiet: Quiet = False,
     errors: Errors = "text",
 ) -> int:
@@ -197,19 +197,19 @@ def reverse(
 
 
 def cut(
-    file: Source,
+    file: MotionSource,
     first: Annotated[
         str | None, typer.Option("--from", metavar="T", help="Time of the file, s; else its start.")
     ] = None,
     last: Annotated[
         str | None, typer.Option("--to", metavar="T", help="Time of the file, s; else its end.")
     ] = None,
-    output: Output = None,
-    form: Form = None,
-    columns: Columns = None,
+    output: MotionOutput = None,
+    form: MotionForm = None,
+    columns: ColumnMap = None,
     units: FileUnits = None,
-    topic: Topic = None,
-    field: Field = None,
+    topic: TopicName = None,
+    field: FieldName = None,
     quiet: Quiet = False,
     errors: Errors = "text",
 ) -> int:
@@ -221,13 +221,13 @@ def cut(
 
 
 def convert(
-    file: Source,
-    output: Output = None,
-    form: Form = None,
-    columns: Columns = None,
+    file: MotionSource,
+    output: MotionOutput = None,
+    form: MotionForm = None,
+    columns: ColumnMap = None,
     units: FileUnits = None,
-    topic: Topic = None,
-    field: Field = None,
+    topic: TopicName = None,
+    field: FieldName = None,
     quiet: Quiet = False,
     errors: Errors = "text",
 ) -> int:
