@@ -20,6 +20,9 @@ from trajcli.streams.text_rows import RowReader
 EXACT = -1
 """Decimals of a column whose numbers were not rounded to decimals."""
 
+FULL_DECIMALS = 13
+"""Decimals from which on a writer shows all digits of a float64, and rounds nothing."""
+
 _QUANTITIES = ("q", "qd", "qdd", "tau")  # of messages
 
 
