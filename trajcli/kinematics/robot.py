@@ -56,22 +56,45 @@ class LinkInertia:
     inertia: tuple[float, float, float, float, float, float]
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.mass < inf:
-            raise InputError(f"expected a mass above 0 kg, got {self.mass:g}")
         xx, yy, zz, xy, xz, yz = self.inertia
-        if not np.isfinite((*self.com, *self.inertia)).all():
-            raise InputError("expected finite numbers for the centre of mass and the inertia")
-        moments = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])).tolist()
-        room = _INERTIA_ROUNDING * max(map(abs, moments))
-        shown = ", ".join(f"{moment:.6g}" for moment in moments)
-        if moments[0] < -room:
-            raise InputError(f"no solid has a negative moment of inertia: the principal ones are {shown}")
-        if moments[2] > moments[0] + moments[1] + room:
-            raise InputError(
-                "no solid has a moment of inertia above the sum of the two others: "
-                f"the principal ones are {shown}",
-                hint="check signs and units (kg m^2), and that it is about the centre of mass",
-            )
+        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        require_possible_solid(self.mass, np.array(self.com), tensor)
+
+
+def require_possible_solid(
+    mass: float, com: Array, inertia: Array, *, least_mass: float | None = None
+) -> None:
+    """Raise when no rigid solid has such a mass and inertia; a point mass and a thin rod are possible.
+
+    Args:
+        mass: kg.
+        com: Centre of mass, m, shape (3,).
+        inertia: Tensor about the centre of mass, kg m^2, shape (3, 3).
+        least_mass: What the mass may be at least, kg; it must be above 0 unless given.
+
+    Raises:
+        InputError: When the mass is too small, a number not finite, the tensor not symmetric, a principal
+            moment negative or above the sum of the two others.
+    """
+    if not (0.0 < mass < inf if least_mass is None else least_mass <= mass < inf):
+        least = "above 0 kg" if least_mass is None else f"of at least {least_mass:g} kg"
+        raise InputError(f"expected a mass {least}, got {mass:g}")
+    if not (np.isfinite(com).all() and np.isfinite(inertia).all()):
+        raise InputError("expected finite numbers for the centre of mass and the inertia")
+    room = _INERTIA_ROUNDING * float(np.abs(inertia).max())
+    if np.abs(inertia - inertia.T).max() > room:
+        raise InputError("a tensor of inertia is symmetric: its products come in equal pairs")
+    moments = np.linalg.eigvalsh(inertia).tolist()
+    room = _INERTIA_ROUNDING * max(map(abs, moments))
+    shown = ", ".join(f"{moment:.6g}" for moment in moments)
+    if moments[0] < -room:
+        raise InputError(f"no solid has a negative moment of inertia: the principal ones are {shown}")
+    if moments[2] > moments[0] + moments[1] + room:
+        raise InputError(
+            "no solid has a moment of inertia above the sum of the two others: "
+            f"the principal ones are {shown}",
+            hint="check signs and units (kg m^2), and that it is about the centre of mass",
+        )
 
 
 @comparable
@@ -93,7 +116,7 @@ class Joint:
         rotor: Inertia of the motor as the joint feels it, kg m^2 (kg for a slide).
         link: Mass and inertia of the link behind the joint, with all that is fixed to it; None where unknown.
 
-    Effort, friction, rotor and link are kept for inverse dynamics; nothing is judged by them yet.
+    Effort, friction, rotor and link are those of inverse dynamics, `trajcli/dynamics/`.
 
     Source: Hayati, Robot arm geometric link parameter estimation, IEEE CDC (1983), for beta.
     """
