@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from trajcli.dynamics.newton_euler import InverseDynamics, Payload
+from trajcli.dynamics.newton_euler import InverseDynamics
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.jacobian import jacobian
-from trajcli.kinematics.robot import Friction, Joint, LinkInertia, Robot, unlimited
+from trajcli.kinematics.robot import Friction, Joint, LinkInertia, Payload, Robot, unlimited
 
 RIGHT = np.pi / 2
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from heavy_arms import energy, gravity_effort, mass_matrix, random_arm, random_payload
 
-from trajcli.dynamics.newton_euler import InverseDynamics, Payload, point_mass
+from trajcli.dynamics.newton_euler import InverseDynamics
 from trajcli.errors import InputError
-from trajcli.kinematics.robot import Friction, Joint, LinkInertia, Robot, unlimited
+from trajcli.kinematics.robot import Friction, Joint, LinkInertia, Payload, Robot, point_mass, unlimited
 
 CONVENTIONS = ["standard", "modified"]
 

@@ -13,7 +13,7 @@ and Control (2009), section 7.5.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import field
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -37,61 +37,10 @@ from trajcli.kinematics.columns import (
     scaled,
     total,
 )
-from trajcli.kinematics.robot import Robot, require_possible_solid
+from trajcli.kinematics.robot import Payload, Robot
 from trajcli.kinematics.serial_chain import blocks, configurations, links_of
 
-GRAVITY = (0.0, 0.0, -9.81)
-"""Acceleration of a body that falls, in world, m/s^2."""
-
 _NO_SCREW: tuple[float, ...] = (0.0, 1.0, 0.0)
-
-
-@frozen
-class Payload:
-    """A rigid solid that is fixed to the tcp.
-
-    Attributes:
-        mass: kg, at least 0.
-        com: Centre of mass in the frame of the tcp, m, shape (3,).
-        inertia: Tensor about the centre of mass in the axes of the tcp, kg m^2, shape (3, 3).
-
-    Raises:
-        InputError: When no rigid solid has them.
-    """
-
-    mass: float
-    com: Array
-    inertia: Array
-
-    def __post_init__(self) -> None:
-        for name, shape in (("com", (3,)), ("inertia", (3, 3))):
-            values = read_only(getattr(self, name))
-            if values.shape != shape:
-                raise InputError(f"payload: expected {name} of shape {shape}, got {values.shape}")
-            object.__setattr__(self, name, values)
-        require_possible_solid(self.mass, self.com, self.inertia, least_mass=0.0)
-
-    def with_mass(self, mass: float) -> Payload:
-        """Return the same payload with another mass; its inertia grows with the mass.
-
-        Raises:
-            InputError: When the mass is negative.
-        """
-        share = mass / self.mass if self.mass > 0.0 else 1.0
-        return Payload(mass, self.com, self.inertia * share)
-
-
-def point_mass(mass: float, com: ArrayLike = (0.0, 0.0, 0.0)) -> Payload:
-    """Return a payload without extent.
-
-    Args:
-        mass: kg, at least 0.
-        com: Its place in the frame of the tcp, m, shape (3,).
-
-    Raises:
-        InputError: When the mass is negative.
-    """
-    return Payload(mass, np.asarray(com, dtype=np.float64), np.zeros((3, 3)))
 
 
 @comparable
@@ -130,10 +79,6 @@ class DynamicLink:
     solid: RigidSolid
 
 
-def _on_earth() -> Array:
-    return read_only(np.array(GRAVITY))
-
-
 @frozen
 class InverseDynamics:
     """Efforts of the joints of a robot: torques in N m, forces of prismatic joints in N.
@@ -142,23 +87,26 @@ class InverseDynamics:
 
     Attributes:
         robot: The arm; every link has its inertia.
-        gravity: Acceleration of a body that falls, in world, m/s^2, shape (3,).
-        payload: What the tcp carries, if anything.
+        gravity: Acceleration of a body that falls, in world, m/s^2, shape (3,); the robot's unless given.
+        payload: What the tcp carries; the robot's unless given.
 
     Raises:
         InputError: When the robot has no geometry, or a link no inertia.
     """
 
     robot: Robot
-    gravity: Array = field(default_factory=_on_earth)
+    gravity: Array | None = None
     payload: Payload | None = None
 
     def __post_init__(self) -> None:
-        gravity = read_only(self.gravity)
+        gravity = read_only(self.robot.gravity if self.gravity is None else self.gravity)
         if gravity.shape != (3,) or not np.isfinite(gravity).all():
             raise InputError("gravity: expected three finite numbers (m/s^2, in world)")
-        object.__setattr__(self, "gravity", gravity)
-        object.__setattr__(self, "_links", dynamic_links(self.robot, self.payload))
+        payload = self.robot.payload if self.payload is None else self.payload
+        robot = replace(self.robot, gravity=gravity, payload=payload)
+        for name, value in (("robot", robot), ("gravity", gravity), ("payload", payload)):
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "_links", dynamic_links(robot))
 
     @property
     def links(self) -> tuple[DynamicLink, ...]:
@@ -169,7 +117,7 @@ class InverseDynamics:
     @property
     def lift(self) -> tuple[float, float, float]:
         """The acceleration against gravity, in the axes of the base, m/s^2."""
-        x, y, z = (-(self.gravity @ self.robot.base[:3, :3])).tolist()
+        x, y, z = (-(self.robot.gravity @ self.robot.base[:3, :3])).tolist()
         return x, y, z
 
     def effort(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
@@ -269,19 +217,14 @@ class InverseDynamics:
         return array
 
 
-def lacks_inertia(robot: Robot) -> tuple[str, ...]:
-    """Return the names of the joints whose links have no inertia."""
-    return tuple(joint.name for joint in robot.joints if joint.link is None)
-
-
-def dynamic_links(robot: Robot, payload: Payload | None) -> tuple[DynamicLink, ...]:
-    """Return the chain with the masses that it carries, the payload as part of the last link.
+def dynamic_links(robot: Robot) -> tuple[DynamicLink, ...]:
+    """Return the chain with the masses that it carries, the robot's payload as part of the last link.
 
     Raises:
         InputError: When the robot has no geometry, or a link no inertia.
     """
     links = links_of(robot)
-    lacking = lacks_inertia(robot)
+    lacking, payload = robot.without_inertia, robot.payload
     if lacking:
         whose = f"joint{'s' * (len(lacking) > 1)} {', '.join(lacking)}"
         raise InputError(

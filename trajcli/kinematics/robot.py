@@ -8,6 +8,7 @@ from math import inf
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from trajcli.curves.piecewise import Array, read_only
 from trajcli.errors import InputError
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
 JointType = Literal["revolute", "prismatic"]
 Convention = Literal["standard", "modified"]
 QUANTITIES = ("position", "velocity", "acceleration", "jerk")
+
+GRAVITY = (0.0, 0.0, -9.81)
+"""Acceleration of a body that falls, in world, m/s^2, where nothing else is said."""
 
 _INERTIA_ROUNDING = 1e-6  # of the largest moment: files have some six digits
 _SMALL_POSITION = 1e-3  # rad or m: what goes beyond a position bound smaller than this is relative to this
@@ -97,6 +101,58 @@ def require_possible_solid(
         )
 
 
+@frozen
+class Payload:
+    """A rigid solid that is fixed to the tcp.
+
+    Attributes:
+        mass: kg, at least 0.
+        com: Centre of mass in the frame of the tcp, m, shape (3,).
+        inertia: Tensor about the centre of mass in the axes of the tcp, kg m^2, shape (3, 3).
+
+    Raises:
+        InputError: When no rigid solid has them.
+    """
+
+    mass: float
+    com: Array
+    inertia: Array
+
+    def __post_init__(self) -> None:
+        for name, shape in (("com", (3,)), ("inertia", (3, 3))):
+            values = read_only(getattr(self, name))
+            if values.shape != shape:
+                raise InputError(f"payload: expected {name} of shape {shape}, got {values.shape}")
+            object.__setattr__(self, name, values)
+        require_possible_solid(self.mass, self.com, self.inertia, least_mass=0.0)
+
+    def __repr__(self) -> str:
+        com = ", ".join(f"{x:g}" for x in self.com.tolist())
+        return f"{type(self).__name__}({self.mass:g} kg at [{com}] m)"
+
+    def with_mass(self, mass: float) -> Payload:
+        """Return the same payload with another mass; its inertia grows with the mass.
+
+        Raises:
+            InputError: When the mass is negative.
+        """
+        share = mass / self.mass if self.mass > 0.0 else 1.0
+        return Payload(mass, self.com, self.inertia * share)
+
+
+def point_mass(mass: float, com: ArrayLike = (0.0, 0.0, 0.0)) -> Payload:
+    """Return a payload without extent.
+
+    Args:
+        mass: kg, at least 0.
+        com: Its place in the frame of the tcp, m, shape (3,).
+
+    Raises:
+        InputError: When the mass is negative.
+    """
+    return Payload(mass, np.asarray(com, dtype=np.float64), np.zeros((3, 3)))
+
+
 @comparable
 class Joint:
     """One joint and its DH row: theta_i = theta + sign q (revolute), d_i = d + sign q (prismatic).
@@ -111,7 +167,8 @@ class Joint:
         sign: 1 or -1: the direction in which the joint counts.
         beta: Angle about y behind alpha, rad: where two axes are almost parallel, d would be far off and
             depend on the last digit of alpha without it.
-        effort: Lowest and highest torque or force, N m or N; infinite where it is not known.
+        effort: Lowest and highest torque or force that the maker states, N m or N; infinite where it is not
+            known. What is in force stands in `Limits.effort`.
         friction: Of the joint.
         rotor: Inertia of the motor as the joint feels it, kg m^2 (kg for a slide).
         link: Mass and inertia of the link behind the joint, with all that is fixed to it; None where unknown.
@@ -154,8 +211,8 @@ class ToolLimits:
     angular_acceleration: float = inf
 
 
-def _not_by_position() -> Array:
-    """Return what stands for limits of velocity by position where no joint has one."""
+def _no_rows() -> Array:
+    """Return what stands for limits of a kind that no joint has."""
     return np.empty((0, 2))
 
 
@@ -171,6 +228,7 @@ class Limits:
         tcp: Of the tool.
         velocity_by_position: Shape (n, 2): d, per second squared, infinite for no such limit, and o, per
             second, of |v| <= max(0, sqrt(2 d x) - o) at the distance x from the position limit ahead.
+        effort: Shape (n, 2), of the torque or force, N m or N; lower < 0 < upper.
     """
 
     position: Array
@@ -178,10 +236,13 @@ class Limits:
     acceleration: Array
     jerk: Array
     tcp: ToolLimits = ToolLimits()
-    velocity_by_position: Array = field(default_factory=_not_by_position)
+    velocity_by_position: Array = field(default_factory=_no_rows)
+    effort: Array = field(default_factory=_no_rows)
 
     def __post_init__(self) -> None:
-        for index, name in enumerate(QUANTITIES):
+        if not len(self.effort):
+            object.__setattr__(self, "effort", np.tile([-np.inf, np.inf], (len(self.position), 1)))
+        for index, name in enumerate((*QUANTITIES, "effort")):
             bounds = read_only(getattr(self, name))
             if bounds.ndim != 2 or bounds.shape[1] != 2 or np.isnan(bounds).any():
                 raise ValueError(f"{name} limits: expected shape (n, 2) without NaN, got {bounds.shape}")
@@ -204,8 +265,13 @@ class Limits:
         return rows
 
     def __repr__(self) -> str:
-        limited = [name for name in QUANTITIES if np.isfinite(getattr(self, name)).any()]
+        limited = [name for name in (*QUANTITIES, "effort") if np.isfinite(getattr(self, name)).any()]
         return f"Limits({len(self.position)} joints: {', '.join(limited) or 'none'})"
+
+    @property
+    def has_effort(self) -> bool:
+        """Whether the torque or force of some joint is limited."""
+        return bool(np.isfinite(self.effort).any())
 
     @property
     def has_velocity_by_position(self) -> bool:
@@ -265,6 +331,8 @@ class Robot:
         convention: Whose DH rows the joints are; None for bare joints, which have no geometry.
         base: T_world_base, shape (4, 4).
         tool: T_flange_tcp, shape (4, 4).
+        gravity: Acceleration of a body that falls, in world, shape (3,), m/s^2.
+        payload: What the tool carries; None for nothing.
     """
 
     name: str
@@ -273,10 +341,12 @@ class Robot:
     convention: Convention | None
     base: Array
     tool: Array
+    gravity: Array = field(default_factory=lambda: np.array(GRAVITY))
+    payload: Payload | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "base", read_only(self.base))
-        object.__setattr__(self, "tool", read_only(self.tool))
+        for name in ("base", "tool", "gravity"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     def __repr__(self) -> str:
         joints = f"{len(self.joints)} joint{'s' * (len(self.joints) != 1)}"
@@ -292,3 +362,8 @@ class Robot:
     def joint_types(self) -> tuple[JointType, ...]:
         """Types of the joints, from the base on."""
         return tuple(joint.type for joint in self.joints)
+
+    @property
+    def without_inertia(self) -> tuple[str, ...]:
+        """Names of the joints whose links have no known mass and inertia."""
+        return tuple(joint.name for joint in self.joints if joint.link is None)
