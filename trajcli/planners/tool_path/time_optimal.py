@@ -7,7 +7,7 @@ IEEE Trans. Robotics 34 (2018).
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -124,8 +124,15 @@ class ToolConstraint:
         limits: Of its speed and acceleration, linear and angular.
     """
 
+    allows_ramps: ClassVar[bool] = True  # its excess sees what they do
+
     path: ToolPath
     limits: ToolLimits
+
+    @property
+    def bounds_sdd(self) -> bool:
+        """Whether some acceleration is bounded."""
+        return bool(np.isfinite([self.limits.acceleration, self.limits.angular_acceleration]).any())
 
     def rows(self, s: Array, side: Side) -> ConstraintRows:
         """Return rows and caps at points (p,) of the path.
