@@ -57,6 +57,14 @@ class RigidSolid:
     first: tuple[float, float, float]
     second: tuple[float, float, float, float, float, float]
 
+    @property
+    def sizes(self) -> tuple[float, float, float, float]:
+        """Mass, length of the first moment, largest principal moment, half its distance to the least."""
+        xx, yy, zz, xy, xz, yz = self.second
+        moments = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])).tolist()
+        largest, least = moments[2], moments[0]
+        return self.mass, float(np.linalg.norm(self.first)), largest, (largest - least) / 2
+
 
 @comparable
 class DynamicLink:
