@@ -17,7 +17,8 @@ FLOORS = (
     ("language",),
     ("planners", "checks", "streams", "urdf"),
     ("job",),
-    ("planning", "comparison", "queries"),
+    ("planning", "comparison", "queries", "consumers"),
+    ("judge",),
     ("output", "plots", "player"),
     ("cli", "api"),
     ("",),  # trajcli/__init__.py, the public face

@@ -14,7 +14,7 @@ import typer
 import typer.core
 
 from trajcli.cli.arm_commands import register
-from trajcli.cli.options import Errors, JobFile, Json, Overrides
+from trajcli.cli.options import Errors, JobErrors, JobFile, Json, Overrides, profile_words
 from trajcli.cli.outcome import guarded
 
 _JUDGE = "trajcli plan JOB --no-output"
@@ -48,8 +48,9 @@ class Commands(typer.core.TyperGroup):
         return super().resolve_command(ctx, args)
 
     def main(self, args: Sequence[str] | None = None, *rest: Any, **options: Any) -> Any:  # noqa: ANN401
-        """Run the command; errors of usage are JSON where the words ask for that."""
-        if not _wants_json(sys.argv[1:] if args is None else args):
+        """Run the command; errors of usage have the form that the words ask for."""
+        form = _form_of_errors(sys.argv[1:] if args is None else args)
+        if form is None:
             return super().main(args, *rest, **options)
         try:
             code = super().main(args, *rest, **{**options, "standalone_mode": False})
@@ -60,14 +61,19 @@ class Commands(typer.core.TyperGroup):
             from trajcli.cli.outcome import report_error
             from trajcli.errors import InputError
 
-            report_error(InputError(words(), hint="see --help"), as_json=True)
+            report_error(InputError(words(), hint="see --help"), form)
             sys.exit(InputError.exit_code)
         sys.exit(code or 0)
 
 
-def _wants_json(words: Sequence[str]) -> bool:
+def _form_of_errors(words: Sequence[str]) -> Any:  # noqa: ANN401
+    """Return in which form for programs errors are wanted; None where they are for people."""
     options = list(words[: words.index("--")] if "--" in words else words)
-    return "--errors=json" in options or ("--errors", "json") in pairwise(options)
+    forms = ("json", "github", "junit", "sarif")
+    asked = (
+        form for form in forms if f"--errors={form}" in options or ("--errors", form) in pairwise(options)
+    )
+    return next(asked, None)
 
 
 app = typer.Typer(
@@ -94,6 +100,9 @@ def commands() -> None:
 @guarded
 def plan(
     job: JobFile,
+    others: Annotated[
+        list[str], typer.Argument(metavar="JOB", help="More jobs, which are only judged: with --no-output.")
+    ] = [],  # noqa: B006
     output: Annotated[
         str | None,
         typer.Option(
@@ -156,7 +165,7 @@ def plan(
     every: Annotated[
         bool, typer.Option("--all", help="Every finding, not only the worst of each move and kind.")
     ] = False,
-    errors: Errors = "text",
+    errors: JobErrors = "text",
 ) -> int:
     """Plan a job, verify it, and write it: rows as CSV or JSON lines, a log, or a goal for a controller."""
     from trajcli.cli.plan import PlanOptions, run_plan
@@ -178,10 +187,14 @@ def plan(
         reference=reference,
         no_output=no_output,
         quiet=quiet,
-        every=every or errors == "json",
+        every=every or errors != "text",
         si=si,
     )
-    return run_plan(job, override, options)
+    if not others and errors in ("text", "json"):
+        return run_plan(job, override, options)
+    from trajcli.cli.gate import run_gate
+
+    return run_gate([job, *others], override, options, errors)
 
 
 @app.command(epilog="Example: trajcli explain examples/cubic.yaml")
@@ -314,6 +327,24 @@ def view(
     from trajcli.cli.view import ViewOptions, run_view
 
     return run_view(source, override, ViewOptions(output, compress, robot))
+
+
+@app.command(epilog="Example: trajcli profiles ros-jtc")
+@guarded
+def profiles(
+    name: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="NAME", help="One consumer; without it all are listed.", autocompletion=profile_words
+        ),
+    ] = None,
+    as_json: Json = False,
+    errors: Errors = "text",
+) -> int:
+    """List the consumers whose rules are known, or the rules of one, with their sources."""
+    from trajcli.cli.profiles import run_profiles
+
+    return run_profiles(name, as_json=as_json)
 
 
 @app.command(epilog="Example: trajcli schema job")

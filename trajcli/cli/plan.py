@@ -53,6 +53,16 @@ def run_plan(job: str, overrides: Sequence[str], options: PlanOptions) -> int:
     Raises:
         TrajcliError: When anything is wrong; then no rows were written.
     """
+    plan_and_write(job, overrides, options)
+    return 0
+
+
+def plan_and_write(job: str, overrides: Sequence[str], options: PlanOptions) -> Plan:
+    """Plan, judge and write a job; return the plan, which verifies.
+
+    Raises:
+        TrajcliError: When anything is wrong; then no rows were written.
+    """
     form = _check_options(options)
     loaded = load_job(job, overrides, rate=options.rate, si=options.si)
     _check_inputs_stay(loaded, options)
@@ -79,7 +89,7 @@ def run_plan(job: str, overrides: Sequence[str], options: PlanOptions) -> int:
         written = 0 if options.no_output or form.content == "knots" else grid.count
         missing = form.content == "log" and loaded.robot.convention is None
         _summarise(plan, written, geometry_missing=missing)
-    return 0
+    return plan
 
 
 def _refusal(plan: Plan, options: PlanOptions) -> VerificationError | None:
@@ -98,7 +108,8 @@ def _refusal(plan: Plan, options: PlanOptions) -> VerificationError | None:
 
 def _problem(plan: Plan, event: Event) -> Problem:
     place = None if event.move is None else plan.loaded.place_of_move(event.move)
-    return Problem(f"{event.kind}: {event.message}", "leave --strict out to accept it", place, event.move)
+    hint = "leave --strict out to accept it"
+    return Problem(f"{event.kind}: {event.message}", hint, place, event.move, kind=event.kind)
 
 
 def _check_options(options: PlanOptions) -> StreamFormat:

@@ -420,4 +420,5 @@ def _problem(plan: Plan, finding: Finding) -> Problem:
         time=finding.time,
         value=finding.value,
         limit=finding.limit,
+        kind=finding.kind,
     )
