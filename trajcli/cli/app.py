@@ -157,6 +157,15 @@ def plan(
             help="Compare each move with the fastest under the same limits, along a path with toppra.",
         ),
     ] = False,
+    consumer: Annotated[
+        str | None,
+        typer.Option(
+            "--for",
+            metavar="PROFILE",
+            help="Judge the rows as written by the rules of a consumer, such as ros-jtc: `trajcli profiles`.",
+            autocompletion=profile_words,
+        ),
+    ] = None,
     no_output: Annotated[bool, typer.Option("--no-output", help="Only judge: write no rows.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on stderr.")] = False,
     si: Annotated[
@@ -185,6 +194,7 @@ def plan(
         log=log,
         strict=strict,
         reference=reference,
+        consumer=consumer,
         no_output=no_output,
         quiet=quiet,
         every=every or errors != "text",

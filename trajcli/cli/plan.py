@@ -22,6 +22,8 @@ from trajcli.streams.whole_file import identity
 
 if TYPE_CHECKING:
     from trajcli.checks.tool_bound import ToolPeak
+    from trajcli.consumers.judgement import ProfileJudgement
+    from trajcli.consumers.profile import Profile
     from trajcli.job.report import MoveReport, PathReferenceReport, ReferenceReport
     from trajcli.output.recording import LogOptions
 
@@ -41,6 +43,7 @@ class PlanOptions:
     log: LogOptions | None = None
     strict: bool = False
     reference: bool = False
+    consumer: str | None = None
     no_output: bool = False
     quiet: bool = False
     every: bool = True
@@ -64,6 +67,7 @@ def plan_and_write(job: str, overrides: Sequence[str], options: PlanOptions) -> 
         TrajcliError: When anything is wrong; then no rows were written.
     """
     form = _check_options(options)
+    profile = _profile(options)
     loaded = load_job(job, overrides, rate=options.rate, si=options.si)
     _check_inputs_stay(loaded, options)
     if options.log is not None:
@@ -78,18 +82,45 @@ def plan_and_write(job: str, overrides: Sequence[str], options: PlanOptions) -> 
         ):  # what is not finite is for the checks to find, not for numpy to print
             plan = plan_job(loaded)
         grid = grid_of(plan)
-        refusal = _refusal(plan, options)
+        refusal, judged = _refusal(plan, options), None
+        if refusal is None and profile is not None:
+            from trajcli.output.consumer import judge_as_written, refusal_of
+
+            digits, log = options.digits or "fixed", options.log
+            judged = judge_as_written(plan, grid, profile, form, digits=digits, log=log)
+            refusal = refusal_of(plan, judged, strict=options.strict)
         if refusal is None and not options.no_output:
             write_rows(plan, grid, options.output, options.digits or "fixed", form=form, log=options.log)
     if options.report is not None or options.reference:
-        _report(plan, options)  # behind the rows: where it stands, they do
+        _report(plan, options, judged)  # behind the rows: where it stands, they do
     if refusal is not None:
         raise refusal
     if not options.quiet:
         written = 0 if options.no_output or form.content == "knots" else grid.count
         missing = form.content == "log" and loaded.robot.convention is None
         _summarise(plan, written, geometry_missing=missing)
+        if judged is not None:
+            _summarise_consumer(judged)
     return plan
+
+
+def _profile(options: PlanOptions) -> Profile | None:
+    """Return the rules of the consumer that is named."""
+    if options.consumer is None:
+        return None
+    from trajcli.consumers.judgement import load_profile
+
+    return load_profile(options.consumer)
+
+
+def _summarise_consumer(judged: ProfileJudgement) -> None:
+    from trajcli.output.consumer import counted
+
+    warnings = [f"  {each.rule}: {each.message}{counted(each)}" for each in judged.breaches]
+    unjudged = ", ".join(rule for rule, _ in judged.unjudged)
+    lines = [f"for {judged.profile.name}: all necessary rules are kept", *warnings]
+    lines += [f"  not judged: {unjudged}"] if unjudged else []
+    print("\n".join(lines), file=sys.stderr)  # noqa: T201
 
 
 def _refusal(plan: Plan, options: PlanOptions) -> VerificationError | None:
@@ -167,10 +198,14 @@ def _write_resolved(loaded: LoadedJob, path: str) -> None:
     write_text(dump_job(loaded), path)
 
 
-def _report(plan: Plan, options: PlanOptions) -> None:
+def _report(plan: Plan, options: PlanOptions, judged: ProfileJudgement | None) -> None:
     from trajcli.output.report import report_of
 
     report = report_of(plan, reference=options.reference)
+    if judged is not None:
+        from trajcli.output.consumer import consumer_report
+
+        report = report.model_copy(update={"consumer": consumer_report(plan, judged)})
     if options.report is not None:
         write_text(report.model_dump_json(indent=2) + "\n", options.report)
     compared = options.reference and plan.verdict.passed and not options.quiet

@@ -15,6 +15,8 @@ from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Limits
 from trajcli.streams.recorded_motion import RecordedMotion
 
+_SAME = 1e-9  # relative: of rows that break a rule alike the first is named
+
 
 @comparable
 class RuleBreach:
@@ -161,7 +163,7 @@ class RuleCheck:
         if before is None:
             self._worst[joint, move] = (excess, breach)
             return
-        worst = (excess, breach) if excess > before[0] else before
+        worst = (excess, breach) if excess > before[0] + _SAME * abs(before[0]) else before
         self._worst[joint, move] = (worst[0], replace(worst[1], count=before[1].count + breach.count))
 
     def note_rows(
@@ -182,7 +184,7 @@ class RuleCheck:
         for joint in np.flatnonzero(over.any(axis=0)).tolist():
             at = np.flatnonzero(over[:, joint])
             for members in _by_move(rows, at):
-                index = int(members[excess[members, joint].argmax()])
+                index = _first_worst(members, excess[members, joint])
                 self.note(
                     rows,
                     joint,
@@ -201,7 +203,7 @@ class RuleCheck:
     ) -> None:
         """Remember breaches that are about rows and no joint; as `note_rows` does for joints."""
         for members in _by_move(rows, np.flatnonzero(over)):
-            index = int(members[excess[members].argmax()])
+            index = _first_worst(members, excess[members])
             self.note(rows, None, index, float(excess[index]), count=int(members.size), **fields(index))
 
     def _parameter(self, name: str) -> Any:  # noqa: ANN401
@@ -215,6 +217,12 @@ def _by_move(rows: RecordedMotion, indices: NDArray[np.intp]) -> Sequence[NDArra
         return [indices] if indices.size else []
     moves = rows.move[indices]
     return [indices[moves == move] for move in np.unique(moves)]
+
+
+def _first_worst(members: NDArray[np.intp], excess: Array) -> int:
+    """Return the first of the rows whose excess is the largest up to rounding."""
+    most = float(excess.max())
+    return int(members[int((excess >= most - _SAME * abs(most)).argmax())])
 
 
 def when(rows: RecordedMotion, index: int) -> str:

@@ -368,6 +368,47 @@ class KnotsReport(ReportPart):
     deviation: KnotsDeviation
 
 
+class ConsumerFinding(ReportPart):
+    """A rule of a consumer that the rows break, of one joint: the worst row, and how many there are."""
+
+    rule: Annotated[str, Field(description="Id of the rule in the profile.")]
+    severity: Annotated[
+        Literal["error", "warning"],
+        Field(description="error: the consumer refuses or aborts such a motion; warning: it runs less well."),
+    ]
+    kind: str
+    joint: str | None
+    move: int
+    time: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
+    row: Annotated[int, Field(description="From 1, as written.")]
+    count: Annotated[int, Field(description="Of rows that break it.")]
+    factor: Annotated[
+        float | None, Field(description="The move must last this many times longer; null: no help.")
+    ]
+    method: Annotated[
+        Literal["exact", "differences"],
+        Field(description="differences: of rows, at the period of the consumer."),
+    ]
+    message: Annotated[str, Field(description="What is wrong, in SI.")]
+    hint: Annotated[str | None, Field(description="What would fix it.")] = None
+
+
+class UnjudgedRule(ReportPart):
+    """A rule of a consumer that could not be judged."""
+
+    rule: str
+    reason: str
+
+
+class ConsumerReport(ReportPart):
+    """What the rows do against the rules of their consumer, as they are written."""
+
+    profile: str
+    accepted: Annotated[bool, Field(description="Whether all necessary rules are kept.")]
+    findings: list[ConsumerFinding]
+    unjudged: list[UnjudgedRule]
+
+
 class Report(ReportPart):
     """What became of a job."""
 
@@ -383,6 +424,9 @@ class Report(ReportPart):
     steps: list[StepReport]
     unchecked: list[UncheckedReport]
     unchecked_of_tool: list[UncheckedToolReport] = []
+    consumer: Annotated[ConsumerReport | None, Field(description="Asked for by `--for`; null otherwise.")] = (
+        None
+    )
     knots: Annotated[
         KnotsReport | None,
         Field(description="Of /joint_trajectory and of ROS goals; null where a limit is broken."),
