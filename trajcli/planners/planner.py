@@ -28,6 +28,7 @@ _REMARKS = (
     "refined",
     "within_tool_limits",
     "within_velocity_by_position",
+    "within_effort_limits",
     "local_optimum",
 )  # kinds of events that concede nothing
 _GIVEN = ("duration", "velocity", "acceleration", "deceleration", "timed")  # where they say how long it lasts

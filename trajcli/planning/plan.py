@@ -208,7 +208,8 @@ def _plan_move(loaded: LoadedJob, carrying: Robot, index: int, planner: Planner,
         from trajcli.planning.retime import long_enough
 
         move = long_enough(index, planner, start, robot, error)
-    if robot.limits.tcp != _NO_TOOL_LIMITS or robot.limits.has_velocity_by_position:
+    limits = robot.limits
+    if limits.tcp != _NO_TOOL_LIMITS or limits.has_velocity_by_position or limits.has_effort:
         from trajcli.planning.retime import keep_further_limits
 
         move = keep_further_limits(move)
@@ -220,6 +221,10 @@ def _plan_move(loaded: LoadedJob, carrying: Robot, index: int, planner: Planner,
         from trajcli.planning.retime import align_to_period
 
         move = align_to_period(move, job.output.rate)
+    if limits.has_effort and not planner.handles:
+        from trajcli.planning.retime import require_holdable
+
+        require_holdable(move)
     return move
 
 
