@@ -95,7 +95,7 @@ def test_fastest_durations_respect_efforts(planner):
 
 
 def test_each_move_is_judged_with_what_it_carries():
-    there, back = ({"planner": "quintic", "to": {"joints": q}, "duration": 0.95} for q in RESTS[::-1])
+    there, back = ({"planner": "quintic", "to": {"joints": q}, "duration": 0.8} for q in RESTS[::-1])
     assert plan(job(there, back)).verdict.passed
     planned = plan(job(there, {"attach": {"mass": 8}}, back))
     assert {finding.move for finding in planned.verdict.findings} == {2}
