@@ -14,12 +14,12 @@ import typer
 import typer.core
 
 from trajcli.cli.arm_commands import register
-from trajcli.cli.options import Errors, JobErrors, JobFile, Json, Overrides, profile_words
+from trajcli.cli.options import Errors, JobErrors, JobFile, Json, Overrides, profile_words, robot_names
 from trajcli.cli.outcome import guarded
 
 _JUDGE = "trajcli plan JOB --no-output"
 _OTHER_NAMES = {
-    **dict.fromkeys(("validate", "check", "verify", "lint", "test"), _JUDGE),
+    **dict.fromkeys(("validate", "verify", "lint", "test"), _JUDGE),
     **dict.fromkeys(("run", "simulate", "sample", "generate", "execute", "trajectory"), "trajcli plan JOB"),
     **dict.fromkeys(("convert", "transform", "rotation", "quaternion", "euler"), "trajcli pose STEP..."),
     **dict.fromkeys(("forward", "forward-kinematics"), "trajcli fk"),
@@ -225,6 +225,107 @@ def explain(
     from trajcli.cli.explain import ExplainOptions, run_explain
 
     return run_explain(job, override, ExplainOptions(move, derivatives, as_json))
+
+
+@app.command(epilog="Example: trajcli check goal.yaml --robot ur5e --limits limits.yaml")
+@guarded
+def check(
+    file: Annotated[
+        str, typer.Argument(metavar="FILE", help="A CSV, JSON lines, ROS, MCAP or .npy file; - is stdin.")
+    ],
+    job: Annotated[
+        str | None,
+        typer.Option("--job", metavar="JOB", help="Robot, limits, start, end and paths that it shall keep."),
+    ] = None,
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            "--robot",
+            "-r",
+            metavar="NAME|FILE",
+            help="Instead of a job: a robot of the catalogue, a robot file or a URDF.",
+            autocompletion=robot_names,
+        ),
+    ] = None,
+    limits: Annotated[
+        str | None,
+        typer.Option(
+            "--limits",
+            metavar="FILE",
+            help="Of the joints and the tool instead of the robot's: as under `limits` in a job.",
+        ),
+    ] = None,
+    columns: Annotated[
+        str | None,
+        typer.Option(
+            "--columns",
+            metavar="MAP",
+            help="What columns are, such as t=timestamp,q=target_q: prefixes or names.",
+        ),
+    ] = None,
+    units: Annotated[
+        str | None, typer.Option("--units", metavar="UNITS", help="Of columns that name none, as deg,mm.")
+    ] = None,
+    topic: Annotated[
+        str | None,
+        typer.Option("--topic", metavar="T", help="MCAP: the topic.", show_default="/joint_states"),
+    ] = None,
+    field: Annotated[
+        str | None,
+        typer.Option("--field", metavar="F", help="Of messages with several states, such as reference."),
+    ] = None,
+    interpolate: Annotated[
+        Literal["hold", "linear", "cubic", "quintic", "jtc", "jtc-upsampling"] | None,
+        typer.Option(
+            "--interpolate",
+            help="How the consumer joins the rows.",
+            show_default="the highest degree that the columns allow",
+        ),
+    ] = None,
+    profile: Annotated[
+        str | None,
+        typer.Option(
+            "--for",
+            metavar="PROFILE",
+            help="Also the rules of a consumer: `trajcli profiles` lists them.",
+            autocompletion=profile_words,
+        ),
+    ] = None,
+    start_tolerance: Annotated[
+        str | None,
+        typer.Option(
+            "--start-tolerance",
+            metavar="X",
+            help="How near the first row must be to the job's start.",
+            show_default="0.001 rad or m",
+        ),
+    ] = None,
+    form: Annotated[
+        Literal["table", "json", "junit", "sarif", "github"],
+        typer.Option("--format", help="Of what is printed."),
+    ] = "table",
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Exit 1 also within rounding, and when there are events.")
+    ] = False,
+    errors: Errors = "text",
+) -> int:
+    """Judge anybody's trajectory for all t. Exit 0: satisfied or within rounding, 1: exceeded."""
+    from trajcli.cli.check import run_check
+    from trajcli.judge.file import CheckOptions
+
+    options = CheckOptions(
+        job=job,
+        robot=robot,
+        limits=limits,
+        columns=columns,
+        units=units,
+        topic=topic,
+        field=field,
+        interpolate=interpolate,
+        profile=profile,
+        start_tolerance=start_tolerance,
+    )
+    return run_check(file, options, form, strict=strict)
 
 
 @app.command(epilog="Example: trajcli diff old.csv new.csv --atol 1e-9")

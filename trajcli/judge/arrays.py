@@ -159,7 +159,7 @@ def _read(name: str, _changed: float) -> Robot:
 
 @lru_cache(maxsize=16)
 def _limited(robot: _Held, limits: _Held) -> Robot:
-    from trajcli.job.files.limits_file import with_limits
+    from trajcli.job.limits_file import with_limits
 
     if not isinstance(limits.value, Mapping):
         raise InputError(f"limits: expected a mapping or Limits, got {type(limits.value).__name__}")

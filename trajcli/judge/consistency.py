@@ -19,13 +19,13 @@ from trajcli.checks.finding import at_time
 from trajcli.checks.tolerances import JUMP_ABSOLUTE, JUMP_RELATIVE, exceeds
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
-from trajcli.judge.finding import JudgedFinding, JudgedKind
+from trajcli.judge.finding import JudgedFinding, JudgedKind, Worst
 from trajcli.judge.intervals import Intervals, JointAxes
 from trajcli.judge.rounding import stated_errors
-from trajcli.judge.worst import Worst
 from trajcli.kinematics.robot import Limits
 
 _ISOLATED = 4.0  # times the changes beside it: a motion that merely is fast changes from row to row alike
+_STEPS = 2.0  # times what one step in acceleration within an interval explains: there may be several
 _NEAR = 2  # intervals on each side that a jump is compared with
 _QUANTITIES = ("position", "velocity", "acceleration")
 
@@ -88,7 +88,9 @@ def changes_of(window: Intervals) -> list[Changes]:
             stated = length * mean
             turns = np.diff(rates, axis=0) / (length if order == 0 else 1.0)
             bend = np.abs(np.diff(turns, axis=0, prepend=0.0, append=0.0))
-            room = length ** (2 if order == 0 else 1) * np.maximum(bend[:-1], bend[1:])
+            padded = np.concatenate([bend[:1], bend, bend[-1:]])
+            near = np.max([padded[k : k + len(change)] for k in range(4)], axis=0)
+            room = _STEPS * length ** (2 if order == 0 else 1) * near
             room = room + 0.5 * length * (off[:-1] + off[1:]) + late * np.abs(mean)
         found.append(Changes(order, change, error, stated, room))
     return found

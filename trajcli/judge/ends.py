@@ -1,13 +1,14 @@
-"""Start and end of a recorded motion: where it shall begin, and how it shall end."""
+"""Start, end and order of recorded rows: where they shall begin, how they end, that stamps increase."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajcli.checks.finding import at_time
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount
-from trajcli.judge.finding import JudgedFinding, JudgedKind, Severity
+from trajcli.judge.finding import FindingSeverity, JudgedFinding, JudgedKind, Worst
 from trajcli.judge.intervals import JointAxes
 from trajcli.judge.rounding import stated_errors
 from trajcli.streams.recorded_motion import Resolution
@@ -102,7 +103,7 @@ def _velocity(
     resolution: Resolution,
     axes: JointAxes,
     kind: JudgedKind,
-    severity: Severity,
+    severity: FindingSeverity,
 ) -> list[JudgedFinding]:
     time, number, (_, qd, _) = row
     if qd is None or not np.isfinite(qd).all():
@@ -132,3 +133,48 @@ def _velocity(
             amounts=axes.amounts(joint, 1, value, limit),
         )
     ]
+
+
+def judge_order_of_stamps(
+    t: Array, rows: NDArray[np.int64], before: float, moves: NDArray[np.int64], worst: Worst
+) -> NDArray[np.bool_]:
+    """Return which of some stamps are finite and later than all before them; add the others as findings.
+
+    Args:
+        t: As they are written, s, shape (N,).
+        rows: Their numbers, shape (N,).
+        before: The latest one before them; -inf for none.
+        moves: Index of the move of each, -1 for none.
+        worst: What is added to.
+    """
+    finite = np.isfinite(t)
+    if t[0] > before and finite.all() and (t[1:] > t[:-1]).all():
+        return finite
+    latest = np.maximum.accumulate(np.append(before, np.where(finite, t, -np.inf)))[:-1]
+    increasing = finite & (np.where(finite, t, -np.inf) > latest)
+    wrong = np.flatnonzero(~increasing)
+
+    def make(k: int) -> JudgedFinding:
+        row = int(wrong[k])
+        number, time, last = int(rows[row]), float(t[row]), float(latest[row])
+        text = f"the time stamp of row {number} is {time!r}"
+        if np.isfinite(time):
+            how = "doubled" if time == last else "earlier than the one before"
+            text = f"the time stamp of row {number}, {time:.9g} s, is {how}: the latest is {last:.9g} s"
+        known = (time, last) if np.isfinite(time) else (None, None)
+        return JudgedFinding(
+            rule="time",
+            severity="error",
+            kind="time",
+            joint=None,
+            value=known[0],
+            limit=known[1],
+            time=known[0],
+            row=number,
+            message=text,
+            hint="time stamps must strictly increase",
+        )
+
+    nothing = np.full(wrong.size, -1)
+    worst.add("time", int(moves[wrong[0]]), nothing, np.ones(wrong.size), make)
+    return increasing

@@ -99,21 +99,20 @@ class Intervals:
         return np.minimum(counts[:-1], counts[1:])
 
     @cached_property
-    def jumps(self) -> Array:
-        """Largest jump of the first derivative that the pieces do not join, near to each piece, (N - 1, n).
+    def jumps(self) -> tuple[Array, Array]:
+        """Largest jumps of the highest derivative, and of the one after it, near to each piece, (N - 1, n).
 
-        It tells whether the rows resolve the motion: where that changes its law between two rows, the pieces
+        They tell whether the rows resolve the motion: where that changes its law between two rows, the pieces
         beside each other disagree.
         """
         order = int(self.highest.max())
+        return self._jumps_near(order), self._jumps_near(order + 1)
+
+    def _jumps_near(self, order: int) -> Array:
         top = derivative_coefficients(self.coefficients, order)
-        nothing = np.zeros((1, top.shape[2]))
-        before = np.concatenate([nothing, horner(top, self.lengths[:, None])])
-        after = np.concatenate([top[-1], nothing])
-        jump = np.abs(after - before)  # at each row
-        near = np.maximum(jump[:-1], jump[1:])
-        padded = np.concatenate([near[:1], near, near[-1:]])
-        return np.asarray(np.maximum(np.maximum(padded[:-2], padded[2:]), near))
+        jump = np.abs(top[-1, 1:] - horner(top, self.lengths[:, None])[:-1])  # at each inner row
+        padded = np.concatenate([np.zeros((2, top.shape[2])), jump, np.zeros((2, top.shape[2]))])
+        return np.asarray(np.max([padded[k : k + self.lengths.size] for k in range(4)], axis=0))
 
     def piece_rows(self, piece: NDArray[np.intp], joint: NDArray[np.intp], count: int) -> PieceRows:
         """Return what stands at the ends of pieces (m,), for one joint each.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,24 +12,24 @@ from numpy.typing import NDArray
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Problem
 from trajcli.frozen import frozen
-from trajcli.judge.approach import judge_velocity_by_position
 from trajcli.judge.consistency import changes_of, judge_consistency
-from trajcli.judge.ends import judge_end, judge_start
-from trajcli.judge.finding import JudgedFinding, Judgement, worst_first
+from trajcli.judge.ends import judge_end, judge_order_of_stamps, judge_start
+from trajcli.judge.finding import JudgedFinding, Judgement, Worst, worst_first
 from trajcli.judge.intervals import BESIDE, Intervals, JointAxes
-from trajcli.judge.limits import judge_limits
+from trajcli.judge.limits import judge_limits, judge_velocity_by_position
 from trajcli.judge.reconstruction import Interpolation, chosen_interpolation
-from trajcli.judge.stamps import Stamps, UnfitError, judge_order_of_stamps
-from trajcli.judge.worst import Worst
+from trajcli.judge.stamps import Stamps, UnfitError
 from trajcli.kinematics.robot import Limits, Robot
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 from trajcli.trajectory import State
 
 if TYPE_CHECKING:
+    from trajcli.judge.consumer import ConsumerJudge
     from trajcli.judge.tool import ToolJudge
 
 JUDGED_ROWS = 16384
 """Rows of a block: what is computed of them takes some 100 MB at most."""
+_FIRST_ROWS = 256  # that are seen together: they show the period
 _EXACT = 4.0  # units in the last place of a length between exact stamps
 _SEEN = 1e-9  # of the period: stamps that are moved by less are as they were
 _TURNS = 4.0 * np.pi  # rad: no joint goes there, and degrees read as radians do
@@ -46,7 +46,8 @@ class Requirements:
         start: The state in which it shall begin; None where nobody says.
         start_tolerance: How near, rad or m by joint, shape (n,).
         end: The state in which it shall end; None where nobody says.
-        tool: Judges the tool; None for an arm without geometry.
+        tool: Makes the judge of the tool; None for an arm without geometry.
+        consumer: Makes the judge by the rules of a consumer; None for none.
     """
 
     robot: Robot
@@ -56,6 +57,7 @@ class Requirements:
     start_tolerance: Array | None = None
     end: State | None = None
     tool: Callable[[], ToolJudge] | None = None
+    consumer: Callable[[], ConsumerJudge] | None = None
 
 
 def judge_motion(blocks: Callable[[], Iterable[RecordedMotion]], requirements: Requirements) -> Judgement:
@@ -118,11 +120,12 @@ class MotionJudge:
         self._interpolation: Interpolation = "linear"
         self._kept: _Rows | None = None
         self._judged, self._count, self._begins = 0, 0, True
-        self._last_stamp = -np.inf
+        self._last_stamp, self._waiting = -np.inf, list[RecordedMotion]()
         self._first_state: _Rows | None = None
         self._resolution: Resolution | None = None
         self._source: str | None = None
-        self._tool = requirements.tool() if requirements.tool is not None else None
+        self._tool = None if requirements.tool is None else requirements.tool()
+        self._consumer = None if requirements.consumer is None else requirements.consumer()
 
     def see(self, block: RecordedMotion) -> None:
         """Judge more rows.
@@ -131,16 +134,26 @@ class MotionJudge:
             InputError: When they cannot be judged.
             UnfitError: When their stamps do not fit the period of those before.
         """
-        if self._stamps is None:
-            self._begin(block)
         self._count += len(block.t)
+        if self._consumer is not None:
+            self._consumer.take(block)
+        if self._stamps is None:  # a period takes some rows to show
+            self._waiting.append(block)
+            if self._count < _FIRST_ROWS:
+                return
+            block = _joined(self._waiting)
+            self._begin(block)
+        self._see(block)
+        if self._kept is not None:
+            self._judge(self._kept.t.size - 1 - BESIDE, ends=False)
+
+    def _see(self, block: RecordedMotion) -> None:
         rows = self._taken(block)
         if not rows.t.size:
             return
         self._kept = rows if self._kept is None else self._kept.followed_by(rows)
         if self._first_state is None:
             self._first_state = rows.part(slice(0, 1))
-        self._judge(self._kept.t.size - 1 - BESIDE, ends=False)
 
     def judgement(self) -> Judgement:
         """Return what there is to say of all rows.
@@ -148,6 +161,10 @@ class MotionJudge:
         Raises:
             InputError: When there are fewer than two.
         """
+        if self._stamps is None and self._waiting:
+            block = _joined(self._waiting)
+            self._begin(block)
+            self._see(block)
         kept, stamps = self._kept, self._stamps
         if kept is None or stamps is None or self._first_state is None or kept.t.size < 2:
             where = self._source or "the motion"
@@ -159,8 +176,11 @@ class MotionJudge:
         if self._tool is not None:
             findings += self._tool.findings()
         notes = [*_note_on_stamps(stamps), *(() if self._tool is None else self._tool.notes)]
+        if self._consumer is not None:
+            of_consumer, unjudged = self._consumer.result()
+            findings, notes = [*findings, *of_consumer], [*notes, *unjudged]
         period = stamps.lattice.period if stamps.lattice is not None and stamps.regular else None
-        hinted = [_with_hint(finding, self._axes) for finding in findings]
+        hinted = [_with_hint(finding, self._axes) for finding in _causes(findings)]
         return Judgement(
             worst_first(hinted), self._interpolation, self._count, period, self._source, tuple(notes)
         )
@@ -265,6 +285,18 @@ class MotionJudge:
         return findings + judge_end(state, required.end, required.start_tolerance, resolution, self._axes)
 
 
+def _joined(blocks: list[RecordedMotion]) -> RecordedMotion:
+    """Return neighbouring rows as one block."""
+    if len(blocks) == 1:
+        return blocks[0]
+    names = ("t", "q", "qd", "qdd", "move")
+    parts = {name: [getattr(block, name) for block in blocks] for name in names}
+    joined: dict[str, Any] = {
+        name: None if each[0] is None else np.concatenate(each) for name, each in parts.items()
+    }
+    return replace(blocks[0], qddd=None, tau=None, **joined)
+
+
 def _looser(a: Limits, b: Limits) -> Limits:
     """Return limits that two moves both keep."""
     rows = []
@@ -297,6 +329,16 @@ def _note_on_stamps(stamps: Stamps) -> list[str]:
     rate = f"{lattice.period:.9g} s ({1 / lattice.period:.9g} Hz)"
     moved = f"by {stamps.largest_snap:.3g} s at most, within their rounding"
     return [f"the time stamps are taken as multiples of {rate}: that moves them {moved}"]
+
+
+def _causes(findings: list[JudgedFinding]) -> list[JudgedFinding]:
+    """Return the findings without accelerations that disagree with velocities which are wrong themselves."""
+    wrong = {(f.joint, f.move) for f in findings if f.kind == "derivative" and f.quantity == "velocity"}
+    return [
+        f
+        for f in findings
+        if f.kind != "derivative" or f.quantity == "velocity" or (f.joint, f.move) not in wrong
+    ]
 
 
 def _with_hint(finding: JudgedFinding, axes: JointAxes) -> JudgedFinding:

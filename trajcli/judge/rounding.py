@@ -23,7 +23,7 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
 
-_SPACING = 2.0  # units in the last place by which a producer's own arithmetic may be off
+_SPACING = 4.0  # units in the last place by which a producer's own arithmetic may be off
 _CUBIC = {1: 1.5, 2: 6.0, 3: 12.0}
 _QUINTIC_D = {1: 1.875, 2: 10.0 / sqrt(3.0), 3: 60.0}
 _QUINTIC_E = {1: 1.0, 2: 1.5, 3: 6.0}

@@ -18,8 +18,6 @@ from numpy.typing import NDArray
 from trajcli.curves.piecewise import Array
 from trajcli.errors import TrajcliError
 from trajcli.frozen import frozen
-from trajcli.judge.finding import JudgedFinding
-from trajcli.judge.worst import Worst
 
 _FEW = 3  # rows that make no period
 _ROUNDING = 4.0  # units in the last place that a sum of periods may be off
@@ -164,48 +162,3 @@ def simplest_between(low: float, high: float) -> float:
     while terms:
         value = terms.pop() + 1 / value
     return float(value)
-
-
-def judge_order_of_stamps(
-    t: Array, rows: NDArray[np.int64], before: float, moves: NDArray[np.int64], worst: Worst
-) -> NDArray[np.bool_]:
-    """Return which of some stamps are finite and later than all before them; add the others as findings.
-
-    Args:
-        t: As they are written, s, shape (N,).
-        rows: Their numbers, shape (N,).
-        before: The latest one before them; -inf for none.
-        moves: Index of the move of each, -1 for none.
-        worst: What is added to.
-    """
-    finite = np.isfinite(t)
-    if t[0] > before and finite.all() and (t[1:] > t[:-1]).all():
-        return finite
-    latest = np.maximum.accumulate(np.append(before, np.where(finite, t, -np.inf)))[:-1]
-    increasing = finite & (np.where(finite, t, -np.inf) > latest)
-    wrong = np.flatnonzero(~increasing)
-
-    def make(k: int) -> JudgedFinding:
-        row = int(wrong[k])
-        number, time, last = int(rows[row]), float(t[row]), float(latest[row])
-        text = f"the time stamp of row {number} is {time!r}"
-        if np.isfinite(time):
-            how = "doubled" if time == last else "earlier than the one before"
-            text = f"the time stamp of row {number}, {time:.9g} s, is {how}: the latest is {last:.9g} s"
-        known = (time, last) if np.isfinite(time) else (None, None)
-        return JudgedFinding(
-            rule="time",
-            severity="error",
-            kind="time",
-            joint=None,
-            value=known[0],
-            limit=known[1],
-            time=known[0],
-            row=number,
-            message=text,
-            hint="time stamps must strictly increase",
-        )
-
-    nothing = np.full(wrong.size, -1)
-    worst.add("time", int(moves[wrong[0]]), nothing, np.ones(wrong.size), make)
-    return increasing

@@ -13,10 +13,9 @@ from trajcli.checks.tool_bound import ToolPeak, tool_bounds
 from trajcli.checks.tool_limits import SPEEDS, limits_tool
 from trajcli.curves.piecewise import Array, derivative_coefficients, horner
 from trajcli.errors import Amount
-from trajcli.judge.finding import JudgedFinding, JudgedKind
+from trajcli.judge.finding import JudgedFinding, JudgedKind, Worst
 from trajcli.judge.intervals import Intervals
 from trajcli.judge.tool_path import RecordedPath
-from trajcli.judge.worst import Worst
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.kinematics.forward import forward

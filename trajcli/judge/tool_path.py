@@ -11,10 +11,9 @@ from trajcli.checks.finding import at_time
 from trajcli.checks.tolerances import exceeds
 from trajcli.curves.piecewise import Array, horner
 from trajcli.errors import Amount
-from trajcli.judge.finding import Certainty, JudgedFinding
+from trajcli.judge.finding import Certainty, JudgedFinding, Worst
 from trajcli.judge.intervals import Intervals
 from trajcli.judge.rounding import stated_errors
-from trajcli.judge.worst import Worst
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.kinematics.following.tool_path import ToolPath

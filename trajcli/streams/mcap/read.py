@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import BinaryIO
 
@@ -13,13 +14,21 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import FileError, InputError
 from trajcli.frozen import frozen
 from trajcli.streams.mcap import definitions, records
-from trajcli.streams.mcap.decode import DamagedMessageError, JointSeries, joint_states, joint_trajectory
+from trajcli.streams.mcap.decode import (
+    DamagedMessageError,
+    JointSeries,
+    StateLayout,
+    controller_state_layout,
+    joint_state_layout,
+    joint_states,
+    joint_trajectory,
+)
 from trajcli.streams.mcap.log_records import HEAD, LogRecords, MessageBlock, known_channels
 from trajcli.streams.mcap.messages import JOINT_ACCELERATIONS, JOINT_STATES
 from trajcli.suggest import did_you_mean, valid_names
 
 METADATA = "trajcli"
-_READ = (definitions.JOINT_STATE, definitions.JOINT_TRAJECTORY)
+_READ = (definitions.JOINT_STATE, definitions.JOINT_TRAJECTORY, definitions.CONTROLLER_STATE)
 _CLOCK = 10**17  # ns: stamps from here on (1973) are times of a clock, and counted from the first
 
 
@@ -48,15 +57,8 @@ class LoggedMotion:
     effort: Array
 
 
-def read_mcap(path: str | Path, topic: str | None = None) -> LoggedMotion:
-    """Read the motion of a topic of sensor_msgs/JointState or trajectory_msgs/JointTrajectory.
-
-    Of a log that trajcli wrote, /joint_states has the accelerations of /joint_accelerations, and times count
-    from its epoch.
-
-    Args:
-        path: The file.
-        topic: The topic; /joint_states unless given, or else the only one that can be read.
+def read_mcap(path: str | Path, topic: str | None = None, field: str | None = None) -> LoggedMotion:
+    """Read the motion of a topic of a file, as `read_log` does.
 
     Raises:
         FileError: When the file cannot be read.
@@ -64,18 +66,33 @@ def read_mcap(path: str | Path, topic: str | None = None) -> LoggedMotion:
     """
     try:
         with Path(path).open("rb") as stream:
-            return _read(stream, str(path), topic)
+            return read_log(stream, str(path), topic, field)
     except OSError as error:
         raise FileError(f"cannot read {path}: {error.strerror or error}") from error
 
 
-def _read(stream: BinaryIO, file: str, topic: str | None) -> LoggedMotion:
+def read_log(stream: BinaryIO, file: str, topic: str | None = None, field: str | None = None) -> LoggedMotion:
+    """Read the motion of a topic of JointState, JointTrajectory or JointTrajectoryControllerState.
+
+    Of a log that trajcli wrote, /joint_states has the accelerations of /joint_accelerations, and times count
+    from its epoch.
+
+    Args:
+        stream: The file, open at its first byte.
+        file: Its name, for messages.
+        topic: The topic; /joint_states unless given, or else the only one that can be read.
+        field: Of JointTrajectoryControllerState, the state that is read, such as "reference".
+
+    Raises:
+        InputError: When it is no whole MCAP file, or has no such topic.
+    """
     known = known_channels(stream, file)
     chosen = _chosen(known, topic)
     log = LogRecords(stream, file)
     wanted = {chosen: _channels(known, chosen)}
     if chosen == JOINT_STATES:
         wanted[JOINT_ACCELERATIONS] = _channels(known, JOINT_ACCELERATIONS)
+    layouts = {number: _layouts(known, number, field) for channels in wanted.values() for number in channels}
     found: dict[str, list[JointSeries]] = {name: [] for name in wanted}
     for block in log.blocks():
         for name, channels in wanted.items():
@@ -86,13 +103,39 @@ def _read(stream: BinaryIO, file: str, topic: str | None) -> LoggedMotion:
                         f"the topic {name} of {file} holds several trajectories, and one is read"
                     )
                 if count:
-                    found[name].append(_decoded(log, block, channel, name, kind))
+                    found[name].append(_decoded(log, block, channel, name, layouts[channel]))
     series = _joined(found[chosen], file, chosen)
     accelerations = found.get(JOINT_ACCELERATIONS, [])
     own = log.metadata.get(METADATA, {})
     if own and accelerations and chosen == JOINT_STATES:
         series = _with_accelerations(series, _joined(accelerations, file, JOINT_ACCELERATIONS))
     return _motion(file, chosen, series, own)
+
+
+def _layouts(known: LogRecords, channel: int, field: str | None) -> Callable[[bytes], StateLayout] | None:
+    """Return where the parts of a channel's messages stand; None where each holds a trajectory.
+
+    Raises:
+        InputError: When the messages have several states and none is chosen, or have no such field.
+    """
+    kind, topic = _type(known, channel), known.channels[channel].topic
+    if kind != definitions.CONTROLLER_STATE:
+        if field is not None:
+            hint = f"--field is about topics of {definitions.CONTROLLER_STATE}"
+            raise InputError(
+                f"the topic {topic} of {known.file} holds {kind}, which has one state", hint=hint
+            )
+        return joint_state_layout if kind == definitions.JOINT_STATE else None
+    schema = known.schemas[known.channels[channel].schema_id]
+    fields = definitions.point_fields(schema.data.decode("utf-8", "replace"))
+    if not fields:
+        raise InputError(f"the definition of {kind} in {known.file} is of an unknown form")
+    if field not in fields:
+        message = f"the topic {topic} of {known.file} holds the states {', '.join(fields)}"
+        near = None if field is None else did_you_mean(field, fields)
+        message += "" if field is None else f", and no '{field}'"
+        raise InputError(message, hint=near or f"choose one: --field {' or --field '.join(fields)}")
+    return partial(controller_state_layout, fields=fields, field=field)
 
 
 def _type(known: LogRecords, channel: int) -> str:
@@ -133,14 +176,20 @@ def _chosen(known: LogRecords, topic: str | None) -> str:
     return topic
 
 
-def _decoded(log: LogRecords, block: MessageBlock, channel: int, topic: str, kind: str) -> JointSeries:
+def _decoded(
+    log: LogRecords,
+    block: MessageBlock,
+    channel: int,
+    topic: str,
+    layout: Callable[[bytes], StateLayout] | None,
+) -> JointSeries:
     """Return the states in the messages of a channel in a block."""
     heads = block.heads(channel)
     starts = block.offsets[channel] + HEAD
     lengths = heads["length"].astype(np.int64) - (HEAD - records.RECORD_HEAD.size)
     try:
-        if kind == definitions.JOINT_STATE:
-            series = joint_states(block.data, starts, lengths)
+        if layout is not None:
+            series = joint_states(block.data, starts, lengths, layout)
             # where nobody has stamped the messages, the recorder has
             stamped = series.nanoseconds.any() or not heads["time"].any()
             return series if stamped else replace(series, nanoseconds=heads["time"].astype(np.int64))
@@ -158,10 +207,11 @@ def _joined(parts: Sequence[JointSeries], file: str, topic: str) -> JointSeries:
     if not parts or not sum(part.nanoseconds.size for part in parts):
         raise InputError(f"the topic {topic} of {file} has no messages")
     first = parts[0]
-    shapes = [part.position.shape[1:] + part.velocity.shape[1:] + part.effort.shape[1:] for part in parts]
-    if any(part.names != first.names for part in parts) or len({*shapes}) > 1:
-        raise InputError(f"the messages of {topic} in {file} are about different joints or quantities")
     arrays = ("nanoseconds", "position", "velocity", "acceleration", "effort")
+    states = arrays[1:]
+    shapes = [[getattr(part, name).shape[1:] for name in states] for part in parts]
+    if any(part.names != first.names for part in parts) or any(shape != shapes[0] for shape in shapes):
+        raise InputError(f"the messages of {topic} in {file} are about different joints or quantities")
     joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in arrays}
     return JointSeries(names=first.names, **joined)
 
@@ -179,8 +229,8 @@ def _motion(file: str, topic: str, series: JointSeries, own: Mapping[str, str]) 
     start = int(stamps[0]) if stamps[0] >= _CLOCK else 0
     if epoch.isdigit() and stamps[0] >= int(epoch):
         start = int(epoch)
-    parts = (series.position, series.velocity, series.acceleration, series.effort)
-    for what, values in zip(("position", "velocity", "acceleration", "effort"), parts, strict=True):
+    parts = (series.position, series.velocity, series.acceleration)
+    for what, values in zip(("position", "velocity", "acceleration"), parts, strict=True):
         finite = np.isfinite(values)
         if not finite.all():
             row, joint = np.argwhere(~finite)[0].tolist()
@@ -189,4 +239,6 @@ def _motion(file: str, topic: str, series: JointSeries, own: Mapping[str, str]) 
                 f"{values[row, joint]}",
                 hint="only finite numbers can be compared",
             )
-    return LoggedMotion(file, topic, series.names, (stamps - start) / 1e9, *parts)
+    # drivers without sensors of effort say NaN
+    effort = series.effort if np.isfinite(series.effort).all() else np.empty((stamps.size, 0))
+    return LoggedMotion(file, topic, series.names, (stamps - start) / 1e9, *parts, effort)
