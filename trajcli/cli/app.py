@@ -14,6 +14,7 @@ import typer
 import typer.core
 
 from trajcli.cli.arm_commands import register
+from trajcli.cli.file_commands import register_file_commands
 from trajcli.cli.options import Errors, JobErrors, JobFile, Json, Overrides, profile_words, robot_names
 from trajcli.cli.outcome import guarded
 
@@ -148,7 +149,8 @@ def plan(
         typer.Option("--compression", help="MCAP: of the messages.", show_default="zstd"),
     ] = None,
     strict: Annotated[
-        bool, typer.Option("--strict", help="Exit 1 when a concession (event) was made.")
+        bool,
+        typer.Option("--strict", help="Exit 1 when there is an event: a concession, or a warning of --for."),
     ] = False,
     reference: Annotated[
         bool,
@@ -218,13 +220,19 @@ def explain(
     derivatives: Annotated[
         bool, typer.Option("--derivatives", help="Also the polynomials of velocity and acceleration.")
     ] = False,
+    sensitivity: Annotated[
+        bool,
+        typer.Option(
+            "--sensitivity", help="What each limit that is 10 % higher would save: plans the moves anew."
+        ),
+    ] = False,
     as_json: Json = False,
     errors: Errors = "text",
 ) -> int:
     """Say each move in words and formulas: polynomials, phases, peaks, branches, and how fast it could be."""
     from trajcli.cli.explain import ExplainOptions, run_explain
 
-    return run_explain(job, override, ExplainOptions(move, derivatives, as_json))
+    return run_explain(job, override, ExplainOptions(move, derivatives, sensitivity, as_json))
 
 
 @app.command(epilog="Example: trajcli check goal.yaml --robot ur5e --limits limits.yaml")
@@ -328,152 +336,7 @@ def check(
     return run_check(file, options, form, strict=strict)
 
 
-@app.command(epilog="Example: trajcli diff old.csv new.csv --atol 1e-9")
-@guarded
-def diff(
-    a: Annotated[str, typer.Argument(metavar="A", help="A CSV or MCAP file; - is CSV from standard input.")],
-    b: Annotated[str, typer.Argument(metavar="B", help="The file to compare it with.")],
-    atol: Annotated[
-        str,
-        typer.Option(
-            "--atol", metavar="TOL", help="Absolute tolerance: 1e-9, or by column: q=1e-9,qd1=1e-6."
-        ),
-    ] = "",
-    rtol: Annotated[
-        str, typer.Option("--rtol", metavar="TOL", help="Relative tolerance, in the same form.")
-    ] = "",
-    resample: Annotated[
-        bool, typer.Option("--resample", help="Interpolate B at the times of A when they differ.")
-    ] = False,
-    topic: Annotated[
-        str | None,
-        typer.Option(
-            "--topic",
-            metavar="T",
-            help="MCAP: the topic, of JointState or JointTrajectory.",
-            show_default="/joint_states",
-        ),
-    ] = None,
-    errors: Errors = "text",
-) -> int:
-    """Compare two files column by column. Exit 0: equal, 1: different, 2: cannot be compared."""
-    from trajcli.cli.diff import run_diff
-
-    return run_diff(a, b, atol, rtol, resample=resample, topic=topic)
-
-
-@app.command(epilog="Example: trajcli plot examples/ur5e_pick.yaml -o pick.svg")
-@guarded
-def plot(
-    files: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="JOB|FILE...", help="A job, files of rows or messages, or such over a job; - is stdin."
-        ),
-    ],
-    output: Annotated[
-        str | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FILE",
-            help="FILE.svg, .png or .pdf; - is stdout. Else the first name's stem with .svg, in this folder.",
-        ),
-    ] = None,
-    kind: Annotated[
-        Literal["svg", "png", "pdf"] | None, typer.Option("--format", help="Where no name says it; else svg.")
-    ] = None,
-    quantities: Annotated[
-        str | None,
-        typer.Option(
-            "--quantities",
-            metavar="LIST",
-            help="Some of q,qd,qdd,qddd,tool,path,phase; else those that suit the job.",
-        ),
-    ] = None,
-    joints: Annotated[
-        list[str], typer.Option("--joints", metavar="NAME...", help="Only these, as a,b or a b; else all.")
-    ] = [],  # noqa: B006
-    override: Overrides = [],  # noqa: B006
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Do not say what was written.")] = False,
-    every: Annotated[
-        bool, typer.Option("--all", help="Every finding, not only the worst of each move and kind.")
-    ] = False,
-    errors: Errors = "text",
-) -> int:
-    """Draw joints, tool and phase plane with limits. Exit 1: one is broken, and the picture shows where."""
-    from trajcli.cli.plot import PlotOptions, run_plot
-
-    every = every or errors == "json"
-    return run_plot(files, override, PlotOptions(output, kind, quantities, tuple(joints), quiet, every))
-
-
-@app.command(epilog="Example: trajcli view examples/ur5e_pick.yaml -o view.html")
-@guarded
-def view(
-    source: Annotated[
-        str,
-        typer.Argument(metavar="JOB|FILE", help="A job, or a file of rows or messages; - is standard input."),
-    ],
-    output: Annotated[
-        str | None,
-        typer.Option("--output", "-o", metavar="FILE", help="Write the page to FILE.html instead of stdout."),
-    ] = None,
-    compress: Annotated[
-        bool, typer.Option("--compress", help="Half the size, for browsers since 2023.")
-    ] = False,
-    robot: Annotated[
-        str | None,
-        typer.Option(
-            "--robot",
-            "-r",
-            metavar="NAME|FILE|JOB",
-            help="The arm of a file: of the catalogue, a robot file, a URDF, or a job.",
-        ),
-    ] = None,
-    override: Overrides = [],  # noqa: B006
-    errors: Errors = "text",
-) -> int:
-    """Write a page that plays the motion: the arm in 3D with linked plots, in one file for any browser."""
-    from trajcli.cli.view import ViewOptions, run_view
-
-    return run_view(source, override, ViewOptions(output, compress, robot))
-
-
-@app.command(epilog="Example: trajcli profiles ros-jtc")
-@guarded
-def profiles(
-    name: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="NAME", help="One consumer; without it all are listed.", autocompletion=profile_words
-        ),
-    ] = None,
-    as_json: Json = False,
-    errors: Errors = "text",
-) -> int:
-    """List the consumers whose rules are known, or the rules of one, with their sources."""
-    from trajcli.cli.profiles import run_profiles
-
-    return run_profiles(name, as_json=as_json)
-
-
-@app.command(epilog="Example: trajcli schema job")
-@guarded
-def schema(
-    kind: Annotated[
-        Literal["job", "robot", "report", "explanation"],
-        typer.Argument(help="Which schema.", show_default=True),
-    ] = "job",
-    errors: Errors = "text",
-) -> int:
-    """Print a JSON Schema, for completion and checking in an editor."""
-    from trajcli.job.schema import schema_text
-    from trajcli.streams.whole_file import standard_output
-
-    with standard_output() as out:
-        out.write(schema_text(kind).encode())
-    return 0
+register_file_commands(app)
 
 
 @app.command(epilog="Example: trajcli init job.yaml")

@@ -12,6 +12,7 @@ from trajcli.cli.progress import progress
 from trajcli.curves.extrema import peaks
 from trajcli.errors import InputError, Problem, VerificationError
 from trajcli.frozen import comparable
+from trajcli.grids import Grid
 from trajcli.job.read import LoadedJob, files_of, load_job
 from trajcli.kinematics.robot import QUANTITIES
 from trajcli.output.write import grid_of, write_rows, write_text
@@ -84,11 +85,7 @@ def plan_and_write(job: str, overrides: Sequence[str], options: PlanOptions) -> 
         grid = grid_of(plan)
         refusal, judged = _refusal(plan, options), None
         if refusal is None and profile is not None:
-            from trajcli.output.consumer import judge_as_written, refusal_of
-
-            digits, log = options.digits or "fixed", options.log
-            judged = judge_as_written(plan, grid, profile, form, digits=digits, log=log)
-            refusal = refusal_of(plan, judged, strict=options.strict)
+            judged, refusal = _judged(plan, grid, profile, form, options)
         if refusal is None and not options.no_output:
             write_rows(plan, grid, options.output, options.digits or "fixed", form=form, log=options.log)
     if options.report is not None or options.reference:
@@ -113,6 +110,17 @@ def _profile(options: PlanOptions) -> Profile | None:
     return load_profile(options.consumer)
 
 
+def _judged(
+    plan: Plan, grid: Grid, profile: Profile, form: StreamFormat, options: PlanOptions
+) -> tuple[ProfileJudgement, VerificationError | None]:
+    """Return what the rows do against the rules of their consumer, and why they are not written."""
+    from trajcli.output.consumer import judge_as_written, refusal_of
+
+    digits = options.digits or "fixed"
+    judged = judge_as_written(plan, grid, profile, form, digits=digits, log=options.log)
+    return judged, refusal_of(plan, judged, strict=options.strict)
+
+
 def _summarise_consumer(judged: ProfileJudgement) -> None:
     from trajcli.output.consumer import counted
 
@@ -129,12 +137,9 @@ def _refusal(plan: Plan, options: PlanOptions) -> VerificationError | None:
         from trajcli.output.report import verification_error
 
         return verification_error(plan, every=options.every)
-    conceded = [event for event in plan.events if event.concedes]
-    return (
-        VerificationError(*(_problem(plan, event) for event in conceded))
-        if options.strict and conceded
-        else None
-    )
+    if options.strict and plan.events:
+        return VerificationError(*(_problem(plan, event) for event in plan.events))
+    return None
 
 
 def _problem(plan: Plan, event: Event) -> Problem:
@@ -267,7 +272,9 @@ def summary(plan: Plan, rows: int) -> str:
         first = plan.verdict.steps[0]
         more = f" and {len(plan.verdict.steps) - 1} more" if len(plan.verdict.steps) > 1 else ""
         lines.append(f"  the acceleration steps: {first.joint} at t = {first.time:.6g} s{more}")
-    lines += [f"  {event.kind}: {_where(event.move)}{event.message}" for event in plan.events]
+    lines += [
+        f"  {event.kind}: {_where(event.move)}{event.message}" for event in (*plan.events, *plan.remarks)
+    ]
     return "\n".join(lines)
 
 

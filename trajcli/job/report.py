@@ -135,6 +135,29 @@ class BindingReport(ReportPart):
     used: Annotated[float, Field(description="Part of the bound that is used: 1 is all of it.")]
 
 
+class AtLimitReport(ReportPart):
+    """For how long a move is at one limit: within a millionth of it, from the roots of polynomials."""
+
+    joint: str
+    quantity: JointQuantity
+    seconds: Annotated[float, Field(description="In either direction.")]
+    share: Annotated[float, Field(description="Of the duration of the move.")]
+    method: Annotated[
+        Literal["exact", "phases"],
+        Field(description="phases: from the switching structure of a time-optimal law."),
+    ] = "exact"
+
+
+class SavingReport(ReportPart):
+    """What a limit of one joint would save if it were 10 % higher, found by planning with it."""
+
+    joint: str
+    quantity: JointQuantity
+    saved: Annotated[float | None, Field(description="Seconds; null where no such motion is known.")]
+    share: Annotated[float | None, Field(description="Of the duration of the moves that were planned anew.")]
+    reason: Annotated[str | None, Field(description="Why none is known.")] = None
+
+
 class ReferenceReport(ReportPart):
     """The shortest duration that any point-to-point move may have under the same limits, from ruckig."""
 
@@ -272,6 +295,14 @@ class MoveReport(ReportPart):
         list[ByPositionReport] | None, Field(description="Null where no joint has such a limit.")
     ] = None
     binding: BindingReport | None
+    at_limit: Annotated[
+        list[AtLimitReport],
+        Field(description="Limits of velocity, acceleration and jerk that bind, and for how long."),
+    ] = []
+    savings: Annotated[
+        list[SavingReport] | None,
+        Field(description="Asked for by `explain --sensitivity`; empty where the duration is given."),
+    ] = None
     waypoints: Annotated[
         tuple[WaypointReport, ...] | None,
         Field(description="The points it passes; null for a move without any."),
@@ -420,10 +451,17 @@ class Report(ReportPart):
     duration: ReportSeconds
     moves: tuple[MoveReport, ...]
     findings: list[FindingReport]
-    events: list[EventReport]
+    events: Annotated[list[EventReport], Field(description="Concessions, which `--strict` refuses.")]
+    remarks: Annotated[
+        list[EventReport], Field(description="How curves were computed, where that is worth a word.")
+    ] = []
     steps: list[StepReport]
     unchecked: list[UncheckedReport]
     unchecked_of_tool: list[UncheckedToolReport] = []
+    savings: Annotated[
+        list[SavingReport] | None,
+        Field(description="Of all moves together, asked for by `explain --sensitivity`."),
+    ] = None
     consumer: Annotated[ConsumerReport | None, Field(description="Asked for by `--for`; null otherwise.")] = (
         None
     )

@@ -87,6 +87,7 @@ def _problem(plan: Plan, breach: RuleBreach) -> Problem:
         time=breach.time - plan.trajectory.start_time,
         value=breach.value,
         limit=breach.limit,
+        kind=breach.rule,
     )
 
 

@@ -39,6 +39,7 @@ from trajcli.job.report import (
 from trajcli.job.unit_hints import unit_hint
 from trajcli.kinematics.robot import QUANTITIES, JointType, Robot
 from trajcli.knots import Knots, knots_of
+from trajcli.output.sensitivity import at_limit_of
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.lower_bound import NoBound, fastest_duration
 from trajcli.planning.plan import Plan
@@ -80,6 +81,7 @@ def report_of(plan: Plan, *, reference: bool = False, knots: Knots | None = None
         moves=tuple(_move(plan, index, reference=reference) for index in range(len(plan.moves))),
         findings=[_finding(plan, finding) for finding in verdict.findings],
         events=[EventReport(kind=e.kind, message=e.message, move=e.move) for e in plan.events],
+        remarks=[EventReport(kind=e.kind, message=e.message, move=e.move) for e in plan.remarks],
         steps=_steps(verdict.steps, units),
         unchecked=[UncheckedReport(joint=joint, quantity=quantity) for joint, quantity in verdict.unchecked],
         unchecked_of_tool=[UncheckedToolReport(quantity=name) for name in verdict.unchecked_of_tool],
@@ -154,6 +156,7 @@ def _move(plan: Plan, index: int, *, reference: bool) -> MoveReport:
         peaks=peaks,
         velocity_by_position=near or None,
         binding=binding,
+        at_limit=at_limit_of(move, plan.verdict.peaks[index]),
         waypoints=_waypoints(move, span),
         outside=_outside(move, plan.verdict, index),
         tool=_tool(plan.trajectory, span, move),

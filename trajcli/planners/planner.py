@@ -24,13 +24,7 @@ if TYPE_CHECKING:
 
 Resolve = Callable[["Target", Array], "Target"]
 WhenOverLimit = Literal["error", "slow"]
-_REMARKS = (
-    "refined",
-    "within_tool_limits",
-    "within_velocity_by_position",
-    "within_effort_limits",
-    "local_optimum",
-)  # kinds of events that concede nothing
+_REMARKS = ("refined",)  # kinds of events that are about how a curve was computed, and concede nothing
 _GIVEN = ("duration", "velocity", "acceleration", "deceleration", "timed")  # where they say how long it lasts
 LITTLE = 1e-3
 """Relative: a law that is stretched by less still counts as the fastest."""
