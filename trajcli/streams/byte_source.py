@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import SpooledTemporaryFile
 from typing import IO, BinaryIO
+from weakref import finalize
 
 from trajcli.errors import FileError
 from trajcli.streams.table import opened
@@ -34,8 +35,8 @@ class ByteSource:
         self._path = Path(source)
         self._spool: IO[bytes] | None = None
         if str(source) == "-" or is_special(str(source)):
-            # it is read as long as this lives
             self._spool = SpooledTemporaryFile(max_size=_IN_MEMORY)  # noqa: SIM115
+            finalize(self, self._spool.close)
             with opened(source, self.file) as stream:
                 shutil.copyfileobj(stream, self._spool, _COPIED)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from math import isfinite
 from typing import BinaryIO, NoReturn
@@ -18,6 +19,7 @@ from trajcli.streams.text_layout import LONGEST_LINE, Header, RowLayout, is_numb
 
 _SHOWN = 40  # characters of a cell, and
 _SHOWN_LINE = 200  # of a line, in a message
+_QUOTED = re.compile(rb'"[^"]*"')
 _CUT = "the file ends in the middle of a line: it may have been cut"
 
 
@@ -156,11 +158,11 @@ class RowReader:
         return rows
 
     def _split(self, line: bytes) -> list[bytes]:
+        """Return the cells of a line; commas between quotation marks do not separate."""
         if b'"' not in line:
             return line.split(b",")
-        import csv
-
-        return [cell.encode("latin-1") for cell in next(csv.reader([line.decode("latin-1")]))]
+        hidden = _QUOTED.sub(lambda match: match[0].replace(b",", b"\x1f"), line)
+        return [cell.replace(b"\x1f", b",") for cell in hidden.split(b",")]
 
     def _explain(self, text: bytes, layout: RowLayout) -> NoReturn:
         """Say what is wrong with the first of some lines that is wrong."""

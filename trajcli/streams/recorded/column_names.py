@@ -192,11 +192,14 @@ def _named(read: ColumnName, letters: Sequence[str]) -> ColumnName:
         if len(match[0]) < 3 or _WORDS.get(match[0].lower()) != read.quantity:
             continue
         if match.end() == len(plain):
-            name = plain[: match.start()].rstrip(" _./").rpartition("/")[2]
+            front = plain[: match.start()].rstrip(" _./")
+            name = front.rpartition("/")[2]
+            stem = f"{front[: len(front) - len(name)]}*{plain[len(front) :]}"
         elif match.start() == 0:
             name = plain[match.end() :].strip(" _./[]")
+            stem = plain[: match.end()]
         else:
             continue
         if name and not set(_PIECES.findall(name.lower())) & _NO_JOINTS:
-            return replace(read, joint=name, stem=plain.replace(name, "*", 1))
+            return replace(read, joint=name, stem=stem)
     return replace(read, quantity=None)
