@@ -17,6 +17,7 @@ from benchmarks.figures import Figure, table
 
 BENCHMARKS = (
     "planning",
+    "batch",
     "help",
     "writing",
     "logs",

@@ -20,6 +20,7 @@ FLOORS = (
     ("planning", "comparison", "queries", "consumers"),
     ("judge",),
     ("output", "plots", "player"),
+    ("batch",),
     ("cli", "api"),
     ("",),  # trajcli/__init__.py, the public face
     ("__main__",),
