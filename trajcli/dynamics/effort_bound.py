@@ -215,11 +215,10 @@ def _known(dynamics: InverseDynamics, starts: Array, lengths: Array, coefficient
         nothing = np.full((*q.shape, _PARTS), np.inf)  # nothing is known of what no float64 holds
         return EffortSurvey((0.0, 0.0), starts, lengths, nothing, nothing[:, 0, :, 0], unknown)
     parts = np.empty((*q.shape, _PARTS))
-    parts[..., 0] = dynamics.rigid_effort(q, qd, qdd, weight=False)
+    parts[..., 0], parts[..., 3] = dynamics.apart_from_gravity(q, qd, qdd)
     parts[..., 1] = qd * [joint.friction.viscous for joint in joints]
     signs = np.sign(qd[:, NODES_DEGREE // 2])
     parts[..., 2] = (signs * [joint.friction.coulomb for joint in joints])[:, None]
-    parts[..., 3] = dynamics.gravity_effort(q)
     n = NODES_DEGREE + 1
     highest = effort_majorants(dynamics, q[:, 0], growth(coefficients, lengths, n + 2))[n]
     rest = highest * BETWEEN_NODES * lengths[:, None] ** n

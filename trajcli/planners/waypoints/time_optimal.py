@@ -19,7 +19,7 @@ from trajcli.curves.parabolic_blends.blends import blended
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.curves.splines.hermite import parabola_velocities
 from trajcli.curves.splines.shape_preserving import ShapeError
-from trajcli.curves.time_optimal.constraints import JointConstraint
+from trajcli.curves.time_optimal.constraints import JointConstraint, PathConstraint
 from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion, UnsettledSpeedError, time_optimal
 from trajcli.curves.time_optimal.passes import UnreachableSpeedError
 from trajcli.curves.time_optimal.phase_plane import PhasePlane
@@ -41,6 +41,11 @@ from trajcli.language.poses import read_numbers
 from trajcli.language.recorded import Recorded
 from trajcli.planners.approach_limits import approach_constraints
 from trajcli.planners.boundary_states import missing_limit, same_state, standstill
+from trajcli.planners.effort_limits import (
+    effort_constraints,
+    lacks_acceleration,
+    solved_within_efforts,
+)
 from trajcli.planners.planner import Event, Phase, Planned, stretched
 from trajcli.planners.waypoints.spline_rules import Rule, curve_through
 from trajcli.planners.waypoints.through_points import REMEDIES, PointTable, ThroughPoints
@@ -312,7 +317,7 @@ class TimeOptimal(ThroughPoints):
         if not moving.any():
             return self._in_one_point(start, points, robot)
         bounds = robot.limits.acceleration
-        lacking = np.flatnonzero(moving & ~np.isfinite(bounds).all(axis=1))
+        lacking = np.flatnonzero(moving & lacks_acceleration(robot))
         if lacking.size:
             raise missing_limit(
                 self.tag, "acceleration", lacking.tolist(), robot, "to find the fastest motion"
@@ -347,7 +352,8 @@ class TimeOptimal(ThroughPoints):
             "ratio" if not alike else "length" if "prismatic" in kinds else "angle"
         )
         joints = JointConstraint(path.curve, limits.velocity, limits.acceleration)
-        constraints = (joints, *approach_constraints(path.curve, robot))
+        curve = path.curve
+        constraints = (joints, *approach_constraints(curve, robot), *effort_constraints(curve, robot))
         return PhasePlane(motion.law, constraints, path.curve.breaks, motion.stops, dimension)
 
     def _in_one_point(self, start: State, points: PointTable, robot: Robot) -> Planned:
@@ -386,15 +392,19 @@ class TimeOptimal(ThroughPoints):
 def _solved(path: JointPath, robot: Robot) -> TimeOptimalMotion:
     limits = robot.limits
     further = approach_constraints(path.curve, robot)
-    try:
+
+    def solve(efforts: tuple[PathConstraint, ...]) -> TimeOptimalMotion:
         return time_optimal(
             path.curve,
             limits.velocity,
             limits.acceleration,
             start_velocity=path.speeds[0],
             end_velocity=path.speeds[1],
-            further=further,
+            further=(*further, *efforts),
         )
+
+    try:
+        return solved_within_efforts(path.curve, robot, solve)
     except UnreachableSpeedError as error:
         share = error.allowed / error.speed
         message = f"time_optimal cannot have so high a velocity at its ends: at most {share:.6g} of it"
