@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from recordings import judged
+from recorded_rows import judged
 from scipy.interpolate import BPoly, PPoly
 from scipy.optimize import minimize_scalar
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from recordings import judged, rows_of
+from recorded_rows import judged, rows_of
 
 from trajcli.curves.hermite import hermite_pieces
 from trajcli.curves.piecewise import PiecewisePolynomial
@@ -231,3 +231,12 @@ def test_the_stamps_of_a_later_block_may_fit_no_period() -> None:
     judgement = judged(replace(motion, t=stamps), limits(0.5), 40)
     assert judgement.period is None
     assert judgement.rows == len(stamps)
+
+
+def test_sparse_points_need_not_say_what_happens_between_them() -> None:
+    """A move of 2 s from rest to rest as its two ends: velocities of zero do not say that nothing moves."""
+    motion = rows_of(quintic(), DURATION)
+    assert len(motion.t) == 2
+    assert judged(motion, limits()).verdict == "satisfied"
+    assert judged(motion, limits(jerk=np.inf)).verdict == "satisfied"
+    assert judged(motion, limits(jerk=np.inf, acceleration=np.inf)).verdict == "satisfied"

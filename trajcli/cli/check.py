@@ -44,8 +44,7 @@ def run_check(source: str, options: CheckOptions, form: Form, *, strict: bool) -
     else:
         from trajcli.output.annotations import render_annotations
 
-        file = judgement.source or source
-        text = render_annotations([*_annotations(checked, file)], form, [file])
+        text = render_annotations([*_annotations(checked, source)], form, [source])
         if text:
             print_lines([text.removesuffix("\n")])
     for event in judgement.events:

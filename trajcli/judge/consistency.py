@@ -20,7 +20,7 @@ from trajcli.checks.tolerances import JUMP_ABSOLUTE, JUMP_RELATIVE, exceeds
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
 from trajcli.judge.finding import JudgedFinding, JudgedKind, Worst
-from trajcli.judge.intervals import Intervals, JointAxes
+from trajcli.judge.intervals import DENSE, Intervals, JointAxes
 from trajcli.judge.rounding import stated_errors
 from trajcli.kinematics.robot import Limits
 
@@ -51,13 +51,26 @@ class Changes:
     stated: Array | None
     room: Array | None
 
-    @property
-    def disagree(self) -> NDArray[np.bool_]:
-        """Where the columns of two derivatives exclude each other, shape (P, n)."""
+    def disagree(self, lengths: Array, limits: Limits) -> NDArray[np.bool_]:
+        """Return where the columns of two derivatives exclude each other, shape (P, n).
+
+        Between rows that are far apart a joint may do all that its limits allow.
+
+        Args:
+            lengths: Of the intervals, s, shape (P,).
+            limits: In force.
+        """
         if self.stated is None or self.room is None:
             return np.zeros(self.change.shape, dtype=bool)
         sizes = np.abs(self.change) + np.abs(self.stated)
         room = self.room + self.error + JUMP_ABSOLUTE + JUMP_RELATIVE * sizes
+        sparse = lengths > DENSE
+        if sparse.any():
+            further = np.abs(limits.of_order(self.order + 2)).max(axis=1) * lengths[sparse, None] ** 2 / 4.0
+            if self.order == 1:  # the acceleration may also step from one limit to the other
+                steps = 2.0 * np.abs(limits.acceleration).max(axis=1) * lengths[sparse, None]
+                further = np.minimum(further, steps)
+            room[sparse] += further
         return np.asarray(np.abs(self.change - self.stated) > room)
 
     def isolated(self, piece: NDArray[np.intp], joint: NDArray[np.intp]) -> NDArray[np.bool_]:
@@ -120,7 +133,8 @@ def judge_consistency(
     """
     for of_order in changes:
         judge = _Judge(window, of_order, axes, move, worst)
-        disagree, over = of_order.disagree[pieces], judge.over_limit(limits)[pieces]
+        disagree = of_order.disagree(window.lengths, limits)[pieces]
+        over = judge.over_limit(limits)[pieces]
         if disagree.any() or over.any():
             judge.add(pieces.start, disagree, over, changes_branch)
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from trajcli.planning.plan import Plan
 
 _START_TOLERANCE = 1e-3  # rad or m: what a controller takes for the state that it is in
+_SAME_DURATION = 1e-6  # s: a file that lasts as long as the plan, within that, is taken for its motion
 _ENTIRE = ("jtc-upsampling",)  # interpolations that need all rows at once
 
 
@@ -75,6 +76,7 @@ class _Given:
     notes: tuple[str, ...] = ()
     loaded: LoadedJob | None = None
     plan: Plan | None = None
+    shown: Units | None = None
 
 
 def check_file(source: str, options: CheckOptions) -> CheckedFile:
@@ -105,25 +107,45 @@ def check_file(source: str, options: CheckOptions) -> CheckedFile:
     requirements = _requirements(options, given, shown, consumer)
     if consumer is not None and options.interpolate is None and consumer().profile.interpolation is not None:
         requirements = replace(requirements, interpolate=consumer().profile.interpolation)
-    moves = () if given.loaded is None else given.loaded.job.moves
-    alone = len(moves) == 1 and "move" not in motion.quantities
+    by_time = None if "move" in motion.quantities else _moves_by_time(given, motion)
 
     def blocks() -> Iterable[RecordedMotion]:
         entire = requirements.interpolate in _ENTIRE
         rows: Iterator[RecordedMotion] = iter((motion.whole(),)) if entire else motion.blocks(JUDGED_ROWS)
-        return map(_of_first_move, rows) if alone else rows
+        return rows if by_time is None else map(by_time, rows)
 
     judgement = judge_motion(blocks, requirements)
     notes = (*motion.notes, *given.notes, *judgement.notes)
-    if len(moves) > 1 and "move" not in motion.quantities:
+    if given.loaded is not None and "move" not in motion.quantities and by_time is None:
         notes = (*notes, "no column `move`: limits and paths of single moves are not judged")
     judged = replace(judgement, notes=notes, events=given.events, source=motion.source)
     return CheckedFile(judged, robot, shown, given.loaded, given.plan, motion)
 
 
-def _of_first_move(rows: RecordedMotion) -> RecordedMotion:
-    """Return the rows of a file without moves as those of the only one that its job has."""
-    return replace(rows, move=np.zeros(len(rows.t), dtype=np.int64))
+def _moves_by_time(given: _Given, motion: MotionFile) -> Callable[[RecordedMotion], RecordedMotion] | None:
+    """Return what names the moves of rows of a file that does not: by the times of the plan.
+
+    None where the file does not last as long as the plan.
+    """
+    if given.plan is None:
+        return None
+    trajectory = given.plan.trajectory
+    stamps = [(rows.t[0], rows.t[-1]) for rows in motion.blocks() if rows.t.size]
+    if not stamps:
+        return None
+    first, last = float(stamps[0][0]), float(stamps[-1][1])
+    alone = len(trajectory.spans) == 1
+    if not alone and not abs(last - first - trajectory.duration) <= _SAME_DURATION + motion.resolution.time:
+        return None
+    starts = np.array([span.start for span in trajectory.spans])
+    indices = np.array([span.index for span in trajectory.spans], dtype=np.int64)
+
+    def named(rows: RecordedMotion) -> RecordedMotion:
+        since = rows.t - first + motion.resolution.time + np.spacing(abs(last))
+        later = np.searchsorted(starts, np.where(np.isfinite(since), since, 0.0), "right") - 1
+        return replace(rows, move=indices[np.clip(later, 0, len(indices) - 1)])
+
+    return named
 
 
 def _given(options: CheckOptions) -> _Given:
@@ -153,9 +175,11 @@ def _given(options: CheckOptions) -> _Given:
     if options.limits is None:
         return _Given(sheet.robot, sheet.units, ())
     from trajcli.job.limits_file import with_limits_file
+    from trajcli.queries.arm import parse_units
 
-    robot, events = with_limits_file(sheet.robot, options.limits, sheet.units)
-    return _Given(robot, sheet.units, tuple(event.text() for event in events if event.concedes))
+    units = parse_units(options.units or "")  # as in a job: rad and m, unless somebody says others
+    robot, events = with_limits_file(sheet.robot, options.limits, units)
+    return _Given(robot, sheet.units, tuple(event.text() for event in events if event.concedes), shown=units)
 
 
 def _of_job(path: str) -> _Given:
@@ -177,7 +201,8 @@ def _of_job(path: str) -> _Given:
 def _shown_units(options: CheckOptions, given: _Given) -> Units:
     from trajcli.queries.arm import parse_units
 
-    return given.units if options.units is None else parse_units(options.units, given.units)
+    known = given.shown or given.units
+    return known if options.units is None else parse_units(options.units, known)
 
 
 def _requirements(

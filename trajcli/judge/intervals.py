@@ -19,7 +19,8 @@ from trajcli.kinematics.robot import JointType
 from trajcli.streams.recorded_motion import Resolution
 
 BESIDE = 2  # intervals on either side that are looked at, too
-_EXACT = 4.0  # units in the last place of a length between exact stamps
+DENSE = 0.0100001
+"""Seconds between rows that controllers take one by one: they run at 100 Hz or faster."""
 HIGHEST = {"hold": 0, "linear": 1, "cubic": 2, "quintic": 3, "jtc-upsampling": 3}
 """Highest derivative that pieces of an interpolation determine."""
 

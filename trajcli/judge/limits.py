@@ -20,14 +20,12 @@ from trajcli.curves.piecewise import Array, derivative_coefficients, horner
 from trajcli.errors import Amount
 from trajcli.frozen import frozen
 from trajcli.judge.finding import Certainty, FindingSeverity, JudgedFinding, JudgedKind, Worst
-from trajcli.judge.intervals import Intervals, JointAxes
+from trajcli.judge.intervals import DENSE, Intervals, JointAxes
 from trajcli.judge.rounding import PieceRows
 from trajcli.kinematics.robot import Limits
 
 _KINDS: tuple[JudgedKind, ...] = ("position", "velocity", "acceleration", "jerk")
 
-DENSE = 0.0100001
-"""Seconds between rows that controllers take one by one: they run at 100 Hz or faster."""
 _UNRESOLVED, _UNRESOLVED_LAST = 0.2, 1.5
 """Of the jump of the highest derivative times powers of the length: how far a piece may go beyond a motion
 that changes its law once between two rows (0.143 and 1.5 at most)."""

@@ -282,7 +282,8 @@ def open_motion(
     own = rows.format != "npy" and is_own_language(rows.named.names)
     plain = Units() if rows.si or own else None
     types = None if joint_types is None else _by_file(joint_types, order, len(roles.joints["q"]))
-    scales = scales_of(rows.named, roles, said, plain=plain, joint_types=types, declared=declared)
+    other = None if rows.si else declared  # messages are in SI, whatever a job says
+    scales = scales_of(rows.named, roles, said, plain=plain, joint_types=types, declared=other)
     found = MotionFile(rows, roles, scales, order, ordered)
     found.notes += notes
     return found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import cast
 
 import numpy as np
@@ -88,14 +88,12 @@ class ColumnScales:
     Attributes:
         factors: SI per unit of each column of the file; of the time, what `per_second` says.
         per_second: Units of the column of time in a second.
-        named: Whether the column of time, or a column of joints, is in a unit that is not SI, by column.
         open: Indices of the columns of joints whose unit nothing says.
         notes: Sentences about units that were taken.
     """
 
     factors: Array
     per_second: float
-    named: tuple[bool, ...]
     open: tuple[int, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -124,27 +122,32 @@ def scales_of(
     """
     factors = np.ones(len(file.names))
     open_columns: list[int] = []
+    bare = False
     for quantity, columns in roles.joints.items():
         for joint, index in enumerate(columns):
             kind = None if joint_types is None or joint >= len(joint_types) else joint_types[joint]
             unit = _Unit(file, roles.names[index], quantity, kind)
             scale = unit.factor(said, plain, declared)
+            bare |= roles.names[index].unit is None and quantity != "tau"
             factors[index] = 1.0 if scale is None else scale
             open_columns += [index] if scale is None else []
     per_second = _per_second(file, roles, said)
     factors[roles.time] = 1 / per_second
-    named = tuple(bool(scale != 1.0) for scale in factors.tolist())
-    return ColumnScales(factors, per_second, named, tuple(open_columns), tuple(_notes(said, plain, declared)))
+    notes = tuple(_notes(said, plain, declared)) if bare else ()
+    return ColumnScales(factors, per_second, tuple(open_columns), notes)
 
 
-def _notes(said: SaidUnits, plain: Units | None, declared: Units | None) -> list[str]:
-    """Say which units count where two sources say different ones."""
-    if plain is None or (declared in (None, plain) and said.angle is None and said.length is None):
-        return []
+def _notes(said: SaidUnits, plain: Units | None, declared: Units | None) -> Iterator[str]:
+    """Say which units count for columns that name none, where somebody may think otherwise."""
+    text = "columns that name no unit are read in"
     if said.angle is not None or said.length is not None:
-        units = " and ".join(unit for unit in (said.angle, said.length) if unit)
-        return [f"columns that name no unit are read in {units}, as --units says"]
-    return ["columns that name no unit are read in rad and m: --units says otherwise where they are not"]
+        if plain is not None:
+            units = " and ".join(unit for unit in (said.angle, said.length) if unit)
+            yield f"{text} {units}, as --units says"
+    elif plain is None and declared is not None:
+        yield f"{text} {declared.angle} and {declared.length}, as the job or the robot says"
+    elif plain is not None and declared not in (None, plain):
+        yield f"{text} rad and m: --units says otherwise where they are not"
 
 
 @frozen

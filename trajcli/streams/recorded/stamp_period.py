@@ -26,7 +26,7 @@ _MANY = 4096  # corners, above which the hull of those is taken
 
 
 @comparable
-class Period:
+class StampGrid:
     """The grid of some time stamps.
 
     Attributes:
@@ -46,7 +46,7 @@ class Period:
         return np.asarray(self.start + np.arange(first, first + count) * self.period, dtype=np.float64)
 
 
-def fit_period(times: Array | Iterable[Array], rounding: float, relative: float = 0.0) -> Period | None:
+def fit_period(times: Array | Iterable[Array], rounding: float, relative: float = 0.0) -> StampGrid | None:
     """Return the grid on which all stamps lie within their rounding; None where they lie on none.
 
     Stamps that are doubled or go backward lie on none, nor do fewer than three, nor those whose rounding is
@@ -85,7 +85,7 @@ class PeriodFit:
             self._upper = self._upper[_corners(self._upper, 1.0)]
             self._lower = self._lower[_corners(self._lower, -1.0)]
 
-    def result(self, rounding: float, relative: float = 0.0) -> Period | None:
+    def result(self, rounding: float, relative: float = 0.0) -> StampGrid | None:
         """Return the grid of all stamps so far; None where there is none."""
         if not self._rising or self._count < _FEWEST:
             return None
@@ -102,7 +102,7 @@ class PeriodFit:
         deviation = max(high - start, start - low)
         if deviation > noise and period < 2 * _LEAST_RATIO * (allowed - noise):
             return None
-        return Period(start, period, deviation > noise, deviation)
+        return StampGrid(start, period, deviation > noise, deviation)
 
     def _rest(self, period: float) -> tuple[float, float]:
         """Return the least and the largest t - k h."""
