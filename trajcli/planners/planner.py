@@ -29,6 +29,7 @@ _REMARKS = (
     "within_tool_limits",
     "within_velocity_by_position",
     "local_optimum",
+    "bound",
 )  # kinds of events that concede nothing
 _GIVEN = ("duration", "velocity", "acceleration", "deceleration", "timed")  # where they say how long it lasts
 LITTLE = 1e-3
@@ -116,6 +117,7 @@ class Planned:
         phase_plane: Of a time-optimal law: the law s(t), and what limits it.
         braking: How a start outside the velocity or acceleration limits is brought inside first: by each
             joint, or by all on one line; None where it is not.
+        continuity: Derivatives that join inside it, where they are fewer than its planner promises.
     """
 
     curve: PiecewisePolynomial
@@ -138,6 +140,7 @@ class Planned:
     virtual_points: ViaPoints | None = None
     phase_plane: PhasePlane | None = None
     braking: Literal["each", "line"] | None = None
+    continuity: Literal[1, 2] | None = None
 
 
 class Planner(Model):
@@ -314,7 +317,8 @@ class PlannedMove:
 
     def span(self, start: float, end: float) -> Span:
         """Return the part of a trajectory, from `start` to `end` s, that is this move."""
-        return Span(self.index, self.planner.tag, start, end, self.planner.joins)
+        continuity = self.planned.continuity or self.planner.joins
+        return Span(self.index, self.planner.tag, start, end, continuity)
 
     def alone(self) -> Trajectory:
         """Return the trajectory of this move alone."""
