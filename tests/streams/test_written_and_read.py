@@ -43,9 +43,7 @@ def test_rows_are_those_of_the_curve(plan, name, digits, tolerance, tmp_path):
     at = np.minimum(motion.t, robot.duration)
     wanted = robot.curve.evaluate_orders(at, (0, 1, 2))
     inside = motion.t < robot.duration - 1e-8
-    inside &= (
-        np.abs(motion.t[:, None] - robot.curve.breaks).min(axis=1) > 1e-8
-    )  # where derivatives may step
+    inside &= np.abs(motion.t[:, None] - robot.curve.breaks).min(axis=1) > 1e-8  # where derivatives may step
     rounding = 1e-8 * (1 + np.abs(robot.curve.evaluate(at, 3)).max()) if name == "a.mcap" else tolerance
     np.testing.assert_allclose(motion.q, wanted[:, 0], rtol=1e-12, atol=rounding)
     np.testing.assert_allclose(motion.qd[inside], wanted[inside, 1], rtol=1e-12, atol=rounding)

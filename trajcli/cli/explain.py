@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from trajcli.cli.numbers import numbers
+from trajcli.cli.plan import peer_lines
 from trajcli.cli.polynomials import amount, blend_lines, knot_lines, law_lines, polynomial_lines
 from trajcli.cli.progress import progress
 from trajcli.errors import InputError
@@ -203,6 +204,7 @@ class ExplainOptions:
     move: int | None = None
     derivatives: bool = False
     sensitivity: bool = False
+    reference: bool = False
     as_json: bool = False
 
 
@@ -221,9 +223,14 @@ def run_explain(job: str, overrides: Sequence[str], options: ExplainOptions) -> 
     with progress():
         plan = plan_job(loaded)
         explained = explanation(
-            plan, move=options.move, derivatives=options.derivatives, sensitivity=options.sensitivity
+            plan,
+            move=options.move,
+            derivatives=options.derivatives,
+            sensitivity=options.sensitivity,
+            reference=options.reference,
         )
-    text = explained.model_dump_json(indent=2) if options.as_json else "\n".join(_lines(explained, count))
+    lines = _lines(explained, count, peers=options.reference)
+    text = explained.model_dump_json(indent=2) if options.as_json else "\n".join(lines)
     with standard_output() as out:
         out.write((text + "\n").encode())
     if not plan.verdict.passed:
@@ -233,7 +240,7 @@ def run_explain(job: str, overrides: Sequence[str], options: ExplainOptions) -> 
     return 0
 
 
-def _lines(explained: Explanation, count: int) -> Iterator[str]:
+def _lines(explained: Explanation, count: int, *, peers: bool) -> Iterator[str]:
     units = explained.units
     joints = ", ".join(f"q{i} = {name}" for i, name in enumerate(explained.joints, 1) if name != f"j{i}")
     alone = f"move {explained.moves[0].index} of " if len(explained.moves) < count else ""
@@ -260,6 +267,7 @@ def _lines(explained: Explanation, count: int) -> Iterator[str]:
         yield from _by_position(move)
         yield from _efforts(move)
         yield from _speed(move)
+        yield from peer_lines(move, "  ") if peers else ()
         yield from (f"  {event.kind}: {event.message}" for event in noted if event.move == move.index)
     if explained.savings is not None and len(explained.moves) > 1:
         yield ""

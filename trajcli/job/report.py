@@ -215,6 +215,17 @@ class SavingReport(ReportPart):
     reason: Annotated[str | None, Field(description="Why none is known.")] = None
 
 
+class PeerViolation(ReportPart):
+    """A limit that the motion of a peer breaks, judged for all t as a motion of our own."""
+
+    joint: str
+    quantity: JointQuantity
+    value: Annotated[float, MeasuredIn(), Field(description="SI.")]
+    limit: Annotated[float, MeasuredIn(), Field(description="SI.")]
+    unit: UnitName
+    time: Annotated[float, Field(description="Seconds from the start of the motion.")]
+
+
 class ReferenceReport(ReportPart):
     """The shortest duration that any point-to-point move may have under the same limits, from ruckig."""
 
@@ -224,6 +235,10 @@ class ReferenceReport(ReportPart):
     ]
     joint: Annotated[str | None, Field(description="The joint that needs it, or for which there is none.")]
     reason: Annotated[str | None, Field(description="Why there is no bound.")] = None
+    violations: Annotated[
+        list[PeerViolation],
+        Field(description="Of ruckig's motions, each joint by itself; it does not know limits of position."),
+    ] = []
 
 
 class LimitUseReport(ReportPart):
@@ -243,6 +258,17 @@ class PathReferenceReport(ReportPart):
     ratio: Annotated[float | None, Field(description="Duration of the move over it.")]
     use: Annotated[LimitUseReport | None, Field(description="What toppra uses; above 1 it is too fast.")]
     own_use: Annotated[LimitUseReport | None, Field(description="What the move uses.")]
+    violations: Annotated[
+        list[PeerViolation],
+        Field(description="Of toppra's motion; the limits of jerk are not toppra's, and are not judged."),
+    ] = []
+    deviation: Annotated[
+        float,
+        Field(
+            description="By how much toppra's path misses that of the move, of all joints together; 0 where "
+            "it is the same polynomial."
+        ),
+    ] = 0.0
     reason: Annotated[str | None, Field(description="Why there is none.")] = None
 
 
@@ -386,7 +412,10 @@ class MoveReport(ReportPart):
     reference: ReferenceReport | None = None
     path_reference: Annotated[
         PathReferenceReport | None,
-        Field(description="Asked for by `--reference`; null where a move is not time-optimal."),
+        Field(
+            description="Asked for by `--reference`; null for a move from state to state. `explain` has that "
+            "of time-optimal moves always."
+        ),
     ] = None
 
 
