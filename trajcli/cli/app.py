@@ -242,7 +242,7 @@ def explain(
     return run_explain(job, override, ExplainOptions(move, derivatives, sensitivity, reference, as_json))
 
 
-@app.command(epilog="Example: trajcli check goal.yaml --robot ur5e --limits limits.yaml")
+@app.command(epilog="Example: trajcli check rows.csv --job examples/ur5e_pick.yaml")
 @guarded
 def check(
     file: Annotated[
