@@ -20,7 +20,7 @@ import numpy as np
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, derivative_coefficients, horner
 from trajcli.curves.time_optimal.constraints import ConstraintRows
 from trajcli.curves.time_optimal.time_law import LawPieces
-from trajcli.dynamics.newton_euler import InverseDynamics
+from trajcli.dynamics.newton_euler import InverseDynamics, direction
 from trajcli.frozen import frozen
 
 _MOST = 1e3  # excess that is told: limits lowered by more would be rounding
@@ -133,7 +133,7 @@ class EffortConstraint:
         times = np.array(_SAMPLES)[:, None, None] * law.durations[:, None]
         position, rate, change = (horner(derivative_coefficients(q, order), times) for order in range(3))
         moving, held = self.dynamics.apart_from_gravity(position, rate, change)
-        moving, held = moving + self._viscous * rate, held + self._coulomb * np.sign(rate)
+        moving, held = moving + self._viscous * rate, held + self._coulomb * direction(rate)
         upper, lower = self._bounded
         rooms = np.concatenate(
             [self.limits[upper, 1] - held[..., upper], held[..., lower] - self.limits[lower, 0]], -1
