@@ -20,12 +20,13 @@ import numpy as np
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, derivative_coefficients, horner
 from trajcli.curves.time_optimal.constraints import ConstraintRows
 from trajcli.curves.time_optimal.time_law import LawPieces
-from trajcli.dynamics.newton_euler import InverseDynamics
+from trajcli.dynamics.newton_euler import InverseDynamics, direction
 from trajcli.frozen import frozen
 
 _MOST = 1e3  # excess that is told: limits lowered by more would be rounding
 _SAMPLES = (0.2, 0.5, 0.8)  # of an interval: at its ends the rows hold
 _SHARE = 0.5  # of what gravity leaves: what the tangent may take of it at rest
+_SAME = 1e-12  # of the largest: states on both sides of a break that differ by less are one
 _SLOWEST = 1e-3  # of the largest speed at which a tangent is taken
 
 
@@ -58,7 +59,8 @@ class _PathDynamics:
         index = np.clip(np.searchsorted(self._s, s), 0, max(self._s.size - 1, 0))
         new = np.ones(s.size, dtype=bool)
         if self._s.size:
-            new = ~((self._s[index] == s) & (self._states[index] == states).all(axis=1))
+            apart = np.abs(self._states[index] - states) <= _SAME * np.abs(states).max(axis=0)
+            new = ~((self._s[index] == s) & apart.all(axis=1))
         values = np.empty_like(states)
         values[~new] = self._values[index[~new]]
         if new.any():
@@ -81,7 +83,7 @@ class EffortConstraint:
             known. It says where viscous friction is not overestimated.
     """
 
-    allows_ramps: ClassVar[bool] = False
+    estimate: ClassVar[float] = 0.3  # rows of efforts turn with the whole arm
 
     dynamics: InverseDynamics
     path: PiecewisePolynomial
@@ -131,7 +133,7 @@ class EffortConstraint:
         times = np.array(_SAMPLES)[:, None, None] * law.durations[:, None]
         position, rate, change = (horner(derivative_coefficients(q, order), times) for order in range(3))
         moving, held = self.dynamics.apart_from_gravity(position, rate, change)
-        moving, held = moving + self._viscous * rate, held + self._coulomb * np.sign(rate)
+        moving, held = moving + self._viscous * rate, held + self._coulomb * direction(rate)
         upper, lower = self._bounded
         rooms = np.concatenate(
             [self.limits[upper, 1] - held[..., upper], held[..., lower] - self.limits[lower, 0]], -1
