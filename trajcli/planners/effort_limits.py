@@ -115,11 +115,10 @@ def _proven(trajectory: PiecewisePolynomial, robot: Robot) -> tuple[float, float
     limits = robot.limits.effort
     survey = effort_survey(InverseDynamics(robot), trajectory.breaks, trajectory.coefficients, limits)
     factor, over = 1.0, 0.0
-    for joint, (low, high) in enumerate(limits.tolist()):
-        for sign, limit in ((1, high), (-1, -low)):
-            if np.isfinite(limit):
-                factor = max(factor, needed_stretch(survey, joint, sign, limit, _ROOM).factor)
-                over = max(over, survey.peak(joint, sign).most / limit - 1.0)
+    for joint, sign, limit in survey.doubtful(limits, _ROOM):
+        needed = needed_stretch(survey, joint, sign, limit, _ROOM).factor
+        if needed > 1.0:
+            factor, over = max(factor, needed), max(over, survey.peak(joint, sign).most / limit - 1.0)
     return factor, over
 
 

@@ -135,7 +135,7 @@ class ToolConstraint:
         limits: Of its speed and acceleration, linear and angular.
     """
 
-    allows_ramps: ClassVar[bool] = True  # its excess sees what they do
+    estimate: ClassVar[float] = 1.0
 
     path: ToolPath
     limits: ToolLimits
