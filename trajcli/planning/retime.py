@@ -218,7 +218,9 @@ def require_holdable(move: PlannedMove) -> None:
     )
     hint = "no duration helps: carry less, go another way, or raise the limit"
     value = copysign(peak.static, limit)
-    raise PlanningError(Problem(message, hint, joint=name, time=peak.time, value=value, amounts=amounts))
+    raise PlanningError(
+        Problem(message, hint, joint=name, time=peak.time, value=value, limit=limit, amounts=amounts)
+    )
 
 
 def align_to_period(move: PlannedMove, rate: float) -> PlannedMove:
