@@ -18,7 +18,7 @@ OTHER_NAMES = {
     "check": "plan JOB --no-output",
     "run": "plan",
     "simulate": "plan",
-    "convert": "pose",
+    "transform": "pose",
     "forward": "fk",
     "inverse": "ik",
     "kinematics": "jacobian",
