@@ -227,16 +227,22 @@ def explain(
             "--sensitivity", help="What each limit that is 10 % higher would save: plans the moves anew."
         ),
     ] = False,
+    reference: Annotated[
+        bool,
+        typer.Option(
+            "--reference", help="Compare each move along a path with toppra, and judge what peers return."
+        ),
+    ] = False,
     as_json: Json = False,
     errors: Errors = "text",
 ) -> int:
     """Say each move in words and formulas: polynomials, phases, peaks, branches, and how fast it could be."""
     from trajcli.cli.explain import ExplainOptions, run_explain
 
-    return run_explain(job, override, ExplainOptions(move, derivatives, sensitivity, as_json))
+    return run_explain(job, override, ExplainOptions(move, derivatives, sensitivity, reference, as_json))
 
 
-@app.command(epilog="Example: trajcli check goal.yaml --robot ur5e --limits limits.yaml")
+@app.command(epilog="Example: trajcli check rows.csv --job examples/ur5e_pick.yaml")
 @guarded
 def check(
     file: Annotated[
@@ -313,6 +319,12 @@ def check(
         Literal["table", "json", "junit", "sarif", "github"],
         typer.Option("--format", help="Of what is printed."),
     ] = "table",
+    reference: Annotated[
+        bool,
+        typer.Option(
+            "--reference", help="Compare with ruckig between its ends, and with toppra along its points."
+        ),
+    ] = False,
     strict: Annotated[
         bool, typer.Option("--strict", help="Exit 1 also within rounding, and when there are events.")
     ] = False,
@@ -334,7 +346,7 @@ def check(
         profile=profile,
         start_tolerance=start_tolerance,
     )
-    return run_check(file, options, form, strict=strict)
+    return run_check(file, options, form, strict=strict, reference=reference)
 
 
 register_file_commands(app)

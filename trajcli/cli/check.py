@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Literal
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Literal
 
 from trajcli.cli.numbers import number, table_lines
 from trajcli.cli.outcome import print_json, print_lines, print_remark
 from trajcli.errors import Amount, at_least
 from trajcli.judge.file import CheckedFile, CheckOptions, check_file
 from trajcli.judge.finding import JudgedFinding, Judgement
-from trajcli.units import amount_text
+from trajcli.units import Units, amount_text
 
 if TYPE_CHECKING:
     from trajcli.output.annotations import Annotation
+    from trajcli.output.motion_reference import MotionReference
 
 Form = Literal["table", "json", "junit", "sarif", "github"]
 _MOST, _FEW = 30, 4  # findings that a table lists: of those that are certain, and of each other group
@@ -28,19 +30,34 @@ _JOINED = {
 }
 
 
-def run_check(source: str, options: CheckOptions, form: Form, *, strict: bool) -> int:
+def run_check(
+    source: str, options: CheckOptions, form: Form, *, strict: bool, reference: bool = False
+) -> int:
     """Judge a file and print what was found; return 0 when nothing is certainly wrong, else 1.
+
+    Args:
+        source: The file.
+        options: What it is judged by.
+        form: Of what is printed.
+        strict: Whether what rounding explains, and events, count as wrong.
+        reference: Whether the motion is compared with peers.
 
     Raises:
         InputError: When the file is no trajectory, or options do not fit.
         FileError: When a file cannot be read.
     """
     checked = check_file(source, options)
+    beside = None
+    if reference:
+        from trajcli.output.motion_reference import compared
+
+        judgement, beside = compared(checked)
+        checked = replace(checked, judgement=judgement)
     judgement = checked.judgement
     if form == "json":
-        print_json(judgement.as_json())
+        print_json(judgement.as_json() | ({} if beside is None else {"reference": _view(beside)}))
     elif form == "table":
-        print_lines(_lines(checked))
+        print_lines([*_lines(checked), *([] if beside is None else _beside(beside, checked.units))])
     else:
         from trajcli.output.annotations import render_annotations
 
@@ -66,10 +83,43 @@ def _lines(checked: CheckedFile) -> Iterator[str]:
         more = len(judgement.findings) - len(listed)
         if more > 0:
             yield f"  and {more} more: --format json has all of them"
-    said = (finding.text(_say(checked)) for finding in judgement.findings if finding.value is None)
+    said = [finding.text(_say(checked)) for finding in judgement.findings if finding.value is None]
+    ruled = [found for found in judgement.findings if found.rule not in _RULES and found.value is not None]
+    said += [f"{found.rule}: {found.text(_say(checked))}" for found in ruled[:_MOST]]
     hints = (finding.hint for finding in judgement.findings if finding.hint is not None)
     for text in dict.fromkeys([*said, *hints, *_stretch(judgement), *judgement.notes]):
         yield f"  {text}"
+
+
+def _view(beside: MotionReference) -> dict[str, Any]:
+    """Return the comparison with peers as JSON has it, in SI."""
+    path = beside.path_reference
+    return {
+        "duration": beside.duration,
+        "ruckig": beside.reference.model_dump(),
+        "toppra": None if path is None else path.model_dump(exclude={"own_use"}),
+    }
+
+
+def _beside(beside: MotionReference, units: Units) -> Iterator[str]:
+    """Yield how a motion compares with peers."""
+    from trajcli.cli.plan import violation_lines
+    from trajcli.job.report import in_units
+
+    reference, path = in_units(beside.reference, units), beside.path_reference
+    if reference.duration is None:
+        yield f"  no bound for the duration: {reference.joint}, {reference.reason}"
+    elif reference.ratio is not None:
+        fastest = f"the fastest between its ends ({reference.duration:.6g} s, {reference.joint}, ruckig)"
+        yield f"  {beside.duration:.6g} s, {reference.ratio:.4g} x {fastest}"
+    yield from violation_lines("ruckig", reference.violations, "  ")
+    if path is not None:
+        path = in_units(path, units)
+        if path.duration is None or path.ratio is None:
+            yield f"  {path.reason or 'nothing to move'}"
+            return
+        yield f"  {path.ratio:.4g} x toppra along the same path ({path.duration:.6g} s)"
+        yield from violation_lines("toppra", path.violations, "  ")
 
 
 def _listed(findings: Sequence[JudgedFinding]) -> Iterator[JudgedFinding]:

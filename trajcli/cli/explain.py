@@ -6,12 +6,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from trajcli.cli.numbers import numbers
+from trajcli.cli.plan import peer_lines
 from trajcli.cli.polynomials import amount, blend_lines, knot_lines, law_lines, polynomial_lines
 from trajcli.cli.progress import progress
 from trajcli.errors import InputError
 from trajcli.frozen import comparable
 from trajcli.job.read import load_job
 from trajcli.output.explain import explanation
+from trajcli.planners import HANDLING
 from trajcli.planning.plan import plan_job
 from trajcli.streams.whole_file import standard_output
 
@@ -202,6 +204,7 @@ class ExplainOptions:
     move: int | None = None
     derivatives: bool = False
     sensitivity: bool = False
+    reference: bool = False
     as_json: bool = False
 
 
@@ -220,9 +223,14 @@ def run_explain(job: str, overrides: Sequence[str], options: ExplainOptions) -> 
     with progress():
         plan = plan_job(loaded)
         explained = explanation(
-            plan, move=options.move, derivatives=options.derivatives, sensitivity=options.sensitivity
+            plan,
+            move=options.move,
+            derivatives=options.derivatives,
+            sensitivity=options.sensitivity,
+            reference=options.reference,
         )
-    text = explained.model_dump_json(indent=2) if options.as_json else "\n".join(_lines(explained, count))
+    lines = _lines(explained, count, peers=options.reference)
+    text = explained.model_dump_json(indent=2) if options.as_json else "\n".join(lines)
     with standard_output() as out:
         out.write((text + "\n").encode())
     if not plan.verdict.passed:
@@ -232,7 +240,7 @@ def run_explain(job: str, overrides: Sequence[str], options: ExplainOptions) -> 
     return 0
 
 
-def _lines(explained: Explanation, count: int) -> Iterator[str]:
+def _lines(explained: Explanation, count: int, *, peers: bool) -> Iterator[str]:
     units = explained.units
     joints = ", ".join(f"q{i} = {name}" for i, name in enumerate(explained.joints, 1) if name != f"j{i}")
     alone = f"move {explained.moves[0].index} of " if len(explained.moves) < count else ""
@@ -245,6 +253,9 @@ def _lines(explained: Explanation, count: int) -> Iterator[str]:
     for move in explained.moves:
         yield ""
         yield f"move {move.index}: {move.planner}, {move.duration:.10g} s, from t = {move.start:.10g} s"
+        yield from _carried(move)
+        if move.planner in HANDLING:
+            continue
         yield from pose_lines(move)
         yield from waypoint_lines(move)
         yield from tool_lines(move)
@@ -254,7 +265,9 @@ def _lines(explained: Explanation, count: int) -> Iterator[str]:
         yield from _phases(move)
         yield from _peaks(move)
         yield from _by_position(move)
+        yield from _efforts(move)
         yield from _speed(move)
+        yield from peer_lines(move, "  ") if peers else ()
         yield from (f"  {event.kind}: {event.message}" for event in noted if event.move == move.index)
     if explained.savings is not None and len(explained.moves) > 1:
         yield ""
@@ -262,6 +275,10 @@ def _lines(explained: Explanation, count: int) -> Iterator[str]:
         yield from _savings(explained.savings, "  ")
     general = [event for event in noted if event.move is None]
     yield from (f"{event.kind}: {event.message}" for event in general)
+    efforts = explained.efforts
+    if efforts is not None and efforts.inertials is not None:
+        how = "judged for all t" if efforts.judged else f"not judged, {efforts.reason}"
+        yield f"efforts: {how}; masses and inertias from {efforts.inertials}"
 
 
 def _phases(move: ExplainedMove) -> Iterator[str]:
@@ -309,6 +326,31 @@ def _by_position(move: ExplainedMove) -> Iterator[str]:
                 f"    {use.joint} qd by position: {velocity} {use.unit} ({when}), {where}; limit {limit}, "
                 f"{100 * use.used:.4g} % used"
             )
+
+
+def _carried(move: ExplainedMove) -> Iterator[str]:
+    payload = move.payload
+    if payload is None:
+        return
+    point = "" if any(payload.inertia) else ", a point mass"
+    where = f"{_point(payload.com)} {payload.com_unit} of the tcp"
+    yield f"  carries {payload.mass:.9g} kg at {where}{point}"
+
+
+def _efforts(move: ExplainedMove) -> Iterator[str]:
+    """Yield the extremes of the efforts, what of the limits is left, and what gravity takes of it."""
+    for effort in move.efforts or ():
+        ends = ((effort.low, effort.low_time), (effort.high, effort.high_time))
+        extent = " .. ".join(
+            f"{end:.6g} (t = {round(time - move.start, _TIME_DECIMALS):.6g})" for end, time in ends
+        )
+        limits = "no limit"
+        if effort.used is not None:
+            low, high = ("unlimited" if bound is None else f"{bound:.9g}" for bound in effort.limit)
+            left = f"{effort.head_room or 0.0:.6g} {effort.unit} left"
+            limits = f"limits {low} .. {high}, {100 * effort.used:.4g} % used, {left}"
+        gravity = f"{effort.gravity:.6g} {effort.unit} of it against gravity"
+        yield f"    {effort.joint} tau: {extent} {effort.unit}; {limits}, {gravity}"
 
 
 def _extent(peak: PeakReport, start: float, nothing: float) -> str:

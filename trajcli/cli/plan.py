@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from trajcli.checks.tool_bound import ToolPeak
     from trajcli.consumers.judgement import ProfileJudgement
     from trajcli.consumers.profile import Profile
-    from trajcli.job.report import MoveReport, PathReferenceReport, ReferenceReport
+    from trajcli.job.report import MoveReport, PathReferenceReport, PeerViolation, ReferenceReport
     from trajcli.output.recording import LogOptions
 
 _STILL = 1e-9  # rad/s or m/s, below which a joint only rounds
@@ -84,6 +84,8 @@ def plan_and_write(job: str, overrides: Sequence[str], options: PlanOptions) -> 
             plan = plan_job(loaded)
         grid = grid_of(plan)
         refusal, judged = _refusal(plan, options), None
+        if refusal is None and options.reference:
+            refusal = _contradicted(plan)
         if refusal is None and profile is not None:
             judged, refusal = _judged(plan, grid, profile, form, options)
         if refusal is None and not options.no_output:
@@ -108,6 +110,28 @@ def _profile(options: PlanOptions) -> Profile | None:
     from trajcli.consumers.judgement import load_profile
 
     return load_profile(options.consumer)
+
+
+def _contradicted(plan: Plan) -> VerificationError | None:
+    """Return the error of moves that are faster than any motion within their limits can be."""
+    from trajcli.output.references import contradictions_of, reference_of
+
+    found = contradictions_of(plan.trajectory.spans, [reference_of(move) for move in plan.moves])
+    problems = [
+        Problem(
+            f"move {one.move}: {one.message}",
+            one.hint,
+            place=plan.loaded.place_of_move(one.move or 0),
+            move=one.move,
+            joint=one.joint,
+            time=one.time,
+            value=one.value,
+            limit=one.limit,
+            kind="reference",
+        )
+        for one in found
+    ]
+    return VerificationError(*problems) if problems else None
 
 
 def _judged(
@@ -206,20 +230,43 @@ def _write_resolved(loaded: LoadedJob, path: str) -> None:
 def _report(plan: Plan, options: PlanOptions, judged: ProfileJudgement | None) -> None:
     from trajcli.output.report import report_of
 
-    report = report_of(plan, reference=options.reference)
+    report = report_of(plan, peers=options.reference)
     if judged is not None:
         from trajcli.output.consumer import consumer_report
 
         report = report.model_copy(update={"consumer": consumer_report(plan, judged)})
     if options.report is not None:
         write_text(report.model_dump_json(indent=2) + "\n", options.report)
+    from trajcli.job.report import in_units
+
     compared = options.reference and plan.verdict.passed and not options.quiet
     for move in report.moves if compared else []:
         if move.reference is not None:
             text = _compared(move, move.reference)
             print(f"move {move.index} ({move.planner}): {text}", file=sys.stderr)  # noqa: T201
-        if move.path_reference is not None:
-            print(f"  {_beside_toppra(move, move.path_reference)}", file=sys.stderr)  # noqa: T201
+        for line in peer_lines(in_units(move, plan.loaded.units), "  "):
+            print(line, file=sys.stderr)  # noqa: T201
+
+
+def peer_lines(move: MoveReport, indent: str) -> Iterator[str]:
+    """Yield how a move compares with toppra along its path, and which limits the peers break."""
+    if move.path_reference is not None:
+        yield f"{indent}{_beside_toppra(move, move.path_reference)}"
+        yield from violation_lines("toppra", move.path_reference.violations, indent)
+    if move.reference is not None:
+        yield from violation_lines("ruckig", move.reference.violations, indent)
+
+
+def violation_lines(peer: str, violations: Sequence[PeerViolation], indent: str) -> Iterator[str]:
+    """Yield the worst limit that a peer breaks, and how many more."""
+    if not violations:
+        return
+    worst = max(
+        violations, key=lambda one: (one.quantity == "position", abs(one.value) / (abs(one.limit) or 1))
+    )
+    more = f", and {len(violations) - 1} more" if len(violations) > 1 else ""
+    reached = f"{worst.value:.9g} {worst.unit}, its limit is {worst.limit:.9g}"
+    yield f"{indent}{peer} breaks a limit: the {worst.quantity} of {worst.joint} reaches {reached}{more}"
 
 
 def _compared(move: MoveReport, bound: ReferenceReport) -> str:
@@ -254,7 +301,7 @@ def _summarise(plan: Plan, rows: int, *, geometry_missing: bool) -> None:
 
 def summary(plan: Plan, rows: int) -> str:
     """Return the verdict in a few lines: extent, tightest limit, what was not checked, concessions."""
-    count = len(plan.moves)
+    count = sum(not move.planner.handles for move in plan.moves)
     head = f"{plan.loaded.name}: verified, {count} move{'s' * (count != 1)}, {plan.trajectory.duration:.6g} s"
     lines = [head + (f", {rows} row{'s' * (rows != 1)}" if rows else "")]
     tightest = _tightest(plan)
@@ -291,7 +338,7 @@ def _tightest(plan: Plan) -> str:
     best, text = 0.0, ""
     verdict = plan.verdict
     of_moves = zip(plan.moves, verdict.peaks, verdict.tool_peaks, verdict.by_position, strict=True)
-    for move, extremes, of_tool, by_position in of_moves:
+    for index, (move, extremes, of_tool, by_position) in enumerate(of_moves):
         for order in (1, 2, 3):
             bounds = move.robot.limits.of_order(order)
             used = np.maximum(extremes[order].low / bounds[:, 0], extremes[order].high / bounds[:, 1])
@@ -304,10 +351,23 @@ def _tightest(plan: Plan) -> str:
             if use.used > best * (1 + 1e-9):
                 best, name = use.used, move.robot.joint_names[use.component]
                 text = f"velocity by position of {name} in move {move.index}, {100 * best:.4g} % used"
+        effort, name = _effort(plan, index)
+        if effort > best * (1 + 1e-6):
+            best, text = effort, f"effort of {name} in move {move.index}, {100 * effort:.4g} % used"
         speed, name = _tool_speed(move) if of_tool is None else _tool_in_joint_space(move, of_tool)
         if speed > best * (1 + 1e-6):
             best, text = speed, f"{name} of the tool in move {move.index}, {100 * speed:.4g} % used"
     return text
+
+
+def _effort(plan: Plan, index: int) -> tuple[float, str]:
+    """Return the largest part of a limit of effort that a move uses, and the joint."""
+    if plan.verdict.efforts[index] is None:
+        return 0.0, ""
+    from trajcli.output.efforts import most_used
+
+    report = most_used(plan, index)
+    return (0.0, "") if report is None else (report.used or 0.0, report.joint)
 
 
 def _tool_speed(move: PlannedMove) -> tuple[float, str]:

@@ -10,7 +10,13 @@ from trajcli.consumers.breach import RuleBreach, RuleCheck, Surroundings
 from trajcli.consumers.differences import Differences, EffortRate, RoundingNoise, VelocityTowardsEnds
 from trajcli.consumers.executed import IntegerRange, QuantisedCurve, VelocitySteps
 from trajcli.consumers.profile import Profile, profile_names, read_profile
-from trajcli.consumers.stamps import FirstPoint, IncreasingTimes, LongestTime, Period, SegmentDurations
+from trajcli.consumers.stamps import (
+    ControllerPeriod,
+    FirstPoint,
+    IncreasingTimes,
+    LongestTime,
+    SegmentDurations,
+)
 from trajcli.consumers.states import (
     AtRest,
     CompletePoints,
@@ -41,7 +47,7 @@ CHECKS: Mapping[str, type[RuleCheck]] = {
     "joint_names": JointNames,
     "last_velocity": LastVelocity,
     "longest_time": LongestTime,
-    "period": Period,
+    "period": ControllerPeriod,
     "position_range": PositionRange,
     "quantised_curve": QuantisedCurve,
     "segment_durations": SegmentDurations,

@@ -11,7 +11,7 @@ from trajcli.consumers.breach import RuleCheck, when
 from trajcli.curves.piecewise import Array
 from trajcli.streams.recorded_motion import RecordedMotion
 
-__all__ = ["FirstPoint", "IncreasingTimes", "LongestTime", "Period", "SegmentDurations"]
+__all__ = ["ControllerPeriod", "FirstPoint", "IncreasingTimes", "LongestTime", "SegmentDurations"]
 
 _UNITS = 4.0  # in the last place: two stamps are rounded, and their difference
 _NEXT = 1e-9  # s: a clock of a controller counts whole nanoseconds
@@ -63,7 +63,7 @@ class IncreasingTimes(_Intervals):
         self._note(rows, steps <= 0, -steps, first, fields)
 
 
-class Period(_Intervals):
+class ControllerPeriod(_Intervals):
     """Rows that are `period` seconds apart."""
 
     parameters: ClassVar[Mapping[str, Any]] = {"period": None}

@@ -43,7 +43,12 @@ if TYPE_CHECKING:
 
 
 def explanation(
-    plan: Plan, *, move: int | None = None, derivatives: bool = False, sensitivity: bool = False
+    plan: Plan,
+    *,
+    move: int | None = None,
+    derivatives: bool = False,
+    sensitivity: bool = False,
+    reference: bool = False,
 ) -> Explanation:
     """Return what `trajcli explain` has to say, in the units of the job.
 
@@ -52,10 +57,11 @@ def explanation(
         move: Index of the one move that is explained, with what is said of the job as a whole; None for all.
         derivatives: Whether polynomials come with those of velocity and acceleration.
         sensitivity: Whether moves are planned with higher limits, to say what these would save.
+        reference: Whether all moves along a path are compared with toppra, not only time-optimal ones.
     """
     units = plan.loaded.units
     wanted = range(len(plan.moves)) if move is None else [move]
-    report = report_of(plan, reference=True)
+    report = report_of(plan, reference=True, peers=reference)
     report = in_units(with_savings(report, plan, wanted) if sensitivity else report, units)
     moves = tuple(_move(plan, index, report.moves[index], derivatives=derivatives) for index in wanted)
     said = {

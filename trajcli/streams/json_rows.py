@@ -15,11 +15,10 @@ from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.number_cells import decimals_of
 from trajcli.streams.recorded.column_names import read_name
 from trajcli.streams.recorded.column_roles import NamedFile
-from trajcli.streams.row_sources import EXACT
+from trajcli.streams.row_sources import EXACT, FULL_DECIMALS
 
 _BLOCK = 4096  # rows gathered at a time
 _LONGEST = 1 << 24  # bytes of a line
-_FULL = 13  # decimals: a writer that shows as many rounds nothing
 _SHOWN = 200  # characters of a line in a message
 
 
@@ -71,7 +70,7 @@ class JsonRows:
             yield self._block(rows, taken)
 
     def _block(self, rows: list[list[float]], taken: Sequence[int]) -> Array:
-        if self._decimals.max(initial=0) < _FULL:
+        if self._decimals.max(initial=0) < FULL_DECIMALS:
             columns = zip(*rows, strict=True)
             most = [max(decimals_of(repr(value).encode()) for value in column) for column in columns]
             self._decimals = np.maximum(self._decimals, most)
@@ -80,7 +79,7 @@ class JsonRows:
     def decimals(self, taken: Sequence[int]) -> NDArray[np.int64]:
         """Return the decimals that columns show; exact where one of the file shows all its digits."""
         found = self._decimals[list(taken)]
-        return found if self._decimals.max(initial=0) < _FULL else np.full_like(found, EXACT)
+        return found if self._decimals.max(initial=0) < FULL_DECIMALS else np.full_like(found, EXACT)
 
     def _row(self, line: bytes, number: int) -> list[float]:
         """Return the numbers of an object, in the order of the columns."""

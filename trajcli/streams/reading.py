@@ -7,23 +7,19 @@ from pathlib import Path
 
 import numpy as np
 
-from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.streams.byte_source import ByteSource
-from trajcli.streams.recorded.column_roles import NamedFile
-from trajcli.streams.row_sources import EXACT, ArrayRows, RowSource, TextRows, unplaced
+from trajcli.streams.row_sources import EXACT, ArrayRows, RowSource, TextRows, in_columns
 from trajcli.streams.table import Table
 from trajcli.streams.whole_file import is_special
 
 _ALL_DECIMALS = 17  # of a float64
-_NANOSECONDS = 9  # decimals of a stamp in whole nanoseconds
 ENDINGS_OF_ROWS = (".csv", ".txt", ".jsonl", ".mcap", ".npy")
 _YAML = (".yaml", ".yml")
 _HEAD = 1 << 16  # bytes of a file that are looked at
 _JOINT_NAMES = re.compile(rb"^[ \t{-]*[\"']?joint_names[\"']?[ \t]*:", re.MULTILINE)
 _MCAP = b"\x89MCAP0\r\n"
 _NPY = b"\x93NUMPY"
-_QUANTITIES = ("q", "qd", "qdd", "tau")
 
 
 def read_table(path: str | Path, topic: str | None = None) -> Table:
@@ -69,7 +65,9 @@ def open_rows_of(
         option = "--topic" if topic is not None else "--field"
         raise InputError(f"{option} is about MCAP, and {source.file} is none", hint=f"leave {option} out")
     if kind == "mcap":
-        return _logged(source, topic, field)
+        from trajcli.streams.logged_rows import LoggedRows
+
+        return LoggedRows(source, topic, field)
     if kind == "ros":
         return _message(source)
     if kind == "jsonl":
@@ -137,34 +135,12 @@ def _begins_as_mcap(path: str | Path) -> bool:
         return False
 
 
-def _logged(source: ByteSource, topic: str | None, field: str | None) -> ArrayRows:
-    """Return the motion in a log."""
-    from trajcli.streams.mcap.read import read_log
-
-    with source.open() as stream:
-        motion = read_log(stream, source.file, topic, field)
-    states = (motion.position, motion.velocity, motion.acceleration, motion.effort)
-    named, columns = _columns(source.file, motion.times, states)
-    written = np.full(len(named.names), EXACT, dtype=np.int64)
-    written[0] = _NANOSECONDS
-    return ArrayRows("mcap", named, columns, written, np.zeros(len(written)), motion.joint_names, si=True)
-
-
 def _message(source: ByteSource) -> ArrayRows:
     """Return the motion in a message."""
     from trajcli.streams.ros_messages import read_ros_yaml
 
     message = read_ros_yaml(source)
     states = (message.position, message.velocity, message.acceleration, message.effort)
-    named, columns = _columns(source.file, message.times, states)
+    named, columns = in_columns(source.file, message.times, states)
     relative = np.zeros(len(named.names))
     return ArrayRows("ros", named, columns, message.decimals, relative, message.joint_names, si=True)
-
-
-def _columns(file: str, times: Array, states: tuple[Array, ...]) -> tuple[NamedFile, Array]:
-    """Return a motion under the names of a CSV file in SI, and its rows."""
-    names, parts = ["t"], [times[:, None]]
-    for kind, values in zip(_QUANTITIES, states, strict=True):
-        names += [f"{kind}{joint + 1}" for joint in range(values.shape[1])]
-        parts.append(values)
-    return NamedFile(file, tuple(names), unplaced), np.concatenate(parts, axis=1)

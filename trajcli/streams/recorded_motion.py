@@ -23,7 +23,7 @@ from trajcli.streams.recorded.column_units import (
     scales_of,
 )
 from trajcli.streams.recorded.stamp_period import PeriodFit
-from trajcli.streams.row_sources import EXACT, RowSource
+from trajcli.streams.row_sources import EXACT, FULL_DECIMALS, RowSource
 from trajcli.units import Units
 
 Names = tuple[str, ...] | None
@@ -249,6 +249,8 @@ class MotionFile:
         found = self._joints.get(quantity)
         if found is None:
             return np.zeros(len(self._joints["q"]))
+        if decimals[found].max() >= FULL_DECIMALS:
+            return np.zeros(len(found))
         values, written = half[found], decimals[found] > 0
         bare = ~written & (everywhere.largest[found] == 0.0)  # zeros without a point: as the others
         values[bare] = values[written].max(initial=0.0)

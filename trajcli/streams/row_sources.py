@@ -20,6 +20,11 @@ from trajcli.streams.text_rows import RowReader
 EXACT = -1
 """Decimals of a column whose numbers were not rounded to decimals."""
 
+FULL_DECIMALS = 13
+"""Decimals from which on a writer shows all digits of a float64, and rounds nothing."""
+
+_QUANTITIES = ("q", "qd", "qdd", "tau")  # of messages
+
 
 class RowSource(Protocol):
     """Rows of a file whose columns have names.
@@ -130,3 +135,18 @@ def unplaced(name: str | None = None) -> Place | None:
     """Return the place of a name in a file without a line of names: none."""
     del name
     return None
+
+
+def in_columns(file: str, times: Array, states: Sequence[Array]) -> tuple[NamedFile, Array]:
+    """Return a motion under the names of a CSV file in SI, and its rows (N, m).
+
+    Args:
+        file: Name of the file.
+        times: Shape (N,).
+        states: Positions, velocities, accelerations and efforts, each (N, n), or (N, 0) where there are none.
+    """
+    names, parts = ["t"], [times[:, None]]
+    for kind, values in zip(_QUANTITIES, states, strict=True):
+        names += [f"{kind}{joint + 1}" for joint in range(values.shape[1])]
+        parts.append(values)
+    return NamedFile(file, tuple(names), unplaced), np.concatenate(parts, axis=1)

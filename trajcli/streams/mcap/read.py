@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import FileError, InputError
@@ -29,6 +30,7 @@ from trajcli.suggest import did_you_mean, valid_names
 
 METADATA = "trajcli"
 _READ = (definitions.JOINT_STATE, definitions.JOINT_TRAJECTORY, definitions.CONTROLLER_STATE)
+_ARRAYS = ("times", "position", "velocity", "acceleration", "effort")  # of a motion
 _CLOCK = 10**17  # ns: stamps from here on (1973) are times of a clock, and counted from the first
 
 
@@ -86,30 +88,103 @@ def read_log(stream: BinaryIO, file: str, topic: str | None = None, field: str |
     Raises:
         InputError: When it is no whole MCAP file, or has no such topic.
     """
+    blocks = list(log_blocks(stream, file, topic, field))
+    first = blocks[0]
+    joined = {name: np.concatenate([getattr(block, name) for block in blocks]) for name in _ARRAYS}
+    return LoggedMotion(file, first.topic, first.joint_names, **joined)
+
+
+def log_blocks(
+    stream: BinaryIO, file: str, topic: str | None = None, field: str | None = None
+) -> Iterator[LoggedMotion]:
+    """Yield the motion of a topic block by block, as `read_log` reads it, at least one.
+
+    Raises:
+        InputError: When it is no whole MCAP file, or has no such topic.
+    """
     known = known_channels(stream, file)
     chosen = _chosen(known, topic)
-    log = LogRecords(stream, file)
+    own = known.metadata.get(METADATA, {})
     wanted = {chosen: _channels(known, chosen)}
-    if chosen == JOINT_STATES:
-        wanted[JOINT_ACCELERATIONS] = _channels(known, JOINT_ACCELERATIONS)
+    accelerations = _channels(known, JOINT_ACCELERATIONS) if own and chosen == JOINT_STATES else set()
+    if accelerations:
+        wanted[JOINT_ACCELERATIONS] = accelerations
+    clock, before = _Clock(own), 0
+    for series in _same_joints(_states(LogRecords(stream, file), known, wanted, field), file, chosen):
+        motion = _motion(file, chosen, series, clock, before)
+        before += motion.times.size
+        yield motion
+    if not before:
+        raise InputError(f"the topic {chosen} of {file} has no messages")
+
+
+def _states(
+    log: LogRecords, known: LogRecords, wanted: Mapping[str, set[int]], field: str | None
+) -> Iterator[JointSeries]:
+    """Yield the states of the first of some topics, with the accelerations of the second."""
     layouts = {number: _layouts(known, number, field) for channels in wanted.values() for number in channels}
-    found: dict[str, list[JointSeries]] = {name: [] for name in wanted}
+    pending: dict[str, list[JointSeries]] = {name: [] for name in wanted}
+    trajectories = 0
     for block in log.blocks():
         for name, channels in wanted.items():
             for channel in channels & block.offsets.keys():
-                kind, count = _type(known, channel), block.offsets[channel].size
-                if kind == definitions.JOINT_TRAJECTORY and count + len(found[name]) > 1:
-                    raise InputError(
-                        f"the topic {name} of {file} holds several trajectories, and one is read"
-                    )
+                count = block.offsets[channel].size
+                trajectories += count if layouts[channel] is None else 0
+                if trajectories > 1:
+                    message = f"the topic {name} of {log.file} holds several trajectories, and one is read"
+                    raise InputError(message)
                 if count:
-                    found[name].append(_decoded(log, block, channel, name, layouts[channel]))
-    series = _joined(found[chosen], file, chosen)
-    accelerations = found.get(JOINT_ACCELERATIONS, [])
-    own = log.metadata.get(METADATA, {})
-    if own and accelerations and chosen == JOINT_STATES:
-        series = _with_accelerations(series, _joined(accelerations, file, JOINT_ACCELERATIONS))
-    return _motion(file, chosen, series, own)
+                    pending[name].append(_decoded(log, block, channel, name, layouts[channel]))
+        yield from _paired(log.file, *pending.values())
+    if any(part.nanoseconds.size for parts in pending.values() for part in parts):
+        raise _other_stamps(log.file)
+
+
+def _paired(
+    file: str, states: list[JointSeries], accelerations: list[JointSeries] | None = None
+) -> Iterator[JointSeries]:
+    """Yield the states whose accelerations are there, too, and take them out of both lists."""
+    if accelerations is None:
+        yield from states
+        states.clear()
+        return
+    while states and accelerations:
+        first, second = states.pop(0), accelerations.pop(0)
+        count = min(first.nanoseconds.size, second.nanoseconds.size)
+        for parts, series in ((states, first), (accelerations, second)):
+            if series.nanoseconds.size > count:
+                parts.insert(0, _rows(series, slice(count, None)))
+        first, second = _rows(first, slice(count)), _rows(second, slice(count))
+        if first.names != second.names or not np.array_equal(first.nanoseconds, second.nanoseconds):
+            raise _other_stamps(file)
+        yield replace(first, acceleration=second.position)
+
+
+def _rows(series: JointSeries, rows: slice) -> JointSeries:
+    return replace(
+        series,
+        nanoseconds=series.nanoseconds[rows],
+        position=series.position[rows],
+        velocity=series.velocity[rows],
+        acceleration=series.acceleration[rows],
+        effort=series.effort[rows],
+    )
+
+
+def _other_stamps(file: str) -> InputError:
+    return InputError(f"{file}: {JOINT_ACCELERATIONS} has other stamps or joints than {JOINT_STATES}")
+
+
+def _same_joints(parts: Iterable[JointSeries], file: str, topic: str) -> Iterator[JointSeries]:
+    """Yield states; refused where some have other joints or quantities than the first."""
+    first: tuple[object, ...] | None = None
+    for part in parts:
+        form = (part.names, *(getattr(part, name).shape[1:] for name in _ARRAYS[1:]))
+        first = form if first is None else first
+        if form != first:
+            raise InputError(f"the messages of {topic} in {file} are about different joints or quantities")
+        if part.nanoseconds.size:
+            yield part
 
 
 def _layouts(known: LogRecords, channel: int, field: str | None) -> Callable[[bytes], StateLayout] | None:
@@ -198,47 +273,38 @@ def _decoded(
         raise log.wrong(f"a message of {topic} cannot be read: {error}") from error
 
 
-def _joined(parts: Sequence[JointSeries], file: str, topic: str) -> JointSeries:
-    """Return all states of a topic in order.
+class _Clock:
+    """The start of the times of a log, which is found with the first stamp.
 
-    Raises:
-        InputError: When there are none, or parts have different joints.
+    Attributes:
+        start: ns.
     """
-    if not parts or not sum(part.nanoseconds.size for part in parts):
-        raise InputError(f"the topic {topic} of {file} has no messages")
-    first = parts[0]
-    arrays = ("nanoseconds", "position", "velocity", "acceleration", "effort")
-    states = arrays[1:]
-    shapes = [[getattr(part, name).shape[1:] for name in states] for part in parts]
-    if any(part.names != first.names for part in parts) or any(shape != shapes[0] for shape in shapes):
-        raise InputError(f"the messages of {topic} in {file} are about different joints or quantities")
-    joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in arrays}
-    return JointSeries(names=first.names, **joined)
+
+    def __init__(self, own: Mapping[str, str]) -> None:
+        self._epoch = own.get("epoch", "")
+        self.start: int | None = None
+
+    def seconds(self, stamps: NDArray[np.int64]) -> Array:
+        """Return times (N,) of stamps (N,) in ns."""
+        if self.start is None:
+            first = int(stamps[0])
+            self.start = first if first >= _CLOCK else 0
+            if self._epoch.isdigit() and first >= int(self._epoch):
+                self.start = int(self._epoch)
+        return np.asarray((stamps - self.start) / 1e9)
 
 
-def _with_accelerations(states: JointSeries, accelerations: JointSeries) -> JointSeries:
-    """Return the states of a log of trajcli with the accelerations of its other topic."""
-    same = np.array_equal(states.nanoseconds, accelerations.nanoseconds)
-    if not same or states.names != accelerations.names:
-        return states
-    return replace(states, acceleration=accelerations.position)
-
-
-def _motion(file: str, topic: str, series: JointSeries, own: Mapping[str, str]) -> LoggedMotion:
-    stamps, epoch = series.nanoseconds, own.get("epoch", "")
-    start = int(stamps[0]) if stamps[0] >= _CLOCK else 0
-    if epoch.isdigit() and stamps[0] >= int(epoch):
-        start = int(epoch)
+def _motion(file: str, topic: str, series: JointSeries, clock: _Clock, before: int) -> LoggedMotion:
     parts = (series.position, series.velocity, series.acceleration)
     for what, values in zip(("position", "velocity", "acceleration"), parts, strict=True):
         finite = np.isfinite(values)
         if not finite.all():
             row, joint = np.argwhere(~finite)[0].tolist()
             raise InputError(
-                f"the {what} of {series.names[joint]} in message {row} of {topic} in {file} is "
+                f"the {what} of {series.names[joint]} in message {before + row} of {topic} in {file} is "
                 f"{values[row, joint]}",
                 hint="only finite numbers can be compared",
             )
     # drivers without sensors of effort say NaN
-    effort = series.effort if np.isfinite(series.effort).all() else np.empty((stamps.size, 0))
-    return LoggedMotion(file, topic, series.names, (stamps - start) / 1e9, *parts, effort)
+    effort = series.effort if np.isfinite(series.effort).all() else series.effort[:, :0]
+    return LoggedMotion(file, topic, series.names, clock.seconds(series.nanoseconds), *parts, effort)
