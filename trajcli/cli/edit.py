@@ -76,7 +76,7 @@ def run_resample(source: str, rate: str, options: EditOptions) -> int:
     _write(found, options)
     rows = f"{found.rows.t.size} row{'s' * (found.rows.t.size != 1)}"
     joint, size = worst_deviation(motion, found.as_written())
-    off = f"the curve through them is off by at most {size:.3g} ({found.joint_names[joint]})"
+    off = f"the curve through them is off by at most {size:.3g} rad or m, in {found.joint_names[joint]}"
     _say(options, f"{found.rows.source}: resampled at {_hertz(rate):.9g} Hz, {rows}; {off}")
     return 0
 

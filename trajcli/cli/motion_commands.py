@@ -22,28 +22,28 @@ _EXAMPLES = {
     "convert": "trajcli convert rows.csv -o rows.mcap",
 }
 
-Source = Annotated[
+MotionSource = Annotated[
     str, typer.Argument(metavar="FILE", help="CSV, MCAP, ROS messages, JSON lines, .npy; - is stdin.")
 ]
-Output = Annotated[
+MotionOutput = Annotated[
     str | None,
     typer.Option(
         "--output", "-o", metavar="OUT", help="OUT.csv, .mcap, .jsonl or .yaml; else CSV to stdout."
     ),
 ]
-Form = Annotated[
+MotionForm = Annotated[
     Literal["csv", "mcap", "jsonl", "ros", "ros-goal"] | None,
     typer.Option("--format", help="Of stdout, and which message a .yaml holds.", show_default="csv"),
 ]
-Columns = Annotated[
+ColumnMap = Annotated[
     str | None,
     typer.Option("--columns", metavar="MAP", help="What columns are: t=timestamp,q=target_q,qd=target_qd."),
 ]
 FileUnits = Annotated[
     str | None, typer.Option("--units", metavar="UNITS", help="Of columns that name none, such as deg,mm.")
 ]
-Topic = Annotated[str | None, typer.Option("--topic", metavar="T", help="MCAP: the topic.")]
-Field = Annotated[
+TopicName = Annotated[str | None, typer.Option("--topic", metavar="T", help="MCAP: the topic.")]
+FieldName = Annotated[
     str | None, typer.Option("--field", metavar="F", help="Of messages with several states: the one meant.")
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Nothing on stderr but errors.")]
@@ -51,11 +51,9 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Nothing on stderr bu
 
 def register_tools(app: typer.Typer) -> None:
     """Add these commands to an application."""
-    for command in (batch, retime, resample, concat, reverse, cut, convert):
-        name = "slice" if command is cut else command.__name__
-        named = guarded(command)
-        named.__name__ = name  # the command line looks commands up by the names of their functions
-        app.command(name, epilog=f"Example: {_EXAMPLES[name]}")(named)
+    for command in (batch, retime, resample, concat, reverse, slice, convert):
+        name = command.__name__
+        app.command(name, epilog=f"Example: {_EXAMPLES[name]}")(guarded(command))
 
 
 def batch(
@@ -102,7 +100,7 @@ def batch(
 
 
 def retime(
-    file: Source,
+    file: MotionSource,
     job: Annotated[
         str | None, typer.Option("--job", "-j", metavar="JOB", help="The job whose limits are kept.")
     ] = None,
@@ -122,12 +120,12 @@ def retime(
     per_move: Annotated[
         bool, typer.Option("--per-move", help="A factor for each move, by the column `move`.")
     ] = False,
-    output: Output = None,
-    form: Form = None,
-    columns: Columns = None,
+    output: MotionOutput = None,
+    form: MotionForm = None,
+    columns: ColumnMap = None,
     units: FileUnits = None,
-    topic: Topic = None,
-    field: Field = None,
+    topic: TopicName = None,
+    field: FieldName = None,
     quiet: Quiet = False,
     errors: Errors = "text",
 ) -> int:
@@ -139,14 +137,14 @@ def retime(
 
 
 def resample(
-    file: Source,
+    file: MotionSource,
     rate: Annotated[str, typer.Option("--rate", metavar="HZ", help="Rows per second.")],
-    output: Output = None,
-    form: Form = None,
-    columns: Columns = None,
+    output: MotionOutput = None,
+    form: MotionForm = None,
+    columns: ColumnMap = None,
     units: FileUnits = None,
-    topic: Topic = None,
-    field: Field = None,
+    topic: TopicName = None,
+    field: FieldName = None,
     quiet: Quiet = False,
     errors: Errors = "text",
 ) -> int:
@@ -162,12 +160,12 @@ def concat(
         list[str],
         typer.Argument(metavar="FILE...", help="Motions, each of which begins where the last ends."),
     ],
-    output: Output = None,
-    form: Form = None,
-    columns: Columns = None,
+    output: MotionOutput = None,
+    form: MotionForm = None,
+    columns: ColumnMap = None,
     units: FileUnits = None,
-    topic: Topic = None,
-    field: Field = None,
+    topic: TopicName = None,
+    field: FieldName = None,
     quiet: Quiet = False,
     errors: Errors = "text",
 ) -> int:
@@ -179,13 +177,13 @@ def concat(
 
 
 def reverse(
-    file: Source,
-    output: Output = None,
-    form: Form = None,
-    columns: Columns = None,
+    file: MotionSource,
+    output: MotionOutput = None,
+    form: MotionForm = None,
+    columns: ColumnMap = None,
     units: FileUnits = None,
-    topic: Topic = None,
-    field: Field = None,
+    topic: TopicName = None,
+    field: FieldName = None,
     quiet: Quiet = False,
     errors: Errors = "text",
 ) -> int:
@@ -196,20 +194,20 @@ def reverse(
     return run_reverse(file, options)
 
 
-def cut(
-    file: Source,
+def slice(  # noqa: A001
+    file: MotionSource,
     first: Annotated[
         str | None, typer.Option("--from", metavar="T", help="Time of the file, s; else its start.")
     ] = None,
     last: Annotated[
         str | None, typer.Option("--to", metavar="T", help="Time of the file, s; else its end.")
     ] = None,
-    output: Output = None,
-    form: Form = None,
-    columns: Columns = None,
+    output: MotionOutput = None,
+    form: MotionForm = None,
+    columns: ColumnMap = None,
     units: FileUnits = None,
-    topic: Topic = None,
-    field: Field = None,
+    topic: TopicName = None,
+    field: FieldName = None,
     quiet: Quiet = False,
     errors: Errors = "text",
 ) -> int:
@@ -221,13 +219,13 @@ def cut(
 
 
 def convert(
-    file: Source,
-    output: Output = None,
-    form: Form = None,
-    columns: Columns = None,
+    file: MotionSource,
+    output: MotionOutput = None,
+    form: MotionForm = None,
+    columns: ColumnMap = None,
     units: FileUnits = None,
-    topic: Topic = None,
-    field: Field = None,
+    topic: TopicName = None,
+    field: FieldName = None,
     quiet: Quiet = False,
     errors: Errors = "text",
 ) -> int:

@@ -69,11 +69,6 @@ class EditedMotion:
         """Names of the joints: of the file, or j1, j2, ..."""
         return self.rows.joints or tuple(f"j{number}" for number in range(1, self.rows.q.shape[1] + 1))
 
-    @property
-    def stated(self) -> int:
-        """How many of position, velocity and acceleration the curve takes from the rows, the first ones."""
-        return 1 + (self.rows.qd is not None) * (1 + (self.rows.qdd is not None))
-
     def curve(self) -> PiecewisePolynomial:
         """Return the curve q(t) through the rows."""
         return reconstruct(self.rows)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
-from trajcli.frozen import frozen
+from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import JointType
 from trajcli.streams.reading import open_rows_of
 from trajcli.streams.recorded.column_names import MOVE
@@ -85,7 +85,7 @@ class RecordedMotion:
     first_row: int = 1
 
 
-@frozen
+@comparable
 class WrittenColumn:
     """A column as a file writes it.
 
