@@ -196,7 +196,7 @@ class AtLimitReport(ReportPart):
     """For how long a move is at one limit: within a millionth of it, from the roots of polynomials."""
 
     joint: str
-    quantity: JointQuantity
+    quantity: JointQuantity | Literal["velocity_by_position"]
     seconds: Annotated[float, Field(description="In either direction.")]
     share: Annotated[float, Field(description="Of the duration of the move.")]
     method: Annotated[
