@@ -57,6 +57,14 @@ class RigidSolid:
     first: tuple[float, float, float]
     second: tuple[float, float, float, float, float, float]
 
+    @property
+    def sizes(self) -> tuple[float, float, float, float]:
+        """Mass, length of the first moment, largest principal moment, half its distance to the least."""
+        xx, yy, zz, xy, xz, yz = self.second
+        moments = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])).tolist()
+        largest, least = moments[2], moments[0]
+        return self.mass, float(np.linalg.norm(self.first)), largest, (largest - least) / 2
+
 
 @comparable
 class DynamicLink:
@@ -136,7 +144,7 @@ class InverseDynamics:
         return np.asarray(rigid + self.friction(rates))
 
     def rigid_effort(
-        self, q: ArrayLike, qd: ArrayLike | None, qdd: ArrayLike | None, *, weight: bool = True
+        self, q: ArrayLike, qd: ArrayLike | None, qdd: ArrayLike | None, *, weight: bool | Array = True
     ) -> Array:
         """Return M qdd + C qd + g, without friction, shape (*batch, n), N m or N.
 
@@ -144,7 +152,7 @@ class InverseDynamics:
             q: Joint values (*batch, n), rad or m.
             qd: Joint velocities of the same shape; zero where None.
             qdd: Joint accelerations of the same shape; zero where None.
-            weight: Whether gravity acts.
+            weight: Whether gravity acts, in all states or in each (*batch,).
 
         Raises:
             InputError: When they have not n finite values of one batch.
@@ -152,18 +160,54 @@ class InverseDynamics:
         values = configurations(self.robot, q)
         rates = None if qd is None else self._matching(values, qd, "qd")
         seconds = None if qdd is None else self._matching(values, qdd, "qdd")
-        lift = self.lift if weight else ZERO
         result = np.empty((values.size // values.shape[-1], values.shape[-1]))
         given = [array for array in (values, rates, seconds) if array is not None]
         for rows, columns in blocks(*given):
             left = iter(columns[1:])
             speeds = None if rates is None else next(left)
             changes = None if seconds is None else next(left)
+            acts = weight if isinstance(weight, bool) else weight.reshape(-1)[rows]
+            lift = scaled(float(acts) if isinstance(acts, bool) else acts.astype(np.float64), self.lift)
             for i, entry in enumerate(_recursion(self.links, lift, columns[0], speeds, changes)):
                 result[rows, i] = entry
         if seconds is not None:
             result += np.array([j.rotor for j in self.robot.joints]) * seconds.reshape(result.shape)
         return result.reshape(values.shape)
+
+    def apart_from_gravity(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array]:
+        """Return M qdd + C qd and g, each of shape (*batch, n), N m or N, in one recursion.
+
+        Args:
+            q: Joint values (*batch, n), rad or m.
+            qd: Joint velocities of the same shape.
+            qdd: Joint accelerations of the same shape.
+
+        Raises:
+            InputError: When they have not n finite values of one batch.
+        """
+        nothing = np.zeros_like(q)
+        weight = np.stack([np.zeros(q.shape[:-1]), np.ones(q.shape[:-1])])
+        both = self.rigid_effort(
+            np.stack([q, q]), np.stack([qd, nothing]), np.stack([qdd, nothing]), weight=weight
+        )
+        return both[0], both[1]
+
+    def along_path(self, q: Array, first: Array, second: Array) -> tuple[Array, Array, Array]:
+        """Return M q', M q'' + C q' and g of a path q(s), each of shape (p, n), in one recursion.
+
+        Args:
+            q: At points of the path (p, n), rad or m.
+            first: q' of the same shape.
+            second: q'' of the same shape.
+
+        Raises:
+            InputError: When they have not n finite values of one batch.
+        """
+        nothing, one = np.zeros_like(q), np.ones(len(q))
+        rates, changes = np.stack([nothing, first, nothing]), np.stack([first, second, nothing])
+        weight = np.stack([0.0 * one, 0.0 * one, one])
+        a, b, held = self.rigid_effort(np.stack([q, q, q]), rates, changes, weight=weight)
+        return a, b, held
 
     def gravity_effort(self, q: ArrayLike) -> Array:
         """Return g(q), the efforts at rest without friction, shape (*batch, n), N m or N.

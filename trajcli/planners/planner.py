@@ -12,7 +12,7 @@ from pydantic import Field
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount, Amounts, PlanningError, Problem, said
 from trajcli.frozen import comparable, frozen
-from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.robot import Payload, Robot
 from trajcli.language.limits import LimitsSpec
 from trajcli.language.numbers import Model
 from trajcli.trajectory import Destination, Promise, Span, State, Trajectory, ViaPoints
@@ -28,6 +28,7 @@ _REMARKS = (
     "refined",
     "within_tool_limits",
     "within_velocity_by_position",
+    "within_effort_limits",
     "local_optimum",
     "bound",
 )  # kinds of events that concede nothing
@@ -156,6 +157,7 @@ class Planner(Model):
         proportional: Whether another duration scales the times of all its parts alike, so that between given
             velocities at its ends each position is linear in the duration.
         follows_jerk: Whether it plans within the limits of jerk, and perhaps not without them.
+        handles: Whether it takes up a payload or leaves it, and moves nothing.
         smoother: Changes of its fields that make a move without steps in acceleration, each by the words that
             ask for it; "planner" may be among them.
         limits: Tightens the job's limits for this move; applied before `plan` is called.
@@ -166,6 +168,7 @@ class Planner(Model):
     one_shape: ClassVar[bool] = False
     proportional: ClassVar[bool] = False
     follows_jerk: ClassVar[bool] = False
+    handles: ClassVar[bool] = False
     smoother: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
 
     limits: Annotated[LimitsSpec | None, Field(description="Tighter limits for this move.")] = None
@@ -224,6 +227,14 @@ class Planner(Model):
                 recorded, or left open.
         """
         return self
+
+    def carried_after(self, payload: Payload | None) -> Payload | None:
+        """Return what the tool carries behind the move that begins with a payload; None for nothing.
+
+        Raises:
+            FlawError: When it takes up a second one, or leaves what is not there.
+        """
+        return payload
 
     def with_duration(self, duration: float) -> Self:
         """Return the planner of the same move over `duration` seconds.
@@ -318,7 +329,7 @@ class PlannedMove:
     def span(self, start: float, end: float) -> Span:
         """Return the part of a trajectory, from `start` to `end` s, that is this move."""
         continuity = self.planned.continuity or self.planner.joins
-        return Span(self.index, self.planner.tag, start, end, continuity)
+        return Span(self.index, self.planner.tag, start, end, continuity, self.robot.payload)
 
     def alone(self) -> Trajectory:
         """Return the trajectory of this move alone."""

@@ -44,28 +44,16 @@ _SHARES = (1.0, 0.5, 0.25, 0.1)  # of a step, the largest first that leads forwa
 
 
 @frozen
-class JerkLimitedMotion:
-    """A near time-optimal motion.
+class JerkLimitedMotion(TimeOptimalMotion):
+    """A near time-optimal motion, whose law has quartic pieces.
 
     Attributes:
-        trajectory: q(t) from t = 0 on.
-        law: s(t), of degree 4.
         second_order: The optimum without limits of jerk: no motion is faster.
-        stretch: By what factor the law was slowed down as a whole to keep the limits everywhere.
         steps: Number of convex steps.
-        lost: Estimate of the share of the duration that finer nodes would save.
-        stops: s at the corners of the path, where the motion stops, shape (k,).
-        stop_times: When it does, in seconds, shape (k,).
     """
 
-    trajectory: PiecewisePolynomial
-    law: PiecewisePolynomial
     second_order: TimeOptimalMotion
-    stretch: float
     steps: int
-    lost: float
-    stops: Array
-    stop_times: Array
 
     @property
     def lower_bound(self) -> float:
@@ -124,8 +112,19 @@ def jerk_limited_time_optimal(
     if stretch > 1.0 + _EXACT:
         curve, trajectory = scale_time(curve, stretch), scale_time(trajectory, stretch)
     times = curve.breaks[np.searchsorted(law.s, second.stops)]
+    lowered = int((search.lowered > 1.0).any(axis=0).sum())
     return JerkLimitedMotion(
-        trajectory, curve, second, stretch, search.steps, lost / law.duration, second.stops, times
+        trajectory,
+        curve,
+        stretch,
+        lowered,
+        search.refinements,
+        law.s,
+        lost / law.duration,
+        second.stops,
+        times,
+        second,
+        search.steps,
     )
 
 
@@ -141,10 +140,11 @@ class _Search:
         best: The law that is the fastest once it is slowed down until it keeps the limits.
         stretch: By what factor that is.
         steps: How many were made.
+        refinements: How often nodes were refined.
     """
 
     def __init__(self, limits: LawLimits, law: QuarticLaw, rests: bool) -> None:
-        self.limits, self.rests, self.steps = limits, rests, 0
+        self.limits, self.rests, self.steps, self.refinements = limits, rests, 0, 0
         self.lowered = np.ones((3, law.lengths.size))
         self.best, self.stretch = law, np.inf
         self._take(law)
@@ -180,6 +180,7 @@ class _Search:
 
     def _cut(self, parts: NDArray[np.intp]) -> None:
         """Cut each interval into so many (N,) parts."""
+        self.refinements += 1
         self.lowered = np.repeat(self.lowered, parts, axis=1)
         self._take(self.law.cut(parts))
 

@@ -182,8 +182,12 @@ class PathProblem:
     @property
     def with_ramps(self) -> bool:
         """Whether sdd may change within an interval."""
-        follows = all(constraint.allows_ramps for constraint in self.constraints)
-        return follows and self.joints.path.degree <= _LARGEST_DEGREE
+        return self.joints.path.degree <= _LARGEST_DEGREE
+
+    @property
+    def estimate(self) -> float:
+        """What share of the time that a grid may lose by estimate it may lose here."""
+        return min(constraint.estimate for constraint in self.constraints)
 
     def excess(self, pieces: LawPieces) -> Array:
         """Return the excess of each of the k constraints in each piece of a law, shape (k, 2, N)."""
@@ -333,10 +337,10 @@ def _parts(solution: GridSolution, room: int) -> tuple[NDArray[np.intp], float]:
     """Return into how many parts to cut each interval, and the share of the duration that is lost."""
     lost, durations, straight = solution.lost, solution.pieces.durations, solution.intervals.straight
     duration, bent = float(durations.sum()), np.where(straight, 0.0, lost)
-    share = float(lost.sum()) / duration
+    share, estimate = float(lost.sum()) / duration, solution.problem.estimate
     parts = np.ones(lost.size, dtype=np.intp)
-    if share > _LOST and room > _FEW_NEW * lost.size:
-        parts = parts_for(bent, _AIM * duration, room)
+    if share > estimate * _LOST and room > _FEW_NEW * lost.size:
+        parts = parts_for(bent, estimate * _AIM * duration, room)
     switching = straight & (lost > _SWITCHING * durations)
     settled = lost[switching].sum() <= _SETTLED * bent.sum()
     if not settled and (parts - 1).sum() + switching.sum() <= room:

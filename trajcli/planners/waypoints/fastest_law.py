@@ -12,11 +12,13 @@ from trajcli.curves.piecewise import Array
 from trajcli.curves.third_order.end_curvature import with_end_curvature
 from trajcli.curves.third_order.parameterization import JerkLimitedMotion, jerk_limited_time_optimal
 from trajcli.curves.third_order.quartic_law import ReversingLawError
+from trajcli.curves.time_optimal.constraints import PathConstraint
 from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion, UnsettledSpeedError, time_optimal
 from trajcli.curves.time_optimal.passes import UnreachableSpeedError
 from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.approach_limits import approach_constraints
+from trajcli.planners.effort_limits import solved_within_efforts
 from trajcli.planners.planner import Event, stretched
 from trajcli.planners.waypoints.joint_path import JointPath
 from trajcli.planners.waypoints.spline_rules import Rule
@@ -41,7 +43,7 @@ def require_continuous_curvature(rule: Rule | None) -> None:
 
 def solve_within_jerk(
     path: JointPath, acceleration: Array, robot: Robot, *, bends: bool
-) -> tuple[JointPath, JerkLimitedMotion]:
+) -> tuple[JointPath, TimeOptimalMotion]:
     """Return the path, bent at ends in motion where it may be, and the fastest law that is found along it.
 
     Args:
@@ -64,16 +66,21 @@ def solve_within_jerk(
     if not (bends and path.speeds[0]):
         _require_along(across, acceleration, robot)
     limits = robot.limits
-    with _ends_refused():
-        return path, jerk_limited_time_optimal(
-            path.curve,
+    curve, speeds, further = path.curve, path.speeds, approach_constraints(path.curve, robot)
+
+    def solve(efforts: tuple[PathConstraint, ...]) -> TimeOptimalMotion:
+        return jerk_limited_time_optimal(
+            curve,
             limits.velocity,
             limits.acceleration,
             limits.jerk,
-            start=(path.speeds[0], along),
-            end=(path.speeds[1], 0.0),
-            further=approach_constraints(path.curve, robot),
+            start=(speeds[0], along),
+            end=(speeds[1], 0.0),
+            further=(*further, *efforts),
         )
+
+    with _ends_refused():
+        return path, solved_within_efforts(curve, robot, solve)
 
 
 @contextmanager
@@ -105,15 +112,19 @@ def solve_second_order(path: JointPath, robot: Robot) -> TimeOptimalMotion:
     """
     limits = robot.limits
     further = approach_constraints(path.curve, robot)
-    with _ends_refused():
+
+    def solve(efforts: tuple[PathConstraint, ...]) -> TimeOptimalMotion:
         return time_optimal(
             path.curve,
             limits.velocity,
             limits.acceleration,
             start_velocity=path.speeds[0],
             end_velocity=path.speeds[1],
-            further=further,
+            further=(*further, *efforts),
         )
+
+    with _ends_refused():
+        return solved_within_efforts(path.curve, robot, solve)
 
 
 def _require_along(across: Array, acceleration: Array, robot: Robot) -> None:
@@ -138,7 +149,7 @@ def _bound(motion: JerkLimitedMotion) -> Event:
     return Event("bound", f"{text}{{bound}}", amounts={"bound": Amount(motion.lower_bound, rounded="down")})
 
 
-def events_of_law(motion: TimeOptimalMotion | JerkLimitedMotion, *, fastest: bool) -> Iterator[Event]:
+def events_of_law(motion: TimeOptimalMotion, *, fastest: bool) -> Iterator[Event]:
     """Yield how good a law is, how it was found, and where it stops.
 
     Args:

@@ -38,6 +38,7 @@ from trajcli.language.poses import read_numbers
 from trajcli.language.recorded import Recorded
 from trajcli.planners.approach_limits import approach_constraints
 from trajcli.planners.boundary_states import missing_limit, same_state, standstill
+from trajcli.planners.effort_limits import effort_constraints, lacks_acceleration
 from trajcli.planners.planner import Phase, Planned
 from trajcli.planners.waypoints.fastest_law import (
     events_of_law,
@@ -186,7 +187,7 @@ class TimeOptimal(ThroughPoints):
         if not moving.any():
             return self._in_one_point(start, points, robot)
         bounds = robot.limits.acceleration
-        lacking = np.flatnonzero(moving & ~np.isfinite(bounds).all(axis=1))
+        lacking = np.flatnonzero(moving & lacks_acceleration(robot))
         if lacking.size:
             raise missing_limit(
                 self.tag, "acceleration", lacking.tolist(), robot, "to find the fastest motion"
@@ -218,7 +219,7 @@ class TimeOptimal(ThroughPoints):
 
     def _solved(
         self, points: PointTable, robot: Robot, moving: NDArray[np.bool_]
-    ) -> tuple[JointPath, TimeOptimalMotion | JerkLimitedMotion]:
+    ) -> tuple[JointPath, TimeOptimalMotion]:
         """Return the path and the fastest motion along it."""
         if not self._keeps_jerk(robot) or not np.isfinite(robot.limits.jerk[moving]).any():
             path = self._path(points, robot, smooth=False)
@@ -230,9 +231,7 @@ class TimeOptimal(ThroughPoints):
             path, points.rates[1, 0], robot, bends=self.path == "spline" and self.rule != "quintic"
         )
 
-    def _phase_plane(
-        self, path: JointPath, motion: TimeOptimalMotion | JerkLimitedMotion, robot: Robot
-    ) -> PhasePlane:
+    def _phase_plane(self, path: JointPath, motion: TimeOptimalMotion, robot: Robot) -> PhasePlane:
         """Return the law with its limits; the length of chords has a unit where all joints share one."""
         limits, kinds = robot.limits, set(robot.joint_types)
         by_chord = self.path == "polyline" or (self.parameter or "chord") == "chord"
@@ -241,7 +240,8 @@ class TimeOptimal(ThroughPoints):
             "ratio" if not alike else "length" if "prismatic" in kinds else "angle"
         )
         joints = JointConstraint(path.curve, limits.velocity, limits.acceleration)
-        constraints = (joints, *approach_constraints(path.curve, robot))
+        curve = path.curve
+        constraints = (joints, *approach_constraints(curve, robot), *effort_constraints(curve, robot))
         return PhasePlane(motion.law, constraints, path.curve.breaks, motion.stops, dimension)
 
     def _in_one_point(self, start: State, points: PointTable, robot: Robot) -> Planned:
