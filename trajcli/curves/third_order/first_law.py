@@ -14,7 +14,8 @@ from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion
 from trajcli.frozen import frozen
 
 _NODES = 64  # over the whole path
-_FEWEST = 3  # of a piece of the path; of a section between two stops, at least as many
+_FEWEST = 3  # of a piece of the path
+_MANY = 64  # breaks of a section between two stops: with more, a node at each is enough
 _WIDEST = 0.3  # of the duration of a section: a wider window would leave nothing of the law
 _SEARCHED = 8  # samples between two nodes, among which the times of breaks are looked up
 _NEWTON = 3  # steps after that
@@ -153,7 +154,8 @@ def _nodes(
     """Return s, sd and sdd at nodes between breaks (k,), evenly in time; their number is about `count`."""
     passed = _passed(average, breaks, count)
     spacing = (passed[-1] - passed[0]) / count
-    parts = np.maximum(np.ceil(np.diff(passed) / spacing), _FEWEST).astype(np.intp)
+    fewest = _FEWEST if breaks.size <= _MANY else 1
+    parts = np.maximum(np.ceil(np.diff(passed) / spacing), fewest).astype(np.intp)
     owner = np.repeat(np.arange(parts.size), parts)
     step = np.arange(owner.size) - (np.cumsum(parts) - parts)[owner]
     times = passed[owner] + np.diff(passed)[owner] * step / parts[owner]

@@ -17,7 +17,7 @@ from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.curves.third_order.convex_step import faster
 from trajcli.curves.third_order.first_law import EndStates, smoothed_law
-from trajcli.curves.third_order.jerk import JointJerkConstraint, ThirdOrderConstraint
+from trajcli.curves.third_order.jerk import JointJerkConstraint, ThirdOrderConstraint, curvature_jumps
 from trajcli.curves.third_order.limits import LawLimits, most_nodes, parts_for, time_lost
 from trajcli.curves.third_order.quartic_law import QuarticLaw, ReversingLawError
 from trajcli.curves.time_optimal.constraints import JointConstraint, PathConstraint
@@ -75,10 +75,10 @@ def jerk_limited_time_optimal(
 ) -> JerkLimitedMotion:
     """Return the fastest motion that is found along a path within bounds that hold for all t.
 
-    At a corner the motion stops. Where it rests, the acceleration is zero.
+    At a corner, and where q'' jumps, the motion stops. Where it rests, the acceleration is zero.
 
     Args:
-        path: q(s) with n joints, of degree at most 5; q'' is continuous but at corners.
+        path: q(s) with n joints, of degree at most 5, without jumps.
         velocity: Lower and upper bounds, shape (n, 2), lower < 0 < upper, infinite for none; per second.
         acceleration: The same, per second squared; not all infinite.
         jerk: The same, per second cubed.
@@ -95,9 +95,9 @@ def jerk_limited_time_optimal(
     """
     bounds = [np.asarray(each, dtype=np.float64) for each in (velocity, acceleration, jerk)]
     ends = EndStates(start, end)
-    second = time_optimal(
-        path, bounds[0], bounds[1], start_velocity=start[0], end_velocity=end[0], further=further
-    )
+    speeds = {"start_velocity": start[0], "end_velocity": end[0]}
+    stops = curvature_jumps(path, bounds[2])
+    second = time_optimal(path, bounds[0], bounds[1], **speeds, further=further, stops=stops)
     limits = LawLimits(
         (JointConstraint(path, bounds[0], bounds[1]), *further),
         (JointJerkConstraint(path, bounds[2]), *further_jerk),

@@ -19,6 +19,7 @@ from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.approach_limits import approach_constraints
 from trajcli.planners.effort_limits import solved_within_efforts
+from trajcli.planners.law_events import distance_from_bound, solved_by_convex_steps
 from trajcli.planners.planner import Event, stretched
 from trajcli.planners.waypoints.joint_path import JointPath
 from trajcli.planners.waypoints.spline_rules import Rule
@@ -140,15 +141,6 @@ def _require_along(across: Array, acceleration: Array, robot: Robot) -> None:
     raise PlanningError(Problem(message, hint, joint=name, value=value, amounts=amounts))
 
 
-def _bound(motion: JerkLimitedMotion) -> Event:
-    """Return the event that says how much faster a motion along the same path may be at most."""
-    above = 100.0 * (motion.law.duration / motion.lower_bound - 1.0)
-    text = (
-        f"at most {above:.2g} % above the fastest possible along this path: without limits of jerk it takes "
-    )
-    return Event("bound", f"{text}{{bound}}", amounts={"bound": Amount(motion.lower_bound, rounded="down")})
-
-
 def events_of_law(motion: TimeOptimalMotion, *, fastest: bool) -> Iterator[Event]:
     """Yield how good a law is, how it was found, and where it stops.
 
@@ -157,11 +149,9 @@ def events_of_law(motion: TimeOptimalMotion, *, fastest: bool) -> Iterator[Event
         fastest: Whether it is not slowed down.
     """
     if isinstance(motion, JerkLimitedMotion):
-        steps = motion.steps
-        text = f"the law has {motion.law.pieces} pieces after {steps} convex step{'s' * (steps != 1)}"
-        yield Event("refined", text)
+        yield solved_by_convex_steps(motion)
         if fastest:
-            yield _bound(motion)
+            yield distance_from_bound(motion)
     elif motion.refinements:
         yield Event(
             "refined",
