@@ -16,7 +16,7 @@ from trajcli.curves.time_optimal.time_law import LawPieces, blocks
 from trajcli.frozen import frozen
 
 _KINK = 1e-6  # of the largest q'' of a joint: a jump above it is one
-_ROUNDING = 1e-9  # of the largest q'' of all joints: the same, where one hardly bends
+_ROUNDING = 1e-9  # of the largest q'' of all joints, or q' over a piece: the same, where one hardly bends
 
 
 @frozen
@@ -118,5 +118,7 @@ def curvature_jumps(path: PiecewisePolynomial, jerk: Array) -> Array:
     """
     begins, ends = path.piece_ends(2)
     largest = np.maximum(np.abs(begins), np.abs(ends)).max(axis=0)
-    jumps = np.abs(begins[1:] - ends[:-1]) > np.maximum(_KINK * largest, _ROUNDING * largest.max())
+    straight = np.abs(path.piece_ends(1)).max() / path.lengths.min()
+    nothing = np.maximum(_KINK * largest, _ROUNDING * max(float(largest.max()), float(straight)))
+    jumps = np.abs(begins[1:] - ends[:-1]) > nothing
     return np.asarray(path.breaks[1:-1][(jumps & np.isfinite(jerk).any(axis=1)).any(axis=1)])

@@ -30,6 +30,7 @@ from trajcli.curves.time_optimal.time_law import law_and_trajectory
 from trajcli.frozen import frozen
 
 _FIRST_GAPS = (1e-3, 1e-4)  # of the duration: what the steps on the first nodes may miss
+_MORE_FIRST, _NEARLY = 8, 1.5  # more of them while a law between moving ends is so far above its limits
 _GAP, _LAST_GAP = 1e-4, 1e-5  # the same of those while nodes are refined, and of the last ones
 _REFINEMENTS = 7
 _SETTLING, _MOST_SETTLING = 8, 30  # steps with lowered limits; where nothing can be slowed down
@@ -153,6 +154,10 @@ class _Search:
         """Refine the nodes while that pays; return the estimate of what is lost, in seconds."""
         for gap in _FIRST_GAPS:
             self._step(gap)
+        for _ in range(0 if self.rests else _MORE_FIRST):
+            if self.excess.max() <= _NEARLY:
+                break
+            self._step(_GAP)
         for _ in range(_REFINEMENTS):
             lost = time_lost(self.law, self.limits, self.excess)
             duration = self.law.duration
