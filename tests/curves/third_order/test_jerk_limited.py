@@ -123,12 +123,6 @@ def test_below_the_stations_of_copp(seed):
     assert duration <= 1.005 * at_stations < made_feasible
 
 
-def copp_at_stations(path, velocity, acceleration, jerk, count=1001):
-    """Return the duration of COPP's law and what it uses of its limits between its stations."""
-    copp = pytest.importorskip("copp_py")
-    return copp, path, velocity, acceleration, jerk, count
-
-
 @pytest.mark.parametrize("seed", range(24))
 def test_random_problems_keep_all_limits(seed):
     judged(*random_problem(seed))
@@ -139,14 +133,6 @@ def test_random_problems_keep_all_limits(seed):
 def test_a_thousand_random_problems_keep_all_limits(block):
     for seed in range(1000 + 10 * block, 1010 + 10 * block):
         judged(*random_problem(seed))
-
-
-@pytest.mark.soak
-@pytest.mark.parametrize("seed", range(2, 100))
-def test_the_published_rule_of_copp(seed):
-    path, *limits = copp_problem(seed)
-    motion = judged(path, *map(both, limits))
-    assert motion.law.duration <= 1.05 * motion.second_order.law.duration
 
 
 def random_problem(seed):
