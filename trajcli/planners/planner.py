@@ -303,6 +303,11 @@ class PlannedMove:
         return self.planned.curve.duration
 
     @property
+    def continuity(self) -> Literal[1, 2]:
+        """Derivatives that join without a jump inside it and at rest."""
+        return self.planned.continuity or self.planner.joins
+
+    @property
     def at_rest(self) -> bool:
         """Whether it begins and ends at rest."""
         return self.start.at_rest and self.planned.end.at_rest
@@ -324,8 +329,7 @@ class PlannedMove:
 
     def span(self, start: float, end: float) -> Span:
         """Return the part of a trajectory, from `start` to `end` s, that is this move."""
-        continuity = self.planned.continuity or self.planner.joins
-        return Span(self.index, self.planner.tag, start, end, continuity, self.robot.payload)
+        return Span(self.index, self.planner.tag, start, end, self.continuity, self.robot.payload)
 
     def alone(self) -> Trajectory:
         """Return the trajectory of this move alone."""
