@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import field
+from dataclasses import field, replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -29,6 +29,7 @@ _REMARKS = (
     "within_tool_limits",
     "within_velocity_by_position",
     "local_optimum",
+    "fastest_found",
 )  # kinds of events that concede nothing
 _GIVEN = ("duration", "velocity", "acceleration", "deceleration", "timed")  # where they say how long it lasts
 LITTLE = 1e-3
@@ -87,6 +88,33 @@ def stretched(factor: float) -> Event:
 
 
 @frozen
+class Certificate:
+    """What is known of how near a motion through points is to the fastest.
+
+    Attributes:
+        lower: No motion through the points within the limits is faster, s.
+        joint: Index of the joint that needs so long; None where several together do.
+        found: Durations to which the starting points of the search led, s, infinite where one led to none.
+        agreeing: How many of these are the motion's, or longer by a thousandth at most.
+        stopping: Duration of the motion that stops at each point, s; infinite where there is none.
+        off_chords: By how much each joint leaves the straight chords between the points at most, shape (n,).
+        off_times: Where it does, s from the start of the move, shape (n,).
+    """
+
+    lower: float
+    joint: int | None
+    found: tuple[float, ...]
+    agreeing: int
+    stopping: float
+    off_chords: Array
+    off_times: Array
+
+    def scaled(self, factor: float) -> Certificate:
+        """Return what is known of the motion that takes `factor` times as long."""
+        return replace(self, off_times=self.off_times * factor)
+
+
+@frozen
 class Planned:
     """What a planner returns.
 
@@ -116,6 +144,7 @@ class Planned:
         phase_plane: Of a time-optimal law: the law s(t), and what limits it.
         braking: How a start outside the velocity or acceleration limits is brought inside first: by each
             joint, or by all on one line; None where it is not.
+        certificate: Of a motion that was searched for: how near to the fastest it is.
     """
 
     curve: PiecewisePolynomial
@@ -138,6 +167,7 @@ class Planned:
     virtual_points: ViaPoints | None = None
     phase_plane: PhasePlane | None = None
     braking: Literal["each", "line"] | None = None
+    certificate: Certificate | None = None
 
 
 class Planner(Model):
