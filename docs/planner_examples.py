@@ -163,12 +163,12 @@ the minimum duration of what lay between goes to the next segment, or where ther
 
 The search is deterministic: `starts` of these starting points are tried, in this order, and each is
 improved until nothing is gained. (1) Knots that are free, eight in each segment, from six tenths of the
-times of stopping at each point; (2) the straight motion of each collinear stretch; (3) six free knots, from
-the times at the velocity limits; (4) central differences of the points, at the best of six speeds; (5)
-twelve free knots; (6) eight, from the times of the best motion so far; (7) ten, from equal times; (8)
-sixteen, from the times of the best so far. The motion that stops at each point is always compared, too, so
-that no result is slower. The lower bound that is named is proven, and so is what the motion is at most
-above the fastest possible.
+times of stopping at each point; (2) the straight motion of each collinear stretch; (3) twelve free knots,
+from eight tenths of those times; (4) central differences of the points, at the best of six speeds; (5) six
+free knots, from the times at the velocity limits; (6) eight, from the times of the best motion so far; (7)
+ten, from equal times; (8) sixteen, from the times of the best so far. The motion that stops at each point
+is always compared, too, so that no result is slower. The lower bound that is named is proven, and so is
+what the motion is at most above the fastest possible.
 
 With `straight` it keeps to the polyline through the points: it passes collinear points without a stop, and
 stops where the polyline turns.""",

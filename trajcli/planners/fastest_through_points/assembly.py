@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
+from trajcli.curves.extrema import peaks
 from trajcli.curves.operations import times_at
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.errors import PlanningError
+from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.frozen import frozen
 from trajcli.planners.fastest_through_points.bound import shortest_duration
 from trajcli.planners.fastest_through_points.motion import PointMotion, exact_motion
 from trajcli.planners.fastest_through_points.problem import WaypointProblem
 from trajcli.planners.fastest_through_points.search import search
+from trajcli.planners.fastest_through_points.states import StateMotion
 from trajcli.planners.fastest_through_points.straight import straight_motion, straight_stretches
 
+_NEARBY = (0.0, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1.0)  # by what part velocities are lowered in turn
+_LONGER = 1e-6  # relative: a motion that lasts so little longer than was found is the one that was found
+_TOUCH = 1e-9  # of the positions: a limit passed by less is touched
 _SLOWER = 1e-9  # relative: durations that differ by less are equal
 
 
@@ -52,23 +58,82 @@ def fastest_motion(problem: WaypointProblem, names: list[str], starts: int) -> F
     Raises:
         PlanningError: When none is found.
     """
-    lower, joint = shortest_duration(problem)
+    lower, joint = shortest_duration(problem.scaled())
+    lower *= problem.units[0]
     kept = _essential(problem)
     short = problem.only(kept)
     straight = _straight_candidate(short, names)
     states = None if straight is None else _states_of(short, straight)
     found = search(short, starts, states)
-    motion = None
+    motion = straight
     if straight is None or found.best.duration < straight.duration * (1 - _SLOWER):
-        motion = exact_motion(short, found.best.states, names)
-    if straight is not None and (motion is None or straight.duration <= motion.duration):
-        motion = straight
+        exact = _exact(short, found.best, names)
+        if exact is not None and (motion is None or exact.duration < motion.duration):
+            motion = exact
     if motion is None:
-        raise PlanningError("no motion through the points was found", hint="raise the limits")
+        raise _none_found(short, names)
     if len(kept) <= problem.segments:
         motion = _with_all_points(problem, kept, motion)
-    return FastestMotion(
-        motion, lower, joint, found.durations, found.agreeing(motion.duration), found.stopping
+    stopping = found.stopping if short is problem else search(problem, 0).stopping
+    agreeing = found.agreeing(motion.duration)
+    return FastestMotion(motion, lower, joint, found.durations, agreeing, stopping)
+
+
+def _exact(problem: WaypointProblem, best: StateMotion, names: list[str]) -> PointMotion | None:
+    """Return the motion between the states that were found, exactly; None where there is none.
+
+    States may lie where only a longer duration suits all joints: then others near to them are tried, and at
+    last those of stopping.
+    """
+    if not np.isfinite(best.duration):
+        return None
+    motions = []
+    for part in _NEARBY:
+        states = problem.inside(best.states * np.array([1 - part, (1 - part) ** 2]))
+        with suppress(PlanningError):
+            motion = exact_motion(problem, states, names)
+            if not _keeps_positions(problem, motion):
+                continue
+            motions.append(motion)
+            if motion.duration <= best.duration * (1 + _LONGER):
+                break
+    return min(motions, key=lambda motion: motion.duration, default=None)
+
+
+def _keeps_positions(problem: WaypointProblem, motion: PointMotion) -> bool:
+    if not problem.walled:
+        return True
+    (found,) = peaks(motion.curve, (0,))
+    low, high = problem.position.T
+    room = _TOUCH * np.maximum(1.0, np.abs(problem.points).max(axis=0))
+    return bool((found.low >= low - room).all() and (found.high <= high + room).all())
+
+
+def _none_found(problem: WaypointProblem, names: list[str]) -> PlanningError:
+    """Return the error of points for which there is no motion, or none within the position limits."""
+    free = replace(problem, position=np.tile([-np.inf, np.inf], (problem.joints, 1)))
+    best = search(free, 1).best
+    if problem.walled and np.isfinite(best.duration):
+        motion = exact_motion(free, best.states, names)
+        (found,) = peaks(motion.curve, (0,))
+        low, high = problem.position.T
+        over = np.maximum(found.high - high, low - found.low)
+        joint = int(over.argmax())
+        above = found.high[joint] - high[joint] >= low[joint] - found.low[joint]
+        value, limit = (found.high, high) if above else (found.low, low)
+        message = (
+            "no motion through the points keeps the position limits: {joint} goes to {value}, beyond {limit}"
+        )
+        amounts: Amounts = {
+            "joint": names[joint],
+            "value": Amount(float(value[joint]), 0, joint),
+            "limit": Amount(float(limit[joint]), 0, joint),
+        }
+        hint = "give other velocities or points, or widen the limit"
+        return PlanningError(Problem(message, hint, joint=names[joint], amounts=amounts))
+    return PlanningError(
+        "no motion through the points was found with the velocities and accelerations that are given",
+        hint="leave some of them out, or lower them",
     )
 
 

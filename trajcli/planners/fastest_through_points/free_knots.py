@@ -26,6 +26,7 @@ from trajcli.planners.fastest_through_points.problem import WaypointProblem
 _ORDERS = 3
 _FIRST, _LARGEST = 0.3, 0.6  # trust region, of the durations of intervals
 _SMALLEST = 1e-3
+_ENOUGH, _PATIENCE = 3e-5, 6  # relative: what must be gained in so many rounds for more of them
 _PENALTY = 10.0  # a position beyond its limits counts as so many times more duration
 _FAR = 100.0  # for a position limit that does not bind, in units of the joints
 _LOST = 10.0  # times the best: a motion so far from its limits is not followed
@@ -110,10 +111,13 @@ def states_by_free_knots(
     motion = _least_jerk(problem, units, times / units.time, intervals)
     best = motion = motion.slowed(_excess(problem, units, motion)) if _may_slow(problem) else motion
     least = best.duration * _excess(problem, units, best)
-    region, astray = _FIRST, False
+    region, astray, history = _FIRST, False, [least]
     for _ in range(rounds):
+        if len(history) > _PATIENCE and least > (1 - _ENOUGH) * history[-_PATIENCE]:
+            break
         motion = _step(problem, units, motion, region)
         value = motion.duration * _excess(problem, units, motion)
+        history.append(least)
         if 0 < value < least:
             best, least, astray = motion, value, False
             region = min(_GROWN * region, _LARGEST)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -91,6 +92,35 @@ class WaypointProblem:
     def stopping(self) -> Array:
         """Return the states of a motion that stops at every inner point, as far as it is free to."""
         return self.inside(np.zeros_like(self.states))
+
+    @property
+    def units(self) -> tuple[float, Array]:
+        """Units of time, s, and of each joint's position, (n,), in which numbers are near one: powers of two.
+
+        Ruckig's tolerances are absolute. Such units change nothing else.
+        """
+        steps = np.abs(self.steps)
+        speeds = self.scales[:, 0]
+        typical = float((steps / speeds).max(axis=1).mean()) + float((self.scales[:, 1] / self.jerk).min())
+        time = 2.0 ** round(math.log2(typical))
+        lengths: Array = 2.0 ** np.round(np.log2(speeds * time))
+        return time, lengths
+
+    def scaled(self) -> WaypointProblem:
+        """Return the problem in its units, each joint from zero."""
+        time, lengths = self.units
+        rates = [(lengths / time**order)[:, None] for order in range(3)]
+        first = self.points[0]
+        return WaypointProblem(
+            (self.points - first) / lengths,
+            self.velocity / rates[1],
+            self.acceleration / rates[2],
+            self.jerk * time**3 / lengths,
+            self.states / np.concatenate(rates[1:], axis=1),
+            self.fixed,
+            self.least / time,
+            (self.position - first[:, None]) / rates[0],
+        )
 
     def only(self, kept: Sequence[int]) -> WaypointProblem:
         """Return the problem of some of the points alone; least durations of segments are added up."""

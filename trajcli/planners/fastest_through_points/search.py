@@ -2,9 +2,9 @@
 
 1. Free knots, eight in each segment, from six tenths of the times of stopping at each point.
 2. The straight motion of each collinear stretch; where there is none, the states of stopping at each point.
-3. Free knots, six in each segment, from times at the velocity limits.
+3. Free knots, twelve in each segment, from eight tenths of the times of stopping.
 4. Central differences of the points over the times of stopping, at the best of six speeds.
-5. Free knots, twelve in each segment, from eight tenths of the times of stopping.
+5. Free knots, six in each segment, from times at the velocity limits.
 6. Free knots, eight in each segment, from the times of the best motion so far.
 7. Free knots, ten in each segment, from equal times.
 8. Free knots, sixteen in each segment, from the times of the best motion so far.
@@ -67,6 +67,22 @@ def search(problem: WaypointProblem, starts: int, straight: Array | None = None)
         starts: How many starting points are tried, 1 to 8.
         straight: States (K + 1, n, 2) of the motion along the polyline, where some points are collinear.
     """
+    found = _found(problem.scaled(), starts, None if straight is None else _scaled(problem, straight))
+    time, lengths = problem.units
+    states = found.best.states * np.stack([lengths / time, lengths / time**2], axis=1)
+    best = StateMotion(problem.inside(states), found.best.times * time)
+    return Found(best, tuple(time * duration for duration in found.durations), found.stopping * time)
+
+
+def _scaled(problem: WaypointProblem, states: Array) -> Array:
+    """Return states (K + 1, n, 2) in the units of the problem."""
+    time, lengths = problem.units
+    scaled: Array = states / np.stack([lengths / time, lengths / time**2], axis=1)
+    return scaled
+
+
+def _found(problem: WaypointProblem, starts: int, straight: Array | None) -> Found:
+    """Return the fastest motion that is found, all in the units of the problem."""
     stopping = evaluated(problem, problem.stopping())
     if problem.walled and np.isfinite(stopping.duration):
         problem = with_limits_near(problem, stopping.times)
@@ -142,9 +158,9 @@ def _central_differences(problem: WaypointProblem, stopping: StateMotion, best: 
 _STARTS: tuple[Start, ...] = (
     _from_stopping(8, 0.6),
     _stopping,
-    _at_speed_limits,
-    _central_differences,
     _from_stopping(12, 0.8),
+    _central_differences,
+    _at_speed_limits,
     _from_best(8),
     _equal_times,
     _from_best(16),

@@ -207,9 +207,11 @@ def _problem(points: GivenPoints, robot: Robot, joints: NDArray[np.intp]) -> Way
 
 def _said(certificate: Certificate, duration: float, robot: Robot, *, straight: bool) -> Event:
     """Return the remark on how near to the fastest a motion is, and how far it leaves the chords."""
-    above = math.ceil(1e4 * (duration / certificate.lower - 1) - _WHOLE) / 100
-    where = " along the polyline" if straight else ""
-    near = f"at most {max(above, 0.0):.4g} % above the fastest possible{where}, {{lower}}"
+    near = "nothing is known of the fastest possible"
+    if certificate.lower > 0:
+        above = math.ceil(1e4 * (duration / certificate.lower - 1) - _WHOLE) / 100
+        where = " along the polyline" if straight else ""
+        near = f"at most {max(above, 0.0):.4g} % above the fastest possible{where}, {{lower}}"
     starts = f"{certificate.agreeing} of {len(certificate.found)} starting points agree"
     stops = "" if np.isinf(certificate.stopping) else "; stopping at each point takes {stopping}"
     joint = int(certificate.off_chords.argmax())
