@@ -91,7 +91,7 @@ def _exact(problem: WaypointProblem, best: StateMotion, names: list[str]) -> Poi
     for part in _NEARBY:
         states = problem.inside(best.states * np.array([1 - part, (1 - part) ** 2]))
         with suppress(PlanningError):
-            motion = exact_motion(problem, states, names)
+            motion = exact_motion(problem, states, names, best.duration)
             if not _keeps_positions(problem, motion):
                 continue
             motions.append(motion)

@@ -15,6 +15,9 @@ from trajcli.planners.fastest_through_points.problem import WaypointProblem
 from trajcli.planners.planner import Phase
 from trajcli.planners.ruckig import BoundaryProblem, PhaseProfile, fastest, together
 
+_ROUNDINGS = 4  # of breaks, that may add up
+_MOST = 1e-7  # relative: no acceleration is lowered by more
+
 
 @frozen
 class PointMotion:
@@ -65,19 +68,21 @@ def joined(parts: Sequence[PointMotion]) -> PointMotion:
     return PointMotion(curve, stamps, tuple(phases))
 
 
-def exact_motion(problem: WaypointProblem, states: Array, names: Sequence[str]) -> PointMotion:
+def exact_motion(
+    problem: WaypointProblem, states: Array, names: Sequence[str], total: float = 0.0
+) -> PointMotion:
     """Return the motion whose segments are fastest between states (K + 1, n, 2), each to its target exactly.
 
     Args:
         problem: Points and limits.
         states: Velocity and acceleration at the points.
         names: Of the joints, for messages.
+        total: About how long all of it lasts, s.
 
     Raises:
         PlanningError: When a segment has no motion.
     """
-    jerk = np.stack([-problem.jerk, problem.jerk], axis=1)
-    bounds = np.stack([problem.velocity, problem.acceleration, jerk], axis=1)
+    bounds = _bounds(problem, total)
     rows = np.concatenate([problem.points[..., None], states], axis=2).tolist()
     parts = []
     for k, least in enumerate(problem.least.tolist()):
@@ -88,6 +93,14 @@ def exact_motion(problem: WaypointProblem, states: Array, names: Sequence[str]) 
         profiles = together(boundaries, [fastest(boundary) for boundary in boundaries], least)
         parts.append(_segment(profiles))
     return joined(parts)
+
+
+def _bounds(problem: WaypointProblem, total: float) -> Array:
+    """Return the bounds (n, 3, 2); the acceleration leaves room for what rounding a late break may cost."""
+    jerk = np.stack([-problem.jerk, problem.jerk], axis=1)
+    share = _ROUNDINGS * np.spacing(total) * problem.jerk / np.abs(problem.acceleration).min(axis=1)
+    acceleration = problem.acceleration * (1 - np.minimum(share, _MOST))[:, None]
+    return np.stack([problem.velocity, acceleration, jerk], axis=1)
 
 
 def _segment(profiles: Sequence[PhaseProfile]) -> PointMotion:

@@ -103,8 +103,7 @@ class WaypointProblem:
         speeds = self.scales[:, 0]
         typical = float((steps / speeds).max(axis=1).mean()) + float((self.scales[:, 1] / self.jerk).min())
         time = 2.0 ** round(math.log2(typical))
-        lengths: Array = 2.0 ** np.round(np.log2(speeds * time))
-        return time, lengths
+        return time, np.exp2(np.round(np.log2(speeds * time))).astype(np.float64)
 
     def scaled(self) -> WaypointProblem:
         """Return the problem in its units, each joint from zero."""
