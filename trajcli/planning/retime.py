@@ -53,6 +53,7 @@ def _scaled(planned: Planned, factor: float) -> Planned:
         tool=planned.tool and planned.tool.scaled(factor),
         virtual_points=planned.virtual_points and planned.virtual_points.scaled(factor),
         phase_plane=planned.phase_plane and planned.phase_plane.scaled(factor),
+        certificate=planned.certificate and planned.certificate.scaled(factor),
     )
 
 
