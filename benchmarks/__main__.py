@@ -22,12 +22,14 @@ BENCHMARKS = (
     "writing",
     "logs",
     "reading",
+    "checking",
     "evaluation",
     "forward_kinematics",
     "urdf",
     "inverse_kinematics",
     "calibration",
     "time_optimal",
+    "dynamics",
     "through_points",
     "operational",
     "long_path",
@@ -36,7 +38,7 @@ BENCHMARKS = (
     "viewing",
 )
 OURS = ("trajcli", "numpy", "pydantic", "pyyaml", "typer")
-THEIRS = ("roboticstoolbox-python", "eaik", "toppra", "numpy", "scipy")
+THEIRS = ("roboticstoolbox-python", "eaik", "pin", "toppra", "numpy", "scipy")
 _VERSIONS = """
 import json, platform, sys
 from importlib.metadata import version

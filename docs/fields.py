@@ -45,6 +45,7 @@ from trajcli.planners.tool_path.move import ToleranceSpec
 from trajcli.planners.tool_path.path import Segment
 from trajcli.planners.waypoints.blends import BlendDurations
 from trajcli.planners.waypoints.time_optimal import PathParameter
+from trajcli.planners.waypoints.waypoints import SegmentTimes
 from trajcli.units import Quantity, Units, unit_name
 
 SECTIONS: dict[type, str] = {
@@ -62,7 +63,7 @@ SECTIONS: dict[type, str] = {
     AxisAngleSpec: "[axis and angle](#axis-and-angle)",
     EulerSpec: "[Euler angles](#euler-angles)",
     Configuration: "[configuration](#configuration)",
-    Waypoint: "[waypoint](#waypoints)",
+    Waypoint: "[waypoint](#points-on-the-path)",
     ToolLimitsSpec: "[limits of the tool](#limits-of-the-tool)",
     VelocityByPosition: "[by position](#velocity-by-position)",
     LawSpec: "[law](#law)",
@@ -74,7 +75,7 @@ SECTIONS: dict[type, str] = {
 
 _BY_JOINT = "[for each joint](#values-by-joint)"
 _LEFT_OUT = "left out"
-_POINTS = "list of [waypoints](#waypoints), or `{positions, times, merge}`, or `{csv, merge}`"
+_POINTS = "list of [waypoints](#points-on-the-path), or `{positions, times, merge}`, or `{csv, merge}`"
 
 
 def field_table(model: type[BaseModel], left_out: Mapping[str, str] | None = None) -> str:
@@ -142,6 +143,7 @@ def _reader_form(reader: FieldType) -> str:
         RobotSource: "[robot](#robot)",
         JointDistance: f"number at least 0, {_BY_JOINT}",
         BlendDurations: "number above 0, or a list of them",
+        SegmentTimes: "list of numbers at least 0",
         PathParameter: "`chord` or `centripetal` or `uniform` or a list of numbers",
     }
     return forms[type(reader)]
@@ -188,7 +190,7 @@ def _unit(field: FieldInfo) -> str:
         return "N m or N"
     if isinstance(reader, Gravity):
         return "m/s^2"
-    if isinstance(reader, JointDistance | BlendDurations):
+    if isinstance(reader, JointDistance | BlendDurations | SegmentTimes):
         return "joint" if isinstance(reader, JointDistance) else "s"
     listed = [item for item in get_args(_bare(field.annotation)) if get_origin(item) is Annotated]
     inner = [item for arm in listed for item in get_args(arm) if isinstance(item, Number)]

@@ -45,8 +45,8 @@ the axes of world: the position is moved by `xyz`, the orientation turned about 
 
 The point is given as a pose, or relative to another point; not by its joints. Its `configuration` holds,
 too, if none stands beside `from`. A point without a whole orientation can only be displaced, with
-`frame: world`. `velocity` and `acceleration`, and in a [waypoint](#waypoints) `time` and `blend`, stand
-beside `from`."""
+`frame: world`. `velocity` and `acceleration`, and in a [waypoint](#points-on-the-path) `time` and `blend`,
+stand beside `from`."""
 
 _VALUES = """\
 A value for each joint has one of three forms: one value that holds for all joints, a list with one
@@ -225,7 +225,7 @@ def job_reference() -> str:
     parts += ["### Relative points", _RELATIVE]
     parts += ["### Axis and angle", field_table(AxisAngleSpec), "### Euler angles", field_table(EulerSpec)]
     parts += ["### Configuration", _CONFIGURATION, field_table(Configuration)]
-    parts += ["### Waypoints", _WAYPOINTS, field_table(Waypoint, {"joints": "a pose instead"})]
+    parts += ["### Points on the path", _WAYPOINTS, field_table(Waypoint, {"joints": "a pose instead"})]
     parts += ["## Values by joint", _VALUES]
     parts += ["## Limits", _LIMITS, field_table(JobLimitsSpec)]
     parts += ["### Scale", first_sentence(Scale.__doc__), field_table(Scale), "### Bounds", _BOUNDS]

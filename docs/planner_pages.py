@@ -41,6 +41,10 @@ WISHES = {
         "as fast as velocity, acceleration and jerk allow along a path through points",
         "only the ends count",
     ),
+    "waypoints": (
+        "as fast as velocity, acceleration and jerk allow through points, on whatever path between them",
+        "the path between the points matters",
+    ),
     "line": ("the tool straight from pose to pose, or turning in its place", "only the end counts"),
     "arc": ("the tool on a circle, several turns, a helix", "only the end counts"),
     "path": (

@@ -131,6 +131,18 @@ def test_warnings_and_strict(tmp_path: Path, capfd: pytest.CaptureFixture[str]) 
     assert "error: jtc-positions-only" in err
 
 
+def test_a_form_may_be_named_for_a_consumer_without_output(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """As rows of positions the motion has steps of velocity; as knots of a goal it has none."""
+    text = job(tmp_path, UR.replace("rate: 500", "rate: 500, columns: [t, q]"))
+    code, out, err = call(capfd, "plan", text, "--for", "ros-jtc", "--no-output", "--format", "ros-goal")
+    assert (code, out) == (0, "")
+    assert "jtc-positions-only" not in err
+    code, _, err = call(capfd, "plan", text, "--no-output", "--format", "ros-goal")
+    assert (code, "--no-output and --format exclude each other" in err) == (2, True)
+
+
 def test_names_and_columns(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     code, _, err = call(capfd, "plan", job(tmp_path, UR), "--for", "ur-servo", "--no-output")
     assert (code, "did you mean 'ur-servoj'?" in err) == (2, True)

@@ -68,6 +68,7 @@ SHORT = {
     "spline": job({"planner": "spline", "to": TO, "through": THROUGH, "duration": 0.3}),
     "blends": job({"planner": "blends", "to": TO, "through": THROUGH, "duration": 0.3}),
     "time_optimal": job({"planner": "time_optimal", "to": TO, "through": THROUGH, "duration": 0.3}),
+    "waypoints": job({"planner": "waypoints", "to": TO, "through": THROUGH}, robot={"joints": 2}),
     "line": tool_job({"planner": "line", "to": AWAY, "law": {"shape": "quintic", "duration": 0.2}}),
     "arc": tool_job({"planner": "arc", **ARC, "law": {"shape": "cubic", "duration": 0.2}}),
     "screw": tool_job(

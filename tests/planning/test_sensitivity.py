@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import trajcli
+from trajcli.curves.approach import ApproachLimits, durations_at_limit
 from trajcli.curves.extrema import durations_above
 from trajcli.planning.plan import Plan
 from trajcli.planning.sensitivity import NEAR, RAISED, raised, savings_of, times_at_limits
@@ -30,7 +31,8 @@ def planned(move: dict[str, Any], limits: dict[str, Any], joints: int = 1, **mor
 def at_limits(plan: Plan, index: int = 0) -> dict[tuple[int, int], float]:
     times = times_at_limits(plan.moves[index], plan.verdict.peaks[index])
     assert times == times_at_limits(plan.moves[index])  # peaks only spare work
-    return {(one.joint, one.order): one.seconds for one in times}
+    orders = ("", "velocity", "acceleration", "jerk", "velocity_by_position")
+    return {(one.joint, orders.index(one.quantity)): one.seconds for one in times}
 
 
 def saved(plan: Plan, index: int = 0) -> dict[tuple[int, int], float | None]:
@@ -154,6 +156,34 @@ def test_a_path_binds_all_the_time() -> None:
     assert sum(times.values()) == pytest.approx(plan.trajectory.duration, rel=1e-6)
     assert times[0, 2] == pytest.approx(1.0, abs=0.02)
     assert saved(plan)[0, 1] == pytest.approx(3.5 - (3 / RAISED + RAISED / 2), abs=1e-4)
+
+
+def test_a_limit_by_position_against_dense_samples() -> None:
+    """x = (2 - t)^2 ahead of the end is what a deceleration of 2 leaves: at the limit all the time.
+
+    Beside it the share of 10^5 times at which random cubics are above their limits.
+    """
+    stop = ApproachLimits(np.array([[-10.0, 0.0]]), np.array([2.0]), np.array([0.0]))
+    q, lengths = np.array([-1.0, 4.0, -4.0])[:, None, None], np.array([1.5])
+    assert durations_at_limit(q, lengths, stop, 1e-6)[0] == pytest.approx(1.5, abs=1e-9)
+    assert durations_at_limit(0.999 * q, lengths, stop, 1e-6)[0] == 0
+    # away from the end nothing holds it
+    away = np.array([-1.0, -1.0, -0.25])[:, None, None]
+    assert durations_at_limit(away, lengths, stop, 1e-6)[0] == 0
+    rng = np.random.default_rng(4)
+    pieces, joints = 30, 2
+    coefficients, spans = rng.normal(size=(4, pieces, joints)), rng.uniform(0.4, 1.2, pieces)
+    some = ApproachLimits(np.tile([-4.0, 4.0], (joints, 1)), np.array([0.5, 1.5]), np.array([0.1, 0.3]))
+    counted, u = np.zeros(joints), (np.arange(100_000) + 0.5) / 100_000
+    for piece in range(pieces):
+        for joint in range(joints):
+            own, t = coefficients[:, piece, joint], u * spans[piece]
+            position, velocity = np.polyval(own, t), np.polyval(np.polyder(own), t)
+            low, high = some.bounds(np.stack([position] * joints, axis=1))
+            over = (velocity >= high[:, joint]) | (velocity <= low[:, joint])
+            counted[joint] += over.mean() * spans[piece]
+    assert (counted > 1).all()
+    assert durations_at_limit(coefficients, spans, some, 1e-6) == pytest.approx(counted, abs=1e-3)
 
 
 def test_against_dense_samples() -> None:

@@ -34,7 +34,7 @@ _EXAMPLES = {
     "fk": "trajcli fk --robot ur5e 0 -90 90 0 90 0",
     "ik": "trajcli ik -r ur5e --pose '{xyz: [0.4, 0.1, 0.3]}'",
     "jacobian": "trajcli jacobian --robot ur5e 0 -90 90 0 90 0",
-    "dynamics": "trajcli dynamics -r iiwa14 --payload '{mass: 5}' 0 45 0 -90 0 45 0",
+    "dynamics": "trajcli dynamics -r ur5e --payload '{mass: 5}' 0 -45 90 0 90 0",
     "pose": "trajcli pose --units deg '{rpy: [0, 0, 90]}' '{xyz: [1, 0, 0]}'",
 }
 

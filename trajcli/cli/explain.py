@@ -379,7 +379,8 @@ def _bound(bound: float | None, unit: str) -> str:
 
 
 def _at_limit(one: AtLimitReport) -> str:
-    return f"{one.quantity} of {one.joint} for {one.seconds:.6g} s ({100 * one.share:.4g} %)"
+    name = one.quantity.replace("_", " ")
+    return f"{name} of {one.joint} for {one.seconds:.6g} s ({100 * one.share:.4g} %)"
 
 
 def _savings(savings: Sequence[SavingReport] | None, indent: str) -> Iterator[str]:

@@ -176,7 +176,9 @@ def _check_options(options: PlanOptions) -> StreamFormat:
     """Return the format of the output; refuse options that do not fit it, or each other."""
     log = () if options.log is None else options.log.given
     if options.no_output:
-        given = {"--output": options.output, "--format": options.form, **dict.fromkeys(log, "")}
+        # a consumer is judged by the form in which the motion would come to it
+        named = options.form if options.consumer is None else None
+        given = {"--output": options.output, "--format": named, **dict.fromkeys(log, "")}
         for name in (name for name, value in given.items() if value is not None):
             raise InputError(f"--no-output and {name} exclude each other", hint="leave one of them out")
     form = format_of(options.output, options.form)

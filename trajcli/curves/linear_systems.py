@@ -181,20 +181,30 @@ class BlockFactors:
     """The factored matrix.
 
     Attributes:
-        size: Number of 2 x 2 blocks on its diagonal.
+        diagonal: Its blocks A[i, i], shape (b, 2, 2).
+        right: Its blocks A[i, i + 1], shape (b - 1, 2, 2).
         levels: From the finest on.
         rest: Inverse of the last block, shape (1, 4, 4).
     """
 
-    size: int
+    diagonal: Array
+    right: Array
     levels: tuple[_Level, ...]
     rest: Array
 
-    def solve(self, right: Array) -> Array:
-        """Return x, shape (b, 2), with A x = right, shape (b, 2)."""
-        values = np.zeros((2 * ((self.size + 1) // 2), 2))
-        values[: self.size] = right
-        return self._solved(values.reshape(-1, 4, 1), 0).reshape(-1, 2)[: self.size]
+    def solve(self, values: Array) -> Array:
+        """Return x, shape (b, 2), with A x = values, shape (b, 2); the residual gives lost digits back."""
+        x = self._solution(values)
+        residual = values - _applied(self.diagonal, x)
+        residual[:-1] -= _applied(self.right, x[1:])
+        residual[1:] -= _applied(np.swapaxes(self.right, 1, 2), x[:-1])
+        return np.asarray(x + self._solution(residual))
+
+    def _solution(self, values: Array) -> Array:
+        blocks = len(values)
+        joined = np.zeros((2 * ((blocks + 1) // 2), 2))
+        joined[:blocks] = values
+        return self._solved(joined.reshape(-1, 4, 1), 0).reshape(-1, 2)[:blocks]
 
     def _solved(self, right: Array, depth: int) -> Array:
         """Return the solution (b, 4, 1) from one level on."""
@@ -220,7 +230,6 @@ def block_factors(diagonal: Array, right: Array) -> BlockFactors:
         diagonal: Blocks A[i, i], shape (b, 2, 2).
         right: Blocks A[i, i + 1], shape (b - 1, 2, 2).
     """
-    size = len(diagonal)
     blocks, links = _paired(diagonal, right)
     levels = []
     while len(blocks) > 1:
@@ -231,7 +240,7 @@ def block_factors(diagonal: Array, right: Array) -> BlockFactors:
         kept[1 : 1 + len(after)] -= up @ after
         levels.append(_Level(inverse, before, after, down, up))
         blocks, links = kept, -(down[: len(after)] @ after)
-    return BlockFactors(size, tuple(levels), _inverse(blocks))
+    return BlockFactors(diagonal, right, tuple(levels), _inverse(blocks))
 
 
 def _paired(diagonal: Array, right: Array) -> tuple[Array, Array]:
@@ -244,6 +253,11 @@ def _paired(diagonal: Array, right: Array) -> tuple[Array, Array]:
     blocks[: size // 2, :2, 2:], blocks[: size // 2, 2:, :2] = within, np.swapaxes(within, 1, 2)
     links[:, 2:, :2] = right[1::2]
     return blocks, links
+
+
+def _applied(blocks: Array, x: Array) -> Array:
+    """Return the products (b, 2) of blocks (b, 2, 2) and vectors (b, 2)."""
+    return np.asarray((blocks @ x[:, :, None])[:, :, 0])
 
 
 def _inverse(blocks: Array) -> Array:

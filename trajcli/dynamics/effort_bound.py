@@ -13,6 +13,7 @@ Source: as of `trajcli/curves/bernstein.py` and `trajcli/kinematics/power_series
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +21,7 @@ import numpy as np
 from trajcli.curves.bernstein import BETWEEN_NODES, NODES_DEGREE, control_points, hull_matrices
 from trajcli.curves.extrema import critical_points
 from trajcli.curves.piecewise import Array, derivative_coefficients, distinct, horner, taylor_shift
-from trajcli.dynamics.newton_euler import InverseDynamics
+from trajcli.dynamics.newton_euler import InverseDynamics, direction
 from trajcli.frozen import frozen
 from trajcli.kinematics.power_series import growth, series_exponential, series_product
 
@@ -85,6 +86,21 @@ class EffortSurvey:
         """How near to the efforts of each joint their bounds are to come, shape (n,)."""
         largest: Array = np.abs(self.parts.sum(axis=3)).max(axis=(0, 1), initial=0.0)
         return _CLOSE * np.maximum(np.minimum(largest, self.limits), _SMALL)
+
+    def doubtful(self, limits: Array, room: float) -> Iterator[tuple[int, int, float]]:
+        """Yield index, direction and magnitude of the limits that a first look at the hull does not prove.
+
+        Args:
+            limits: Lower and upper bounds, shape (n, 2).
+            room: By what part of a limit it may be passed.
+        """
+        points = np.tensordot(hull_matrices()[0], self.parts.sum(axis=3), axes=(1, 1))
+        high = (points.max(axis=0) + self.rest).max(axis=0, initial=0.0)
+        low = (points.min(axis=0) - self.rest).min(axis=0, initial=0.0)
+        for joint, (lower, upper) in enumerate(limits.tolist()):
+            for sign, most, limit in ((1, high[joint], upper), (-1, -low[joint], -lower)):
+                if not most <= limit * (1.0 + room):
+                    yield joint, sign, limit
 
     def highest(self, stretch: float = 1.0) -> list[EffortPeak]:
         """Return the largest effort of each joint upwards.
@@ -217,7 +233,7 @@ def _known(dynamics: InverseDynamics, starts: Array, lengths: Array, coefficient
     parts = np.empty((*q.shape, _PARTS))
     parts[..., 0], parts[..., 3] = dynamics.apart_from_gravity(q, qd, qdd)
     parts[..., 1] = qd * [joint.friction.viscous for joint in joints]
-    signs = np.sign(qd[:, NODES_DEGREE // 2])
+    signs = direction(qd[:, NODES_DEGREE // 2])
     parts[..., 2] = (signs * [joint.friction.coulomb for joint in joints])[:, None]
     n = NODES_DEGREE + 1
     highest = effort_majorants(dynamics, q[:, 0], growth(coefficients, lengths, n + 2))[n]

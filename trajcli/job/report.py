@@ -196,7 +196,7 @@ class AtLimitReport(ReportPart):
     """For how long a move is at one limit: within a millionth of it, from the roots of polynomials."""
 
     joint: str
-    quantity: JointQuantity
+    quantity: JointQuantity | Literal["velocity_by_position"]
     seconds: Annotated[float, Field(description="In either direction.")]
     share: Annotated[float, Field(description="Of the duration of the move.")]
     method: Annotated[
@@ -295,6 +295,46 @@ class OutsideReport(ReportPart):
         float, Field(description="Where it is furthest, seconds from the start of the trajectory.")
     ]
     unit: UnitName
+
+
+class OffChordReport(ReportPart):
+    """How far a joint leaves the straight chords between the points of a move."""
+
+    joint: str
+    distance: Annotated[float, MeasuredIn(), Field(description="At most, SI.")]
+    time: Annotated[float, Field(description="Where, seconds from the start of the trajectory.")]
+    unit: UnitName
+
+
+class FastestReport(ReportPart):
+    """How near a motion that was searched for is to the fastest through its points."""
+
+    lower: Annotated[
+        float | None,
+        Field(description="No motion through the points is faster, seconds; null where none is known."),
+    ]
+    above: Annotated[
+        float | None, Field(description="Part by which the move is at most above the fastest possible.")
+    ]
+    joint: Annotated[
+        str | None, Field(description="The joint that needs so long; null where several together do.")
+    ]
+    method: Annotated[
+        Literal["bounded", "heuristic"],
+        Field(description="bounded: `above` is proven; heuristic: nothing is known of it."),
+    ]
+    starts: Annotated[int, Field(description="How many starting points were tried.")]
+    agreeing: Annotated[
+        int, Field(description="How many of them led to this duration, or a thousandth above it at most.")
+    ]
+    found: Annotated[
+        list[float | None],
+        Field(description="Durations to which they led, seconds; null where one led to none."),
+    ]
+    stopping: Annotated[
+        float | None, Field(description="Seconds with a stop at each point; null where there is none.")
+    ]
+    off_chords: list[OffChordReport]
 
 
 class ToolPeakReport(ReportPart):
@@ -401,6 +441,10 @@ class MoveReport(ReportPart):
         Field(
             description="Joints that leave the range of the waypoints, and how far; null without waypoints."
         ),
+    ] = None
+    fastest: Annotated[
+        FastestReport | None,
+        Field(description="Of a motion that was searched for; null for other moves."),
     ] = None
     tool: Annotated[
         ToolReport | None, Field(description="The tool on its path; null for a move in joint space.")

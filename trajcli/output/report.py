@@ -18,11 +18,13 @@ from trajcli.job.report import (
     BindingReport,
     ByPositionReport,
     EventReport,
+    FastestReport,
     FindingReport,
     KnotsDeviation,
     KnotsReport,
     LowestSpeedReport,
     MoveReport,
+    OffChordReport,
     OutsideReport,
     PeakReport,
     Report,
@@ -168,6 +170,7 @@ def _move(plan: Plan, index: int, *, reference: bool, peers: bool) -> MoveReport
         at_limit=at_limit_of(move, plan.verdict.peaks[index]),
         waypoints=_waypoints(move, span),
         outside=_outside(move, plan.verdict, index),
+        fastest=_fastest(move, span),
         tool=_tool(plan.trajectory, span, move),
         tool_peaks=None if of_tool is None else _tool_peaks(of_tool, span, move.robot),
         reference=reference_of(move) if reference else None,
@@ -251,6 +254,30 @@ def _outside(move: PlannedMove, verdict: Verdict, index: int) -> tuple[OutsideRe
                 at = float(time[joint])
                 reports.append(OutsideReport(joint=name, beyond=beyond, time=at, unit=units[joint]))
     return tuple(reports)
+
+
+def _fastest(move: PlannedMove, span: Span) -> FastestReport | None:
+    """Return how near a motion that was searched for is to the fastest; None for other moves."""
+    known = move.planned.certificate
+    if known is None:
+        return None
+    units, names = joint_units(move.robot.joint_types), move.robot.joint_names
+    rows = zip(names, known.off_chords.tolist(), known.off_times.tolist(), units, strict=True)
+    bounded = known.lower > 0
+    return FastestReport(
+        lower=known.lower if bounded else None,
+        above=max(move.duration / known.lower - 1, 0.0) if bounded else None,
+        joint=None if known.joint is None else names[known.joint],
+        method="bounded" if bounded else "heuristic",
+        starts=len(known.found),
+        agreeing=known.agreeing,
+        found=[time if math.isfinite(time) else None for time in known.found],
+        stopping=known.stopping if math.isfinite(known.stopping) else None,
+        off_chords=[
+            OffChordReport(joint=name, distance=off, time=span.start + time, unit=unit)
+            for name, off, time, unit in rows
+        ],
+    )
 
 
 def _tool(trajectory: Trajectory, span: Span, move: PlannedMove) -> ToolReport | None:

@@ -29,7 +29,7 @@ def at_limit_of(move: PlannedMove, peaks: Sequence[Peaks]) -> list[AtLimitReport
     return [
         AtLimitReport(
             joint=names[one.joint],
-            quantity=QUANTITIES[one.order],
+            quantity=one.quantity,
             seconds=one.seconds,
             share=min(1.0, one.seconds / move.duration),
             method=one.method,

@@ -25,6 +25,7 @@ _WHERE = {
     "spline": "waypoints.spline.Spline",
     "blends": "waypoints.blends.Blends",
     "time_optimal": "waypoints.time_optimal.TimeOptimal",
+    "waypoints": "waypoints.waypoints.FastestThroughPoints",
     "line": "tool_path.line.LineMove",
     "arc": "tool_path.arc.ArcMove",
     "path": "tool_path.path.PathMove",

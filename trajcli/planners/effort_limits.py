@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,6 @@ from trajcli.kinematics.robot import Robot
 from trajcli.units import effort_unit
 
 if TYPE_CHECKING:
-    from trajcli.curves.third_order.parameterization import JerkLimitedMotion
     from trajcli.curves.time_optimal.constraints import PathConstraint
     from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion
     from trajcli.dynamics.effort_constraint import EffortConstraint, HeldOverLimitError
@@ -31,8 +30,7 @@ _ROUNDS = 3  # of tangents at the speeds of the motion before: the last one chan
 _TRIES = 4  # of lower limits between moving states
 _LOWERED = 1.5  # times what is proven to be over them
 
-_Motion = TypeVar("_Motion", "TimeOptimalMotion", "JerkLimitedMotion")
-_Solve = Callable[["tuple[PathConstraint, ...]"], _Motion]
+Solve = Callable[["tuple[PathConstraint, ...]"], "TimeOptimalMotion"]
 
 
 def lacks_acceleration(robot: Robot) -> NDArray[np.bool_]:
@@ -61,7 +59,7 @@ def effort_constraints(path: PiecewisePolynomial, robot: Robot) -> tuple[EffortC
     return (EffortConstraint(InverseDynamics(robot), path, limits.effort, limits.velocity),)
 
 
-def solved_within_efforts(path: PiecewisePolynomial, robot: Robot, solve: _Solve[_Motion]) -> _Motion:
+def solved_within_efforts(path: PiecewisePolynomial, robot: Robot, solve: Solve) -> TimeOptimalMotion:
     """Return the fastest motion along a path, within limits of effort that are proven for all t.
 
     Args:
@@ -93,18 +91,17 @@ def solved_within_efforts(path: PiecewisePolynomial, robot: Robot, solve: _Solve
     return motion
 
 
-def _solved(constraint: EffortConstraint, solve: _Solve[_Motion]) -> _Motion:
+def _solved(constraint: EffortConstraint, solve: Solve) -> TimeOptimalMotion:
     """Return the fastest motion, with viscous friction by its tangents at the speeds of the motion."""
     motion = solve((constraint,))
     for _ in range(_ROUNDS - 1 if constraint.has_viscous else 0):
-        motion = solve((replace(constraint, speed=_speed_along(motion.law)),))
+        points, speeds = motion.grid, motion.law.evaluate(motion.law.breaks, 1)[:, 0]
+
+        def near(s: Array, points: Array = points, speeds: Array = speeds) -> Array:
+            return np.interp(s, points, speeds)
+
+        motion = solve((replace(constraint, speed=near),))
     return motion
-
-
-def _speed_along(law: PiecewisePolynomial) -> Callable[[Array], Array]:
-    """Return sd as a function of s, by straight lines between the breaks of a law."""
-    points, speeds = (law.evaluate(law.breaks, order)[:, 0] for order in (0, 1))
-    return lambda s: np.interp(s, points, speeds)
 
 
 def _proven(trajectory: PiecewisePolynomial, robot: Robot) -> tuple[float, float]:
@@ -115,15 +112,14 @@ def _proven(trajectory: PiecewisePolynomial, robot: Robot) -> tuple[float, float
     limits = robot.limits.effort
     survey = effort_survey(InverseDynamics(robot), trajectory.breaks, trajectory.coefficients, limits)
     factor, over = 1.0, 0.0
-    for joint, (low, high) in enumerate(limits.tolist()):
-        for sign, limit in ((1, high), (-1, -low)):
-            if np.isfinite(limit):
-                factor = max(factor, needed_stretch(survey, joint, sign, limit, _ROOM).factor)
-                over = max(over, survey.peak(joint, sign).most / limit - 1.0)
+    for joint, sign, limit in survey.doubtful(limits, _ROOM):
+        needed = needed_stretch(survey, joint, sign, limit, _ROOM).factor
+        if needed > 1.0:
+            factor, over = max(factor, needed), max(over, survey.peak(joint, sign).most / limit - 1.0)
     return factor, over
 
 
-def _slower(motion: _Motion, factor: float) -> _Motion:
+def _slower(motion: TimeOptimalMotion, factor: float) -> TimeOptimalMotion:
     """Return the motion stretched, where a stretch helps."""
     if not np.isfinite(factor):
         return motion  # the verdict says why

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import field
+from dataclasses import field, replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -27,6 +27,7 @@ WhenOverLimit = Literal["error", "slow"]
 _REMARKS = (
     "refined",
     "bound",
+    "fastest_found",
 )  # kinds of events that are about how a curve was computed, and concede nothing
 _GIVEN = ("duration", "velocity", "acceleration", "deceleration", "timed")  # where they say how long it lasts
 LITTLE = 1e-3
@@ -85,6 +86,33 @@ def stretched(factor: float) -> Event:
 
 
 @frozen
+class Certificate:
+    """What is known of how near a motion through points is to the fastest.
+
+    Attributes:
+        lower: No motion through the points within the limits is faster, s.
+        joint: Index of the joint that needs so long; None where several together do.
+        found: Durations to which the starting points of the search led, s, infinite where one led to none.
+        agreeing: How many of these are the motion's, or longer by a thousandth at most.
+        stopping: Duration of the motion that stops at each point, s; infinite where there is none.
+        off_chords: By how much each joint leaves the straight chords between the points at most, shape (n,).
+        off_times: Where it does, s from the start of the move, shape (n,).
+    """
+
+    lower: float
+    joint: int | None
+    found: tuple[float, ...]
+    agreeing: int
+    stopping: float
+    off_chords: Array
+    off_times: Array
+
+    def scaled(self, factor: float) -> Certificate:
+        """Return what is known of the motion that takes `factor` times as long."""
+        return replace(self, off_times=self.off_times * factor)
+
+
+@frozen
 class Planned:
     """What a planner returns.
 
@@ -115,6 +143,7 @@ class Planned:
         braking: How a start outside the velocity or acceleration limits is brought inside first: by each
             joint, or by all on one line; None where it is not.
         continuity: Derivatives that join inside it, where they are fewer than its planner promises.
+        certificate: Of a motion that was searched for: how near to the fastest it is.
     """
 
     curve: PiecewisePolynomial
@@ -138,6 +167,7 @@ class Planned:
     phase_plane: PhasePlane | None = None
     braking: Literal["each", "line"] | None = None
     continuity: Literal[1, 2] | None = None
+    certificate: Certificate | None = None
 
 
 class Planner(Model):
@@ -303,6 +333,11 @@ class PlannedMove:
         return self.planned.curve.duration
 
     @property
+    def continuity(self) -> Literal[1, 2]:
+        """Derivatives that join without a jump inside it and at rest."""
+        return self.planned.continuity or self.planner.joins
+
+    @property
     def at_rest(self) -> bool:
         """Whether it begins and ends at rest."""
         return self.start.at_rest and self.planned.end.at_rest
@@ -324,8 +359,7 @@ class PlannedMove:
 
     def span(self, start: float, end: float) -> Span:
         """Return the part of a trajectory, from `start` to `end` s, that is this move."""
-        continuity = self.planned.continuity or self.planner.joins
-        return Span(self.index, self.planner.tag, start, end, continuity, self.robot.payload)
+        return Span(self.index, self.planner.tag, start, end, self.continuity, self.robot.payload)
 
     def alone(self) -> Trajectory:
         """Return the trajectory of this move alone."""

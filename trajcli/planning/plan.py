@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -25,7 +25,7 @@ from trajcli.errors import (
 from trajcli.frozen import frozen
 from trajcli.job.limits import with_move_limits
 from trajcli.job.read import LoadedJob
-from trajcli.kinematics.robot import QUANTITIES, Robot, ToolLimits
+from trajcli.kinematics.robot import QUANTITIES, Payload, Robot, ToolLimits
 from trajcli.language.targets import Target
 from trajcli.planners.planner import Event, PlannedMove, Planner, Resolve
 from trajcli.progress import report_progress
@@ -34,6 +34,7 @@ from trajcli.trajectory import State, Trajectory
 if TYPE_CHECKING:
     from trajcli.planning.resolve_poses import ResolvedPose
 
+Carried = Callable[[int, Payload | None], Payload | None]
 _NO_TOOL_LIMITS = ToolLimits()
 
 
@@ -66,15 +67,20 @@ class Plan:
         return f"{type(self).__name__}({of_what}, {duration:g} s, {self.verdict.text})"
 
 
-def plan_job(loaded: LoadedJob) -> Plan:
+def plan_job(loaded: LoadedJob, carried: Carried | None = None, *, advise: bool = True) -> Plan:
     """Return the plan of a job, with its verdict: a verdict with findings is no error here.
+
+    Args:
+        loaded: The job.
+        carried: What the tool carries in a move instead, by its index and what the job says.
+        advise: Whether findings come with what would help, which is tried out.
 
     Raises:
         InputError: When a move loosens a limit, or lacks one it needs.
         PlanningError: When a move has no curve.
     """
     poses: dict[int | None, ResolvedPose] = {}
-    moves = _plan_moves(loaded, poses)
+    moves = _plan_moves(loaded, poses, carried)
     events = [*loaded.events, *_events_of(poses.get(None), None)]
     for move in moves:
         events += _events_of(poses.get(move.index), move.index)
@@ -82,7 +88,7 @@ def plan_job(loaded: LoadedJob) -> Plan:
     trajectory = _joined(moves, loaded, _first_state(loaded, _first_moving(moves), events))
     report_progress("checking the trajectory")
     verdict = verify(trajectory, [move.robot.limits for move in moves], [move.promise for move in moves])
-    if not verdict.passed:
+    if advise and not verdict.passed:
         from trajcli.planning.advice import with_tested_advice
 
         verdict = _in_units(_with_unit_hint(with_tested_advice(verdict, moves, loaded.say), loaded), loaded)
@@ -92,7 +98,9 @@ def plan_job(loaded: LoadedJob) -> Plan:
     return Plan(loaded, tuple(moves), trajectory, verdict, conceded, poses, remarks)
 
 
-def _plan_moves(loaded: LoadedJob, poses: dict[int | None, ResolvedPose]) -> list[PlannedMove]:
+def _plan_moves(
+    loaded: LoadedJob, poses: dict[int | None, ResolvedPose], carried: Carried | None
+) -> list[PlannedMove]:
     """Return the moves of a job, and note how its poses are reached.
 
     Raises:
@@ -111,12 +119,13 @@ def _plan_moves(loaded: LoadedJob, poses: dict[int | None, ResolvedPose]) -> lis
         report_progress(f"planning move {index + 1} of {len(loaded.job.moves)} ({planner.tag})")
         start = _handed_over(state, before, planner)
         robot = replace(robot, payload=planner.carried_after(robot.payload)) if planner.handles else robot
+        used = robot if carried is None else replace(robot, payload=carried(index, robot.payload))
         begun = sum(float(done.planned.curve.breaks[-1]) for done in moves)
         try:
             with _errors_of(loaded, index, planner, begun):
                 reachable = planner.with_joint_targets(partial(resolve, index=index), state.position)
                 with _points_of_errors(loaded, index):
-                    move = _plan_move(loaded, robot, index, reachable.coming_from(origin), start)
+                    move = _plan_move(loaded, used, index, reachable.coming_from(origin), start)
             moves.append(move)
             state = move.planned.end
         except MissingLimitError as error:

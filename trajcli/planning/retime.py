@@ -53,6 +53,7 @@ def _scaled(planned: Planned, factor: float) -> Planned:
         tool=planned.tool and planned.tool.scaled(factor),
         virtual_points=planned.virtual_points and planned.virtual_points.scaled(factor),
         phase_plane=planned.phase_plane and planned.phase_plane.scaled(factor),
+        certificate=planned.certificate and planned.certificate.scaled(factor),
     )
 
 
@@ -218,7 +219,9 @@ def require_holdable(move: PlannedMove) -> None:
     )
     hint = "no duration helps: carry less, go another way, or raise the limit"
     value = copysign(peak.static, limit)
-    raise PlanningError(Problem(message, hint, joint=name, time=peak.time, value=value, amounts=amounts))
+    raise PlanningError(
+        Problem(message, hint, joint=name, time=peak.time, value=value, limit=limit, amounts=amounts)
+    )
 
 
 def align_to_period(move: PlannedMove, rate: float) -> PlannedMove:

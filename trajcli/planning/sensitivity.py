@@ -15,6 +15,7 @@ from typing import Literal
 
 import numpy as np
 
+from trajcli.curves.approach import durations_at_limit
 from trajcli.curves.extrema import Peaks, durations_above
 from trajcli.curves.piecewise import Array, derivative_coefficients
 from trajcli.errors import TrajcliError
@@ -23,6 +24,9 @@ from trajcli.kinematics.robot import QUANTITIES, Limits
 from trajcli.planners.planner import PlannedMove, Planner
 from trajcli.planning.plan import Plan, plan_move_within
 from trajcli.progress import report_progress
+
+BindingQuantity = Literal["velocity", "acceleration", "jerk", "velocity_by_position"]
+_BINDING: tuple[BindingQuantity, ...] = ("velocity", "acceleration", "jerk")
 
 NEAR = 1e-6
 """Relative: a limit binds where the motion is as near to it as that."""
@@ -38,13 +42,13 @@ class TimeAtLimit:
 
     Attributes:
         joint: Index.
-        order: 1 for velocity, 2 acceleration, 3 jerk.
+        quantity: "velocity", "acceleration", "jerk" or "velocity_by_position".
         seconds: For how long, in either direction.
         method: "exact": from roots; "phases": from the switching structure of a time-optimal law.
     """
 
     joint: int
-    order: int
+    quantity: BindingQuantity
     seconds: float
     method: Literal["exact", "phases"] = "exact"
 
@@ -69,7 +73,7 @@ class Saving:
 
 
 def times_at_limits(move: PlannedMove, peaks: Sequence[Peaks] | None = None) -> tuple[TimeAtLimit, ...]:
-    """Return for how long a move is at its limits of velocity, acceleration and jerk, the longest first.
+    """Return for how long a move is at the limits of its joints, the longest first.
 
     Args:
         move: The move.
@@ -94,24 +98,27 @@ def times_at_limits(move: PlannedMove, peaks: Sequence[Peaks] | None = None) -> 
                 above = durations_above(sign * rates[:, :, some], curve.lengths, levels[some])
                 seconds[some] += above.sum(axis=0)
         found += [
-            TimeAtLimit(int(joint), order, float(each))
+            TimeAtLimit(int(joint), _BINDING[order - 1], float(each))
             for joint, each in zip(joints, seconds, strict=True)
             if each > 0
         ]
+    if move.robot.limits.has_velocity_by_position and curve.degree > 1:
+        limits = move.robot.limits.approach
+        seconds = durations_at_limit(curve.coefficients, curve.lengths, limits, NEAR)
+        for joint, each in zip(limits.limited.tolist(), seconds.tolist(), strict=True):
+            found += [TimeAtLimit(joint, "velocity_by_position", each)] if each > 0 else []
     return tuple(sorted(found, key=lambda one: -one.seconds))
 
 
 def _times_of_phases(move: PlannedMove) -> tuple[TimeAtLimit, ...]:
     """Return for how long limits of joints bind by the phases of the move."""
-    seconds: dict[tuple[int, int], float] = {}
+    seconds: dict[tuple[int, BindingQuantity], float] = {}
     for phase in move.planned.phases:
-        quantity = phase.name.split()[0]
-        if phase.joint is not None and quantity in QUANTITIES:
-            key = phase.joint, QUANTITIES.index(quantity)
+        named = [quantity for quantity in _BINDING if phase.name.split()[0] == quantity]
+        if phase.joint is not None and named:
+            key = phase.joint, named[0]
             seconds[key] = seconds.get(key, 0.0) + phase.end - phase.start
-    times = [
-        TimeAtLimit(joint, order, each, "phases") for (joint, order), each in seconds.items() if each > 0
-    ]
+    times = [TimeAtLimit(*key, each, "phases") for key, each in seconds.items() if each > 0]
     return tuple(sorted(times, key=lambda one: -one.seconds))
 
 

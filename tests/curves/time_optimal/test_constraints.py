@@ -83,7 +83,7 @@ def test_the_excess_of_a_speed_limit_is_the_largest_share_of_it(seed):
 class Wave:
     """A speed limit that is 1 at every 96th part of [0, 1], where grid points stand, and 0.7 between them."""
 
-    allows_ramps, bounds_sdd = True, False
+    estimate, bounds_sdd = 1.0, False
 
     def limit(self, s):
         return 1.0 - 0.3 * np.sin(96 * np.pi * s) ** 2

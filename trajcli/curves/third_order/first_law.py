@@ -14,7 +14,8 @@ from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion
 from trajcli.frozen import frozen
 
 _NODES = 64  # over the whole path
-_FEWEST = 3  # of a piece of the path; of a section between two stops, at least as many
+_FEWEST = 3  # of a piece of the path
+_MANY = 64  # breaks of a section between two stops: with more, a node at each is enough
 _WIDEST = 0.3  # of the duration of a section: a wider window would leave nothing of the law
 _SEARCHED = 8  # samples between two nodes, among which the times of breaks are looked up
 _NEWTON = 3  # steps after that
@@ -153,15 +154,45 @@ def _nodes(
     """Return s, sd and sdd at nodes between breaks (k,), evenly in time; their number is about `count`."""
     passed = _passed(average, breaks, count)
     spacing = (passed[-1] - passed[0]) / count
-    parts = np.maximum(np.ceil(np.diff(passed) / spacing), _FEWEST).astype(np.intp)
+    fewest = _FEWEST if breaks.size <= _MANY else 1
+    parts = np.maximum(np.ceil(np.diff(passed) / spacing), fewest).astype(np.intp)
     owner = np.repeat(np.arange(parts.size), parts)
     step = np.arange(owner.size) - (np.cumsum(parts) - parts)[owner]
     times = passed[owner] + np.diff(passed)[owner] * step / parts[owner]
     s, speed, acceleration = average.states(np.append(times, passed[-1]))
     s[np.append(step == 0, True)] = breaks
     for end, state in ((0, ends.start), (-1, ends.end)):
+        if state[0] > 0.0:
+            near = abs(
+                float(average.states(np.array([passed[end] + (1 + 2 * end) * average.width]))[0][0] - s[end])
+            )
+            speed, acceleration = _led_to(
+                state[0], np.abs(s - s[end]) / near, 1 + 2 * end, near, speed, acceleration
+            )
         speed[end], acceleration[end] = state
     return s, speed, acceleration
+
+
+def _led_to(
+    wanted: float, shares: Array, sign: int, length: float, speed: Array, acceleration: Array
+) -> tuple[Array, Array]:
+    """Return speeds and accelerations that come near to a speed as the shares (k,) of a length vanish.
+
+    Args:
+        wanted: The speed where the share is zero.
+        shares: Distances from there, in multiples of the length.
+        sign: 1 where s grows with the distance, or -1.
+        length: Over which the speed is led away from it.
+        speed: Shape (k,).
+        acceleration: Shape (k,).
+    """
+    x = np.minimum(shares, 1.0)
+    weight, slope = x**2 * (3.0 - 2.0 * x), sign * 6.0 * x * (1.0 - x) / length
+    led = wanted + (speed - wanted) * weight
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = np.where(speed > 0.0, acceleration / speed, 0.0)
+    changed = led * (slope * (speed - wanted) + weight * along)
+    return led, np.where(x < 1.0, changed, acceleration)
 
 
 def _passed(average: MovingAverage, breaks: Array, count: float) -> Array:

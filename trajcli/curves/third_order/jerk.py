@@ -15,6 +15,9 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, derivativ
 from trajcli.curves.time_optimal.time_law import LawPieces, blocks
 from trajcli.frozen import frozen
 
+_KINK = 1e-6  # of the largest q'' of a joint: a jump above it is one
+_ROUNDING = 1e-9  # of the largest q'' of all joints, or q' over a piece: the same, where one hardly bends
+
 
 @frozen
 class JerkRows:
@@ -43,6 +46,28 @@ class ThirdOrderConstraint(Protocol):
     def excess(self, law: LawPieces) -> Array:
         """Return the largest multiple of its limits that each piece of a law reaches, shape (N,)."""
         ...
+
+
+@frozen
+class LawJerkConstraint:
+    """A limit of sddd itself; what is linear in each piece has its extremes at the ends.
+
+    Attributes:
+        limit: Of its size, positive.
+    """
+
+    limit: float
+
+    def rows(self, s: Array, side: Side) -> JerkRows:
+        """Return the rows of both signs at the points (p,) of the path."""
+        del side
+        signs, nothing = np.tile([1.0, -1.0], (s.size, 1)), np.zeros((s.size, 2))
+        return JerkRows(signs, nothing, nothing, np.full((s.size, 2), self.limit))
+
+    def excess(self, law: LawPieces) -> Array:
+        """Return what is used of the limit in each piece, shape (N,)."""
+        points = control_points(derivative_coefficients(law.coefficients, 3), law.durations)
+        return np.asarray(np.abs(points).max(axis=0) / self.limit)
 
 
 @frozen
@@ -82,3 +107,18 @@ class JointJerkConstraint:
             used = points / self.jerk[:, 1, None], points / self.jerk[:, 0, None]
             excess[block] = np.maximum(*used).max(axis=(0, 1))
         return excess
+
+
+def curvature_jumps(path: PiecewisePolynomial, jerk: Array) -> Array:
+    """Return the breaks at which q'' of a joint with a limit of jerk jumps: the motion must stop.
+
+    Args:
+        path: q(s) with n joints.
+        jerk: Bounds, shape (n, 2).
+    """
+    begins, ends = path.piece_ends(2)
+    largest = np.maximum(np.abs(begins), np.abs(ends)).max(axis=0)
+    straight = np.abs(path.piece_ends(1)).max() / path.lengths.min()
+    nothing = np.maximum(_KINK * largest, _ROUNDING * max(float(largest.max()), float(straight)))
+    jumps = np.abs(begins[1:] - ends[:-1]) > nothing
+    return np.asarray(path.breaks[1:-1][(jumps & np.isfinite(jerk).any(axis=1)).any(axis=1)])

@@ -17,7 +17,7 @@ from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.curves.third_order.convex_step import faster
 from trajcli.curves.third_order.first_law import EndStates, smoothed_law
-from trajcli.curves.third_order.jerk import JointJerkConstraint, ThirdOrderConstraint
+from trajcli.curves.third_order.jerk import JointJerkConstraint, ThirdOrderConstraint, curvature_jumps
 from trajcli.curves.third_order.limits import LawLimits, most_nodes, parts_for, time_lost
 from trajcli.curves.third_order.quartic_law import QuarticLaw, ReversingLawError
 from trajcli.curves.time_optimal.constraints import JointConstraint, PathConstraint
@@ -30,6 +30,7 @@ from trajcli.curves.time_optimal.time_law import law_and_trajectory
 from trajcli.frozen import frozen
 
 _FIRST_GAPS = (1e-3, 1e-4)  # of the duration: what the steps on the first nodes may miss
+_MORE_FIRST, _NEARLY = 8, 1.5  # more of them while a law between moving ends is so far above its limits
 _GAP, _LAST_GAP = 1e-4, 1e-5  # the same of those while nodes are refined, and of the last ones
 _REFINEMENTS = 7
 _SETTLING, _MOST_SETTLING = 8, 30  # steps with lowered limits; where nothing can be slowed down
@@ -44,28 +45,16 @@ _SHARES = (1.0, 0.5, 0.25, 0.1)  # of a step, the largest first that leads forwa
 
 
 @frozen
-class JerkLimitedMotion:
-    """A near time-optimal motion.
+class JerkLimitedMotion(TimeOptimalMotion):
+    """A near time-optimal motion, whose law has quartic pieces.
 
     Attributes:
-        trajectory: q(t) from t = 0 on.
-        law: s(t), of degree 4.
         second_order: The optimum without limits of jerk: no motion is faster.
-        stretch: By what factor the law was slowed down as a whole to keep the limits everywhere.
         steps: Number of convex steps.
-        lost: Estimate of the share of the duration that finer nodes would save.
-        stops: s at the corners of the path, where the motion stops, shape (k,).
-        stop_times: When it does, in seconds, shape (k,).
     """
 
-    trajectory: PiecewisePolynomial
-    law: PiecewisePolynomial
     second_order: TimeOptimalMotion
-    stretch: float
     steps: int
-    lost: float
-    stops: Array
-    stop_times: Array
 
     @property
     def lower_bound(self) -> float:
@@ -87,10 +76,10 @@ def jerk_limited_time_optimal(
 ) -> JerkLimitedMotion:
     """Return the fastest motion that is found along a path within bounds that hold for all t.
 
-    At a corner the motion stops. Where it rests, the acceleration is zero.
+    At a corner, and where q'' jumps, the motion stops. Where it rests, the acceleration is zero.
 
     Args:
-        path: q(s) with n joints, of degree at most 5; q'' is continuous but at corners.
+        path: q(s) with n joints, of degree at most 5, without jumps.
         velocity: Lower and upper bounds, shape (n, 2), lower < 0 < upper, infinite for none; per second.
         acceleration: The same, per second squared; not all infinite.
         jerk: The same, per second cubed.
@@ -107,9 +96,9 @@ def jerk_limited_time_optimal(
     """
     bounds = [np.asarray(each, dtype=np.float64) for each in (velocity, acceleration, jerk)]
     ends = EndStates(start, end)
-    second = time_optimal(
-        path, bounds[0], bounds[1], start_velocity=start[0], end_velocity=end[0], further=further
-    )
+    speeds = {"start_velocity": start[0], "end_velocity": end[0]}
+    stops = curvature_jumps(path, bounds[2])
+    second = time_optimal(path, bounds[0], bounds[1], **speeds, further=further, stops=stops)
     limits = LawLimits(
         (JointConstraint(path, bounds[0], bounds[1]), *further),
         (JointJerkConstraint(path, bounds[2]), *further_jerk),
@@ -124,8 +113,19 @@ def jerk_limited_time_optimal(
     if stretch > 1.0 + _EXACT:
         curve, trajectory = scale_time(curve, stretch), scale_time(trajectory, stretch)
     times = curve.breaks[np.searchsorted(law.s, second.stops)]
+    lowered = int((search.lowered > 1.0).any(axis=0).sum())
     return JerkLimitedMotion(
-        trajectory, curve, second, stretch, search.steps, lost / law.duration, second.stops, times
+        trajectory,
+        curve,
+        stretch,
+        lowered,
+        search.refinements,
+        law.s,
+        lost / law.duration,
+        second.stops,
+        times,
+        second,
+        search.steps,
     )
 
 
@@ -141,10 +141,11 @@ class _Search:
         best: The law that is the fastest once it is slowed down until it keeps the limits.
         stretch: By what factor that is.
         steps: How many were made.
+        refinements: How often nodes were refined.
     """
 
     def __init__(self, limits: LawLimits, law: QuarticLaw, rests: bool) -> None:
-        self.limits, self.rests, self.steps = limits, rests, 0
+        self.limits, self.rests, self.steps, self.refinements = limits, rests, 0, 0
         self.lowered = np.ones((3, law.lengths.size))
         self.best, self.stretch = law, np.inf
         self._take(law)
@@ -153,6 +154,10 @@ class _Search:
         """Refine the nodes while that pays; return the estimate of what is lost, in seconds."""
         for gap in _FIRST_GAPS:
             self._step(gap)
+        for _ in range(0 if self.rests else _MORE_FIRST):
+            if self.excess.max() <= _NEARLY:
+                break
+            self._step(_GAP)
         for _ in range(_REFINEMENTS):
             lost = time_lost(self.law, self.limits, self.excess)
             duration = self.law.duration
@@ -180,6 +185,7 @@ class _Search:
 
     def _cut(self, parts: NDArray[np.intp]) -> None:
         """Cut each interval into so many (N,) parts."""
+        self.refinements += 1
         self.lowered = np.repeat(self.lowered, parts, axis=1)
         self._take(self.law.cut(parts))
 

@@ -54,11 +54,11 @@ class PathConstraint(Protocol):
     interval where that is above one, its caps and its c are lowered and the problem is solved again.
 
     Attributes:
-        allows_ramps: Whether sdd may change within an interval. It should not where what is bounded turns
-            with the path, so that it has its peaks between grid points when it is at its bound at both.
+        estimate: What share of the time that a grid may lose by estimate it may lose here, at most 1: less
+            where rows change faster along the path than those of accelerations of joints.
     """
 
-    allows_ramps: ClassVar[bool]
+    estimate: ClassVar[float]
 
     @property
     def bounds_sdd(self) -> bool:
@@ -96,7 +96,7 @@ class JointConstraint:
         ValueError: When bounds have another shape or sign.
     """
 
-    allows_ramps: ClassVar[bool] = True
+    estimate: ClassVar[float] = 1.0
 
     path: PiecewisePolynomial
     velocity: Array
@@ -156,7 +156,7 @@ class SpeedConstraint:
             jumps, a grid point must stand, with the lower value.
     """
 
-    allows_ramps: ClassVar[bool] = True
+    estimate: ClassVar[float] = 1.0
     bounds_sdd: ClassVar[bool] = False
 
     limit: Callable[[Array], Array]
@@ -190,7 +190,7 @@ class ApproachConstraint:
         limits: Of the joints.
     """
 
-    allows_ramps: ClassVar[bool] = True
+    estimate: ClassVar[float] = 1.0
     bounds_sdd: ClassVar[bool] = False
 
     path: PiecewisePolynomial

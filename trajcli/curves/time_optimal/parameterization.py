@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from trajcli.curves.extrema import peaks
 from trajcli.curves.operations import scale_time
-from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, distinct
 from trajcli.curves.time_optimal.collocation import CollocatedConstraints, CollocationRows, collocated
 from trajcli.curves.time_optimal.constraints import JointConstraint, PathConstraint, corners, is_at_rest
 from trajcli.curves.time_optimal.maximum_velocity import maximum_velocity_curve
@@ -110,6 +110,7 @@ def time_optimal(
     start_velocity: float = 0.0,
     end_velocity: float = 0.0,
     further: Sequence[PathConstraint] = (),
+    stops: ArrayLike = (),
 ) -> TimeOptimalMotion:
     """Return the fastest motion along a path within bounds of velocity and acceleration that hold for all t.
 
@@ -123,6 +124,7 @@ def time_optimal(
         start_velocity: sd at the start, not negative.
         end_velocity: sd at the end, not negative.
         further: Other constraints; kept as far as their excess tells.
+        stops: Breaks of the path at which it stops, too, shape (k,).
 
     Raises:
         UnlimitedSpeedError: When nothing limits the motion somewhere.
@@ -140,7 +142,8 @@ def time_optimal(
         np.inf if resting and speed == 0 else speed
         for speed, resting in zip((start_velocity, end_velocity), is_at_rest(path), strict=True)
     )
-    problem = PathProblem(joints, tuple(further), corners(path), (ends[0], ends[1]))
+    halts = distinct(np.append(corners(path), np.asarray(stops, dtype=np.float64)))
+    problem = PathProblem(joints, tuple(further), halts, (ends[0], ends[1]))
     if path.duration == 0 or not any(constraint.bounds_sdd for constraint in problem.constraints):
         raise UnlimitedSpeedError(path.start)
     solution, rounds, lost = _refined_solution(problem)
@@ -182,8 +185,12 @@ class PathProblem:
     @property
     def with_ramps(self) -> bool:
         """Whether sdd may change within an interval."""
-        follows = all(constraint.allows_ramps for constraint in self.constraints)
-        return follows and self.joints.path.degree <= _LARGEST_DEGREE
+        return self.joints.path.degree <= _LARGEST_DEGREE
+
+    @property
+    def estimate(self) -> float:
+        """What share of the time that a grid may lose by estimate it may lose here."""
+        return min(constraint.estimate for constraint in self.constraints)
 
     def excess(self, pieces: LawPieces) -> Array:
         """Return the excess of each of the k constraints in each piece of a law, shape (k, 2, N)."""
@@ -333,10 +340,10 @@ def _parts(solution: GridSolution, room: int) -> tuple[NDArray[np.intp], float]:
     """Return into how many parts to cut each interval, and the share of the duration that is lost."""
     lost, durations, straight = solution.lost, solution.pieces.durations, solution.intervals.straight
     duration, bent = float(durations.sum()), np.where(straight, 0.0, lost)
-    share = float(lost.sum()) / duration
+    share, estimate = float(lost.sum()) / duration, solution.problem.estimate
     parts = np.ones(lost.size, dtype=np.intp)
-    if share > _LOST and room > _FEW_NEW * lost.size:
-        parts = parts_for(bent, _AIM * duration, room)
+    if share > estimate * _LOST and room > _FEW_NEW * lost.size:
+        parts = parts_for(bent, estimate * _AIM * duration, room)
     switching = straight & (lost > _SWITCHING * durations)
     settled = lost[switching].sum() <= _SETTLED * bent.sum()
     if not settled and (parts - 1).sum() + switching.sum() <= room:

@@ -19,6 +19,7 @@ from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.approach_limits import approach_constraints
 from trajcli.planners.effort_limits import solved_within_efforts
+from trajcli.planners.law_events import distance_from_bound, solved_by_convex_steps
 from trajcli.planners.planner import Event, stretched
 from trajcli.planners.waypoints.joint_path import JointPath
 from trajcli.planners.waypoints.spline_rules import Rule
@@ -43,7 +44,7 @@ def require_continuous_curvature(rule: Rule | None) -> None:
 
 def solve_within_jerk(
     path: JointPath, acceleration: Array, robot: Robot, *, bends: bool
-) -> tuple[JointPath, JerkLimitedMotion]:
+) -> tuple[JointPath, TimeOptimalMotion]:
     """Return the path, bent at ends in motion where it may be, and the fastest law that is found along it.
 
     Args:
@@ -66,21 +67,21 @@ def solve_within_jerk(
     if not (bends and path.speeds[0]):
         _require_along(across, acceleration, robot)
     limits = robot.limits
-    further = approach_constraints(path.curve, robot)
+    curve, speeds, further = path.curve, path.speeds, approach_constraints(path.curve, robot)
 
-    def solve(efforts: tuple[PathConstraint, ...]) -> JerkLimitedMotion:
+    def solve(efforts: tuple[PathConstraint, ...]) -> TimeOptimalMotion:
         return jerk_limited_time_optimal(
-            path.curve,
+            curve,
             limits.velocity,
             limits.acceleration,
             limits.jerk,
-            start=(path.speeds[0], along),
-            end=(path.speeds[1], 0.0),
+            start=(speeds[0], along),
+            end=(speeds[1], 0.0),
             further=(*further, *efforts),
         )
 
     with _ends_refused():
-        return path, solved_within_efforts(path.curve, robot, solve)
+        return path, solved_within_efforts(curve, robot, solve)
 
 
 @contextmanager
@@ -140,16 +141,7 @@ def _require_along(across: Array, acceleration: Array, robot: Robot) -> None:
     raise PlanningError(Problem(message, hint, joint=name, value=value, amounts=amounts))
 
 
-def _bound(motion: JerkLimitedMotion) -> Event:
-    """Return the event that says how much faster a motion along the same path may be at most."""
-    above = 100.0 * (motion.law.duration / motion.lower_bound - 1.0)
-    text = (
-        f"at most {above:.2g} % above the fastest possible along this path: without limits of jerk it takes "
-    )
-    return Event("bound", f"{text}{{bound}}", amounts={"bound": Amount(motion.lower_bound, rounded="down")})
-
-
-def events_of_law(motion: TimeOptimalMotion | JerkLimitedMotion, *, fastest: bool) -> Iterator[Event]:
+def events_of_law(motion: TimeOptimalMotion, *, fastest: bool) -> Iterator[Event]:
     """Yield how good a law is, how it was found, and where it stops.
 
     Args:
@@ -157,11 +149,9 @@ def events_of_law(motion: TimeOptimalMotion | JerkLimitedMotion, *, fastest: boo
         fastest: Whether it is not slowed down.
     """
     if isinstance(motion, JerkLimitedMotion):
-        steps = motion.steps
-        text = f"the law has {motion.law.pieces} pieces after {steps} convex step{'s' * (steps != 1)}"
-        yield Event("refined", text)
+        yield solved_by_convex_steps(motion)
         if fastest:
-            yield _bound(motion)
+            yield distance_from_bound(motion)
     elif motion.refinements:
         yield Event(
             "refined",

@@ -219,7 +219,7 @@ class TimeOptimal(ThroughPoints):
 
     def _solved(
         self, points: PointTable, robot: Robot, moving: NDArray[np.bool_]
-    ) -> tuple[JointPath, TimeOptimalMotion | JerkLimitedMotion]:
+    ) -> tuple[JointPath, TimeOptimalMotion]:
         """Return the path and the fastest motion along it."""
         if not self._keeps_jerk(robot) or not np.isfinite(robot.limits.jerk[moving]).any():
             path = self._path(points, robot, smooth=False)
@@ -231,9 +231,7 @@ class TimeOptimal(ThroughPoints):
             path, points.rates[1, 0], robot, bends=self.path == "spline" and self.rule != "quintic"
         )
 
-    def _phase_plane(
-        self, path: JointPath, motion: TimeOptimalMotion | JerkLimitedMotion, robot: Robot
-    ) -> PhasePlane:
+    def _phase_plane(self, path: JointPath, motion: TimeOptimalMotion, robot: Robot) -> PhasePlane:
         """Return the law with its limits; the length of chords has a unit where all joints share one."""
         limits, kinds = robot.limits, set(robot.joint_types)
         by_chord = self.path == "polyline" or (self.parameter or "chord") == "chord"
