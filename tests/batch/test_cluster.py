@@ -36,7 +36,7 @@ def cluster() -> Iterator[Any]:
     from distributed import LocalCluster
 
     dask.config.set({"distributed.scheduler.allowed-failures": 0})
-    with LocalCluster(n_workers=1, threads_per_worker=2, dashboard_address=None) as cluster:
+    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
         yield cluster
 
 
@@ -52,7 +52,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def run(*words: str) -> tuple[int, dict[str, dict[str, Any]], str]:
     """Run a batch; return its exit code, its lines by the stems of the jobs, and standard error."""
-    done = subprocess.run([*COMMAND, *words], capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run([*COMMAND, *words], capture_output=True, text=True, timeout=300, check=False)
     values = [json.loads(line) for line in done.stdout.splitlines()]
     return done.returncode, {Path(value["job"]).stem: value for value in values}, done.stderr
 
@@ -103,7 +103,7 @@ def test_a_killed_worker_costs_its_own_job(cluster: Any) -> None:
 
 def kill_when_under_way(cluster: Any) -> None:
     """Kill the worker once it does nothing but write the rows of the job that does not end."""
-    end = time.monotonic() + 60
+    end = time.monotonic() + 150
     while not (Path("out/b.csv").exists() and list(Path("out").glob(".trajcli-*.part"))):
         assert time.monotonic() < end
         time.sleep(0.05)

@@ -190,3 +190,17 @@ def test_what_is_no_motion(text: str, message: str, tmp_path: Path) -> None:
     path.write_text(text)
     with pytest.raises(InputError, match=message):
         read(path)
+
+
+def test_a_motion_as_written_is_what_is_read(source: Path, tmp_path: Path) -> None:
+    """The reader is the oracle: of values, stamps and how far they are rounded."""
+    motion = read(source)
+    quantities = {name: values / 3 for name, values in motion.quantities.items()}
+    changed = motion.with_rows(motion.rows.t, quantities, motion.rows.move)
+    expected = changed.as_written().rows
+    found = read(written(changed, tmp_path / "out.csv")).rows
+    assert np.abs(found.q - changed.rows.q).max() > 1e-12
+    for name in ("t", *motion.quantities):
+        np.testing.assert_allclose(getattr(expected, name), getattr(found, name), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(expected.resolution.q, found.resolution.q)
+    assert not np.signbit(expected.q[expected.q == 0]).any()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +13,10 @@ from trajcli.curves.piecewise import Array
 from trajcli.editing.edited_motion import EditedMotion, ReadingOptions, read_motion
 from trajcli.editing.limits import kept_limits
 from trajcli.editing.retiming import Stretch, retime
-from trajcli.editing.writing import write_motion
+from trajcli.editing.writing import as_read, write_motion
 from trajcli.errors import InputError, VerificationError
 from trajcli.judge.file import CheckOptions, check_file
+from trajcli.streams.recorded_motion import open_motion
 
 PEAKS = (15 / 8, 10 / 3**0.5, 60.0)
 """Of the quintic over distance 1 in 1 s: velocity, acceleration, jerk."""
@@ -209,6 +211,28 @@ def test_rows_with_nine_decimals_verify_as_they_are_written(tmp_path: Path) -> N
         assert stretch.factor == pytest.approx(56.25 / velocity, rel=2e-4)
         write_motion(found, str(tmp_path / "out.csv"))
         assert verdict(tmp_path / "out.csv", arm) != "exceeded"
+
+
+UR_GOAL = Path(__file__).parents[1] / "oracles/recorded/ur_goal.yaml"
+
+
+@pytest.mark.parametrize("ending", ["csv", "yaml", "mcap"])
+def test_the_goal_of_an_ur_that_is_within_its_limit_at_its_points_only(ending: str, tmp_path: Path) -> None:
+    """Universal_Robots_ROS2_Driver, issue 1273: 6.87 rad/s^2 between points that state 5 at most."""
+    names = open_motion(UR_GOAL).joints
+    assert names is not None
+    arm = tmp_path / "arm.yaml"
+    arm.write_text("joints:\n" + "".join(f"  - {{name: {name}, acceleration: 5}}\n" for name in names))
+    path = str(tmp_path / f"out.{ending}")
+    kept = kept_limits(None, str(arm))
+    found, (stretch,) = retime(
+        read_motion(str(UR_GOAL), ReadingOptions()), kept.requirements, as_read=partial(as_read, path=path)
+    )
+    assert stretch.factor == pytest.approx((6.87031 / 5) ** 0.5, rel=1e-4)
+    assert stretch.binding is not None
+    assert (stretch.binding.kind, stretch.binding.joint) == ("acceleration", "elbow_joint")
+    write_motion(found, path)
+    assert verdict(Path(path), arm) != "exceeded"
 
 
 @pytest.mark.parametrize("names", [(None, None), ("a.yaml", "ur5e")])

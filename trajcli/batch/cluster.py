@@ -13,7 +13,7 @@ from trajcli.batch.jobs import BatchJob
 from trajcli.batch.task import BUG, BatchSetup, JobOutcome, Task, run_task
 from trajcli.errors import FileError, InputError, Problem
 
-_CONNECTING = 5.0  # s until a scheduler that does not answer is given up
+_CONNECTING = 10.0  # s until a scheduler that does not answer is given up
 _ONE_AT_A_TIME = Lock()
 """Planning is bound to one core: threads of one worker process would only hinder each other."""
 

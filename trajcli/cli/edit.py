@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +12,7 @@ from trajcli.cli.outcome import print_remark
 from trajcli.editing.continuity import new_jumps, worst_deviation
 from trajcli.editing.edited_motion import EditedMotion, ReadingOptions, read_motion
 from trajcli.editing.operations import cut, join, resample, reverse
-from trajcli.editing.writing import write_motion
+from trajcli.editing.writing import as_read, write_motion
 from trajcli.errors import InputError, VerificationError
 from trajcli.frozen import comparable
 from trajcli.streams.formats import FormatName, format_of
@@ -150,7 +151,9 @@ def run_retime(
         joint_types=robot.joint_types,
         declared=stated_units(arm[0] or arm[1] or ""),
     )
-    found, stretches = retime(motion, limits.requirements, fastest=fastest, per_move=per_move)
+    reader = partial(as_read, path=options.output, form=options.form)
+    kept = limits.requirements
+    found, stretches = retime(motion, kept, fastest=fastest, per_move=per_move, as_read=reader)
     _check_continuity(motion, found)
     _write(found, options)
     for stretch in stretches:

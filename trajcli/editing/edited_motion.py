@@ -99,16 +99,19 @@ class EditedMotion:
         return EditedMotion(rows, columns, self.format, (*self.notes, *notes))
 
     def as_written(self) -> EditedMotion:
-        """Return the motion that a reader of its file finds: rounded to the decimals of its columns."""
+        """Return the motion that a reader of its file finds: rounded to the decimals of its columns.
+
+        A column without decimals is exact.
+        """
         t = self.rows.t
         values: dict[str, Any] = {name: rows.copy() for name, rows in self.quantities.items()}
         resolution = self.rows.resolution
         rounding = {name: np.array(getattr(resolution, name)) for name in ("q", "qd", "qdd")}
         time = resolution.time
         for column in self.columns:
-            if column.decimals is None or column.quantity == "move":
+            if column.quantity == "move":
                 continue
-            half = 0.5 * 10.0**-column.decimals * column.factor
+            half = 0.0 if column.decimals is None else 0.5 * 10.0**-column.decimals * column.factor
             if column.joint is None:
                 t, time = rounded(t / column.factor, column.decimals) * column.factor, half
                 continue
@@ -116,13 +119,13 @@ class EditedMotion:
             of_joint[:] = rounded(of_joint / column.factor, column.decimals) * column.factor
             if column.quantity in rounding:
                 rounding[column.quantity][column.joint] = half
-        exact = Resolution(time, rounding["q"], rounding["qd"], rounding["qdd"], resolution.relative)
+        exact = Resolution(time, rounding["q"], rounding["qd"], rounding["qdd"])
         return replace(self, rows=replace(self.rows, t=t, resolution=exact, **values))
 
 
-def rounded(values: Array, decimals: int) -> Array:
-    """Return values with that many decimals, without a negative zero."""
-    return (np.round(values, decimals) if decimals <= _ROUNDED else values) + 0.0
+def rounded(values: Array, decimals: int | None) -> Array:
+    """Return values with that many decimals, all of them for None, without a negative zero."""
+    return (np.round(values, decimals) if decimals is not None and decimals <= _ROUNDED else values) + 0.0
 
 
 def _with_decimals(column: WrittenColumn, decimals: int) -> WrittenColumn:

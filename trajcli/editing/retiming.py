@@ -43,6 +43,7 @@ STRETCHABLE = (
 _FINE = 1e-4  # relative: how far above the smallest factor the one that is found may be
 _SLOWEST, _FASTEST = 1e6, 1e-9
 _TRIES = 40
+_SMALL_ROUNDING = 0.01  # of a limit: where it is more, it hides how far the limit is used
 _FEWER = 4  # decimals that rounding twice may cost at most
 _NUDGE = 1e-7  # relative: what the rounding of the rows that are written may ask for besides
 _AT_REST = 1e-9  # of the largest velocity of a joint: below that a border of two moves is at rest
@@ -69,7 +70,12 @@ class Stretch:
 
 
 def retime(
-    motion: EditedMotion, requirements: Requirements, *, fastest: bool = False, per_move: bool = False
+    motion: EditedMotion,
+    requirements: Requirements,
+    *,
+    fastest: bool = False,
+    per_move: bool = False,
+    as_read: Callable[[EditedMotion], EditedMotion] = EditedMotion.as_written,
 ) -> tuple[EditedMotion, tuple[Stretch, ...]]:
     """Return a motion over the same positions that keeps its limits, and by what it is stretched.
 
@@ -78,38 +84,44 @@ def retime(
         requirements: Its limits.
         fastest: Whether it may also become faster; else it keeps its time where it keeps its limits.
         per_move: Whether each move has a factor of its own; moves that meet in motion share one.
+        as_read: Returns a motion as a reader of what is written of it finds it.
 
     Raises:
         InputError: When there are no moves, or nothing bounds how fast it may be.
         VerificationError: When something is wrong with it that no time mends.
     """
-    judge = _judge_of(requirements)
+    judge, strictly = (_judge_of(requirements, strict=strict) for strict in (False, True))
     ranges = _ranges(motion) if per_move else [(slice(0, motion.rows.t.size), None)]
     stretches = []
     for rows, moves in ranges:
-        factor, binding = _smallest(_part(motion.rows, rows), judge, fastest=fastest)
+        factor, binding = _smallest(_part(motion.rows, rows), judge, strictly, fastest=fastest)
         stretches.append(Stretch(factor, moves, binding))
-    return _verified(motion, [rows for rows, _ in ranges], stretches, judge)
+    return _verified(motion, [rows for rows, _ in ranges], stretches, judge, as_read)
 
 
-def _judge_of(requirements: Requirements) -> Judge:
+def _judge_of(requirements: Requirements, *, strict: bool) -> Judge:
+    """Return what judges rows: as `trajcli check` does, or strictly where rounding is small."""
+
     def judge(rows: RecordedMotion) -> JudgedFinding | None:
-        judgement = judge_motion(lambda: (rows,), requirements)
-        wrong = [f for f in judgement.findings if f.severity == "error" and f.certainty == "exceeded"]
+        wrong = [f for f in judge_motion(lambda: (rows,), requirements).findings if _counts(f, strict=strict)]
         for finding in wrong:
             if finding.kind not in STRETCHABLE:
+                hint = finding.hint or "another time of the motion does not help"
+                text, joint = finding.text(), finding.joint
                 raise VerificationError(
-                    Problem(
-                        finding.text(),
-                        finding.hint or "another time of the motion does not help",
-                        joint=finding.joint,
-                        time=finding.time,
-                        kind=finding.kind,
-                    )
+                    Problem(text, hint, joint=joint, time=finding.time, kind=finding.kind)
                 )
         return max(wrong, key=lambda finding: finding.factor or np.inf, default=None)
 
     return judge
+
+
+def _counts(finding: JudgedFinding, *, strict: bool) -> bool:
+    """Return whether a motion with a finding does not keep its limits."""
+    if finding.severity != "error":
+        return False
+    small = finding.limit is not None and finding.rounding <= _SMALL_ROUNDING * abs(finding.limit)
+    return finding.certainty == "exceeded" or (strict and small and finding.kind in STRETCHABLE)
 
 
 def _part(rows: RecordedMotion, part: slice) -> RecordedMotion:
@@ -122,8 +134,13 @@ def _part(rows: RecordedMotion, part: slice) -> RecordedMotion:
     return replace(rows, t=t - t[0], **values)
 
 
-def _smallest(rows: RecordedMotion, judge: Judge, *, fastest: bool) -> tuple[float, JudgedFinding | None]:
-    """Return the smallest factor with which limits are kept, and what a smaller one breaks."""
+def _smallest(
+    rows: RecordedMotion, judge: Judge, strictly: Judge, *, fastest: bool
+) -> tuple[float, JudgedFinding | None]:
+    """Return the smallest factor with which limits are kept, and what a smaller one breaks.
+
+    Whether the motion keeps them as it is, is left to its rounding, as `trajcli check` does.
+    """
     broken, low, most = judge(rows), 1.0, _SLOWEST
     if broken is None:
         most = 1.0
@@ -134,7 +151,7 @@ def _smallest(rows: RecordedMotion, judge: Judge, *, fastest: bool) -> tuple[flo
             if low < _FASTEST:
                 what = f"no limit bounds how fast {rows.source} may be"
                 raise InputError(what, hint="it does not move, or its joints have no limits")
-            broken = judge(stretched(rows, low))
+            broken = strictly(stretched(rows, low))
     high = low
     for _ in range(_TRIES):
         binding, low = broken, high
@@ -142,9 +159,9 @@ def _smallest(rows: RecordedMotion, judge: Judge, *, fastest: bool) -> tuple[flo
         if not isfinite(high) or high > _SLOWEST:
             break
         high = min(high, most)
-        broken = None if high == 1.0 else judge(stretched(rows, high))
+        broken = None if high == 1.0 else strictly(stretched(rows, high))
         if broken is None:
-            return _bracketed(rows, judge, (low, high), binding)
+            return _bracketed(rows, strictly, (low, high), binding)
     raise VerificationError(
         Problem(f"no stretch keeps the limits: {binding.text()}", joint=binding.joint, kind=binding.kind)
     )
@@ -208,14 +225,18 @@ def _rests(motion: EditedMotion, row: int) -> bool:
 
 
 def _verified(
-    motion: EditedMotion, ranges: list[slice], stretches: list[Stretch], judge: Judge
+    motion: EditedMotion,
+    ranges: list[slice],
+    stretches: list[Stretch],
+    judge: Judge,
+    as_read: Callable[[EditedMotion], EditedMotion],
 ) -> tuple[EditedMotion, tuple[Stretch, ...]]:
     """Return the retimed motion, which keeps its limits as it will be read."""
     tries = coarser = 0
     while True:
         found = _assembled(motion, ranges, [stretch.factor for stretch in stretches], coarser)
         try:
-            broken = judge(found.as_written().rows)
+            broken = None if found is motion else judge(as_read(found).rows)
         except VerificationError:
             # numbers that are rounded twice are off by more than their decimals say: fewer are certain
             if coarser == _FEWER:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO
 
@@ -58,9 +59,25 @@ def write_motion(motion: EditedMotion, path: str | None, form: FormatName | None
     return notes
 
 
+def as_read(motion: EditedMotion, path: str | None, form: FormatName | None = None) -> EditedMotion:
+    """Return a motion as a reader finds it in what `write_motion` writes.
+
+    Raises:
+        InputError: When nothing says the format.
+    """
+    if format_of(path, form).name == "CSV":
+        return replace(motion, columns=_table_columns(motion)).as_written()
+    exact = tuple(replace(column, decimals=None) for column in motion.columns)
+    return replace(motion, columns=exact).as_written()
+
+
+def _table_columns(motion: EditedMotion) -> tuple[WrittenColumn, ...]:
+    return motion.columns if motion.format == "csv" else _plain_columns(motion)
+
+
 def write_table(motion: EditedMotion, out: BinaryIO) -> None:
     """Write a motion as comma-separated values: names, order, units and decimals of its columns."""
-    columns = motion.columns if motion.format == "csv" else _plain_columns(motion)
+    columns = _table_columns(motion)
     out.write(_header([column.name for column in columns]))
     decimals = [0 if column.quantity == "move" else column.decimals for column in columns]
     for block in _blocks(motion, columns):
@@ -82,21 +99,23 @@ def _encoded(block: Array, decimals: list[int | None]) -> bytes:
         return encoder_of("full")(block, whole)
     cells = block.copy()
     for index, count in enumerate(decimals):
-        if count is not None:
-            cells[:, index] = rounded(cells[:, index], count)
+        cells[:, index] = rounded(cells[:, index], count)
     line = ",".join("%r" if count is None else f"%.{count}f" for count in decimals) + "\n"
     return "".join(line % tuple(row) for row in cells.tolist()).encode()
 
 
 def _plain_columns(motion: EditedMotion) -> tuple[WrittenColumn, ...]:
-    """Return the columns of trajcli's own language, in SI, for a file that has none."""
-    count = motion.rows.q.shape[1]
-    found = [WrittenColumn("t", "t", None, 1.0, DECIMALS)]
-    for name in motion.quantities:
-        found += [WrittenColumn(f"{name}{joint + 1}", name, joint, 1.0, DECIMALS) for joint in range(count)]
-    if motion.rows.move is not None:
-        found.append(WrittenColumn("move", "move", None, 1.0, 0))
-    return tuple(found)
+    """Return the columns of trajcli's own language, in SI, for a file that has none; decimals are kept."""
+    known = {(column.quantity, column.joint): column.decimals for column in motion.columns}
+
+    def column(name: str, quantity: str, joint: int | None) -> WrittenColumn:
+        decimals = known.get((quantity, joint))
+        return WrittenColumn(name, quantity, joint, 1.0, DECIMALS if decimals is None else decimals)
+
+    joints = range(motion.rows.q.shape[1])
+    found = [column("t", "t", None)]
+    found += [column(f"{name}{joint + 1}", name, joint) for name in motion.quantities for joint in joints]
+    return tuple(found) if motion.rows.move is None else (*found, column("move", "move", None))
 
 
 def _blocks(motion: EditedMotion, columns: tuple[WrittenColumn, ...]) -> Iterator[Array]:
