@@ -22,6 +22,7 @@ BENCHMARKS = (
     "writing",
     "logs",
     "reading",
+    "checking",
     "evaluation",
     "forward_kinematics",
     "urdf",

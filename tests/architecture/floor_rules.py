@@ -18,7 +18,7 @@ FLOORS = (
     ("job",),
     ("planning", "comparison", "queries", "consumers"),
     ("judge",),
-    ("output", "plots", "player"),
+    ("output", "plots", "player", "editing"),
     ("batch",),
     ("cli", "api"),
     ("",),  # trajcli/__init__.py, the public face

@@ -12,7 +12,7 @@ from running import EXAMPLES, ROOT, call, run
 
 import trajcli
 
-GOAL = ROOT / "tests/judge/recordings/moveit_goal.yaml"
+GOAL = ROOT / "tests/oracles/recorded/ur_goal.yaml"
 LIMITS = ROOT / "tests/judge/recordings/five.yaml"
 BY_UR10E = ("--robot", "ur10e", "--limits", LIMITS)
 

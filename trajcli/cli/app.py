@@ -15,6 +15,7 @@ import typer.core
 
 from trajcli.cli.arm_commands import register
 from trajcli.cli.file_commands import register_file_commands
+from trajcli.cli.motion_commands import register_tools
 from trajcli.cli.options import Errors, JobErrors, JobFile, Json, Overrides, profile_words, robot_names
 from trajcli.cli.outcome import guarded
 
@@ -22,7 +23,7 @@ _JUDGE = "trajcli plan JOB --no-output"
 _OTHER_NAMES = {
     **dict.fromkeys(("validate", "verify", "lint", "test"), _JUDGE),
     **dict.fromkeys(("run", "simulate", "sample", "generate", "execute", "trajectory"), "trajcli plan JOB"),
-    **dict.fromkeys(("convert", "transform", "rotation", "quaternion", "euler"), "trajcli pose STEP..."),
+    **dict.fromkeys(("transform", "rotation", "quaternion", "euler"), "trajcli pose STEP..."),
     **dict.fromkeys(("forward", "forward-kinematics"), "trajcli fk"),
     **dict.fromkeys(("inverse", "inverse-kinematics", "solve"), "trajcli ik"),
     "kinematics": "trajcli fk, trajcli ik or trajcli jacobian",
@@ -209,51 +210,6 @@ def plan(
     return run_gate([job, *others], override, options, errors)
 
 
-@app.command(epilog="Example: trajcli batch examples/cubic.yaml examples/quintic.yaml -o rows")
-@guarded
-def batch(
-    jobs: Annotated[
-        list[str], typer.Argument(metavar="JOB|DIR...", help="Job files, and folders with job files.")
-    ],
-    output: Annotated[
-        str | None,
-        typer.Option(
-            "--output", "-o", metavar="DIR", help="Where the rows go; else beside each job, under its name."
-        ),
-    ] = None,
-    count: Annotated[
-        str | None, typer.Option("-j", metavar="N", help="Processes at a time; else one a core.")
-    ] = None,
-    form: Annotated[
-        Literal["csv", "mcap", "jsonl", "ros", "ros-goal"], typer.Option("--format", help="Of the rows.")
-    ] = "csv",
-    force: Annotated[bool, typer.Option("--force", help="Plan unchanged jobs, too.")] = False,
-    timeout: Annotated[
-        str | None,
-        typer.Option("--timeout", metavar="SECONDS", help="For each job; 0 for no end.", show_default="600"),
-    ] = None,
-    engine: Annotated[
-        Literal["processes", "dask"],
-        typer.Option("--engine", help="Processes of this machine, or the workers of a Dask cluster."),
-    ] = "processes",
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            "--scheduler",
-            metavar="ADDRESS",
-            help="Of the cluster, such as tcp://10.0.0.5:8786; else that of Dask's configuration.",
-        ),
-    ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on stderr.")] = False,
-    errors: Errors = "text",
-) -> int:
-    """Plan many jobs, and write each; unchanged ones are skipped. Prints a line of JSON for each job."""
-    from trajcli.cli.batch import BatchOptions, run_batch
-
-    options = BatchOptions(output, count, form, force, timeout, engine, scheduler, quiet)
-    return run_batch(jobs, options)
-
-
 @app.command(epilog="Example: trajcli explain examples/cubic.yaml")
 @guarded
 def explain(
@@ -410,6 +366,7 @@ def init(
 
 
 register(app)
+register_tools(app)
 
 
 def run() -> None:

@@ -110,10 +110,15 @@ class Intervals:
         return self._jumps_near(order), self._jumps_near(order + 1)
 
     def _jumps_near(self, order: int) -> Array:
-        top = derivative_coefficients(self.coefficients, order)
-        jump = np.abs(top[-1, 1:] - horner(top, self.lengths[:, None])[:-1])  # at each inner row
-        padded = np.concatenate([np.zeros((2, top.shape[2])), jump, np.zeros((2, top.shape[2]))])
-        return np.asarray(np.max([padded[k : k + self.lengths.size] for k in range(4)], axis=0))
+        top, lengths = derivative_coefficients(self.coefficients, order), self.lengths[:, None]
+        ends = horner(top, lengths)
+        jump = np.abs(top[-1, 1:] - ends[:-1])  # at each inner row
+        outer = np.zeros((2, top.shape[2]))
+        if len(lengths) > 1:  # at the first and the last row, against what the piece beside goes on with
+            outer[0] = np.abs(top[-1, 0] - horner(top[:, 1], -lengths[0]))
+            outer[1] = np.abs(ends[-1] - horner(top[:, -2], lengths[-2] + lengths[-1]))
+        padded = np.concatenate([outer[:1], outer[:1], jump, outer[1:], outer[1:]])
+        return np.asarray(np.max([padded[k : k + len(lengths)] for k in range(4)], axis=0))
 
     def piece_rows(self, piece: NDArray[np.intp], joint: NDArray[np.intp], count: int) -> PieceRows:
         """Return what stands at the ends of pieces (m,), for one joint each.

@@ -19,6 +19,7 @@ from trajcli.streams.row_sources import EXACT, FULL_DECIMALS
 
 _BLOCK = 4096  # rows gathered at a time
 _LONGEST = 1 << 24  # bytes of a line
+_LARGEST_NUMBER = 1e300
 _SHOWN = 200  # characters of a line in a message
 
 
@@ -93,7 +94,7 @@ class JsonRows:
         lengths = all(_length(value.get(key)) == count for key, count in self._columns.items())
         if list(value) != self._keys or not lengths:
             raise InputError(Problem("other keys or lists than in the first row", None, place))
-        if not all(type(item) in (int, float) for item in row):
+        if not all(type(item) in (int, float) and abs(item) <= _LARGEST_NUMBER for item in row):
             raise InputError(Problem("a value is no number", None, place))
         return row
 

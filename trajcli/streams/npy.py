@@ -14,7 +14,8 @@ from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.recorded.column_roles import NamedFile
 from trajcli.streams.row_sources import EXACT, unplaced
 
-_ROWS = 1 << 16  # rows at a time
+_ROWS = 1 << 14  # rows at a time
+_LARGEST_ROW = 1 << 14  # bytes
 _LAYOUT = (
     "a structured array has fields such as t, q1, q2 or t, q; a plain one has the shape (N, 1 + n), of time "
     "and positions, or (N, 1 + 2 n) and (N, 1 + 3 n) with velocities and accelerations behind them"
@@ -44,6 +45,9 @@ class ArrayFile:
         with source.open() as stream:
             self._dtype, self._shape, fortran = _head(stream, source.file)
         self._plain = self._dtype.names is None
+        widest = self._dtype.itemsize * (self._shape[1] if self._plain and len(self._shape) == 2 else 1)
+        if widest > _LARGEST_ROW:
+            raise InputError(f"{source.file}: a row of {widest} bytes is none of a motion", hint=_LAYOUT)
         if fortran and len(self._shape) > 1:
             hint = "save it with numpy.ascontiguousarray"
             raise InputError(f"{source.file}: the array is stored column by column", hint=hint)
@@ -127,7 +131,7 @@ def _head(stream: Any, file: str) -> tuple[np.dtype[Any], tuple[int, ...], bool]
         version = npy.read_magic(stream)
         read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
         shape, fortran, dtype = read(stream)
-    except (ValueError, EOFError, OverflowError) as error:
+    except Exception as error:  # of its tokenizer, too
         raise InputError(f"{file} is no array of numpy: {error}".split("\n", maxsplit=1)[0]) from error
     kinds = [dtype[name].base.kind for name in dtype.names] if dtype.names else [dtype.kind]
     if not {*kinds} <= set("fiu"):

@@ -29,13 +29,13 @@ def read_table(path: str | Path, topic: str | None = None) -> Table:
 
     Args:
         path: The file; "-" is standard input.
-        topic: Of MCAP, the topic; /joint_states unless given.
+        topic: Of MCAP, the topic; /joint_states unless given. Other files have none.
 
     Raises:
         FileError: When it cannot be read.
         InputError: When it is no such file, or has no such topic.
     """
-    rows = open_rows_of(path, topic=topic)
+    rows = open_rows_of(path, topic=topic if is_log(path) else None)
     every = range(len(rows.named.names))
     columns = np.concatenate(list(rows.blocks(every, ())))
     decimals = rows.decimals(every)

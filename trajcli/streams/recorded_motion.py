@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
-from trajcli.frozen import frozen
+from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import JointType
 from trajcli.streams.reading import open_rows_of
 from trajcli.streams.recorded.column_names import MOVE
@@ -83,6 +83,25 @@ class RecordedMotion:
     resolution: Resolution
     source: str
     first_row: int = 1
+
+
+@comparable
+class WrittenColumn:
+    """A column as a file writes it.
+
+    Attributes:
+        name: Its name in the file.
+        quantity: "t", "q", "qd", "qdd", "qddd", "tau" or "move".
+        joint: Index of the joint; None for times and moves.
+        factor: SI per unit of the column.
+        decimals: The most that a number of it has; None where they are binary.
+    """
+
+    name: str
+    quantity: str
+    joint: int | None
+    factor: float
+    decimals: int | None
 
 
 class MotionFile:
@@ -168,6 +187,24 @@ class MotionFile:
     def whole(self) -> RecordedMotion:
         """Return all rows at once."""
         return self._motion(np.concatenate(list(self._blocks())), 1)
+
+    def written_columns(self) -> tuple[WrittenColumn, ...]:
+        """Return the columns that are used, in the order of the file."""
+        where: dict[int, tuple[str, int | None]] = {self._time: ("t", None)}
+        if self._move is not None:
+            where[self._move] = (MOVE, None)
+        for quantity, found in self._joints.items():
+            where |= {position: (quantity, joint) for joint, position in enumerate(found)}
+        decimals = self._rows.decimals(self._taken).tolist()
+        return tuple(
+            WrittenColumn(
+                self._rows.named.names[self._taken[position]],
+                *where[position],
+                1.0 / self._per_second if position == self._time else float(self._factors[position]),
+                None if decimals[position] == EXACT else decimals[position],
+            )
+            for position in sorted(where)
+        )
 
     def _blocks(self) -> Iterable[Array]:
         return self._kept if self._kept is not None else self._rows.blocks(self._taken, self._fixed)

@@ -25,6 +25,7 @@ from trajcli.streams.number_cells import decimals_of
 
 _LARGEST = 64 << 20  # bytes: a text that is larger is no message
 _KEYS = ("positions", "velocities", "accelerations", "effort")
+_LARGEST_NUMBER = 1e300
 _NANOSECONDS = 9  # decimals of a time that is given as sec and nanosec
 _WRAPPERS = ("joint_trajectory", "trajectory", "goal", "planned_trajectory", "robot_trajectory")
 _CUT = re.compile(r"^\s*-?\s*'?\.\.\.'?\s*$|, '?\.\.\.'?\s*\]", re.MULTILINE)
@@ -209,7 +210,9 @@ def _decimals(value: float) -> int:
 
 
 def _is_number(value: Any) -> bool:  # noqa: ANN401
-    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return False
+    return abs(value) <= _LARGEST_NUMBER  # also of whole numbers that no float holds
 
 
 def _shown(value: Any) -> str:  # noqa: ANN401

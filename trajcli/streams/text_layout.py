@@ -15,8 +15,6 @@ LONGEST_LINE = 1 << 16
 _MOST_COMMENTS = 1000  # lines in front of the names
 _NUMBER = re.compile(rb"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _LOCAL_NUMBER = re.compile(rb"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
-_BLANKS = re.compile(rb"[ \t]+")
-_EDGES = re.compile(rb"(?m)^[ \t]+|[ \t]+$")
 _COMMENT = (b"#", b"%")
 
 
@@ -151,10 +149,10 @@ class RowLayout:
     def plain(self, text: bytes) -> bytes:
         """Return whole lines with commas between cells, points in decimals and no blanks around cells."""
         if self.separator == " ":
-            if b"\t" in text or b"  " in text or b"\n " in text or b" \n" in text or text.startswith(b" "):
-                text = _EDGES.sub(b"", text)
-                text = _BLANKS.sub(b",", text)
-            text = text.replace(b" ", b",")
+            text = text.replace(b"\t", b" ")
+            while b"  " in text:
+                text = text.replace(b"  ", b" ")
+            text = text.replace(b"\n ", b"\n").replace(b" \n", b"\n").removeprefix(b" ").replace(b" ", b",")
         else:
             text = _without_blanks(text, self.separator.encode())
             if self.decimal_comma:
