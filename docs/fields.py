@@ -12,7 +12,8 @@ from pydantic.fields import FieldInfo
 from docs.markdown import first_sentence, table
 from trajcli.job.model import Output, OutputUnits, RobotSource, UnitsSpec
 from trajcli.job.robot import JointModel
-from trajcli.language.dynamics import EffortBound, FrictionSpec, LinkSpec
+from trajcli.language.dynamics import FrictionSpec, Gravity, LinkSpec, PayloadSpec
+from trajcli.language.efforts import EffortBound, Efforts
 from trajcli.language.limits import (
     UNLIMITED,
     Bounds,
@@ -57,6 +58,7 @@ SECTIONS: dict[type, str] = {
     JointModel: "[joint](#joints)",
     FrictionSpec: "[friction](#friction)",
     LinkSpec: "[link](#link)",
+    PayloadSpec: "[payload](#payload)",
     AxisAngleSpec: "[axis and angle](#axis-and-angle)",
     EulerSpec: "[Euler angles](#euler-angles)",
     Configuration: "[configuration](#configuration)",
@@ -133,7 +135,9 @@ def _reader_form(reader: FieldType) -> str:
         Direction: "`x` or `y` or `z` or a list of 3 numbers",
         Matrix: "3 rows of 3 numbers, or 4 of 4",
         JointBound: "[bound](#bounds)",
-        EffortBound: "[bound](#bounds), N m or N",
+        EffortBound: "[bound](#bounds)",
+        Efforts: f"[bound](#bounds), {_BY_JOINT}, or `robot`",
+        Gravity: "list of 3 numbers",
         Pose: "[pose](#poses)",
         RobotSource: "[robot](#robot)",
         JointDistance: f"number at least 0, {_BY_JOINT}",
@@ -180,6 +184,10 @@ def _unit(field: FieldInfo) -> str:
         return "joint" + ("", "/s", "/s^2", "/s^3")[reader.order]
     if isinstance(reader, Number | Numbers):
         return _quantity_unit(reader.quantity)
+    if isinstance(reader, EffortBound | Efforts):
+        return "N m or N"
+    if isinstance(reader, Gravity):
+        return "m/s^2"
     if isinstance(reader, JointDistance | BlendDurations):
         return "joint" if isinstance(reader, JointDistance) else "s"
     listed = [item for item in get_args(_bare(field.annotation)) if get_origin(item) is Annotated]

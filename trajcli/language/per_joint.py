@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -22,6 +23,9 @@ from trajcli.language.numbers import (
     written_number,
 )
 from trajcli.units import Quantity
+
+LowerUpper = tuple[float, float]
+UNLIMITED: LowerUpper = (-math.inf, math.inf)
 
 
 def read_per_joint(
@@ -105,6 +109,15 @@ def flawed(flaws: list[Flaw]) -> FlawError:
     """Return the error that holds several flaws of one value."""
     error = FlawError("; ".join(flaw[1] for flaw in flaws))
     error.flaws = flaws
+    return error
+
+
+def with_pair_hint(error: FlawError, value: object) -> FlawError:
+    """Return the error of bounds by joint; where a pair stands in the place of a list, it says what to do."""
+    pair = isinstance(value, list | tuple) and len(value) == 2
+    if pair and all(isinstance(v, int | float) for v in value):  # type: ignore[attr-defined]
+        named = f"a list has one entry for each joint: for a pair write {{NAME: {list(value)}}}"  # type: ignore[call-overload]
+        error.flaws = [(path, text, named) for path, text, _ in error.flaws]
     return error
 
 

@@ -12,7 +12,7 @@ from pydantic import Field
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount, Amounts, PlanningError, Problem, said
 from trajcli.frozen import comparable, frozen
-from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.robot import Payload, Robot
 from trajcli.language.limits import LimitsSpec
 from trajcli.language.numbers import Model
 from trajcli.trajectory import Destination, Promise, Span, State, Trajectory, ViaPoints
@@ -24,7 +24,10 @@ if TYPE_CHECKING:
 
 Resolve = Callable[["Target", Array], "Target"]
 WhenOverLimit = Literal["error", "slow"]
-_REMARKS = ("refined",)  # kinds of events that are about how a curve was computed, and concede nothing
+_REMARKS = (
+    "refined",
+    "bound",
+)  # kinds of events that are about how a curve was computed, and concede nothing
 _GIVEN = ("duration", "velocity", "acceleration", "deceleration", "timed")  # where they say how long it lasts
 LITTLE = 1e-3
 """Relative: a law that is stretched by less still counts as the fastest."""
@@ -111,6 +114,7 @@ class Planned:
         phase_plane: Of a time-optimal law: the law s(t), and what limits it.
         braking: How a start outside the velocity or acceleration limits is brought inside first: by each
             joint, or by all on one line; None where it is not.
+        continuity: Derivatives that join inside it, where they are fewer than its planner promises.
     """
 
     curve: PiecewisePolynomial
@@ -133,6 +137,7 @@ class Planned:
     virtual_points: ViaPoints | None = None
     phase_plane: PhasePlane | None = None
     braking: Literal["each", "line"] | None = None
+    continuity: Literal[1, 2] | None = None
 
 
 class Planner(Model):
@@ -148,6 +153,7 @@ class Planner(Model):
         proportional: Whether another duration scales the times of all its parts alike, so that between given
             velocities at its ends each position is linear in the duration.
         follows_jerk: Whether it plans within the limits of jerk, and perhaps not without them.
+        handles: Whether it takes up a payload or leaves it, and moves nothing.
         smoother: Changes of its fields that make a move without steps in acceleration, each by the words that
             ask for it; "planner" may be among them.
         limits: Tightens the job's limits for this move; applied before `plan` is called.
@@ -158,6 +164,7 @@ class Planner(Model):
     one_shape: ClassVar[bool] = False
     proportional: ClassVar[bool] = False
     follows_jerk: ClassVar[bool] = False
+    handles: ClassVar[bool] = False
     smoother: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
 
     limits: Annotated[LimitsSpec | None, Field(description="Tighter limits for this move.")] = None
@@ -216,6 +223,14 @@ class Planner(Model):
                 recorded, or left open.
         """
         return self
+
+    def carried_after(self, payload: Payload | None) -> Payload | None:
+        """Return what the tool carries behind the move that begins with a payload; None for nothing.
+
+        Raises:
+            FlawError: When it takes up a second one, or leaves what is not there.
+        """
+        return payload
 
     def with_duration(self, duration: float) -> Self:
         """Return the planner of the same move over `duration` seconds.
@@ -309,7 +324,8 @@ class PlannedMove:
 
     def span(self, start: float, end: float) -> Span:
         """Return the part of a trajectory, from `start` to `end` s, that is this move."""
-        return Span(self.index, self.planner.tag, start, end, self.planner.joins)
+        continuity = self.planned.continuity or self.planner.joins
+        return Span(self.index, self.planner.tag, start, end, continuity, self.robot.payload)
 
     def alone(self) -> Trajectory:
         """Return the trajectory of this move alone."""

@@ -119,7 +119,7 @@ def time_optimal(
     Args:
         path: q(s) with n joints, of degree at most 5, without jumps.
         velocity: Lower and upper bounds, shape (n, 2), lower < 0 < upper, infinite for none; per second.
-        acceleration: The same, per second squared; not all infinite.
+        acceleration: The same, per second squared; not all infinite, unless another constraint bounds sdd.
         start_velocity: sd at the start, not negative.
         end_velocity: sd at the end, not negative.
         further: Other constraints; kept as far as their excess tells.
@@ -140,9 +140,9 @@ def time_optimal(
         np.inf if resting and speed == 0 else speed
         for speed, resting in zip((start_velocity, end_velocity), is_at_rest(path), strict=True)
     )
-    if not np.isfinite(bounds[1]).any() or path.duration == 0:
-        raise UnlimitedSpeedError(path.start)
     problem = PathProblem(joints, tuple(further), corners(path), (ends[0], ends[1]))
+    if path.duration == 0 or not any(constraint.bounds_sdd for constraint in problem.constraints):
+        raise UnlimitedSpeedError(path.start)
     solution, rounds, lost = _refined_solution(problem)
     solution, tightened = _tightened_solution(solution)
     grid, pieces, excess = solution.grid, solution.pieces, float(solution.excess.max())
@@ -182,11 +182,12 @@ class PathProblem:
     @property
     def with_ramps(self) -> bool:
         """Whether sdd may change within an interval."""
-        return self.joints.path.degree <= _LARGEST_DEGREE
+        follows = all(constraint.allows_ramps for constraint in self.constraints)
+        return follows and self.joints.path.degree <= _LARGEST_DEGREE
 
     def excess(self, pieces: LawPieces) -> Array:
-        """Return the largest excess over all constraints in each piece of a law, shape (2, N)."""
-        return np.asarray(np.maximum.reduce([each.excess(pieces) for each in self.constraints]))
+        """Return the excess of each of the k constraints in each piece of a law, shape (k, 2, N)."""
+        return np.stack([each.excess(pieces) for each in self.constraints])
 
 
 @frozen
@@ -199,7 +200,7 @@ class GridSolution:
         intervals: The rows that it obeys.
         speeds: sd^2 at its grid points.
         pieces: Of its law s(t).
-        excess: Of the constraints in each interval, shape (2, N).
+        excess: Of each of the k constraints in each interval, shape (k, 2, N).
     """
 
     problem: PathProblem
@@ -222,7 +223,7 @@ class GridSolution:
     @property
     def lost(self) -> Array:
         """Estimate of the time lost in each interval, the time to keep exceeded limits included, (N,)."""
-        durations, over = self.pieces.durations, np.clip(self.excess - 1.0, 0.0, 1.0)
+        durations, over = self.pieces.durations, np.clip(self.excess.max(axis=0) - 1.0, 0.0, 1.0)
         lost = time_lost(self.intervals, self.x, self.speeds.mvc, durations)
         return np.asarray(lost + durations * np.maximum(over[0], 0.5 * over[1]))
 
@@ -230,21 +231,24 @@ class GridSolution:
         """Return the solution with limits divided by factors.
 
         Args:
-            factors: Of velocity and acceleration in each interval, shape (2, N).
+            factors: Of velocity and acceleration of each constraint in each interval, shape (k, 2, N).
             new_ramps: Whether to find the sdd ramps anew.
 
         Raises:
             UnreachableSpeedError: When the speeds at the ends are too high for these limits.
         """
         problem, constraints, grid = self.problem, self.collocated, self.grid
+        velocity, acceleration = factors[:, 0].max(axis=0), factors[:, 1]
         if new_ramps and problem.with_ramps:
-            calm = self.excess.max(axis=0) <= _WILD  # elsewhere sdd changes by more than the limits follow
+            calm = (
+                self.excess.max(axis=(0, 1)) <= _WILD
+            )  # elsewhere sdd changes by more than the limits follow
             wanted = np.where(calm, wanted_ramps(self.intervals, self.x), 0.0)
             rows = constraints.intervals(wanted, distances_at_mean_speed(grid, self.x, wanted))
-            rows = rows.tightened(*np.where(calm, factors, 1.0))
+            rows = rows.tightened(np.where(calm, velocity, 1.0), np.where(calm, acceleration, 1.0))
             with suppress(UnreachableSpeedError):  # then there may be one with the ramps as they are
                 return _judged(problem, constraints, rows, solve(rows, *problem.ends))
-        rows, changed = self.intervals.tightened(*factors), (factors != 1.0).any(axis=0)
+        rows, changed = self.intervals.tightened(velocity, acceleration), (factors != 1.0).any(axis=(0, 1))
         mvc = maximum_velocity_curve(rows, self.speeds.mvc, changed)
         few = changed.mean() < _FEW_CHANGED
         speeds = solve_locally(rows, self.speeds, changed, mvc) if few else None
@@ -273,7 +277,7 @@ def _judged(
     else:
         excess, differs = before.excess.copy(), before.x != speeds.x
         chosen = np.flatnonzero(differs[:-1] | differs[1:])
-        excess[:, chosen] = problem.excess(pieces.chosen(chosen))
+        excess[:, :, chosen] = problem.excess(pieces.chosen(chosen))
     return GridSolution(problem, constraints, rows, speeds, pieces, excess)
 
 
@@ -352,7 +356,7 @@ def _tightened_solution(solution: GridSolution) -> tuple[GridSolution, int]:
         exceeded = solution.excess > 1.0 + _EXACT
         if not exceeded.any():
             break
-        tightened |= exceeded.any(axis=0)
+        tightened |= exceeded.any(axis=(0, 1))
         lowered = _LOWERED[min(turn, len(_LOWERED) - 1)]
         factors = 1.0 + lowered * np.where(exceeded, solution.excess - 1.0, 0.0)
         solution = solution.tightened(factors, new_ramps=turn == 0)

@@ -7,7 +7,7 @@ IEEE Trans. Robotics 34 (2018).
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -20,8 +20,8 @@ from trajcli.curves.piecewise import (
     distinct,
     horner,
 )
-from trajcli.curves.time_optimal.constraints import ConstraintRows, JointConstraint
-from trajcli.curves.time_optimal.parameterization import time_optimal
+from trajcli.curves.time_optimal.constraints import ConstraintRows, JointConstraint, PathConstraint
+from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion, time_optimal
 from trajcli.curves.time_optimal.phase_plane import PhasePlane
 from trajcli.curves.time_optimal.switching import switching_structure
 from trajcli.curves.time_optimal.time_law import LawPieces
@@ -32,6 +32,11 @@ from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.planners.approach_limits import approach_constraints
 from trajcli.planners.boundary_states import missing_limit
+from trajcli.planners.effort_limits import (
+    effort_constraints,
+    lacks_acceleration,
+    solved_within_efforts,
+)
 from trajcli.planners.planner import Event, Phase, stretched
 from trajcli.planners.tool_path.follow import FollowedPath, JointMotion
 from trajcli.planners.tool_path.law import LawSpec
@@ -65,7 +70,12 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
     limits = robot.limits
     with joints.diagnosed():
         further = (ToolConstraint(joints.executed, tcp), *approach_constraints(curve, robot))
-        solved = time_optimal(curve, limits.velocity, limits.acceleration, further=further)
+
+        def solve(efforts: tuple[PathConstraint, ...]) -> TimeOptimalMotion:
+            every = (*further, *efforts)
+            return time_optimal(curve, limits.velocity, limits.acceleration, further=every)
+
+        solved = solved_within_efforts(curve, robot, solve)
         remaining = _remaining_stretch(joints.executed, solved.law, tcp)
     least = spec.minimum_duration or 0.0
     factor = max(remaining, least / solved.trajectory.duration)
@@ -84,9 +94,10 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
     if stretch > 1 + _NOTED:
         events.append(stretched(stretch))
     joint_constraint = JointConstraint(curve, limits.velocity, limits.acceleration)
+    constraints = (joint_constraint, *further, *effort_constraints(curve, robot))
     breaks = distinct(np.concatenate([curve.breaks, path.breaks]))
     dimension: Literal["length", "angle"] = "angle" if path.poses.pure_rotation else "length"
-    plane = PhasePlane(law, (joint_constraint, *further), breaks, solved.stops, dimension)
+    plane = PhasePlane(law, constraints, breaks, solved.stops, dimension)
     kept = tuple(events if solved.refinements else events[1:])
     return JointMotion(trajectory, motion, tuple(phases), kept, plane)
 
@@ -109,7 +120,7 @@ def _limits(spec: LawSpec, limits: ToolLimits) -> ToolLimits:
 
 def _require_acceleration(curve: PiecewisePolynomial, robot: Robot, planner: str) -> None:
     moving = np.abs(curve.piece_ends(1)).max(axis=(0, 1)) > 0
-    lacking = np.flatnonzero(moving & ~np.isfinite(robot.limits.acceleration).all(axis=1))
+    lacking = np.flatnonzero(moving & lacks_acceleration(robot))
     if lacking.size:
         why = "for the fastest law"
         raise missing_limit(planner, "acceleration", lacking.tolist(), robot, why, "use another law `shape`")
@@ -124,8 +135,15 @@ class ToolConstraint:
         limits: Of its speed and acceleration, linear and angular.
     """
 
+    allows_ramps: ClassVar[bool] = True  # its excess sees what they do
+
     path: ToolPath
     limits: ToolLimits
+
+    @property
+    def bounds_sdd(self) -> bool:
+        """Whether some acceleration is bounded."""
+        return bool(np.isfinite([self.limits.acceleration, self.limits.angular_acceleration]).any())
 
     def rows(self, s: Array, side: Side) -> ConstraintRows:
         """Return rows and caps at points (p,) of the path.
