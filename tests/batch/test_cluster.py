@@ -36,7 +36,7 @@ def cluster() -> Iterator[Any]:
     from distributed import LocalCluster
 
     dask.config.set({"distributed.scheduler.allowed-failures": 0})
-    with LocalCluster(n_workers=1, threads_per_worker=2, dashboard_address=None) as cluster:
+    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
         yield cluster
 
 

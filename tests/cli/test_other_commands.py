@@ -133,7 +133,7 @@ def test_every_command_is_in_the_readme() -> None:
         "slice",
         "view",
     }
-    assert set(COMMANDS) == kinematic | of_jobs | of_files
+    assert kinematic | of_jobs | of_files <= set(COMMANDS)
     assert [name for name in COMMANDS if f"trajcli {name}" not in readme] == []
 
 

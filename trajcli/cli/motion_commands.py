@@ -14,9 +14,9 @@ from trajcli.cli.outcome import guarded
 
 _EXAMPLES = {
     "batch": "trajcli batch examples/cubic.yaml examples/quintic.yaml -o rows",
-    "retime": "trajcli retime rows.csv --job examples/cubic.yaml -o slower.csv",
+    "retime": "trajcli retime rows.csv --job examples/ur5e_pick.yaml -o slower.csv",
     "resample": "trajcli resample rows.csv --rate 500 -o coarse.csv",
-    "concat": "trajcli concat rows.csv back.csv -o both.csv",
+    "concat": "trajcli concat there.csv back.csv -o both.csv",
     "reverse": "trajcli reverse rows.csv -o back.csv",
     "slice": "trajcli slice rows.csv --from 0.25 --to 0.75 -o part.csv",
     "convert": "trajcli convert rows.csv -o rows.mcap",
