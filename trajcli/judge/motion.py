@@ -240,7 +240,7 @@ class MotionJudge:
             robot, pieces = self._robot_of(before, after), slice(low, high)
             arguments = (window, pieces, robot.limits, before, self._axes, self._worst)
             judge_limits(*arguments, asked=asked)
-            judge_velocity_by_position(*arguments)
+            judge_velocity_by_position(*arguments, asked=asked)
             judge_consistency(*arguments, changes, flips)
             if self._tool is not None:
                 self._tool.see(window, pieces, robot, before, asked=asked)
