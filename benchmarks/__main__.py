@@ -31,6 +31,7 @@ BENCHMARKS = (
     "operational",
     "long_path",
     "jerk_limited",
+    "waypoints",
     "plotting",
     "viewing",
 )
