@@ -67,7 +67,7 @@ def _ruckig(count):
 
 
 def _shown(_duration):
-    return None  # the motions are different ones
+    return []  # the motions are different ones
 
 
 _OURS = {"planner": "waypoints"}
