@@ -34,6 +34,7 @@ BENCHMARKS = (
     "operational",
     "long_path",
     "jerk_limited",
+    "waypoints",
     "plotting",
     "viewing",
 )
