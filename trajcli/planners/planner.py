@@ -30,6 +30,7 @@ _REMARKS = (
     "within_velocity_by_position",
     "within_effort_limits",
     "local_optimum",
+    "bound",
 )  # kinds of events that concede nothing
 _GIVEN = ("duration", "velocity", "acceleration", "deceleration", "timed")  # where they say how long it lasts
 LITTLE = 1e-3
@@ -117,6 +118,7 @@ class Planned:
         phase_plane: Of a time-optimal law: the law s(t), and what limits it.
         braking: How a start outside the velocity or acceleration limits is brought inside first: by each
             joint, or by all on one line; None where it is not.
+        continuity: Derivatives that join inside it, where they are fewer than its planner promises.
     """
 
     curve: PiecewisePolynomial
@@ -139,6 +141,7 @@ class Planned:
     virtual_points: ViaPoints | None = None
     phase_plane: PhasePlane | None = None
     braking: Literal["each", "line"] | None = None
+    continuity: Literal[1, 2] | None = None
 
 
 class Planner(Model):
@@ -304,6 +307,11 @@ class PlannedMove:
         return self.planned.curve.duration
 
     @property
+    def continuity(self) -> Literal[1, 2]:
+        """Derivatives that join without a jump inside it and at rest."""
+        return self.planned.continuity or self.planner.joins
+
+    @property
     def at_rest(self) -> bool:
         """Whether it begins and ends at rest."""
         return self.start.at_rest and self.planned.end.at_rest
@@ -325,7 +333,7 @@ class PlannedMove:
 
     def span(self, start: float, end: float) -> Span:
         """Return the part of a trajectory, from `start` to `end` s, that is this move."""
-        return Span(self.index, self.planner.tag, start, end, self.planner.joins, self.robot.payload)
+        return Span(self.index, self.planner.tag, start, end, self.continuity, self.robot.payload)
 
     def alone(self) -> Trajectory:
         """Return the trajectory of this move alone."""

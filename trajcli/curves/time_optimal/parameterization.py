@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from trajcli.curves.extrema import peaks
 from trajcli.curves.operations import scale_time
-from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, distinct
 from trajcli.curves.time_optimal.collocation import CollocatedConstraints, CollocationRows, collocated
 from trajcli.curves.time_optimal.constraints import JointConstraint, PathConstraint, corners, is_at_rest
 from trajcli.curves.time_optimal.maximum_velocity import maximum_velocity_curve
@@ -110,6 +110,7 @@ def time_optimal(
     start_velocity: float = 0.0,
     end_velocity: float = 0.0,
     further: Sequence[PathConstraint] = (),
+    stops: ArrayLike = (),
 ) -> TimeOptimalMotion:
     """Return the fastest motion along a path within bounds of velocity and acceleration that hold for all t.
 
@@ -123,6 +124,7 @@ def time_optimal(
         start_velocity: sd at the start, not negative.
         end_velocity: sd at the end, not negative.
         further: Other constraints; kept as far as their excess tells.
+        stops: Breaks of the path at which it stops, too, shape (k,).
 
     Raises:
         UnlimitedSpeedError: When nothing limits the motion somewhere.
@@ -140,7 +142,8 @@ def time_optimal(
         np.inf if resting and speed == 0 else speed
         for speed, resting in zip((start_velocity, end_velocity), is_at_rest(path), strict=True)
     )
-    problem = PathProblem(joints, tuple(further), corners(path), (ends[0], ends[1]))
+    halts = distinct(np.append(corners(path), np.asarray(stops, dtype=np.float64)))
+    problem = PathProblem(joints, tuple(further), halts, (ends[0], ends[1]))
     if path.duration == 0 or not any(constraint.bounds_sdd for constraint in problem.constraints):
         raise UnlimitedSpeedError(path.start)
     solution, rounds, lost = _refined_solution(problem)
