@@ -305,3 +305,30 @@ def read_line(given):
     pose = forward(robot, given["start"]["joints"])
     given["points"] = {"there": {"matrix": pose.tolist()}}
     return plan(given)
+
+
+def test_phases_name_the_efforts_that_bind():
+    """A lift is at its upper limit until it switches, and at its lower one from there on."""
+    given = {
+        "version": 1,
+        "robot": {
+            "convention": "standard",
+            "joints": [
+                {
+                    "name": "lift",
+                    "type": "prismatic",
+                    "link": {"mass": 5, "com": [0, 0, 0], "inertia": [0] * 6},
+                }
+            ],
+        },
+        "limits": {"velocity": 50, "effort": 80},
+        "start": {"joints": [0]},
+        "moves": [{"planner": "time_optimal", "through": [{"joints": [1]}], "to": {"joints": [3]}}],
+    }
+    planned = plan(given)
+    first, second = planned.moves[0].planned.phases
+    up, down = 80 / 5 - 9.81, 80 / 5 + 9.81
+    switch = (2 * 3.0 * down / (up * (up + down))) ** 0.5
+    assert (first.name, second.name) == ("effort +", "effort -")
+    assert first.end == pytest.approx(switch, rel=1e-3)
+    assert second.start == pytest.approx(switch, rel=1e-3)
