@@ -110,6 +110,17 @@ def test_durations_against_toppra(name, seed):
     assert motion.trajectory.duration <= 1.003 * toppra_duration(robot, points, 800)
 
 
+@pytest.mark.soak
+@pytest.mark.parametrize("name", EFFORTS)
+def test_durations_against_toppra_on_many_splines(name):
+    for seed in range(34):
+        robot = arm(name)
+        path, points = spline_of(robot, seed)
+        motion = solved(path, robot)
+        assert np.abs(shares(motion.trajectory, robot)).max() <= 1 + 1e-6
+        assert motion.trajectory.duration <= 1.003 * toppra_duration(robot, points)
+
+
 @pytest.mark.parametrize("mass", [0.0, 5.0])
 def test_a_joint_is_at_its_limit_nearly_always(mass):
     robot = arm("ur5", mass=mass)
