@@ -207,11 +207,15 @@ class PathReferenceReport(ReportPart):
     ] = []
     deviation: Annotated[
         float,
+        MeasuredIn("deviation_unit"),
         Field(
             description="By how much toppra's path misses that of the move, of all joints together; 0 where "
             "it is the same polynomial."
         ),
     ] = 0.0
+    deviation_unit: Annotated[
+        str, Field(description="rad or m; empty where joints of both kinds are measured together, in SI.")
+    ] = "rad"
     reason: Annotated[str | None, Field(description="Why there is none.")] = None
 
 
