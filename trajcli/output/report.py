@@ -157,7 +157,7 @@ def _move(plan: Plan, index: int, *, reference: bool, peers: bool) -> MoveReport
         peaks=peaks,
         velocity_by_position=near or None,
         binding=binding,
-        at_limit=at_limit_of(move, plan.verdict.peaks[index]),
+        at_limit=at_limit_of(move, plan.verdict.peaks[index], plan.verdict.by_position[index]),
         waypoints=_waypoints(move, span),
         outside=_outside(move, plan.verdict, index),
         tool=_tool(plan.trajectory, span, move),
