@@ -29,6 +29,7 @@ BENCHMARKS = (
     "inverse_kinematics",
     "calibration",
     "time_optimal",
+    "dynamics",
     "through_points",
     "operational",
     "long_path",
@@ -37,7 +38,7 @@ BENCHMARKS = (
     "viewing",
 )
 OURS = ("trajcli", "numpy", "pydantic", "pyyaml", "typer")
-THEIRS = ("roboticstoolbox-python", "eaik", "toppra", "numpy", "scipy")
+THEIRS = ("roboticstoolbox-python", "eaik", "pin", "toppra", "numpy", "scipy")
 _VERSIONS = """
 import json, platform, sys
 from importlib.metadata import version

@@ -12,7 +12,8 @@ from pydantic.fields import FieldInfo
 from docs.markdown import first_sentence, table
 from trajcli.job.model import Output, OutputUnits, RobotSource, UnitsSpec
 from trajcli.job.robot import JointModel
-from trajcli.language.dynamics import EffortBound, FrictionSpec, LinkSpec
+from trajcli.language.dynamics import FrictionSpec, Gravity, LinkSpec, PayloadSpec
+from trajcli.language.efforts import EffortBound, Efforts
 from trajcli.language.limits import (
     UNLIMITED,
     Bounds,
@@ -44,6 +45,7 @@ from trajcli.planners.tool_path.move import ToleranceSpec
 from trajcli.planners.tool_path.path import Segment
 from trajcli.planners.waypoints.blends import BlendDurations
 from trajcli.planners.waypoints.time_optimal import PathParameter
+from trajcli.planners.waypoints.waypoints import SegmentTimes
 from trajcli.units import Quantity, Units, unit_name
 
 SECTIONS: dict[type, str] = {
@@ -57,10 +59,11 @@ SECTIONS: dict[type, str] = {
     JointModel: "[joint](#joints)",
     FrictionSpec: "[friction](#friction)",
     LinkSpec: "[link](#link)",
+    PayloadSpec: "[payload](#payload)",
     AxisAngleSpec: "[axis and angle](#axis-and-angle)",
     EulerSpec: "[Euler angles](#euler-angles)",
     Configuration: "[configuration](#configuration)",
-    Waypoint: "[waypoint](#waypoints)",
+    Waypoint: "[waypoint](#points-on-the-path)",
     ToolLimitsSpec: "[limits of the tool](#limits-of-the-tool)",
     VelocityByPosition: "[by position](#velocity-by-position)",
     LawSpec: "[law](#law)",
@@ -72,7 +75,7 @@ SECTIONS: dict[type, str] = {
 
 _BY_JOINT = "[for each joint](#values-by-joint)"
 _LEFT_OUT = "left out"
-_POINTS = "list of [waypoints](#waypoints), or `{positions, times, merge}`, or `{csv, merge}`"
+_POINTS = "list of [waypoints](#points-on-the-path), or `{positions, times, merge}`, or `{csv, merge}`"
 
 
 def field_table(model: type[BaseModel], left_out: Mapping[str, str] | None = None) -> str:
@@ -133,11 +136,14 @@ def _reader_form(reader: FieldType) -> str:
         Direction: "`x` or `y` or `z` or a list of 3 numbers",
         Matrix: "3 rows of 3 numbers, or 4 of 4",
         JointBound: "[bound](#bounds)",
-        EffortBound: "[bound](#bounds), N m or N",
+        EffortBound: "[bound](#bounds)",
+        Efforts: f"[bound](#bounds), {_BY_JOINT}, or `robot`",
+        Gravity: "list of 3 numbers",
         Pose: "[pose](#poses)",
         RobotSource: "[robot](#robot)",
         JointDistance: f"number at least 0, {_BY_JOINT}",
         BlendDurations: "number above 0, or a list of them",
+        SegmentTimes: "list of numbers at least 0",
         PathParameter: "`chord` or `centripetal` or `uniform` or a list of numbers",
     }
     return forms[type(reader)]
@@ -180,7 +186,11 @@ def _unit(field: FieldInfo) -> str:
         return "joint" + ("", "/s", "/s^2", "/s^3")[reader.order]
     if isinstance(reader, Number | Numbers):
         return _quantity_unit(reader.quantity)
-    if isinstance(reader, JointDistance | BlendDurations):
+    if isinstance(reader, EffortBound | Efforts):
+        return "N m or N"
+    if isinstance(reader, Gravity):
+        return "m/s^2"
+    if isinstance(reader, JointDistance | BlendDurations | SegmentTimes):
         return "joint" if isinstance(reader, JointDistance) else "s"
     listed = [item for item in get_args(_bare(field.annotation)) if get_origin(item) is Annotated]
     inner = [item for arm in listed for item in get_args(arm) if isinstance(item, Number)]

@@ -15,7 +15,7 @@ from trajcli.columns import GROUPS, Group
 from trajcli.job.model import Job, Output, OutputUnits, UnitsSpec
 from trajcli.job.robot import JointModel, RobotModel
 from trajcli.job.yaml.load import read_document
-from trajcli.language.dynamics import FrictionSpec, LinkSpec
+from trajcli.language.dynamics import FrictionSpec, LinkSpec, PayloadSpec
 from trajcli.language.limits import JobLimitsSpec, Scale, ToolLimitsSpec, VelocityByPosition
 from trajcli.language.numbers import MAX_JOINTS
 from trajcli.language.poses import SEQUENCES
@@ -45,8 +45,8 @@ the axes of world: the position is moved by `xyz`, the orientation turned about 
 
 The point is given as a pose, or relative to another point; not by its joints. Its `configuration` holds,
 too, if none stands beside `from`. A point without a whole orientation can only be displaced, with
-`frame: world`. `velocity` and `acceleration`, and in a [waypoint](#waypoints) `time` and `blend`, stand
-beside `from`."""
+`frame: world`. `velocity` and `acceleration`, and in a [waypoint](#points-on-the-path) `time` and `blend`,
+stand beside `from`."""
 
 _VALUES = """\
 A value for each joint has one of three forms: one value that holds for all joints, a list with one
@@ -101,11 +101,30 @@ With standard rows the pose of a link is Rz(theta) Tz(d) Tx(a) Rx(alpha); with m
 Rx(alpha) Tx(a) Rz(theta) Tz(d). The joint's value q is added: theta + sign q for a revolute joint, d +
 sign q for a prismatic one."""
 
+_EFFORTS = """\
+`effort` limits the torque of a revolute joint (N m) and the force of a slide (N), in any units of the job.
+What drives a joint is tau = M(q) qdd + C(q, qd) qd + g(q) + coulomb sign(qd) + viscous qd, with the rotors in
+M and with the [payload](#payload). All links need their mass and inertia, else the job is refused.
+
+`effort: robot` takes the efforts that the robot itself states. Those of a robot that stands in the job, or
+in a robot file of your own, are in force without it where all links have their inertia; those of the
+catalogue and of a URDF only with it, for many of them are guesses: the report names their source and says
+whether efforts were judged."""
+
+_PAYLOAD = """\
+`- {attach: {mass: 3.2}}` between two moves: from there on the tool carries a payload, until `- {detach: {}}`.
+Neither takes time nor moves anything; they count among the `moves`, so that the number of a move in messages
+and in the column `move` is its place in the list. Each move is planned and judged with what it carries. A
+`start` with a payload is an `attach` before the first move.
+
+An `inertia` that no solid has is refused: a principal moment below zero, or one above the sum of the two
+others. A point mass (all zeros, the default) and a thin rod are possible."""
+
 _DYNAMICS = """\
-Effort, friction, rotor and link are read, checked and kept: `trajcli urdf` and `--resolved` write them.
-Nothing is planned or judged by them yet. They are in SI whatever the units of the file, but for the centre of
-mass, which is a length. An inertia that no solid has is refused: a mass not above zero, a principal moment
-below zero, or one above the sum of the two others."""
+Effort, friction, rotor and link are what [efforts](#efforts) are computed from. They are in SI whatever
+the units of the file, but for the centre of mass, which is a length. An inertia that no solid has is refused:
+a mass not above zero, a principal moment below zero, or one above the sum of the two others."""
+
 _BY_POSITION = """\
 A joint that is the distance x before the end of its range may move towards that end with at most
 max(0, sqrt(2 d x) - o), and away from it as its `velocity` says: a joint that brakes with the deceleration d
@@ -173,6 +192,7 @@ _MEANINGS: dict[Group, str] = {
     "twist": "`vx vy vz wx wy wz`: velocity at the tcp and angular velocity, in world",
     "twistd": "`ax ay az ex ey ez`: time derivative of the twist",
     "path": "`s sd sdd`: arc length of the tcp along its path and two derivatives; 0 without a path",
+    "tau": "effort of each joint, N m or N in any units: inverse dynamics with what the tool carries",
     "move": "index of the move, from 0; at the border of two moves, that of the later one",
 }
 
@@ -205,10 +225,11 @@ def job_reference() -> str:
     parts += ["### Relative points", _RELATIVE]
     parts += ["### Axis and angle", field_table(AxisAngleSpec), "### Euler angles", field_table(EulerSpec)]
     parts += ["### Configuration", _CONFIGURATION, field_table(Configuration)]
-    parts += ["### Waypoints", _WAYPOINTS, field_table(Waypoint, {"joints": "a pose instead"})]
+    parts += ["### Points on the path", _WAYPOINTS, field_table(Waypoint, {"joints": "a pose instead"})]
     parts += ["## Values by joint", _VALUES]
     parts += ["## Limits", _LIMITS, field_table(JobLimitsSpec)]
     parts += ["### Scale", first_sentence(Scale.__doc__), field_table(Scale), "### Bounds", _BOUNDS]
+    parts += ["### Efforts", _EFFORTS]
     parts += ["### Limits of MoveIt", _MOVEIT]
     parts += ["### Limits of the tool", _TOOL_LIMITS, field_table(ToolLimitsSpec)]
     parts += ["## Robot", _ROBOT, field_table(RobotModel)]
@@ -218,6 +239,7 @@ def job_reference() -> str:
     parts += ["#### Friction", field_table(FrictionSpec), "#### Link", field_table(LinkSpec)]
     parts += ["### Poses", _POSES]
     parts += ["## Moves", _MOVES.rstrip(), _common_fields()]
+    parts += ["### Payload", _PAYLOAD, field_table(PayloadSpec)]
     parts += tool_path_sections()
     parts += ["## Planners"]
     for tag, planner in PLANNERS.items():
@@ -260,7 +282,7 @@ def _examples_of(tag: str) -> list[Path]:
     found = [
         path
         for path in sorted((ROOT / "examples").glob("*.yaml"))
-        if any(move["planner"] == tag for move in read_document(str(path)).plain()["moves"])
+        if any(move.get("planner") == tag for move in read_document(str(path)).plain()["moves"])
     ]
     if not found:
         raise RuntimeError(f"there is no example of the planner {tag} in examples/")

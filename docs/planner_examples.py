@@ -53,6 +53,15 @@ EXAMPLES = {
         "    corner: 3                                           # degrees\n"
         "    through: {positions: [[50, 25], [20, 30], [0, 0]]}\n"
     ),
+    "waypoints": (
+        "version: 1\nunits: {angle: deg}\nrobot: {joints: 2}\n"
+        "limits: {velocity: 60, acceleration: 200, jerk: 2000}\nstart: {joints: [0, 0]}\nmoves:\n"
+        "  - {planner: waypoints, through: {positions: [[20, 30], [50, 25]]}, to: {joints: [60, 0]}}\n"
+        "  - planner: waypoints\n"
+        "    through: [{joints: [50, 25], velocity: {j1: -20}}, {joints: [20, 30]}]\n"
+        "    to: {joints: [0, 0]}\n"
+        "    minimum_durations: [0.5, 0, 0]                      # s, one for each segment\n"
+    ),
     "line": (
         f"{_UR5E}  - {{planner: line, to: {{xyz: [400, 300, 250]}}}}   # keeps its orientation\n"
         "  - {planner: line, to: {rpy: [180, 0, 60]}}                 # rotates about the tcp\n"
@@ -117,8 +126,8 @@ refused. With `brake: true` it is brought inside first, as fast as possible, eac
 `synchronize: phase` all together); an event says so. Until then, and no longer, the limits that the start
 breaks do not count; all others do.""",
     "spline": """\
-`through` lists the [waypoints](#waypoints) between the start and `to`; without `to` its last point is the
-target. Either all of them have a `time` or none.
+`through` lists the [waypoints](#points-on-the-path) between the start and `to`; without `to` its last point
+is the target. Either all of them have a `time` or none.
 
 Without times the move is the fastest of its kind within the limits; a `duration` alone stretches that, and
 with a recording it stretches the recording. What the ends impose depends on the rule: velocity and
@@ -139,12 +148,33 @@ velocity and acceleration, and so are the blends; a `duration` stretches all of 
 at rest. With times the start and the target may have a velocity: a centred blend then begins before the
 first point, which only the start of a job can do (an event, `begins_before`), and ends beyond the last.""",
     "time_optimal": """\
-Points stand as for `spline`, without times: it is as fast as the limits of velocity and acceleration
+Points stand as for `spline`, without times: it is as fast as the limits of velocity, acceleration and jerk
 allow along its path, which is a smooth curve through the points (`path: spline`; `rule` and `parameter`
 say which one) or straight from point to point (`path: polyline`). On a polyline it stops at each point,
-or, with `corner`, passes it at no more than that distance by a parabola. The times of a recording are not
-used. `explain` says which limit of which joint binds when. Its acceleration steps, so joints with a limit
-of jerk need another planner. A `duration` stretches the fastest motion.""",
+or, with `corner`, passes it at no more than that distance. The times of a recording are not used. `explain`
+says which limit of which joint binds when. Where a joint has a limit of jerk, the limits of jerk are kept and
+the acceleration has no steps: corners are rounded with continuous curvature, and rules whose curvature jumps
+(`computed`, `shape_preserving`) are refused. `jerk: ignore` leaves the limits of jerk aside; where there is
+none, the acceleration steps. Where the arm starts in motion, it keeps its acceleration, and a spline bends
+so that it can; it ends in motion without acceleration. A `duration` stretches the fastest motion.""",
+    "waypoints": """\
+Points stand as for `time_optimal`. Between them the motion is free: it goes where it is fast, and may leave
+the straight chords by as much as `explain` and the report say, so where obstacles stand between the points
+take `time_optimal`. A `velocity` or `acceleration` of a point fixes the joints that it names; what it
+leaves out is found. The last point's are zero unless given. Points that repeat the one before count once;
+the minimum duration of what lay between goes to the next segment, or where there is none to the one before.
+
+The search is deterministic: `starts` of these starting points are tried, in this order, and each is
+improved until nothing is gained. (1) Knots that are free, eight in each segment, from six tenths of the
+times of stopping at each point; (2) the straight motion of each collinear stretch; (3) twelve free knots,
+from eight tenths of those times; (4) central differences of the points, at the best of six speeds; (5) six
+free knots, from the times at the velocity limits; (6) eight, from the times of the best motion so far; (7)
+ten, from equal times; (8) sixteen, from the times of the best so far. The motion that stops at each point
+is always compared, too, so that no result is slower. The lower bound that is named is proven, and so is
+what the motion is at most above the fastest possible.
+
+With `straight` it keeps to the polyline through the points: it passes collinear points without a stop, and
+stops where the polyline turns.""",
     "line": _JOINS,
     "arc": f"""\
 Which arc is meant is said in one of [three ways](#arcs). An arc by its angle ends with the orientation with

@@ -187,6 +187,18 @@ def _time_optimal(rng: np.random.Generator, start: Fields, joints: int, rest: bo
     return {"through": through, "to": target, **fields, **_maybe(rng, parameter="centripetal")}
 
 
+def _waypoints(rng: np.random.Generator, start: Fields, joints: int, rest: bool) -> Fields:
+    through, target = _points_on_the_way(rng, start, timed=False)
+    if not rest:
+        start |= _maybe(rng, velocity=random_values(rng, joints, 0.05))
+        if rng.random() < 0.3:
+            target["velocity"] = random_values(rng, joints, 0.05)
+    fields: Fields = {"starts": 1, "straight": bool(rest and rng.random() < 0.3)}
+    if rng.random() < 0.3:
+        fields["minimum_durations"] = rng.uniform(0, 1, len(through) + 1).tolist()
+    return {"through": through, "to": target, **fields}
+
+
 _FIELDS = {
     "cubic": _cubic,
     "quintic": _quintic,
@@ -197,6 +209,7 @@ _FIELDS = {
     "spline": _spline,
     "blends": _blends,
     "time_optimal": _time_optimal,
+    "waypoints": _waypoints,
     "hold": _hold,
 }
 TAGS = sorted(_FIELDS)

@@ -113,6 +113,7 @@ WORKED = {
         "b0 = 1.9875, b1 = 0.75, b2 = -1.25",
     ],
     "time_optimal": ["5.5 s"],
+    "waypoints": ["of 4 starting points agree", "above the fastest possible along the polyline"],
     "line": ["accelerate 0..0.585786", "0.250000000,0.037722087,0.462277913,0.000000000"],
     "arc": ["accelerate 0..0.429204", "1.700000000,0.000000000,-0.489047677,0.895921329"],
     "path": ["3.000000000,1.000000000,0.500000000,0.000000000"],
@@ -168,7 +169,7 @@ def test_every_planner_has_its_section_with_every_field(tag: str) -> None:
         ("## Job", None),
         ("## Units", "UnitsSpec"),
         ("## States", "Target"),
-        ("### Waypoints", "Waypoint"),
+        ("### Points on the path", "Waypoint"),
         ("## Limits", "JobLimitsSpec"),
         ("### Scale", "Scale"),
         ("### Limits of the tool", "ToolLimitsSpec"),
@@ -212,6 +213,7 @@ def test_every_definition_of_the_schema_is_looked_at() -> None:
         "Waypoint",
     }
     known |= {"RelativeTarget", "RelativeWaypoint"}  # described in words
+    known |= {"Attach", "Detach", "Empty", "PayloadSpec"}
     known |= {"ToolLimitsSpec", "LawSpec", "ToleranceSpec", "Segment", "ArcFields"}
     others = {name for name, definition in SCHEMA["$defs"].items() if "properties" in definition} - known
     assert {SCHEMA["$defs"][name]["properties"]["planner"]["const"] for name in others} == set(MOVES)

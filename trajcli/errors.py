@@ -44,6 +44,7 @@ class Amount:
         joint: Index of the joint that says whether angle or length is meant.
         dimension: "length" or "angle" of the tool; with neither this nor a joint the number is a time.
         rounded: "up" for a lower bound, "down" for an upper one: the number that is shown keeps it.
+        unit: Where it is the same in all units of a job, such as "N m".
     """
 
     value: float | tuple[float, ...]
@@ -51,8 +52,11 @@ class Amount:
     joint: int | None = None
     dimension: Literal["length", "angle"] | None = None
     rounded: Literal["up", "down"] | None = None
+    unit: str | None = None
 
     def __str__(self) -> str:
+        if self.unit is not None:
+            return f"{self.numbers()} {self.unit}"
         unit = {"length": " m", "angle": " rad", None: ""}[self.dimension]
         return self.numbers() + (unit + ("", "/s", "/s^2", "/s^3")[self.order] if unit else "")
 

@@ -13,7 +13,7 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial, read_only
 from trajcli.errors import InputError
 from trajcli.frozen import comparable, frozen
 from trajcli.grids import UniformGrid, onto_breaks
-from trajcli.kinematics.robot import JointType, Robot
+from trajcli.kinematics.robot import JointType, Payload, Robot
 
 if TYPE_CHECKING:
     from trajcli.kinematics.following.motion import ToolMotion
@@ -124,6 +124,7 @@ class Span:
         start: Seconds from the start of the trajectory.
         end: Seconds from the start of the trajectory; equals the next span's start.
         continuity: Derivatives that the planner promises to join without a jump: 1 or 2.
+        payload: What the tool carries meanwhile; None for nothing.
     """
 
     index: int
@@ -131,6 +132,7 @@ class Span:
     start: float
     end: float
     continuity: int
+    payload: Payload | None = None
 
     @property
     def duration(self) -> float:

@@ -9,6 +9,10 @@ Inside the house everything is SI. A number of a file is `value * factor(quantit
 | length | m, cm, mm, um |
 | time | s, ms, us, min |
 | frequency | Hz, kHz |
+| mass | kg, g |
+| force | N, kN |
+| torque | N m, Nm, kN m |
+| inertia | kg m^2, kg m² |
 
 A rate is an angle or a length over a time: `deg/s`, `mm/s^2`, `m/s³`, `rev/min`. Ratios have no unit.
 """
@@ -23,7 +27,7 @@ from typing import Literal
 from trajcli.errors import Amount
 from trajcli.frozen import comparable
 
-Dimension = Literal["angle", "length", "time", "frequency", "ratio"]
+Dimension = Literal["angle", "length", "time", "frequency", "ratio", "mass", "force", "torque", "inertia"]
 AngleUnit = Literal["rad", "deg"]
 LengthUnit = Literal["m", "mm"]
 
@@ -31,13 +35,40 @@ _ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180, "°": math.pi / 180, 
 _LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
 _TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
 _FREQUENCIES = {"Hz": 1.0, "kHz": 1e3}
-_UNITS = {"angle": _ANGLES, "length": _LENGTHS, "time": _TIMES, "frequency": _FREQUENCIES}
+_UNITS = {
+    "angle": _ANGLES,
+    "length": _LENGTHS,
+    "time": _TIMES,
+    "frequency": _FREQUENCIES,
+    "mass": {"kg": 1.0, "g": 1e-3},
+    "force": {"N": 1.0, "kN": 1e3},
+    "torque": {"N m": 1.0, "Nm": 1.0, "kN m": 1e3, "kNm": 1e3},
+    "inertia": {"kg m^2": 1.0, "kg m²": 1.0},
+}
+_FIXED = {
+    "time": "s",
+    "frequency": "Hz",
+    "ratio": "",
+    "mass": "kg",
+    "force": "N",
+    "torque": "N m",
+    "inertia": "kg m^2",
+}
 
 _ALIASES = {"rpm": "rev/min"}
 _EXPONENTS = {"": 1, "^2": 2, "²": 2, "^3": 3, "³": 3}
 _RATES = ("", "/s", "/s^2", "/s^3")
 _ORDERS = ("", " per second", " per second squared", " per second cubed")
-_EXAMPLES = {"angle": "120 deg", "length": "250 mm", "time": "0.5 s", "frequency": "500 Hz"}
+_EXAMPLES = {
+    "angle": "120 deg",
+    "length": "250 mm",
+    "time": "0.5 s",
+    "frequency": "500 Hz",
+    "mass": "3.2 kg",
+    "force": "400 N",
+    "torque": "28 N m",
+    "inertia": "0.02 kg m^2",
+}
 _QUOTED = 40  # characters of the user's text that a message repeats
 
 _NUMBER = re.compile(r"\s*([-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*", re.DOTALL)
@@ -88,14 +119,24 @@ def factor(quantity: Quantity, units: Units) -> float:
 
 def unit_name(quantity: Quantity, units: Units) -> str:
     """Return the user's unit as messages say it, such as "deg/s" or "mm/s^2"; empty for a ratio."""
-    if quantity.dimension in ("time", "frequency", "ratio"):
-        return {"time": "s", "frequency": "Hz", "ratio": ""}[quantity.dimension]
+    if quantity.dimension in _FIXED:
+        return _FIXED[quantity.dimension]
     return (units.angle if quantity.dimension == "angle" else units.length) + _RATES[quantity.order]
 
 
 def joint_quantity(joint_type: str, order: int = 0) -> Quantity:
     """Return what the value of a joint measures, or its time derivative of the given order."""
     return Quantity("length" if joint_type == "prismatic" else "angle", order)
+
+
+def effort_quantity(joint_type: str) -> Quantity:
+    """Return what drives a joint: a force, or a torque."""
+    return Quantity("force" if joint_type == "prismatic" else "torque")
+
+
+def effort_unit(joint_type: str) -> str:
+    """Return the unit of what drives a joint, the same in all units of a job."""
+    return _FIXED[effort_quantity(joint_type).dimension]
 
 
 def to_user(si: float, quantity: Quantity, units: Units) -> float:
@@ -113,6 +154,8 @@ def amount_text(amount: Amount, joint_types: Sequence[str], units: Units) -> str
     """
     if amount.value in (math.inf, -math.inf):
         return "unlimited"
+    if amount.unit is not None:
+        return str(amount)
     if amount.joint is not None:
         quantity = joint_quantity(joint_types[amount.joint], amount.order)
     else:

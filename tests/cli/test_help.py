@@ -17,7 +17,7 @@ OTHER_NAMES = {
     "validate": "plan JOB --no-output",
     "run": "plan",
     "simulate": "plan",
-    "convert": "pose",
+    "transform": "pose",
     "forward": "fk",
     "inverse": "ik",
     "kinematics": "jacobian",

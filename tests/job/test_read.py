@@ -271,8 +271,8 @@ def test_dynamics_of_joints_are_in_si_but_for_the_centre_of_mass() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("mass: 2,", "mass: 0,", "expected a number above 0, got 0"),
-        ("mass: 2,", "mass: -1,", "expected a number above 0, got -1"),
+        ("mass: 2,", "mass: 0,", "expected a number above 0 kg, got 0"),
+        ("mass: 2,", "mass: -1,", "expected a number above 0 kg, got -1"),
         ("mass: 2, ", "", "`mass` is missing"),
         ("[1, 2, 2.5, 0.1, 0, 0]", "[1, 2, -0.1, 0, 0, 0]", "no solid has a negative moment of inertia"),
         ("[1, 2, 2.5, 0.1, 0, 0]", "[1, 1, 1, 2, 0, 0]", "no solid has a negative moment of inertia"),
@@ -280,7 +280,7 @@ def test_dynamics_of_joints_are_in_si_but_for_the_centre_of_mass() -> None:
         ("[1, 2, 2.5, 0.1, 0, 0]", "[1, 2, 3]", "expected 6 numbers, got 3 values"),
         ("com: [10, 0, -5]", "com: 3", "expected 3 numbers, got 3"),
         ("coulomb: 1.5", "coulomb: -1", "expected a number at least 0, got -1"),
-        ("rotor: 0.1", "rotor: -0.1", "expected a number at least 0, got -0.1"),
+        ("rotor: 0.1", "rotor: -0.1", "expected a number at least 0 kg m^2, got -0.1"),
         ("effort: 30", "effort: 0", "expected a number above 0 (N m or N)"),
         ("[-5, 7]", "[5, 7]", "got [5, 7]"),
         ("[-5, 7]", "[-5, 6, 7]", "got [-5, 6, 7]"),

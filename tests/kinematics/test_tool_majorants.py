@@ -11,7 +11,8 @@ from numpy.polynomial import chebyshev
 
 from trajcli.job.robot import load_robot
 from trajcli.kinematics.forward import forward
-from trajcli.kinematics.tool_majorants import growth, majorants
+from trajcli.kinematics.power_series import growth
+from trajcli.kinematics.tool_majorants import majorants
 
 ORDER, LENGTH = 11, 0.3
 RNG = np.random.default_rng(11)

@@ -122,7 +122,7 @@ def _use(job: Job, move: Job, complaint: Complaint, match: re.Match[str]) -> Any
     if "law" in word or "law: {shape" in sentence.split(word)[0]:
         move.setdefault("law", {})["shape"] = "quintic" if "law" in word else word
         return None
-    through = "through" in move
+    through = "through" in move and word != "jerk_limited"
     if through:
         kept = {
             k: v for k, v in move.items() if k in ("through", "to", "duration", "when_over_limit", "limits")

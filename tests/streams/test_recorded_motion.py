@@ -292,6 +292,23 @@ def test_one_clear_error(text, place, message, tmp_path):
     assert message in said
 
 
+@pytest.mark.parametrize(
+    ("magic", "what"),
+    [
+        (b"#ROSBAG V2.0\nabc", "a bag of ROS 1"),
+        (b"SQLite format 3\x00", "a bag of ROS 2"),
+        (b"PAR1\x15", "parquet"),
+        (b"\x89HDF\r\n\x1a\n", "HDF5"),
+        (b"PK\x03\x04\x14", "archive"),
+        (b"\x1f\x8b\x08", "gzip"),
+    ],
+)
+def test_formats_that_are_not_read_are_named(magic, what, tmp_path):
+    _, message, hint = refused(tmp_path, magic)
+    assert what in message
+    assert hint
+
+
 def test_a_cut_file_is_said_to_be_cut(tmp_path):
     assert "cut" in refused(tmp_path, "t,q1\n0,1\n1,2\n2")[2]
 

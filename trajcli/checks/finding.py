@@ -20,6 +20,7 @@ FindingKind = Literal[
     "acceleration",
     "jerk",
     "velocity_by_position",
+    "effort",
     "position_jump",
     "velocity_jump",
     "acceleration_jump",
@@ -37,7 +38,7 @@ FindingKind = Literal[
 ]
 FindingMethod = Literal["exact", "bounded", "sampled"]
 _RATES = ("", "/s", "/s^2", "/s^3")
-LIMITS_OF_JOINTS = ("position", "velocity", "acceleration", "jerk", "velocity_by_position")
+LIMITS_OF_JOINTS = ("position", "velocity", "acceleration", "jerk", "velocity_by_position", "effort")
 """Kinds of findings about limits of joints."""
 
 
@@ -84,6 +85,8 @@ class Finding:
         amount = self.amounts.get("value")
         if not isinstance(amount, Amount):
             return self.unit
+        if amount.unit is not None:
+            return amount.unit
         return ("m" if amount.dimension == "length" else "rad") + _RATES[amount.order]
 
     def text(self, say: Callable[[Amount], str] = str) -> str:

@@ -51,6 +51,9 @@ TARGET_ON_PATH = 2e-5
 # on top; their peaks are looked for between rows until they change by less than this.
 TOOL_RELATIVE = 1e-6
 
+# What is proven of efforts between rows is off them by some 1e-7, and a planner's own proof by as much.
+EFFORT_RELATIVE = 1e-6
+
 # When a braking joint comes inside its limits is the root of a quadratic, of the rounding of its phases.
 BRAKING_RELATIVE = 1e-9
 

@@ -11,20 +11,16 @@ The Bernstein polynomial basis, Computer Aided Geometric Design 29 (2012).
 
 from __future__ import annotations
 
-from functools import cache
-from math import comb, factorial
-
 import numpy as np
 
+from trajcli.curves.bernstein import BETWEEN_NODES, NODES_DEGREE, hull_matrices
 from trajcli.curves.piecewise import Array, derivative_coefficients, horner, taylor_shift
 from trajcli.frozen import frozen
 from trajcli.kinematics.jacobian import jacobian_dot_qd, linearisation
+from trajcli.kinematics.power_series import growth
 from trajcli.kinematics.robot import Robot
-from trajcli.kinematics.tool_majorants import growth, majorants
+from trajcli.kinematics.tool_majorants import majorants
 
-_DEGREE = 8
-_BETWEEN = factorial(_DEGREE) / 4 / _DEGREE ** (_DEGREE + 1)
-"""Bounds the product of the distances from nine equidistant nodes of a piece of length 1."""
 _CLOSE = 2.5e-7  # relative: of the remainder, and of the hull
 _SMALL = 1e-3  # m/s, rad/s or by s^2: what is smaller need not be known so well
 _HALVINGS, _DIVISIONS, _MOST = 8, 24, 1 << 16
@@ -85,7 +81,7 @@ def _known(robot: Robot, coefficients: Array, lengths: Array) -> tuple[Array, Ar
 
     The latter has the shape (4, P).
     """
-    inside = lengths[:, None] * np.linspace(0.0, 1.0, _DEGREE + 1)
+    inside = lengths[:, None] * np.linspace(0.0, 1.0, NODES_DEGREE + 1)
     q, qd, qdd = (
         horner(derivative_coefficients(coefficients, order)[:, :, None], inside[..., None])
         for order in range(3)
@@ -94,19 +90,19 @@ def _known(robot: Robot, coefficients: Array, lengths: Array) -> tuple[Array, Ar
     first = (slopes @ qd[..., None])[..., 0]
     second = (slopes @ qdd[..., None])[..., 0] + jacobian_dot_qd(robot, q, qd)
     rows = np.stack([first[..., :3], first[..., 3:], second[..., :3], second[..., 3:]])
-    n = _DEGREE + 1
+    n = NODES_DEGREE + 1
     position, angle = majorants(robot, q[:, 0], growth(coefficients, lengths, n + 2))
     highest = np.stack(
         [(n + 1) * position[n + 1], angle[n], (n + 1) * (n + 2) * position[n + 2], (n + 1) * angle[n + 1]]
     )
-    return rows, highest * _BETWEEN * lengths**n
+    return rows, highest * BETWEEN_NODES * lengths**n
 
 
 def _largest(rows: Array, rest: Array, starts: Array, lengths: Array) -> ToolPeak:
     """Return the bound of vectors at nine rows of pieces (P, 9, 3), off by `rest` (P,) between them."""
     if not (np.isfinite(rows).all() and np.isfinite(rest).all()):
         return ToolPeak(np.inf, float(starts.min()), np.inf)  # nothing is proven of what no float64 holds
-    hull, halves = _matrices()
+    hull, halves = hull_matrices()
     points = hull @ rows
     value, time, most = 0.0, float(starts.min()), 0.0
     for _ in range(_DIVISIONS):
@@ -125,14 +121,3 @@ def _largest(rows: Array, rest: Array, starts: Array, lengths: Array) -> ToolPea
         starts = np.tile(starts[wide], 2)
         starts[len(starts) // 2 :] += lengths[len(starts) // 2 :]
     return ToolPeak(value, time, max(most, float((np.linalg.norm(points, axis=2).max(axis=1) + rest).max())))
-
-
-@cache
-def _matrices() -> tuple[Array, Array]:
-    """Return what makes Bernstein coefficients of rows (9, 9), and those of both halves of them (2, 9, 9)."""
-    n, x = _DEGREE, np.linspace(0.0, 1.0, _DEGREE + 1)[:, None]
-    k = np.arange(n + 1)
-    chosen = np.array([comb(n, j) for j in range(n + 1)], dtype=np.float64)
-    hull = np.asarray(np.linalg.inv(chosen * x**k * (1.0 - x) ** (n - k)), dtype=np.float64)
-    first = np.array([[comb(i, j) / 2**i for j in range(n + 1)] for i in range(n + 1)])
-    return hull, np.stack([first, first[::-1, ::-1]])

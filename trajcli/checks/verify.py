@@ -21,6 +21,7 @@ from trajcli.kinematics.robot import QUANTITIES, Limits, ToolLimits
 from trajcli.trajectory import Promise, Span, Trajectory
 
 if TYPE_CHECKING:
+    from trajcli.checks.effort import MoveEfforts
     from trajcli.checks.tool_bound import ToolPeak
     from trajcli.curves.approach import ApproachUse
 
@@ -54,6 +55,7 @@ class Verdict:
             proof of what lies between them.
         by_position: For each span where joints use most of their limits of velocity by position, one for each
             joint that has such, times on the curve.
+        efforts: For each span the largest efforts, times on the curve; None where no limit asks for them.
     """
 
     findings: tuple[Finding, ...]
@@ -64,6 +66,7 @@ class Verdict:
     unchecked_of_tool: tuple[str, ...] = ()
     sampled: tuple[int, ...] = ()
     by_position: tuple[tuple[ApproachUse, ...], ...] = ()
+    efforts: tuple[MoveEfforts | None, ...] = ()
 
     def __repr__(self) -> str:
         worst = [f"{found.kind} of {found.joint or 'the tool'}" for found in self.findings[:2]]
@@ -104,6 +107,8 @@ def verify(
         from trajcli.checks.velocity_by_position import check_velocity_by_position
 
         findings += check_velocity_by_position(trajectory, by_position)
+    efforts = _efforts(trajectory, promises)
+    findings += _check_efforts(trajectory, promises, efforts)
     findings += check_continuity(trajectory, limits_by_move, peaks)
     if promises is not None:
         findings += check_waypoints(trajectory, [promise.via_points for promise in promises])
@@ -122,6 +127,7 @@ def verify(
         ),
         unchecked_of_tool=_unchecked_of_tool(limits_by_move, promises, peaks),
         by_position=by_position,
+        efforts=efforts,
     )
 
 
@@ -135,6 +141,30 @@ def _by_position(
 
     pairs = zip(trajectory.spans, limits_by_move, strict=True)
     return tuple(velocity_by_position_uses(trajectory, span, limits) for span, limits in pairs)
+
+
+def _efforts(trajectory: Trajectory, promises: Sequence[Promise] | None) -> tuple[MoveEfforts | None, ...]:
+    """Return for each span the largest efforts, where the arm has limits of them."""
+    efforts: list[MoveEfforts | None] = []
+    for span, promise in zip(trajectory.spans, promises or [Promise()] * len(trajectory.spans), strict=True):
+        robot, known = promise.robot, None
+        if robot is not None and robot.limits.has_effort:
+            from trajcli.checks.effort import move_efforts
+
+            known = move_efforts(trajectory, span, robot)
+        efforts.append(known)
+    return tuple(efforts)
+
+
+def _check_efforts(
+    trajectory: Trajectory, promises: Sequence[Promise] | None, efforts: Sequence[MoveEfforts | None]
+) -> Iterator[Finding]:
+    """Yield the findings about torques and forces."""
+    for span, promise, of_span in zip(trajectory.spans, promises or (), efforts, strict=False):
+        if of_span is not None and promise.robot is not None:
+            from trajcli.checks.effort import check_efforts
+
+            yield from check_efforts(trajectory, span, promise.robot, of_span)
 
 
 def _judged(
@@ -320,6 +350,8 @@ def _ends_over_limit(finding: Finding, joint: int, promise: Promise) -> bool:
         return promise.robot is not None and (
             ends_over_velocity_by_position(promise.robot.limits, promise.ends or ()) is not None
         )
+    if finding.kind == "effort":
+        return False
     order = QUANTITIES.index(finding.kind)
     rates = [(state.velocity, state.acceleration)[order - 1] for state in promise.ends or () if order < 3]
     ends = [float(values[joint]) for values in rates]

@@ -242,6 +242,30 @@ def explain(
     return run_explain(job, override, ExplainOptions(move, derivatives, sensitivity, reference, as_json))
 
 
+@app.command(epilog="Example: trajcli payload examples/pick_carry_place.yaml")
+@guarded
+def payload(
+    job: JobFile,
+    override: Overrides = [],  # noqa: B006
+    at: Annotated[
+        int | None,
+        typer.Option("--at", metavar="MOVE", help="Only what is carried in this move, counted from 0."),
+    ] = None,
+    as_json: Json = False,
+    errors: Errors = "text",
+) -> int:
+    """Find the largest mass with which a job still verifies, and which joint then is at its limit, and when.
+
+    It is the mass of what the job attaches, at its centre of mass and with its inertia; where it attaches
+    nothing, of a point at the tcp. Moves that find their durations are planned anew for each mass.
+
+    Exit codes: 0 found; 1, 2, 3 as of plan, where the job does not verify even without it.
+    """
+    from trajcli.cli.payload import run_payload
+
+    return run_payload(job, override, at, as_json=as_json)
+
+
 @app.command(epilog="Example: trajcli check rows.csv --job examples/ur5e_pick.yaml")
 @guarded
 def check(

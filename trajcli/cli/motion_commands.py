@@ -51,11 +51,9 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Nothing on stderr bu
 
 def register_tools(app: typer.Typer) -> None:
     """Add these commands to an application."""
-    for command in (batch, retime, resample, concat, reverse, cut, convert):
-        name = "slice" if command is cut else command.__name__
-        named = guarded(command)
-        named.__name__ = name  # the command line looks commands up by the names of their functions
-        app.command(name, epilog=f"Example: {_EXAMPLES[name]}")(named)
+    for command in (batch, retime, resample, concat, reverse, slice, convert):
+        name = command.__name__
+        app.command(name, epilog=f"Example: {_EXAMPLES[name]}")(guarded(command))
 
 
 def batch(
@@ -196,7 +194,7 @@ def reverse(
     return run_reverse(file, options)
 
 
-def cut(
+def slice(  # noqa: A001
     file: MotionSource,
     first: Annotated[
         str | None, typer.Option("--from", metavar="T", help="Time of the file, s; else its start.")

@@ -20,10 +20,11 @@ import numpy as np
 from trajcli.errors import InputError
 from trajcli.job.read import LoadedJob
 from trajcli.job.robot import DH_ROW, RobotSheet
-from trajcli.kinematics.robot import QUANTITIES, Robot
+from trajcli.kinematics.robot import GRAVITY, QUANTITIES, Robot
 from trajcli.language.dynamics import written_dynamics
-from trajcli.language.limits import UNLIMITED, ToolLimitsSpec
+from trajcli.language.limits import ToolLimitsSpec
 from trajcli.language.numbers import ReadingContext, written_number
+from trajcli.language.per_joint import UNLIMITED
 from trajcli.units import Quantity, joint_quantity
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -39,22 +40,28 @@ def dump_job(loaded: LoadedJob) -> str:
     robot, job = loaded.robot, loaded.job
     context = ReadingContext(loaded.units, robot.joint_names, robot.joint_types)
     written = job.model_dump(context=context, exclude={"robot", "base", "tool", "limits"}, exclude_none=True)
-    moves = [{"planner": move.pop("planner"), **move} for move in written["moves"]]
+    moves = [_without_empty(move) if "planner" in move else move for move in map(_move, written["moves"])]
     ordered = {
         "version": job.version,
         "name": loaded.name,
         "units": written["units"],
         "robot": robot_as_mapping(robot),
-        "limits": _tool_limits(robot, context),
+        **({} if job.gravity == GRAVITY else {"gravity": written["gravity"]}),
+        "limits": {**_tool_limits(robot, context), **_efforts(robot)},
         "points": written["points"],
         "start": written["start"],
-        "moves": moves,
+        "moves": [],
         "when_over_limit": job.when_over_limit,
         "output": written["output"],
     }
     if job.output.times is not None:
         ordered["output"].pop("rate")
-    return "\n".join(_block(_without_empty(ordered))) + "\n"
+    return "\n".join(_block({**_without_empty(ordered), "moves": moves})) + "\n"
+
+
+def _move(written: dict[str, Any]) -> dict[str, Any]:
+    """Return a move with its planner first; what handles a payload has none."""
+    return {"planner": written.pop("planner"), **written} if "planner" in written else written
 
 
 def dump_robot(sheet: RobotSheet) -> str:
@@ -163,6 +170,15 @@ def _tool_limits(robot: Robot, context: ReadingContext) -> dict[str, Any]:
     given = {name: value for name, value in asdict(robot.limits.tcp).items() if isfinite(value)}
     spec = ToolLimitsSpec(**given)
     return {"tcp": spec.model_dump(context=context, exclude_none=True)} if given else {}
+
+
+def _efforts(robot: Robot) -> dict[str, Any]:
+    """Return the efforts that are in force, where the robot's joints do not say the same."""
+    in_force = robot.limits.effort.tolist()
+    if all((low, high) == joint.effort for (low, high), joint in zip(in_force, robot.joints, strict=True)):
+        return {}
+    bounds = [None if tuple(bound) == UNLIMITED else bound for bound in in_force]
+    return {"effort": dict(zip(robot.joint_names, bounds, strict=True))}
 
 
 def _without_empty(value: Any) -> Any:  # noqa: ANN401

@@ -12,7 +12,7 @@ from pydantic_core import ErrorDetails
 from trajcli.errors import Problem
 from trajcli.job.yaml.load import Document
 from trajcli.language.numbers import AT_KEY, FieldPath, Flaw, shown
-from trajcli.planners import ALSO_CALLED, PLANNERS
+from trajcli.planners import ALSO_CALLED, HANDLING, PLANNERS
 from trajcli.suggest import did_you_mean, valid_names
 
 _KINDS = {
@@ -70,7 +70,7 @@ def _flaws(
 ) -> list[tuple[FieldPath, str, str | None, bool]]:
     """Return (path in the file, message, hint, whether the key itself is wrong) of each flaw of one error."""
     kind, context, loc = detail["type"], detail.get("ctx", {}), detail["loc"]
-    path = _path_in_file(loc, document, prefix)
+    path = _path_in_file(_without_key_of_entry(loc), document, prefix)
     if kind == "flaws":
         flaws: list[Flaw] = context["flaws"]
         return [_flaw((*path, *below), text, hint) for below, text, hint in flaws]
@@ -91,6 +91,11 @@ def _flaws(
     return [(path, message, hint, False)]
 
 
+def _without_key_of_entry(loc: FieldPath) -> FieldPath:
+    """Return the path without the tag of an entry among the moves, which is a key of it, too."""
+    return (*loc[:2], *loc[3:]) if loc[:1] == ("moves",) and loc[2:3] and loc[2] in HANDLING else loc
+
+
 def _flaw(path: FieldPath, text: str, hint: str | None) -> tuple[FieldPath, str, str | None, bool]:
     at_key = path[-1:] == (AT_KEY,)
     return path[:-1] if at_key else path, text, hint, at_key
@@ -100,6 +105,8 @@ def _unknown_planner(move: object) -> tuple[str, str | None]:
     tag = move.get("planner") if isinstance(move, Mapping) else move
     if not isinstance(tag, str):
         return f"expected a planner's name, got {shown(tag)}", _every_planner()
+    if tag in HANDLING:
+        return f"{tag} is no planner", f"write `- {{{tag}: ...}}`: it stands alone between moves"
     meant = ALSO_CALLED.get(tag.strip().casefold().replace("-", "_").replace(" ", "_"))
     own = f"write `planner: {meant}` ({_every_planner()})" if meant else did_you_mean(tag, PLANNERS)
     return f"unknown planner '{tag}'", own or _every_planner()
@@ -139,7 +146,11 @@ def _other_place(path: FieldPath, names: list[str], document: Document) -> str |
 
 def _text(kind: str, context: Mapping[str, Any], value: object) -> tuple[str, str | None]:
     if kind == "union_tag_not_found":
-        return "a move needs `planner`", _every_planner()
+        keys = [str(key) for key in value] if isinstance(value, Mapping) else []
+        meant = [near for key in keys if (near := did_you_mean(key, HANDLING))]
+        if meant:
+            return "a move needs `planner`", meant[0]
+        return "a move needs `planner`", f"{_every_planner()}; between moves stand {' and '.join(HANDLING)}"
     if kind == "literal_error":
         names = [word.strip().strip("'") for word in context["expected"].replace(" or ", ", ").split(",")]
         quoted = isinstance(value, str) and value in names  # "1" where 1 is meant
@@ -176,7 +187,8 @@ def _path_in_file(loc: FieldPath, document: Document, prefix: FieldPath) -> Fiel
 
 def _field_names(model: type[BaseModel], loc: FieldPath) -> list[str]:
     """Return the keys that may stand at `loc`, read off the model."""
-    return list(_model_at(model, loc).model_fields)
+    fields = _model_at(model, loc).model_fields
+    return [name for name, field in fields.items() if not field.exclude]
 
 
 def _model_at(model: type[BaseModel], loc: FieldPath) -> type[BaseModel]:
@@ -185,6 +197,8 @@ def _model_at(model: type[BaseModel], loc: FieldPath) -> type[BaseModel]:
     for step in loc:
         if isinstance(step, str) and step in PLANNERS:
             current = PLANNERS[step]
+        elif isinstance(step, str) and step in HANDLING and step not in current.model_fields:
+            current = HANDLING[step]
         elif isinstance(step, str) and step in current.model_fields:
             current = _model_in(current.model_fields[step].annotation) or current
     return current

@@ -24,7 +24,8 @@ from pydantic_core import CoreSchema, core_schema
 
 from trajcli.columns import Group
 from trajcli.frozen import comparable
-from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.robot import GRAVITY, Payload, Robot
+from trajcli.language.dynamics import Gravity
 from trajcli.language.limits import JobLimitsSpec
 from trajcli.language.numbers import (
     AT_KEY,
@@ -39,7 +40,7 @@ from trajcli.language.numbers import (
 from trajcli.language.per_joint import PerJoint
 from trajcli.language.points import NamedTarget
 from trajcli.language.poses import Pose
-from trajcli.planners import PLANNERS, Planner, moves_adapter
+from trajcli.planners import HANDLING, PLANNERS, Planner, moves_adapter
 from trajcli.planners.planner import WhenOverLimit
 from trajcli.units import Quantity, Units
 
@@ -188,22 +189,33 @@ class _Moves:
 
     @staticmethod
     def _read(value: Any, info: core_schema.ValidationInfo) -> list[Planner]:  # noqa: ANN401
-        moves: list[Planner] = _adapter(_tags_of(value)).validate_python(value, context=info.context)
+        entries = [_tagged(entry) for entry in value] if isinstance(value, list) else value
+        moves: list[Planner] = _adapter(_tags_of(entries)).validate_python(entries, context=info.context)
         return moves
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        return handler(moves_adapter(PLANNERS).core_schema)
+        moves = handler(moves_adapter(PLANNERS).core_schema)
+        beside = [handler(TypeAdapter(HANDLING[key]).core_schema) for key in HANDLING]
+        return {**moves, "items": {"anyOf": [moves["items"], *beside]}}
+
+
+def _tagged(entry: Any) -> Any:  # noqa: ANN401
+    """Return an entry of the moves with the name of what reads it where it has none: its first key."""
+    if not isinstance(entry, Mapping) or "planner" in entry:
+        return entry
+    key = next((key for key in HANDLING if key in entry), None)
+    return entry if key is None else {"planner": key, **entry}
 
 
 def _tags_of(moves: Any) -> frozenset[str]:  # noqa: ANN401
-    """Return the planners that moves name; all of them where a name is wrong."""
+    """Return the planners, and what handles a payload, that moves name; all where a name is wrong."""
     if not isinstance(moves, list) or not moves:
-        return frozenset(PLANNERS)
+        return frozenset((*PLANNERS, *HANDLING))
     tags = [m.get("planner") if isinstance(m, Mapping) else getattr(m, "planner", None) for m in moves]
-    known = [tag for tag in tags if isinstance(tag, str) and tag in PLANNERS]
-    return frozenset(known if len(known) == len(moves) else PLANNERS)
+    known = [tag for tag in tags if isinstance(tag, str) and (tag in PLANNERS or tag in HANDLING)]
+    return frozenset(known if len(known) == len(moves) else (*PLANNERS, *HANDLING))
 
 
 @cache
@@ -225,6 +237,10 @@ class Job(Model):
         ]
         | None
     ) = None
+    gravity: Annotated[
+        tuple[float, ...],
+        Gravity("Acceleration of a body that falls, in world, m/s^2 whatever the units."),
+    ] = GRAVITY
     limits: Annotated[JobLimitsSpec | None, Field(description="Replace the robot's, then scale.")] = None
     points: dict[str, NamedTarget] = Field(default_factory=dict, description="Named states.")
     start: Annotated[
@@ -254,8 +270,21 @@ class Job(Model):
     def _start_is_a_state(self) -> Job:
         if not self.start.gives_joints_or_pose:
             raise refuse([(("start",), "the start needs `joints` or a pose", None)])
-        first = self.moves[0]
+        first = next((move for move in self.moves if not move.handles), None)
+        if first is None:
+            raise refuse([(("moves",), "nothing moves: a payload is attached between moves", None)])
         if first.joins == 1 and any(self.start.acceleration or ()):
             hint = "use quintic or jerk_limited for the first move, or leave it out"
             raise refuse([(("start",), f"{first.tag} cannot start with an acceleration", hint)])
+        return self
+
+    @model_validator(mode="after")
+    def _payloads_alternate(self) -> Job:
+        carried: Payload | None = None
+        for index, move in enumerate(self.moves):
+            try:
+                carried = move.carried_after(carried)
+            except FlawError as error:
+                flaws = [(("moves", index, *path), text, hint) for path, text, hint in error.flaws]
+                raise refuse(flaws) from None
         return self

@@ -14,7 +14,13 @@ from pydantic import ValidationError
 from trajcli.columns import TOOL_COLUMNS
 from trajcli.errors import Amount, InputError, Place, Problem, utf8
 from trajcli.frozen import frozen
-from trajcli.job.limits import looser_bounds, looser_problem, looser_tool_bounds, with_job_limits
+from trajcli.job.limits import (
+    flaws_of_dynamics,
+    looser_bounds,
+    looser_problem,
+    looser_tool_bounds,
+    with_job_limits,
+)
 from trajcli.job.messages import problems_of
 from trajcli.job.model import Job, UnitsSpec
 from trajcli.job.robot import RobotSheet, find_sheet
@@ -42,6 +48,7 @@ class LoadedJob:
         robot: With the job's limits in force.
         document: For the places of later errors.
         events: Concessions, such as a limit looser than the robot's.
+        source: Where the numbers of the robot come from.
     """
 
     job: Job
@@ -49,6 +56,7 @@ class LoadedJob:
     robot: Robot
     document: Document
     events: tuple[Event, ...]
+    source: str = "the job"
 
     def __repr__(self) -> str:
         tags = ", ".join(move.tag for move in self.job.moves)
@@ -177,17 +185,29 @@ def _load(document: Document) -> LoadedJob:
     mounted = {key: pose for key in ("base", "tool") if (pose := getattr(job, key)) is not None}
     limits, noted = _with_limits_file(job.limits, document, robot)
     try:
-        effective, events = with_job_limits(replace(robot, **mounted), limits)
+        placed = replace(robot, gravity=np.array(job.gravity), **mounted)
+        effective, events = with_job_limits(placed, limits)
     except InputError as error:
         raise error.said_by(str).located(place=document.place(("limits", "position"))) from None
     name = job.name or ("stdin" if document.file in ("-", "<stdin>") else utf8(Path(document.file).stem))
     if sheet is not None and sheet.concession is not None:
         events = [Event("angles_snapped", sheet.concession), *events]
-    loaded = LoadedJob(job, name, effective, document, (*noted, *events))
-    flaws = [*_loosened_by_moves(loaded), *_loosened_tool_limits(loaded), *_columns_without_geometry(loaded)]
+    source = "the job" if sheet is None else sheet.source or _named_source(plain["robot"])
+    loaded = LoadedJob(job, name, effective, document, (*noted, *events), source)
+    flaws = [
+        *_loosened_by_moves(loaded),
+        *_loosened_tool_limits(loaded),
+        *_columns_without_geometry(loaded),
+        *flaws_of_dynamics(job, effective, document),
+    ]
     if flaws:
         raise InputError(*sorted(flaws, key=_position))
     return loaded
+
+
+def _named_source(value: Any) -> str:  # noqa: ANN401
+    """Return where a robot comes from whose file does not say it: the file that the job names, or the job."""
+    return str(value["file"]) if isinstance(value, Mapping) and "file" in value else "the job"
 
 
 def _with_limits_file(

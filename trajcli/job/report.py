@@ -127,11 +127,68 @@ class ByPositionReport(ReportPart):
     time: Annotated[float, Field(description="Where it is, seconds from the start of the trajectory.")]
 
 
+class EffortReport(ReportPart):
+    """The extremes of what drives one joint in one move: inverse dynamics with what the tool carries."""
+
+    joint: str
+    low: Annotated[float, Field(description="Smallest torque or force, N m or N.")]
+    low_time: Annotated[float, Field(description="Where it is, seconds from the start of the trajectory.")]
+    high: Annotated[float, Field(description="Largest torque or force, N m or N.")]
+    high_time: Annotated[float, Field(description="Where it is, seconds from the start of the trajectory.")]
+    bound: Annotated[
+        tuple[float, float], Field(description="It is proven to lie between these at every time, N m or N.")
+    ]
+    limit: Annotated[
+        tuple[float | None, float | None], Field(description="Bounds, N m or N; null is unlimited.")
+    ]
+    used: Annotated[
+        float | None, Field(description="Largest part of the bound that is used; null if unlimited.")
+    ]
+    head_room: Annotated[
+        float | None, Field(description="What is left of the limit there, N m or N; negative beyond it.")
+    ]
+    gravity: Annotated[
+        float, Field(description="Where most is used, what it takes to hold arm and payload, N m or N.")
+    ]
+    gravity_share: Annotated[
+        float, Field(description="The same as part of the effort: above 1 where the motion helps.")
+    ]
+    unit: Literal["N m", "N"]
+    method: Literal["bounded"] = "bounded"
+
+
+class PayloadReport(ReportPart):
+    """What the tool carries."""
+
+    mass: Annotated[float, Field(description="kg.")]
+    mass_unit: Literal["kg"] = "kg"
+    com: Annotated[
+        list[float], MeasuredIn("com_unit"), Field(description="Centre of mass in the tcp frame, m.")
+    ]
+    com_unit: UnitName = "m"
+    inertia: Annotated[
+        list[float], Field(description="ixx, iyy, izz, ixy, ixz, iyz about the centre of mass, kg m^2.")
+    ]
+    inertia_unit: Literal["kg m^2"] = "kg m^2"
+
+
+class EffortsReport(ReportPart):
+    """Whether torques and forces were judged, and by which numbers."""
+
+    judged: Annotated[bool, Field(description="Whether the effort of some joint was judged in some move.")]
+    reason: Annotated[str | None, Field(description="Why not; null where they were.")] = None
+    inertials: Annotated[
+        str | None, Field(description="Where masses and inertias come from; null where the robot has none.")
+    ] = None
+    gravity: Annotated[list[float], Field(description="Acceleration of a body that falls, in world, m/s^2.")]
+    gravity_unit: Literal["m/s^2"] = "m/s^2"
+
+
 class BindingReport(ReportPart):
     """The limit that a move uses most."""
 
     joint: str
-    quantity: JointQuantity | Literal["velocity_by_position"]
+    quantity: JointQuantity | Literal["velocity_by_position", "effort"]
     used: Annotated[float, Field(description="Part of the bound that is used: 1 is all of it.")]
 
 
@@ -244,6 +301,46 @@ class OutsideReport(ReportPart):
     unit: UnitName
 
 
+class OffChordReport(ReportPart):
+    """How far a joint leaves the straight chords between the points of a move."""
+
+    joint: str
+    distance: Annotated[float, MeasuredIn(), Field(description="At most, SI.")]
+    time: Annotated[float, Field(description="Where, seconds from the start of the trajectory.")]
+    unit: UnitName
+
+
+class FastestReport(ReportPart):
+    """How near a motion that was searched for is to the fastest through its points."""
+
+    lower: Annotated[
+        float | None,
+        Field(description="No motion through the points is faster, seconds; null where none is known."),
+    ]
+    above: Annotated[
+        float | None, Field(description="Part by which the move is at most above the fastest possible.")
+    ]
+    joint: Annotated[
+        str | None, Field(description="The joint that needs so long; null where several together do.")
+    ]
+    method: Annotated[
+        Literal["bounded", "heuristic"],
+        Field(description="bounded: `above` is proven; heuristic: nothing is known of it."),
+    ]
+    starts: Annotated[int, Field(description="How many starting points were tried.")]
+    agreeing: Annotated[
+        int, Field(description="How many of them led to this duration, or a thousandth above it at most.")
+    ]
+    found: Annotated[
+        list[float | None],
+        Field(description="Durations to which they led, seconds; null where one led to none."),
+    ]
+    stopping: Annotated[
+        float | None, Field(description="Seconds with a stop at each point; null where there is none.")
+    ]
+    off_chords: list[OffChordReport]
+
+
 class ToolPeakReport(ReportPart):
     """The largest magnitude of one quantity of the tool in one move."""
 
@@ -324,6 +421,12 @@ class MoveReport(ReportPart):
     velocity_by_position: Annotated[
         list[ByPositionReport] | None, Field(description="Null where no joint has such a limit.")
     ] = None
+    efforts: Annotated[
+        list[EffortReport] | None, Field(description="Null where no limit of effort is in force.")
+    ] = None
+    payload: Annotated[
+        PayloadReport | None, Field(description="What the tool carries; null for nothing.")
+    ] = None
     binding: BindingReport | None
     at_limit: Annotated[
         list[AtLimitReport],
@@ -342,6 +445,10 @@ class MoveReport(ReportPart):
         Field(
             description="Joints that leave the range of the waypoints, and how far; null without waypoints."
         ),
+    ] = None
+    fastest: Annotated[
+        FastestReport | None,
+        Field(description="Of a motion that was searched for; null for other moves."),
     ] = None
     tool: Annotated[
         ToolReport | None, Field(description="The tool on its path; null for a move in joint space.")
@@ -498,6 +605,9 @@ class Report(ReportPart):
     consumer: Annotated[ConsumerReport | None, Field(description="Asked for by `--for`; null otherwise.")] = (
         None
     )
+    efforts: Annotated[
+        EffortsReport | None, Field(description="Of an arm with geometry; null for bare joints.")
+    ] = None
     knots: Annotated[
         KnotsReport | None,
         Field(description="Of /joint_trajectory and of ROS goals; null where a limit is broken."),

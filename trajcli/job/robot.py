@@ -27,8 +27,9 @@ from trajcli.job.model import UnitsSpec
 from trajcli.job.yaml.load import Document, parse_document
 from trajcli.job.yaml.source import STDIN, read_bytes
 from trajcli.kinematics.robot import QUANTITIES, Joint, Limits, Robot
-from trajcli.language.dynamics import EffortBound, FrictionSpec, LinkSpec
-from trajcli.language.limits import UNLIMITED, JointBound, LowerUpper, VelocityByPosition
+from trajcli.language.dynamics import FrictionSpec, LinkSpec
+from trajcli.language.efforts import EffortBound
+from trajcli.language.limits import JointBound, VelocityByPosition
 from trajcli.language.numbers import (
     MAX_JOINTS,
     Model,
@@ -37,6 +38,7 @@ from trajcli.language.numbers import (
     refuse,
     shown,
 )
+from trajcli.language.per_joint import UNLIMITED, LowerUpper
 from trajcli.language.poses import Pose
 from trajcli.suggest import did_you_mean, nearest, nearest_names
 from trajcli.units import Quantity, Units
@@ -73,21 +75,21 @@ class JointModel(Model):
         UNLIMITED
     )
     jerk: Annotated[LowerUpper, JointBound(3, "Jerk limit, or [lower, upper], per s^3.")] = UNLIMITED
-    effort: Annotated[
-        LowerUpper, EffortBound("Torque or force limit, or [lower, upper], N m or N; kept, not yet judged.")
-    ] = UNLIMITED
-    friction: Annotated[FrictionSpec, Field(description="Friction; kept, not yet used.")] = FrictionSpec()
+    effort: Annotated[LowerUpper, EffortBound("Torque or force limit, or [lower, upper], N m or N.")] = (
+        UNLIMITED
+    )
+    friction: Annotated[FrictionSpec, Field(description="Friction of the joint.")] = FrictionSpec()
     rotor: Annotated[
         float,
         Number(
-            Quantity("ratio"),
-            "Motor's inertia reflected to the joint, kg m^2; kept, not yet used.",
+            Quantity("inertia"),
+            "Motor's inertia reflected to the joint, kg m^2 (kg for a slide).",
             at_least=0.0,
         ),
     ] = 0.0
-    link: Annotated[
-        LinkSpec | None, Field(description="Mass and inertia of the link behind; kept, not yet used.")
-    ] = None
+    link: Annotated[LinkSpec | None, Field(description="Mass and inertia of the link behind the joint.")] = (
+        None
+    )
 
     velocity_by_position: Annotated[
         VelocityByPosition | None,
@@ -186,8 +188,12 @@ class RobotModel(Model):
         """Return the names of the joints: j1, j2, ... where none is given."""
         return [joint.name or f"j{number}" for number, joint in enumerate(self.joints, 1)]
 
-    def as_robot(self) -> Robot:
-        """Return the robot that this describes."""
+    def as_robot(self, *, efforts: bool = True) -> Robot:
+        """Return the robot that this describes.
+
+        Args:
+            efforts: Whether its efforts are in force; they are where all links have their inertia.
+        """
         joints = tuple(
             Joint(
                 name,
@@ -208,7 +214,11 @@ class RobotModel(Model):
         position, *rates = (np.array([getattr(m, quantity) for m in self.joints]) for quantity in QUANTITIES)
         near = [m.velocity_by_position for m in self.joints]
         by_position = np.array([(np.inf, 0.0) if m is None else (m.deceleration, m.offset) for m in near])
-        limits = Limits(position, rates[0], rates[1], rates[2], velocity_by_position=by_position)
+        judged = efforts and self.convention is not None and all(m.link is not None for m in self.joints)
+        effort = np.array([m.effort if judged else UNLIMITED for m in self.joints])
+        limits = Limits(
+            position, rates[0], rates[1], rates[2], velocity_by_position=by_position, effort=effort
+        )
         base, tool = (np.eye(4) if pose is None else pose for pose in (self.base, self.tool))
         return Robot(self.name, joints, limits, self.convention, base, tool)
 
@@ -386,7 +396,9 @@ def _sheet_of(content: bytes, path: str) -> RobotSheet:
     model = _validated({"name": utf8(Path(path).stem), **plain}, document, (), units)
     text = "\n".join(document.lines)
     said = (model.source, model.licence, model.note, text, model.maker, model.origin, model.date)
-    return RobotSheet(model.as_robot(), units, *said)
+    # numbers that nobody has looked at count where a job asks for them
+    of_others = Path(path).parent == CATALOGUE or is_urdf(model.source or "")
+    return RobotSheet(model.as_robot(efforts=not of_others), units, *said)
 
 
 def _from_urdf_entry(value: Mapping[str, Any], document: Document) -> RobotSheet:

@@ -8,6 +8,7 @@ from math import inf
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from trajcli.curves.piecewise import Array, read_only
 from trajcli.errors import InputError
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
 JointType = Literal["revolute", "prismatic"]
 Convention = Literal["standard", "modified"]
 QUANTITIES = ("position", "velocity", "acceleration", "jerk")
+
+GRAVITY = (0.0, 0.0, -9.81)
+"""Acceleration of a body that falls, in world, m/s^2, where nothing else is said."""
 
 _INERTIA_ROUNDING = 1e-6  # of the largest moment: files have some six digits
 _SMALL_POSITION = 1e-3  # rad or m: what goes beyond a position bound smaller than this is relative to this
@@ -56,22 +60,97 @@ class LinkInertia:
     inertia: tuple[float, float, float, float, float, float]
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.mass < inf:
-            raise InputError(f"expected a mass above 0 kg, got {self.mass:g}")
         xx, yy, zz, xy, xz, yz = self.inertia
-        if not np.isfinite((*self.com, *self.inertia)).all():
-            raise InputError("expected finite numbers for the centre of mass and the inertia")
-        moments = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])).tolist()
-        room = _INERTIA_ROUNDING * max(map(abs, moments))
-        shown = ", ".join(f"{moment:.6g}" for moment in moments)
-        if moments[0] < -room:
-            raise InputError(f"no solid has a negative moment of inertia: the principal ones are {shown}")
-        if moments[2] > moments[0] + moments[1] + room:
-            raise InputError(
-                "no solid has a moment of inertia above the sum of the two others: "
-                f"the principal ones are {shown}",
-                hint="check signs and units (kg m^2), and that it is about the centre of mass",
-            )
+        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        require_possible_solid(self.mass, np.array(self.com), tensor)
+
+
+def require_possible_solid(
+    mass: float, com: Array, inertia: Array, *, least_mass: float | None = None
+) -> None:
+    """Raise when no rigid solid has such a mass and inertia; a point mass and a thin rod are possible.
+
+    Args:
+        mass: kg.
+        com: Centre of mass, m, shape (3,).
+        inertia: Tensor about the centre of mass, kg m^2, shape (3, 3).
+        least_mass: What the mass may be at least, kg; it must be above 0 unless given.
+
+    Raises:
+        InputError: When the mass is too small, a number not finite, the tensor not symmetric, a principal
+            moment negative or above the sum of the two others.
+    """
+    if not (0.0 < mass < inf if least_mass is None else least_mass <= mass < inf):
+        least = "above 0 kg" if least_mass is None else f"of at least {least_mass:g} kg"
+        raise InputError(f"expected a mass {least}, got {mass:g}")
+    if not (np.isfinite(com).all() and np.isfinite(inertia).all()):
+        raise InputError("expected finite numbers for the centre of mass and the inertia")
+    room = _INERTIA_ROUNDING * float(np.abs(inertia).max())
+    if np.abs(inertia - inertia.T).max() > room:
+        raise InputError("a tensor of inertia is symmetric: its products come in equal pairs")
+    moments = np.linalg.eigvalsh(inertia).tolist()
+    room = _INERTIA_ROUNDING * max(map(abs, moments))
+    shown = ", ".join(f"{moment:.6g}" for moment in moments)
+    if moments[0] < -room:
+        raise InputError(f"no solid has a negative moment of inertia: the principal ones are {shown}")
+    if moments[2] > moments[0] + moments[1] + room:
+        raise InputError(
+            "no solid has a moment of inertia above the sum of the two others: "
+            f"the principal ones are {shown}",
+            hint="check signs and units (kg m^2), and that it is about the centre of mass",
+        )
+
+
+@frozen
+class Payload:
+    """A rigid solid that is fixed to the tcp.
+
+    Attributes:
+        mass: kg, at least 0.
+        com: Centre of mass in the frame of the tcp, m, shape (3,).
+        inertia: Tensor about the centre of mass in the axes of the tcp, kg m^2, shape (3, 3).
+
+    Raises:
+        InputError: When no rigid solid has them.
+    """
+
+    mass: float
+    com: Array
+    inertia: Array
+
+    def __post_init__(self) -> None:
+        for name, shape in (("com", (3,)), ("inertia", (3, 3))):
+            values = read_only(getattr(self, name))
+            if values.shape != shape:
+                raise InputError(f"payload: expected {name} of shape {shape}, got {values.shape}")
+            object.__setattr__(self, name, values)
+        require_possible_solid(self.mass, self.com, self.inertia, least_mass=0.0)
+
+    def __repr__(self) -> str:
+        com = ", ".join(f"{x:g}" for x in self.com.tolist())
+        return f"{type(self).__name__}({self.mass:g} kg at [{com}] m)"
+
+    def with_mass(self, mass: float) -> Payload:
+        """Return the same payload with another mass; its inertia grows with the mass.
+
+        Raises:
+            InputError: When the mass is negative.
+        """
+        share = mass / self.mass if self.mass > 0.0 else 1.0
+        return Payload(mass, self.com, self.inertia * share)
+
+
+def point_mass(mass: float, com: ArrayLike = (0.0, 0.0, 0.0)) -> Payload:
+    """Return a payload without extent.
+
+    Args:
+        mass: kg, at least 0.
+        com: Its place in the frame of the tcp, m, shape (3,).
+
+    Raises:
+        InputError: When the mass is negative.
+    """
+    return Payload(mass, np.asarray(com, dtype=np.float64), np.zeros((3, 3)))
 
 
 @comparable
@@ -88,12 +167,13 @@ class Joint:
         sign: 1 or -1: the direction in which the joint counts.
         beta: Angle about y behind alpha, rad: where two axes are almost parallel, d would be far off and
             depend on the last digit of alpha without it.
-        effort: Lowest and highest torque or force, N m or N; infinite where it is not known.
+        effort: Lowest and highest torque or force that the maker states, N m or N; infinite where it is not
+            known. What is in force stands in `Limits.effort`.
         friction: Of the joint.
         rotor: Inertia of the motor as the joint feels it, kg m^2 (kg for a slide).
         link: Mass and inertia of the link behind the joint, with all that is fixed to it; None where unknown.
 
-    Effort, friction, rotor and link are kept for inverse dynamics; nothing is judged by them yet.
+    Effort, friction, rotor and link are those of inverse dynamics, `trajcli/dynamics/`.
 
     Source: Hayati, Robot arm geometric link parameter estimation, IEEE CDC (1983), for beta.
     """
@@ -131,8 +211,8 @@ class ToolLimits:
     angular_acceleration: float = inf
 
 
-def _not_by_position() -> Array:
-    """Return what stands for limits of velocity by position where no joint has one."""
+def _no_rows() -> Array:
+    """Return what stands for limits of a kind that no joint has."""
     return np.empty((0, 2))
 
 
@@ -148,6 +228,7 @@ class Limits:
         tcp: Of the tool.
         velocity_by_position: Shape (n, 2): d, per second squared, infinite for no such limit, and o, per
             second, of |v| <= max(0, sqrt(2 d x) - o) at the distance x from the position limit ahead.
+        effort: Shape (n, 2), of the torque or force, N m or N; lower < 0 < upper.
     """
 
     position: Array
@@ -155,10 +236,13 @@ class Limits:
     acceleration: Array
     jerk: Array
     tcp: ToolLimits = ToolLimits()
-    velocity_by_position: Array = field(default_factory=_not_by_position)
+    velocity_by_position: Array = field(default_factory=_no_rows)
+    effort: Array = field(default_factory=_no_rows)
 
     def __post_init__(self) -> None:
-        for index, name in enumerate(QUANTITIES):
+        if not len(self.effort):
+            object.__setattr__(self, "effort", np.tile([-np.inf, np.inf], (len(self.position), 1)))
+        for index, name in enumerate((*QUANTITIES, "effort")):
             bounds = read_only(getattr(self, name))
             if bounds.ndim != 2 or bounds.shape[1] != 2 or np.isnan(bounds).any():
                 raise ValueError(f"{name} limits: expected shape (n, 2) without NaN, got {bounds.shape}")
@@ -181,8 +265,13 @@ class Limits:
         return rows
 
     def __repr__(self) -> str:
-        limited = [name for name in QUANTITIES if np.isfinite(getattr(self, name)).any()]
+        limited = [name for name in (*QUANTITIES, "effort") if np.isfinite(getattr(self, name)).any()]
         return f"Limits({len(self.position)} joints: {', '.join(limited) or 'none'})"
+
+    @property
+    def has_effort(self) -> bool:
+        """Whether the torque or force of some joint is limited."""
+        return bool(np.isfinite(self.effort).any())
 
     @property
     def has_velocity_by_position(self) -> bool:
@@ -242,6 +331,8 @@ class Robot:
         convention: Whose DH rows the joints are; None for bare joints, which have no geometry.
         base: T_world_base, shape (4, 4).
         tool: T_flange_tcp, shape (4, 4).
+        gravity: Acceleration of a body that falls, in world, shape (3,), m/s^2.
+        payload: What the tool carries; None for nothing.
     """
 
     name: str
@@ -250,10 +341,12 @@ class Robot:
     convention: Convention | None
     base: Array
     tool: Array
+    gravity: Array = field(default_factory=lambda: np.array(GRAVITY))
+    payload: Payload | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "base", read_only(self.base))
-        object.__setattr__(self, "tool", read_only(self.tool))
+        for name in ("base", "tool", "gravity"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     def __repr__(self) -> str:
         joints = f"{len(self.joints)} joint{'s' * (len(self.joints) != 1)}"
@@ -269,3 +362,8 @@ class Robot:
     def joint_types(self) -> tuple[JointType, ...]:
         """Types of the joints, from the base on."""
         return tuple(joint.type for joint in self.joints)
+
+    @property
+    def without_inertia(self) -> tuple[str, ...]:
+        """Names of the joints whose links have no known mass and inertia."""
+        return tuple(joint.name for joint in self.joints if joint.link is None)

@@ -1,4 +1,4 @@
-"""Dynamics of a joint in robot files: effort, friction, the motor's inertia, mass and inertia of the link.
+"""Dynamics in files: efforts, friction, the motor's inertia, mass and inertia of links and payloads.
 
 These numbers are in SI whatever the units of the file, but for the centre of mass, which is a length.
 """
@@ -8,59 +8,46 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import model_validator
 from pydantic.json_schema import JsonSchemaValue
 
 from trajcli.errors import InputError
 from trajcli.frozen import comparable
-from trajcli.kinematics.robot import Friction, Joint, LinkInertia
-from trajcli.language.limits import UNLIMITED, LowerUpper
+from trajcli.kinematics.robot import Friction, Joint, LinkInertia, Payload
 from trajcli.language.numbers import (
+    SI,
     FieldType,
-    FlawError,
     Model,
     Number,
     ReadingContext,
     number_schema,
-    read_number,
     refuse,
-    shown,
 )
+from trajcli.language.per_joint import UNLIMITED
+from trajcli.language.poses import read_numbers
 from trajcli.language.targets import Numbers
 from trajcli.units import Quantity
 
 _SI = Quantity("ratio")
+_MASS, _INERTIA = Quantity("mass"), Quantity("inertia")
 _LENGTH = Quantity("length")
 
 
 @comparable
-class EffortBound(FieldType):
-    """The bound of a joint's torque or force, SI: a magnitude, a pair by direction, or null."""
+class Gravity(FieldType):
+    """The acceleration of a body that falls, in world: m/s^2 whatever the units of the file."""
 
     description: str
 
-    def read(self, value: Any, context: ReadingContext) -> LowerUpper:  # noqa: ANN401
-        """Return (lower, upper), N m or N."""
-        if value is None:
-            return UNLIMITED
-        if isinstance(value, list | tuple) and len(value) == 2:
-            low, high = (read_number(item, _SI, context.units) for item in value)
-            if low < 0 < high:
-                return low, high
-        elif not isinstance(value, list | tuple):
-            size = read_number(value, _SI, context.units)
-            if size > 0:
-                return -size, size
-        got = f"[{', '.join(map(shown, value))}]" if isinstance(value, list | tuple) else shown(value)
-        raise FlawError(
-            "expected a number above 0 (N m or N), a pair [lower, upper], a negative and a positive number, "
-            f"or null (not known), got {got}"
-        )
+    def read(self, value: Any, context: ReadingContext) -> tuple[float, ...]:  # noqa: ANN401
+        """Return the three numbers, m/s^2."""
+        return tuple(read_numbers(value, 3, Quantity("length", 2), SI).tolist())
 
     def json_schema(self) -> JsonSchemaValue:
-        """Return the schema of a magnitude, a pair or null."""
-        pair = {"type": "array", "items": number_schema(_SI), "minItems": 2, "maxItems": 2}
-        return {"anyOf": [number_schema(_SI, exclusiveMinimum=0.0), pair, {"type": "null"}]}
+        """Return the schema of three numbers."""
+        items = number_schema(Quantity("length", 2))
+        return {"type": "array", "items": items, "minItems": 3, "maxItems": 3}
 
 
 class FrictionSpec(Model):
@@ -77,13 +64,13 @@ class FrictionSpec(Model):
 class LinkSpec(Model):
     """Mass of the link behind a joint, with all that is fixed to it, in the frame of the joint's row."""
 
-    mass: Annotated[float, Number(_SI, "Mass, kg.", above=0.0)]
+    mass: Annotated[float, Number(_MASS, "Mass, kg.", above=0.0)]
     com: Annotated[
         tuple[float, ...], Numbers(3, _LENGTH, "Centre of mass in the link's DH frame (length unit).")
     ]
     inertia: Annotated[
         tuple[float, ...],
-        Numbers(6, _SI, "ixx, iyy, izz, ixy, ixz, iyz about the centre of mass, kg m^2."),
+        Numbers(6, _INERTIA, "ixx, iyy, izz, ixy, ixz, iyz about the centre of mass, kg m^2."),
     ]
 
     @model_validator(mode="after")
@@ -103,6 +90,43 @@ class LinkSpec(Model):
         x, y, z = self.com
         xx, yy, zz, xy, xz, yz = self.inertia
         return LinkInertia(self.mass, (x, y, z), (xx, yy, zz, xy, xz, yz))
+
+
+class PayloadSpec(Model):
+    """What the tool carries from here on, in the tcp frame."""
+
+    mass: Annotated[float, Number(_MASS, "Mass, kg.", at_least=0.0)]
+    com: Annotated[
+        tuple[float, ...], Numbers(3, _LENGTH, "Centre of mass in the tcp frame (length unit).")
+    ] = (0.0, 0.0, 0.0)
+    inertia: Annotated[
+        tuple[float, ...],
+        Numbers(
+            6,
+            _INERTIA,
+            "ixx, iyy, izz, ixy, ixz, iyz about the centre of mass, kg m^2; zero: a point mass.",
+        ),
+    ] = (0.0,) * 6
+
+    @model_validator(mode="after")
+    def _is_possible(self) -> PayloadSpec:
+        try:
+            self.as_payload()
+        except InputError as error:
+            raise refuse([(("inertia",), str(error), error.problems[0].hint)]) from None
+        if self.mass == 0 and any(self.inertia):
+            raise refuse([(("inertia",), "nothing without mass has a moment of inertia", None)])
+        return self
+
+    def as_payload(self) -> Payload:
+        """Return the plain value.
+
+        Raises:
+            InputError: When no solid has such an inertia.
+        """
+        xx, yy, zz, xy, xz, yz = self.inertia
+        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        return Payload(self.mass, np.array(self.com), tensor)
 
 
 def written_dynamics(joint: Joint, say: Callable[[float, Quantity], float | str]) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Any
 
 from pydantic import Field
@@ -10,6 +9,7 @@ from pydantic.json_schema import JsonSchemaValue
 
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import QUANTITIES
+from trajcli.language.efforts import EffortBounds, Efforts
 from trajcli.language.numbers import (
     FieldType,
     FlawError,
@@ -21,11 +21,14 @@ from trajcli.language.numbers import (
     shown,
     written_number,
 )
-from trajcli.language.per_joint import per_joint_schema, read_per_joint
+from trajcli.language.per_joint import (
+    UNLIMITED,
+    LowerUpper,
+    per_joint_schema,
+    read_per_joint,
+    with_pair_hint,
+)
 from trajcli.units import Quantity
-
-LowerUpper = tuple[float, float]
-UNLIMITED: LowerUpper = (-math.inf, math.inf)
 
 
 def read_bound(value: Any, quantity: Quantity, context: ReadingContext) -> LowerUpper:  # noqa: ANN401
@@ -149,14 +152,7 @@ class Bounds(FieldType):
         try:
             bounds = read_per_joint(value, context, read_one, None)
         except FlawError as error:
-            if (
-                isinstance(value, list | tuple)
-                and len(value) == 2
-                and all(isinstance(v, int | float) for v in value)
-            ):
-                named = f"a list has one entry for each joint: for a pair write {{NAME: {list(value)}}}"
-                error.flaws = [(path, text, named) for path, text, _ in error.flaws]
-            raise
+            raise with_pair_hint(error, value) from None
         return bounds if any(bound is not None for bound in bounds) else ()
 
     def write(self, value: tuple[LowerUpper | None, ...], context: ReadingContext) -> dict[str, Any]:
@@ -229,6 +225,10 @@ class LimitsSpec(Model, defer_build=False):  # made once, not for each planner t
         tuple[LowerUpper | None, ...], Bounds(2, "Acceleration limit of each joint, per s^2.")
     ] = ()
     jerk: Annotated[tuple[LowerUpper | None, ...], Bounds(3, "Jerk limit of each joint, per s^3.")] = ()
+    effort: Annotated[
+        EffortBounds,
+        Efforts("Torque or force limit of each joint, N m or N; `robot`: the robot's own."),
+    ] = ()
     scale: Scale = Scale()
     tcp: ToolLimitsSpec | None = None
 

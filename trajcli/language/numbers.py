@@ -222,7 +222,7 @@ def _is_distance(quantity: Quantity) -> bool:
 
 def written_number(value: float, quantity: Quantity) -> float | str:
     """Return an SI number as it may stand in a file of any units, to be read bit by bit."""
-    if quantity.dimension in ("ratio", "time", "frequency"):
+    if quantity.dimension not in ("angle", "length"):
         return value
     return f"{value!r} {unit_name(quantity, Units())}"
 

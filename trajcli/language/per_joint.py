@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, Self
 
 from pydantic.json_schema import JsonSchemaValue
 
@@ -22,6 +23,9 @@ from trajcli.language.numbers import (
     written_number,
 )
 from trajcli.units import Quantity
+
+LowerUpper = tuple[float, float]
+UNLIMITED: LowerUpper = (-math.inf, math.inf)
 
 
 def read_per_joint(
@@ -108,6 +112,35 @@ def flawed(flaws: list[Flaw]) -> FlawError:
     return error
 
 
+def with_pair_hint(error: FlawError, value: object) -> FlawError:
+    """Return the error of bounds by joint; where a pair stands in the place of a list, it says what to do."""
+    pair = isinstance(value, list | tuple) and len(value) == 2
+    if pair and all(isinstance(v, int | float) for v in value):  # type: ignore[attr-defined]
+        named = f"a list has one entry for each joint: for a pair write {{NAME: {list(value)}}}"  # type: ignore[call-overload]
+        error.flaws = [(path, text, named) for path, text, _ in error.flaws]
+    return error
+
+
+class NamedValues(tuple[float, ...]):
+    """Values by joint of which a mapping names only some: the others are zero, or free.
+
+    Attributes:
+        named: Whether each joint is named, in the order of the values.
+    """
+
+    named: tuple[bool, ...]
+
+    def __new__(cls, values: Iterable[float], named: Iterable[bool]) -> Self:
+        """Return the values (n,) with which of them are named (n,)."""
+        row = super().__new__(cls, values)
+        row.named = tuple(named)
+        return row
+
+    def __getnewargs__(self) -> tuple[tuple[float, ...], tuple[bool, ...]]:
+        """Return what copies are made of."""
+        return tuple(self), self.named
+
+
 @comparable
 class PerJoint(FieldType):
     """A joint value or one of its time derivatives, for each joint.
@@ -125,17 +158,29 @@ class PerJoint(FieldType):
     above: float | None = None
 
     def read(self, value: Any, context: ReadingContext) -> tuple[float, ...]:  # noqa: ANN401
-        """Return one number for each joint, in SI."""
+        """Return one number for each joint, in SI; `NamedValues` where a mapping leaves some out."""
 
         def read_one(item: Any, joint: int) -> float:  # noqa: ANN401
             number = Number(context.joint_quantity(joint, self.order), self.description, above=self.above)
             return number.read(item, context)
 
-        return read_per_joint(value, context, read_one, 0.0 if self.zero_missing else ...)
+        if isinstance(value, NamedValues):
+            return value
+        values = read_per_joint(value, context, read_one, 0.0 if self.zero_missing else ...)
+        names = context.joint_names
+        if isinstance(value, Mapping) and names is not None and len(value) < len(names):
+            return NamedValues(values, (name in value for name in names))
+        return values
 
-    def write(self, value: tuple[float, ...], context: ReadingContext) -> list[float | str]:
-        """Return a list with the SI unit of each joint."""
-        return [written_number(v, context.joint_quantity(i, self.order)) for i, v in enumerate(value)]
+    def write(
+        self, value: tuple[float, ...], context: ReadingContext
+    ) -> list[float | str] | dict[str, float | str]:
+        """Return a list with the SI unit of each joint, or a mapping of those that are named."""
+        rows = [written_number(v, context.joint_quantity(i, self.order)) for i, v in enumerate(value)]
+        if isinstance(value, NamedValues) and context.joint_names is not None:
+            table = zip(context.joint_names, rows, value.named, strict=True)
+            return {name: row for name, row, named in table if named}
+        return rows
 
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of one value for all joints, a list, or a mapping by joint name."""

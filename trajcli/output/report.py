@@ -18,11 +18,13 @@ from trajcli.job.report import (
     BindingReport,
     ByPositionReport,
     EventReport,
+    FastestReport,
     FindingReport,
     KnotsDeviation,
     KnotsReport,
     LowestSpeedReport,
     MoveReport,
+    OffChordReport,
     OutsideReport,
     PeakReport,
     Report,
@@ -36,6 +38,7 @@ from trajcli.job.report import (
 from trajcli.job.unit_hints import unit_hint
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.knots import Knots, knots_of
+from trajcli.output.efforts import effort_reports, efforts_report, most_used, payload_report
 from trajcli.output.references import contradictions_of, path_reference_of, reference_of
 from trajcli.output.references import joint_units as joint_units  # noqa: PLC0414
 from trajcli.output.sensitivity import at_limit_of
@@ -85,6 +88,7 @@ def report_of(
         remarks=[EventReport(kind=e.kind, message=e.message, move=e.move) for e in plan.remarks],
         steps=_steps(verdict.steps, units),
         unchecked=[UncheckedReport(joint=joint, quantity=quantity) for joint, quantity in verdict.unchecked],
+        efforts=efforts_report(plan),
         unchecked_of_tool=[UncheckedToolReport(quantity=name) for name in verdict.unchecked_of_tool],
         knots=_knots(plan.trajectory, knots or knots_of(plan.trajectory)) if verdict.passed else None,
     )
@@ -146,6 +150,10 @@ def _move(plan: Plan, index: int, *, reference: bool, peers: bool) -> MoveReport
     nearest = max(near, key=lambda use: use.used or 0.0, default=None)
     if nearest is not None and (binding is None or nearest.used > (binding.used or 0.0)):
         binding = BindingReport(joint=nearest.joint, quantity="velocity_by_position", used=nearest.used)
+    effort = most_used(plan, index)
+    used_most = 0.0 if effort is None else effort.used or 0.0
+    if effort is not None and (binding is None or used_most > (binding.used or 0.0)):
+        binding = BindingReport(joint=effort.joint, quantity="effort", used=used_most)
     return MoveReport(
         index=span.index,
         planner=span.planner,
@@ -156,10 +164,13 @@ def _move(plan: Plan, index: int, *, reference: bool, peers: bool) -> MoveReport
         stretch=move.stretch,
         peaks=peaks,
         velocity_by_position=near or None,
+        efforts=effort_reports(plan, index),
+        payload=payload_report(span.payload),
         binding=binding,
         at_limit=at_limit_of(move, plan.verdict.peaks[index], plan.verdict.by_position[index]),
         waypoints=_waypoints(move, span),
         outside=_outside(move, plan.verdict, index),
+        fastest=_fastest(move, span),
         tool=_tool(plan.trajectory, span, move),
         tool_peaks=None if of_tool is None else _tool_peaks(of_tool, span, move.robot),
         reference=reference_of(move) if reference else None,
@@ -243,6 +254,30 @@ def _outside(move: PlannedMove, verdict: Verdict, index: int) -> tuple[OutsideRe
                 at = float(time[joint])
                 reports.append(OutsideReport(joint=name, beyond=beyond, time=at, unit=units[joint]))
     return tuple(reports)
+
+
+def _fastest(move: PlannedMove, span: Span) -> FastestReport | None:
+    """Return how near a motion that was searched for is to the fastest; None for other moves."""
+    known = move.planned.certificate
+    if known is None:
+        return None
+    units, names = joint_units(move.robot.joint_types), move.robot.joint_names
+    rows = zip(names, known.off_chords.tolist(), known.off_times.tolist(), units, strict=True)
+    bounded = known.lower > 0
+    return FastestReport(
+        lower=known.lower if bounded else None,
+        above=max(move.duration / known.lower - 1, 0.0) if bounded else None,
+        joint=None if known.joint is None else names[known.joint],
+        method="bounded" if bounded else "heuristic",
+        starts=len(known.found),
+        agreeing=known.agreeing,
+        found=[time if math.isfinite(time) else None for time in known.found],
+        stopping=known.stopping if math.isfinite(known.stopping) else None,
+        off_chords=[
+            OffChordReport(joint=name, distance=off, time=span.start + time, unit=unit)
+            for name, off, time, unit in rows
+        ],
+    )
 
 
 def _tool(trajectory: Trajectory, span: Span, move: PlannedMove) -> ToolReport | None:

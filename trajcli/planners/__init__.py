@@ -25,6 +25,7 @@ _WHERE = {
     "spline": "waypoints.spline.Spline",
     "blends": "waypoints.blends.Blends",
     "time_optimal": "waypoints.time_optimal.TimeOptimal",
+    "waypoints": "waypoints.waypoints.FastestThroughPoints",
     "line": "tool_path.line.LineMove",
     "arc": "tool_path.arc.ArcMove",
     "path": "tool_path.path.PathMove",
@@ -32,6 +33,9 @@ _WHERE = {
     "hold": "point_to_point.point_to_point.Hold",
 }
 """The module and class of each planner, by its name in job files."""
+
+_PAYLOAD = {"attach": "payload.Attach", "detach": "payload.Detach"}
+"""Likewise what stands between moves, by its key in job files."""
 
 ALSO_CALLED = {
     "ptp": "jerk_limited",
@@ -68,25 +72,30 @@ ALSO_CALLED = {
 """What other programs and books call what a planner does, in lower case."""
 
 
+@frozen
 class _Planners(Mapping[str, type[Planner]]):
     """Every planner by its name; one that is asked for is loaded."""
 
+    where: Mapping[str, str]
+
     def __getitem__(self, tag: str) -> type[Planner]:
-        module, _, name = _WHERE[tag].rpartition(".")
+        module, _, name = self.where[tag].rpartition(".")
         planner: type[Planner] = getattr(import_module(f"trajcli.planners.{module}"), name)
         return planner
 
     def __contains__(self, tag: object) -> bool:
-        return tag in _WHERE
+        return tag in self.where
 
     def __iter__(self) -> Iterator[str]:
-        return iter(_WHERE)
+        return iter(self.where)
 
     def __len__(self) -> int:
-        return len(_WHERE)
+        return len(self.where)
 
 
-PLANNERS = _Planners()
+PLANNERS = _Planners(_WHERE)
+HANDLING = _Planners(_PAYLOAD)
+"""What takes up a payload or leaves it: an entry among the moves, by its key."""
 
 
 @frozen
@@ -99,7 +108,8 @@ class _ByName:
     tags: tuple[str, ...]
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
-        choices = {tag: handler.generate_schema(PLANNERS[tag]) for tag in self.tags}
+        known = _Planners({**_WHERE, **_PAYLOAD})
+        choices = {tag: handler.generate_schema(known[tag]) for tag in self.tags}
         return core_schema.tagged_union_schema(choices, discriminator="planner")
 
 
@@ -131,4 +141,4 @@ def changed(planner: Planner, change: Mapping[str, Any]) -> Planner | None:
         return None
 
 
-__all__ = ["ALSO_CALLED", "PLANNERS", "Planner", "changed", "moves_adapter"]
+__all__ = ["ALSO_CALLED", "HANDLING", "PLANNERS", "Planner", "changed", "moves_adapter"]

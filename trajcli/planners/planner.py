@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import field
+from dataclasses import field, replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -12,7 +12,7 @@ from pydantic import Field
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount, Amounts, PlanningError, Problem, said
 from trajcli.frozen import comparable, frozen
-from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.robot import Payload, Robot
 from trajcli.language.limits import LimitsSpec
 from trajcli.language.numbers import Model
 from trajcli.trajectory import Destination, Promise, Span, State, Trajectory, ViaPoints
@@ -24,7 +24,11 @@ if TYPE_CHECKING:
 
 Resolve = Callable[["Target", Array], "Target"]
 WhenOverLimit = Literal["error", "slow"]
-_REMARKS = ("refined",)  # kinds of events that are about how a curve was computed, and concede nothing
+_REMARKS = (
+    "refined",
+    "bound",
+    "fastest_found",
+)  # kinds of events that are about how a curve was computed, and concede nothing
 _GIVEN = ("duration", "velocity", "acceleration", "deceleration", "timed")  # where they say how long it lasts
 LITTLE = 1e-3
 """Relative: a law that is stretched by less still counts as the fastest."""
@@ -82,6 +86,33 @@ def stretched(factor: float) -> Event:
 
 
 @frozen
+class Certificate:
+    """What is known of how near a motion through points is to the fastest.
+
+    Attributes:
+        lower: No motion through the points within the limits is faster, s.
+        joint: Index of the joint that needs so long; None where several together do.
+        found: Durations to which the starting points of the search led, s, infinite where one led to none.
+        agreeing: How many of these are the motion's, or longer by a thousandth at most.
+        stopping: Duration of the motion that stops at each point, s; infinite where there is none.
+        off_chords: By how much each joint leaves the straight chords between the points at most, shape (n,).
+        off_times: Where it does, s from the start of the move, shape (n,).
+    """
+
+    lower: float
+    joint: int | None
+    found: tuple[float, ...]
+    agreeing: int
+    stopping: float
+    off_chords: Array
+    off_times: Array
+
+    def scaled(self, factor: float) -> Certificate:
+        """Return what is known of the motion that takes `factor` times as long."""
+        return replace(self, off_times=self.off_times * factor)
+
+
+@frozen
 class Planned:
     """What a planner returns.
 
@@ -111,6 +142,8 @@ class Planned:
         phase_plane: Of a time-optimal law: the law s(t), and what limits it.
         braking: How a start outside the velocity or acceleration limits is brought inside first: by each
             joint, or by all on one line; None where it is not.
+        continuity: Derivatives that join inside it, where they are fewer than its planner promises.
+        certificate: Of a motion that was searched for: how near to the fastest it is.
     """
 
     curve: PiecewisePolynomial
@@ -133,6 +166,8 @@ class Planned:
     virtual_points: ViaPoints | None = None
     phase_plane: PhasePlane | None = None
     braking: Literal["each", "line"] | None = None
+    continuity: Literal[1, 2] | None = None
+    certificate: Certificate | None = None
 
 
 class Planner(Model):
@@ -148,6 +183,7 @@ class Planner(Model):
         proportional: Whether another duration scales the times of all its parts alike, so that between given
             velocities at its ends each position is linear in the duration.
         follows_jerk: Whether it plans within the limits of jerk, and perhaps not without them.
+        handles: Whether it takes up a payload or leaves it, and moves nothing.
         smoother: Changes of its fields that make a move without steps in acceleration, each by the words that
             ask for it; "planner" may be among them.
         limits: Tightens the job's limits for this move; applied before `plan` is called.
@@ -158,6 +194,7 @@ class Planner(Model):
     one_shape: ClassVar[bool] = False
     proportional: ClassVar[bool] = False
     follows_jerk: ClassVar[bool] = False
+    handles: ClassVar[bool] = False
     smoother: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
 
     limits: Annotated[LimitsSpec | None, Field(description="Tighter limits for this move.")] = None
@@ -216,6 +253,14 @@ class Planner(Model):
                 recorded, or left open.
         """
         return self
+
+    def carried_after(self, payload: Payload | None) -> Payload | None:
+        """Return what the tool carries behind the move that begins with a payload; None for nothing.
+
+        Raises:
+            FlawError: When it takes up a second one, or leaves what is not there.
+        """
+        return payload
 
     def with_duration(self, duration: float) -> Self:
         """Return the planner of the same move over `duration` seconds.
@@ -288,6 +333,11 @@ class PlannedMove:
         return self.planned.curve.duration
 
     @property
+    def continuity(self) -> Literal[1, 2]:
+        """Derivatives that join without a jump inside it and at rest."""
+        return self.planned.continuity or self.planner.joins
+
+    @property
     def at_rest(self) -> bool:
         """Whether it begins and ends at rest."""
         return self.start.at_rest and self.planned.end.at_rest
@@ -309,7 +359,7 @@ class PlannedMove:
 
     def span(self, start: float, end: float) -> Span:
         """Return the part of a trajectory, from `start` to `end` s, that is this move."""
-        return Span(self.index, self.planner.tag, start, end, self.planner.joins)
+        return Span(self.index, self.planner.tag, start, end, self.continuity, self.robot.payload)
 
     def alone(self) -> Trajectory:
         """Return the trajectory of this move alone."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -25,7 +25,7 @@ from trajcli.errors import (
 from trajcli.frozen import frozen
 from trajcli.job.limits import with_move_limits
 from trajcli.job.read import LoadedJob
-from trajcli.kinematics.robot import QUANTITIES, Robot, ToolLimits
+from trajcli.kinematics.robot import QUANTITIES, Payload, Robot, ToolLimits
 from trajcli.language.targets import Target
 from trajcli.planners.planner import Event, PlannedMove, Planner, Resolve
 from trajcli.progress import report_progress
@@ -34,6 +34,7 @@ from trajcli.trajectory import State, Trajectory
 if TYPE_CHECKING:
     from trajcli.planning.resolve_poses import ResolvedPose
 
+Carried = Callable[[int, Payload | None], Payload | None]
 _NO_TOOL_LIMITS = ToolLimits()
 
 
@@ -66,23 +67,28 @@ class Plan:
         return f"{type(self).__name__}({of_what}, {duration:g} s, {self.verdict.text})"
 
 
-def plan_job(loaded: LoadedJob) -> Plan:
+def plan_job(loaded: LoadedJob, carried: Carried | None = None, *, advise: bool = True) -> Plan:
     """Return the plan of a job, with its verdict: a verdict with findings is no error here.
+
+    Args:
+        loaded: The job.
+        carried: What the tool carries in a move instead, by its index and what the job says.
+        advise: Whether findings come with what would help, which is tried out.
 
     Raises:
         InputError: When a move loosens a limit, or lacks one it needs.
         PlanningError: When a move has no curve.
     """
     poses: dict[int | None, ResolvedPose] = {}
-    moves = _plan_moves(loaded, poses)
+    moves = _plan_moves(loaded, poses, carried)
     events = [*loaded.events, *_events_of(poses.get(None), None)]
     for move in moves:
         events += _events_of(poses.get(move.index), move.index)
         events += [replace(event, move=move.index) for event in move.planned.events]
-    trajectory = _joined(moves, loaded, _first_state(loaded, moves[0], events))
+    trajectory = _joined(moves, loaded, _first_state(loaded, _first_moving(moves), events))
     report_progress("checking the trajectory")
     verdict = verify(trajectory, [move.robot.limits for move in moves], [move.promise for move in moves])
-    if not verdict.passed:
+    if advise and not verdict.passed:
         from trajcli.planning.advice import with_tested_advice
 
         verdict = _in_units(_with_unit_hint(with_tested_advice(verdict, moves, loaded.say), loaded), loaded)
@@ -92,7 +98,9 @@ def plan_job(loaded: LoadedJob) -> Plan:
     return Plan(loaded, tuple(moves), trajectory, verdict, conceded, poses, remarks)
 
 
-def _plan_moves(loaded: LoadedJob, poses: dict[int | None, ResolvedPose]) -> list[PlannedMove]:
+def _plan_moves(
+    loaded: LoadedJob, poses: dict[int | None, ResolvedPose], carried: Carried | None
+) -> list[PlannedMove]:
     """Return the moves of a job, and note how its poses are reached.
 
     Raises:
@@ -105,16 +113,19 @@ def _plan_moves(loaded: LoadedJob, poses: dict[int | None, ResolvedPose]) -> lis
     with _errors_at(loaded, loaded.document.place(("start",))):
         state = resolve(loaded.job.start, np.zeros(len(loaded.robot.joints)), index=None).as_state()
     before: Planner | None = None
+    robot = loaded.robot
     origin: Target | None = loaded.job.start
     for index, planner in enumerate(loaded.job.moves):
         report_progress(f"planning move {index + 1} of {len(loaded.job.moves)} ({planner.tag})")
         start = _handed_over(state, before, planner)
+        robot = replace(robot, payload=planner.carried_after(robot.payload)) if planner.handles else robot
+        used = robot if carried is None else replace(robot, payload=carried(index, robot.payload))
         begun = sum(float(done.planned.curve.breaks[-1]) for done in moves)
         try:
             with _errors_of(loaded, index, planner, begun):
                 reachable = planner.with_joint_targets(partial(resolve, index=index), state.position)
                 with _points_of_errors(loaded, index):
-                    move = _plan_move(loaded, index, reachable.coming_from(origin), start)
+                    move = _plan_move(loaded, used, index, reachable.coming_from(origin), start)
             moves.append(move)
             state = move.planned.end
         except MissingLimitError as error:
@@ -189,8 +200,9 @@ def _events_of(pose: ResolvedPose | None, index: int | None) -> list[Event]:
     return [replace(event, move=index) for event in nearest_rotation_events(pose)]
 
 
-def _plan_move(loaded: LoadedJob, index: int, planner: Planner, start: State) -> PlannedMove:
-    robot = with_move_limits(loaded.robot, planner.limits, index)
+def _plan_move(loaded: LoadedJob, carrying: Robot, index: int, planner: Planner, start: State) -> PlannedMove:
+    """Return a move of the robot with what its tool carries then."""
+    robot = with_move_limits(carrying, planner.limits, index)
     return plan_move_within(loaded, index, planner, start, robot)
 
 
@@ -220,7 +232,8 @@ def plan_move_within(
         from trajcli.planning.retime import long_enough
 
         move = long_enough(index, planner, start, robot, error)
-    if robot.limits.tcp != _NO_TOOL_LIMITS or robot.limits.has_velocity_by_position:
+    limits = robot.limits
+    if limits.tcp != _NO_TOOL_LIMITS or limits.has_velocity_by_position or limits.has_effort:
         from trajcli.planning.retime import keep_further_limits
 
         move = keep_further_limits(move)
@@ -232,6 +245,10 @@ def plan_move_within(
         from trajcli.planning.retime import align_to_period
 
         move = align_to_period(move, job.output.rate)
+    if limits.has_effort and not planner.handles:
+        from trajcli.planning.retime import require_holdable
+
+        require_holdable(move)
     return move
 
 
@@ -245,6 +262,11 @@ def _handed_over(state: State, before: Planner | None, after: Planner) -> State:
         np.where(np.abs(rates) <= JUMP_ABSOLUTE, 0.0, rates) for rates in (state.velocity, state.acceleration)
     )
     return State(state.position, velocity, acceleration if smooth else np.zeros_like(acceleration))
+
+
+def _first_moving(moves: Sequence[PlannedMove]) -> PlannedMove:
+    """Return the first of the moves that does not only take up a payload."""
+    return next(move for move in moves if not move.planner.handles)
 
 
 def _first_state(loaded: LoadedJob, first: PlannedMove, events: list[Event]) -> State:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import ceil
+from math import ceil, copysign
 
 from trajcli.checks.finding import LIMITS_OF_JOINTS, Finding
 from trajcli.checks.verify import verify
@@ -14,6 +14,7 @@ from trajcli.errors import Amount, Amounts, PlanningError, Problem, TrajcliError
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.planners.planner import LITTLE, Event, Planned, PlannedMove, Planner
 from trajcli.trajectory import State
+from trajcli.units import effort_unit
 
 LONGEST = 1e4
 """Times the planned duration: a move that needs more is not over its limit, it is wrong."""
@@ -21,7 +22,7 @@ _ONE_BY_ONE = 1  # factors tried at once: each costs a plan of its own
 _WHOLE = 1e-9  # of a period: what is this close to whole is whole
 _TRIES = 50
 _NO_TOOL_LIMITS = ToolLimits()
-_BY_POSITION = "velocity_by_position"
+_BY_POSITION, _EFFORT = "velocity_by_position", "effort"
 
 
 def with_duration(move: PlannedMove, duration: float) -> PlannedMove:
@@ -52,35 +53,38 @@ def _scaled(planned: Planned, factor: float) -> Planned:
         tool=planned.tool and planned.tool.scaled(factor),
         virtual_points=planned.virtual_points and planned.virtual_points.scaled(factor),
         phase_plane=planned.phase_plane and planned.phase_plane.scaled(factor),
+        certificate=planned.certificate and planned.certificate.scaled(factor),
     )
 
 
 def keep_further_limits(move: PlannedMove) -> PlannedMove:
     """Return the move, where it finds its duration itself, within limits that its planner does not know.
 
-    These are the limits of the tool for moves in joint space, and those of velocity by position for all. It
-    is stretched by the smallest factor that does it, with an event: a limit that is in force says how fast a
-    move may be, whichever it is.
+    These are the limits of the tool for moves in joint space, and those of velocity by position and of
+    efforts for all. It is stretched by the smallest factor that does it, with an event: a limit that is in
+    force says how fast a move may be, whichever it is.
     """
     finds = move.planner.finds_duration and move.planner.without_duration() is None and move.duration > 0
     limits = move.robot.limits
-    if not finds or (limits.tcp == _NO_TOOL_LIMITS and not limits.has_velocity_by_position):
+    further = limits.tcp != _NO_TOOL_LIMITS or limits.has_velocity_by_position or limits.has_effort
+    if not (finds and further):
         return move
     in_joint_space = move.planned.tool is None
     over = [
         finding
         for finding in over_limit(move)
-        if (finding.joint is None and in_joint_space) or finding.kind == _BY_POSITION
+        if (finding.joint is None and in_joint_space) or finding.kind in (_BY_POSITION, _EFFORT)
     ]
     factor = smallest_stretch(move, over) if over else None
     if factor is None or isinstance(factor, Problem):
         return move
-    by_position = any(finding.kind == _BY_POSITION for finding in over)
-    if by_position and factor <= 1 + LITTLE:
+    kinds = {finding.kind for finding in over}
+    if kinds & {_BY_POSITION, _EFFORT} and factor <= 1 + LITTLE:
         return _stretched(move, factor, over, "refined")
     if move.planner.one_shape and move.at_rest:
-        kind = "within_velocity_by_position" if by_position else "within_tool_limits"
-        return _stretched(move, factor, over, kind)
+        worst = max(over, key=lambda finding: finding.factor or 0.0).kind
+        kind = f"within_{worst if worst in (_BY_POSITION, _EFFORT) else 'tool'}"
+        return _stretched(move, factor, over, kind if worst == _BY_POSITION else f"{kind}_limits")
     return _stretched(move, factor, over, "stretched", "; a faster motion may exist")
 
 
@@ -179,6 +183,45 @@ def over_limit(move: PlannedMove) -> list[Finding]:
     """Return the findings about a move alone that a longer duration may help against, and about positions."""
     findings = verify(move.alone(), [move.robot.limits], [move.promise]).findings
     return [f for f in findings if f.kind in LIMITS_OF_JOINTS or f.factor is not None]
+
+
+def require_holdable(move: PlannedMove) -> None:
+    """Raise where a move is over a limit of effort that gravity and friction alone exceed.
+
+    A motion that keeps its limits all the same, because it falls fast enough there, is none of these.
+
+    Raises:
+        PlanningError: With the joint, the place and by how much.
+        InputError: When a link of the arm has no inertia, or the arm no geometry.
+    """
+    from trajcli.checks.effort import held_over_limit, move_efforts
+
+    trajectory = move.alone()
+    efforts = move_efforts(trajectory, trajectory.spans[0], move.robot)
+    over = None if efforts is None else held_over_limit(move.robot, efforts)
+    if over is None:
+        return
+    joint, limit, peak = over
+    name, unit = move.robot.joint_names[joint], effort_unit(move.robot.joint_types[joint])
+    position = trajectory.curve.evaluate(peak.time)
+    amounts: Amounts = {
+        "joint": name,
+        "needed": Amount(copysign(peak.static, limit), unit=unit),
+        "limit": Amount(limit, unit=unit),
+        "more": Amount(peak.static - abs(limit), unit=unit),
+        **{f"q{k}": Amount(value, 0, k) for k, value in enumerate(position.tolist())},
+    }
+    where = ", ".join(f"{{q{k}}}" for k in range(position.size))
+    cause = "gravity with friction" if peak.parts[2] else "gravity"
+    message = (
+        f"{cause} alone takes {{needed}} of {{joint}} at t = {peak.time:.6g} s of the move, "
+        f"with the joints at {where}: {{more}} more than its effort limit of {{limit}}"
+    )
+    hint = "no duration helps: carry less, go another way, or raise the limit"
+    value = copysign(peak.static, limit)
+    raise PlanningError(
+        Problem(message, hint, joint=name, time=peak.time, value=value, limit=limit, amounts=amounts)
+    )
 
 
 def align_to_period(move: PlannedMove, rate: float) -> PlannedMove:

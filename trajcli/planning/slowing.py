@@ -8,7 +8,7 @@ import numpy as np
 
 from trajcli.checks.braking import judged_peaks
 from trajcli.checks.limits import peaks_by_move
-from trajcli.checks.tolerances import exceeds
+from trajcli.checks.tolerances import EFFORT_RELATIVE, exceeds
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.kinematics.robot import QUANTITIES, ToolLimits, share_of_limits
@@ -166,6 +166,12 @@ class StretchSearch:
 
             uses = velocity_by_position_uses(alone, alone.spans[0], robot.limits)
             joints = max([joints, *(use.used - (1 + _ROOM) for use in uses)])
+        if robot.limits.has_effort:
+            from trajcli.checks.effort import move_efforts
+
+            efforts = move_efforts(alone, alone.spans[0], robot)
+            used = 0.0 if efforts is None else efforts.share(robot.limits.effort)
+            joints = max(joints, used - (1 + EFFORT_RELATIVE / 2))
         if robot.limits.tcp == _NO_TOOL_LIMITS:
             return joints
         from trajcli.checks.tool_limits import limits_tool, share_of_tool_limits, tool_peaks

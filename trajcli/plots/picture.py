@@ -106,7 +106,7 @@ def _sensible(motion: PlannedMotion | None, records: Sequence[DrawnTable]) -> li
         return [name for name in QUANTITY_NAMES if name in shown]
     names = ["q", "qd", "qdd"]
     limited = any(np.isfinite(move.robot.limits.jerk).any() for move in motion.moves)
-    if limited or all(move.planner.joins > 1 for move in motion.moves):
+    if limited or all(move.continuity > 1 for move in motion.moves):
         names.append("qddd")  # elsewhere the acceleration steps, and says all
     along_path = any(move.planned.tool is not None for move in motion.moves)
     tcp = [move.robot.limits.tcp for move in motion.moves]

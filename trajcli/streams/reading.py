@@ -20,6 +20,15 @@ _HEAD = 1 << 16  # bytes of a file that are looked at
 _JOINT_NAMES = re.compile(rb"^[ \t{-]*[\"']?joint_names[\"']?[ \t]*:", re.MULTILINE)
 _MCAP = b"\x89MCAP0\r\n"
 _NPY = b"\x93NUMPY"
+_OTHERS = {
+    b"#ROSBAG": ("a bag of ROS 1", "`rosbags-convert` makes MCAP of it"),
+    b"SQLite format 3": ("a bag of ROS 2 in SQLite", "`ros2 bag convert` makes MCAP of it"),
+    b"PAR1": ("a parquet file", "trajcli.check takes its columns as arrays; or save them as CSV or .npy"),
+    b"\x89HDF": ("an HDF5 file", "save its arrays as CSV or .npy"),
+    b"PK\x03\x04": ("an archive (.zip, .npz, .xlsx)", "save one table of it as CSV, or one array as .npy"),
+    b"\x1f\x8b": ("compressed by gzip", "`gunzip -c FILE | trajcli ... -` unpacks it"),
+}
+"""Files that are known by their first bytes and are not read: what they are, and what would be read."""
 
 
 def read_table(path: str | Path, topic: str | None = None) -> Table:
@@ -82,8 +91,16 @@ def open_rows_of(
 
 
 def format_of_rows(source: ByteSource) -> str:
-    """Return "mcap", "npy", "ros", "jsonl" or "csv", by the first bytes or the name of a file."""
+    """Return "mcap", "npy", "ros", "jsonl" or "csv", by the first bytes or the name of a file.
+
+    Raises:
+        FileError: When it cannot be read.
+        InputError: When it is known to be of a format that is not read.
+    """
     head = source.head(_HEAD)
+    for magic, (what, hint) in _OTHERS.items():
+        if head.startswith(magic):
+            raise InputError(f"{source.file} is {what}, which is not read", hint=hint)
     if head.startswith(_MCAP) or source.ending == ".mcap":
         return "mcap"
     if head.startswith(_NPY) or source.ending == ".npy":

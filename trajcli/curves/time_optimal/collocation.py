@@ -37,6 +37,7 @@ class CollocationRows:
         cap: Largest x at each grid point, shape (N + 1,).
         ramps: d, shape (N,).
         distances: E, shape (N,).
+        owners: Which constraint each row is of, shape (m,).
     """
 
     grid: Array
@@ -46,6 +47,7 @@ class CollocationRows:
     cap: Array
     ramps: Array
     distances: Array
+    owners: NDArray[np.intp]
 
     @property
     def straight(self) -> NDArray[np.bool_]:
@@ -53,15 +55,21 @@ class CollocationRows:
         return np.asarray((np.abs(self.P + self.R) <= _FLAT * np.abs(self.R)).all(axis=0))
 
     def tightened(self, velocity: Array, acceleration: Array) -> CollocationRows:
-        """Return the intervals with all speeds and every c divided by factors (N,) of their own."""
+        """Return the intervals with caps and every c divided by factors of their own.
+
+        Args:
+            velocity: What speeds are divided by, shape (N,).
+            acceleration: What the c of each of the k constraints are divided by, shape (k, N); or (N,), all.
+        """
         cap = self.cap.copy()
         cap[:-1] /= velocity**2
         cap[1:] = np.minimum(cap[1:], self.cap[1:] / velocity**2)
-        C, less = self.C.copy(), 1.0 - 1.0 / acceleration
+        C, less = self.C.copy(), np.atleast_2d(1.0 - 1.0 / acceleration)
         for block in blocks(self.distances.size):
             at_rest = self._at_rest(block)
             at_rest[np.isinf(at_rest)] = 0.0  # no bound stays none
-            C[:, block] = np.maximum(C[:, block] - at_rest * less[block], 0.0)
+            of_rows = less[:, block] if len(less) == 1 else less[self.owners, block]
+            C[:, block] = np.maximum(C[:, block] - at_rest * of_rows, 0.0)
         return replace(self, C=C, cap=cap)
 
     def sdd_ranges(self, x: Array, relaxed: float = 0.0) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
@@ -107,12 +115,14 @@ class CollocatedConstraints:
         near: a, b and c at the near ends, each of shape (k, N).
         far: The same at the far ends.
         cap: Largest x at each grid point, shape (N + 1,).
+        owners: Which constraint each row is of, shape (k,).
     """
 
     grid: Array
     near: tuple[Array, Array, Array]
     far: tuple[Array, Array, Array]
     cap: Array
+    owners: NDArray[np.intp]
 
     def intervals(self, ramps: Array, distances: Array) -> CollocationRows:
         """Return the rows of the intervals for given sdd ramps d and distances E, each of shape (N,)."""
@@ -127,7 +137,7 @@ class CollocatedConstraints:
             size_P, size_R = np.abs(P[:, block]), np.abs(R[:, block])
             P[:, block][size_P <= _FLAT * size_R] = 0.0
             R[:, block][size_R <= _FLAT * size_P] = 0.0
-        return CollocationRows(self.grid, P, R, C, self.cap, ramps, distances)
+        return CollocationRows(self.grid, P, R, C, self.cap, ramps, distances, np.tile(self.owners, 2))
 
 
 def collocated(grid: Array, constraints: Sequence[PathConstraint], stops: Array) -> CollocatedConstraints:
@@ -138,12 +148,14 @@ def collocated(grid: Array, constraints: Sequence[PathConstraint], stops: Array)
         constraints: At least one.
         stops: Grid points where x must be zero.
     """
-    near, near_cap = _joined([constraint.rows(grid[:-1], "right") for constraint in constraints])
+    near_rows = [constraint.rows(grid[:-1], "right") for constraint in constraints]
+    near, near_cap = _joined(near_rows)
     far, far_cap = _joined([constraint.rows(grid[1:], "left") for constraint in constraints])
+    owners = np.repeat(np.arange(len(near_rows)), [rows.a.shape[1] for rows in near_rows])
     cap = np.append(near_cap, np.inf)
     cap[1:] = np.minimum(cap[1:], far_cap)
     cap[np.isin(grid, stops)] = 0.0
-    return CollocatedConstraints(grid, near, far, cap)
+    return CollocatedConstraints(grid, near, far, cap, owners)
 
 
 def collocation_rows(grid: Array, constraints: Sequence[PathConstraint], stops: Array) -> CollocationRows:

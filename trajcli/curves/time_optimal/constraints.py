@@ -13,7 +13,7 @@ Source: Pham and Pham (2018), sections II and III, for the rows.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -51,8 +51,19 @@ class PathConstraint(Protocol):
     """What limits the motion along a path: how fast it may be, and by how much a law is too fast.
 
     A solution obeys the rows at the points of its grid. Between them it is judged by the excess: in an
-    interval where that is above one, cap and c are lowered and the problem is solved again.
+    interval where that is above one, its caps and its c are lowered and the problem is solved again.
+
+    Attributes:
+        estimate: What share of the time that a grid may lose by estimate it may lose here, at most 1: less
+            where rows change faster along the path than those of accelerations of joints.
     """
+
+    estimate: ClassVar[float]
+
+    @property
+    def bounds_sdd(self) -> bool:
+        """Whether it has rows with a bound."""
+        ...
 
     def rows(self, s: Array, side: Side) -> ConstraintRows:
         """Return the rows at the points (p,) of the path, seen from one side; k is always the same."""
@@ -62,8 +73,9 @@ class PathConstraint(Protocol):
         """Return the largest multiples of its limits that each piece of a law reaches, shape (2, N).
 
         The first row is of what grows with sd, and met by dividing the caps by its square; the second of
-        what grows with sd^2 and sdd, and met by dividing every c by it. Zero where there is no such limit;
-        above one never less than what is reached, up to the resolution that the constraint names.
+        what grows with sd^2 and sdd, and met by dividing every c by it: the share of what c leaves room for,
+        without what does not change with the speed. Zero where there is no such limit; above one never less
+        than what is reached, up to the resolution that the constraint names.
 
         Args:
             law: N pieces, one for each interval, each within one piece of the path.
@@ -84,9 +96,16 @@ class JointConstraint:
         ValueError: When bounds have another shape or sign.
     """
 
+    estimate: ClassVar[float] = 1.0
+
     path: PiecewisePolynomial
     velocity: Array
     acceleration: Array
+
+    @property
+    def bounds_sdd(self) -> bool:
+        """Whether some acceleration is bounded."""
+        return bool(np.isfinite(self.acceleration).any())
 
     def __post_init__(self) -> None:
         n = self.path.dimension
@@ -137,6 +156,9 @@ class SpeedConstraint:
             jumps, a grid point must stand, with the lower value.
     """
 
+    estimate: ClassVar[float] = 1.0
+    bounds_sdd: ClassVar[bool] = False
+
     limit: Callable[[Array], Array]
 
     def rows(self, s: Array, side: Side) -> ConstraintRows:
@@ -167,6 +189,9 @@ class ApproachConstraint:
         path: q(s) with n joints.
         limits: Of the joints.
     """
+
+    estimate: ClassVar[float] = 1.0
+    bounds_sdd: ClassVar[bool] = False
 
     path: PiecewisePolynomial
     limits: ApproachLimits

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from trajcli.curves.extrema import peaks
 from trajcli.curves.operations import scale_time
-from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, distinct
 from trajcli.curves.time_optimal.collocation import CollocatedConstraints, CollocationRows, collocated
 from trajcli.curves.time_optimal.constraints import JointConstraint, PathConstraint, corners, is_at_rest
 from trajcli.curves.time_optimal.maximum_velocity import maximum_velocity_curve
@@ -110,6 +110,7 @@ def time_optimal(
     start_velocity: float = 0.0,
     end_velocity: float = 0.0,
     further: Sequence[PathConstraint] = (),
+    stops: ArrayLike = (),
 ) -> TimeOptimalMotion:
     """Return the fastest motion along a path within bounds of velocity and acceleration that hold for all t.
 
@@ -119,10 +120,11 @@ def time_optimal(
     Args:
         path: q(s) with n joints, of degree at most 5, without jumps.
         velocity: Lower and upper bounds, shape (n, 2), lower < 0 < upper, infinite for none; per second.
-        acceleration: The same, per second squared; not all infinite.
+        acceleration: The same, per second squared; not all infinite, unless another constraint bounds sdd.
         start_velocity: sd at the start, not negative.
         end_velocity: sd at the end, not negative.
         further: Other constraints; kept as far as their excess tells.
+        stops: Breaks of the path at which it stops, too, shape (k,).
 
     Raises:
         UnlimitedSpeedError: When nothing limits the motion somewhere.
@@ -140,9 +142,10 @@ def time_optimal(
         np.inf if resting and speed == 0 else speed
         for speed, resting in zip((start_velocity, end_velocity), is_at_rest(path), strict=True)
     )
-    if not np.isfinite(bounds[1]).any() or path.duration == 0:
+    halts = distinct(np.append(corners(path), np.asarray(stops, dtype=np.float64)))
+    problem = PathProblem(joints, tuple(further), halts, (ends[0], ends[1]))
+    if path.duration == 0 or not any(constraint.bounds_sdd for constraint in problem.constraints):
         raise UnlimitedSpeedError(path.start)
-    problem = PathProblem(joints, tuple(further), corners(path), (ends[0], ends[1]))
     solution, rounds, lost = _refined_solution(problem)
     solution, tightened = _tightened_solution(solution)
     grid, pieces, excess = solution.grid, solution.pieces, float(solution.excess.max())
@@ -184,9 +187,14 @@ class PathProblem:
         """Whether sdd may change within an interval."""
         return self.joints.path.degree <= _LARGEST_DEGREE
 
+    @property
+    def estimate(self) -> float:
+        """What share of the time that a grid may lose by estimate it may lose here."""
+        return min(constraint.estimate for constraint in self.constraints)
+
     def excess(self, pieces: LawPieces) -> Array:
-        """Return the largest excess over all constraints in each piece of a law, shape (2, N)."""
-        return np.asarray(np.maximum.reduce([each.excess(pieces) for each in self.constraints]))
+        """Return the excess of each of the k constraints in each piece of a law, shape (k, 2, N)."""
+        return np.stack([each.excess(pieces) for each in self.constraints])
 
 
 @frozen
@@ -199,7 +207,7 @@ class GridSolution:
         intervals: The rows that it obeys.
         speeds: sd^2 at its grid points.
         pieces: Of its law s(t).
-        excess: Of the constraints in each interval, shape (2, N).
+        excess: Of each of the k constraints in each interval, shape (k, 2, N).
     """
 
     problem: PathProblem
@@ -222,7 +230,7 @@ class GridSolution:
     @property
     def lost(self) -> Array:
         """Estimate of the time lost in each interval, the time to keep exceeded limits included, (N,)."""
-        durations, over = self.pieces.durations, np.clip(self.excess - 1.0, 0.0, 1.0)
+        durations, over = self.pieces.durations, np.clip(self.excess.max(axis=0) - 1.0, 0.0, 1.0)
         lost = time_lost(self.intervals, self.x, self.speeds.mvc, durations)
         return np.asarray(lost + durations * np.maximum(over[0], 0.5 * over[1]))
 
@@ -230,21 +238,24 @@ class GridSolution:
         """Return the solution with limits divided by factors.
 
         Args:
-            factors: Of velocity and acceleration in each interval, shape (2, N).
+            factors: Of velocity and acceleration of each constraint in each interval, shape (k, 2, N).
             new_ramps: Whether to find the sdd ramps anew.
 
         Raises:
             UnreachableSpeedError: When the speeds at the ends are too high for these limits.
         """
         problem, constraints, grid = self.problem, self.collocated, self.grid
+        velocity, acceleration = factors[:, 0].max(axis=0), factors[:, 1]
         if new_ramps and problem.with_ramps:
-            calm = self.excess.max(axis=0) <= _WILD  # elsewhere sdd changes by more than the limits follow
+            calm = (
+                self.excess.max(axis=(0, 1)) <= _WILD
+            )  # elsewhere sdd changes by more than the limits follow
             wanted = np.where(calm, wanted_ramps(self.intervals, self.x), 0.0)
             rows = constraints.intervals(wanted, distances_at_mean_speed(grid, self.x, wanted))
-            rows = rows.tightened(*np.where(calm, factors, 1.0))
+            rows = rows.tightened(np.where(calm, velocity, 1.0), np.where(calm, acceleration, 1.0))
             with suppress(UnreachableSpeedError):  # then there may be one with the ramps as they are
                 return _judged(problem, constraints, rows, solve(rows, *problem.ends))
-        rows, changed = self.intervals.tightened(*factors), (factors != 1.0).any(axis=0)
+        rows, changed = self.intervals.tightened(velocity, acceleration), (factors != 1.0).any(axis=(0, 1))
         mvc = maximum_velocity_curve(rows, self.speeds.mvc, changed)
         few = changed.mean() < _FEW_CHANGED
         speeds = solve_locally(rows, self.speeds, changed, mvc) if few else None
@@ -273,7 +284,7 @@ def _judged(
     else:
         excess, differs = before.excess.copy(), before.x != speeds.x
         chosen = np.flatnonzero(differs[:-1] | differs[1:])
-        excess[:, chosen] = problem.excess(pieces.chosen(chosen))
+        excess[:, :, chosen] = problem.excess(pieces.chosen(chosen))
     return GridSolution(problem, constraints, rows, speeds, pieces, excess)
 
 
@@ -329,10 +340,10 @@ def _parts(solution: GridSolution, room: int) -> tuple[NDArray[np.intp], float]:
     """Return into how many parts to cut each interval, and the share of the duration that is lost."""
     lost, durations, straight = solution.lost, solution.pieces.durations, solution.intervals.straight
     duration, bent = float(durations.sum()), np.where(straight, 0.0, lost)
-    share = float(lost.sum()) / duration
+    share, estimate = float(lost.sum()) / duration, solution.problem.estimate
     parts = np.ones(lost.size, dtype=np.intp)
-    if share > _LOST and room > _FEW_NEW * lost.size:
-        parts = parts_for(bent, _AIM * duration, room)
+    if share > estimate * _LOST and room > _FEW_NEW * lost.size:
+        parts = parts_for(bent, estimate * _AIM * duration, room)
     switching = straight & (lost > _SWITCHING * durations)
     settled = lost[switching].sum() <= _SETTLED * bent.sum()
     if not settled and (parts - 1).sum() + switching.sum() <= room:
@@ -352,7 +363,7 @@ def _tightened_solution(solution: GridSolution) -> tuple[GridSolution, int]:
         exceeded = solution.excess > 1.0 + _EXACT
         if not exceeded.any():
             break
-        tightened |= exceeded.any(axis=0)
+        tightened |= exceeded.any(axis=(0, 1))
         lowered = _LOWERED[min(turn, len(_LOWERED) - 1)]
         factors = 1.0 + lowered * np.where(exceeded, solution.excess - 1.0, 0.0)
         solution = solution.tightened(factors, new_ramps=turn == 0)

@@ -17,8 +17,9 @@ from trajcli.errors import FileError, InputError, Problem
 from trajcli.frozen import frozen
 from trajcli.job.yaml.load import Document, read_document
 from trajcli.kinematics.robot import QUANTITIES, Robot
-from trajcli.language.limits import UNLIMITED, LimitsSpec, LowerUpper
+from trajcli.language.limits import LimitsSpec
 from trajcli.language.numbers import SI, FlawError, check_not_tiny, read_number, shown
+from trajcli.language.per_joint import UNLIMITED, LowerUpper
 from trajcli.planners.planner import Event
 from trajcli.suggest import did_you_mean, nearest, valid_names
 from trajcli.units import joint_quantity

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -209,6 +209,7 @@ class JointMotion:
         phases: Named intervals of time.
         events: What was conceded.
         phase_plane: Of a time-optimal law.
+        continuity: Of the curve, where its law promises less.
     """
 
     curve: PiecewisePolynomial
@@ -216,6 +217,7 @@ class JointMotion:
     phases: tuple[Phase, ...] = ()
     events: tuple[Event, ...] = ()
     phase_plane: PhasePlane | None = None
+    continuity: Literal[1, 2] | None = None
 
 
 @frozen

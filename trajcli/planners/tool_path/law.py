@@ -298,7 +298,6 @@ class TimeOptimalLaw(TimeLaw):
 
     shape: str = "time_optimal"
     continuity: Literal[1, 2] = 1
-    has_jerk: bool = False
     takes_duration: bool = False
     uses_joint_limits: bool = True
 

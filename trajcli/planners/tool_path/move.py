@@ -200,6 +200,7 @@ class ToolPathMove(Planner):
             remedies=REMEDIES,
             events=(*planned.events, *joints.events),
             phase_plane=joints.phase_plane,
+            continuity=joints.continuity,
         )
 
     def _followed(self, planned: PlannedPath, start: Array, robot: Robot) -> JointMotion:

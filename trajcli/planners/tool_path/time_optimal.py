@@ -7,9 +7,10 @@ IEEE Trans. Robotics 34 (2018).
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import (
@@ -20,8 +21,10 @@ from trajcli.curves.piecewise import (
     distinct,
     horner,
 )
-from trajcli.curves.time_optimal.constraints import ConstraintRows, JointConstraint
-from trajcli.curves.time_optimal.parameterization import time_optimal
+from trajcli.curves.third_order.jerk import LawJerkConstraint
+from trajcli.curves.third_order.parameterization import JerkLimitedMotion, jerk_limited_time_optimal
+from trajcli.curves.time_optimal.constraints import ConstraintRows, JointConstraint, PathConstraint
+from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion, time_optimal
 from trajcli.curves.time_optimal.phase_plane import PhasePlane
 from trajcli.curves.time_optimal.switching import switching_structure
 from trajcli.curves.time_optimal.time_law import LawPieces
@@ -32,6 +35,12 @@ from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.planners.approach_limits import approach_constraints
 from trajcli.planners.boundary_states import missing_limit
+from trajcli.planners.effort_limits import (
+    effort_constraints,
+    lacks_acceleration,
+    solved_within_efforts,
+)
+from trajcli.planners.law_events import distance_from_bound, solved_by_convex_steps
 from trajcli.planners.planner import Event, Phase, stretched
 from trajcli.planners.tool_path.follow import FollowedPath, JointMotion
 from trajcli.planners.tool_path.law import LawSpec
@@ -65,7 +74,17 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
     limits = robot.limits
     with joints.diagnosed():
         further = (ToolConstraint(joints.executed, tcp), *approach_constraints(curve, robot))
-        solved = time_optimal(curve, limits.velocity, limits.acceleration, further=further)
+
+        of_law = _jerk_of_law(tcp, angular=path.poses.pure_rotation)
+        keeps_jerk = bool(of_law) or _moving(curve)[np.isfinite(limits.jerk).any(axis=1)].any()
+
+        def solve(efforts: tuple[PathConstraint, ...]) -> TimeOptimalMotion:
+            every, bounds = (*further, *efforts), (limits.velocity, limits.acceleration)
+            if not keeps_jerk:
+                return time_optimal(curve, *bounds, further=every)
+            return jerk_limited_time_optimal(curve, *bounds, limits.jerk, further=every, further_jerk=of_law)
+
+        solved = solved_within_efforts(curve, robot, solve)
         remaining = _remaining_stretch(joints.executed, solved.law, tcp)
     least = spec.minimum_duration or 0.0
     factor = max(remaining, least / solved.trajectory.duration)
@@ -73,22 +92,47 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
         scale_time(each, factor) if factor > 1 else each for each in (solved.law, solved.trajectory)
     )
     motion = motion_along(path, law, law.breaks, tolerance, None)
-    binding = switching_structure(solved.trajectory, limits.velocity, limits.acceleration)
+    jerk = limits.jerk if keeps_jerk else None
+    binding = switching_structure(solved.trajectory, limits.velocity, limits.acceleration, jerk)
     phases = [
         Phase(f"{b.quantity} {'+' if b.sign > 0 else '-'}", b.start * factor, b.end * factor, b.joint)
         for b in binding
     ]
-    text = f"the grid was refined {solved.refinements} times, to {solved.grid.size} grid points"
-    events = [Event("refined", text)]
+    events = _events(solved, remaining, fastest=factor == remaining)
+    joint_constraint = JointConstraint(curve, limits.velocity, limits.acceleration)
+    constraints = (joint_constraint, *further, *effort_constraints(curve, robot))
+    breaks = distinct(np.concatenate([curve.breaks, path.breaks]))
+    dimension: Literal["length", "angle"] = "angle" if path.poses.pure_rotation else "length"
+    plane = PhasePlane(law, constraints, breaks, solved.stops, dimension)
+    return JointMotion(trajectory, motion, tuple(phases), events, plane, 2 if keeps_jerk else 1)
+
+
+def _jerk_of_law(limits: ToolLimits, *, angular: bool) -> tuple[LawJerkConstraint, ...]:
+    """Return the constraint of the jerk of the tool along its path; none where it has no limit, or rests."""
+    return () if angular or math.isinf(limits.jerk) else (LawJerkConstraint(limits.jerk),)
+
+
+def _moving(curve: PiecewisePolynomial) -> NDArray[np.bool_]:
+    """Return which joints move along a path, shape (n,)."""
+    return np.asarray(np.abs(curve.piece_ends(1)).max(axis=(0, 1)) > 0)
+
+
+def _events(solved: TimeOptimalMotion, remaining: float, *, fastest: bool) -> tuple[Event, ...]:
+    """Return how a law was found, how good it is, and where it stops."""
+    events = []
+    if isinstance(solved, JerkLimitedMotion):
+        events += [solved_by_convex_steps(solved)] + [distance_from_bound(solved, remaining)] * fastest
+        if solved.stops.size:
+            count = solved.stops.size
+            text = f"stops {count} time{'s' * (count != 1)} where the path bends: limits of jerk ask for it"
+            events.append(Event("stops", text))
+    elif solved.refinements:
+        text = f"the grid was refined {solved.refinements} times, to {solved.grid.size} grid points"
+        events.append(Event("refined", text))
     stretch = solved.stretch * remaining
     if stretch > 1 + _NOTED:
         events.append(stretched(stretch))
-    joint_constraint = JointConstraint(curve, limits.velocity, limits.acceleration)
-    breaks = distinct(np.concatenate([curve.breaks, path.breaks]))
-    dimension: Literal["length", "angle"] = "angle" if path.poses.pure_rotation else "length"
-    plane = PhasePlane(law, (joint_constraint, *further), breaks, solved.stops, dimension)
-    kept = tuple(events if solved.refinements else events[1:])
-    return JointMotion(trajectory, motion, tuple(phases), kept, plane)
+    return tuple(events)
 
 
 def _remaining_stretch(path: ToolPath, law: PiecewisePolynomial, limits: ToolLimits) -> float:
@@ -103,13 +147,14 @@ def _remaining_stretch(path: ToolPath, law: PiecewisePolynomial, limits: ToolLim
 
 
 def _limits(spec: LawSpec, limits: ToolLimits) -> ToolLimits:
-    given = spec.model_dump(include={"speed", "acceleration", "angular_speed", "angular_acceleration"})
+    given = spec.model_dump(
+        include={"speed", "acceleration", "jerk", "angular_speed", "angular_acceleration"}
+    )
     return ToolLimits(**{**vars(limits), **{name: v for name, v in given.items() if v is not None}})
 
 
 def _require_acceleration(curve: PiecewisePolynomial, robot: Robot, planner: str) -> None:
-    moving = np.abs(curve.piece_ends(1)).max(axis=(0, 1)) > 0
-    lacking = np.flatnonzero(moving & ~np.isfinite(robot.limits.acceleration).all(axis=1))
+    lacking = np.flatnonzero(_moving(curve) & lacks_acceleration(robot))
     if lacking.size:
         why = "for the fastest law"
         raise missing_limit(planner, "acceleration", lacking.tolist(), robot, why, "use another law `shape`")
@@ -124,8 +169,15 @@ class ToolConstraint:
         limits: Of its speed and acceleration, linear and angular.
     """
 
+    estimate: ClassVar[float] = 1.0
+
     path: ToolPath
     limits: ToolLimits
+
+    @property
+    def bounds_sdd(self) -> bool:
+        """Whether some acceleration is bounded."""
+        return bool(np.isfinite([self.limits.acceleration, self.limits.angular_acceleration]).any())
 
     def rows(self, s: Array, side: Side) -> ConstraintRows:
         """Return rows and caps at points (p,) of the path.

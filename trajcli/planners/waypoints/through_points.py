@@ -70,18 +70,14 @@ OPEN_END_REMEDIES = {
 }
 
 
-class ThroughPoints(Planner):
-    """A planner that passes points on the way to its target.
+class PointSequence(Planner):
+    """A planner that goes from point to point to its target.
 
     Attributes:
         finds_times: Whether it always finds itself when it passes them, whatever a recording says.
     """
 
     finds_times: ClassVar[bool] = False
-    smoother: ClassVar[Mapping[str, Mapping[str, Any]]] = {
-        "spline with rule continuous_acceleration": {"planner": "spline", "rule": "continuous_acceleration"},
-        "quintic": {"planner": "spline", "rule": "quintic"},
-    }
 
     to: Annotated[
         NamedWaypoint | None,
@@ -90,7 +86,6 @@ class ThroughPoints(Planner):
     through: Annotated[
         Through, Field(description="The points between start and target, or a file of recorded points.")
     ] = ()
-    duration: Duration | None = None
 
     @property
     def listed(self) -> tuple[Waypoint, ...]:
@@ -103,6 +98,47 @@ class ThroughPoints(Planner):
         """The last of the points; None where they are recorded."""
         return self.listed[-1] if self.listed else None
 
+    @model_validator(mode="after")
+    def _goes_somewhere(self) -> Self:
+        if self.to is None and not isinstance(self.through, Recorded) and not self.through:
+            raise refuse([((), f"{self.tag} needs points: `through`, `to` or both", None)])
+        return self
+
+    def with_joint_targets(self, resolve: Resolve, near: Array) -> Self:
+        """Return the planner with joints in the place of poses, each near to the point before it.
+
+        Raises:
+            TrajcliError: What `resolve` raises, with the name of the point.
+        """
+        if not any(point.gives_pose for point in self.listed):
+            return self
+        recorded = isinstance(self.through, Recorded)
+        near = self.through.positions[-1] if isinstance(self.through, Recorded) else near
+        points = []
+        for index, point in enumerate(self.listed):
+            try:
+                resolved = resolve(point, near)
+            except TrajcliError as error:
+                last = self.to is not None and index == len(self.listed) - 1
+                raise _of_point(error, "target" if last else f"waypoint {index}") from None
+            near = resolved.as_state().position
+            points.append(_placed(point, resolved))
+        if self.to is None:
+            return self.model_copy(update={"through": tuple(points)})
+        through = self.through if recorded else tuple(points[:-1])
+        return self.model_copy(update={"through": through, "to": points[-1]})
+
+
+class ThroughPoints(PointSequence):
+    """A planner that passes points at times that are given, or over a given duration."""
+
+    smoother: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "spline with rule continuous_acceleration": {"planner": "spline", "rule": "continuous_acceleration"},
+        "quintic": {"planner": "spline", "rule": "quintic"},
+    }
+
+    duration: Duration | None = None
+
     @property
     def timed(self) -> bool:
         """Whether the points say when they are passed."""
@@ -111,12 +147,6 @@ class ThroughPoints(Planner):
         return any(point.time is not None for point in self.through) or (
             self.to is not None and self.to.time is not None
         )
-
-    @model_validator(mode="after")
-    def _goes_somewhere(self) -> Self:
-        if self.to is None and not isinstance(self.through, Recorded) and not self.through:
-            raise refuse([((), f"{self.tag} needs points: `through`, `to` or both", None)])
-        return self
 
     @model_validator(mode="after")
     def _times_fit(self) -> Self:
@@ -171,30 +201,6 @@ class ThroughPoints(Planner):
             for (_, before), (k, time) in pairwise(times)
             if time <= before
         ]
-
-    def with_joint_targets(self, resolve: Resolve, near: Array) -> Self:
-        """Return the planner with joints in the place of poses, each near to the point before it.
-
-        Raises:
-            TrajcliError: What `resolve` raises, with the name of the point.
-        """
-        if not any(point.gives_pose for point in self.listed):
-            return self
-        recorded = isinstance(self.through, Recorded)
-        near = self.through.positions[-1] if isinstance(self.through, Recorded) else near
-        points = []
-        for index, point in enumerate(self.listed):
-            try:
-                resolved = resolve(point, near)
-            except TrajcliError as error:
-                last = self.to is not None and index == len(self.listed) - 1
-                raise _of_point(error, "target" if last else f"waypoint {index}") from None
-            near = resolved.as_state().position
-            points.append(_placed(point, resolved))
-        if self.to is None:
-            return self.model_copy(update={"through": tuple(points)})
-        through = self.through if recorded else tuple(points[:-1])
-        return self.model_copy(update={"through": through, "to": points[-1]})
 
     def with_duration(self, duration: float) -> Self:
         """Return the planner whose points are passed in the same proportion, the last after `duration` s."""

@@ -1,0 +1,207 @@
+"""Bounds of efforts for all t against dense samples, and against motions whose true efforts are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from heavy_arms import random_arm, random_payload
+from scipy.optimize import minimize_scalar
+
+from trajcli.dynamics import effort_bound
+from trajcli.dynamics.effort_bound import effort_majorants, effort_survey, needed_stretch
+from trajcli.dynamics.newton_euler import InverseDynamics
+from trajcli.kinematics.power_series import growth
+from trajcli.kinematics.robot import Friction, Joint, LinkInertia, Robot, point_mass, unlimited
+
+NODES = np.linspace(0.0, 1.0, 9)
+
+
+def lift(mass: float = 5.0, friction: Friction = Friction(), gravity: float = 9.81) -> InverseDynamics:  # noqa: B008
+    """Return one vertical slide: its effort is mass (qdd + gravity) and friction."""
+    slide = Joint("lift", "prismatic", friction=friction, link=LinkInertia(mass, (0.1, 0.2, 0.3), (0.0,) * 6))
+    robot = Robot("lift", (slide,), unlimited(1), "standard", np.eye(4), np.eye(4))
+    return InverseDynamics(robot, np.array([0.0, 0.0, -gravity]))
+
+
+def dense(dynamics, breaks, coefficients, count=3001):
+    """Return the efforts at many times, both sides of each break."""
+    efforts = []
+    for p, length in enumerate(np.diff(breaks)):
+        t = np.linspace(0.0, length, count)
+        state = [
+            np.stack([np.polyval(np.polyder(row, order), t) for row in coefficients[:, p].T], axis=1)
+            for order in range(3)
+        ]
+        efforts.append(dynamics.effort(*state))
+    return np.concatenate(efforts)
+
+
+def random_motion(rng, joints):
+    pieces, degree = int(rng.integers(1, 4)), int(rng.integers(1, 6))
+    breaks = np.concatenate([[0.0], np.cumsum(rng.uniform(0.1, 0.8, pieces))]) + rng.uniform(-1, 1)
+    return breaks, rng.normal(size=(degree + 1, pieces, joints)) * rng.uniform(0.1, 4.0)
+
+
+def random_dynamics(rng, friction):
+    joints = int(rng.integers(1, 8))
+    arm = random_arm(rng, joints, rng.choice(["standard", "modified"]), friction=friction)
+    return InverseDynamics(arm, rng.normal(size=3) * 9, random_payload(rng) if rng.random() < 0.5 else None)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_bounds_are_never_below_samples_and_hardly_above(seed):
+    rng = np.random.default_rng(seed)
+    dynamics = random_dynamics(rng, friction=seed % 3 == 0)
+    breaks, coefficients = random_motion(rng, len(dynamics.links))
+    survey = effort_survey(dynamics, breaks, coefficients)
+    efforts = dense(dynamics, breaks, coefficients)
+    scale = np.abs(efforts).max(axis=0)
+    for peaks, sampled in ((survey.highest(), efforts.max(axis=0)), (survey.lowest(), -efforts.min(axis=0))):
+        most = np.array([peak.most for peak in peaks])
+        assert (most >= sampled - 1e-9 * scale).all()
+        assert (most <= sampled + 1e-4 * scale).all()
+        for joint, peak in enumerate(peaks):
+            assert sum(peak.parts) == pytest.approx(peak.value, abs=1e-12 * scale[joint])
+            assert breaks[0] <= peak.time <= breaks[-1]
+            assert peak.value <= peak.most
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_majorants_bound_taylor_coefficients_everywhere(seed):
+    rng = np.random.default_rng(1000 + seed)
+    dynamics = random_dynamics(rng, friction=False)
+    viscous = tuple(
+        replace(j, friction=Friction(0.0, float(rng.uniform(0, 2)))) for j in dynamics.robot.joints
+    )
+    dynamics = InverseDynamics(replace(dynamics.robot, joints=viscous))
+    length, (_, coefficients) = 0.2, random_motion(rng, len(dynamics.links))
+    coefficients = coefficients[:, :1]
+    found = effort_majorants(dynamics, coefficients[-1], growth(coefficients, np.array([length]), 9))[:, 0]
+    nodes = (1 - np.cos(np.pi * np.arange(41) / 40)) / 2 * length
+    state = [
+        np.stack([np.polyval(np.polyder(row, order), nodes) for row in coefficients[:, 0].T], axis=1)
+        for order in range(3)
+    ]
+    efforts = np.polynomial.chebyshev.Chebyshev.fit
+    for joint, values in enumerate(dynamics.effort(*state).T):
+        series, factorial = efforts(nodes, values, 16, domain=[0.0, length]), 1.0
+        for k in range(5):
+            factorial *= max(k, 1)
+            true = np.abs(series.deriv(k)(np.linspace(0, length, 101)) if k else values).max() / factorial
+            rounding = 1e-15 * np.abs(values).max() * (256 / (length / 2)) ** k
+            assert true <= found[k, joint] * (1 + 1e-6) + rounding
+
+
+def hidden_peak(size: float) -> tuple[np.ndarray, float]:
+    """Return a polynomial that is 1 at all nodes, highest power first, and its largest value between them."""
+    product = np.poly(NODES)
+    largest = minimize_scalar(lambda x: -np.polyval(product, x), bounds=(0.0, NODES[1]), method="bounded")
+    product *= size / -largest.fun
+    product[-1] += 1.0
+    return product, 1.0 + size
+
+
+def hidden_motion(size: float, length: float) -> np.ndarray:
+    """Return q(t) of one slide, whose acceleration has a peak that nine rows do not show."""
+    joint = np.polyint(np.polyint(hidden_peak(size)[0])) * length**2
+    return (joint / length ** np.arange(joint.size - 1, -1, -1))[:, None, None]
+
+
+@pytest.mark.parametrize("length", [0.05, 1.0, 7.0])
+def test_a_planted_peak_between_rows_is_found(length):
+    """A peak of 0.01 % that none of nine rows shows."""
+    found = effort_survey(lift(), np.array([0.0, length]), hidden_motion(1e-4, length)).highest()[0]
+    true = 5.0 * (9.81 + 1.0001)
+    assert found.value == pytest.approx(true, rel=1e-6)
+    assert true * (1 - 1e-12) <= found.most <= true * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("length", [0.05, 1.0, 7.0])
+def test_the_remainder_covers_a_peak_that_no_row_shows(length, monkeypatch):
+    """So small a peak is not worth halving the piece: the bound is what the rows show plus the remainder."""
+    dynamics, size = lift(gravity=0.0), 1e-8
+    motion = hidden_motion(size, length)
+    found = effort_survey(dynamics, np.array([0.0, length]), motion).highest()[0]
+    assert found.most - 5.0 >= 5.0 * size * (1 - 1e-5)
+    monkeypatch.setattr(effort_bound, "_HALVINGS", 0)
+    found = effort_survey(dynamics, np.array([0.0, length]), motion).highest()[0]
+    assert 5.0 * size * (1 - 1e-5) <= found.most - 5.0 <= 2.1 * 5.0 * size
+    monkeypatch.setattr(effort_bound, "BETWEEN_NODES", effort_bound.BETWEEN_NODES / 10)
+    found = effort_survey(dynamics, np.array([0.0, length]), motion).highest()[0]
+    assert found.most - 5.0 < 5.0 * size * 0.5  # ten times too small a remainder would be noticed above
+
+
+def test_coulomb_friction_jumps_where_a_joint_turns_back():
+    dynamics = lift(2.0, Friction(coulomb=3.0))
+    coefficients = np.array([1.0, -1.0, 0.0])[:, None, None]  # qd = 2 t - 1, qdd = 2
+    survey = effort_survey(dynamics, np.array([0.0, 1.0]), coefficients)
+    high, low = survey.highest()[0], survey.lowest()[0]
+    assert high.most == pytest.approx(2.0 * 11.81 + 3.0)
+    assert low.most == pytest.approx(-2.0 * 11.81 + 3.0)
+    assert high.time == pytest.approx(0.5, abs=1e-9) or high.time > 0.5
+    assert high.parts == pytest.approx((4.0, 0.0, 3.0, 19.62))
+
+
+def test_a_motion_of_no_length_asks_for_nothing():
+    survey = effort_survey(lift(), np.array([2.0, 2.0]), np.zeros((2, 1, 1)))
+    assert survey.highest()[0].most == 0.0
+    assert needed_stretch(survey, 0, 1, 1.0, 1e-6).factor == 1.0
+
+
+@pytest.mark.filterwarnings("error")
+def test_what_no_float_holds_is_not_proven():
+    with np.errstate(over="ignore", invalid="ignore"):
+        survey = effort_survey(lift(), np.array([0.0, 1.0]), np.full((3, 1, 1), 1e308))
+    assert survey.highest()[0].most == np.inf
+
+
+def test_stretch_of_a_lift_in_closed_form():
+    """m (a / k^2 + g) = limit, with viscous friction m a / k^2 + v / k + m g = limit."""
+    coefficients = np.array([2.0, 0.0, 0.0])[:, None, None]  # qdd = 4 up to qd = 4
+    survey = effort_survey(lift(), np.array([0.0, 1.0]), coefficients)
+    found = needed_stretch(survey, 0, 1, 60.0, 0.0)
+    assert found.factor == pytest.approx((20.0 / (60.0 - 49.05)) ** 0.5, rel=1e-8)
+    survey = effort_survey(lift(5.0, Friction(1.0, 2.0)), np.array([0.0, 1.0]), coefficients)
+    free = 60.0 - 49.05 - 1.0
+    wanted = (8.0 + (64.0 + 80.0 * free) ** 0.5) / (2 * free)
+    assert needed_stretch(survey, 0, 1, 60.0, 0.0).factor == pytest.approx(wanted, rel=1e-8)
+    assert needed_stretch(survey, 0, 1, 200.0, 0.0).factor == 1.0
+
+
+def test_no_stretch_helps_where_gravity_alone_is_over_the_limit():
+    survey = effort_survey(lift(), np.array([0.0, 1.0]), np.array([2.0, 0.0, 0.0])[:, None, None])
+    found = needed_stretch(survey, 0, 1, 49.0, 1e-6)
+    assert found.factor == np.inf
+    assert found.peak.gravity == pytest.approx(49.05)
+
+
+def test_a_fast_motion_may_keep_a_limit_that_gravity_alone_exceeds():
+    falling = np.array([-2.0, 0.0, 0.0])[:, None, None]  # qdd = -4
+    survey = effort_survey(lift(), np.array([0.0, 1.0]), falling)
+    assert needed_stretch(survey, 0, 1, 40.0, 1e-6).factor == 1.0
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_stretch_is_the_smallest(seed):
+    rng = np.random.default_rng(300 + seed)
+    dynamics = random_dynamics(rng, friction=seed % 2 == 0)
+    breaks, coefficients = random_motion(rng, len(dynamics.links))
+    survey, joint = effort_survey(dynamics, breaks, coefficients), 0
+    static = max(peak.static for peak in (survey.highest(1e6)[joint], survey.lowest(1e6)[joint]))
+    limit = 1.2 * static + 0.3 * max(survey.highest()[joint].most, survey.lowest()[joint].most) + 0.1
+    needed = max(needed_stretch(survey, joint, sign, limit, 0.0).factor for sign in (1, -1))
+    powers = np.arange(len(coefficients) - 1, -1, -1)[:, None, None]
+    for share, kept in ((1.0, True), (0.999, needed == 1.0)):
+        factor = max(needed * share, 1.0)
+        efforts = dense(dynamics, breaks * factor, coefficients / factor**powers)[:, joint]
+        assert (np.abs(efforts).max() <= limit * (1 + 1e-6)) == kept
+
+
+def test_payload_takes_its_share():
+    heavy = replace(lift().robot, payload=point_mass(3.0))
+    survey = effort_survey(
+        InverseDynamics(heavy), np.array([0.0, 1.0]), np.array([2.0, 0.0, 0.0])[:, None, None]
+    )
+    assert survey.highest()[0].most == pytest.approx(8.0 * 13.81)

@@ -1,0 +1,66 @@
+"""The law `time_optimal` of tool paths within limits of jerk, of joints and of the tool."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from trajcli.curves.extrema import peaks
+from trajcli.job.read import job_from_text
+from trajcli.planning.plan import plan_job
+
+START = [0, -1.57, 1.57, -1.57, -1.57, 0]
+TURN = {"planner": "line", "to": {"rpy": [3.14, 0, 1.0]}}
+ARC = {"planner": "arc", "via": {"xyz": [0.5, 0.0, 0.45]}, "to": {"xyz": [0.45, -0.15, 0.45]}}
+CORNER = {
+    "planner": "path",
+    "segments": [{"line": {"xyz": [0.4, 0.1, 0.45]}}, {"line": {"xyz": [0.4, -0.1, 0.5]}}],
+    "corner": "round",
+    "radius": 0.02,
+}
+
+
+def fastest(move, limits, **law):
+    job = {
+        "version": 1,
+        "robot": "ur5e",
+        "limits": limits,
+        "start": {"joints": START},
+        "moves": [{**move, "law": {"shape": "time_optimal"} | law}],
+    }
+    made = plan_job(job_from_text(json.dumps(job)))
+    assert made.verdict.passed, made.verdict.findings[0].message
+    return made
+
+
+@pytest.mark.parametrize("move", [TURN, ARC, CORNER], ids=["turn", "arc", "corner"])
+def test_limits_of_the_jerk_of_joints_are_kept_without_steps(move):
+    """The verdict judges the jerk for all t, and steps of joints with a limit of jerk."""
+    limits = {"acceleration": 10, "jerk": 80}
+    made = fastest(move, limits)
+    assert made.trajectory.spans[0].continuity == 2
+    curve = made.moves[0].planned.curve
+    np.testing.assert_allclose(curve.evaluate(np.array([0.0, curve.end]), 2), 0.0, atol=1e-6)
+    without = fastest(move, {"acceleration": 10})
+    assert without.trajectory.spans[0].continuity == 1
+    assert without.trajectory.duration < made.trajectory.duration < 3 * without.trajectory.duration
+    assert any(event.kind == "bound" for event in made.events)
+
+
+def test_the_jerk_of_the_tool_along_a_line_is_that_of_ruckig():
+    """Far within the limits of joints, the law is the jerk-limited one of the tool."""
+    tcp = {"speed": 0.1, "acceleration": 0.5, "jerk": 4.0}
+    straight = {"planner": "line", "to": {"xyz": [0.45, 0.0, 0.5]}}
+    made = fastest(straight, {"acceleration": 20, "tcp": tcp})
+    reference = fastest(straight, {"acceleration": 20, "tcp": tcp}, shape="jerk_limited").trajectory.duration
+    assert reference * (1 - 1e-9) <= made.trajectory.duration <= 1.002 * reference
+    (jerk,) = peaks(made.moves[0].planned.tool.law, (3,))
+    assert jerk.magnitude[0] <= 4.0 * (1 + 1e-9)
+
+
+def test_a_law_may_name_a_lower_jerk():
+    limits = {"acceleration": 10, "tcp": {"speed": 0.25, "acceleration": 2.0, "jerk": 20.0}}
+    slower, faster = (fastest(ARC, limits, jerk=jerk).trajectory.duration for jerk in (5.0, 20.0))
+    assert slower > 1.01 * faster

@@ -1,0 +1,257 @@
+"""The planner waypoints: what may be given at points, limits of position, straight moves, degenerate lists."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from waypoint_problems import job_of, most_used, stopping
+
+import trajcli
+from trajcli.errors import InputError, MissingLimitError, PlanningError
+
+LIMITS = {"velocity": [1.0, 2.0, 1.5], "acceleration": [3.0, 4.0, 2.0], "jerk": [20.0, 15.0, 30.0]}
+POINTS = [[0.0, 0.0, 0.0], [0.4, -0.3, 0.2], [0.1, 0.5, 0.6], [0.9, 0.2, 0.3]]
+CASE = {"waypoints": POINTS, "limits": LIMITS}
+
+
+def plan_of(case=CASE, start=None, points=None, robot=None, **fields):
+    """Return the verified plan of a case; `points` is merged into its points by index."""
+    job = job_of(case, **{"starts": 1, **fields})
+    for k, more in (points or {}).items():
+        job["moves"][0]["through"][k - 1] |= more
+    job["start"] |= start or {}
+    if robot is not None:
+        job["robot"] = robot
+    plan = trajcli.plan(job)
+    assert plan.verdict.passed, plan.verdict.text
+    return plan
+
+
+def at_points(plan, order):
+    """Return a derivative at the points, shape (m, n)."""
+    times = np.minimum(plan.moves[0].planned.via_points.times, plan.trajectory.curve.end)
+    return plan.trajectory.curve.evaluate(times, order)
+
+
+def refusal(error, **fields):
+    with pytest.raises(error) as caught:
+        plan_of(**fields)
+    return caught.value.problems
+
+
+@settings(max_examples=12, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_random_lists_keep_limits_and_points_and_are_not_slower_than_stopping(seed):
+    rng = np.random.default_rng(seed)
+    n, count = int(rng.integers(1, 5)), int(rng.integers(2, 6))
+    steps = rng.uniform(-1, 1, (count, n)) * (rng.random((count, n)) < 0.8)
+    limits = {
+        "velocity": 10 ** rng.uniform(-0.5, 0.5, n),
+        "acceleration": 10 ** rng.uniform(0, 1, n),
+        "jerk": 10 ** rng.uniform(0.5, 3, n),
+    }
+    case = {"waypoints": np.cumsum(steps, axis=0), "limits": limits}
+    plan = plan_of(case)
+    assert most_used(plan, case) < 1 + 1e-9
+    assert plan.trajectory.duration <= stopping(case) * (1 + 1e-9)
+
+
+def test_same_job_same_motion():
+    curves = [plan_of(starts=2).trajectory.curve for _ in range(2)]
+    np.testing.assert_array_equal(curves[0].breaks, curves[1].breaks)
+    np.testing.assert_array_equal(curves[0].coefficients, curves[1].coefficients)
+
+
+def test_faster_limits_scale_the_time():
+    faster = {"velocity": 3.0, "acceleration": 9.0, "jerk": 27.0}
+    limits = {name: [factor * value for value in LIMITS[name]] for name, factor in faster.items()}
+    ratio = plan_of().trajectory.duration / plan_of({**CASE, "limits": limits}).trajectory.duration
+    assert ratio == pytest.approx(3, rel=1e-3)
+
+
+def test_more_starts_are_not_slower():
+    durations = [plan_of(starts=starts).trajectory.duration for starts in (1, 4, 8)]
+    assert durations[0] >= durations[1] * (1 - 1e-9) >= durations[2] * (1 - 2e-9)
+
+
+def test_velocity_of_a_joint_is_kept_and_the_others_are_found():
+    plan = plan_of(points={1: {"velocity": {"j2": -0.5}}, 2: {"acceleration": {"j1": 0.25, "j3": 0.0}}})
+    velocity, acceleration = at_points(plan, 1), at_points(plan, 2)
+    assert velocity[1, 1] == pytest.approx(-0.5, abs=1e-12)
+    assert acceleration[2, [0, 2]] == pytest.approx([0.25, 0.0], abs=1e-9)
+    assert np.abs(velocity[1, [0, 2]]).min() > 1e-3
+    free = plan_of().trajectory.duration
+    assert plan.trajectory.duration >= free * (1 - 1e-3)
+
+
+def test_what_a_point_names_survives_writing():
+    job = job_of(CASE)
+    job["moves"][0]["through"][0]["velocity"] = {"j2": -0.5}
+    from trajcli.job.read import job_from_text
+
+    loaded = job_from_text(json.dumps(job))
+    assert loaded.job.moves[0].through[0].velocity.named == (False, True, False)
+
+
+def test_stop_at_every_point_where_all_is_given():
+    still = {"velocity": 0, "acceleration": 0}
+    plan = plan_of(points={1: still, 2: still})
+    assert plan.trajectory.duration == pytest.approx(stopping(CASE), rel=1e-8)
+
+
+def test_start_and_end_in_motion():
+    ends = {"velocity": [0.3, -0.2, 0.1], "acceleration": [0.5, 0.0, -0.2]}
+    plan = plan_of(start=ends, points={3: {"velocity": [-0.1, 0.4, 0.0]}})
+    np.testing.assert_allclose(at_points(plan, 1)[[0, -1]], [ends["velocity"], [-0.1, 0.4, 0.0]], atol=1e-12)
+    np.testing.assert_allclose(at_points(plan, 2)[[0, -1]], [ends["acceleration"], [0] * 3], atol=1e-9)
+
+
+def test_minimum_durations():
+    least = [1.5, 0.0, 2.5]
+    times = np.diff(plan_of(minimum_durations=least).moves[0].planned.via_points.times)
+    assert (times >= np.array(least) - 1e-12).all()
+    (short,) = refusal(InputError, minimum_durations=[1.0])
+    assert "expected 3 times" in short.text()
+    (negative,) = refusal(InputError, minimum_durations=[1.0, -1.0, 0.0])
+    assert "at least 0" in negative.text()
+
+
+def test_two_points_are_a_move_from_state_to_state():
+    case = {**CASE, "waypoints": POINTS[:2]}
+    job = job_of(case)
+    job["moves"][0] = {"planner": "jerk_limited", "to": job["moves"][0]["through"][0]}
+    assert plan_of(case).trajectory.duration == pytest.approx(
+        trajcli.plan(job).trajectory.duration, rel=1e-12
+    )
+
+
+def test_doubled_points_count_once_and_leave_their_duration_to_the_next():
+    doubled = {**CASE, "waypoints": [POINTS[0], POINTS[0], POINTS[1], POINTS[1], *POINTS[2:], POINTS[3]]}
+    plan = plan_of(doubled, minimum_durations=[0.5, 0, 1.25, 0, 0, 1.5])
+    assert plan.moves[0].planned.via_points.points.shape == (4, 3)
+    assert any("left out 3 waypoints" in event.message for event in plan.events)
+    times = np.diff(plan.moves[0].planned.via_points.times)
+    assert (times >= np.array([0.5, 1.25, 1.5]) - 1e-12).all()
+    assert plan_of(doubled).trajectory.duration == pytest.approx(plan_of().trajectory.duration, rel=1e-9)
+    still = {**CASE, "waypoints": [POINTS[0]] * 3}
+    assert plan_of(still, minimum_durations=[0.5, 0.25]).trajectory.duration == 0.75
+
+
+def test_different_velocities_in_one_place_are_refused():
+    doubled = {**CASE, "waypoints": [*POINTS[:2], *POINTS[1:]]}
+    points = {1: {"velocity": {"j1": 0.1}}, 2: {"velocity": {"j1": 0.2}}}
+    (problem,) = refusal(PlanningError, case=doubled, points=points)
+    assert "j1" in problem.text()
+    assert "0.1" in problem.text()
+    assert "0.2" in problem.text()
+
+
+def test_joints_that_do_not_move_stand_still_and_need_no_limits():
+    case = {
+        "waypoints": [[q[0], 0.7, q[2]] for q in POINTS],
+        "limits": {name: [values[0], 1.0, values[2]] for name, values in LIMITS.items()},
+    }
+    robot = {"joints": [{}, {}, {}]}
+    job = job_of(case, starts=1)
+    job["limits"] = {name: [values[0], None, values[2]] for name, values in job["limits"].items()}
+    plan = trajcli.plan({**job, "robot": robot})
+    assert (plan.trajectory(np.linspace(0, plan.trajectory.duration, 50))[:, 1] == 0.7).all()
+    job["limits"]["jerk"] = [20.0, None, None]
+    with pytest.raises(MissingLimitError, match="j3"):
+        trajcli.plan({**job, "robot": robot})
+
+
+@pytest.mark.parametrize("margin", [0.02, 0.0])
+def test_position_limits_are_kept(margin):
+    q = np.array(POINTS)
+    bounds = [[low - margin, high + margin] for low, high in zip(q.min(0), q.max(0), strict=True)]
+    robot = {"joints": [{"position": bound} for bound in bounds]}
+    plan = plan_of(robot=robot)
+    reached = plan.trajectory(np.linspace(0, plan.trajectory.duration, 20001))
+    assert (reached >= q.min(0) - margin - 1e-9).all()
+    assert (reached <= q.max(0) + margin + 1e-9).all()
+    assert plan_of().trajectory.duration <= plan.trajectory.duration <= stopping(CASE) * (1 + 1e-9)
+
+
+def test_position_limits_that_cannot_be_kept():
+    robot = {"joints": [{"position": [0, 0.9]}, {"position": [-0.31, 0.51]}, {"position": [0, 0.6]}]}
+    (problem,) = refusal(PlanningError, robot=robot, points={1: {"velocity": {"j2": -1.5}}})
+    assert "j2" in problem.text()
+    assert "position limits" in problem.text()
+
+
+def test_straight_keeps_to_the_polyline():
+    line = np.array([[0.0, 0.0, 0.0], [0.1, 0.2, -0.1], [0.3, 0.6, -0.3], [0.4, 0.8, -0.4], [0.4, 0.3, 0.0]])
+    case = {**CASE, "waypoints": line}
+    plan = plan_of(case, straight=True)
+    corners = {**CASE, "waypoints": line[[0, 3, 4]]}
+    phases = 0.0
+    for before, after in ((line[0], line[3]), (line[3], line[4])):
+        job = job_of({**CASE, "waypoints": [before, after]})
+        to = job["moves"][0]["through"][0]
+        job["moves"] = [{"planner": "jerk_limited", "synchronize": "phase", "to": to}]
+        phases += trajcli.plan(job).trajectory.duration
+    assert plan.trajectory.duration == pytest.approx(phases, rel=1e-9)
+    assert plan.moves[0].planned.certificate.off_chords.max() < 1e-12
+    assert np.abs(at_points(plan, 1)[1:3]).min() > 0.01
+    assert plan_of(corners, straight=True).trajectory.duration == pytest.approx(phases, rel=1e-9)
+    slow = plan_of(case, straight=True, minimum_durations=[0.5, 0.8, 0, 0])
+    assert np.diff(slow.moves[0].planned.via_points.times)[1] >= 0.8 - 1e-12
+    assert slow.moves[0].planned.certificate.off_chords.max() < 1e-12
+    (problem,) = refusal(PlanningError, case=case, straight=True, points={1: {"velocity": [0.1, 0, 0]}})
+    assert "j1" in problem.text() or "j2" in problem.text()
+
+
+IMPOSSIBLE = {
+    "start too fast": ({"start": {"velocity": [1.5, 0, 0]}}, "j1", "at its start"),
+    "point too fast": ({"points": {1: {"velocity": {"j2": 2.5}}}}, "j2", "at point 1"),
+    "target accelerates too much": ({"points": {3: {"acceleration": [0, 0, 2.5]}}}, "j3", "in its target"),
+    "leads outside": ({"start": {"velocity": [0.9, 0, 0], "acceleration": [2.9, 0, 0]}}, "j1", "after"),
+}
+
+
+@pytest.mark.parametrize(("fields", "joint", "words"), IMPOSSIBLE.values(), ids=IMPOSSIBLE)
+def test_what_cannot_be_is_named(fields, joint, words):
+    problem = refusal(PlanningError, **fields)[0]
+    assert problem.joint == joint
+    assert words in problem.text()
+
+
+@pytest.mark.parametrize(
+    ("point", "words"),
+    [({"time": 1.0}, "finds the times"), ({"blend": 0.1}, "has no blends")],
+)
+def test_what_points_may_not_say(point, words):
+    (problem,) = refusal(InputError, points={2: point})
+    assert words in problem.text()
+
+
+def test_report_says_how_near_to_the_fastest_it_is():
+    from trajcli.output.report import report_of
+
+    plan = plan_of(starts=3)
+    known = report_of(plan).moves[0].fastest
+    assert known.method == "bounded"
+    assert known.above == pytest.approx(plan.trajectory.duration / known.lower - 1)
+    assert (known.starts, len(known.found)) == (3, 3)
+    assert known.stopping == pytest.approx(stopping(CASE), rel=1e-8)
+    worst = max(known.off_chords, key=lambda off: off.distance)
+    assert worst.distance == pytest.approx(off_chords(plan), rel=1e-3)
+
+
+def off_chords(plan):
+    """Return the largest distance of a joint from the chords, by looking closely."""
+    points, curve = plan.moves[0].planned.via_points, plan.trajectory.curve
+    largest = 0.0
+    for k in range(len(points.points) - 1):
+        times = np.linspace(points.times[k], min(points.times[k + 1], curve.end), 4001)
+        q, first = curve.evaluate(times), points.points[k]
+        weight = 1 / np.array(LIMITS["velocity"]) ** 2
+        line = points.points[k + 1] - first
+        along = ((q - first) * weight) @ line / (line @ (weight * line))
+        largest = max(largest, float(np.abs(q - first - along[:, None] * line).max()))
+    return largest

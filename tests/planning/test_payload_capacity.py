@@ -1,0 +1,179 @@
+"""The largest payload against bisection from outside, by plans of jobs that attach it."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from trajcli.cli.payload import run_payload
+from trajcli.dynamics.newton_euler import InverseDynamics
+from trajcli.errors import InputError, TrajcliError
+from trajcli.job.read import job_from_text
+from trajcli.planning.payload_capacity import payload_capacity
+from trajcli.planning.plan import plan_job
+
+HEAD = """
+version: 1
+units: {angle: deg, length: mm}
+robot:
+  name: arm
+  convention: standard
+  joints:
+    - {name: a, a: 500, velocity: 100, acceleration: 300, link: {mass: 4, com: [-250, 0, 0], inertia: [0.01, 0.1, 0.1, 0, 0, 0]}}
+    - {name: b, a: 400, velocity: 100, acceleration: 300, link: {mass: 2, com: [-200, 0, 0], inertia: [0.01, 0.05, 0.05, 0, 0, 0]}}
+gravity: [0, -9.81, 0]
+"""
+EMPTY = (
+    HEAD
+    + """
+limits: {effort: {a: 90, b: [-40, 30]}}
+start: {joints: [0, 0]}
+moves:
+  - {planner: quintic, to: {joints: [90, 20]}, duration: 2}
+  - {planner: quintic, to: {joints: [20, 90]}, duration: 1.5}
+  - {planner: quintic, to: {joints: [0, -90]}, duration: 4}
+"""
+)
+MIDDLE = "  - {planner: quintic, to: {joints: [20, 90]}, duration: 1.5}\n"
+CARRYING = EMPTY.replace(
+    MIDDLE,
+    f"  - {{attach: {{mass: MASS, com: [60, 20, 0], inertia: [0.01, 0.02, 0.02, 0, 0, 0]}}}}\n{MIDDLE}  - {{detach: {{}}}}\n",
+)
+FREE = CARRYING.replace(", duration: 1.5", "")
+SLOWED = CARRYING.replace(", duration: 1.5", ", duration: 1.5, when_over_limit: slow")
+WHOLE = EMPTY.replace("moves:\n", "moves:\n  - {attach: {mass: MASS}}\n")
+FIRST = EMPTY.replace(
+    "moves:\n  - {planner: quintic, to: {joints: [90, 20]}, duration: 2}\n",
+    "moves:\n  - {attach: {mass: MASS}}\n  - {planner: quintic, to: {joints: [90, 20]}, duration: 2}\n  - {detach: {}}\n",
+)
+
+
+def verifies(text: str, mass: float) -> bool:
+    """Return whether `trajcli plan` would end with 0 with a mass in the place of MASS."""
+    try:
+        return plan_job(job_from_text(text.replace("MASS", repr(mass)))).verdict.passed
+    except TrajcliError:
+        return False
+
+
+def bisected(text: str) -> float:
+    """Return the largest mass that verifies, from outside."""
+    low, high = 1e-3, 64.0
+    assert verifies(text, low)
+    assert not verifies(text, high)
+    while high - low > 2e-7 * high:
+        middle = (low + high) / 2
+        low, high = (middle, high) if verifies(text, middle) else (low, middle)
+    return low
+
+
+@pytest.mark.parametrize(
+    ("job", "at", "outside"),
+    [
+        (CARRYING.replace("MASS", "0.5"), None, CARRYING),
+        (CARRYING.replace("MASS", "0.5"), 2, CARRYING),
+        (FREE.replace("MASS", "0.5"), None, FREE),
+        (SLOWED.replace("MASS", "0.5"), None, SLOWED),
+        (EMPTY, None, WHOLE),
+        (EMPTY, 0, FIRST),
+    ],
+    ids=["attached", "its move", "free duration", "slowed", "at the tcp", "in one move"],
+)
+def test_the_largest_mass_is_that_of_bisection_from_outside(job: str, at: int | None, outside: str) -> None:
+    found = payload_capacity(job_from_text(job), at)
+    assert found.mass == pytest.approx(bisected(outside), rel=1e-6)
+    assert verifies(outside, float(found.mass or 0))
+    assert not verifies(outside, float(found.mass or 0) * (1 + 1e-6))
+
+
+def test_what_binds_is_said_with_its_place() -> None:
+    loaded = job_from_text(EMPTY)
+    found = payload_capacity(loaded)
+    assert found.mass is not None
+    # a point at the tcp: gravity and inertia of one kilogram, about both axes in closed form
+    plan = plan_job(loaded)
+    t = np.linspace(0, plan.trajectory.duration, 20001)
+    q, qd, qdd = (plan.trajectory(t, order) for order in range(3))
+    angle, rate, change = (np.stack([each[:, 0], each.sum(axis=1)]) for each in (q, qd, qdd))
+    arms = np.array([[0.5], [0.4]])
+    x, y = arms * np.cos(angle), arms * np.sin(angle)
+    ax = (-y * change - x * rate**2).sum(axis=0)
+    ay = (x * change - y * rate**2).sum(axis=0) + 9.81
+    moments = np.stack([x.sum(axis=0) * ay - y.sum(axis=0) * ax, x[1] * ay - y[1] * ax], axis=1)
+    empty = InverseDynamics(loaded.robot).effort(q, qd, qdd)
+    bounds = np.where(moments > 0, [90, 30], [-90, -40])
+    masses = (bounds - empty) / moments
+    row, joint = np.unravel_index(masses.argmin(), masses.shape)
+    assert found.mass == pytest.approx(masses.min(), rel=1e-5)
+    assert found.joint == "ab"[joint]
+    assert found.limit == bounds[row, joint]
+    assert found.effort == pytest.approx(found.limit, rel=1e-5)
+    assert found.time == pytest.approx(t[row], abs=1e-3)
+    assert found.move == int(np.searchsorted([2, 3.5], t[row], "right"))
+
+
+def test_of_several_payloads_one_or_all() -> None:
+    two = CARRYING.replace("MASS", "1") + "  - {attach: {mass: 2}}\n"
+    two += "  - {planner: quintic, to: {joints: [0, 0]}, duration: 4}\n"
+    alone = payload_capacity(job_from_text(two), 2).mass
+    last = payload_capacity(job_from_text(two), 6).mass
+    every = payload_capacity(job_from_text(two)).mass
+    assert every == pytest.approx(min(alone or 0, last or 0), rel=1e-6)
+    assert alone != pytest.approx(last, rel=1e-3)
+    assert payload_capacity(job_from_text(CARRYING.replace("MASS", "3"))).mass == pytest.approx(
+        alone, rel=1e-6
+    )
+
+
+def test_an_arm_in_the_horizontal_that_rests_carries_anything() -> None:
+    text = EMPTY.replace("gravity: [0, -9.81, 0]", "gravity: [0, 0, -9.81]")
+    text = text[: text.index("moves:")] + "moves: [{planner: hold, duration: 1}]\n"
+    found = payload_capacity(job_from_text(text))
+    assert (found.mass, found.joint) == (None, None)
+
+
+@pytest.mark.parametrize(
+    ("text", "at", "message"),
+    [
+        (EMPTY, 3, "--at 3: arm has no such move"),
+        (EMPTY, -1, "--at -1"),
+        (CARRYING.replace("MASS", "1"), 3, "nothing is carried there"),
+        (
+            EMPTY.replace("limits: {effort: {a: 90, b: [-40, 30]}}", ""),
+            None,
+            "no limit of effort is in force",
+        ),
+        (EMPTY.replace("duration: 2}", "duration: 0.5}"), None, "does not verify even without the payload"),
+    ],
+)
+def test_one_clear_error(text: str, at: int | None, message: str) -> None:
+    with pytest.raises(TrajcliError) as refused:
+        payload_capacity(job_from_text("name: arm\n" + text), at)
+    assert message in str(refused.value)
+    assert refused.value.exit_code == (1 if "verify" in message else 2)
+    assert len(refused.value.problems) == 1
+
+
+def test_gravity_that_is_too_much_without_any_payload_is_the_error_of_the_job() -> None:
+    with pytest.raises(TrajcliError, match="gravity") as refused:
+        payload_capacity(job_from_text(EMPTY.replace("a: 90", "a: 20")))
+    assert refused.value.exit_code == 3
+    assert not isinstance(refused.value, InputError)
+
+
+def test_the_command_for_people_and_programs(tmp_path, capsys) -> None:  # type: ignore[no-untyped-def]
+    job = tmp_path / "job.yaml"
+    job.write_text(CARRYING.replace("MASS", "0.5"))
+    assert run_payload(str(job), [], None, as_json=True) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert list(told) == ["mass", "joint", "move", "time", "effort", "limit"]
+    assert (told["joint"], told["move"]) in (("a", 2), ("b", 2))
+    assert run_payload(str(job), ["moves.1.attach.mass=0.1"], 2, as_json=False) == 0
+    first, second = capsys.readouterr().out.splitlines()
+    assert first.startswith("largest mass at [60, 20, 0] mm of the tcp in move 2: ")
+    shown = float(first.rsplit(" ", 2)[1])
+    assert 0 < told["mass"] - shown < 1e-4 * told["mass"] or shown == pytest.approx(told["mass"], rel=1e-5)
+    assert shown <= told["mass"]
+    assert f"with more, {told['joint']} needs" in second

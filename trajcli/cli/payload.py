@@ -1,0 +1,54 @@
+"""Payload capacity on the command line: `trajcli payload`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from trajcli.cli.numbers import numbers
+from trajcli.cli.outcome import print_json, print_lines
+from trajcli.cli.progress import progress
+from trajcli.job.read import LoadedJob, load_job
+from trajcli.planning.payload_capacity import PayloadCapacity, payload_capacity
+from trajcli.units import Quantity, effort_unit, to_user
+
+
+def run_payload(job: str, overrides: Sequence[str], at: int | None, *, as_json: bool) -> int:
+    """Print the largest mass with which a job verifies, and what binds; return the exit code.
+
+    Raises:
+        InputError: When there is no such move, or no effort is limited.
+        TrajcliError: Of the job.
+    """
+    loaded = load_job(job, overrides)
+    with progress():
+        capacity = payload_capacity(loaded, at)
+    if as_json:
+        names = ("mass", "joint", "move", "time", "effort", "limit")
+        print_json({name: getattr(capacity, name) for name in names})
+    else:
+        print_lines(_lines(loaded, capacity))
+    return 0
+
+
+def _lines(loaded: LoadedJob, capacity: PayloadCapacity) -> Iterator[str]:
+    com = [to_user(x, Quantity("length"), loaded.units) for x in capacity.payload.com.tolist()]
+    where = f"at [{', '.join(numbers([x]) for x in com)}] {loaded.units.length} of the tcp"
+    carried = [k for k in capacity.moves if not loaded.job.moves[k].handles]
+    moves = f"move{'s' * (len(carried) > 1)} {', '.join(map(str, carried))}"
+    if capacity.mass is None:
+        yield f"any mass {where} will do in {moves}"
+        return
+    yield f"largest mass {where} in {moves}: {_rounded_down(capacity.mass)} kg"
+    if capacity.joint is None or capacity.effort is None:
+        return
+    unit = effort_unit(loaded.robot.joint_types[loaded.robot.joint_names.index(capacity.joint)])
+    when = "" if capacity.time is None else f", t = {capacity.time:.6g} s"
+    limit = "" if capacity.limit is None else f", its limit is {capacity.limit:.9g} {unit}"
+    needed = f"{capacity.joint} needs {capacity.effort:.6g} {unit}"
+    yield f"  with more, {needed} in move {capacity.move}{when}{limit}"
+
+
+def _rounded_down(mass: float) -> str:
+    """Return a mass with six digits that verifies."""
+    shown = f"{mass:.6g}"
+    return shown if float(shown) <= mass else f"{mass - 0.5 * 10 ** (-5) * mass:.6g}"

@@ -1,0 +1,1 @@
+"""Dynamics of serial robots: efforts of the joints from a motion. numpy only."""

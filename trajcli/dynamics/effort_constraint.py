@@ -1,0 +1,198 @@
+"""Limits of efforts as a constraint on the motion along a path of the joints.
+
+With q(s) and s(t) the effort is a u + b x + g + f, where x = sd^2, u = sdd, a = M q',
+b = M q'' + C(q, q') q', g is gravity and f friction: Coulomb friction keeps its sign along the path, and
+belongs to g. Viscous friction v q' sd is not linear in x. Where it takes from what a joint may do it is
+bounded by the tangent at a speed r, sd <= r / 2 + x / (2 r), where it gives by the chord to the largest
+speed, sd >= x / cap: both are on the safe side, whatever r is, and the first is exact where sd = r.
+
+Source: Bobrow, Dubowsky and Gibson, Time-optimal control of robotic manipulators along specified paths, Int.
+J. Robotics Research 4 (1985); the bounds of viscous friction are our own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import ClassVar
+
+import numpy as np
+
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, derivative_coefficients, horner
+from trajcli.curves.time_optimal.constraints import ConstraintRows
+from trajcli.curves.time_optimal.time_law import LawPieces
+from trajcli.dynamics.newton_euler import InverseDynamics, direction
+from trajcli.frozen import frozen
+
+_MOST = 1e3  # excess that is told: limits lowered by more would be rounding
+_SAMPLES = (0.2, 0.5, 0.8)  # of an interval: at its ends the rows hold
+_SHARE = 0.5  # of what gravity leaves: what the tangent may take of it at rest
+_SAME = 1e-12  # of the largest: states on both sides of a break that differ by less are one
+_SLOWEST = 1e-3  # of the largest speed at which a tangent is taken
+
+
+class HeldOverLimitError(ValueError):
+    """Gravity and friction alone take as much of a joint as it has, or more.
+
+    Attributes:
+        joint: Index.
+        s: Path parameter.
+        effort: What they take, N m or N.
+        limit: What the joint has in that direction.
+    """
+
+    def __init__(self, joint: int, s: float, effort: float, limit: float) -> None:
+        self.joint, self.s, self.effort, self.limit = joint, s, effort, limit
+        super().__init__(f"at s = {s:.9g} joint {joint} is held with {effort:.9g}, its limit is {limit:.9g}")
+
+
+class _PathDynamics:
+    """What inverse dynamics says at points of a path, kept: finer grids, and both sides, ask again."""
+
+    def __init__(self, dynamics: InverseDynamics) -> None:
+        n = len(dynamics.links)
+        self._dynamics = dynamics
+        self._s, self._states, self._values = np.empty(0), np.empty((0, 3 * n)), np.empty((0, 3 * n))
+
+    def at(self, s: Array, q: Array, first: Array, second: Array) -> list[Array]:
+        """Return M q', M q'' + C q' and g at points (p,), each (p, n)."""
+        states = np.concatenate([q, first, second], axis=1)
+        index = np.clip(np.searchsorted(self._s, s), 0, max(self._s.size - 1, 0))
+        new = np.ones(s.size, dtype=bool)
+        if self._s.size:
+            apart = np.abs(self._states[index] - states) <= _SAME * np.abs(states).max(axis=0)
+            new = ~((self._s[index] == s) & apart.all(axis=1))
+        values = np.empty_like(states)
+        values[~new] = self._values[index[~new]]
+        if new.any():
+            values[new] = np.concatenate(self._dynamics.along_path(q[new], first[new], second[new]), axis=1)
+            every = np.concatenate([s, self._s])
+            order = np.argsort(every, kind="stable")  # of one point the newest comes first
+            order = order[np.append(True, np.diff(every[order]) > 0)]
+            self._s = every[order]
+            self._states = np.concatenate([states, self._states])[order]
+            self._values = np.concatenate([values, self._values])[order]
+        return np.split(values, 3, axis=1)
+
+
+@frozen
+class EffortConstraint:
+    """Limits of torques and forces of joints; between grid points they are sampled.
+
+    Attributes:
+        dynamics: Of the arm with what it carries.
+        path: q(s) with n joints.
+        limits: Lower and upper bounds, shape (n, 2), lower < 0 < upper, infinite for none.
+        velocity: Bounds of the joints' velocities, shape (n, 2): how fast viscous friction can be.
+        speed: From points (p,) of the path to a speed sd near that of the motion, (p,); None where it is not
+            known. It says where viscous friction is not overestimated.
+    """
+
+    estimate: ClassVar[float] = 0.3  # rows of efforts turn with the whole arm
+
+    dynamics: InverseDynamics
+    path: PiecewisePolynomial
+    limits: Array
+    velocity: Array
+    speed: Callable[[Array], Array] | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_memory", _PathDynamics(self.dynamics))
+
+    @property
+    def _known(self) -> _PathDynamics:
+        memory: _PathDynamics = self.__dict__["_memory"]
+        return memory
+
+    @property
+    def bounds_sdd(self) -> bool:
+        """Whether some effort is bounded."""
+        return bool(np.isfinite(self.limits).any())
+
+    @property
+    def has_viscous(self) -> bool:
+        """Whether a joint has viscous friction."""
+        return bool(self._viscous.any())
+
+    def rows(self, s: Array, side: Side) -> ConstraintRows:
+        """Return the rows at points (p,), one for each finite bound.
+
+        Raises:
+            HeldOverLimitError: When gravity and friction alone take a joint to its limit at one of them.
+        """
+        q, first, second = self.path.evaluate_orders(s, (0, 1, 2), side=side).transpose(1, 0, 2)
+        a, b, held = self._known.at(s, q, first, second)
+        held = held + self._coulomb * np.sign(first)
+        upper, lower = self._bounded
+        rooms = np.concatenate(
+            [self.limits[upper, 1] - held[:, upper], held[:, lower] - self.limits[lower, 0]], 1
+        )
+        self._require_room(s, held, rooms)
+        a, b, rub = (self._both_bounds(values) for values in (a, b, self._viscous * first))
+        slopes, offsets = self._viscous_rows(s, first, rub, rooms)
+        return ConstraintRows(a, b + slopes, rooms - offsets, np.full(s.size, np.inf))
+
+    def excess(self, law: LawPieces) -> Array:
+        """Return zeros for velocity, and the shares used of what gravity leaves, at samples, (2, N)."""
+        q = law.along(self.path).transpose(0, 2, 1)[:, None]
+        times = np.array(_SAMPLES)[:, None, None] * law.durations[:, None]
+        position, rate, change = (horner(derivative_coefficients(q, order), times) for order in range(3))
+        begins = law.coefficients[-1]
+        states = self.path.evaluate_orders(begins, (0, 1, 2), side="right").transpose(1, 0, 2)
+        # where the limit is met the share is 1 whatever gravity is taken to be: that of the near end is known
+        gravity = self._known.at(begins, *states)[2]
+        moving = self.dynamics.rigid_effort(position, rate, change) - gravity + self._viscous * rate
+        rooms = self._rooms(gravity + self._coulomb * direction(rate))
+        used = self._both_bounds(moving)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            shares = np.where(rooms > 0, used / rooms, np.where(used > rooms, _MOST, 0.0))
+        worst = np.clip(shares.max(axis=(0, 2), initial=0.0), 0.0, _MOST)
+        return np.stack([np.zeros_like(worst), worst])
+
+    @property
+    def _bounded(self) -> tuple[Array, Array]:
+        """Which joints have an upper and which a lower bound, each (n,)."""
+        return np.isfinite(self.limits[:, 1]), np.isfinite(self.limits[:, 0])
+
+    @property
+    def _coulomb(self) -> Array:
+        return np.array([joint.friction.coulomb for joint in self.dynamics.robot.joints])
+
+    @property
+    def _viscous(self) -> Array:
+        return np.array([joint.friction.viscous for joint in self.dynamics.robot.joints])
+
+    def _both_bounds(self, values: Array) -> Array:
+        """Return values (..., n) of joints as rows: those with an upper bound, then with a lower one."""
+        upper, lower = self._bounded
+        return np.concatenate([values[..., upper], -values[..., lower]], axis=-1)
+
+    def _rooms(self, held: Array) -> Array:
+        """Return what the limits leave in each row where joints are held with efforts (..., n)."""
+        upper, lower = self._bounded
+        limits = np.concatenate([self.limits[upper, 1], -self.limits[lower, 0]])
+        return np.asarray(limits - self._both_bounds(held))
+
+    def _require_room(self, s: Array, held: Array, rooms: Array) -> None:
+        if (rooms > 0).all():
+            return
+        point, row = np.unravel_index(int(rooms.argmin()), rooms.shape)
+        upper, lower = map(np.flatnonzero, self._bounded)
+        side = int(row < upper.size)
+        joint = int(upper[row] if side else lower[row - upper.size])
+        effort, limit = float(held[point, joint]), float(self.limits[joint, side])
+        raise HeldOverLimitError(joint, float(s[point]), effort, limit)
+
+    def _viscous_rows(self, s: Array, first: Array, rub: Array, rooms: Array) -> tuple[Array, Array]:
+        """Return what viscous friction adds to b, and takes of c, in rows (p, k) of `rub` = v q'."""
+        if not self.has_viscous:
+            return np.zeros_like(rub), np.zeros_like(rub)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            rate = np.maximum(first / self.velocity[:, 1], first / self.velocity[:, 0]).max(axis=1)
+            cap = np.where(rate > 0, 1.0 / rate, np.inf)
+            near = cap if self.speed is None else self.speed(s)
+            largest = _SHARE * 2.0 * rooms / rub  # beyond it the tangent would leave nothing at rest
+        near = np.where(np.isfinite(near), near, 1.0)
+        near = np.maximum(near, _SLOWEST * near.max(initial=0.0) + 1e-12)
+        touch = np.where(rub > 0, np.minimum(near[:, None], largest), 1.0)
+        slopes = np.where(rub > 0, rub / (2.0 * touch), rub / cap[:, None])
+        return slopes, np.where(rub > 0, rub * touch / 2.0, 0.0)

@@ -1,0 +1,1 @@
+"""Fastest jerk-limited motions through points: starting points, optimisation, bounds."""

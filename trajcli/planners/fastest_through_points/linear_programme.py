@@ -1,0 +1,277 @@
+"""Linear programmes over the segments of a list of points, by an interior-point method.
+
+The unknowns are those of each segment and joint (w), those of each joint at each inner point (x), and those
+that all joints of a segment share (s). A row sees one segment and one joint: its own w, x at both ends, and
+s. Eliminating w, then s, leaves a system for x that is block-tridiagonal by points, so that a step costs
+time in proportion to the number of segments.
+
+Source: Mehrotra, On the Implementation of a Primal-Dual Interior Point Method, SIAM J. Optimization 2 (1992);
+Nocedal and Wright, Numerical Optimization, 2nd edition (2006), chapter 14.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trajcli.curves.piecewise import Array
+from trajcli.frozen import frozen
+
+_ENDS = 2  # unknowns of a joint at a point: velocity and acceleration
+_STEP = 0.995  # of the way to where a slack or a multiplier becomes zero
+_TINY = 1e-300
+_SMALL = 1e-6  # the least scale by which a gap is judged
+_KEPT = 1e-9  # a row missed by less is kept
+_BEGIN = 1e-3  # of the scale: the least slack to begin with
+_STIFF = 1e14  # a larger ratio of multiplier and slack changes nothing
+
+
+@frozen
+class SegmentProgramme:
+    """Minimise cost @ s + weight |y|^2 / 2 over y = (w, x, s) with low <= rows y <= high and s within bounds.
+
+    Attributes:
+        rows: Shape (K, n, R, q + 4 + m): columns for w, x at the point before and after, s. Columns of x that
+            is fixed, as at both ends, are zero.
+        low: Shape (K, n, R), finite.
+        high: Shape (K, n, R), finite.
+        cost: Shape (K, m).
+        least: Lower bound of s, shape (K, m).
+        most: Upper bound of s, shape (K, m).
+        weight: Of the square; makes the answer unique.
+    """
+
+    rows: Array
+    low: Array
+    high: Array
+    cost: Array
+    least: Array
+    most: Array
+    weight: float = 1e-6
+
+    @property
+    def own(self) -> int:
+        """How many unknowns w each segment and joint has."""
+        return int(self.rows.shape[3] - 2 * _ENDS - self.cost.shape[1])
+
+    def split(self, y: Array) -> tuple[Array, Array, Array]:
+        """Return w (K, n, q), x (K + 1, n, 2) and s (K, m)."""
+        segments, joints = self.rows.shape[:2]
+        first, last = segments * joints * self.own, y.size - self.cost.size
+        return (
+            y[:first].reshape(segments, joints, self.own),
+            y[first:last].reshape(segments + 1, joints, _ENDS),
+            y[last:].reshape(self.cost.shape),
+        )
+
+    @property
+    def size(self) -> int:
+        """How many unknowns there are, those at both ends counted."""
+        segments, joints = self.rows.shape[:2]
+        return int(segments * joints * self.own + (segments + 1) * joints * _ENDS + self.cost.size)
+
+    def apply(self, y: Array) -> Array:
+        """Return the rows times y, then s, as one vector."""
+        w, x, s = self.split(y)
+        segments, joints = self.rows.shape[:2]
+        shared = np.broadcast_to(s[:, None], (segments, joints, s.shape[1]))
+        local = np.concatenate([w, x[:-1], x[1:], shared], axis=2)
+        return np.concatenate([(self.rows @ local[..., None])[..., 0].ravel(), s.ravel()])
+
+    def adjoint(self, z: Array) -> Array:
+        """Return the transposed rows times z, which has a number for each row and for each bound of s."""
+        at, count = self.cost.size, self.low.size
+        local = (z[:count].reshape(self.low.shape)[..., None, :] @ self.rows)[..., 0, :]
+        q = self.own
+        y = np.zeros(self.size)
+        w, x, s = self.split(y)
+        w += local[..., :q]
+        x[:-1] += local[..., q : q + _ENDS]
+        x[1:] += local[..., q + _ENDS : q + 2 * _ENDS]
+        s += local[..., q + 2 * _ENDS :].sum(axis=1) + z[count : count + at].reshape(s.shape)
+        return y
+
+
+class _Newton:
+    """The matrix weight I + rows' D rows, factored."""
+
+    def __init__(self, programme: SegmentProgramme, scale: Array) -> None:
+        rows, weight, q = programme.rows, programme.weight, programme.own
+        segments, joints = rows.shape[:2]
+        self._programme, self._sizes = programme, (segments, joints, q)
+        local = scale[: programme.low.size].reshape(programme.low.shape)
+        matrix = rows.swapaxes(2, 3) @ (rows * local[..., None])
+        inner = 2 * _ENDS
+        if q:
+            matrix[:, :, range(q), range(q)] += weight
+            self._w_inverse = np.linalg.inv(matrix[:, :, :q, :q])
+            self._w_gain = self._w_inverse @ matrix[:, :, :q, q:]
+            matrix = matrix[:, :, q:, q:] - matrix[:, :, q:, :q] @ self._w_gain
+        shared = matrix[:, :, inner:, inner:].sum(axis=1)
+        m = shared.shape[1]
+        shared[:, range(m), range(m)] += weight + scale[programme.low.size :].reshape(segments, m)
+        self._s_inverse = np.linalg.inv(shared)
+        self._coupling = matrix[:, :, :inner, inner:].reshape(segments, joints * inner, m)
+        self._s_gain = self._coupling @ self._s_inverse
+        self._factor(matrix[:, :, :inner, :inner])
+
+    def _factor(self, ends: Array) -> None:
+        """Assemble and factor the block-tridiagonal matrix of x at the inner points."""
+        segments, joints, _ = self._sizes
+        size = joints * _ENDS
+        blocks = np.zeros((segments, joints, 2 * _ENDS, joints, 2 * _ENDS))
+        blocks[:, range(joints), :, range(joints), :] = ends.swapaxes(0, 1)
+        lower = self._s_gain @ self._coupling.swapaxes(1, 2)
+        blocks -= lower.reshape(blocks.shape)
+        left, right = slice(0, _ENDS), slice(_ENDS, 2 * _ENDS)
+        first = blocks[:, :, left, :, left].reshape(segments, size, size)
+        last = blocks[:, :, right, :, right].reshape(segments, size, size)
+        across = blocks[:, :, left, :, right].reshape(segments, size, size)
+        diagonal = last[:-1] + first[1:]
+        diagonal[:, range(size), range(size)] += self._programme.weight
+        self._across = across[1:-1]
+        self._inverses: list[Array] = []
+        for k in range(segments - 1):
+            block = diagonal[k]
+            if k:
+                block = block - self._across[k - 1].T @ self._inverses[-1] @ self._across[k - 1]
+            self._inverses.append(np.linalg.inv(block))
+
+    def solve(self, right: Array) -> Array:
+        """Return the solution for a right side."""
+        programme = self._programme
+        segments, joints, q = self._sizes
+        w, x, s = programme.split(right)
+        ends = np.zeros((segments, joints, 2 * _ENDS))
+        if q:
+            moved = (self._w_gain.swapaxes(2, 3) @ w[..., None])[..., 0]
+            ends -= moved[..., : 2 * _ENDS]
+            s = s - moved[..., 2 * _ENDS :].sum(axis=1)
+        ends -= (self._s_gain @ s[..., None]).reshape(ends.shape)
+        known = (x[1:-1] + ends[:-1, :, _ENDS:] + ends[1:, :, :_ENDS]).reshape(segments - 1, -1)
+        answer = np.zeros(programme.size)
+        w_answer, x_answer, s_answer = programme.split(answer)
+        x_answer[1:-1] = self._points(known).reshape(segments - 1, joints, _ENDS)
+        both = np.concatenate([x_answer[:-1], x_answer[1:]], axis=2)
+        along = (both.reshape(segments, 1, -1) @ self._coupling)[:, 0]
+        s_answer += (self._s_inverse @ (s - along)[..., None])[..., 0]
+        if q:
+            shared = np.broadcast_to(s_answer[:, None], (segments, joints, s_answer.shape[1]))
+            rest = np.concatenate([both, shared], axis=2)
+            w_answer += (self._w_inverse @ w[..., None] - self._w_gain @ rest[..., None])[..., 0]
+        return answer
+
+    def _points(self, known: Array) -> Array:
+        """Return the solution of the block-tridiagonal system."""
+        rows = [known[0]] if len(known) else []
+        for k in range(1, len(known)):
+            rows.append(known[k] - self._across[k - 1].T @ (self._inverses[k - 1] @ rows[-1]))
+        for k in range(len(known) - 1, -1, -1):
+            right = rows[k] - self._across[k] @ rows[k + 1] if k + 1 < len(known) else rows[k]
+            rows[k] = self._inverses[k] @ right
+        return np.array(rows).reshape(known.shape)
+
+
+def solved(programme: SegmentProgramme, scale: float, rounds: int = 30, exactness: float = 1e-7) -> Array:
+    """Return y (size,) to which a fixed rule of steps leads; see `SegmentProgramme.split`.
+
+    Where rows exclude each other, or rounding ends the method, it is what was reached.
+
+    Args:
+        programme: What to minimise; y = 0 keeps its rows, or nearly so.
+        scale: What unknowns typically amount to: it sets where the method begins.
+        rounds: The most steps.
+        exactness: Relative: the duality gap at which it ends.
+    """
+    iterate = _Iterate(programme, scale)
+    goal = exactness * iterate.total * max(scale, _SMALL)
+    with np.errstate(all="ignore"):
+        for _ in range(rounds):
+            if iterate.gap <= goal and iterate.missed <= _KEPT:
+                break
+            try:
+                advanced = iterate.advanced()
+            except np.linalg.LinAlgError:
+                break
+            if not np.isfinite(advanced):
+                break
+    return iterate.y
+
+
+class _Iterate:
+    """Unknowns, slacks (lower, upper) and multipliers (lower, upper) of the method."""
+
+    def __init__(self, programme: SegmentProgramme, scale: float) -> None:
+        low = np.concatenate([programme.low.ravel(), programme.least.ravel()])
+        high = np.concatenate([programme.high.ravel(), programme.most.ravel()])
+        self._programme, self._bounds = programme, np.stack([low, -high])
+        self._cost = np.zeros(programme.size)
+        programme.split(self._cost)[2][:] = programme.cost
+        self.total = float(np.abs(programme.cost).sum())
+        self.y = np.zeros(programme.size)
+        self._value = np.zeros(low.size)
+        self._slack = np.maximum(-self._bounds, _BEGIN * scale)
+        self._force = self.total * scale / low.size / self._slack
+
+    @property
+    def gap(self) -> float:
+        """The sum of the products of slacks and multipliers."""
+        return float((self._slack * self._force).sum())
+
+    @property
+    def _miss(self) -> Array:
+        miss: Array = np.stack([self._value, -self._value]) - self._bounds - self._slack
+        return miss
+
+    @property
+    def missed(self) -> float:
+        """The largest amount by which a row and its slack disagree."""
+        return float(np.abs(self._miss).max())
+
+    def advanced(self) -> float:
+        """Take one step of the predictor and the corrector; return the sum of what changed."""
+        programme, slack, force, miss = self._programme, self._slack, self._force, self._miss
+        pushed = programme.adjoint(force[0] - force[1])
+        dual = self._cost + programme.weight * self.y - pushed
+        newton = _Newton(programme, np.minimum((force / slack).sum(axis=0), _STIFF))
+
+        def change(wanted: Array | float) -> tuple[Array, Array, Array]:
+            """Return the changes of y, slacks and multipliers for products that are wanted."""
+            pull = (wanted - force * miss) / slack - force
+            dy = newton.solve(programme.adjoint(pull[0] - pull[1]) - dual)
+            along = programme.apply(dy)
+            d_slack = np.stack([along, -along]) + miss
+            return dy, d_slack, (wanted - force * d_slack) / slack - force
+
+        _, d_slack, d_force = change(0.0)
+        left = (slack + _length(slack, d_slack) * d_slack) * (force + _length(force, d_force) * d_force)
+        count = slack.size
+        centre = self.gap / count * (float(left.sum()) / self.gap) ** 3
+        dy, d_slack, d_force = change(centre - d_slack * d_force)
+        size = float(np.abs(dy).sum())
+        if not np.isfinite(size):
+            return size
+        step = min(1.0, _STEP * _length(slack, d_slack))
+        self.y = self.y + step * dy
+        self._value = programme.apply(self.y)
+        self._slack = slack + step * d_slack
+        self._force = force + min(1.0, _STEP * _length(force, d_force)) * d_force
+        return size
+
+
+def weighted_least_squares(programme: SegmentProgramme, target: Array, fixed: float) -> Array:
+    """Return y (size,) for which the rows are nearest to a target (K, n, R) in the sum of squares.
+
+    Args:
+        programme: Its rows and its weight count.
+        target: What the rows shall be.
+        fixed: Weight of s, which shall be zero.
+    """
+    scale = np.concatenate([np.ones(programme.low.size), np.full(programme.cost.size, fixed)])
+    known = np.concatenate([target.ravel(), np.zeros(programme.cost.size)])
+    return _Newton(programme, scale).solve(programme.adjoint(known))
+
+
+def _length(values: Array, changes: Array) -> float:
+    """Return how far, at most 1, positive numbers may go along their changes."""
+    worst = float((-changes / (values + _TINY)).max())
+    return 1.0 if worst <= 1 else 1.0 / worst

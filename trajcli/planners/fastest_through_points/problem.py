@@ -1,0 +1,132 @@
+"""Waypoint problems: points to pass, limits, and what is fixed at the points, in units that suit them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajcli.curves.piecewise import Array
+from trajcli.frozen import frozen
+
+_INSIDE = 0.999999  # of the limits: states on the edge have no motion at all for ruckig
+
+
+@frozen
+class WaypointProblem:
+    """Points through which joints go as fast as they can.
+
+    Attributes:
+        points: Shape (K + 1, n), start and target among them; no two that follow each other are equal.
+        velocity: Lower and upper bounds, shape (n, 2), finite.
+        acceleration: The same.
+        jerk: Largest magnitude, shape (n,), finite.
+        states: Velocity and acceleration at the points, shape (K + 1, n, 2); zero where free.
+        fixed: Which of them are given, shape (K + 1, n, 2); all at the start and at the target.
+        least: Shortest duration of each segment, shape (K,).
+        position: Lower and upper bounds, shape (n, 2), perhaps infinite.
+    """
+
+    points: Array
+    velocity: Array
+    acceleration: Array
+    jerk: Array
+    states: Array
+    fixed: NDArray[np.bool_]
+    least: Array
+    position: Array
+
+    @property
+    def segments(self) -> int:
+        """How many there are."""
+        return len(self.points) - 1
+
+    @property
+    def joints(self) -> int:
+        """How many there are."""
+        return int(self.points.shape[1])
+
+    @property
+    def steps(self) -> Array:
+        """Displacement along each segment, shape (K, n)."""
+        return np.diff(self.points, axis=0)
+
+    @property
+    def scales(self) -> Array:
+        """Half the ranges of velocity and acceleration, shape (n, 2)."""
+        return 0.5 * np.stack([np.ptp(self.velocity, axis=1), np.ptp(self.acceleration, axis=1)], axis=1)
+
+    @property
+    def walled(self) -> bool:
+        """Whether any position has a limit."""
+        return bool(np.isfinite(self.position).any())
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether it begins and ends at rest."""
+        return not (self.states[0].any() or self.states[-1].any())
+
+    def inside(self, states: Array) -> Array:
+        """Return states (K + 1, n, 2) moved inside the limits, and to the values that are given.
+
+        An acceleration a that is built up from zero, or taken back to zero, changes the velocity by
+        a |a| / (2 jerk); before or after it the velocity must keep its bounds, too.
+        """
+        low, high = (_INSIDE * bound for bound in self.velocity.T)
+        least, most = (_INSIDE * bound for bound in self.acceleration.T)
+        given = np.where(self.fixed, self.states, states)
+        bent = np.clip(given[..., 1], least, most)
+        room = np.sqrt(self.jerk * (high - low))
+        velocity = np.where(self.fixed[..., 0], self.states[..., 0], given[..., 0])
+        ahead = np.maximum(np.minimum(high - velocity, velocity - low), 0.0)
+        kept = np.sqrt(2 * self.jerk * ahead)
+        bent = np.where(self.fixed[..., 0], np.clip(bent, -kept, kept), np.clip(bent, -room, room))
+        bent = np.where(self.fixed[..., 1], self.states[..., 1], bent)
+        used = bent**2 / (2 * self.jerk)
+        velocity = np.where(self.fixed[..., 0], velocity, np.clip(velocity, low + used, high - used))
+        return np.stack([velocity, bent], axis=2)
+
+    def stopping(self) -> Array:
+        """Return the states of a motion that stops at every inner point, as far as it is free to."""
+        return self.inside(np.zeros_like(self.states))
+
+    @property
+    def units(self) -> tuple[float, Array]:
+        """Units of time, s, and of each joint's position, (n,), in which numbers are near one: powers of two.
+
+        Ruckig's tolerances are absolute. Such units change nothing else.
+        """
+        steps = np.abs(self.steps)
+        speeds = self.scales[:, 0]
+        typical = float((steps / speeds).max(axis=1).mean()) + float((self.scales[:, 1] / self.jerk).min())
+        time = 2.0 ** round(math.log2(typical))
+        return time, np.exp2(np.round(np.log2(speeds * time))).astype(np.float64)
+
+    def scaled(self) -> WaypointProblem:
+        """Return the problem in its units, each joint from zero."""
+        time, lengths = self.units
+        rates = [(lengths / time**order)[:, None] for order in range(3)]
+        first = self.points[0]
+        return WaypointProblem(
+            (self.points - first) / lengths,
+            self.velocity / rates[1],
+            self.acceleration / rates[2],
+            self.jerk * time**3 / lengths,
+            self.states / np.concatenate(rates[1:], axis=1),
+            self.fixed,
+            self.least / time,
+            (self.position - first[:, None]) / rates[0],
+        )
+
+    def only(self, kept: Sequence[int]) -> WaypointProblem:
+        """Return the problem of some of the points alone; least durations of segments are added up."""
+        rows = list(kept)
+        if len(rows) == len(self.points):
+            return self
+        least = np.add.reduceat(self.least, rows[:-1])
+        return replace(
+            self, points=self.points[rows], states=self.states[rows], fixed=self.fixed[rows], least=least
+        )

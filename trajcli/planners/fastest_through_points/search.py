@@ -1,0 +1,167 @@
+"""Search for the fastest motion through points, from several starting points of a fixed order.
+
+1. Free knots, eight in each segment, from six tenths of the times of stopping at each point.
+2. The straight motion of each collinear stretch; where there is none, the states of stopping at each point.
+3. Free knots, twelve in each segment, from eight tenths of the times of stopping.
+4. Central differences of the points over the times of stopping, at the best of six speeds.
+5. Free knots, six in each segment, from times at the velocity limits.
+6. Free knots, eight in each segment, from the times of the best motion so far.
+7. Free knots, ten in each segment, from equal times.
+8. Free knots, sixteen in each segment, from the times of the best motion so far.
+
+Each gives velocities and accelerations at the points, which are then improved until no more is gained. A
+motion that stops at each point is always among those that are compared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from trajcli.curves.piecewise import Array
+from trajcli.frozen import frozen
+from trajcli.planners.fastest_through_points.free_knots import states_by_free_knots
+from trajcli.planners.fastest_through_points.position_limits import with_limits_near
+from trajcli.planners.fastest_through_points.problem import WaypointProblem
+from trajcli.planners.fastest_through_points.states import (
+    StateMotion,
+    evaluated,
+    improved,
+    within_position_limits,
+)
+from trajcli.progress import report_progress
+
+MOST_STARTS = 8
+_SPEEDS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0)  # of central differences
+_ALIKE = 1e-3  # relative: durations this near to the shortest agree with it
+_SHORT = 0.05  # of the longest time at the velocity limits: no segment begins with less
+
+Start = Callable[[WaypointProblem, StateMotion, StateMotion], Array]
+
+
+@frozen
+class Found:
+    """What a search found.
+
+    Attributes:
+        best: The fastest motion.
+        durations: To which each starting point led, s, in the order of the starting points.
+        stopping: Duration of the motion that stops at each point, s; infinite where there is none.
+    """
+
+    best: StateMotion
+    durations: tuple[float, ...]
+    stopping: float
+
+    def agreeing(self, duration: float) -> int:
+        """Return how many starting points led to a duration, or nearly so."""
+        return sum(found <= duration * (1 + _ALIKE) for found in self.durations)
+
+
+def search(problem: WaypointProblem, starts: int, straight: Array | None = None) -> Found:
+    """Return the fastest motion that the first starting points lead to.
+
+    Args:
+        problem: Points, limits, and what is given.
+        starts: How many starting points are tried, 1 to 8.
+        straight: States (K + 1, n, 2) of the motion along the polyline, where some points are collinear.
+    """
+    found = _found(problem.scaled(), starts, None if straight is None else _scaled(problem, straight))
+    time, lengths = problem.units
+    states = found.best.states * np.stack([lengths / time, lengths / time**2], axis=1)
+    best = StateMotion(problem.inside(states), found.best.times * time)
+    return Found(best, tuple(time * duration for duration in found.durations), found.stopping * time)
+
+
+def _scaled(problem: WaypointProblem, states: Array) -> Array:
+    """Return states (K + 1, n, 2) in the units of the problem."""
+    time, lengths = problem.units
+    scaled: Array = states / np.stack([lengths / time, lengths / time**2], axis=1)
+    return scaled
+
+
+def _found(problem: WaypointProblem, starts: int, straight: Array | None) -> Found:
+    """Return the fastest motion that is found, all in the units of the problem."""
+    stopping = evaluated(problem, problem.stopping())
+    if problem.walled and np.isfinite(stopping.duration):
+        problem = with_limits_near(problem, stopping.times)
+    if problem.segments == 1 or problem.fixed.all():
+        return Found(stopping, (stopping.duration,) * starts, stopping.duration)
+    best, durations = stopping, []
+    for number, start in enumerate(_STARTS[:starts]):
+        report_progress(f"starting point {number + 1} of {starts}")
+        if number == 1:
+            states = problem.stopping() if straight is None else straight
+        else:
+            states = start(problem, stopping, best)
+        motion = improved(problem, within_position_limits(problem, states))
+        durations.append(motion.duration)
+        if motion.duration < best.duration:
+            best = motion
+    return Found(best, tuple(durations), stopping.duration)
+
+
+def _usual_times(problem: WaypointProblem, motion: StateMotion) -> Array:
+    """Return the times of a motion, or where it has none, twice those at the velocity limits."""
+    return np.where(np.isfinite(motion.times), motion.times, 2 * _speed_times(problem))
+
+
+def _speed_times(problem: WaypointProblem) -> Array:
+    """Return what each segment needs at the velocity limits, s, shape (K,)."""
+    steps, bounds = problem.steps, problem.velocity
+    times = np.where(steps > 0, steps / bounds[:, 1], steps / bounds[:, 0]).max(axis=1)
+    times = np.maximum(times, problem.least)
+    return np.asarray(np.maximum(times, _SHORT * float(times.max())))
+
+
+def _from_stopping(intervals: int, part: float) -> Start:
+    def start(problem: WaypointProblem, stopping: StateMotion, best: StateMotion) -> Array:
+        return states_by_free_knots(problem, part * _usual_times(problem, stopping), intervals)
+
+    return start
+
+
+def _from_best(intervals: int) -> Start:
+    def start(problem: WaypointProblem, stopping: StateMotion, best: StateMotion) -> Array:
+        return states_by_free_knots(problem, _usual_times(problem, best), intervals)
+
+    return start
+
+
+def _at_speed_limits(problem: WaypointProblem, stopping: StateMotion, best: StateMotion) -> Array:
+    return states_by_free_knots(problem, 1.2 * _speed_times(problem), 6)
+
+
+def _equal_times(problem: WaypointProblem, stopping: StateMotion, best: StateMotion) -> Array:
+    times = _usual_times(problem, best)
+    return states_by_free_knots(problem, np.full_like(times, times.mean()), 10)
+
+
+def _stopping(problem: WaypointProblem, stopping: StateMotion, best: StateMotion) -> Array:
+    return problem.stopping()
+
+
+def _central_differences(problem: WaypointProblem, stopping: StateMotion, best: StateMotion) -> Array:
+    times = _usual_times(problem, stopping)
+    slopes = problem.steps / times[:, None]
+    weight = (times[1:] / (times[1:] + times[:-1]))[:, None]
+    between = weight * slopes[:-1] + (1 - weight) * slopes[1:]
+    motions = []
+    for speed in _SPEEDS:
+        states = np.zeros_like(problem.states)
+        states[1:-1, :, 0] = speed * between
+        motions.append(evaluated(problem, states))
+    return min(motions, key=lambda motion: motion.duration).states
+
+
+_STARTS: tuple[Start, ...] = (
+    _from_stopping(8, 0.6),
+    _stopping,
+    _from_stopping(12, 0.8),
+    _central_differences,
+    _at_speed_limits,
+    _from_best(8),
+    _equal_times,
+    _from_best(16),
+)

@@ -1,0 +1,159 @@
+"""Durations of the fastest motions between the states at points, and their derivatives by the states.
+
+Ruckig takes many joints at once, each by itself where none waits for another: all states of a list, and all
+that differences need, cost one call.
+
+Source: Berscheid and Kroeger, Jerk-limited Real-time Trajectory Generation with Arbitrary Target States
+(RSS 2021).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajcli.curves.piecewise import Array
+from trajcli.frozen import frozen
+from trajcli.planners.fastest_through_points.problem import WaypointProblem
+
+_DIFFERENCE = 1e-5  # of the scale of a state
+_APART = 1e-9  # relative: durations that differ by less are equal
+
+
+@frozen
+class StateTimes:
+    """What the states at the points mean for the durations.
+
+    Attributes:
+        alone: Fastest of each joint by itself, shape (K, n).
+        together: Shortest common duration of each segment, at least its given one, shape (K,); infinite where
+            there is none.
+        slopes: Of `alone` by velocity and acceleration before and after, in units of their scales, shape
+            (K, n, 4).
+        lifted: Whether the common duration is longer than that of each joint and the given one, shape (K,).
+    """
+
+    alone: Array
+    together: Array
+    slopes: Array
+    lifted: NDArray[np.bool_]
+
+    @property
+    def duration(self) -> float:
+        """Of the whole motion."""
+        return float(self.together.sum())
+
+
+def durations(problem: WaypointProblem, states: Array) -> Array:
+    """Return the shortest common duration (K,) of each segment between states (K + 1, n, 2).
+
+    Infinite where ruckig finds no motion.
+    """
+    import ruckig
+
+    n = problem.joints
+    solver, answer, wanted = ruckig.Ruckig(n), ruckig.Trajectory(n), ruckig.InputParameter(n)
+    set_limits(wanted, problem.velocity, problem.acceleration, problem.jerk)
+    wanted.current_position = [0.0] * n
+    velocities, accelerations = states[..., 0].tolist(), states[..., 1].tolist()
+    found = []
+    for k, (step, least) in enumerate(zip(problem.steps.tolist(), problem.least.tolist(), strict=True)):
+        wanted.target_position = step
+        wanted.current_velocity, wanted.target_velocity = velocities[k], velocities[k + 1]
+        wanted.current_acceleration, wanted.target_acceleration = accelerations[k], accelerations[k + 1]
+        wanted.minimum_duration = least or None
+        try:
+            result = solver.calculate(wanted, answer)
+        except (ruckig.RuckigError, ValueError):
+            found.append(np.inf)
+            continue
+        found.append(answer.duration if result == ruckig.Result.Working else np.inf)
+    return np.array(found)
+
+
+def state_times(problem: WaypointProblem, states: Array, together: Array | None = None) -> StateTimes:
+    """Return the durations between states (K + 1, n, 2), and their derivatives.
+
+    Args:
+        problem: Points and limits.
+        states: Inside the limits.
+        together: `durations(problem, states)`, where that is known.
+    """
+    common = durations(problem, states) if together is None else together
+    segments, joints = problem.steps.shape
+    scales = problem.scales
+    pairs = np.concatenate([states[:-1], states[1:]], axis=2)
+    moves = np.zeros((9, segments, joints, 4))
+    for k in range(4):
+        moves[1 + 2 * k, ..., k], moves[2 + 2 * k, ..., k] = 1, -1
+    sizes = _DIFFERENCE * np.concatenate([scales, scales], axis=1)
+    trial = np.clip(pairs + moves * sizes, *_box(problem))
+    steps = np.broadcast_to(problem.steps, trial.shape[:3])
+    times = alone_times(problem, steps, trial)
+    spans = np.stack([(trial[1 + 2 * k] - trial[2 + 2 * k])[..., k] for k in range(4)], axis=2)
+    changes = np.stack([times[1 + 2 * k] - times[2 + 2 * k] for k in range(4)], axis=2)
+    spans = spans / np.concatenate([scales, scales], axis=1)
+    slopes = np.where(np.isfinite(changes) & (spans > 0), changes / np.where(spans > 0, spans, 1.0), 0.0)
+    usual = np.maximum(times[0].max(axis=1), problem.least)
+    return StateTimes(times[0], common, slopes, common > usual * (1 + _APART))
+
+
+def _box(problem: WaypointProblem) -> tuple[Array, Array]:
+    rows = np.stack([problem.velocity, problem.acceleration], axis=1)  # (n, 2, 2)
+    both = np.concatenate([rows, rows], axis=1)
+    return both[..., 0], both[..., 1]
+
+
+def alone_times(problem: WaypointProblem, steps: Array, pairs: Array) -> Array:
+    """Return the fastest duration of each joint by itself.
+
+    Args:
+        problem: Limits.
+        steps: Displacements, shape (..., n).
+        pairs: Velocity and acceleration before, then after, shape (..., n, 4).
+
+    Returns:
+        Shape (..., n); infinite where ruckig finds no motion.
+    """
+    shape = steps.shape
+    count = int(np.prod(shape[:-1]))
+    joints = np.tile(np.arange(shape[-1]), count)
+    limits = problem.velocity[joints], problem.acceleration[joints], problem.jerk[joints]
+    found = np.empty(joints.size)
+    _fill(found, steps.reshape(-1), pairs.reshape(-1, 4), limits, slice(0, joints.size))
+    return found.reshape(shape)
+
+
+def _fill(found: Array, steps: Array, pairs: Array, limits: tuple[Array, Array, Array], part: slice) -> None:
+    """Write the durations of a part; one that has no motion spoils a call, so that a part is halved."""
+    import ruckig
+
+    count = part.stop - part.start
+    wanted, answer = ruckig.InputParameter(count), ruckig.Trajectory(count)
+    set_limits(wanted, *(limit[part] for limit in limits))
+    wanted.synchronization = ruckig.Synchronization.No
+    wanted.current_position, wanted.target_position = [0.0] * count, steps[part].tolist()
+    columns = pairs[part].T.tolist()
+    wanted.current_velocity, wanted.current_acceleration = columns[0], columns[1]
+    wanted.target_velocity, wanted.target_acceleration = columns[2], columns[3]
+    try:
+        fine = ruckig.Ruckig(count).calculate(wanted, answer) == ruckig.Result.Working
+    except (ruckig.RuckigError, ValueError):
+        fine = False
+    if fine:
+        found[part] = answer.independent_min_durations
+    elif count == 1:
+        found[part] = np.inf
+    else:
+        middle = part.start + count // 2
+        _fill(found, steps, pairs, limits, slice(part.start, middle))
+        _fill(found, steps, pairs, limits, slice(middle, part.stop))
+
+
+def set_limits(wanted: Any, velocity: Array, acceleration: Array, jerk: Array) -> None:  # noqa: ANN401
+    """Give ruckig's input the limits of its joints, (n, 2), (n, 2) and (n,)."""
+    wanted.min_velocity, wanted.max_velocity = velocity.T.tolist()
+    wanted.min_acceleration, wanted.max_acceleration = acceleration.T.tolist()
+    wanted.max_jerk = jerk.tolist()

@@ -1,0 +1,70 @@
+"""Payload between moves: what the tool takes up and leaves, without motion and in no time."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import Field
+from pydantic.json_schema import SkipJsonSchema
+
+from trajcli.curves.piecewise import constant
+from trajcli.kinematics.robot import Payload, Robot
+from trajcli.language.dynamics import PayloadSpec
+from trajcli.language.numbers import FlawError, Model
+from trajcli.planners.planner import Planned, Planner
+from trajcli.trajectory import State
+
+
+class _Handling(Planner):
+    """A change of what the tool carries, where the arm is and as it moves there."""
+
+    continuity: ClassVar[Literal[1, 2]] = 2
+    handles: ClassVar[bool] = True
+    # what would say how to move stands beside a planner only
+    limits: ClassVar[Any] = None  # type: ignore[misc]
+    when_over_limit: ClassVar[Any] = None  # type: ignore[misc]
+
+    def plan(self, start: State, robot: Robot) -> Planned:
+        """Return the curve of no length."""
+        del robot
+        return Planned(constant(start.position, 0.0), start, no_lower_bound="it does not move")
+
+
+class Attach(_Handling):
+    """From here on the tool carries a payload."""
+
+    planner: SkipJsonSchema[Literal["attach"]] = Field("attach", exclude=True)
+    attach: Annotated[PayloadSpec, Field(description="What the tool carries from here on.")]
+
+    def carried_after(self, payload: Payload | None) -> Payload | None:
+        """Return its own payload.
+
+        Raises:
+            FlawError: When the tool carries one already.
+        """
+        if payload is not None:
+            text = f"the tool carries {payload.mass:g} kg already"
+            raise FlawError(text, "attach", hint="write `- {detach: {}}` before it")
+        return self.attach.as_payload()
+
+
+class Empty(Model):
+    """No fields: what is left is what was attached."""
+
+
+class Detach(_Handling):
+    """From here on the tool carries nothing."""
+
+    planner: SkipJsonSchema[Literal["detach"]] = Field("detach", exclude=True)
+    detach: Annotated[Empty, Field(description="Nothing: what is left is what was attached.")]
+
+    def carried_after(self, payload: Payload | None) -> Payload | None:
+        """Return that there is no payload.
+
+        Raises:
+            FlawError: When there was none before.
+        """
+        if payload is None:
+            text = "nothing is attached here that could be detached"
+            raise FlawError(text, "detach", hint="attach a payload in a move before it")
+        return None

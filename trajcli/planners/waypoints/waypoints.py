@@ -1,0 +1,243 @@
+"""Jerk-limited motion through waypoints, with free geometry between them.
+
+Source: Berscheid and Kroeger, Jerk-limited Real-time Trajectory Generation with Arbitrary Target States
+(RSS 2021); Nocedal and Wright, Numerical Optimization, 2nd edition (2006), chapter 18.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+from pydantic.json_schema import JsonSchemaValue
+
+from trajcli.errors import Amount, Amounts, MissingLimitError, PlanningError, Problem
+from trajcli.frozen import comparable
+from trajcli.kinematics.robot import QUANTITIES, Robot
+from trajcli.language.numbers import (
+    FieldType,
+    Flaw,
+    FlawError,
+    Number,
+    ReadingContext,
+    number_schema,
+    refuse,
+    shown,
+)
+from trajcli.language.per_joint import flawed
+from trajcli.language.recorded import Recorded
+from trajcli.planners.boundary_states import missing_limit, standstill
+from trajcli.planners.planner import Certificate, Event, Planned
+from trajcli.planners.waypoints.given_points import (
+    GivenPoints,
+    given_points,
+    require_possible,
+    without_repeats,
+)
+from trajcli.planners.waypoints.through_points import PointSequence
+from trajcli.trajectory import State, ViaPoints
+from trajcli.units import Quantity
+
+if TYPE_CHECKING:
+    from trajcli.planners.fastest_through_points.problem import WaypointProblem
+
+_WHOLE = 1e-3  # of a hundredth of a percent: what rounding may put above a proven bound
+_TIME = Number(Quantity("time"), "Shortest duration of a segment, s.", at_least=0.0)
+
+
+@comparable
+class SegmentTimes(FieldType):
+    """A list of durations, one for each segment."""
+
+    description: str
+
+    def read(self, value: Any, context: ReadingContext) -> tuple[float, ...]:  # noqa: ANN401
+        """Return seconds."""
+        if not isinstance(value, list | tuple) or not value:
+            raise FlawError(f"expected a list of times, one for each segment, got {shown(value)}")
+        times: list[float] = []
+        flaws: list[Flaw] = []
+        for index, item in enumerate(value):
+            try:
+                times.append(_TIME.read(item, context))
+            except FlawError as error:
+                flaws += [((index, *path), text, hint) for path, text, hint in error.flaws]
+        if flaws:
+            raise flawed(flaws)
+        return tuple(times)
+
+    def json_schema(self) -> JsonSchemaValue:
+        """Return the schema of the list."""
+        return {"type": "array", "items": number_schema(Quantity("time"), minimum=0.0), "minItems": 1}
+
+
+class FastestThroughPoints(PointSequence):
+    """As fast as velocity, acceleration and jerk limits allow through points, however it goes between them.
+
+    Source: Berscheid and Kroeger, Jerk-limited Real-time Trajectory Generation with Arbitrary Target States
+    (RSS 2021); Nocedal and Wright, Numerical Optimization, 2nd edition (2006), chapter 18.
+    """
+
+    continuity: ClassVar[Literal[1, 2]] = 2
+    follows_jerk: ClassVar[bool] = True
+    finds_times: ClassVar[bool] = True
+
+    planner: Literal["waypoints"] = "waypoints"
+    starts: Annotated[
+        Literal[1, 2, 3, 4, 5, 6, 7, 8],
+        Field(description="How many starting points of the search are tried, of a fixed order."),
+    ] = 4
+    minimum_durations: (
+        Annotated[
+            tuple[float, ...],
+            SegmentTimes("Each segment lasts at least this long, s, the first from the start."),
+        ]
+        | None
+    ) = None
+    straight: Annotated[
+        bool,
+        Field(
+            description="Whether it keeps to the polyline: through collinear points without a stop, with a "
+            "stop where it turns."
+        ),
+    ] = False
+
+    @model_validator(mode="after")
+    def _points_fit(self) -> FastestThroughPoints:
+        flaws = [*self._flaws_of_times(), *self._flaws_of_points()]
+        if flaws:
+            raise refuse(flaws)
+        return self
+
+    def _flaws_of_times(self) -> Iterator[Flaw]:
+        times, count = self.minimum_durations, len(self.listed)
+        if times is None or isinstance(self.through, Recorded) or len(times) == count:
+            return
+        text = f"expected {count} times, one for each segment from the start on, got {len(times)}"
+        yield ("minimum_durations",), text, None
+
+    def _flaws_of_points(self) -> Iterator[Flaw]:
+        for k, point in enumerate(self.listed):
+            last = k == len(self.listed) - 1
+            path: Sequence[str | int] = ("to",) if self.to is not None and last else ("through", k)
+            if point.time is not None:
+                yield (*path, "time"), "waypoints finds the times", "leave it out, or use spline"
+            if point.blend is not None:
+                yield (*path, "blend"), "waypoints has no blends: it goes through the points", "leave it out"
+
+    def plan(self, start: State, robot: Robot) -> Planned:
+        """Return the fastest motion through the points that is found.
+
+        Raises:
+            MissingLimitError: When a moving joint lacks a limit on velocity, acceleration or jerk.
+            PlanningError: When what is given at a point cannot be, or no motion keeps the position limits.
+        """
+        points = without_repeats(self._points(start), robot)
+        least = float(points.least.sum())
+        if not points.moving.any():
+            return replace(standstill(points.target, least), events=points.events)
+        _require_limits(points, robot)
+        require_possible(points, robot)
+        return self._through(points, robot)
+
+    def _through(self, points: GivenPoints, robot: Robot) -> Planned:
+        """Return the motion of the joints that move; the others stand still."""
+        from trajcli.planners.fastest_through_points.assembly import fastest_motion, straight_only
+        from trajcli.planners.fastest_through_points.deviation import off_chords
+
+        joints = np.flatnonzero(points.moving)
+        problem = _problem(points, robot, joints)
+        names = [robot.joint_names[joint] for joint in joints.tolist()]
+        plan = straight_only if self.straight else fastest_motion
+        fastest = plan(problem, names, self.starts)
+        motion = fastest.motion.among(joints, points.positions[0])
+        off, times = off_chords(motion, points.positions, robot.limits.velocity)
+        joint = None if fastest.joint is None else int(joints[fastest.joint])
+        certificate = Certificate(
+            fastest.lower, joint, fastest.found, fastest.agreeing, fastest.stopping, off, times
+        )
+        return Planned(
+            motion.curve,
+            points.target,
+            phases=motion.phases,
+            via_points=ViaPoints(motion.times, points.positions, np.zeros_like(points.positions)),
+            events=(*points.events, _said(certificate, motion.duration, robot, straight=self.straight)),
+            certificate=certificate,
+        )
+
+    def _points(self, start: State) -> GivenPoints:
+        listed = list(self.listed)
+        paths: list[tuple[str | int, ...]] = [("through", k) for k in range(len(listed))]
+        if self.to is not None:
+            paths[-1] = ("to",)
+        recorded = np.empty((0, start.position.size))
+        if isinstance(self.through, Recorded):
+            free = replace(self.through, times=None)
+            target = None if self.to is None else self.to.as_state().position
+            recorded = free.after(start.position, target).positions
+        least = self.minimum_durations
+        wanted = len(recorded) + len(listed)
+        if least is not None and len(least) != wanted:
+            message = f"{len(least)} minimum durations, but the recorded points make {wanted} segments"
+            raise PlanningError(message, hint="give one for each segment, the first from the start")
+        return given_points(start, recorded, list(zip(paths, listed, strict=True)), least)
+
+
+def _problem(points: GivenPoints, robot: Robot, joints: NDArray[np.intp]) -> WaypointProblem:
+    """Return the problem of some joints; of a jerk that differs by direction the smaller one counts."""
+    from trajcli.planners.fastest_through_points.problem import WaypointProblem
+
+    limits = robot.limits
+    return WaypointProblem(
+        points.positions[:, joints],
+        limits.velocity[joints],
+        limits.acceleration[joints],
+        np.abs(limits.jerk[joints]).min(axis=1),
+        points.states[:, joints],
+        points.fixed[:, joints],
+        points.least,
+        limits.position[joints],
+    )
+
+
+def _said(certificate: Certificate, duration: float, robot: Robot, *, straight: bool) -> Event:
+    """Return the remark on how near to the fastest a motion is, and how far it leaves the chords."""
+    near = "nothing is known of the fastest possible"
+    if certificate.lower > 0:
+        above = math.ceil(1e4 * (duration / certificate.lower - 1) - _WHOLE) / 100
+        where = " along the polyline" if straight else ""
+        near = f"at most {max(above, 0.0):.4g} % above the fastest possible{where}, {{lower}}"
+    starts = f"{certificate.agreeing} of {len(certificate.found)} starting points agree"
+    stops = "" if np.isinf(certificate.stopping) else "; stopping at each point takes {stopping}"
+    joint = int(certificate.off_chords.argmax())
+    amounts: Amounts = {
+        "lower": Amount(certificate.lower, rounded="down"),
+        "stopping": Amount(certificate.stopping),
+        "off": Amount(float(certificate.off_chords[joint]), 0, joint),
+        "joint": robot.joint_names[joint],
+        "time": Amount(float(certificate.off_times[joint])),
+    }
+    message = f"{near}; {starts}{stops}; it leaves the chords by up to {{off}} ({{joint}} at {{time}})"
+    return Event("fastest_found", message, amounts=amounts)
+
+
+def _require_limits(points: GivenPoints, robot: Robot) -> None:
+    """Refuse moving joints without the limits that their motion follows from.
+
+    Raises:
+        MissingLimitError: With one problem for each quantity, naming the joints.
+    """
+    problems: list[Problem] = []
+    for order in (1, 2, 3):
+        bounded = np.isfinite(robot.limits.of_order(order)).all(axis=1)
+        lacking = np.flatnonzero(points.moving & ~bounded).tolist()
+        if lacking:
+            why = "to find the fastest motion"
+            problems += missing_limit("waypoints", QUANTITIES[order], lacking, robot, why).problems
+    if problems:
+        raise MissingLimitError(*problems)

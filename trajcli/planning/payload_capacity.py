@@ -1,0 +1,267 @@
+"""Payload capacity: the largest mass with which a job still verifies, and what binds there.
+
+At each instant of a motion every effort is affine in the mass that the tool carries, so that the rows of a
+plan say nearly which mass brings the first of them to its limit. The proof of all instants, and what depends
+on the mass in the planning itself, are met by halving the bracket around it, by the job's own verdict.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from trajcli.checks.effort import move_efforts
+from trajcli.checks.tolerances import EFFORT_RELATIVE
+from trajcli.curves.piecewise import Array
+from trajcli.dynamics.newton_euler import InverseDynamics
+from trajcli.errors import Amount, InputError, Problem, TrajcliError, VerificationError
+from trajcli.frozen import frozen
+from trajcli.job.read import LoadedJob
+from trajcli.kinematics.robot import Payload, Robot, point_mass
+from trajcli.planners.planner import PlannedMove
+from trajcli.planning.plan import Plan, plan_job
+from trajcli.progress import report_progress
+
+LARGEST = 1e6
+"""What no arm carries, kg: a job that verifies with it has no largest payload."""
+_CLOSE = 1e-10  # relative: width at which a bracket is closed
+_GUESS = 1e-4  # relative: how near the rows of a plan come to its mass
+_EACH = 64  # rows of a piece
+
+
+@frozen
+class PayloadCapacity:
+    """The largest mass with which a job still verifies.
+
+    Attributes:
+        mass: kg; None where any mass will do.
+        payload: Where it is carried, with that mass or that of the job.
+        moves: Indices of the moves in which it is carried.
+        joint: Name of the joint that binds; None where none does.
+        move: Index of the move in which it binds.
+        time: When, s from the start of the trajectory.
+        effort: Of the joint there, N m or N.
+        limit: That it reaches.
+    """
+
+    mass: float | None
+    payload: Payload
+    moves: tuple[int, ...]
+    joint: str | None = None
+    move: int | None = None
+    time: float | None = None
+    effort: float | None = None
+    limit: float | None = None
+
+
+def payload_capacity(loaded: LoadedJob, at: int | None = None) -> PayloadCapacity:
+    """Return the largest mass with which a job verifies, each move planned anew as the job says it.
+
+    Args:
+        loaded: The job. Where it attaches payloads their masses are sought, all of them the same, each at its
+            centre of mass and with its inertia; where it attaches none, that of a point at the tcp.
+        at: Index of a move: only what is carried there is sought, or, where nothing is, a point at the tcp in
+            this move alone.
+
+    Raises:
+        InputError: When there is no such move, or no limit of effort is in force in it.
+        TrajcliError: Of the job, when it does not even verify without the payload.
+    """
+    search = _Search(loaded, _carriers(loaded, at))
+    passing, plan = search.passing_mass()
+    search.require_limits(plan)
+    low, high = search.bracket(passing, plan)
+    if high is None:
+        return PayloadCapacity(None, search.template, search.moves)
+    low, high = search.closed(low, high)
+    return search.result(low, high)
+
+
+def _carriers(loaded: LoadedJob, at: int | None) -> dict[int, Payload]:
+    """Return what is carried in the moves that count, by their index; of the mass that the job says."""
+    moves = loaded.job.moves
+    known = f"its moves are 0 to {len(moves) - 1}"
+    if at is not None and not 0 <= at < len(moves):
+        raise InputError(f"--at {at}: {loaded.name} has no such move", hint=known)
+    carried: list[Payload | None] = []
+    for planner in moves:
+        carried.append(planner.carried_after(carried[-1] if carried else None))
+    held = {index: payload for index, payload in enumerate(carried) if payload is not None}
+    if at is not None and carried[at] is not None:
+        return {index: payload for index, payload in held.items() if payload is carried[at]}
+    if at is not None:
+        if moves[at].handles:
+            raise InputError(f"--at {at}: nothing is carried there", hint="name a move, or what attaches")
+        return {at: point_mass(0.0)}
+    return held or dict.fromkeys(range(len(moves)), point_mass(0.0))
+
+
+class _Search:
+    """Attempts at planning a job with different masses."""
+
+    def __init__(self, loaded: LoadedJob, carriers: dict[int, Payload]) -> None:
+        self._loaded, self._carriers = loaded, carriers
+        self.moves = tuple(sorted(carriers))
+        self.template = carriers[self.moves[0]]
+        self._plans: dict[float, Plan | TrajcliError] = {}
+
+    def attempt(self, mass: float) -> Plan | TrajcliError:
+        """Return the plan with a mass, or why there is none."""
+        if mass not in self._plans:
+            report_progress(f"trying {mass:.9g} kg")
+            try:
+                self._plans[mass] = plan_job(self._loaded, partial(self._carried, mass), advise=False)
+            except TrajcliError as error:
+                self._plans[mass] = error
+        return self._plans[mass]
+
+    def _carried(self, mass: float, index: int, payload: Payload | None) -> Payload | None:
+        own = self._carriers.get(index)
+        return payload if own is None else Payload(mass, own.com, own.inertia)
+
+    def passes(self, mass: float) -> bool:
+        """Return whether the job verifies with a mass."""
+        plan = self.attempt(mass)
+        return isinstance(plan, Plan) and plan.verdict.passed
+
+    def passing_mass(self) -> tuple[float, Plan]:
+        """Return a mass with which the job verifies, and its plan: none, or else that of the job.
+
+        Raises:
+            TrajcliError: Of the job without the payload.
+        """
+        for mass in (0.0, self.template.mass):
+            plan = self.attempt(mass)
+            if isinstance(plan, Plan) and plan.verdict.passed:
+                return mass, plan
+        empty = self.attempt(0.0)
+        if isinstance(empty, TrajcliError):
+            raise empty
+        worst = max(empty.verdict.findings, key=lambda finding: finding.kind == "effort")
+        hint = worst.hint or "`trajcli plan` says what is wrong"
+        text = f"the job does not verify even without the payload: {worst.text(self._loaded.say)}"
+        place = self._loaded.place_of_move(worst.move or 0)
+        raise VerificationError(Problem(text, hint, place, worst.move, worst.joint, worst.time))
+
+    def require_limits(self, plan: Plan) -> None:
+        """Raise when no effort is limited where the payload is carried."""
+        if not any(plan.moves[index].robot.limits.has_effort for index in self.moves):
+            place = self._loaded.document.place(("limits",))
+            hint = "say `limits: {effort: robot}`, or give them by joint"
+            message = "no limit of effort is in force, so there is no largest payload"
+            raise InputError(Problem(message, hint, place))
+
+    def bracket(self, passing: float, plan: Plan) -> tuple[float, float | None]:
+        """Return a mass that verifies and one above it that does not; None where any does."""
+        low = passing
+        guesses = sorted(mass for mass in self._guesses(plan) if passing < mass < LARGEST)
+        near = [mass * factor for mass in guesses for factor in (1 - _GUESS, 1 + _GUESS)]
+        beyond = 2.0 ** np.arange(-3, np.ceil(np.log2(LARGEST)) + 1)
+        for mass in sorted({*near, *(beyond * max([1.0, *guesses])).tolist()}):
+            if mass <= low:
+                continue
+            if not self.passes(mass):
+                return low, mass
+            low = mass
+        return low, None
+
+    def _guesses(self, plan: Plan) -> Iterator[float]:
+        """Yield masses that bring an effort of a plan to its limit, of its motion and of the arm at rest."""
+        for index in self.moves:
+            move = plan.moves[index]
+            if move.duration > 0 and move.robot.limits.has_effort:
+                yield from _masses_at_limit(move, self._carriers[index])
+
+    def closed(self, low: float, high: float) -> tuple[float, float]:
+        """Return the bracket as narrow as it gets.
+
+        Where the motion is the same at both ends it is so between them: only its efforts change.
+        """
+        below, above = self.attempt(low), self.attempt(high)
+        motion = below if _same_motion(below, above) else None
+        while high - low > _CLOSE * high:
+            middle = 0.5 * (low + high)
+            verifies = self.passes(middle) if motion is None else self._keeps_efforts(motion, middle)
+            low, high = (middle, high) if verifies else (low, middle)
+        return low, high
+
+    def _keeps_efforts(self, plan: Plan | TrajcliError, mass: float) -> bool:
+        """Return whether the efforts of a plan keep their limits with another mass."""
+        if not isinstance(plan, Plan):
+            return False
+        for index in self.moves:
+            move, own = plan.moves[index], self._carriers[index]
+            robot = replace(move.robot, payload=Payload(mass, own.com, own.inertia))
+            if not robot.limits.has_effort:
+                continue
+            efforts = move_efforts(plan.trajectory, plan.trajectory.spans[index], robot)
+            if efforts is not None and efforts.share(robot.limits.effort) > 1 + EFFORT_RELATIVE:
+                return False
+        return True
+
+    def result(self, low: float, high: float) -> PayloadCapacity:
+        """Return the capacity within a bracket, and what binds: what fails at its upper end."""
+        capacity = PayloadCapacity(low, self.template, self.moves)
+        failed = self.attempt(high)
+        if isinstance(failed, Plan):
+            efforts = [found for found in failed.verdict.findings if found.kind == "effort"]
+            worst = max(efforts, key=lambda found: abs(found.value / found.limit), default=None)
+            if worst is None:
+                return capacity
+            return replace(
+                capacity,
+                joint=worst.joint,
+                move=worst.move,
+                time=worst.time,
+                effort=worst.value,
+                limit=worst.limit,
+            )
+        problem = failed.problems[0]
+        return replace(
+            capacity,
+            joint=problem.joint,
+            move=problem.move,
+            time=problem.time,
+            effort=problem.value,
+            limit=problem.limit if problem.limit is not None else _amount(problem, "limit"),
+        )
+
+
+def _amount(problem: Problem, name: str) -> float | None:
+    """Return a number of a problem's message."""
+    amount = problem.amounts.get(name)
+    value = amount.value if isinstance(amount, Amount) else None
+    return None if isinstance(value, tuple) else value
+
+
+def _same_motion(a: Plan | TrajcliError, b: Plan | TrajcliError) -> bool:
+    """Return whether two plans are the same motion."""
+    if not (isinstance(a, Plan) and isinstance(b, Plan)):
+        return False
+    one, other = a.trajectory.curve, b.trajectory.curve
+    return np.array_equal(one.breaks, other.breaks) and np.array_equal(one.coefficients, other.coefficients)
+
+
+def _masses_at_limit(move: PlannedMove, payload: Payload) -> Iterator[float]:
+    """Yield the least mass that brings a joint to its limit on rows of a move, in motion and at rest."""
+    curve, limits = move.planned.curve, move.robot.limits.effort
+    inside = np.linspace(0.0, 1.0, _EACH)
+    times = (curve.breaks[:-1, None] + curve.lengths[:, None] * inside).reshape(-1)
+    q, qd, qdd = (curve.evaluate(times, order) for order in range(3))
+    for rates in ((qd, qdd), (np.zeros_like(q), np.zeros_like(q))):
+        without, with_one = (_efforts(move.robot, payload, mass, q, rates) for mass in (0.0, 1.0))
+        slope = with_one - without
+        with np.errstate(divide="ignore", invalid="ignore"):
+            masses = (np.where(slope > 0, limits[:, 1], limits[:, 0]) - without) / slope
+        masses = masses[np.isfinite(masses) & (masses > 0)]
+        if masses.size:
+            yield float(masses.min())
+
+
+def _efforts(robot: Robot, payload: Payload, mass: float, q: Array, rates: tuple[Array, Array]) -> Array:
+    """Return the efforts of states (N, n) with another mass."""
+    carrying = replace(robot, payload=Payload(mass, payload.com, payload.inertia))
+    return InverseDynamics(carrying).effort(q, *rates)
