@@ -10,7 +10,7 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 from trajcli.errors import PlanningError
 from trajcli.frozen import frozen
-from trajcli.job.report import PathReferenceReport, ReferenceReport
+from trajcli.job.reports.comparisons import PathReferenceReport, ReferenceReport
 from trajcli.judge.finding import JudgedFinding, Judgement, worst_first
 from trajcli.kinematics.robot import Robot
 from trajcli.output.references import (

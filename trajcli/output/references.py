@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from trajcli.errors import PlanningError
-from trajcli.job.report import (
-    FindingReport,
+from trajcli.job.report import FindingReport
+from trajcli.job.reports.comparisons import (
     LimitUseReport,
     PathReferenceReport,
     PeerViolation,

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from trajcli.curves.approach import ApproachUse
 from trajcli.curves.extrema import Peaks
-from trajcli.job.report import AtLimitReport, MoveReport, Report, SavingReport
+from trajcli.job.report import MoveReport, Report
+from trajcli.job.reports.comparisons import AtLimitReport, SavingReport
 from trajcli.kinematics.robot import QUANTITIES
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan
