@@ -27,7 +27,8 @@ if TYPE_CHECKING:
         PoseReport,
         SegmentReport,
     )
-    from trajcli.job.report import AtLimitReport, PeakReport, SavingReport, ToolReport
+    from trajcli.job.report import PeakReport, ToolReport
+    from trajcli.job.reports.comparisons import AtLimitReport, SavingReport
 
 _MOST_LIMITS = 6  # that bind, in one line
 _MOST_POINTS = 20  # points that are listed one by one
@@ -240,7 +241,7 @@ def run_explain(job: str, overrides: Sequence[str], options: ExplainOptions) -> 
     return 0
 
 
-def _lines(explained: Explanation, count: int, *, peers: bool) -> Iterator[str]:
+def _lines(explained: Explanation, count: int, *, peers: bool = False) -> Iterator[str]:
     units = explained.units
     joints = ", ".join(f"q{i} = {name}" for i, name in enumerate(explained.joints, 1) if name != f"j{i}")
     alone = f"move {explained.moves[0].index} of " if len(explained.moves) < count else ""
