@@ -27,6 +27,7 @@ BENCHMARKS = (
     "inverse_kinematics",
     "calibration",
     "time_optimal",
+    "third_order",
     "through_points",
     "operational",
     "long_path",
@@ -35,7 +36,7 @@ BENCHMARKS = (
     "viewing",
 )
 OURS = ("trajcli", "numpy", "pydantic", "pyyaml", "typer")
-THEIRS = ("roboticstoolbox-python", "eaik", "toppra", "numpy", "scipy")
+THEIRS = ("roboticstoolbox-python", "eaik", "toppra", "copp-py", "numpy", "scipy")
 _VERSIONS = """
 import json, platform, sys
 from importlib.metadata import version
