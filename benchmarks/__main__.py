@@ -28,6 +28,7 @@ BENCHMARKS = (
     "calibration",
     "time_optimal",
     "third_order",
+    "dynamics",
     "through_points",
     "operational",
     "long_path",
@@ -37,6 +38,7 @@ BENCHMARKS = (
 )
 OURS = ("trajcli", "numpy", "pydantic", "pyyaml", "typer")
 THEIRS = ("roboticstoolbox-python", "eaik", "toppra", "copp-py", "numpy", "scipy")
+THEIRS = ("roboticstoolbox-python", "eaik", "pin", "toppra", "numpy", "scipy")
 _VERSIONS = """
 import json, platform, sys
 from importlib.metadata import version

@@ -21,14 +21,19 @@ from trajcli.units import (
     Dimension,
     Quantity,
     Units,
+    effort_quantity,
     factor,
     joint_quantity,
     unit_name,
 )
 
-Group = Literal["t", "q", "qd", "qdd", "qddd", "pose", "twist", "twistd", "path", "move"]
-GROUPS: tuple[Group, ...] = ("t", "q", "qd", "qdd", "qddd", "pose", "twist", "twistd", "path", "move")
+Group = Literal["t", "q", "qd", "qdd", "qddd", "pose", "twist", "twistd", "path", "tau", "move"]
+GROUPS: tuple[Group, ...] = ("t", "q", "qd", "qdd", "qddd", "pose", "twist", "twistd", "path", "tau", "move")
 JOINT_ORDERS = {"q": 0, "qd": 1, "qdd": 2, "qddd": 3}
+EFFORT: Group = "tau"
+"""The group of torques and forces, in N m and N whatever the units."""
+JOINT_GROUPS = (*JOINT_ORDERS, EFFORT)
+"""Groups with a column for each joint."""
 
 
 def _tool(linear: Sequence[str], angular: Sequence[str], order: int) -> dict[str, Quantity]:
@@ -57,7 +62,7 @@ _UNIT_FACTORS = {
     "mm": factor(Quantity("length"), Units(length="mm")),
 }
 _NAME = re.compile(r"(?P<stem>.+?)(?:_(?P<unit>deg|mm))?", re.DOTALL)
-_JOINT = re.compile(r"(?P<kind>qd{0,3})(?P<number>[1-9][0-9]*)")
+_JOINT = re.compile(r"(?P<kind>qd{0,3}|tau)(?P<number>[1-9][0-9]*)")
 
 
 @comparable
@@ -65,7 +70,7 @@ class Column:
     """What one column holds.
 
     Attributes:
-        kind: "t", "q", "qd", "qdd", "qddd", "move", or the plain name of any other column, such as "x".
+        kind: "t", "q", "qd", "qdd", "qddd", "tau", "move", or the plain name of any other column, as "x".
         joint: Index of the joint, from 0; None where the column is not about one joint.
         unit: "deg" or "mm"; None for SI.
         quantity: What its numbers measure; None where nothing says it, as in a file the name `q1` of a joint
@@ -99,7 +104,7 @@ def parse_column(name: str) -> Column:
     parts = _NAME.fullmatch(name)
     stem, unit = (parts["stem"], parts["unit"]) if parts else (name, None)
     joint = _JOINT.fullmatch(stem)
-    if joint is None:
+    if joint is None or (unit is not None and joint["kind"] == EFFORT):
         known = _QUANTITIES.get(stem)
         contradicted = known is not None and unit is not None and known.dimension != _DIMENSIONS[unit]
         return Column(stem, None, unit, None if contradicted else known)
@@ -127,9 +132,10 @@ def columns_of(groups: Sequence[Group], joint_types: Sequence[JointType], units:
     check_groups(groups)
     columns: list[Column] = []
     for group in groups:
-        if group in JOINT_ORDERS:
+        if group in JOINT_GROUPS:
             for joint, kind in enumerate(joint_types):
-                quantity = joint_quantity(kind, JOINT_ORDERS[group])
+                effort = group == EFFORT
+                quantity = effort_quantity(kind) if effort else joint_quantity(kind, JOINT_ORDERS[group])
                 columns.append(Column(group, joint, _unit(quantity, units), quantity))
         else:
             measured = _COLUMNS[group].items()

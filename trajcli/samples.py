@@ -6,11 +6,13 @@ Rows are evaluated in blocks of bounded size, so that memory does not grow with 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.columns import (
+    EFFORT,
     JOINT_ORDERS,
     TOOL_COLUMNS,
     Group,
@@ -47,12 +49,13 @@ def sample(
         grid: Where; of the trajectory's duration.
         groups: Groups of columns in the order wanted, as `columns_of` lists them.
         units: Units of the rows; SI if left out.
-        robot: Whose tool it is, base and tool included; needed for the groups of `TOOL_COLUMNS` only.
+        robot: Whose tool it is, base and tool included; needed for the groups of `TOOL_COLUMNS` and for
+            efforts only. What it carries is what the spans say.
         size: Most rows of a block.
 
     Raises:
         InputError: When `groups` is empty, or holds an unknown group or one twice, or one about the tool of
-            no robot or of one without geometry.
+            no robot or of one without geometry, or efforts of one without inertias.
     """
     units = units or Units()
     check_groups(groups)
@@ -66,6 +69,8 @@ def sample(
         for group in groups:
             if group in JOINT_ORDERS:
                 parts.append(motion[:, orders.index(JOINT_ORDERS[group])])
+            elif group == EFFORT:
+                parts.append(_efforts(trajectory, robot, starts.spans(local), motion * factors))
             elif group in TOOL_COLUMNS:
                 part = _of_tool(group, robot, motion * factors, last)
                 last = part[-1, 3:] if group == "pose" else last
@@ -81,7 +86,7 @@ def _orders(groups: Sequence[Group]) -> list[int]:
     """Return the orders of derivatives that `groups` need, rising; at least one."""
     orders = {JOINT_ORDERS[group] for group in groups if group in JOINT_ORDERS}
     for group in groups:
-        orders |= set(range(_TOOL_ORDERS.get(group, -1) + 1))
+        orders |= set(range((2 if group == EFFORT else _TOOL_ORDERS.get(group, -1)) + 1))
     return sorted(orders) or [0]
 
 
@@ -110,6 +115,29 @@ def _of_tool(group: Group, robot: Robot | None, motion: Array, last: Array | Non
     poses = forward(robot, motion[:, 0])
     quaternions = without_jumps(quaternion_from_matrix(poses[:, :3, :3]), last)
     return np.concatenate([poses[:, :3, 3], quaternions], axis=1)
+
+
+def _efforts(trajectory: Trajectory, robot: Robot | None, owner: NDArray[np.intp], motion: Array) -> Array:
+    """Return the efforts of the joints with what the tool carries in each span, shape (N, n), N m or N.
+
+    Args:
+        trajectory: Whose spans know what is carried.
+        robot: Whose efforts.
+        owner: Span of each row, shape (N,).
+        motion: q, qd and qdd, SI, shape (N, 3 or more, n).
+    """
+    from trajcli.dynamics.newton_euler import InverseDynamics
+
+    if robot is None:
+        raise InputError(
+            f"the columns '{EFFORT}' are about a robot, and there is none", hint="give the robot"
+        )
+    efforts = np.empty((motion.shape[0], motion.shape[2]))
+    for index in np.unique(owner).tolist():
+        rows = owner == index
+        dynamics = InverseDynamics(replace(robot, payload=trajectory.spans[index].payload))
+        efforts[rows] = dynamics.effort(*(motion[rows, order] for order in range(3)))
+    return efforts
 
 
 def _in_units(curve: PiecewisePolynomial, factors: Array) -> PiecewisePolynomial:

@@ -122,6 +122,10 @@ def test_one_robot_as_data(arms):
         "acceleration": None,
         "jerk": None,
     }
+    upper_arm = told["dynamics"][1]
+    assert (upper_arm["joint"], upper_arm["effort"]) == ("shoulder_lift_joint", [-150, 150])
+    assert upper_arm["link"]["mass"] == 8.058  # Universal Robots, parameters for calculations of dynamics
+    assert upper_arm["link"]["com"] == [0.2125, 0, 0.11336]
     assert told["units"] == {"angle": "deg", "length": "m"}
     assert told["base"]["rpy"] == pytest.approx([0, 0, 180])
     assert len(told["ik"]["branches"]) == 8

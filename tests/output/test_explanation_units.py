@@ -17,6 +17,8 @@ from trajcli.planning.plan import plan_job
 USER = {"deg": math.pi / 180, "mm": 1e-3}
 SAME = {"deg": "rad", "mm": "m"}
 PLAIN = {
+    "gravity",  # m/s^2 in any units
+    "gravity_share",
     *(
         "version",
         "index",

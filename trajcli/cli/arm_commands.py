@@ -14,6 +14,7 @@ import typer.core
 
 from trajcli.cli.options import (
     ArmUnits,
+    Base,
     DigitsOption,
     Errors,
     Joints,
@@ -26,13 +27,14 @@ from trajcli.cli.options import (
 from trajcli.cli.outcome import guarded
 
 _NUMBER_LIKE = re.compile(r"[-+]?(?:\.?[0-9][^=]*|\.?nan|\.?inf(?:inity)?)", re.IGNORECASE)
-JOINED = ("--qd", "--near", "--point", "--s")
+JOINED = ("--qd", "--qdd", "--near", "--point", "--s")
 """Options that take all the numbers behind them."""
 
 _EXAMPLES = {
     "fk": "trajcli fk --robot ur5e 0 -90 90 0 90 0",
     "ik": "trajcli ik -r ur5e --pose '{xyz: [0.4, 0.1, 0.3]}'",
     "jacobian": "trajcli jacobian --robot ur5e 0 -90 90 0 90 0",
+    "dynamics": "trajcli dynamics -r ur5e --payload '{mass: 5}' 0 -45 90 0 90 0",
     "pose": "trajcli pose --units deg '{rpy: [0, 0, 90]}' '{xyz: [1, 0, 0]}'",
 }
 
@@ -96,8 +98,8 @@ def sorted_words(args: list[str], takes: Mapping[str, int]) -> list[str]:
 
 
 def register(app: typer.Typer) -> None:
-    """Add the commands fk, ik, jacobian, pose, robots, urdf, calibrate and mobility."""
-    for command in (fk, ik, jacobian, pose):
+    """Add the commands fk, ik, jacobian, dynamics, pose, robots, urdf, calibrate and mobility."""
+    for command in (fk, ik, jacobian, dynamics, pose):
         app.command(cls=NumbersCommand, epilog=f"Example: {_EXAMPLES[command.__name__]}")(command)
     app.command(epilog="Example: trajcli robots ur5e")(robots)
     app.command(epilog="Example: trajcli urdf arm.urdf -o robot.yaml")(urdf)
@@ -206,6 +208,43 @@ def jacobian(
     from trajcli.cli.jacobian import JacobianOptions, run_jacobian
 
     return run_jacobian(robot, joints, JacobianOptions(tool, frame, rates, units, si, as_json))
+
+
+@guarded
+def dynamics(
+    robot: RobotName,
+    joints: Joints,
+    tool: Tool = None,
+    base: Base = None,
+    payload: Annotated[
+        str | None,
+        typer.Option(
+            "--payload", metavar="PAYLOAD", help="What the tool carries, {mass, com?, inertia?} or @FILE."
+        ),
+    ] = None,
+    rates: Annotated[
+        str | None,
+        typer.Option("--qd", metavar="V...", help="A velocity for each joint; -- ends them."),
+    ] = None,
+    accelerations: Annotated[
+        str | None,
+        typer.Option("--qdd", metavar="A...", help="An acceleration for each joint; -- ends them."),
+    ] = None,
+    units: ArmUnits = None,
+    si: Si = False,
+    as_json: Json = False,
+    digits: DigitsOption = "fixed",
+    errors: Errors = "text",
+) -> int:
+    """Say what drives the joints: torques (N m) and forces (N) of a motion, and what they are made of.
+
+    tau = M(q) qdd + C(q, qd) qd + g(q) + friction, with the rotors in M. Joint values and rates are in the
+    units of the robot's file, everything else is SI. Rows of q, qd and qdd become rows of tau.
+    """
+    from trajcli.cli.dynamics import DynamicsOptions, run_dynamics
+
+    options = DynamicsOptions(tool, base, payload, rates, accelerations, units, si, as_json, digits)
+    return run_dynamics(robot, joints, options)
 
 
 @guarded

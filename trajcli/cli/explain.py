@@ -12,6 +12,7 @@ from trajcli.errors import InputError
 from trajcli.frozen import comparable
 from trajcli.job.read import load_job
 from trajcli.output.explain import explanation
+from trajcli.planners import HANDLING
 from trajcli.planning.plan import plan_job
 from trajcli.streams.whole_file import standard_output
 
@@ -240,6 +241,9 @@ def _lines(explained: Explanation, count: int) -> Iterator[str]:
     for move in explained.moves:
         yield ""
         yield f"move {move.index}: {move.planner}, {move.duration:.10g} s, from t = {move.start:.10g} s"
+        yield from _carried(move)
+        if move.planner in HANDLING:
+            continue
         yield from pose_lines(move)
         yield from waypoint_lines(move)
         yield from tool_lines(move)
@@ -249,12 +253,17 @@ def _lines(explained: Explanation, count: int) -> Iterator[str]:
         yield from _phases(move)
         yield from _peaks(move)
         yield from _by_position(move)
+        yield from _efforts(move)
         yield from _speed(move)
         yield from (
             f"  {event.kind}: {event.message}" for event in explained.events if event.move == move.index
         )
     general = [event for event in explained.events if event.move is None]
     yield from (f"{event.kind}: {event.message}" for event in general)
+    efforts = explained.efforts
+    if efforts is not None and efforts.inertials is not None:
+        how = "judged for all t" if efforts.judged else f"not judged, {efforts.reason}"
+        yield f"efforts: {how}; masses and inertias from {efforts.inertials}"
 
 
 def _phases(move: ExplainedMove) -> Iterator[str]:
@@ -302,6 +311,31 @@ def _by_position(move: ExplainedMove) -> Iterator[str]:
                 f"    {use.joint} qd by position: {velocity} {use.unit} ({when}), {where}; limit {limit}, "
                 f"{100 * use.used:.4g} % used"
             )
+
+
+def _carried(move: ExplainedMove) -> Iterator[str]:
+    payload = move.payload
+    if payload is None:
+        return
+    point = "" if any(payload.inertia) else ", a point mass"
+    where = f"{_point(payload.com)} {payload.com_unit} of the tcp"
+    yield f"  carries {payload.mass:.9g} kg at {where}{point}"
+
+
+def _efforts(move: ExplainedMove) -> Iterator[str]:
+    """Yield the extremes of the efforts, what of the limits is left, and what gravity takes of it."""
+    for effort in move.efforts or ():
+        ends = ((effort.low, effort.low_time), (effort.high, effort.high_time))
+        extent = " .. ".join(
+            f"{end:.6g} (t = {round(time - move.start, _TIME_DECIMALS):.6g})" for end, time in ends
+        )
+        limits = "no limit"
+        if effort.used is not None:
+            low, high = ("unlimited" if bound is None else f"{bound:.9g}" for bound in effort.limit)
+            left = f"{effort.head_room or 0.0:.6g} {effort.unit} left"
+            limits = f"limits {low} .. {high}, {100 * effort.used:.4g} % used, {left}"
+        gravity = f"{effort.gravity:.6g} {effort.unit} of it against gravity"
+        yield f"    {effort.joint} tau: {extent} {effort.unit}; {limits}, {gravity}"
 
 
 def _extent(peak: PeakReport, start: float, nothing: float) -> str:

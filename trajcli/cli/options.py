@@ -43,6 +43,14 @@ Tool = Annotated[
         help="T_flange_tcp as YAML or @FILE, instead of the robot's own or the job's.",
     ),
 ]
+Base = Annotated[
+    str | None,
+    typer.Option(
+        "--base",
+        metavar="POSE",
+        help="T_world_base as YAML or @FILE, instead of the robot's own or the job's.",
+    ),
+]
 ArmUnits = Annotated[
     str | None,
     typer.Option(

@@ -203,7 +203,7 @@ def _summarise(plan: Plan, rows: int, *, geometry_missing: bool) -> None:
 
 def summary(plan: Plan, rows: int) -> str:
     """Return the verdict in a few lines: extent, tightest limit, what was not checked, concessions."""
-    count = len(plan.moves)
+    count = sum(not move.planner.handles for move in plan.moves)
     head = f"{plan.loaded.name}: verified, {count} move{'s' * (count != 1)}, {plan.trajectory.duration:.6g} s"
     lines = [head + (f", {rows} row{'s' * (rows != 1)}" if rows else "")]
     tightest = _tightest(plan)
@@ -238,7 +238,7 @@ def _tightest(plan: Plan) -> str:
     best, text = 0.0, ""
     verdict = plan.verdict
     of_moves = zip(plan.moves, verdict.peaks, verdict.tool_peaks, verdict.by_position, strict=True)
-    for move, extremes, of_tool, by_position in of_moves:
+    for index, (move, extremes, of_tool, by_position) in enumerate(of_moves):
         for order in (1, 2, 3):
             bounds = move.robot.limits.of_order(order)
             used = np.maximum(extremes[order].low / bounds[:, 0], extremes[order].high / bounds[:, 1])
@@ -251,10 +251,23 @@ def _tightest(plan: Plan) -> str:
             if use.used > best * (1 + 1e-9):
                 best, name = use.used, move.robot.joint_names[use.component]
                 text = f"velocity by position of {name} in move {move.index}, {100 * best:.4g} % used"
+        effort, name = _effort(plan, index)
+        if effort > best * (1 + 1e-6):
+            best, text = effort, f"effort of {name} in move {move.index}, {100 * effort:.4g} % used"
         speed, name = _tool_speed(move) if of_tool is None else _tool_in_joint_space(move, of_tool)
         if speed > best * (1 + 1e-6):
             best, text = speed, f"{name} of the tool in move {move.index}, {100 * speed:.4g} % used"
     return text
+
+
+def _effort(plan: Plan, index: int) -> tuple[float, str]:
+    """Return the largest part of a limit of effort that a move uses, and the joint."""
+    if plan.verdict.efforts[index] is None:
+        return 0.0, ""
+    from trajcli.output.efforts import most_used
+
+    report = most_used(plan, index)
+    return (0.0, "") if report is None else (report.used or 0.0, report.joint)
 
 
 def _tool_speed(move: PlannedMove) -> tuple[float, str]:

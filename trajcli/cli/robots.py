@@ -120,6 +120,7 @@ def _card_lines(card: Mapping[str, Any]) -> Iterator[str]:
     if near:
         yield "velocity by position, at most sqrt(2 d x) - o with x to the limit ahead:"
         yield from table_lines([["joint", "d", "o"], *map(_by_position_row, near)])
+    yield from _dynamics_lines(card["dynamics"], length)
     for key, name in (("base", "base in world"), ("tool", "tool in the flange")):
         pose = card[key]
         if any(pose["xyz"]) or any(pose["rpy"]):
@@ -144,6 +145,19 @@ def _with_q(offset: str, sign: int) -> str:
 
 def _limit_row(joint: Mapping[str, Any]) -> list[str]:
     return [joint["name"], *(_range(joint[key]) for key in _LIMITS)]
+
+
+def _dynamics_lines(joints: Sequence[Mapping[str, Any]], length: str) -> Iterator[str]:
+    """Yield efforts and inertias of the joints; nothing where none is known."""
+    if not any(joint["effort"] or joint["link"] for joint in joints):
+        return
+    yield f"efforts (N m or N) and links (kg, centre of mass in {length} in the frame of the row):"
+    rows = [["joint", "effort", "mass", "centre of mass"]]
+    for joint in joints:
+        link = joint["link"]
+        solid = ["-", "-"] if link is None else [number(link["mass"]), numbers(link["com"])]
+        rows.append([joint["joint"], _range(joint["effort"]), *solid])
+    yield from table_lines(rows)
 
 
 def _by_position_row(joint: Mapping[str, Any]) -> list[str]:

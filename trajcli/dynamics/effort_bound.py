@@ -21,7 +21,7 @@ import numpy as np
 from trajcli.curves.bernstein import BETWEEN_NODES, NODES_DEGREE, control_points, hull_matrices
 from trajcli.curves.extrema import critical_points
 from trajcli.curves.piecewise import Array, derivative_coefficients, distinct, horner, taylor_shift
-from trajcli.dynamics.newton_euler import InverseDynamics
+from trajcli.dynamics.newton_euler import InverseDynamics, direction
 from trajcli.frozen import frozen
 from trajcli.kinematics.power_series import growth, series_exponential, series_product
 
@@ -233,7 +233,7 @@ def _known(dynamics: InverseDynamics, starts: Array, lengths: Array, coefficient
     parts = np.empty((*q.shape, _PARTS))
     parts[..., 0], parts[..., 3] = dynamics.apart_from_gravity(q, qd, qdd)
     parts[..., 1] = qd * [joint.friction.viscous for joint in joints]
-    signs = np.sign(qd[:, NODES_DEGREE // 2])
+    signs = direction(qd[:, NODES_DEGREE // 2])
     parts[..., 2] = (signs * [joint.friction.coulomb for joint in joints])[:, None]
     n = NODES_DEGREE + 1
     highest = effort_majorants(dynamics, q[:, 0], growth(coefficients, lengths, n + 2))[n]

@@ -20,7 +20,7 @@ import numpy as np
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, derivative_coefficients, horner
 from trajcli.curves.time_optimal.constraints import ConstraintRows
 from trajcli.curves.time_optimal.time_law import LawPieces
-from trajcli.dynamics.newton_euler import InverseDynamics
+from trajcli.dynamics.newton_euler import InverseDynamics, direction
 from trajcli.frozen import frozen
 
 _MOST = 1e3  # excess that is told: limits lowered by more would be rounding
@@ -65,8 +65,12 @@ class _PathDynamics:
         values[~new] = self._values[index[~new]]
         if new.any():
             values[new] = np.concatenate(self._dynamics.along_path(q[new], first[new], second[new]), axis=1)
-            order = np.argsort(s, kind="stable")
-            self._s, self._states, self._values = s[order], states[order], values[order]
+            every = np.concatenate([s, self._s])
+            order = np.argsort(every, kind="stable")  # of one point the newest comes first
+            order = order[np.append(True, np.diff(every[order]) > 0)]
+            self._s = every[order]
+            self._states = np.concatenate([states, self._states])[order]
+            self._values = np.concatenate([values, self._values])[order]
         return np.split(values, 3, axis=1)
 
 
@@ -132,12 +136,12 @@ class EffortConstraint:
         q = law.along(self.path).transpose(0, 2, 1)[:, None]
         times = np.array(_SAMPLES)[:, None, None] * law.durations[:, None]
         position, rate, change = (horner(derivative_coefficients(q, order), times) for order in range(3))
-        moving, held = self.dynamics.apart_from_gravity(position, rate, change)
-        moving, held = moving + self._viscous * rate, held + self._coulomb * np.sign(rate)
-        upper, lower = self._bounded
-        rooms = np.concatenate(
-            [self.limits[upper, 1] - held[..., upper], held[..., lower] - self.limits[lower, 0]], -1
-        )
+        begins = law.coefficients[-1]
+        states = self.path.evaluate_orders(begins, (0, 1, 2), side="right").transpose(1, 0, 2)
+        # where the limit is met the share is 1 whatever gravity is taken to be: that of the near end is known
+        gravity = self._known.at(begins, *states)[2]
+        moving = self.dynamics.rigid_effort(position, rate, change) - gravity + self._viscous * rate
+        rooms = self._rooms(gravity + self._coulomb * direction(rate))
         used = self._both_bounds(moving)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             shares = np.where(rooms > 0, used / rooms, np.where(used > rooms, _MOST, 0.0))

@@ -40,6 +40,7 @@ from trajcli.kinematics.columns import (
 from trajcli.kinematics.robot import Payload, Robot
 from trajcli.kinematics.serial_chain import blocks, configurations, links_of
 
+_REST = 1e-12  # rad/s or m/s
 _NO_SCREW: tuple[float, ...] = (0.0, 1.0, 0.0)
 
 
@@ -244,14 +245,14 @@ class InverseDynamics:
         return result.reshape(*values.shape, n)
 
     def friction(self, qd: ArrayLike) -> Array:
-        """Return coulomb sign(qd) + viscous qd, shape (*batch, n), N m or N; zero at rest.
+        """Return coulomb sign(qd) + viscous qd, shape (*batch, n), N m or N; zero at rest, up to rounding.
 
         Raises:
             InputError: When qd has not n finite values.
         """
         rates = configurations(self.robot, qd, "qd")
         coulomb, viscous = np.array([(j.friction.coulomb, j.friction.viscous) for j in self.robot.joints]).T
-        return np.asarray(coulomb * np.sign(rates) + viscous * rates)
+        return np.asarray(coulomb * direction(rates) + viscous * rates)
 
     def _matching(self, values: Array, given: ArrayLike, name: str) -> Array:
         """Return rates as an array of the same shape as the joint values."""
@@ -259,6 +260,11 @@ class InverseDynamics:
         if array.shape != values.shape:
             raise InputError(f"{name} has shape {array.shape}, q has shape {values.shape}")
         return array
+
+
+def direction(rates: Array) -> Array:
+    """Return the signs of joint velocities; what rounding leaves of none has no direction."""
+    return np.where(np.abs(rates) > _REST, np.sign(rates), 0.0)
 
 
 def dynamic_links(robot: Robot) -> tuple[DynamicLink, ...]:

@@ -1,4 +1,4 @@
-"""Inline values on the command line: numbers and poses, as YAML or as @FILE for the file that holds it."""
+"""Inline values on the command line: numbers, poses and payloads, as YAML or as @FILE."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from trajcli.errors import InputError, Problem
 from trajcli.job.messages import problems_of
 from trajcli.job.yaml.document import Document
 from trajcli.job.yaml.load import parse_document, read_document
+from trajcli.kinematics.robot import Payload
+from trajcli.language.dynamics import PayloadSpec
 from trajcli.language.numbers import AT_KEY, FlawError, ReadingContext, within_bounds
 from trajcli.language.poses import Pose
 from trajcli.language.targets import PoseFields
@@ -104,6 +106,26 @@ def inline_target(word: str, name: str, units: Units) -> PoseFields:
         hint = "give a position, an orientation or both, such as {xyz: [0.4, 0, 0.3], rpy: [0, 0, 0]}"
         raise InputError(Problem("the target fixes nothing", hint, document.place(())))
     return target
+
+
+def inline_payload(word: str, name: str, units: Units) -> Payload:
+    """Return the payload that a word describes.
+
+    Args:
+        word: As under `attach` in a job, or @FILE.
+        name: What the word is called in messages.
+        units: Of plain numbers; its mass and inertia are in kg and kg m^2 in any.
+
+    Raises:
+        InputError: When it is no payload, or one that no solid has.
+        FileError: When the file cannot be read.
+    """
+    document = inline_document(word, name)
+    try:
+        spec = PayloadSpec.model_validate(document.plain(), context=ReadingContext(units))
+    except ValidationError as error:
+        raise InputError(*problems_of(error, PayloadSpec, document)) from None
+    return spec.as_payload()
 
 
 def read_at(document: Document, units: Units, read: Callable[[Any, ReadingContext], T]) -> T:

@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from trajcli.columns import EFFORT
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount, InputError, Problem
 from trajcli.job.model import Job
@@ -217,6 +218,9 @@ def flaws_of_dynamics(job: Job, robot: Robot, document: Document) -> Iterator[Pr
             yield Problem(f"{robot.name} states no efforts", hint, place)
         elif _limits_any(bounds):
             yield from _lacking(robot, "efforts", document, path)
+    for index, group in enumerate(job.output.columns):
+        if group == EFFORT:
+            yield from _lacking(robot, f"the columns '{EFFORT}'", document, ("output", "columns", index))
     for index, move in enumerate(job.moves):
         if move.handles and robot.convention is None:
             message = f"a payload needs a robot with geometry, {robot.name} has bare joints"

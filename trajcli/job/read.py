@@ -48,6 +48,7 @@ class LoadedJob:
         robot: With the job's limits in force.
         document: For the places of later errors.
         events: Concessions, such as a limit looser than the robot's.
+        source: Where the numbers of the robot come from.
     """
 
     job: Job
@@ -55,6 +56,7 @@ class LoadedJob:
     robot: Robot
     document: Document
     events: tuple[Event, ...]
+    source: str = "the job"
 
     def __repr__(self) -> str:
         tags = ", ".join(move.tag for move in self.job.moves)
@@ -180,7 +182,8 @@ def _load(document: Document) -> LoadedJob:
     name = job.name or ("stdin" if document.file in ("-", "<stdin>") else utf8(Path(document.file).stem))
     if sheet is not None and sheet.concession is not None:
         events = [Event("angles_snapped", sheet.concession), *events]
-    loaded = LoadedJob(job, name, effective, document, (*noted, *events))
+    source = "the job" if sheet is None else sheet.source or _named_source(plain["robot"])
+    loaded = LoadedJob(job, name, effective, document, (*noted, *events), source)
     flaws = [
         *_loosened_by_moves(loaded),
         *_loosened_tool_limits(loaded),
@@ -190,6 +193,11 @@ def _load(document: Document) -> LoadedJob:
     if flaws:
         raise InputError(*sorted(flaws, key=_position))
     return loaded
+
+
+def _named_source(value: Any) -> str:  # noqa: ANN401
+    """Return where a robot comes from whose file does not say it: the file that the job names, or the job."""
+    return str(value["file"]) if isinstance(value, Mapping) and "file" in value else "the job"
 
 
 def _with_limits_file(

@@ -11,6 +11,7 @@ from decimal import Decimal
 import numpy as np
 from numpy.typing import NDArray
 
+from trajcli.columns import EFFORT
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import comparable
@@ -36,6 +37,11 @@ _PER_SECOND = 1_000_000_000
 _LATEST = 2**31 - 1  # s: what a time of ROS 2 can say
 _MOST_POSES = 1000  # of the tool's path
 _POSES_RATE = 60.0  # Hz: more of them show nothing more
+_STATES = {
+    False: "position and velocity; effort is empty: the columns tau were not asked for",
+    True: "position, velocity and effort: N m, or N of prismatic joints, from inverse dynamics",
+}
+"""What is in a message, by whether the job asks for efforts."""
 _DECIMAL = re.compile(r"[0-9]+(?:\.[0-9]+)?")
 
 
@@ -180,7 +186,7 @@ def _metadata(plan: Plan, job: bytes, options: LogOptions) -> Mapping[str, str]:
         "duration": repr(trajectory.duration),
         "epoch": str(_epoch(options)),
         "units": "SI: rad or m by joint, s; epoch in ns",
-        "joint_states": "position and velocity; effort is empty: torques are not known",
+        "joint_states": _STATES[EFFORT in plan.loaded.job.output.columns],
         "joint_accelerations": "accelerations, in the field position: rad/s^2, or m/s^2 of prismatic joints",
         "joint_trajectory": "the knots: quintics between them reproduce the motion as report.json says",
     }

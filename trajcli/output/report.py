@@ -39,6 +39,7 @@ from trajcli.job.report import (
 from trajcli.job.unit_hints import unit_hint
 from trajcli.kinematics.robot import QUANTITIES, JointType, Robot
 from trajcli.knots import Knots, knots_of
+from trajcli.output.efforts import effort_reports, efforts_report, most_used, payload_report
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.lower_bound import NoBound, fastest_duration
 from trajcli.planning.plan import Plan
@@ -82,6 +83,7 @@ def report_of(plan: Plan, *, reference: bool = False, knots: Knots | None = None
         events=[EventReport(kind=e.kind, message=e.message, move=e.move) for e in plan.events],
         steps=_steps(verdict.steps, units),
         unchecked=[UncheckedReport(joint=joint, quantity=quantity) for joint, quantity in verdict.unchecked],
+        efforts=efforts_report(plan),
         unchecked_of_tool=[UncheckedToolReport(quantity=name) for name in verdict.unchecked_of_tool],
         knots=_knots(plan.trajectory, knots or knots_of(plan.trajectory)) if verdict.passed else None,
     )
@@ -143,6 +145,10 @@ def _move(plan: Plan, index: int, *, reference: bool) -> MoveReport:
     nearest = max(near, key=lambda use: use.used or 0.0, default=None)
     if nearest is not None and (binding is None or nearest.used > (binding.used or 0.0)):
         binding = BindingReport(joint=nearest.joint, quantity="velocity_by_position", used=nearest.used)
+    effort = most_used(plan, index)
+    used_most = 0.0 if effort is None else effort.used or 0.0
+    if effort is not None and (binding is None or used_most > (binding.used or 0.0)):
+        binding = BindingReport(joint=effort.joint, quantity="effort", used=used_most)
     return MoveReport(
         index=span.index,
         planner=span.planner,
@@ -153,6 +159,8 @@ def _move(plan: Plan, index: int, *, reference: bool) -> MoveReport:
         stretch=move.stretch,
         peaks=peaks,
         velocity_by_position=near or None,
+        efforts=effort_reports(plan, index),
+        payload=payload_report(span.payload),
         binding=binding,
         waypoints=_waypoints(move, span),
         outside=_outside(move, plan.verdict, index),

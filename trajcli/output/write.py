@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trajcli.columns import Column, Group, columns_of
+from trajcli.columns import EFFORT, Column, Group, columns_of
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.grids import Grid, ListedGrid, UniformGrid
@@ -69,7 +69,8 @@ def write_rows(
     rows: Iterator[Array] = iter(())
     columns: tuple[Column, ...] = ()
     if form.content != "knots":
-        groups = tuple(loaded.job.output.columns) if form.content == "rows" else _groups_of_log(log)
+        asked = tuple(loaded.job.output.columns)
+        groups = asked if form.content == "rows" else _groups_of_log(log, asked)
         units = Units() if form.si else loaded.output_units
         columns = columns_of(groups, loaded.robot.joint_types, units)
         rows = _counted(sample(plan.trajectory, grid, groups, units, robot=loaded.robot), grid.count)
@@ -96,10 +97,11 @@ def _write_options(plan: Plan, form: StreamFormat, digits: Digits, log: LogOptio
     return WriteOptions(digits)
 
 
-def _groups_of_log(log: LogOptions | None) -> tuple[Group, ...]:
-    """Return the columns that the messages of a log are made of."""
+def _groups_of_log(log: LogOptions | None, asked: Sequence[Group]) -> tuple[Group, ...]:
+    """Return the columns that the messages of a log are made of: efforts where the job asks for them."""
     twist: tuple[Group, ...] = ("twist",) if log is not None and "/tool_twist" in log.names else ()
-    return ("t", "q", "qd", "qdd", *twist)
+    efforts: tuple[Group, ...] = (EFFORT,) if EFFORT in asked else ()
+    return ("t", "q", "qd", "qdd", *twist, *efforts)
 
 
 def _counted(blocks: Iterator[Array], count: int) -> Iterator[Array]:

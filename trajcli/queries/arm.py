@@ -129,6 +129,7 @@ def open_arm(
     name: str,
     tool: str | None = None,
     *,
+    base: str | None = None,
     units: str | None = None,
     si: bool = False,
     frame: Literal["world", "base"] = "world",
@@ -138,12 +139,13 @@ def open_arm(
     Args:
         name: Of a robot in the catalogue, or the path of a robot file or a job.
         tool: T_flange_tcp as YAML or @FILE, instead of the robot's own and the job's.
+        base: T_world_base likewise.
         units: Of numbers, such as "deg,mm"; what it leaves out is as in the file.
         si: Whether numbers are in rad and m, whatever units the file has.
         frame: "base" counts poses from the robot's base, as if it stood at the world's origin.
 
     Raises:
-        InputError: When there is no such robot, it has no geometry, the tool is no pose, or units are unknown
+        InputError: When there is no such robot, it has no geometry, a pose is none, or units are unknown
             or given twice.
         FileError: When a file cannot be read.
     """
@@ -155,6 +157,8 @@ def open_arm(
     links_of(robot)  # refuses bare joints before anything is read or written
     if tool is not None:
         robot = replace(robot, tool=inline_pose(tool, "--tool", shown))
+    if base is not None:
+        robot = replace(robot, base=inline_pose(base, "--base", shown))
     return ArmInUnits(replace(robot, base=np.eye(4)) if frame == "base" else robot, shown)
 
 

@@ -36,7 +36,7 @@ class Stream(NamedTuple):
     blocks: Iterator[Array]
 
 
-class _JointColumns(NamedTuple):
+class JointColumns(NamedTuple):
     """Index of the time's column, and index, SI per unit and unit of each joint's column."""
 
     time: int | None
@@ -83,14 +83,14 @@ def poses_of(arm: ArmInUnits, rows: TableBlocks, watch: LimitWatch | None = None
     Raises:
         InputError: When a joint has no column, or one of another unit; when taken, if a row is wrong.
     """
-    inputs = _joint_columns(arm.robot, rows)
+    inputs = joint_columns(arm.robot, rows)
     groups: tuple[Group, ...] = ("pose",) if inputs.time is None else ("t", "pose")
     columns = columns_of(groups, arm.robot.joint_types, arm.units)
     return Stream(columns, _poses(arm, rows, inputs, watch))
 
 
 def _poses(
-    arm: ArmInUnits, rows: TableBlocks, inputs: _JointColumns, watch: LimitWatch | None
+    arm: ArmInUnits, rows: TableBlocks, inputs: JointColumns, watch: LimitWatch | None
 ) -> Iterator[Array]:
     last = None
     for block in rows.blocks:
@@ -122,7 +122,7 @@ def jacobians_of(
     Raises:
         InputError: As `poses_of`.
     """
-    inputs = _joint_columns(arm.robot, rows)
+    inputs = joint_columns(arm.robot, rows)
     entries = [f"J{i}{j}" for i in range(1, 7) for j in range(1, len(arm.robot.joints) + 1)]
     time = [] if inputs.time is None else ["t"]
     columns = map(parse_column, [*time, "manipulability", "inverse_condition", *entries])
@@ -132,7 +132,7 @@ def jacobians_of(
 def _jacobians(
     arm: ArmInUnits,
     rows: TableBlocks,
-    inputs: _JointColumns,
+    inputs: JointColumns,
     frame: ReferenceFrame,
     watch: LimitWatch | None,
 ) -> Iterator[Array]:
@@ -147,14 +147,24 @@ def _jacobians(
         yield np.hstack([inputs.times(block), columns, entries])
 
 
-def _joint_columns(robot: Robot, rows: TableBlocks) -> _JointColumns:
+def joint_columns(robot: Robot, rows: TableBlocks, kind: str = "q") -> JointColumns:
+    """Return where the values of the joints stand, or derivatives of them.
+
+    Args:
+        robot: With n joints.
+        rows: A file.
+        kind: "q", "qd" or "qdd".
+
+    Raises:
+        InputError: When a joint has no such column, or one of another unit.
+    """
     by_joint: dict[int, tuple[int, Column]] = {}
     time = None
     for index, name in enumerate(rows.names):
         column = parse_column(name)
         if column.kind == "t" and column.unit is None:
             time = index
-        if column.kind != "q" or column.joint is None:
+        if column.kind != kind or column.joint is None:
             continue
         flaw = _flaw(robot, column, by_joint)
         if flaw:
@@ -162,17 +172,17 @@ def _joint_columns(robot: Robot, rows: TableBlocks) -> _JointColumns:
             place = Place(rows.file, 1, start, ",".join(rows.names), len(name))
             raise InputError(Problem(*flaw, place))
         by_joint[column.joint] = index, column
-    missing = [f"q{i + 1}" for i in range(len(robot.joints)) if i not in by_joint]
+    missing = [f"{kind}{i + 1}" for i in range(len(robot.joints)) if i not in by_joint]
     if missing:
         place = Place(rows.file, 1, 1, ",".join(rows.names))
         message = f"{robot.name} has {len(robot.joints)} joints, and there is no column {', '.join(missing)}"
-        hint = "columns are called q1 in SI, q1_deg or q1_mm otherwise"
+        hint = f"columns are called {kind}1 in SI, {kind}1_deg or {kind}1_mm otherwise"
         raise InputError(Problem(message, hint, place))
     columns = [by_joint[i] for i in range(len(robot.joints))]
     indices = np.array([index for index, _ in columns])
     si = ["m" if kind == "prismatic" else "rad" for kind in robot.joint_types]
     units = [column.unit or plain for (_, column), plain in zip(columns, si, strict=True)]
-    return _JointColumns(time, indices, np.array([column.factor for _, column in columns]), units)
+    return JointColumns(time, indices, np.array([column.factor for _, column in columns]), units)
 
 
 def _flaw(
@@ -188,5 +198,5 @@ def _flaw(
     unit = "mm" if kind == "prismatic" else "deg"
     if column.unit not in (None, unit):
         message = f"{column.name} cannot be in {column.unit}: {robot.joint_names[joint]} is {kind}"
-        return message, f"expected q{joint + 1} or q{joint + 1}_{unit}"
+        return message, f"expected {column.kind}{joint + 1} or {column.kind}{joint + 1}_{unit}"
     return None

@@ -14,7 +14,7 @@ from trajcli.frozen import comparable
 from trajcli.job.robot import RobotSheet
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.families.choose import method_for
-from trajcli.kinematics.robot import QUANTITIES, Robot
+from trajcli.kinematics.robot import QUANTITIES, Friction, Robot
 from trajcli.queries.pose import pose_view
 from trajcli.suggest import did_you_mean
 from trajcli.units import Quantity, factor, joint_quantity, to_user
@@ -182,6 +182,7 @@ def robot_card(name: str, sheet: RobotSheet) -> dict[str, Any]:
         "units": asdict(units),
         "convention": robot.convention,
         "joints": [_joint_card(sheet, index) for index in range(len(robot.joints))],
+        "dynamics": [_dynamics_card(sheet, index) for index in range(len(robot.joints))],
         "base": pose_view(robot.base, units),
         "tool": pose_view(robot.tool, units),
         "mobility": len(robot.joints),
@@ -218,6 +219,22 @@ def _joint_card(sheet: RobotSheet, index: int) -> dict[str, Any]:
         limits["velocity_by_position"] = {name: _finite(value) for name, value in both}
     described = table if sheet.robot.convention is not None else {}
     return {"name": joint.name, "type": joint.type, **described, "sign": joint.sign, **limits}
+
+
+def _dynamics_card(sheet: RobotSheet, index: int) -> dict[str, Any]:
+    """Return effort, friction, rotor and link of a joint, SI but for the centre of mass."""
+    joint, length = sheet.robot.joints[index], factor(Quantity("length"), sheet.units)
+    effort = [_finite(bound) for bound in joint.effort]
+    link = joint.link
+    solid = link and {
+        "mass": link.mass,
+        "com": [round(x / length, 12) for x in link.com],
+        "inertia": list(link.inertia),
+    }
+    known: dict[str, Any] = {"friction": asdict(joint.friction) if joint.friction != Friction() else None}
+    known["rotor"] = joint.rotor or None
+    given = {key: value for key, value in known.items() if value is not None}
+    return {"joint": joint.name, "effort": effort if effort != [None, None] else None, **given, "link": solid}
 
 
 def _finite(value: float) -> float | None:

@@ -13,7 +13,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from trajcli.columns import JOINT_ORDERS, Column, group_of, kinds_of, require_finite
+from trajcli.columns import JOINT_GROUPS, Column, group_of, kinds_of, require_finite
 from trajcli.curves.piecewise import Array
 from trajcli.errors import FileError, InputError, Place, Problem, TrajcliError
 from trajcli.frozen import frozen
@@ -172,12 +172,12 @@ def _columns_of_object(value: Mapping[str, Any], file: str) -> tuple[Column, ...
         kinds = kinds_of(key)
         if count is None:
             columns.append(Column(key))
-        elif key in JOINT_ORDERS:
+        elif key in JOINT_GROUPS:
             columns += [Column(key, joint) for joint in range(count)]
         elif len(kinds) == count:
             columns += [Column(kind) for kind in kinds]
         else:
-            lists = ", ".join([*JOINT_ORDERS, "pose, twist, twistd, path"])
+            lists = ", ".join([*JOINT_GROUPS, "pose, twist, twistd, path"])
             hint = f"{key} has {', '.join(kinds)}" if kinds else f"lists are {lists}"
             raise InputError(Problem(f"unexpected list '{key}' of {count} numbers", hint, Place(file, 1, 1)))
     return tuple(columns)

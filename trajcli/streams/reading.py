@@ -88,7 +88,9 @@ def _begins_as_mcap(path: str | Path) -> bool:
 def _table(motion: LoggedMotion | JointMessage) -> Table:
     """Return a motion under the names of a CSV file in SI."""
     names, parts = ["t"], [motion.times[:, None]]
-    for kind, values in (("q", motion.position), ("qd", motion.velocity), ("qdd", motion.acceleration)):
+    states = {"q": motion.position, "qd": motion.velocity, "qdd": motion.acceleration}
+    states["tau"] = getattr(motion, "effort", motion.position[:, :0])
+    for kind, values in states.items():
         names += [f"{kind}{joint + 1}" for joint in range(values.shape[1])]
         parts.append(values)
     decimals = np.full(len(names), _ALL_DECIMALS, dtype=np.int64)

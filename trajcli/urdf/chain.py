@@ -34,6 +34,7 @@ class UrdfJoint:
         sign: 1 or -1: its axis is 0 0 sign.
         origin: Pose of its frame at q = 0 in the frame of the link before, shape (4, 4).
         skeleton: Points from its frame's origin to that of the next joint, in its frame, shape (k, 3), m.
+        row: Pose of the frame of its Denavit-Hartenberg row in its frame, shape (4, 4).
     """
 
     name: str
@@ -42,10 +43,11 @@ class UrdfJoint:
     sign: int
     origin: Array
     skeleton: Array
+    row: Array
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "origin", read_only(self.origin))
-        object.__setattr__(self, "skeleton", read_only(self.skeleton))
+        for name in ("origin", "skeleton", "row"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
 
 
 @frozen
@@ -114,7 +116,13 @@ def chain_of(robot: Robot) -> UrdfChain:
     origins, skeletons = zip(*map(_product, parts), strict=True)
     joints = [
         UrdfJoint(
-            joint.name, f"link_{k + 1}", joint.type == "prismatic", joint.sign, origins[k], skeletons[k + 1]
+            joint.name,
+            f"link_{k + 1}",
+            joint.type == "prismatic",
+            joint.sign,
+            origins[k],
+            skeletons[k + 1],
+            _product(after[k])[0],
         )
         for k, joint in enumerate(robot.joints)
     ]

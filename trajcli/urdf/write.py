@@ -1,7 +1,8 @@
 """Text of a robot in URDF: joints with limits, and simple shapes of the links.
 
 URDF has no negative DH direction, but axes: a joint of sign -1 has the axis 0 0 -1. Lengths are in m, angles
-in rad. What URDF cannot say is in a comment: limits of acceleration and jerk, bounds of one side.
+in rad. What URDF cannot say is in a comment: limits of acceleration and jerk, bounds of one side. Limits of
+velocity by position stand in Franka's element for them.
 
 Source: the URDF XML specification of urdfdom, version 1.0 (https://wiki.ros.org/urdf/XML).
 """
@@ -17,7 +18,7 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.geometry.euler import rpy_from_matrix
-from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.robot import LinkInertia, Robot
 from trajcli.urdf.chain import FIRST_LINK, TOOL, WORLD, UrdfJoint, chain_of
 
 UNLIMITED = 1e6
@@ -67,7 +68,9 @@ def urdf_of(robot: Robot) -> str:
     for number, (parent, joint) in enumerate(zip(chain.links, chain.joints, strict=False)):
         lines += _moving(joint, parent, robot, number)
         shapes = _tube(joint.skeleton, radius) + _rod(joint, robot.limits.position[number], radius)
-        lines += _link(joint.link, shapes, radius, ("orange", "grey")[number % 2])
+        solid = robot.joints[number].link
+        inertial = [] if solid is None else [_inertial(solid, joint.row)]
+        lines += _link(joint.link, shapes, radius, ("orange", "grey")[number % 2], inertial)
     lines += [f'  <link name="{TOOL}"/>']
     lines += _fixed(_free("tool_fixed_joint", names), chain.links[-1], TOOL, chain.tool)
     return _HEAD.format(unlimited=UNLIMITED) + "\n".join([*lines, "</robot>"]) + "\n"
@@ -99,6 +102,10 @@ def _moving(joint: UrdfJoint, parent: str, robot: Robot, number: int) -> Iterato
     yield f"    {_origin(joint.origin)}"
     yield f'    <axis xyz="0 0 {joint.sign}"/>'
     yield f'    <limit {span}effort="{effort}" velocity="{velocity!r}"/>'
+    deceleration, offset = robot.limits.velocity_by_position[number].tolist()
+    if np.isfinite(deceleration):
+        near = f'deceleration_limit="{deceleration!r}" velocity_offset="{offset!r}"'
+        yield f"    <position_based_velocity_limits {near}/>"
     friction = robot.joints[number].friction
     if friction.coulomb or friction.viscous:
         yield f'    <dynamics damping="{friction.viscous!r}" friction="{friction.coulomb!r}"/>'
@@ -109,11 +116,23 @@ def _bounded(value: float) -> float:
     return float(np.clip(value, -UNLIMITED, UNLIMITED))
 
 
-def _link(name: str, shapes: Sequence[str], radius: float, colour: str) -> Iterator[str]:
+def _link(
+    name: str, shapes: Sequence[str], radius: float, colour: str, inertial: Sequence[str] = ()
+) -> Iterator[str]:
     yield f'  <link name="{name}">'
+    yield from (f"    {line}" for line in inertial)
     for shape in [f'<geometry><sphere radius="{_JOINT_RADIUS * radius:.6g}"/></geometry>', *shapes]:
         yield f'    <visual>{shape}<material name="{colour}"/></visual>'
     yield "  </link>"
+
+
+def _inertial(solid: LinkInertia, row: Array) -> str:
+    """Return the element of a link's mass: its axes are those of the row's frame, given in the link's."""
+    pose = row.copy()
+    pose[:3, 3] += row[:3, :3] @ np.array(solid.com)
+    names = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+    tensor = " ".join(f'{name}="{value!r}"' for name, value in zip(names, solid.inertia, strict=True))
+    return f'<inertial>{_origin(pose)}<mass value="{solid.mass!r}"/><inertia {tensor}/></inertial>'
 
 
 def _tube(points: Array, radius: float) -> list[str]:

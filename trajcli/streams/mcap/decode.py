@@ -32,6 +32,7 @@ class JointSeries:
         position: Shape (N, n), or (N, 0) where the messages have none, as the others.
         velocity: Likewise.
         acceleration: Likewise.
+        effort: Likewise.
     """
 
     names: tuple[str, ...]
@@ -39,6 +40,7 @@ class JointSeries:
     position: Array
     velocity: Array
     acceleration: Array
+    effort: Array
 
 
 @comparable
@@ -151,7 +153,7 @@ def joint_states(data: Bytes, starts: NDArray[np.int64], lengths: NDArray[np.int
             part = np.ascontiguousarray(raw[:, at : at + 8 * number])
             out[alike] = part.view(layout.order + "f8") if number else part.astype(np.float64)
         left = np.setdiff1d(left, alike, assume_unique=True)
-    return JointSeries(first.names, stamps, values[0], values[1], np.empty((count, 0)))
+    return JointSeries(first.names, stamps, values[0], values[1], np.empty((count, 0)), values[2])
 
 
 def _fits(raw: Bytes, layout: _StateLayout) -> NDArray[np.bool_]:
@@ -188,11 +190,10 @@ def joint_trajectory(message: bytes) -> JointSeries:
     cursor.need(24 * count)
     times, states = np.empty(count, np.int64), []
     for k in range(count):
-        states.append([cursor.values() for _ in range(3)])
-        cursor.sequence()
+        states.append([cursor.values() for _ in range(4)])
         times[k] = cursor.time()
         sizes = [each.size for each in states[k]]
         if sizes != [each.size for each in states[0]] or not {*sizes} <= {0, len(names)}:
             raise DamagedMessageError(f"its point {k} has {sizes} values for {len(names)} joints")
-    columns = [np.array([state[order] for state in states]).reshape(count, -1) for order in range(3)]
-    return JointSeries(names, times, columns[0], columns[1], columns[2])
+    columns = [np.array([state[order] for state in states]).reshape(count, -1) for order in range(4)]
+    return JointSeries(names, times, columns[0], columns[1], columns[2], columns[3])

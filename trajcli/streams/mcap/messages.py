@@ -97,12 +97,19 @@ def single_record(channel: int, time: int, data: bytes) -> bytes:
     return records.MESSAGE_HEAD.pack(records.MESSAGE, content, channel, 0, time, time) + data
 
 
-def row_message(topic: str, joint_names: tuple[str, ...]) -> MessageLayout:
-    """Return the layout of a topic with one message for each row."""
+def row_message(topic: str, joint_names: tuple[str, ...], *, efforts: bool = False) -> MessageLayout:
+    """Return the layout of a topic with one message for each row.
+
+    Args:
+        topic: Which.
+        joint_names: n names.
+        efforts: Whether states hold efforts, too.
+    """
     layout, count = MessageLayout(), len(joint_names)
     if topic == JOINT_STATES:
         named = layout.header("").texts(joint_names)
-        return named.sequence("position", count).sequence("velocity", count).count(0)
+        named = named.sequence("position", count).sequence("velocity", count)
+        return named.sequence("effort", count) if efforts else named.count(0)
     if topic == JOINT_ACCELERATIONS:
         return layout.header("").texts(joint_names).sequence("acceleration", count).count(0).count(0)
     if topic == TOOL_TWIST:

@@ -36,9 +36,9 @@ Times = NDArray[np.int64]
 _PER_SECOND = 1e9
 _TRANSFORMS_RATE = 60.0  # Hz: what a screen shows
 _MOST = 4096  # rows, and transforms, in a chunk
-_NAMES = {"q": "position", "qd": "velocity", "qdd": "acceleration"}
+_NAMES = {"q": "position", "qd": "velocity", "qdd": "acceleration", "tau": "effort"}
 _KINDS: Mapping[str, tuple[str, ...]] = {
-    JOINT_STATES: ("q", "qd"),
+    JOINT_STATES: ("q", "qd", "tau"),
     JOINT_ACCELERATIONS: ("qdd",),
     TRAJECTORY_POINT: ("q", "qd", "qdd"),
 }
@@ -71,8 +71,12 @@ class RowRecords:
 
     def __init__(self, topics: Mapping[str, int], columns: Sequence[Column], recording: Recording) -> None:
         self._epoch, self._origin = recording.epoch, recording.origin
+        kinds = [column.kind for column in columns]
+        self._where = {kind: slice(kinds.index(kind), _end(kinds, kind)) for kind in dict.fromkeys(kinds)}
+        self._kinds = {**_KINDS, JOINT_STATES: tuple(k for k in _KINDS[JOINT_STATES] if k in self._where)}
+        efforts = "tau" in self._where
         self._layouts = {
-            topic: record_layout(topics[topic], row_message(topic, recording.joint_names))
+            topic: record_layout(topics[topic], row_message(topic, recording.joint_names, efforts=efforts))
             for topic in BY_ROW
             if topic in topics
         }
@@ -82,8 +86,6 @@ class RowRecords:
         self._template = np.frombuffer(b"".join(each.template for each in self._layouts.values()), np.uint8)
         self._raw = np.empty((0, self._template.size), np.uint8)
         self._count = 0
-        kinds = [column.kind for column in columns]
-        self._where = {kind: slice(kinds.index(kind), _end(kinds, kind)) for kind in dict.fromkeys(kinds)}
 
     def of_block(self, block: Array) -> RecordGroup:
         """Return the records of rows (N, m), SI; they hold until the next ones are asked for."""
@@ -97,7 +99,7 @@ class RowRecords:
         for topic, layout in self._layouts.items():
             messages = _structures(raw, self._starts[topic], layout)
             _put_heads(messages, numbers, times)
-            for kind in _KINDS.get(topic, ()):
+            for kind in self._kinds.get(topic, ()):
                 messages[_NAMES[kind]] = block[:, self._where[kind]]
             if topic == TOOL_TWIST:
                 first = self._where["vx"].start

@@ -35,6 +35,7 @@ class LoggedMotion:
         position: Shape (N, n), or (N, 0) where it is not given, as the others.
         velocity: Likewise.
         acceleration: Likewise.
+        effort: Likewise.
     """
 
     file: str
@@ -44,6 +45,7 @@ class LoggedMotion:
     position: Array
     velocity: Array
     acceleration: Array
+    effort: Array
 
 
 def read_mcap(path: str | Path, topic: str | None = None) -> LoggedMotion:
@@ -156,10 +158,10 @@ def _joined(parts: Sequence[JointSeries], file: str, topic: str) -> JointSeries:
     if not parts or not sum(part.nanoseconds.size for part in parts):
         raise InputError(f"the topic {topic} of {file} has no messages")
     first = parts[0]
-    shapes = [part.position.shape[1:] + part.velocity.shape[1:] for part in parts]
+    shapes = [part.position.shape[1:] + part.velocity.shape[1:] + part.effort.shape[1:] for part in parts]
     if any(part.names != first.names for part in parts) or len({*shapes}) > 1:
         raise InputError(f"the messages of {topic} in {file} are about different joints or quantities")
-    arrays = ("nanoseconds", "position", "velocity", "acceleration")
+    arrays = ("nanoseconds", "position", "velocity", "acceleration", "effort")
     joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in arrays}
     return JointSeries(names=first.names, **joined)
 
@@ -177,8 +179,8 @@ def _motion(file: str, topic: str, series: JointSeries, own: Mapping[str, str]) 
     start = int(stamps[0]) if stamps[0] >= _CLOCK else 0
     if epoch.isdigit() and stamps[0] >= int(epoch):
         start = int(epoch)
-    parts = (series.position, series.velocity, series.acceleration)
-    for what, values in zip(("position", "velocity", "acceleration"), parts, strict=True):
+    parts = (series.position, series.velocity, series.acceleration, series.effort)
+    for what, values in zip(("position", "velocity", "acceleration", "effort"), parts, strict=True):
         finite = np.isfinite(values)
         if not finite.all():
             row, joint = np.argwhere(~finite)[0].tolist()

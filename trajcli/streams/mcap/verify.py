@@ -34,12 +34,13 @@ def verify_mcap(
     written.seek(0)
     log = _StatesReadBack(written)
     where = {
-        kind: [k for k, column in enumerate(columns) if column.kind == kind] for kind in ("q", "qd", "qdd")
+        kind: [k for k, column in enumerate(columns) if column.kind == kind]
+        for kind in ("q", "qd", "qdd", "tau")
     }
     count = 0
     for block in rows:
         times = np.rint(block[:, 0] * 1e9).astype(np.int64) + recording.epoch
-        states = {JOINT_STATES: ("q", "qd"), JOINT_ACCELERATIONS: ("qdd",)}
+        states = {JOINT_STATES: ("q", "qd", "tau"), JOINT_ACCELERATIONS: ("qdd",)}
         for topic, kinds in states.items():
             read = log.take(topic, len(block))
             if not np.array_equal(read[0], times):
@@ -70,14 +71,14 @@ class _StatesReadBack:
         self._counts: dict[int, int] = {}
 
     def take(self, topic: str, count: int) -> tuple[Array, ...]:
-        """Return times, positions and velocities of the next messages of a topic."""
+        """Return times, positions, velocities and efforts of the next messages of a topic."""
         parts = self._left[topic]
         while sum(part.nanoseconds.size for part in parts) < count:
             block = next(self._blocks, None)
             if block is None:
                 raise TrajcliError(f"the file read back has too few messages of {topic}")
             self._note(block)
-        names = ("nanoseconds", "position", "velocity")
+        names = ("nanoseconds", "position", "velocity", "effort")
         whole = [np.concatenate([getattr(part, name) for part in parts]) for name in names]
         rest = {name: values[count:] for name, values in zip(names, whole, strict=True)}
         self._left[topic] = [JointSeries(parts[0].names, **rest, acceleration=rest["position"][:, :0])]

@@ -1,0 +1,73 @@
+"""Masses, inertias and efforts of the catalogue, against pinocchio on the URDFs that they come from.
+
+Oracle: `catalogue_efforts.yaml`, recorded from pinocchio, which reads the URDFs itself.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from trajcli.dynamics.newton_euler import InverseDynamics
+from trajcli.job.robot import catalogue_names, load_robot, load_sheet
+from trajcli.urdf.limits import LEAST_PLACEHOLDER_EFFORT
+from trajcli.urdf.robot import robot_of_urdf
+from trajcli.urdf.write import urdf_of
+
+HEAVY = [name for name in catalogue_names() if not load_robot(name).without_inertia]
+
+
+@cache
+def cases() -> list[dict[str, Any]]:
+    file = Path(__file__).parents[1] / "oracles" / "catalogue_efforts.yaml"
+    found: list[dict[str, Any]] = yaml.safe_load(file.read_text(encoding="utf-8"))["cases"]
+    return found
+
+
+def test_every_arm_with_inertias_was_recorded() -> None:
+    assert set(HEAVY) == {case["arm"] for case in cases()}
+    assert len(HEAVY) == 14
+
+
+@pytest.mark.parametrize("number", range(len(cases())))
+def test_efforts_are_those_of_pinocchio(number: int) -> None:
+    case = cases()[number]
+    q, qd, qdd = (np.array(case[key]) for key in ("q", "qd", "qdd"))
+    tau = InverseDynamics(load_robot(case["arm"])).rigid_effort(q, qd, qdd)
+    assert tau == pytest.approx(case["tau"], rel=1e-10, abs=1e-10 * np.abs(case["tau"]).max())
+
+
+@pytest.mark.parametrize("name", HEAVY)
+def test_a_file_has_all_links_or_none_and_says_where_they_come_from(name: str) -> None:
+    sheet = load_sheet(name)
+    assert "inertia" in (sheet.source or "")
+    for joint in sheet.robot.joints:
+        bounds = np.array(joint.effort)
+        assert np.isinf(bounds).all() or (np.abs(bounds) < LEAST_PLACEHOLDER_EFFORT).all()
+    assert not sheet.robot.limits.has_effort  # they count where a job says so
+
+
+@pytest.mark.parametrize("name", catalogue_names())
+def test_no_arm_has_some_links_only(name: str) -> None:
+    assert len(load_robot(name).without_inertia) in (0, len(load_robot(name).joints))
+
+
+@pytest.mark.parametrize("name", [*HEAVY, "fr3"])
+def test_a_urdf_that_is_written_has_the_same_dynamics_and_limits(name: str) -> None:
+    robot = load_robot(name)
+    read = robot_of_urdf(urdf_of(robot).encode(), "written", exact=True).robot
+    generator = np.random.default_rng(3)
+    q, qd, qdd = generator.uniform(-2, 2, (3, 20, len(robot.joints)))
+    tau = InverseDynamics(robot).rigid_effort(q, qd, qdd)
+    assert InverseDynamics(read).rigid_effort(q, qd, qdd) == pytest.approx(tau, rel=1e-9, abs=1e-9)
+    assert [joint.effort for joint in read.joints] == [joint.effort for joint in robot.joints]
+    bounded = np.isfinite(robot.limits.velocity_by_position[:, 0])
+    assert read.limits.velocity_by_position[bounded] == pytest.approx(
+        robot.limits.velocity_by_position[bounded]
+    )
+    assert read.limits.has_velocity_by_position == (name == "fr3")

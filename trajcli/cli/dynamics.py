@@ -1,0 +1,108 @@
+"""Inverse dynamics on the command line: `trajcli dynamics`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from trajcli.cli.numbers import matrix_lines, number, table_lines
+from trajcli.cli.outcome import print_json, print_lines, print_remark
+from trajcli.errors import InputError
+from trajcli.frozen import comparable
+from trajcli.job.inline import inline_payload
+from trajcli.kinematics.robot import Robot
+from trajcli.queries.arm import ArmInUnits, LimitWatch, beyond_two_turns, open_arm
+from trajcli.queries.dynamics import dynamics_report, efforts_of, left_out
+from trajcli.streams.decimals import Digits
+from trajcli.streams.whole_file import standard_output
+from trajcli.units import effort_unit
+
+
+@comparable
+class DynamicsOptions:
+    """What the command line says beside robot and joints; see `trajcli dynamics --help`."""
+
+    tool: str | None = None
+    base: str | None = None
+    payload: str | None = None
+    rates: str | None = None
+    accelerations: str | None = None
+    units: str | None = None
+    si: bool = False
+    as_json: bool = False
+    digits: Digits = "fixed"
+
+
+def run_dynamics(robot: str, words: Sequence[str], options: DynamicsOptions) -> int:
+    """Print the efforts of a state, or those of each row of standard input; return the exit code.
+
+    Raises:
+        InputError: When robot, joints, rates, payload or rows are not as they should be.
+        FileError: When a file cannot be read, or standard output not written.
+    """
+    arm = open_arm(robot, options.tool, base=options.base, units=options.units, si=options.si)
+    if options.payload is not None:
+        payload = inline_payload(options.payload, "--payload", arm.units)
+        arm = replace(arm, robot=replace(arm.robot, payload=payload))
+    if list(words) == ["-"]:
+        return _stream(arm, options)
+    q = arm.joint_values(words)
+    given = (("--qd", options.rates, 1), ("--qdd", options.accelerations, 2))
+    qd, qdd = (
+        np.zeros_like(q) if text is None else arm.joint_values([text], name, order)
+        for name, text, order in given
+    )
+    remark = beyond_two_turns(arm.robot, q[None], [arm.joint_unit(i) for i in range(len(q))])
+    if remark is not None:
+        print_remark(remark)
+    report = dynamics_report(arm, q, qd, qdd)
+    if options.as_json:
+        print_json(report)
+    else:
+        print_lines(_lines(arm.robot, report))
+    return 0
+
+
+def _lines(robot: Robot, report: dict[str, Any]) -> Iterator[str]:
+    carried = "" if robot.payload is None else f" with {robot.payload.mass:.9g} kg"
+    units = ", ".join(dict.fromkeys(map(effort_unit, robot.joint_types)))
+    yield f"efforts of {robot.name}{carried} ({units}):"
+    efforts = [report[key] for key in ("tau", "gravity", "coriolis", "friction")]
+    rows = [["joint", "tau", "gravity", "Coriolis", "friction", "limit", "% used"]]
+    for index, joint in enumerate(robot.joints):
+        values = [each[index] for each in efforts]
+        low, high = robot.limits.effort[index].tolist()
+        bounds = (low, high) if np.isfinite((low, high)).any() else joint.effort
+        rows.append([joint.name, *map(number, values), *_used(values[0], bounds)])
+    yield from table_lines(rows)
+    yield "mass matrix, rotors included (kg m^2; kg m and kg where joints slide):"
+    yield from matrix_lines(report["mass_matrix"])
+
+
+def _used(tau: float, bounds: tuple[float, float]) -> tuple[str, str]:
+    """Return the bound on the side of an effort, in force or else the robot's own, and the part used."""
+    bound = bounds[tau > 0]
+    return ("-", "-") if np.isinf(bound) else (number(bound), f"{100 * tau / bound:.4g}")
+
+
+def _stream(arm: ArmInUnits, options: DynamicsOptions) -> int:
+    from trajcli.streams.csv import write_csv
+    from trajcli.streams.table import open_rows
+
+    given = {"--json": options.as_json, "--qd": options.rates, "--qdd": options.accelerations}
+    for name, value in given.items():
+        if value:
+            raise InputError(f"{name} is for one state, rows from standard input become a CSV")
+    watch, rows = LimitWatch(arm.robot), open_rows("-")
+    columns, blocks = efforts_of(arm, rows, watch)
+    missing = left_out(rows)
+    with standard_output() as out:
+        write_csv(blocks, columns, out, options.digits)
+    if missing:
+        print_remark(f"without columns {' and '.join(missing)}, which count as zero")
+    if watch.remark is not None:
+        print_remark(watch.remark)
+    return 0

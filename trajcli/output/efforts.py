@@ -1,0 +1,100 @@
+"""Efforts in reports: extremes, share of gravity and head room of each joint, and what was judged by what."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Literal
+
+from trajcli.job.report import EffortReport, EffortsReport, PayloadReport
+from trajcli.kinematics.robot import Payload, Robot
+from trajcli.language.efforts import OF_ROBOT
+from trajcli.planning.plan import Plan
+from trajcli.units import effort_unit
+
+if TYPE_CHECKING:
+    from trajcli.checks.effort import MoveEfforts
+    from trajcli.dynamics.effort_bound import EffortPeak
+
+
+def payload_report(payload: Payload | None) -> PayloadReport | None:
+    """Return what the tool carries, in SI; None where it is nothing."""
+    if payload is None:
+        return None
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = payload.inertia.tolist()
+    inertia = [xx, yy, zz, xy, xz, yz]
+    return PayloadReport(mass=payload.mass, com=payload.com.tolist(), inertia=inertia)
+
+
+def effort_reports(plan: Plan, index: int) -> list[EffortReport] | None:
+    """Return the extremes of the efforts in a move, a report for each joint; None where none are limited."""
+    efforts = plan.verdict.efforts[index] if index < len(plan.verdict.efforts) else None
+    if efforts is None:
+        return None
+    robot, start = plan.moves[index].robot, plan.trajectory.curve.start
+    return [_report(robot, joint, efforts, start) for joint in range(len(robot.joints))]
+
+
+def _report(robot: Robot, joint: int, efforts: MoveEfforts, start: float) -> EffortReport:
+    high, low = efforts.highest[joint], efforts.lowest[joint]
+    lower, upper = robot.limits.effort[joint].tolist()
+    used = max(high.most / upper, low.most / -lower)
+    upwards = high.most / upper >= low.most / -lower if used > 0 else high.value >= low.value
+    worst, sign, limit = (high, 1, upper) if upwards else (low, -1, -lower)
+    kind: Literal["N m", "N"] = "N" if effort_unit(robot.joint_types[joint]) == "N" else "N m"
+    return EffortReport(
+        joint=robot.joint_names[joint],
+        low=-low.value,
+        low_time=low.time - start,
+        high=high.value,
+        high_time=high.time - start,
+        bound=(-low.most, high.most),
+        limit=(_known(lower), _known(upper)),
+        used=max(used, 0.0) if math.isfinite(min(-lower, upper)) else None,
+        head_room=limit - worst.most if math.isfinite(limit) else None,
+        gravity=sign * worst.gravity,
+        gravity_share=_share(worst),
+        unit=kind,
+    )
+
+
+def _share(peak: EffortPeak) -> float:
+    return peak.gravity / peak.value if peak.value else 0.0
+
+
+def _known(bound: float) -> float | None:
+    return bound if math.isfinite(bound) else None
+
+
+def efforts_report(plan: Plan) -> EffortsReport | None:
+    """Return whether torques and forces were judged, and by which numbers; None for bare joints."""
+    robot = plan.loaded.robot
+    if robot.convention is None:
+        return None
+    judged = any(efforts is not None for efforts in plan.verdict.efforts)
+    lacking = robot.without_inertia
+    return EffortsReport(
+        judged=judged,
+        reason=None if judged else _reason(plan),
+        inertials=None if len(lacking) == len(robot.joints) else plan.loaded.source,
+        gravity=robot.gravity.tolist(),
+    )
+
+
+def _reason(plan: Plan) -> str:
+    """Return why no effort was judged."""
+    robot, limits = plan.loaded.robot, plan.loaded.job.limits
+    lacking = robot.without_inertia
+    if lacking:
+        return f"no mass and inertia of the links behind {', '.join(lacking)}"
+    if limits is not None and limits.effort not in ((), OF_ROBOT):
+        return "the job's limits say null"
+    stated = any(math.isfinite(bound) for joint in robot.joints for bound in joint.effort)
+    if stated:
+        return f"those of {robot.name} count where the job says `limits: {{effort: robot}}`"
+    return "no limit of effort is given"
+
+
+def most_used(plan: Plan, index: int) -> EffortReport | None:
+    """Return the effort of a move that uses most of its limit; None where none is limited."""
+    reports = [report for report in effort_reports(plan, index) or () if report.used is not None]
+    return max(reports, key=lambda report: report.used or 0.0, default=None)
