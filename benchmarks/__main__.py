@@ -29,6 +29,7 @@ BENCHMARKS = (
     "inverse_kinematics",
     "calibration",
     "time_optimal",
+    "third_order",
     "dynamics",
     "through_points",
     "operational",
@@ -39,6 +40,7 @@ BENCHMARKS = (
     "viewing",
 )
 OURS = ("trajcli", "numpy", "pydantic", "pyyaml", "typer")
+THEIRS = ("roboticstoolbox-python", "eaik", "toppra", "copp-py", "numpy", "scipy")
 THEIRS = ("roboticstoolbox-python", "eaik", "pin", "toppra", "numpy", "scipy")
 _VERSIONS = """
 import json, platform, sys

@@ -208,7 +208,7 @@ class TimeOptimal(ThroughPoints):
                 for b in binding
             ),
             via_points=ViaPoints(passed * factor, points.positions, path.missed),
-            events=(*points.events, *path.events, *events_of_law(motion, fastest=factor == 1.0)),
+            events=(*points.events, *path.events, *events_of_law(motion, robot, fastest=factor == 1.0)),
             binding_phases=True,
             remedies=REMEDIES,
             phase_plane=self._phase_plane(path, motion, robot).scaled(factor),
