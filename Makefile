@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 PEERS := .venv-peers
-EXTRAS ?= dev  # dev,docs,viewers: also what the tests of viewers and of the site need
+EXTRAS ?= dev  # dev,dask,docs,viewers: also what the tests of viewers, of the site and of clusters need
 
 .PHONY: setup demo check format lint types test soak bench golden schema docs player picture site clean
 

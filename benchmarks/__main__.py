@@ -17,10 +17,12 @@ from benchmarks.figures import Figure, table
 
 BENCHMARKS = (
     "planning",
+    "batch",
     "help",
     "writing",
     "logs",
     "reading",
+    "checking",
     "evaluation",
     "forward_kinematics",
     "urdf",

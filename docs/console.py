@@ -50,6 +50,7 @@ def outcome(document: str) -> Outcome:
         (folder / "examples").symlink_to(ROOT / "examples")
         for block in blocks(document):
             if block.language == "yaml" and block.name:
+                (folder / block.name).parent.mkdir(parents=True, exist_ok=True)
                 (folder / block.name).write_text(block.text, encoding="utf-8")
             if block.language == "console" and not _sets_up(block):
                 result += document[done : block.start] + _renewed_block(block, folder)

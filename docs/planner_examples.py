@@ -139,12 +139,15 @@ velocity and acceleration, and so are the blends; a `duration` stretches all of 
 at rest. With times the start and the target may have a velocity: a centred blend then begins before the
 first point, which only the start of a job can do (an event, `begins_before`), and ends beyond the last.""",
     "time_optimal": """\
-Points stand as for `spline`, without times: it is as fast as the limits of velocity and acceleration
+Points stand as for `spline`, without times: it is as fast as the limits of velocity, acceleration and jerk
 allow along its path, which is a smooth curve through the points (`path: spline`; `rule` and `parameter`
 say which one) or straight from point to point (`path: polyline`). On a polyline it stops at each point,
-or, with `corner`, passes it at no more than that distance by a parabola. The times of a recording are not
-used. `explain` says which limit of which joint binds when. Its acceleration steps, so joints with a limit
-of jerk need another planner. A `duration` stretches the fastest motion.""",
+or, with `corner`, passes it at no more than that distance. The times of a recording are not used. `explain`
+says which limit of which joint binds when. Where a joint has a limit of jerk, the limits of jerk are kept and
+the acceleration has no steps: corners are rounded with continuous curvature, and rules whose curvature jumps
+(`computed`, `shape_preserving`) are refused. `jerk: ignore` leaves the limits of jerk aside; where there is
+none, the acceleration steps. Where the arm starts in motion, it keeps its acceleration, and a spline bends
+so that it can; it ends in motion without acceleration. A `duration` stretches the fastest motion.""",
     "line": _JOINS,
     "arc": f"""\
 Which arc is meant is said in one of [three ways](#arcs). An arc by its angle ends with the orientation with

@@ -38,8 +38,8 @@ WISHES = {
         "points must be met",
     ),
     "time_optimal": (
-        "as fast as velocity and acceleration allow along a path through points",
-        "jerk has a limit",
+        "as fast as velocity, acceleration and jerk allow along a path through points",
+        "only the ends count",
     ),
     "line": ("the tool straight from pose to pose, or turning in its place", "only the end counts"),
     "arc": ("the tool on a circle, several turns, a helix", "only the end counts"),

@@ -262,8 +262,8 @@ JOBS = [
 @pytest.mark.parametrize("text", JOBS)
 def test_jobs_and_robots_can_be_used_as_they_stand(text: str, tmp_path: Path) -> None:
     content = yaml.safe_load(text)
-    if content is None or "joint_limits" in content:  # MoveIt's, which a command of the page reads
-        return
+    if content is None or not {"joints", "moves"} & content.keys():
+        return  # limits and messages, which a command of the page reads
     if "joints" in content:
         (tmp_path / "robot.yaml").write_text(text, encoding="utf-8")
         assert read_robot_file(str(tmp_path / "robot.yaml")).joints

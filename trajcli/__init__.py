@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 from trajcli.version import __version__
 
 if TYPE_CHECKING:
-    from trajcli.api import Arm, InverseSolution, PlannedJob, load_robot, plan
+    from trajcli.api import Arm, InverseSolution, PlannedJob, check, load_robot, plan
     from trajcli.checks.finding import Finding
     from trajcli.checks.verify import Verdict
     from trajcli.curves.piecewise import PiecewisePolynomial
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from trajcli.job.read import LoadedJob, job_from_text, load_job
     from trajcli.job.report import Report
     from trajcli.job.robot import catalogue_names
+    from trajcli.judge.finding import JudgedFinding, Judgement
     from trajcli.kinematics.robot import Joint, Limits, Robot
     from trajcli.output.report import report_of, verification_error
     from trajcli.output.write import write_plan
@@ -47,7 +48,7 @@ if TYPE_CHECKING:
     from trajcli.trajectory import Rows, State, Trajectory
 
 _HOMES = {
-    "trajcli.api": ("Arm", "InverseSolution", "PlannedJob", "load_robot", "plan"),
+    "trajcli.api": ("Arm", "InverseSolution", "PlannedJob", "check", "load_robot", "plan"),
     "trajcli.checks.finding": ("Finding",),
     "trajcli.checks.verify": ("Verdict",),
     "trajcli.curves.piecewise": ("PiecewisePolynomial",),
@@ -66,6 +67,7 @@ _HOMES = {
     "trajcli.job.read": ("LoadedJob", "job_from_text", "load_job"),
     "trajcli.job.report": ("Report",),
     "trajcli.job.robot": ("catalogue_names",),
+    "trajcli.judge.finding": ("JudgedFinding", "Judgement"),
     "trajcli.kinematics.robot": ("Joint", "Limits", "Robot"),
     "trajcli.planning.plan": ("Plan", "plan_job"),
     "trajcli.output.report": ("report_of", "verification_error"),
@@ -82,6 +84,8 @@ __all__ = [
     "InverseSolution",
     "Job",
     "Joint",
+    "JudgedFinding",
+    "Judgement",
     "Limits",
     "LoadedJob",
     "MissingLimitError",
@@ -101,6 +105,7 @@ __all__ = [
     "VerificationError",
     "__version__",
     "catalogue_names",
+    "check",
     "dump_job",
     "job_from_text",
     "load_job",

@@ -15,10 +15,11 @@ from trajcli.frozen import frozen
 from trajcli.job.read import LoadedJob, job_from_text, load_job
 from trajcli.job.report import Report
 from trajcli.job.robot import load_sheet
-from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.robot import Limits, Robot
 from trajcli.planning.plan import Plan, plan_job
 
 if TYPE_CHECKING:
+    from trajcli.judge.finding import Judgement
     from trajcli.kinematics.jacobian import ReferenceFrame
     from trajcli.streams.decimals import Digits
 
@@ -171,6 +172,42 @@ def plan(job: str | Path | Mapping[str, Any] | LoadedJob, *, overrides: Sequence
                 error.add_note(note)
         raise
     return PlannedJob(**vars(planned))
+
+
+def check(
+    times: ArrayLike,
+    q: ArrayLike,
+    *,
+    robot: str | Path | Robot | None = None,
+    qd: ArrayLike | None = None,
+    qdd: ArrayLike | None = None,
+    interpolate: str | None = None,
+    limits: Limits | Mapping[str, Any] | None = None,
+) -> Judgement:
+    """Return the judgement of a motion that is arrays, as `trajcli check` judges a file.
+
+    Rows are joined to the curve that a consumer makes of them, and the curve is judged for all t. What a name
+    stands for is read once.
+
+    Args:
+        times: s, shape (N,).
+        q: Positions, rad or m, shape (N, n).
+        robot: Its name, the path of a robot file, a URDF or a job, or a robot; None for bare joints, which
+            have the `limits` alone.
+        qd: Velocities, shape (N, n).
+        qdd: Accelerations, shape (N, n).
+        interpolate: hold, linear, cubic, quintic, jtc or jtc-upsampling; None for the highest degree that the
+            columns allow.
+        limits: Instead of the robot's: as under `limits` in a job, in SI, or as they are; None in them is
+            unlimited.
+
+    Raises:
+        InputError: When shapes do not fit, something is not a finite number, or there is no such robot.
+        FileError: When a file cannot be read.
+    """
+    from trajcli.judge.arrays import judge_arrays, requirements_of
+
+    return judge_arrays(times, q, qd, qdd, requirements_of(robot, limits, interpolate, q))
 
 
 def load_robot(name: str | Path) -> Arm:

@@ -112,6 +112,7 @@ class Problem:
         amounts: Numbers and names that the message holds as `{name}`.
         field: Where below the move the value stands that it is about, such as ("to",); None where it is about
             no one value.
+        kind: A stable word for programs, such as "velocity", where it comes from a finding.
     """
 
     message: str
@@ -124,6 +125,7 @@ class Problem:
     limit: float | None = None
     amounts: Amounts = field(default_factory=dict)
     field: tuple[str | int, ...] | None = None
+    kind: str | None = None
 
     def text(self, say: Callable[[Amount], str] = str) -> str:
         """Return the message with its amounts as `say` writes them."""

@@ -17,8 +17,10 @@ FLOORS = (
     ("language",),
     ("planners", "checks", "streams", "urdf"),
     ("job",),
-    ("planning", "comparison", "queries"),
-    ("output", "plots", "player"),
+    ("planning", "comparison", "queries", "consumers"),
+    ("judge",),
+    ("output", "plots", "player", "editing"),
+    ("batch",),
     ("cli", "api"),
     ("",),  # trajcli/__init__.py, the public face
     ("__main__",),
@@ -28,7 +30,7 @@ FLOORS = (
 FLOOR_OF = {room: level for level, floor in enumerate(FLOORS) for room in floor}
 HOMES = {
     "pydantic": ("language/", "planners/", "job/"),
-    "pydantic_core": ("language/", "planners/", "job/", "streams/jsonl.py"),
+    "pydantic_core": ("language/", "planners/", "job/", "streams/jsonl.py", "streams/json_rows.py"),
     "yaml": ("job/yaml/", "streams/ros_messages.py"),
     "typer": ("cli/",),
     "click": ("cli/",),

@@ -15,10 +15,9 @@ Capture = pytest.CaptureFixture[str]
 NAMES = [info.callback.__name__ for info in app.registered_commands if info.callback]
 OTHER_NAMES = {
     "validate": "plan JOB --no-output",
-    "check": "plan JOB --no-output",
     "run": "plan",
     "simulate": "plan",
-    "convert": "pose",
+    "transform": "pose",
     "forward": "fk",
     "inverse": "ik",
     "kinematics": "jacobian",
@@ -37,8 +36,12 @@ def test_each_command_has_an_example_that_runs(
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     for file in ("old.csv", "new.csv"):
         (tmp_path / file).write_text("t,q1\n0,0\n1,1\n")
+    (tmp_path / "there.csv").write_text("t,q1\n0,0\n1,1\n")
+    (tmp_path / "back.csv").write_text("t,q1\n0,1\n1,0\n")
     (tmp_path / "arm.urdf").symlink_to(ROOT / "tests/urdf/models/ur5.urdf")
     words = shlex.split(example)
+    if "rows.csv" in words[1:]:
+        call(capfd, "plan", "examples/ur5e_pick.yaml", "-o", "rows.csv")
     assert words[0] == name
     assert call(capfd, *words).code == 0
 

@@ -46,7 +46,7 @@ def test_the_fastest_duration_of_a_law_respects_the_speed_of_the_tool(planner: s
     assert plan.verdict.passed
     assert plan.trajectory.duration == pytest.approx(PEAKS[planner] * LEVER * TURN / SPEED, rel=2e-6)
     (event,) = plan.events
-    assert (event.kind, event.concedes) == ("within_tool_limits", False)
+    assert (event.kind, event.concedes) == ("within_tool_limits", True)
     assert "to keep the speed limit of the tool" in event.message
 
 

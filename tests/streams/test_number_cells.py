@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from trajcli.streams import table
+from trajcli.streams import text_rows
 from trajcli.streams.decimals import NotFixedError
 from trajcli.streams.number_cells import scan_decimals
 from trajcli.streams.table import read_csv
@@ -89,7 +89,7 @@ def test_ordinary_files_are_read_by_blocks(tmp_path, monkeypatch):
     def never(*_):
         raise AssertionError("read cell by cell")
 
-    monkeypatch.setattr(table._Reader, "_read_any", never)
+    monkeypatch.setattr(text_rows.RowReader, "_numbers_of_any_form", never)
     values = np.random.default_rng(0).normal(size=(500, 3)) * [1, 1e-4, 1e3]
     for form in ("%.6f", "%.18e", "%.17g", "%.3f"):
         np.savetxt(tmp_path / "a.csv", values, form, ",", header="a,b,c", comments="")

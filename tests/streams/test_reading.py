@@ -146,7 +146,7 @@ def test_files_that_cannot_be_read(tmp_path):
     (tmp_path / "large.yaml").touch()
     with (tmp_path / "large.yaml").open("r+b") as stream:
         stream.truncate(2 << 30)
-    with pytest.raises(InputError, match="has 2147483648 bytes"):
+    with pytest.raises(InputError, match="has at most"):
         read_table(tmp_path / "large.yaml")
     (tmp_path / "bytes.yaml").write_bytes(b"joint_names: \xff")
     with pytest.raises(InputError, match="no UTF-8"):

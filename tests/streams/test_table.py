@@ -115,14 +115,13 @@ def test_chunks_join_without_a_seam(tmp_path, monkeypatch):
         ("t,q1\n0,0x10\n", [("in.csv:2:3", "q1 is '0x10', expected a finite number")]),
         ("t,q1\n0,1\n\n1\n", [("in.csv:4:1", "the line has 1 values, expected 2 as in line 1")]),
         ("t,q1\n0,1,2\n", [("in.csv:2:1", "the line has 3 values, expected 2 as in line 1")]),
-        ("t,q1\n0,\xe9\xe9,\n", [("in.csv:2:1", "the line has 3 values, expected 2 as in line 1")]),
-        ("t,q1\nx,1\n0,y\n", [("in.csv:2:1", "t is 'x', expected a finite number"),
-                              ("in.csv:3:3", "q1 is 'y', expected a finite number")]),
+        ("t,q1\n0,\xe9\xe9,\n", [("in.csv:2:3", "q1 is 'éé', expected a finite number")]),
+        ("t,q1\nx,1\n0,y\n", [("in.csv:2:1", "t is 'x', expected a finite number")]),
+        ("t;q1\n0;1\n0;a\n", [("in.csv:3:3", "q1 is 'a', expected a finite number")]),
         ("t,q1,t\n0,1,2\n", [("in.csv:1:6", "there are two columns 't'")]),
         ("t,,q1\n0,1,2\n", [("in.csv:1:3", "column 2 of 3 has no name")]),
         ("0,1\n0,1\n", [("in.csv:1:1", "0 stands where a column's name should be")]),
         ("\n0,1\n", [("in.csv:1:1", "column 1 of 1 has no name")]),
-        ("t;q1\n0;1\n", [("in.csv:1:1", "there is one column 't;q1'")]),
         ("t,q1\n", [("in.csv:1:1", "the file has no rows, only the columns' names")]),
         ("t,q1\n\n", [("in.csv:1:1", "the file has no rows, only the columns' names")]),
     ],
@@ -131,8 +130,8 @@ def test_what_is_wrong_is_said_with_its_place(tmp_path, text, expected):
     assert flaws(tmp_path, text) == expected
 
 
-def test_at_most_ten_things_are_said(tmp_path):
-    assert len(flaws(tmp_path, "t,q1,q2\n" + "x,y,z\n" * 100)) == 10
+def test_one_thing_is_said(tmp_path):
+    assert len(flaws(tmp_path, "t,q1,q2\n" + "x,y,z\n" * 100)) == 1
 
 
 @pytest.mark.parametrize(

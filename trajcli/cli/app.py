@@ -14,14 +14,16 @@ import typer
 import typer.core
 
 from trajcli.cli.arm_commands import register
-from trajcli.cli.options import Errors, JobFile, Json, Overrides
+from trajcli.cli.file_commands import register_file_commands
+from trajcli.cli.motion_commands import register_tools
+from trajcli.cli.options import Errors, JobErrors, JobFile, Json, Overrides, profile_words, robot_names
 from trajcli.cli.outcome import guarded
 
 _JUDGE = "trajcli plan JOB --no-output"
 _OTHER_NAMES = {
-    **dict.fromkeys(("validate", "check", "verify", "lint", "test"), _JUDGE),
+    **dict.fromkeys(("validate", "verify", "lint", "test"), _JUDGE),
     **dict.fromkeys(("run", "simulate", "sample", "generate", "execute", "trajectory"), "trajcli plan JOB"),
-    **dict.fromkeys(("convert", "transform", "rotation", "quaternion", "euler"), "trajcli pose STEP..."),
+    **dict.fromkeys(("transform", "rotation", "quaternion", "euler"), "trajcli pose STEP..."),
     **dict.fromkeys(("forward", "forward-kinematics"), "trajcli fk"),
     **dict.fromkeys(("inverse", "inverse-kinematics", "solve"), "trajcli ik"),
     "kinematics": "trajcli fk, trajcli ik or trajcli jacobian",
@@ -48,8 +50,9 @@ class Commands(typer.core.TyperGroup):
         return super().resolve_command(ctx, args)
 
     def main(self, args: Sequence[str] | None = None, *rest: Any, **options: Any) -> Any:  # noqa: ANN401
-        """Run the command; errors of usage are JSON where the words ask for that."""
-        if not _wants_json(sys.argv[1:] if args is None else args):
+        """Run the command; errors of usage have the form that the words ask for."""
+        form = _form_of_errors(sys.argv[1:] if args is None else args)
+        if form is None:
             return super().main(args, *rest, **options)
         try:
             code = super().main(args, *rest, **{**options, "standalone_mode": False})
@@ -60,14 +63,19 @@ class Commands(typer.core.TyperGroup):
             from trajcli.cli.outcome import report_error
             from trajcli.errors import InputError
 
-            report_error(InputError(words(), hint="see --help"), as_json=True)
+            report_error(InputError(words(), hint="see --help"), form)
             sys.exit(InputError.exit_code)
         sys.exit(code or 0)
 
 
-def _wants_json(words: Sequence[str]) -> bool:
+def _form_of_errors(words: Sequence[str]) -> Any:  # noqa: ANN401
+    """Return in which form for programs errors are wanted; None where they are for people."""
     options = list(words[: words.index("--")] if "--" in words else words)
-    return "--errors=json" in options or ("--errors", "json") in pairwise(options)
+    forms = ("json", "github", "junit", "sarif")
+    asked = (
+        form for form in forms if f"--errors={form}" in options or ("--errors", form) in pairwise(options)
+    )
+    return next(asked, None)
 
 
 app = typer.Typer(
@@ -94,6 +102,9 @@ def commands() -> None:
 @guarded
 def plan(
     job: JobFile,
+    others: Annotated[
+        list[str], typer.Argument(metavar="JOB", help="More jobs, which are only judged: with --no-output.")
+    ] = [],  # noqa: B006
     output: Annotated[
         str | None,
         typer.Option(
@@ -139,7 +150,8 @@ def plan(
         typer.Option("--compression", help="MCAP: of the messages.", show_default="zstd"),
     ] = None,
     strict: Annotated[
-        bool, typer.Option("--strict", help="Exit 1 when a concession (event) was made.")
+        bool,
+        typer.Option("--strict", help="Exit 1 when there is an event: a concession, or a warning of --for."),
     ] = False,
     reference: Annotated[
         bool,
@@ -148,6 +160,15 @@ def plan(
             help="Compare each move with the fastest under the same limits, along a path with toppra.",
         ),
     ] = False,
+    consumer: Annotated[
+        str | None,
+        typer.Option(
+            "--for",
+            metavar="PROFILE",
+            help="Judge the rows as written by the rules of a consumer, such as ros-jtc: `trajcli profiles`.",
+            autocompletion=profile_words,
+        ),
+    ] = None,
     no_output: Annotated[bool, typer.Option("--no-output", help="Only judge: write no rows.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on stderr.")] = False,
     si: Annotated[
@@ -156,7 +177,7 @@ def plan(
     every: Annotated[
         bool, typer.Option("--all", help="Every finding, not only the worst of each move and kind.")
     ] = False,
-    errors: Errors = "text",
+    errors: JobErrors = "text",
 ) -> int:
     """Plan a job, verify it, and write it: rows as CSV or JSON lines, a log, or a goal for a controller."""
     from trajcli.cli.plan import PlanOptions, run_plan
@@ -176,12 +197,17 @@ def plan(
         log=log,
         strict=strict,
         reference=reference,
+        consumer=consumer,
         no_output=no_output,
         quiet=quiet,
-        every=every or errors == "json",
+        every=every or errors != "text",
         si=si,
     )
-    return run_plan(job, override, options)
+    if not others and errors in ("text", "json"):
+        return run_plan(job, override, options)
+    from trajcli.cli.gate import run_gate
+
+    return run_gate([job, *others], override, options, errors)
 
 
 @app.command(epilog="Example: trajcli explain examples/cubic.yaml")
@@ -195,13 +221,25 @@ def explain(
     derivatives: Annotated[
         bool, typer.Option("--derivatives", help="Also the polynomials of velocity and acceleration.")
     ] = False,
+    sensitivity: Annotated[
+        bool,
+        typer.Option(
+            "--sensitivity", help="What each limit that is 10 % higher would save: plans the moves anew."
+        ),
+    ] = False,
+    reference: Annotated[
+        bool,
+        typer.Option(
+            "--reference", help="Compare each move along a path with toppra, and judge what peers return."
+        ),
+    ] = False,
     as_json: Json = False,
     errors: Errors = "text",
 ) -> int:
     """Say each move in words and formulas: polynomials, phases, peaks, branches, and how fast it could be."""
     from trajcli.cli.explain import ExplainOptions, run_explain
 
-    return run_explain(job, override, ExplainOptions(move, derivatives, as_json))
+    return run_explain(job, override, ExplainOptions(move, derivatives, sensitivity, reference, as_json))
 
 
 @app.command(epilog="Example: trajcli payload examples/pick_carry_place.yaml")
@@ -228,134 +266,114 @@ def payload(
     return run_payload(job, override, at, as_json=as_json)
 
 
-@app.command(epilog="Example: trajcli diff old.csv new.csv --atol 1e-9")
+@app.command(epilog="Example: trajcli check rows.csv --job examples/ur5e_pick.yaml")
 @guarded
-def diff(
-    a: Annotated[str, typer.Argument(metavar="A", help="A CSV or MCAP file; - is CSV from standard input.")],
-    b: Annotated[str, typer.Argument(metavar="B", help="The file to compare it with.")],
-    atol: Annotated[
-        str,
-        typer.Option(
-            "--atol", metavar="TOL", help="Absolute tolerance: 1e-9, or by column: q=1e-9,qd1=1e-6."
-        ),
-    ] = "",
-    rtol: Annotated[
-        str, typer.Option("--rtol", metavar="TOL", help="Relative tolerance, in the same form.")
-    ] = "",
-    resample: Annotated[
-        bool, typer.Option("--resample", help="Interpolate B at the times of A when they differ.")
-    ] = False,
-    topic: Annotated[
-        str | None,
-        typer.Option(
-            "--topic",
-            metavar="T",
-            help="MCAP: the topic, of JointState or JointTrajectory.",
-            show_default="/joint_states",
-        ),
-    ] = None,
-    errors: Errors = "text",
-) -> int:
-    """Compare two files column by column. Exit 0: equal, 1: different, 2: cannot be compared."""
-    from trajcli.cli.diff import run_diff
-
-    return run_diff(a, b, atol, rtol, resample=resample, topic=topic)
-
-
-@app.command(epilog="Example: trajcli plot examples/ur5e_pick.yaml -o pick.svg")
-@guarded
-def plot(
-    files: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="JOB|FILE...", help="A job, files of rows or messages, or such over a job; - is stdin."
-        ),
+def check(
+    file: Annotated[
+        str, typer.Argument(metavar="FILE", help="A CSV, JSON lines, ROS, MCAP or .npy file; - is stdin.")
     ],
-    output: Annotated[
+    job: Annotated[
         str | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FILE",
-            help="FILE.svg, .png or .pdf; - is stdout. Else the first name's stem with .svg, in this folder.",
-        ),
+        typer.Option("--job", metavar="JOB", help="Robot, limits, start, end and paths that it shall keep."),
     ] = None,
-    kind: Annotated[
-        Literal["svg", "png", "pdf"] | None, typer.Option("--format", help="Where no name says it; else svg.")
-    ] = None,
-    quantities: Annotated[
-        str | None,
-        typer.Option(
-            "--quantities",
-            metavar="LIST",
-            help="Some of q,qd,qdd,qddd,tool,path,phase; else those that suit the job.",
-        ),
-    ] = None,
-    joints: Annotated[
-        list[str], typer.Option("--joints", metavar="NAME...", help="Only these, as a,b or a b; else all.")
-    ] = [],  # noqa: B006
-    override: Overrides = [],  # noqa: B006
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Do not say what was written.")] = False,
-    every: Annotated[
-        bool, typer.Option("--all", help="Every finding, not only the worst of each move and kind.")
-    ] = False,
-    errors: Errors = "text",
-) -> int:
-    """Draw joints, tool and phase plane with limits. Exit 1: one is broken, and the picture shows where."""
-    from trajcli.cli.plot import PlotOptions, run_plot
-
-    every = every or errors == "json"
-    return run_plot(files, override, PlotOptions(output, kind, quantities, tuple(joints), quiet, every))
-
-
-@app.command(epilog="Example: trajcli view examples/ur5e_pick.yaml -o view.html")
-@guarded
-def view(
-    source: Annotated[
-        str,
-        typer.Argument(metavar="JOB|FILE", help="A job, or a file of rows or messages; - is standard input."),
-    ],
-    output: Annotated[
-        str | None,
-        typer.Option("--output", "-o", metavar="FILE", help="Write the page to FILE.html instead of stdout."),
-    ] = None,
-    compress: Annotated[
-        bool, typer.Option("--compress", help="Half the size, for browsers since 2023.")
-    ] = False,
     robot: Annotated[
         str | None,
         typer.Option(
             "--robot",
             "-r",
-            metavar="NAME|FILE|JOB",
-            help="The arm of a file: of the catalogue, a robot file, a URDF, or a job.",
+            metavar="NAME|FILE",
+            help="Instead of a job: a robot of the catalogue, a robot file or a URDF.",
+            autocompletion=robot_names,
         ),
     ] = None,
-    override: Overrides = [],  # noqa: B006
+    limits: Annotated[
+        str | None,
+        typer.Option(
+            "--limits",
+            metavar="FILE",
+            help="Of the joints and the tool instead of the robot's: as under `limits` in a job.",
+        ),
+    ] = None,
+    columns: Annotated[
+        str | None,
+        typer.Option(
+            "--columns",
+            metavar="MAP",
+            help="What columns are, such as t=timestamp,q=target_q: prefixes or names.",
+        ),
+    ] = None,
+    units: Annotated[
+        str | None, typer.Option("--units", metavar="UNITS", help="Of columns that name none, as deg,mm.")
+    ] = None,
+    topic: Annotated[
+        str | None,
+        typer.Option("--topic", metavar="T", help="MCAP: the topic.", show_default="/joint_states"),
+    ] = None,
+    field: Annotated[
+        str | None,
+        typer.Option("--field", metavar="F", help="Of messages with several states, such as reference."),
+    ] = None,
+    interpolate: Annotated[
+        Literal["hold", "linear", "cubic", "quintic", "jtc", "jtc-upsampling"] | None,
+        typer.Option(
+            "--interpolate",
+            help="How the consumer joins the rows.",
+            show_default="the highest degree that the columns allow",
+        ),
+    ] = None,
+    profile: Annotated[
+        str | None,
+        typer.Option(
+            "--for",
+            metavar="PROFILE",
+            help="Also the rules of a consumer: `trajcli profiles` lists them.",
+            autocompletion=profile_words,
+        ),
+    ] = None,
+    start_tolerance: Annotated[
+        str | None,
+        typer.Option(
+            "--start-tolerance",
+            metavar="X",
+            help="How near the first row must be to the job's start.",
+            show_default="0.001 rad or m",
+        ),
+    ] = None,
+    form: Annotated[
+        Literal["table", "json", "junit", "sarif", "github"],
+        typer.Option("--format", help="Of what is printed."),
+    ] = "table",
+    reference: Annotated[
+        bool,
+        typer.Option(
+            "--reference", help="Compare with ruckig between its ends, and with toppra along its points."
+        ),
+    ] = False,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Exit 1 also within rounding, and when there are events.")
+    ] = False,
     errors: Errors = "text",
 ) -> int:
-    """Write a page that plays the motion: the arm in 3D with linked plots, in one file for any browser."""
-    from trajcli.cli.view import ViewOptions, run_view
+    """Judge anybody's trajectory for all t. Exit 0: satisfied or within rounding, 1: exceeded."""
+    from trajcli.cli.check import run_check
+    from trajcli.judge.file import CheckOptions
 
-    return run_view(source, override, ViewOptions(output, compress, robot))
+    options = CheckOptions(
+        job=job,
+        robot=robot,
+        limits=limits,
+        columns=columns,
+        units=units,
+        topic=topic,
+        field=field,
+        interpolate=interpolate,
+        profile=profile,
+        start_tolerance=start_tolerance,
+    )
+    return run_check(file, options, form, strict=strict, reference=reference)
 
 
-@app.command(epilog="Example: trajcli schema job")
-@guarded
-def schema(
-    kind: Annotated[
-        Literal["job", "robot", "report", "explanation"],
-        typer.Argument(help="Which schema.", show_default=True),
-    ] = "job",
-    errors: Errors = "text",
-) -> int:
-    """Print a JSON Schema, for completion and checking in an editor."""
-    from trajcli.job.schema import schema_text
-    from trajcli.streams.whole_file import standard_output
-
-    with standard_output() as out:
-        out.write(schema_text(kind).encode())
-    return 0
+register_file_commands(app)
 
 
 @app.command(epilog="Example: trajcli init job.yaml")
@@ -372,6 +390,7 @@ def init(
 
 
 register(app)
+register_tools(app)
 
 
 def run() -> None:

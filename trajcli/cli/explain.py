@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from trajcli.cli.numbers import numbers
+from trajcli.cli.plan import peer_lines
 from trajcli.cli.polynomials import amount, blend_lines, knot_lines, law_lines, polynomial_lines
 from trajcli.cli.progress import progress
 from trajcli.errors import InputError
@@ -26,8 +27,9 @@ if TYPE_CHECKING:
         PoseReport,
         SegmentReport,
     )
-    from trajcli.job.report import PeakReport, ToolReport
+    from trajcli.job.report import AtLimitReport, PeakReport, SavingReport, ToolReport
 
+_MOST_LIMITS = 6  # that bind, in one line
 _MOST_POINTS = 20  # points that are listed one by one
 _TIME_DECIMALS = 12
 _ZERO = 1e-9  # user units: a coordinate or an angle below that is rounding
@@ -201,6 +203,8 @@ class ExplainOptions:
 
     move: int | None = None
     derivatives: bool = False
+    sensitivity: bool = False
+    reference: bool = False
     as_json: bool = False
 
 
@@ -218,8 +222,15 @@ def run_explain(job: str, overrides: Sequence[str], options: ExplainOptions) -> 
         raise InputError(f"--move {options.move}: {loaded.name} has no such move", hint=known)
     with progress():
         plan = plan_job(loaded)
-        explained = explanation(plan, move=options.move, derivatives=options.derivatives)
-    text = explained.model_dump_json(indent=2) if options.as_json else "\n".join(_lines(explained, count))
+        explained = explanation(
+            plan,
+            move=options.move,
+            derivatives=options.derivatives,
+            sensitivity=options.sensitivity,
+            reference=options.reference,
+        )
+    lines = _lines(explained, count, peers=options.reference)
+    text = explained.model_dump_json(indent=2) if options.as_json else "\n".join(lines)
     with standard_output() as out:
         out.write((text + "\n").encode())
     if not plan.verdict.passed:
@@ -229,7 +240,7 @@ def run_explain(job: str, overrides: Sequence[str], options: ExplainOptions) -> 
     return 0
 
 
-def _lines(explained: Explanation, count: int) -> Iterator[str]:
+def _lines(explained: Explanation, count: int, *, peers: bool) -> Iterator[str]:
     units = explained.units
     joints = ", ".join(f"q{i} = {name}" for i, name in enumerate(explained.joints, 1) if name != f"j{i}")
     alone = f"move {explained.moves[0].index} of " if len(explained.moves) < count else ""
@@ -238,6 +249,7 @@ def _lines(explained: Explanation, count: int) -> Iterator[str]:
     yield f"angles in {units.angle}, lengths in {units.length}, t in s from the start of each move" + (
         f"; {joints}" if joints else ""
     )
+    noted = [*explained.events, *explained.remarks]
     for move in explained.moves:
         yield ""
         yield f"move {move.index}: {move.planner}, {move.duration:.10g} s, from t = {move.start:.10g} s"
@@ -255,10 +267,13 @@ def _lines(explained: Explanation, count: int) -> Iterator[str]:
         yield from _by_position(move)
         yield from _efforts(move)
         yield from _speed(move)
-        yield from (
-            f"  {event.kind}: {event.message}" for event in explained.events if event.move == move.index
-        )
-    general = [event for event in explained.events if event.move is None]
+        yield from peer_lines(move, "  ") if peers else ()
+        yield from (f"  {event.kind}: {event.message}" for event in noted if event.move == move.index)
+    if explained.savings is not None and len(explained.moves) > 1:
+        yield ""
+        yield "all moves together:"
+        yield from _savings(explained.savings, "  ")
+    general = [event for event in noted if event.move is None]
     yield from (f"{event.kind}: {event.message}" for event in general)
     efforts = explained.efforts
     if efforts is not None and efforts.inertials is not None:
@@ -363,11 +378,39 @@ def _bound(bound: float | None, unit: str) -> str:
     return "unlimited" if bound is None else amount(bound, unit, beside=False)
 
 
+def _at_limit(one: AtLimitReport) -> str:
+    name = one.quantity.replace("_", " ")
+    return f"{name} of {one.joint} for {one.seconds:.6g} s ({100 * one.share:.4g} %)"
+
+
+def _savings(savings: Sequence[SavingReport] | None, indent: str) -> Iterator[str]:
+    """Yield what higher limits would save, of those that save something."""
+    if savings is None:
+        return
+    if not savings:
+        yield f"{indent}its limits do not say how long it lasts: none that is higher would save time"
+        return
+    useful = [one for one in savings if one.saved]
+    if not useful:
+        yield f"{indent}no limit of a joint that is 10 % higher would save time"
+    for one in useful:
+        share = f" ({100 * one.share:.4g} %)" if one.share is not None else ""
+        yield f"{indent}10 % more {one.quantity} of {one.joint} would save {one.saved:.6g} s{share}"
+    for one in savings:
+        if one.reason is not None:
+            yield f"{indent}10 % more {one.quantity} of {one.joint}: {one.reason}"
+
+
 def _speed(move: ExplainedMove) -> Iterator[str]:
     binding, reference = move.binding, move.reference
     if binding and binding.used > 0:
         part = f"{100 * binding.used:.4g} % used"
         yield f"  binding limit: {binding.quantity} of {binding.joint}, {part}"
+    if move.at_limit:
+        times = ", ".join(_at_limit(one) for one in move.at_limit[:_MOST_LIMITS])
+        more = f" and {len(move.at_limit) - _MOST_LIMITS} more" if len(move.at_limit) > _MOST_LIMITS else ""
+        yield f"  at its limits: {times}{more}"
+    yield from _savings(move.savings, "  ")
     if move.stretch != 1:
         yield f"  stretched {move.stretch:.6g} times"
     if reference is None:

@@ -15,6 +15,14 @@ def robot_names(incomplete: str) -> list[str]:
     return sorted(path.stem for path in folder.glob("*.yaml") if path.stem.startswith(incomplete))
 
 
+def profile_words(incomplete: str) -> list[str]:
+    """Return the names of consumers' profiles that begin so, for the shell; none is read for that."""
+    from pathlib import Path
+
+    folder = Path(__file__).parent.parent / "profiles"
+    return sorted(path.stem for path in folder.glob("*.yaml") if path.stem.startswith(incomplete))
+
+
 JobFile = Annotated[str, typer.Argument(metavar="JOB", help="The job file; - is standard input.")]
 Overrides = Annotated[
     list[str],
@@ -24,6 +32,13 @@ Overrides = Annotated[
 ]
 Errors = Annotated[
     Literal["text", "json"], typer.Option("--errors", help="How errors are written to stderr.")
+]
+JobErrors = Annotated[
+    Literal["text", "json", "github", "junit", "sarif"],
+    typer.Option(
+        "--errors",
+        help="How errors are written to stderr: for people, for programs, or for continuous integration.",
+    ),
 ]
 RobotName = Annotated[
     str,

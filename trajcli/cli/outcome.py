@@ -7,9 +7,11 @@ import os
 import sys
 from collections.abc import Callable, Iterable
 from functools import wraps
-from typing import Any, NoReturn
+from typing import Any, Literal, NoReturn
 
-from trajcli.errors import TrajcliError
+from trajcli.errors import Problem, TrajcliError
+
+ErrorForm = Literal["text", "json", "github", "junit", "sarif"]
 
 FILE_FAILED, BUG, INTERRUPTED, PIPE_CLOSED = 4, 70, 130, 141
 
@@ -31,10 +33,11 @@ def guarded(command: Callable[..., int]) -> Callable[..., NoReturn]:
 
 
 def _outcome(command: Callable[..., int], args: tuple[Any, ...], options: dict[str, Any]) -> int:
+    form = options.get("errors", "text")
     try:
         return command(*args, **options)
     except TrajcliError as error:
-        report_error(error, as_json=options.get("errors") == "json")
+        report_error(error, form)
         return error.exit_code
     except BrokenPipeError:
         return PIPE_CLOSED
@@ -42,40 +45,54 @@ def _outcome(command: Callable[..., int], args: tuple[Any, ...], options: dict[s
         return INTERRUPTED
     except OSError as error:
         if error.filename is not None:
-            return _bug(error, as_json=options.get("errors") == "json")
+            return report_bug(error, form)
         return FILE_FAILED  # of standard error: nobody can be told
     except Exception as error:  # noqa: BLE001
-        return _bug(error, as_json=options.get("errors") == "json")
+        return report_bug(error, form)
 
 
-def report_error(error: TrajcliError, *, as_json: bool) -> None:
-    """Print an error on standard error, for people or for programs."""
-    from trajcli.cli.frames import problem_as_json, render_problem
+def report_error(error: TrajcliError, form: ErrorForm = "text", file: str | None = None) -> None:
+    """Print an error on standard error, for people or for programs.
 
-    if as_json:
-        import json
-
-        problems = [problem_as_json(problem) for problem in error.problems]
-        said = {"error": type(error).__name__, "exit": error.exit_code, "problems": problems}
-        print(json.dumps(said, ensure_ascii=False), file=sys.stderr)  # noqa: T201
+    Args:
+        error: What is wrong.
+        form: For people, as JSON, or for a service of continuous integration.
+        file: What it is about, for services, where it has no place in a file.
+    """
+    if form == "json":
+        print(json.dumps(error_as_json(error), ensure_ascii=False), file=sys.stderr)  # noqa: T201
         return
+    if form != "text":
+        from trajcli.output.annotations import annotations_of, render_annotations
+
+        print(render_annotations(annotations_of(error, file), form), end="", file=sys.stderr)  # noqa: T201
+        return
+    from trajcli.cli.frames import render_problem
+
     color = wants_color()
     for problem in error.problems:
         print(render_problem(problem, color=color), file=sys.stderr)  # noqa: T201
 
 
-def _bug(error: Exception, *, as_json: bool) -> int:
+def error_as_json(error: TrajcliError) -> dict[str, Any]:
+    """Return an error as a mapping that JSON can hold: its class, its exit code and its problems."""
+    from trajcli.cli.frames import problem_as_json
+
+    problems = [problem_as_json(problem) for problem in error.problems]
+    return {"error": type(error).__name__, "exit": error.exit_code, "problems": problems}
+
+
+def report_bug(error: Exception, form: ErrorForm = "text") -> int:
+    """Print an error that nobody raised on purpose on standard error; return its exit code."""
     import traceback
 
-    if as_json:
-        import json
-
-        said = {
-            "error": type(error).__name__,
-            "exit": BUG,
-            "problems": [{"message": f"a bug in trajcli: {error}"}],
-        }
+    message = f"a bug in trajcli: {error}"
+    if form == "json":
+        said = {"error": type(error).__name__, "exit": BUG, "problems": [{"message": message}]}
         print(json.dumps(said), file=sys.stderr)  # noqa: T201
+        return BUG
+    if form != "text":
+        report_error(TrajcliError(Problem(message)), form)
         return BUG
     traceback.print_exception(error)
     request = "This is a bug in trajcli. Please report it with the lines above and the job file."

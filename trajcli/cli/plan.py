@@ -12,6 +12,7 @@ from trajcli.cli.progress import progress
 from trajcli.curves.extrema import peaks
 from trajcli.errors import InputError, Problem, VerificationError
 from trajcli.frozen import comparable
+from trajcli.grids import Grid
 from trajcli.job.read import LoadedJob, files_of, load_job
 from trajcli.kinematics.robot import QUANTITIES
 from trajcli.output.write import grid_of, write_rows, write_text
@@ -22,7 +23,9 @@ from trajcli.streams.whole_file import identity
 
 if TYPE_CHECKING:
     from trajcli.checks.tool_bound import ToolPeak
-    from trajcli.job.report import MoveReport, PathReferenceReport, ReferenceReport
+    from trajcli.consumers.judgement import ProfileJudgement
+    from trajcli.consumers.profile import Profile
+    from trajcli.job.report import MoveReport, PathReferenceReport, PeerViolation, ReferenceReport
     from trajcli.output.recording import LogOptions
 
 _STILL = 1e-9  # rad/s or m/s, below which a joint only rounds
@@ -41,6 +44,7 @@ class PlanOptions:
     log: LogOptions | None = None
     strict: bool = False
     reference: bool = False
+    consumer: str | None = None
     no_output: bool = False
     quiet: bool = False
     every: bool = True
@@ -53,7 +57,18 @@ def run_plan(job: str, overrides: Sequence[str], options: PlanOptions) -> int:
     Raises:
         TrajcliError: When anything is wrong; then no rows were written.
     """
+    plan_and_write(job, overrides, options)
+    return 0
+
+
+def plan_and_write(job: str, overrides: Sequence[str], options: PlanOptions) -> Plan:
+    """Plan, judge and write a job; return the plan, which verifies.
+
+    Raises:
+        TrajcliError: When anything is wrong; then no rows were written.
+    """
     form = _check_options(options)
+    profile = _profile(options)
     loaded = load_job(job, overrides, rate=options.rate, si=options.si)
     _check_inputs_stay(loaded, options)
     if options.log is not None:
@@ -68,18 +83,76 @@ def run_plan(job: str, overrides: Sequence[str], options: PlanOptions) -> int:
         ):  # what is not finite is for the checks to find, not for numpy to print
             plan = plan_job(loaded)
         grid = grid_of(plan)
-        refusal = _refusal(plan, options)
+        refusal, judged = _refusal(plan, options), None
+        if refusal is None and options.reference:
+            refusal = _contradicted(plan)
+        if refusal is None and profile is not None:
+            judged, refusal = _judged(plan, grid, profile, form, options)
         if refusal is None and not options.no_output:
             write_rows(plan, grid, options.output, options.digits or "fixed", form=form, log=options.log)
     if options.report is not None or options.reference:
-        _report(plan, options)  # behind the rows: where it stands, they do
+        _report(plan, options, judged)  # behind the rows: where it stands, they do
     if refusal is not None:
         raise refusal
     if not options.quiet:
         written = 0 if options.no_output or form.content == "knots" else grid.count
         missing = form.content == "log" and loaded.robot.convention is None
         _summarise(plan, written, geometry_missing=missing)
-    return 0
+        if judged is not None:
+            _summarise_consumer(judged)
+    return plan
+
+
+def _profile(options: PlanOptions) -> Profile | None:
+    """Return the rules of the consumer that is named."""
+    if options.consumer is None:
+        return None
+    from trajcli.consumers.judgement import load_profile
+
+    return load_profile(options.consumer)
+
+
+def _contradicted(plan: Plan) -> VerificationError | None:
+    """Return the error of moves that are faster than any motion within their limits can be."""
+    from trajcli.output.references import contradictions_of, reference_of
+
+    found = contradictions_of(plan.trajectory.spans, [reference_of(move) for move in plan.moves])
+    problems = [
+        Problem(
+            f"move {one.move}: {one.message}",
+            one.hint,
+            place=plan.loaded.place_of_move(one.move or 0),
+            move=one.move,
+            joint=one.joint,
+            time=one.time,
+            value=one.value,
+            limit=one.limit,
+            kind="reference",
+        )
+        for one in found
+    ]
+    return VerificationError(*problems) if problems else None
+
+
+def _judged(
+    plan: Plan, grid: Grid, profile: Profile, form: StreamFormat, options: PlanOptions
+) -> tuple[ProfileJudgement, VerificationError | None]:
+    """Return what the rows do against the rules of their consumer, and why they are not written."""
+    from trajcli.output.consumer import judge_as_written, refusal_of
+
+    digits = options.digits or "fixed"
+    judged = judge_as_written(plan, grid, profile, form, digits=digits, log=options.log)
+    return judged, refusal_of(plan, judged, strict=options.strict)
+
+
+def _summarise_consumer(judged: ProfileJudgement) -> None:
+    from trajcli.output.consumer import counted
+
+    warnings = [f"  {each.rule}: {each.message}{counted(each)}" for each in judged.breaches]
+    unjudged = ", ".join(rule for rule, _ in judged.unjudged)
+    lines = [f"for {judged.profile.name}: all necessary rules are kept", *warnings]
+    lines += [f"  not judged: {unjudged}"] if unjudged else []
+    print("\n".join(lines), file=sys.stderr)  # noqa: T201
 
 
 def _refusal(plan: Plan, options: PlanOptions) -> VerificationError | None:
@@ -88,24 +161,24 @@ def _refusal(plan: Plan, options: PlanOptions) -> VerificationError | None:
         from trajcli.output.report import verification_error
 
         return verification_error(plan, every=options.every)
-    conceded = [event for event in plan.events if event.concedes]
-    return (
-        VerificationError(*(_problem(plan, event) for event in conceded))
-        if options.strict and conceded
-        else None
-    )
+    if options.strict and plan.events:
+        return VerificationError(*(_problem(plan, event) for event in plan.events))
+    return None
 
 
 def _problem(plan: Plan, event: Event) -> Problem:
     place = None if event.move is None else plan.loaded.place_of_move(event.move)
-    return Problem(f"{event.kind}: {event.message}", "leave --strict out to accept it", place, event.move)
+    hint = "leave --strict out to accept it"
+    return Problem(f"{event.kind}: {event.message}", hint, place, event.move, kind=event.kind)
 
 
 def _check_options(options: PlanOptions) -> StreamFormat:
     """Return the format of the output; refuse options that do not fit it, or each other."""
     log = () if options.log is None else options.log.given
     if options.no_output:
-        given = {"--output": options.output, "--format": options.form, **dict.fromkeys(log, "")}
+        # a consumer is judged by the form in which the motion would come to it
+        named = options.form if options.consumer is None else None
+        given = {"--output": options.output, "--format": named, **dict.fromkeys(log, "")}
         for name in (name for name, value in given.items() if value is not None):
             raise InputError(f"--no-output and {name} exclude each other", hint="leave one of them out")
     form = format_of(options.output, options.form)
@@ -156,19 +229,46 @@ def _write_resolved(loaded: LoadedJob, path: str) -> None:
     write_text(dump_job(loaded), path)
 
 
-def _report(plan: Plan, options: PlanOptions) -> None:
+def _report(plan: Plan, options: PlanOptions, judged: ProfileJudgement | None) -> None:
     from trajcli.output.report import report_of
 
-    report = report_of(plan, reference=options.reference)
+    report = report_of(plan, peers=options.reference)
+    if judged is not None:
+        from trajcli.output.consumer import consumer_report
+
+        report = report.model_copy(update={"consumer": consumer_report(plan, judged)})
     if options.report is not None:
         write_text(report.model_dump_json(indent=2) + "\n", options.report)
+    from trajcli.job.report import in_units
+
     compared = options.reference and plan.verdict.passed and not options.quiet
     for move in report.moves if compared else []:
         if move.reference is not None:
             text = _compared(move, move.reference)
             print(f"move {move.index} ({move.planner}): {text}", file=sys.stderr)  # noqa: T201
-        if move.path_reference is not None:
-            print(f"  {_beside_toppra(move, move.path_reference)}", file=sys.stderr)  # noqa: T201
+        for line in peer_lines(in_units(move, plan.loaded.units), "  "):
+            print(line, file=sys.stderr)  # noqa: T201
+
+
+def peer_lines(move: MoveReport, indent: str) -> Iterator[str]:
+    """Yield how a move compares with toppra along its path, and which limits the peers break."""
+    if move.path_reference is not None:
+        yield f"{indent}{_beside_toppra(move, move.path_reference)}"
+        yield from violation_lines("toppra", move.path_reference.violations, indent)
+    if move.reference is not None:
+        yield from violation_lines("ruckig", move.reference.violations, indent)
+
+
+def violation_lines(peer: str, violations: Sequence[PeerViolation], indent: str) -> Iterator[str]:
+    """Yield the worst limit that a peer breaks, and how many more."""
+    if not violations:
+        return
+    worst = max(
+        violations, key=lambda one: (one.quantity == "position", abs(one.value) / (abs(one.limit) or 1))
+    )
+    more = f", and {len(violations) - 1} more" if len(violations) > 1 else ""
+    reached = f"{worst.value:.9g} {worst.unit}, its limit is {worst.limit:.9g}"
+    yield f"{indent}{peer} breaks a limit: the {worst.quantity} of {worst.joint} reaches {reached}{more}"
 
 
 def _compared(move: MoveReport, bound: ReferenceReport) -> str:
@@ -221,7 +321,9 @@ def summary(plan: Plan, rows: int) -> str:
         first = plan.verdict.steps[0]
         more = f" and {len(plan.verdict.steps) - 1} more" if len(plan.verdict.steps) > 1 else ""
         lines.append(f"  the acceleration steps: {first.joint} at t = {first.time:.6g} s{more}")
-    lines += [f"  {event.kind}: {_where(event.move)}{event.message}" for event in plan.events]
+    lines += [
+        f"  {event.kind}: {_where(event.move)}{event.message}" for event in (*plan.events, *plan.remarks)
+    ]
     return "\n".join(lines)
 
 

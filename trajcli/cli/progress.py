@@ -14,8 +14,8 @@ from trajcli.progress import listening
 
 _QUIET = 1.0  # s: work that is done by then shows nothing
 _PERIOD = 0.2  # s between two looks at what is under way
-_ERASE = "\r\x1b[2K"
-_WIDTH = 79  # columns: a longer line would wrap, and could not be erased
+ERASE = "\r\x1b[2K"
+WIDTH = 79  # columns: a longer line would wrap, and could not be erased
 
 
 @contextmanager
@@ -26,7 +26,7 @@ def progress(*, to_terminal: bool = False) -> Iterator[None]:
         to_terminal: Whether rows may go to standard output: nothing is shown where that is a terminal, too.
     """
     stream = sys.stderr
-    if not _is_terminal(stream) or (to_terminal and _is_terminal(sys.stdout)):
+    if not is_terminal(stream) or (to_terminal and is_terminal(sys.stdout)):
         yield
         return
     line = ProgressLine(stream)
@@ -34,7 +34,7 @@ def progress(*, to_terminal: bool = False) -> Iterator[None]:
         yield
 
 
-def _is_terminal(stream: TextIO | None) -> bool:
+def is_terminal(stream: TextIO | None) -> bool:
     """Return whether a stream is a terminal that can erase a line."""
     try:
         return stream is not None and stream.isatty() and os.environ.get("TERM") != "dumb"
@@ -70,13 +70,13 @@ class ProgressLine:
         self._done.set()
         self._thread.join()
         if self._shown:
-            self._write(_ERASE)
+            self._write(ERASE)
 
     def _run(self) -> None:
         wait = self._quiet
         while not self._done.wait(wait):
             text = f"{self._text}, {monotonic() - self._begun:.0f} s".removeprefix(", ")
-            self._write(f"{_ERASE}{text[:_WIDTH]}")
+            self._write(f"{ERASE}{text[:WIDTH]}")
             self._shown, wait = True, self._period
 
     def _write(self, text: str) -> None:

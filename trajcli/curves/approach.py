@@ -133,6 +133,34 @@ def uses_of_pieces(
     return _piece_uses(approaches, lengths, d, o, at_least)
 
 
+def durations_at_limit(coefficients: Array, lengths: Array, limits: ApproachLimits, near: float) -> Array:
+    """Return for how long each component that has a limit is at it, or above, shape (m,).
+
+    Args:
+        coefficients: Shape (degree + 1, w, n), highest power first.
+        lengths: Of the pieces, shape (w,).
+        limits: Of the n components, m of which have one.
+        near: Relative: as near as that to the limit counts.
+    """
+    approaches, d, o = _approaches(coefficients, limits)
+    shape = approaches.shape[1:]
+    distances = approaches.reshape(len(approaches), -1)
+    speeds = -derivative_coefficients(distances, 1)
+    excess = _excess(distances, speeds / (1 - near), *(np.tile(each, shape[0]) for each in (d, o)))
+    whole = np.repeat(lengths, shape[1])
+    roots = [np.zeros((1, whole.size)), whole[None]]
+    for polynomial in (excess, speeds):
+        powers = np.arange(len(polynomial), 0, -1, dtype=np.float64)
+        antiderivative = np.concatenate([polynomial / powers[:, None], np.zeros((1, whole.size))])
+        (inside,) = critical_points(antiderivative[:, :, None], whole, (0,))
+        roots.append(np.clip(inside[:, :, 0], 0.0, whole))
+    knots = np.sort(np.concatenate(roots), axis=0)
+    middles = (knots[1:] + knots[:-1]) / 2
+    at_limit = (horner(excess, middles) >= 0) & (horner(speeds, middles) > ROOM)
+    seconds = np.where(at_limit, np.diff(knots, axis=0), 0.0).sum(axis=0).reshape(shape).sum(axis=0)
+    return np.asarray(seconds[: shape[1] // 2] + seconds[shape[1] // 2 :])
+
+
 def _approaches(coefficients: Array, limits: ApproachLimits) -> tuple[Array, Array, Array]:
     """Return the distances (degree + 1, w, 2 m) to upper and then lower ends, and limits (2 m,)."""
     limited = limits.limited

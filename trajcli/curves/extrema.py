@@ -140,6 +140,30 @@ def critical_points(coefficients: Array, lengths: Array, orders: Sequence[int]) 
     return [roots.get(order + 1, nowhere) * lengths[:, None] for order in orders]
 
 
+def durations_above(coefficients: Array, lengths: Array, levels: Array) -> Array:
+    """Return for how long polynomials are at or above a level, each from 0 to its own length, shape (w, n).
+
+    Between neighbouring roots of the polynomial less the level, its middle says on which side it is.
+
+    Args:
+        coefficients: Shape (degree + 1, w, n), highest power first.
+        lengths: Shape (w,), none negative.
+        levels: Shape (n,).
+    """
+    above = np.array(coefficients)
+    above[-1] -= levels
+    powers = np.arange(above.shape[0], 0, -1)[:, None, None]
+    # the roots of a polynomial are the critical points of its antiderivative
+    antiderivative = np.concatenate([above / powers, np.zeros((1, *above.shape[1:]))])
+    (roots,) = critical_points(antiderivative, lengths, (0,))
+    shape = (1, *above.shape[1:])
+    ends = np.broadcast_to(lengths[:, None], shape)
+    knots = np.sort(np.concatenate([np.zeros(shape), np.clip(roots, 0.0, ends), ends]), axis=0)
+    middles = (knots[1:] + knots[:-1]) / 2
+    inside = np.where(horner(above, middles) >= 0, np.diff(knots, axis=0), 0.0)
+    return np.asarray(inside.sum(axis=0))
+
+
 def _normalised(coefficients: Array, lengths: Array) -> Array:
     """Return the polynomials in u = t / length, scaled: the largest coefficient from u^1 up becomes 1."""
     powers = lengths ** np.arange(coefficients.shape[0] - 1, -1, -1)[:, None]

@@ -89,7 +89,7 @@ def read_measurements(path: str, robot: Robot, units: Units) -> Measurements:
         except InputError as error:
             problems += error.problems
     if problems:
-        raise InputError(*problems[:_MOST_PROBLEMS])
+        raise InputError(*_first_of_each(problems))
     places = [document.place((index,)) for index in range(len(targets))]
     flaw = next(_flaws_of_deviations(deviations, targets), None)
     if flaw is not None:
@@ -115,8 +115,22 @@ def read_configurations(path: str, robot: Robot, units: Units) -> Array:
         except InputError as error:
             problems += error.problems
     if problems:
-        raise InputError(*problems[:_MOST_PROBLEMS])
+        raise InputError(*_first_of_each(problems))
     return np.array(rows)
+
+
+def _first_of_each(problems: Sequence[Problem]) -> list[Problem]:
+    """Return the first problem of each message, with how many more there are like it."""
+    alike: dict[str, list[Problem]] = {}
+    for problem in problems:
+        alike.setdefault(problem.text(), []).append(problem)
+    found = []
+    for same in list(alike.values())[:_MOST_PROBLEMS]:
+        first, more = same[0], len(same) - 1
+        others = f"{more} more measurement{'s are' * (more > 1) or ' is'} like this"
+        hint = first.hint if not more else others if first.hint is None else f"{first.hint}; {others}"
+        found.append(replace(first, hint=hint))
+    return found
 
 
 def _open_list(path: str, robot: Robot, units: Units) -> tuple[Document, ReadingContext]:

@@ -131,6 +131,16 @@ def job_from_text(text: str, file: str = "<text>") -> LoadedJob:
     return _load(parse_document(text, file))
 
 
+def job_of_document(document: Document) -> LoadedJob:
+    """Return the job of a document.
+
+    Raises:
+        InputError: With every flaw of the document at once.
+        FileError: When a file that it names cannot be read.
+    """
+    return _load(document)
+
+
 def files_of(document: Document) -> Iterator[tuple[str, str]]:
     """Yield the files that a job was read from: what each is, and its path; standard input is `-`."""
     standard = document.file in ("-", "<stdin>")

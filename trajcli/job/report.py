@@ -192,6 +192,40 @@ class BindingReport(ReportPart):
     used: Annotated[float, Field(description="Part of the bound that is used: 1 is all of it.")]
 
 
+class AtLimitReport(ReportPart):
+    """For how long a move is at one limit: within a millionth of it, from the roots of polynomials."""
+
+    joint: str
+    quantity: JointQuantity | Literal["velocity_by_position"]
+    seconds: Annotated[float, Field(description="In either direction.")]
+    share: Annotated[float, Field(description="Of the duration of the move.")]
+    method: Annotated[
+        Literal["exact", "phases"],
+        Field(description="phases: from the switching structure of a time-optimal law."),
+    ] = "exact"
+
+
+class SavingReport(ReportPart):
+    """What a limit of one joint would save if it were 10 % higher, found by planning with it."""
+
+    joint: str
+    quantity: JointQuantity
+    saved: Annotated[float | None, Field(description="Seconds; null where no such motion is known.")]
+    share: Annotated[float | None, Field(description="Of the duration of the moves that were planned anew.")]
+    reason: Annotated[str | None, Field(description="Why none is known.")] = None
+
+
+class PeerViolation(ReportPart):
+    """A limit that the motion of a peer breaks, judged for all t as a motion of our own."""
+
+    joint: str
+    quantity: JointQuantity
+    value: Annotated[float, MeasuredIn(), Field(description="SI.")]
+    limit: Annotated[float, MeasuredIn(), Field(description="SI.")]
+    unit: UnitName
+    time: Annotated[float, Field(description="Seconds from the start of the motion.")]
+
+
 class ReferenceReport(ReportPart):
     """The shortest duration that any point-to-point move may have under the same limits, from ruckig."""
 
@@ -201,6 +235,10 @@ class ReferenceReport(ReportPart):
     ]
     joint: Annotated[str | None, Field(description="The joint that needs it, or for which there is none.")]
     reason: Annotated[str | None, Field(description="Why there is no bound.")] = None
+    violations: Annotated[
+        list[PeerViolation],
+        Field(description="Of ruckig's motions, each joint by itself; it does not know limits of position."),
+    ] = []
 
 
 class LimitUseReport(ReportPart):
@@ -220,6 +258,17 @@ class PathReferenceReport(ReportPart):
     ratio: Annotated[float | None, Field(description="Duration of the move over it.")]
     use: Annotated[LimitUseReport | None, Field(description="What toppra uses; above 1 it is too fast.")]
     own_use: Annotated[LimitUseReport | None, Field(description="What the move uses.")]
+    violations: Annotated[
+        list[PeerViolation],
+        Field(description="Of toppra's motion; the limits of jerk are not toppra's, and are not judged."),
+    ] = []
+    deviation: Annotated[
+        float,
+        Field(
+            description="By how much toppra's path misses that of the move, of all joints together; 0 where "
+            "it is the same polynomial."
+        ),
+    ] = 0.0
     reason: Annotated[str | None, Field(description="Why there is none.")] = None
 
 
@@ -335,6 +384,14 @@ class MoveReport(ReportPart):
         PayloadReport | None, Field(description="What the tool carries; null for nothing.")
     ] = None
     binding: BindingReport | None
+    at_limit: Annotated[
+        list[AtLimitReport],
+        Field(description="Limits of velocity, acceleration and jerk that bind, and for how long."),
+    ] = []
+    savings: Annotated[
+        list[SavingReport] | None,
+        Field(description="Asked for by `explain --sensitivity`; empty where the duration is given."),
+    ] = None
     waypoints: Annotated[
         tuple[WaypointReport, ...] | None,
         Field(description="The points it passes; null for a move without any."),
@@ -355,7 +412,10 @@ class MoveReport(ReportPart):
     reference: ReferenceReport | None = None
     path_reference: Annotated[
         PathReferenceReport | None,
-        Field(description="Asked for by `--reference`; null where a move is not time-optimal."),
+        Field(
+            description="Asked for by `--reference`; null for a move from state to state. `explain` has that "
+            "of time-optimal moves always."
+        ),
     ] = None
 
 
@@ -431,6 +491,47 @@ class KnotsReport(ReportPart):
     deviation: KnotsDeviation
 
 
+class ConsumerFinding(ReportPart):
+    """A rule of a consumer that the rows break, of one joint: the worst row, and how many there are."""
+
+    rule: Annotated[str, Field(description="Id of the rule in the profile.")]
+    severity: Annotated[
+        Literal["error", "warning"],
+        Field(description="error: the consumer refuses or aborts such a motion; warning: it runs less well."),
+    ]
+    kind: str
+    joint: str | None
+    move: int
+    time: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
+    row: Annotated[int, Field(description="From 1, as written.")]
+    count: Annotated[int, Field(description="Of rows that break it.")]
+    factor: Annotated[
+        float | None, Field(description="The move must last this many times longer; null: no help.")
+    ]
+    method: Annotated[
+        Literal["exact", "differences"],
+        Field(description="differences: of rows, at the period of the consumer."),
+    ]
+    message: Annotated[str, Field(description="What is wrong, in SI.")]
+    hint: Annotated[str | None, Field(description="What would fix it.")] = None
+
+
+class UnjudgedRule(ReportPart):
+    """A rule of a consumer that could not be judged."""
+
+    rule: str
+    reason: str
+
+
+class ConsumerReport(ReportPart):
+    """What the rows do against the rules of their consumer, as they are written."""
+
+    profile: str
+    accepted: Annotated[bool, Field(description="Whether all necessary rules are kept.")]
+    findings: list[ConsumerFinding]
+    unjudged: list[UnjudgedRule]
+
+
 class Report(ReportPart):
     """What became of a job."""
 
@@ -442,10 +543,20 @@ class Report(ReportPart):
     duration: ReportSeconds
     moves: tuple[MoveReport, ...]
     findings: list[FindingReport]
-    events: list[EventReport]
+    events: Annotated[list[EventReport], Field(description="Concessions, which `--strict` refuses.")]
+    remarks: Annotated[
+        list[EventReport], Field(description="How curves were computed, where that is worth a word.")
+    ] = []
     steps: list[StepReport]
     unchecked: list[UncheckedReport]
     unchecked_of_tool: list[UncheckedToolReport] = []
+    savings: Annotated[
+        list[SavingReport] | None,
+        Field(description="Of all moves together, asked for by `explain --sensitivity`."),
+    ] = None
+    consumer: Annotated[ConsumerReport | None, Field(description="Asked for by `--for`; null otherwise.")] = (
+        None
+    )
     efforts: Annotated[
         EffortsReport | None, Field(description="Of an arm with geometry; null for bare joints.")
     ] = None

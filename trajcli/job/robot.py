@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -22,7 +24,8 @@ from trajcli.errors import FileError, InputError, Place, Problem, utf8
 from trajcli.frozen import frozen
 from trajcli.job.messages import problems_of
 from trajcli.job.model import UnitsSpec
-from trajcli.job.yaml.load import Document, read_document
+from trajcli.job.yaml.load import Document, parse_document
+from trajcli.job.yaml.source import STDIN, read_bytes
 from trajcli.kinematics.robot import QUANTITIES, Joint, Limits, Robot
 from trajcli.language.dynamics import FrictionSpec, LinkSpec
 from trajcli.language.efforts import EffortBound
@@ -341,12 +344,21 @@ def read_urdf(
         InputError: When the file is no URDF, or has no such chain.
         FileError: When it cannot be read.
     """
-    from trajcli.job.yaml.source import STDIN, read_bytes
     from trajcli.urdf.read import MAX_BYTES
-    from trajcli.urdf.robot import robot_of_urdf
 
     name = STDIN if path == "-" else path
-    return robot_of_urdf(read_bytes(path, MAX_BYTES), name, root=root, tip=tip, exact=exact, soft=soft)
+    read = _robot_of_urdf(read_bytes(path, MAX_BYTES), name, root, tip, exact, soft)
+    return replace(read, robot=replace(read.robot))
+
+
+@lru_cache(maxsize=64)
+def _robot_of_urdf(
+    content: bytes, name: str, root: str | None, tip: str | None, exact: bool, soft: bool
+) -> UrdfRobot:
+    """Return the robot of a URDF's content: many jobs of one process convert it once."""
+    from trajcli.urdf.robot import robot_of_urdf
+
+    return robot_of_urdf(content, name, root=root, tip=tip, exact=exact, soft=soft)
 
 
 def urdf_sheet(path: str, read: UrdfRobot) -> RobotSheet:
@@ -367,7 +379,14 @@ def read_sheet(path: str) -> RobotSheet:
             return urdf_sheet(path, read_urdf(path))
         except InputError as error:
             raise error.located(place=Place(path, 1, 1)) from None
-    document = read_document(path)
+    sheet = _sheet_of(read_bytes(path), STDIN if path == "-" else path)
+    return replace(sheet, robot=replace(sheet.robot))  # of its own: a robot keeps what was computed of it
+
+
+@lru_cache(maxsize=64)
+def _sheet_of(content: bytes, path: str) -> RobotSheet:
+    """Return the sheet of a robot file's content: many jobs of one process read it once."""
+    document = parse_document(content, path)
     plain = document.plain()
     spec = plain.get("units") if isinstance(plain.get("units"), Mapping) else {}
     units = Units(

@@ -30,6 +30,7 @@ from trajcli.job.explanation import (
 from trajcli.job.report import MoveReport, WaypointReport, in_units
 from trajcli.output.polynomials import blends_of, knots_of, polynomial_intervals, polynomials_of
 from trajcli.output.report import joint_units, report_of
+from trajcli.output.sensitivity import with_savings
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan
 from trajcli.units import Quantity, Units, factor
@@ -41,21 +42,31 @@ if TYPE_CHECKING:
     from trajcli.planning.resolve_poses import ResolvedPose
 
 
-def explanation(plan: Plan, *, move: int | None = None, derivatives: bool = False) -> Explanation:
+def explanation(
+    plan: Plan,
+    *,
+    move: int | None = None,
+    derivatives: bool = False,
+    sensitivity: bool = False,
+    reference: bool = False,
+) -> Explanation:
     """Return what `trajcli explain` has to say, in the units of the job.
 
     Args:
         plan: The plan.
         move: Index of the one move that is explained, with what is said of the job as a whole; None for all.
         derivatives: Whether polynomials come with those of velocity and acceleration.
+        sensitivity: Whether moves are planned with higher limits, to say what these would save.
+        reference: Whether all moves along a path are compared with toppra, not only time-optimal ones.
     """
     units = plan.loaded.units
-    report = in_units(report_of(plan, reference=True), units)
     wanted = range(len(plan.moves)) if move is None else [move]
+    report = report_of(plan, reference=True, peers=reference)
+    report = in_units(with_savings(report, plan, wanted) if sensitivity else report, units)
     moves = tuple(_move(plan, index, report.moves[index], derivatives=derivatives) for index in wanted)
     said = {
         name: [part for part in getattr(report, name) if part.move is None or part.move in wanted]
-        for name in ("findings", "events", "steps")
+        for name in ("findings", "events", "remarks", "steps")
     }
     return Explanation(
         **{**report.__dict__, **said, "moves": moves},

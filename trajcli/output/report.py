@@ -13,7 +13,7 @@ from trajcli.checks.finding import AccelerationSteps, Finding
 from trajcli.checks.verify import Verdict
 from trajcli.curves.extrema import Peaks
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.errors import PlanningError, Problem, VerificationError
+from trajcli.errors import Problem, VerificationError
 from trajcli.job.report import (
     BindingReport,
     ByPositionReport,
@@ -21,13 +21,10 @@ from trajcli.job.report import (
     FindingReport,
     KnotsDeviation,
     KnotsReport,
-    LimitUseReport,
     LowestSpeedReport,
     MoveReport,
     OutsideReport,
-    PathReferenceReport,
     PeakReport,
-    ReferenceReport,
     Report,
     StepReport,
     ToolPeakReport,
@@ -37,11 +34,13 @@ from trajcli.job.report import (
     WaypointReport,
 )
 from trajcli.job.unit_hints import unit_hint
-from trajcli.kinematics.robot import QUANTITIES, JointType, Robot
+from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.knots import Knots, knots_of
 from trajcli.output.efforts import effort_reports, efforts_report, most_used, payload_report
+from trajcli.output.references import contradictions_of, path_reference_of, reference_of
+from trajcli.output.references import joint_units as joint_units  # noqa: PLC0414
+from trajcli.output.sensitivity import at_limit_of
 from trajcli.planners.planner import PlannedMove
-from trajcli.planning.lower_bound import NoBound, fastest_duration
 from trajcli.planning.plan import Plan
 from trajcli.trajectory import Span, Trajectory
 from trajcli.version import __version__
@@ -57,30 +56,34 @@ _AT_REST = 1e-6  # SI: a tool that turns, or moves, less than that does not
 _RATES = ("", "/s", "/s^2", "/s^3")
 
 
-def joint_units(joint_types: tuple[JointType, ...], order: int = 0) -> list[str]:
-    """Return the SI unit of each joint's position, or of its time derivative of an order."""
-    return [("m" if kind == "prismatic" else "rad") + _RATES[order] for kind in joint_types]
-
-
-def report_of(plan: Plan, *, reference: bool = False, knots: Knots | None = None) -> Report:
+def report_of(
+    plan: Plan, *, reference: bool = False, peers: bool = False, knots: Knots | None = None
+) -> Report:
     """Return the report of a plan, in SI.
 
     Args:
         plan: The plan.
-        reference: Whether each move is compared with ruckig's bound.
+        reference: Whether each move is compared with ruckig's bound, time-optimal ones with toppra, too.
+        peers: Whether all moves along a path are compared with toppra; implies `reference`.
         knots: Those of its trajectory, where they are known.
     """
     verdict = plan.verdict
+    moves = tuple(
+        _move(plan, index, reference=reference or peers, peers=peers) for index in range(len(plan.moves))
+    )
+    references = [move.reference for move in moves]
+    contradictions = contradictions_of(plan.trajectory.spans, references) if verdict.passed else []
     units = dict(zip(plan.trajectory.joint_names, joint_units(plan.trajectory.joint_types, 2), strict=True))
     return Report(
         trajcli=__version__,
-        verdict="verified" if verdict.passed else "violated",
+        verdict="verified" if verdict.passed and not contradictions else "violated",
         job=plan.loaded.name,
         robot=plan.loaded.robot.name,
         duration=plan.trajectory.duration,
-        moves=tuple(_move(plan, index, reference=reference) for index in range(len(plan.moves))),
-        findings=[_finding(plan, finding) for finding in verdict.findings],
+        moves=moves,
+        findings=[*(_finding(plan, finding) for finding in verdict.findings), *contradictions],
         events=[EventReport(kind=e.kind, message=e.message, move=e.move) for e in plan.events],
+        remarks=[EventReport(kind=e.kind, message=e.message, move=e.move) for e in plan.remarks],
         steps=_steps(verdict.steps, units),
         unchecked=[UncheckedReport(joint=joint, quantity=quantity) for joint, quantity in verdict.unchecked],
         efforts=efforts_report(plan),
@@ -130,7 +133,7 @@ def _finding(plan: Plan, finding: Finding) -> FindingReport:
     )
 
 
-def _move(plan: Plan, index: int, *, reference: bool) -> MoveReport:
+def _move(plan: Plan, index: int, *, reference: bool, peers: bool) -> MoveReport:
     move, span = plan.moves[index], plan.trajectory.spans[index]
     peaks = [
         _peak(move, joint, order, extremes)
@@ -162,12 +165,13 @@ def _move(plan: Plan, index: int, *, reference: bool) -> MoveReport:
         efforts=effort_reports(plan, index),
         payload=payload_report(span.payload),
         binding=binding,
+        at_limit=at_limit_of(move, plan.verdict.peaks[index]),
         waypoints=_waypoints(move, span),
         outside=_outside(move, plan.verdict, index),
         tool=_tool(plan.trajectory, span, move),
         tool_peaks=None if of_tool is None else _tool_peaks(of_tool, span, move.robot),
         reference=reference_of(move) if reference else None,
-        path_reference=path_reference_of(move) if reference and move.planned.phase_plane else None,
+        path_reference=path_reference_of(move) if peers or (reference and move.planned.phase_plane) else None,
     )
 
 
@@ -247,41 +251,6 @@ def _outside(move: PlannedMove, verdict: Verdict, index: int) -> tuple[OutsideRe
                 at = float(time[joint])
                 reports.append(OutsideReport(joint=name, beyond=beyond, time=at, unit=units[joint]))
     return tuple(reports)
-
-
-def reference_of(move: PlannedMove) -> ReferenceReport:
-    """Return how a move compares with the shortest duration under its limits."""
-    reason = move.planned.no_lower_bound
-    if reason is not None:
-        return ReferenceReport(duration=None, ratio=None, joint=move.robot.joint_names[0], reason=reason)
-    begins = move.planned.begins or move.start
-    bound = fastest_duration(begins, move.planned.end, move.robot.limits)
-    name = None if bound.joint is None else move.robot.joint_names[bound.joint]
-    if isinstance(bound, NoBound):
-        return ReferenceReport(duration=None, ratio=None, joint=name, reason=bound.reason)
-    ratio = move.duration / bound.duration if bound.duration > 0 else None
-    return ReferenceReport(duration=bound.duration, ratio=ratio, joint=name)
-
-
-def path_reference_of(move: PlannedMove) -> PathReferenceReport | None:
-    """Return how a time-optimal move compares with toppra's motion along its path; None for other moves."""
-    from trajcli.planning.path_reference import LimitUse, limit_use, path_reference
-
-    def report(use: LimitUse | None) -> LimitUseReport | None:
-        if use is None:
-            return None
-        name = move.robot.joint_names[use.joint]
-        return LimitUseReport(quantity=use.quantity, joint=name, used=use.used, time=use.time)
-
-    own = report(limit_use(move.planned.curve, move.robot.limits))
-    try:
-        other = path_reference(move)
-    except PlanningError as error:
-        return PathReferenceReport(duration=None, ratio=None, use=None, own_use=own, reason=str(error))
-    if other is None:
-        return None
-    ratio = move.duration / other.duration if other.duration > 0 else None
-    return PathReferenceReport(duration=other.duration, ratio=ratio, use=report(other.use), own_use=own)
 
 
 def _tool(trajectory: Trajectory, span: Span, move: PlannedMove) -> ToolReport | None:
@@ -428,4 +397,5 @@ def _problem(plan: Plan, finding: Finding) -> Problem:
         time=finding.time,
         value=finding.value,
         limit=finding.limit,
+        kind=finding.kind,
     )

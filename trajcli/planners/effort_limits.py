@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from trajcli.kinematics.robot import Robot
 from trajcli.units import effort_unit
 
 if TYPE_CHECKING:
+    from trajcli.curves.third_order.parameterization import JerkLimitedMotion
     from trajcli.curves.time_optimal.constraints import PathConstraint
     from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion
     from trajcli.dynamics.effort_constraint import EffortConstraint, HeldOverLimitError
@@ -30,7 +31,8 @@ _ROUNDS = 3  # of tangents at the speeds of the motion before: the last one chan
 _TRIES = 4  # of lower limits between moving states
 _LOWERED = 1.5  # times what is proven to be over them
 
-Solve = Callable[["tuple[PathConstraint, ...]"], "TimeOptimalMotion"]
+_Motion = TypeVar("_Motion", "TimeOptimalMotion", "JerkLimitedMotion")
+_Solve = Callable[["tuple[PathConstraint, ...]"], _Motion]
 
 
 def lacks_acceleration(robot: Robot) -> NDArray[np.bool_]:
@@ -59,7 +61,7 @@ def effort_constraints(path: PiecewisePolynomial, robot: Robot) -> tuple[EffortC
     return (EffortConstraint(InverseDynamics(robot), path, limits.effort, limits.velocity),)
 
 
-def solved_within_efforts(path: PiecewisePolynomial, robot: Robot, solve: Solve) -> TimeOptimalMotion:
+def solved_within_efforts(path: PiecewisePolynomial, robot: Robot, solve: _Solve[_Motion]) -> _Motion:
     """Return the fastest motion along a path, within limits of effort that are proven for all t.
 
     Args:
@@ -91,17 +93,18 @@ def solved_within_efforts(path: PiecewisePolynomial, robot: Robot, solve: Solve)
     return motion
 
 
-def _solved(constraint: EffortConstraint, solve: Solve) -> TimeOptimalMotion:
+def _solved(constraint: EffortConstraint, solve: _Solve[_Motion]) -> _Motion:
     """Return the fastest motion, with viscous friction by its tangents at the speeds of the motion."""
     motion = solve((constraint,))
     for _ in range(_ROUNDS - 1 if constraint.has_viscous else 0):
-        points, speeds = motion.grid, motion.law.evaluate(motion.law.breaks, 1)[:, 0]
-
-        def near(s: Array, points: Array = points, speeds: Array = speeds) -> Array:
-            return np.interp(s, points, speeds)
-
-        motion = solve((replace(constraint, speed=near),))
+        motion = solve((replace(constraint, speed=_speed_along(motion.law)),))
     return motion
+
+
+def _speed_along(law: PiecewisePolynomial) -> Callable[[Array], Array]:
+    """Return sd as a function of s, by straight lines between the breaks of a law."""
+    points, speeds = (law.evaluate(law.breaks, order)[:, 0] for order in (0, 1))
+    return lambda s: np.interp(s, points, speeds)
 
 
 def _proven(trajectory: PiecewisePolynomial, robot: Robot) -> tuple[float, float]:
@@ -119,7 +122,7 @@ def _proven(trajectory: PiecewisePolynomial, robot: Robot) -> tuple[float, float
     return factor, over
 
 
-def _slower(motion: TimeOptimalMotion, factor: float) -> TimeOptimalMotion:
+def _slower(motion: _Motion, factor: float) -> _Motion:
     """Return the motion stretched, where a stretch helps."""
     if not np.isfinite(factor):
         return motion  # the verdict says why

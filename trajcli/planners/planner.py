@@ -26,11 +26,8 @@ Resolve = Callable[["Target", Array], "Target"]
 WhenOverLimit = Literal["error", "slow"]
 _REMARKS = (
     "refined",
-    "within_tool_limits",
-    "within_velocity_by_position",
-    "within_effort_limits",
-    "local_optimum",
-)  # kinds of events that concede nothing
+    "bound",
+)  # kinds of events that are about how a curve was computed, and concede nothing
 _GIVEN = ("duration", "velocity", "acceleration", "deceleration", "timed")  # where they say how long it lasts
 LITTLE = 1e-3
 """Relative: a law that is stretched by less still counts as the fastest."""
@@ -117,6 +114,7 @@ class Planned:
         phase_plane: Of a time-optimal law: the law s(t), and what limits it.
         braking: How a start outside the velocity or acceleration limits is brought inside first: by each
             joint, or by all on one line; None where it is not.
+        continuity: Derivatives that join inside it, where they are fewer than its planner promises.
     """
 
     curve: PiecewisePolynomial
@@ -139,6 +137,7 @@ class Planned:
     virtual_points: ViaPoints | None = None
     phase_plane: PhasePlane | None = None
     braking: Literal["each", "line"] | None = None
+    continuity: Literal[1, 2] | None = None
 
 
 class Planner(Model):
@@ -325,7 +324,8 @@ class PlannedMove:
 
     def span(self, start: float, end: float) -> Span:
         """Return the part of a trajectory, from `start` to `end` s, that is this move."""
-        return Span(self.index, self.planner.tag, start, end, self.planner.joins, self.robot.payload)
+        continuity = self.planned.continuity or self.planner.joins
+        return Span(self.index, self.planner.tag, start, end, continuity, self.robot.payload)
 
     def alone(self) -> Trajectory:
         """Return the trajectory of this move alone."""

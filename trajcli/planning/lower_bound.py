@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
+
 import numpy as np
 
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import PlanningError
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import QUANTITIES, Limits
 from trajcli.planners.ruckig import BoundaryProblem, fastest
+from trajcli.planning.path_reference import LimitBreach, breaches_of
 from trajcli.trajectory import State
 
 _ROUNDING = 1e-12
@@ -21,10 +26,13 @@ class LowerBound:
     Attributes:
         duration: Seconds.
         joint: Index of the joint that needs so long; None when no joint needs any time.
+        breaches: Limits, those of the position among them, that the solver's own motions break, each joint
+            moving by itself.
     """
 
     duration: float
     joint: int | None
+    breaches: tuple[LimitBreach, ...] = ()
 
 
 @comparable
@@ -53,6 +61,7 @@ def fastest_duration(start: State, end: State, limits: Limits) -> LowerBound | N
         limits: Those that the motion was judged by.
     """
     bound = LowerBound(0.0, None)
+    breaches: list[LimitBreach] = []
     for joint in range(start.position.size):
         problem = _problem(start, end, limits, joint)
         if problem.done:
@@ -68,7 +77,17 @@ def fastest_duration(start: State, end: State, limits: Limits) -> LowerBound | N
             return NoBound("its start state leads out of its limits", joint)
         if profile.duration > bound.duration:
             bound = LowerBound(profile.duration, joint)
-    return bound
+        breaches += _breaches(profile.curve(), limits.position[joint], problem, joint)
+    return replace(bound, breaches=tuple(breaches))
+
+
+def _breaches(
+    curve: PiecewisePolynomial, position: Array, problem: BoundaryProblem, joint: int
+) -> Iterator[LimitBreach]:
+    """Yield the limits of one joint that its motion breaks: of position, and those that were given."""
+    own = Limits(position[None], *(problem.bounds[order][None] for order in range(3)))
+    for breach in breaches_of(curve, own, (0, 1, 2, 3)):
+        yield replace(breach, joint=joint)
 
 
 def _problem(start: State, end: State, limits: Limits, joint: int) -> BoundaryProblem:

@@ -10,13 +10,15 @@ IEEE Trans. Robotics 34 (2018).
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
 
+from trajcli.checks.tolerances import exceeds
 from trajcli.curves.extrema import peaks
 from trajcli.curves.operations import compose
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
@@ -25,6 +27,7 @@ from trajcli.errors import PlanningError
 from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Limits
 from trajcli.planners.planner import PlannedMove
+from trajcli.planning.geometric_path import GeometricPath
 
 _UNLIMITED = 1e3  # times the largest limit of its kind: the solver of toppra takes no infinite ones
 _FEWEST, _MOST = 100, 2000  # points of the grid of one smooth path
@@ -47,6 +50,25 @@ class LimitUse:
     time: float
 
 
+@comparable
+class LimitBreach:
+    """A limit that the motion of a peer breaks, as found for all t by the roots of polynomials.
+
+    Attributes:
+        order: 0 for position, 1 velocity, 2 acceleration, 3 jerk.
+        joint: Index.
+        value: What it reaches, SI.
+        limit: SI.
+        time: When, s from the start of the motion.
+    """
+
+    order: int
+    joint: int
+    value: float
+    limit: float
+    time: float
+
+
 @frozen
 class PathReference:
     """The motion of toppra along a path.
@@ -54,10 +76,14 @@ class PathReference:
     Attributes:
         duration: Seconds.
         use: What it uses of the limits; None where nothing is limited.
+        breaches: Limits of position, velocity and acceleration that it breaks.
+        deviation: By how much its path misses that of the motion it is compared with, rad or m.
     """
 
     duration: float
     use: LimitUse | None
+    breaches: tuple[LimitBreach, ...] = ()
+    deviation: float = 0.0
 
 
 def path_reference(move: PlannedMove) -> PathReference | None:
@@ -82,13 +108,72 @@ def path_reference(move: PlannedMove) -> PathReference | None:
         0.0 if rest else max(0.0, float(plane.law.evaluate(time, 1)[0]))
         for rest, time in zip(is_at_rest(joints.path), (plane.law.start, plane.law.end), strict=True)
     ]
-    parts = list(_smooth_parts(joints.path, plane.stops))
+    return _along(joints, plane.stops, (ends[0], ends[1]), move.robot.limits)
+
+
+def reference_along(
+    geometric: GeometricPath, limits: Limits, velocities: tuple[Array, Array] | None = None
+) -> PathReference | None:
+    """Return the motion of toppra along a path of joint space; None where neither velocities are limited.
+
+    Args:
+        geometric: The path.
+        limits: Those of velocity and acceleration count.
+        velocities: Of the joints at the start and at the end, each of shape (n,); rest unless given.
+
+    Raises:
+        PlanningError: When toppra finds no motion.
+    """
+    if not (np.isfinite(limits.velocity).any() or np.isfinite(limits.acceleration).any()):
+        return None
+    path = geometric.path
+    joints = JointConstraint(path, limits.velocity, limits.acceleration)
+    speeds = (0.0, 0.0)
+    if velocities is not None:
+        along = [path.evaluate(s, 1, side=side) for s, side in ((path.start, "right"), (path.end, "left"))]  # type: ignore[arg-type]
+        first, last = (
+            max(0.0, float(velocity @ tangent) / float(tangent @ tangent))
+            for velocity, tangent in zip(velocities, along, strict=True)
+        )
+        speeds = first, last
+    found = _along(joints, geometric.stops, speeds, limits)
+    return replace(found, deviation=geometric.deviation)
+
+
+def _along(joints: JointConstraint, stops: Array, ends: tuple[float, float], limits: Limits) -> PathReference:
+    """Return toppra's motion from the speed along the path at its start to that at its end."""
+    parts = list(_smooth_parts(joints.path, stops))
     curves = []
     for index, (low, high) in enumerate(parts):
         speeds = (ends[0] if index == 0 else 0.0, ends[1] if index == len(parts) - 1 else 0.0)
         curves.append(compose(joints.path, _law(joints, low, high, speeds)))
     curve = concatenate(curves)
-    return PathReference(curve.duration, limit_use(curve, move.robot.limits))
+    return PathReference(curve.duration, limit_use(curve, limits), breaches_of(curve, limits, (0, 1, 2)))
+
+
+def breaches_of(curve: PiecewisePolynomial, limits: Limits, orders: Sequence[int]) -> tuple[LimitBreach, ...]:
+    """Return which limits a curve q(t) breaks, of each joint and quantity the worst, for all t.
+
+    Args:
+        curve: Of n joints.
+        limits: Of as many.
+        orders: Derivatives that are judged: 0 for position, to 3 for jerk.
+    """
+    found = []
+    for order, extremes in zip(orders, peaks(curve, orders), strict=True):
+        bounds = limits.of_order(order)
+        for joint in range(curve.dimension):
+            sides = (
+                (extremes.low[joint], bounds[joint, 0], extremes.low_time[joint], -1.0),
+                (extremes.high[joint], bounds[joint, 1], extremes.high_time[joint], 1.0),
+            )
+            beyond = [
+                (sign * (value - bound), LimitBreach(order, joint, float(value), float(bound), float(time)))
+                for value, bound, time, sign in sides
+                if exceeds(sign * value, sign * bound)
+            ]
+            found += [max(beyond, key=lambda pair: pair[0])[1]] if beyond else []
+    return tuple(found)
 
 
 def limit_use(curve: PiecewisePolynomial, limits: Limits) -> LimitUse | None:

@@ -48,6 +48,7 @@ class Plan:
         trajectory: All of them, joined.
         verdict: Of the checks.
         events: Concessions, in order of the moves; the job's own first.
+        remarks: How curves were computed, where that is worth a word; in the same order.
         poses: How poses are reached, by the index of the move that goes there, or None for the job's start.
     """
 
@@ -57,6 +58,7 @@ class Plan:
     verdict: Verdict
     events: tuple[Event, ...]
     poses: Mapping[int | None, ResolvedPose]
+    remarks: tuple[Event, ...] = ()
 
     def __repr__(self) -> str:
         moves, duration = len(self.moves), self.trajectory.duration
@@ -91,7 +93,9 @@ def plan_job(loaded: LoadedJob, carried: Carried | None = None, *, advise: bool 
 
         verdict = _in_units(_with_unit_hint(with_tested_advice(verdict, moves, loaded.say), loaded), loaded)
     shown = tuple(replace(event, message=event.text(loaded.say), amounts={}) for event in events)
-    return Plan(loaded, tuple(moves), trajectory, verdict, shown, poses)
+    conceded = tuple(event for event in shown if event.concedes)
+    remarks = tuple(event for event in shown if not event.concedes)
+    return Plan(loaded, tuple(moves), trajectory, verdict, conceded, poses, remarks)
 
 
 def _plan_moves(
@@ -197,17 +201,28 @@ def _events_of(pose: ResolvedPose | None, index: int | None) -> list[Event]:
 
 
 def _plan_move(loaded: LoadedJob, carrying: Robot, index: int, planner: Planner, start: State) -> PlannedMove:
-    """Return a planned move.
+    """Return a move of the robot with what its tool carries then."""
+    robot = with_move_limits(carrying, planner.limits, index)
+    return plan_move_within(loaded, index, planner, start, robot)
+
+
+def plan_move_within(
+    loaded: LoadedJob, index: int, planner: Planner, start: State, robot: Robot
+) -> PlannedMove:
+    """Return a move of a job, planned, and retimed as the job asks for.
 
     Args:
         loaded: The job.
-        carrying: Its robot with what the tool carries in this move.
         index: Of the move.
-        planner: Of the move.
-        start: Where it begins.
+        planner: Of the move, its target by joints.
+        start: State in which it begins.
+        robot: With the limits in force.
+
+    Raises:
+        InputError: When it lacks a limit.
+        PlanningError: When it has no curve.
     """
     job = loaded.job
-    robot = with_move_limits(carrying, planner.limits, index)
     over_limit = planner.when_over_limit or job.when_over_limit
     try:
         move = PlannedMove(index, planner, start, robot, planner.plan(start, robot), over_limit)

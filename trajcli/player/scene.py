@@ -49,7 +49,7 @@ def scene_of_plan(plan: Plan) -> dict[str, Any]:
         "limits": limits_of([(s.start, s.end, plan.moves[s.index].robot.limits) for s in spans]),
         "waypoints": waypoints_of([*_waypoints(plan)]) if loaded.robot.convention else [],
         "findings": [_finding(plan, finding) for finding in verdict.findings],
-        "events": [_event(plan, event.move, event.message) for event in plan.events],
+        "events": [_event(plan, event.move, event.message) for event in (*plan.events, *plan.remarks)],
         "steps": [_step(plan, k) for k in range(min(len(verdict.steps), _MOST_STEPS))],
         "notes": list(_notes(plan)),
     }

@@ -28,7 +28,7 @@ from trajcli.plots.sampling import thinned
 from trajcli.streams.table import Table
 
 if TYPE_CHECKING:
-    from trajcli.plots.recorded_motion import RecordedMotion
+    from trajcli.plots.recorded_motion import DrawnTable
 
 MOST_PLANES = 12
 """Phase planes that a picture shows; more would make it too high to look at."""
@@ -84,22 +84,22 @@ def picture_of(
     )
 
 
-def _records(motion: PlannedMotion | None, tables: Sequence[Table]) -> list[RecordedMotion]:
+def _records(motion: PlannedMotion | None, tables: Sequence[Table]) -> list[DrawnTable]:
     """Return the files in the units of the job, or in their own."""
-    from trajcli.plots.recorded_motion import RecordedMotion, columns_of_table
+    from trajcli.plots.recorded_motion import DrawnTable, columns_of_table
 
     columns = [columns_of_table(table) for table in tables]
     if motion is not None:
         for table, of_table in zip(tables, columns, strict=True):
             require_joints(table.file, of_table, motion.display)
         robot, display = motion.plan.loaded.robot, motion.display
-        return [RecordedMotion(t, c, display, robot) for t, c in zip(tables, columns, strict=True)]
+        return [DrawnTable(t, c, display, robot) for t, c in zip(tables, columns, strict=True)]
     named = [(t.file, column) for t, c in zip(tables, columns, strict=True) for column in c]
     display = units_of_files(named)
-    return [RecordedMotion(t, c, display) for t, c in zip(tables, columns, strict=True)]
+    return [DrawnTable(t, c, display) for t, c in zip(tables, columns, strict=True)]
 
 
-def _sensible(motion: PlannedMotion | None, records: Sequence[RecordedMotion]) -> list[str]:
+def _sensible(motion: PlannedMotion | None, records: Sequence[DrawnTable]) -> list[str]:
     """Return what is drawn unless other quantities are asked for."""
     if motion is None:
         shown = frozenset[str]().union(*(record.shows() for record in records))
@@ -115,7 +115,7 @@ def _sensible(motion: PlannedMotion | None, records: Sequence[RecordedMotion]) -
     return [*names, *([PATH] if along_path else []), PHASE]
 
 
-def _impossible(motion: PlannedMotion | None, records: Sequence[RecordedMotion]) -> dict[str, str]:
+def _impossible(motion: PlannedMotion | None, records: Sequence[DrawnTable]) -> dict[str, str]:
     """Return why a quantity cannot be drawn, by its name."""
     if motion is not None:
         why = {}
@@ -132,7 +132,7 @@ def _impossible(motion: PlannedMotion | None, records: Sequence[RecordedMotion])
     return {name: text for name, text in needs.items() if name not in shown}
 
 
-def _title(motion: PlannedMotion | None, records: Sequence[RecordedMotion]) -> str:
+def _title(motion: PlannedMotion | None, records: Sequence[DrawnTable]) -> str:
     if motion is None:
         more = len(records) - 1
         return records[0].table.file + (f" and {more} more file{'s' * (more > 1)}" if more else "")
@@ -152,7 +152,7 @@ class _Maker:
     """Panels of a plan and of files, whose traces are numbered in this order."""
 
     def __init__(
-        self, motion: PlannedMotion | None, records: Sequence[RecordedMotion], display: DisplayUnits
+        self, motion: PlannedMotion | None, records: Sequence[DrawnTable], display: DisplayUnits
     ) -> None:
         self._motion = motion
         self._records = list(enumerate(records, start=0 if motion is None else 1))

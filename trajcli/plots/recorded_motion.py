@@ -31,7 +31,7 @@ def columns_of_table(table: Table) -> tuple[Column, ...]:
 
 
 @frozen
-class RecordedMotion:
+class DrawnTable:
     """A file, in the units of a picture.
 
     Attributes:

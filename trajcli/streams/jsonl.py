@@ -7,20 +7,15 @@ Each number has as many digits as restore all its bits.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, BinaryIO
 
 import numpy as np
 
-from trajcli.columns import JOINT_GROUPS, Column, group_of, kinds_of, require_finite
+from trajcli.columns import Column, group_of, require_finite
 from trajcli.curves.piecewise import Array
-from trajcli.errors import FileError, InputError, Place, Problem, TrajcliError
+from trajcli.errors import TrajcliError
 from trajcli.frozen import frozen
-from trajcli.streams.table import Table
-
-_BLOCK = 4096  # rows gathered at a time
-_ALL_DECIMALS = 17  # of a float64
 
 
 @frozen
@@ -117,79 +112,3 @@ def _keys(columns: Sequence[Column]) -> tuple[_Key, ...]:
             alone = group == column.kind and column.joint is None
             keys.append(_Key(group, index, index + 1, alone, column.whole_numbers))
     return tuple(keys)
-
-
-def read_jsonl(path: str | Path) -> Table:
-    """Read JSON lines: an object for each row, all with the same keys, numbers and lists of numbers.
-
-    Raises:
-        FileError: When the file cannot be read.
-        InputError: When a line is no such object; with file and line.
-    """
-    file = str(path)
-    blocks: list[Array] = []
-    rows: list[list[float]] = []
-    columns: tuple[Column, ...] = ()
-    keys: list[str] = []
-    try:
-        with Path(file).open("rb") as stream:
-            for number, line in enumerate(stream, 1):
-                value = _object(line, file, number)
-                if not columns:
-                    columns = _columns_of_object(value, file)
-                    keys = list(value)
-                rows.append(_row(value, keys, len(columns), Place(file, number, 1)))
-                if len(rows) == _BLOCK:
-                    blocks.append(np.array(rows))
-                    rows = []
-    except OSError as error:
-        raise FileError(f"{file} cannot be read: {error.strerror}") from error
-    blocks += [np.array(rows)] if rows else []
-    if not blocks:
-        raise InputError(f"{file} has no rows")
-    decimals = np.full(len(columns), _ALL_DECIMALS, dtype=np.int64)
-    return Table(tuple(column.name for column in columns), np.concatenate(blocks), decimals, file)
-
-
-def _object(line: bytes, file: str, number: int) -> dict[str, Any]:
-    from pydantic_core import from_json
-
-    try:
-        value = from_json(line, allow_inf_nan=False)
-    except ValueError as error:
-        raise InputError(Problem(f"no JSON: {error}", None, Place(file, number, 1))) from error
-    if not isinstance(value, dict) or not value:
-        message = "expected an object of numbers and lists of numbers"
-        raise InputError(Problem(message, None, Place(file, number, 1)))
-    return value
-
-
-def _columns_of_object(value: Mapping[str, Any], file: str) -> tuple[Column, ...]:
-    """Return what the first object of a file holds."""
-    columns: list[Column] = []
-    for key, numbers in value.items():
-        count = len(numbers) if isinstance(numbers, list) else None
-        kinds = kinds_of(key)
-        if count is None:
-            columns.append(Column(key))
-        elif key in JOINT_GROUPS:
-            columns += [Column(key, joint) for joint in range(count)]
-        elif len(kinds) == count:
-            columns += [Column(kind) for kind in kinds]
-        else:
-            lists = ", ".join([*JOINT_GROUPS, "pose, twist, twistd, path"])
-            hint = f"{key} has {', '.join(kinds)}" if kinds else f"lists are {lists}"
-            raise InputError(Problem(f"unexpected list '{key}' of {count} numbers", hint, Place(file, 1, 1)))
-    return tuple(columns)
-
-
-def _row(value: Mapping[str, Any], keys: Sequence[str], count: int, place: Place) -> list[float]:
-    """Return the `count` numbers of an object with the given keys, in their order."""
-    row: list[Any] = []
-    for numbers in value.values():
-        row += numbers if isinstance(numbers, list) else [numbers]
-    if list(value) != keys or len(row) != count:
-        raise InputError(Problem("other keys or lists than in the first row", None, place))
-    if not all(type(item) in (int, float) for item in row):
-        raise InputError(Problem("a value is no number", None, place))
-    return row

@@ -1,56 +1,123 @@
-"""Reading of files with motions: tables of rows, whatever their format.
-
-What is no CSV file has the columns of one in SI: t, q1.., qd1.., qdd1..
-"""
+"""Reading of files with motions: rows of every format, by the name or the first bytes of a file."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trajcli.streams.table import Table, read_csv
+from trajcli.errors import InputError
+from trajcli.streams.byte_source import ByteSource
+from trajcli.streams.row_sources import EXACT, ArrayRows, RowSource, TextRows, in_columns
+from trajcli.streams.table import Table
 from trajcli.streams.whole_file import is_special
 
-if TYPE_CHECKING:
-    from trajcli.streams.mcap.read import LoggedMotion
-    from trajcli.streams.ros_messages import JointMessage
-
 _ALL_DECIMALS = 17  # of a float64
-ENDINGS_OF_ROWS = (".csv", ".txt", ".jsonl", ".mcap")
+ENDINGS_OF_ROWS = (".csv", ".txt", ".jsonl", ".mcap", ".npy")
 _YAML = (".yaml", ".yml")
-_HEAD = 1 << 16  # bytes of a YAML file that are looked at
-_JOINT_NAMES = re.compile(rb"^[ \t-]*joint_names[ \t]*:", re.MULTILINE)
+_HEAD = 1 << 16  # bytes of a file that are looked at
+_JOINT_NAMES = re.compile(rb"^[ \t{-]*[\"']?joint_names[\"']?[ \t]*:", re.MULTILINE)
 _MCAP = b"\x89MCAP0\r\n"
+_NPY = b"\x93NUMPY"
+_OTHERS = {
+    b"#ROSBAG": ("a bag of ROS 1", "`rosbags-convert` makes MCAP of it"),
+    b"SQLite format 3": ("a bag of ROS 2 in SQLite", "`ros2 bag convert` makes MCAP of it"),
+    b"PAR1": ("a parquet file", "trajcli.check takes its columns as arrays; or save them as CSV or .npy"),
+    b"\x89HDF": ("an HDF5 file", "save its arrays as CSV or .npy"),
+    b"PK\x03\x04": ("an archive (.zip, .npz, .xlsx)", "save one table of it as CSV, or one array as .npy"),
+    b"\x1f\x8b": ("compressed by gzip", "`gunzip -c FILE | trajcli ... -` unpacks it"),
+}
+"""Files that are known by their first bytes and are not read: what they are, and what would be read."""
 
 
 def read_table(path: str | Path, topic: str | None = None) -> Table:
-    """Read the rows of a file: CSV, JSON lines, MCAP, or a ROS message in YAML, by its name or first bytes.
+    """Read all rows of a file: CSV, JSON lines, MCAP, arrays of numpy, or a ROS message in YAML.
+
+    What is no CSV file has the columns of one in SI: t, q1.., qd1.., qdd1..
 
     Args:
-        path: The file; "-" is standard input, and CSV.
-        topic: Of MCAP, the topic; /joint_states unless given.
+        path: The file; "-" is standard input.
+        topic: Of MCAP, the topic; /joint_states unless given. Other files have none.
 
     Raises:
         FileError: When it cannot be read.
         InputError: When it is no such file, or has no such topic.
     """
-    ending = Path(str(path)).suffix.lower()
-    if is_log(path):
-        from trajcli.streams.mcap.read import read_mcap
+    rows = open_rows_of(path, topic=topic if is_log(path) else None)
+    every = range(len(rows.named.names))
+    columns = np.concatenate(list(rows.blocks(every, ())))
+    decimals = rows.decimals(every)
+    return Table(
+        rows.named.names, columns, np.where(decimals == EXACT, _ALL_DECIMALS, decimals), rows.named.file
+    )
 
-        return _table(read_mcap(path, topic))
-    if ending in _YAML:
-        from trajcli.streams.ros_messages import read_ros_yaml
 
-        return _table(read_ros_yaml(path))
-    if ending == ".jsonl":
-        from trajcli.streams.jsonl import read_jsonl
+def open_rows_of(
+    path: str | Path, *, topic: str | None = None, field: str | None = None, joints: int | None = None
+) -> RowSource:
+    """Open the rows of a file of any format.
 
-        return read_jsonl(path)
-    return read_csv(path)
+    Args:
+        path: The file; "-" is standard input.
+        topic: Of MCAP, the topic; /joint_states unless given.
+        field: Of messages with several states, the one that is read.
+        joints: Number of joints that are expected, for arrays without names.
+
+    Raises:
+        FileError: When it cannot be read.
+        InputError: When it is no such file, or has no such topic.
+    """
+    source = ByteSource(path)
+    kind = format_of_rows(source)
+    if kind != "mcap" and (topic is not None or field is not None):
+        option = "--topic" if topic is not None else "--field"
+        raise InputError(f"{option} is about MCAP, and {source.file} is none", hint=f"leave {option} out")
+    if kind == "mcap":
+        from trajcli.streams.logged_rows import LoggedRows
+
+        return LoggedRows(source, topic, field)
+    if kind == "ros":
+        return _message(source)
+    if kind == "jsonl":
+        from trajcli.streams.json_rows import JsonRows
+
+        return JsonRows(source)
+    if kind == "npy":
+        from trajcli.streams.npy import ArrayFile
+
+        return ArrayFile(source, joints)
+    return TextRows(source)
+
+
+def format_of_rows(source: ByteSource) -> str:
+    """Return "mcap", "npy", "ros", "jsonl" or "csv", by the first bytes or the name of a file.
+
+    Raises:
+        FileError: When it cannot be read.
+        InputError: When it is known to be of a format that is not read.
+    """
+    head = source.head(_HEAD)
+    for magic, (what, hint) in _OTHERS.items():
+        if head.startswith(magic):
+            raise InputError(f"{source.file} is {what}, which is not read", hint=hint)
+    if head.startswith(_MCAP) or source.ending == ".mcap":
+        return "mcap"
+    if head.startswith(_NPY) or source.ending == ".npy":
+        return "npy"
+    if source.ending == ".jsonl":
+        return "jsonl"
+    if source.ending in _YAML:
+        return "ros"
+    if source.ending == ".csv":
+        return "csv"
+    first = head.lstrip().split(b"\n", maxsplit=1)[0]
+    if first.startswith(b"{"):
+        from trajcli.streams.json_rows import is_json_object
+
+        if is_json_object(first) and not _JOINT_NAMES.match(first):
+            return "jsonl"
+    return "ros" if _JOINT_NAMES.search(head) else "csv"
 
 
 def is_log(path: str | Path) -> bool:
@@ -85,13 +152,12 @@ def _begins_as_mcap(path: str | Path) -> bool:
         return False
 
 
-def _table(motion: LoggedMotion | JointMessage) -> Table:
-    """Return a motion under the names of a CSV file in SI."""
-    names, parts = ["t"], [motion.times[:, None]]
-    states = {"q": motion.position, "qd": motion.velocity, "qdd": motion.acceleration}
-    states["tau"] = getattr(motion, "effort", motion.position[:, :0])
-    for kind, values in states.items():
-        names += [f"{kind}{joint + 1}" for joint in range(values.shape[1])]
-        parts.append(values)
-    decimals = np.full(len(names), _ALL_DECIMALS, dtype=np.int64)
-    return Table(tuple(names), np.concatenate(parts, axis=1), decimals, motion.file)
+def _message(source: ByteSource) -> ArrayRows:
+    """Return the motion in a message."""
+    from trajcli.streams.ros_messages import read_ros_yaml
+
+    message = read_ros_yaml(source)
+    states = (message.position, message.velocity, message.acceleration, message.effort)
+    named, columns = in_columns(source.file, message.times, states)
+    relative = np.zeros(len(named.names))
+    return ArrayRows("ros", named, columns, message.decimals, relative, message.joint_names, si=True)

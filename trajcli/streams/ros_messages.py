@@ -1,25 +1,32 @@
 """Joint trajectories in YAML, as ROS tools print and take them: messages, goals, and streams of them.
 
 Read are JointTrajectory, the RobotTrajectory and DisplayTrajectory of MoveIt, goals of FollowJointTrajectory,
-and the first message of `ros2 topic echo`, with the names of ROS 1 as well.
+and the first message of `ros2 topic echo`, with the names of ROS 1 as well. Numbers know how many decimals
+they were written with.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
-from trajcli.errors import FileError, InputError, Place, Problem
+from trajcli.errors import InputError, Place, Problem
 from trajcli.frozen import frozen
+from trajcli.streams.byte_source import ByteSource
+from trajcli.streams.number_cells import decimals_of
 
-_LARGEST = 512 << 20  # bytes: a text that is larger is no message
-_KEYS = ("positions", "velocities", "accelerations")
+_LARGEST = 64 << 20  # bytes: a text that is larger is no message
+_KEYS = ("positions", "velocities", "accelerations", "effort")
+_LARGEST_NUMBER = 1e300
+_NANOSECONDS = 9  # decimals of a time that is given as sec and nanosec
 _WRAPPERS = ("joint_trajectory", "trajectory", "goal", "planned_trajectory", "robot_trajectory")
 _CUT = re.compile(r"^\s*-?\s*'?\.\.\.'?\s*$|, '?\.\.\.'?\s*\]", re.MULTILINE)
 _SHOWN = 40  # characters of a value in a message
@@ -36,6 +43,8 @@ class JointMessage:
         position: Shape (N, n).
         velocity: Shape (N, n), or (N, 0) where no point has any.
         acceleration: Likewise.
+        effort: Likewise.
+        decimals: The most that a number of each column shows: of the times, the positions and so on, (m,).
     """
 
     file: str
@@ -44,52 +53,88 @@ class JointMessage:
     position: Array
     velocity: Array
     acceleration: Array
+    effort: Array
+    decimals: NDArray[np.int64]
 
 
-def read_ros_yaml(path: str | Path) -> JointMessage:
+class WrittenNumber(float):
+    """A number that knows its decimals."""
+
+    decimals = 0
+
+
+def read_ros_yaml(source: str | Path | ByteSource) -> JointMessage:
     """Return the joint trajectory of a YAML file.
 
     Raises:
         FileError: When it cannot be read.
         InputError: When it is no YAML, holds no joint trajectory, or one that is cut or incomplete.
     """
-    file = str(path)
-    text = _text(file)
+    bytes_of = source if isinstance(source, ByteSource) else ByteSource(source)
+    file = bytes_of.file
+    text = _text(bytes_of)
     cut = _CUT.search(text)
     if cut is not None and "'...'" in cut[0]:
         line = text.count("\n", 0, cut.start()) + 1 + cut[0].startswith("\n")
         place = Place(file, line, 1, cut[0].strip())
         hint = "print it again with `ros2 topic echo --full-length`"
         raise InputError(Problem("the message is cut: long arrays end in '...'", hint, place))
-    return _message(_trajectory(_first_document(text, file), file), file)
+    return _message(_trajectory(_document(text, file), file), file)
 
 
-def _text(file: str) -> str:
+def _text(source: ByteSource) -> str:
+    """Return the first document of a stream of them."""
+    lines: list[bytes] = []
+    size, content = 0, False
+    with source.open() as stream:
+        while line := stream.readline(_LARGEST + 1):
+            size += len(line)
+            if size > _LARGEST:
+                hint = "longer motions are read from CSV, JSON lines and MCAP"
+                raise InputError(f"{source.file}: a message in YAML has at most {_LARGEST} bytes", hint=hint)
+            if content and line.startswith((b"---", b"...")):
+                break
+            content = content or (bool(line.strip()) and not line.startswith((b"---", b"#", b"%")))
+            lines.append(line)
     try:
-        size = Path(file).stat().st_size
-        if size > _LARGEST:
-            raise InputError(f"{file} has {size} bytes, a message in YAML at most {_LARGEST}")
-        return Path(file).read_text(encoding="utf-8")
+        return b"".join(lines).decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(f"{file} is no UTF-8 text: {error.reason} at byte {error.start}") from error
-    except OSError as error:
-        raise FileError(f"{file} cannot be read: {error.strerror}") from error
+        at = f"{error.reason} at byte {error.start}"
+        raise InputError(f"{source.file} is no UTF-8 text: {at}") from error
 
 
-def _first_document(text: str, file: str) -> Any:  # noqa: ANN401
-    """Return the first document of a YAML stream."""
+def _document(text: str, file: str) -> Any:  # noqa: ANN401
+    """Return the content of a YAML document."""
     import yaml
 
-    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     try:
-        return next(iter(yaml.load_all(text, Loader=loader)), None)
+        return yaml.load(text, Loader=_loader())  # noqa: S506
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         place = None if mark is None else Place(file, mark.line + 1, mark.column + 1)
         problem = getattr(error, "problem", None) or "it is no YAML"
         raise InputError(Problem(f"{file} is no YAML: {problem}", None, place)) from error
-    except RecursionError:
-        raise InputError(f"{file} is nested too deeply to be a message") from None
+    except (RecursionError, ValueError) as error:
+        raise InputError(f"{file} is no message in YAML: {type(error).__name__}") from None
+
+
+@cache
+def _loader() -> Any:  # noqa: ANN401
+    """Return a safe loader whose numbers know their decimals; 1e-05 is a number, as ROS 1 prints it."""
+    import yaml
+
+    class Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
+        pass
+
+    def number(loader: Any, node: Any) -> float:  # noqa: ANN401
+        value = WrittenNumber(loader.construct_yaml_float(node))
+        value.decimals = decimals_of(node.value.encode()) if isfinite(value) else 0
+        return value
+
+    form = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)[eE][-+]?[0-9]+$")
+    Loader.add_implicit_resolver("tag:yaml.org,2002:float", form, list("-+0123456789."))
+    Loader.add_constructor("tag:yaml.org,2002:float", number)
+    return Loader
 
 
 def _trajectory(document: Any, file: str) -> Mapping[str, Any]:  # noqa: ANN401
@@ -115,12 +160,16 @@ def _message(message: Mapping[str, Any], file: str) -> JointMessage:
         raise InputError(f"{file}: joint_names are {_shown(names)}, expected a list of names")
     if not isinstance(points, list) or not points:
         raise InputError(f"{file}: points are {_shown(points)}, expected at least one point")
-    states = {key: np.array(list(_values(points, key, len(names), file))) for key in _KEYS}
-    for key in _KEYS[1:]:
-        if not states[key].size:
-            states[key] = np.empty((len(points), 0))
-    times = np.array([_seconds(point, index, file) for index, point in enumerate(points)])
-    return JointMessage(file, tuple(names), times, *(states[key] for key in _KEYS))
+    written = {key: list(_values(points, key, len(names), file)) for key in _KEYS}
+    times = [_seconds(point, index, file) for index, point in enumerate(points)]
+    columns = [column for rows in written.values() for column in zip(*rows, strict=True)]
+    decimals = [max(decimals for _, decimals in times), *(max(map(_decimals, each)) for each in columns)]
+    position, velocity, acceleration, effort = (
+        np.array(written[key], dtype=np.float64).reshape(len(points), -1) for key in _KEYS
+    )
+    seconds = np.array([time for time, _ in times])
+    shown = np.array(decimals, dtype=np.int64)
+    return JointMessage(file, tuple(names), seconds, position, velocity, acceleration, effort, shown)
 
 
 def _values(points: Sequence[Any], key: str, joints: int, file: str) -> Iterator[list[float]]:
@@ -135,27 +184,35 @@ def _values(points: Sequence[Any], key: str, joints: int, file: str) -> Iterator
                 f"{file}: {key} of point {index} are {_shown(values)}, expected {joints} finite numbers",
                 hint="a point has a number for each joint" if all(given) else f"give {key} for all points",
             )
-        yield [float(value) for value in values]
+        yield values
 
 
-def _seconds(point: Mapping[str, Any], index: int, file: str) -> float:
-    """Return the time of a point from the start, s."""
+def _seconds(point: Mapping[str, Any], index: int, file: str) -> tuple[float, int]:
+    """Return the time of a point from the start, s, and its decimals."""
     value = point.get("time_from_start")
     if isinstance(value, Mapping):
         parts = [value.get(key, value.get(old, 0)) for key, old in (("sec", "secs"), ("nanosec", "nsecs"))]
         known = {"sec", "secs", "nanosec", "nsecs"}
         if value and value.keys() <= known and all(map(_is_number, parts)):
-            return float(parts[0]) + float(parts[1]) * 1e-9
+            nanoseconds = parts[0] * 10**9 + parts[1]
+            if abs(nanoseconds) < 2**63:
+                return nanoseconds / 10**9, _NANOSECONDS
     elif _is_number(value):
-        return float(value)  # type: ignore[arg-type]
+        return float(value), _decimals(value)  # type: ignore[arg-type]
     raise InputError(
         f"{file}: time_from_start of point {index} is {_shown(value)}",
         hint="expected {sec: 1, nanosec: 500000000}",
     )
 
 
+def _decimals(value: float) -> int:
+    return value.decimals if isinstance(value, WrittenNumber) else 0
+
+
 def _is_number(value: Any) -> bool:  # noqa: ANN401
-    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return False
+    return abs(value) <= _LARGEST_NUMBER  # also of whole numbers that no float holds
 
 
 def _shown(value: Any) -> str:  # noqa: ANN401

@@ -43,7 +43,7 @@ def whole_file(path: str | Path) -> Iterator[BinaryIO]:
         target = Path(os.path.realpath(path))
         mode = _mode_of(target)
         # The name is short whatever the target's is, and its permissions are what the umask leaves.
-        temporary = target.with_name(f".trajcli-{secrets.token_hex(8)}.part")
+        temporary = target.with_name(f".trajcli-{os.getpid()}-{secrets.token_hex(8)}.part")
         try:
             with temporary.open("x+b") as stream:
                 if mode is not None:
@@ -54,6 +54,13 @@ def whole_file(path: str | Path) -> Iterator[BinaryIO]:
             with suppress(OSError):
                 temporary.unlink(missing_ok=True)
             raise
+
+
+def remove_unfinished(folder: str | Path, process: int) -> None:
+    """Remove what a process has half written in a folder: one that was killed could not do so itself."""
+    with suppress(OSError):
+        for path in Path(folder).glob(f".trajcli-{process}-*.part"):
+            path.unlink(missing_ok=True)
 
 
 @contextmanager

@@ -195,10 +195,10 @@ def test_where_which_limit_binds():
     np.testing.assert_allclose(borders, [V / A, duration - V / A, duration], rtol=1e-2)
 
 
-def test_a_limit_of_jerk_is_a_violation_with_a_way_out():
+def test_a_limit_of_jerk_that_is_ignored_is_a_violation_with_a_way_out():
     from trajcli.output.report import verification_error
 
-    made = fastest([[0.0], [1.0]], limits={**LIMITS, "jerk": 100}, passes=False)
+    made = fastest([[0.0], [1.0]], limits={**LIMITS, "jerk": 100}, passes=False, jerk="ignore")
     assert {finding.kind for finding in made.verdict.findings} >= {"acceleration_jump"}
     assert "use spline with rule continuous_acceleration" in (verification_error(made).problems[0].hint or "")
     assert len(report_of(made).findings) < 5

@@ -12,6 +12,7 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.frozen import comparable
 
 _BINDS = 0.95  # of a limit, on average over a piece: its ends reach the limit only as far as the grid is fine
+_QUANTITIES: tuple[Literal["velocity", "acceleration", "jerk"], ...] = ("velocity", "acceleration", "jerk")
 _STAYS = 0.01  # by which another limit must be nearer before it takes over
 
 
@@ -30,12 +31,15 @@ class Binding:
     start: float
     end: float
     joint: int
-    quantity: Literal["velocity", "acceleration"]
+    quantity: Literal["velocity", "acceleration", "jerk"]
     sign: Literal[-1, 1]
 
 
 def switching_structure(
-    trajectory: PiecewisePolynomial, velocity: ArrayLike, acceleration: ArrayLike
+    trajectory: PiecewisePolynomial,
+    velocity: ArrayLike,
+    acceleration: ArrayLike,
+    jerk: ArrayLike | None = None,
 ) -> list[Binding]:
     """Return the intervals of time in which a limit binds; where none is named, the motion switches.
 
@@ -45,8 +49,10 @@ def switching_structure(
         trajectory: q(t) with n joints, in short pieces.
         velocity: Bounds, shape (n, 2).
         acceleration: Bounds, shape (n, 2).
+        jerk: Bounds, shape (n, 2), where it follows them.
     """
-    used = np.concatenate([_used(trajectory, 1, velocity), _used(trajectory, 2, acceleration)], axis=1)
+    bounds = [velocity, acceleration] if jerk is None else [velocity, acceleration, jerk]
+    used = np.concatenate([_used(trajectory, k + 1, each) for k, each in enumerate(bounds)], axis=1)
     labels = _labels(used)
     bindings, times, n = [], trajectory.breaks, trajectory.dimension
     for label, group in groupby(range(trajectory.pieces), labels.__getitem__):
@@ -59,7 +65,7 @@ def switching_structure(
                 float(times[pieces[0]]),
                 float(times[pieces[-1] + 1]),
                 joint,
-                "velocity" if side < 2 else "acceleration",
+                _QUANTITIES[side // 2],
                 1 if side % 2 == 0 else -1,
             )
         )

@@ -70,7 +70,7 @@ class JerkLimited(PointToPoint):
         """Return the move to the target, or to its velocity where it has no joints.
 
         Raises:
-            MissingLimitError: When a moving joint lacks a limit on velocity, acceleration or jerk.
+            MissingLimitError: When a moving joint lacks a limit on velocity or acceleration.
             PlanningError: When no such motion exists.
         """
         request = Request(
@@ -118,7 +118,7 @@ def plan_motion(request: Request, robot: Robot) -> Planned:
     """Return the fastest motion that fulfils the request within the robot's limits.
 
     Raises:
-        MissingLimitError: When a moving joint lacks a limit on velocity, acceleration or jerk.
+        MissingLimitError: When a moving joint lacks a limit on velocity or acceleration.
         PlanningError: When no such motion exists.
     """
     boundaries = _boundaries(request, robot)
@@ -308,17 +308,19 @@ def _jerk_events(boundaries: Sequence[BoundaryProblem]) -> list[Event]:
 def _require_limits(boundaries: Sequence[BoundaryProblem], robot: Robot) -> None:
     """Refuse moving joints without the limits that their motion follows from.
 
+    Without a limit on the jerk the acceleration steps, and limits itself what a motion follows from.
+
     Raises:
         MissingLimitError: With one problem for each quantity, naming the joints.
     """
     problems: list[Problem] = []
-    for order in (1, 2, 3):
+    for order in (1, 2):
         lacking = [
             joint
             for joint, boundary in enumerate(boundaries)
             if not boundary.steady
             and not np.isfinite(boundary.bounds[order - 1]).all()
-            and (order > 1 or boundary.control == "position")
+            and (order == 2 or boundary.control == "position")
         ]
         if lacking:
             why, also = "to find its fastest motion", f"give the joint its own `{QUANTITIES[order]}`"

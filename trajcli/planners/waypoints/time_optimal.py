@@ -11,21 +11,18 @@ from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 from pydantic.json_schema import JsonSchemaValue
 
 from trajcli.curves.operations import scale_time, times_at
-from trajcli.curves.parabolic_blends.blends import blended
-from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.curves.splines.hermite import parabola_velocities
-from trajcli.curves.splines.shape_preserving import ShapeError
-from trajcli.curves.time_optimal.constraints import JointConstraint, PathConstraint
-from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion, UnsettledSpeedError, time_optimal
-from trajcli.curves.time_optimal.passes import UnreachableSpeedError
+from trajcli.curves.third_order.parameterization import JerkLimitedMotion
+from trajcli.curves.time_optimal.constraints import JointConstraint
+from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion
 from trajcli.curves.time_optimal.phase_plane import PhasePlane
 from trajcli.curves.time_optimal.switching import switching_structure
 from trajcli.errors import Amount, Amounts, PlanningError, Problem
-from trajcli.frozen import comparable, frozen
+from trajcli.frozen import comparable
 from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import (
     FieldType,
@@ -41,164 +38,21 @@ from trajcli.language.poses import read_numbers
 from trajcli.language.recorded import Recorded
 from trajcli.planners.approach_limits import approach_constraints
 from trajcli.planners.boundary_states import missing_limit, same_state, standstill
-from trajcli.planners.effort_limits import (
-    effort_constraints,
-    lacks_acceleration,
-    solved_within_efforts,
+from trajcli.planners.effort_limits import effort_constraints, lacks_acceleration
+from trajcli.planners.planner import Phase, Planned
+from trajcli.planners.waypoints.fastest_law import (
+    events_of_law,
+    require_continuous_curvature,
+    solve_second_order,
+    solve_within_jerk,
 )
-from trajcli.planners.planner import Event, Phase, Planned, stretched
-from trajcli.planners.waypoints.spline_rules import Rule, curve_through
+from trajcli.planners.waypoints.joint_path import JointPath, polyline_through, spline_through
+from trajcli.planners.waypoints.spline_rules import Rule
 from trajcli.planners.waypoints.through_points import REMEDIES, PointTable, ThroughPoints
 from trajcli.trajectory import State, ViaPoints
 from trajcli.units import Quantity
 
-Parameter = Literal["chord", "centripetal", "uniform"] | tuple[float, ...]
-
 _NAMED = ("chord", "centripetal", "uniform")
-_MOST_STOPS = 10  # that an event lists
-_STRETCHED = 1e-9  # relative: a smaller stretch is rounding
-_OFF = 1e-9  # relative: a velocity this little off the path is on it
-_ROOM = 0.999  # of a segment that two blends may share: each keeps a straight piece between
-
-
-@frozen
-class JointPath:
-    """A path through points.
-
-    Attributes:
-        curve: q(s).
-        s: Path parameter at each point, shape (m,).
-        missed: By how much each joint passes beside each point, shape (m, n).
-        speeds: sd at the start and at the end.
-        events: What was conceded.
-    """
-
-    curve: PiecewisePolynomial
-    s: Array
-    missed: Array
-    speeds: tuple[float, float]
-    events: tuple[Event, ...] = ()
-
-
-def spline_through(rule: Rule, parameter: Parameter, points: PointTable, robot: Robot) -> JointPath:
-    """Return the spline of a rule; where the arm moves at an end, the path has that direction there.
-
-    A quintic that ends at rest leaves its end towards the next point.
-
-    Raises:
-        PlanningError: When the parameter has another number of values than points, or shape_preserving does
-            not allow the direction.
-    """
-    s = _parameter_values(parameter, points)
-    q, ends = points.positions, points.rates[0, [0, -1]]
-    slopes, speeds = np.zeros_like(ends), [0.0, 0.0]
-    for k, (velocity, piece) in enumerate(zip(ends, (0, -1), strict=True)):
-        speed = float(np.linalg.norm(velocity))
-        chord = np.diff(q, axis=0)[piece] / np.diff(s)[piece]
-        if speed:
-            slopes[k] = velocity / speed * np.linalg.norm(chord)
-            speeds[k] = speed / float(np.linalg.norm(chord))
-        elif rule == "quintic":  # without slope and curvature it would take infinite sd to leave the end
-            slopes[k] = chord
-    rates = np.zeros_like(points.rates)
-    rates[0, [0, -1]] = slopes
-    known = replace(points, rates=rates)
-    try:
-        curve = curve_through(rule, _bent_where_all_turn(known, s) if rule == "quintic" else known, s)
-    except ShapeError as error:
-        name = robot.joint_names[error.component]
-        message = f"the velocity of {name} at the {error.end} point does not let the path be monotone there"
-        raise PlanningError(Problem(message, "use rule not_a_knot", joint=name)) from None
-    return JointPath(curve, s, np.zeros_like(q), (speeds[0], speeds[1]))
-
-
-def _bent_where_all_turn(points: PointTable, s: Array) -> PointTable:
-    """Return the points with the accelerations of parabolas where all joints turn back at once.
-
-    There the computed velocities and accelerations of a quintic vanish, and it would take infinite sd to
-    leave the point as fast as the joints can.
-    """
-    ends = points.rates[0, [0, -1]]
-    computed: Array = parabola_velocities(s, points.positions, *ends)
-    turning = np.logical_not(computed.any(axis=1))
-    turning[[0, -1]] = False
-    if not turning.any():
-        return points
-    slopes = np.diff(points.positions, axis=0) / np.diff(s)[:, None]
-    rates, given = points.rates.copy(), points.given.copy()
-    rates[1, 1:-1][turning[1:-1]] = (2 * np.diff(slopes, axis=0) / (s[2:] - s[:-2])[:, None])[turning[1:-1]]
-    given[1] = given[1] | turning
-    return replace(points, rates=rates, given=given)
-
-
-def _parameter_values(parameter: Parameter, points: PointTable) -> Array:
-    if isinstance(parameter, tuple):
-        if len(parameter) != points.count:
-            message = f"{len(parameter)} values of the parameter for {points.count} points"
-            raise PlanningError(message, hint="give one for each point, or use chord")
-        return np.array(parameter)
-    chords = np.linalg.norm(np.diff(points.positions, axis=0), axis=1)
-    steps = {"chord": chords, "centripetal": np.sqrt(chords), "uniform": np.ones_like(chords)}[parameter]
-    return np.concatenate([[0.0], np.cumsum(steps)])
-
-
-def polyline_through(points: PointTable, corner: Array, robot: Robot) -> JointPath:
-    """Return straight segments, corners rounded by parabolas that stay within `corner` of them.
-
-    Args:
-        points: What to pass.
-        corner: How far each joint may pass from a corner, rad or m, shape (n,): all above zero, or all zero
-            for sharp corners.
-        robot: For the names of joints.
-
-    Raises:
-        PlanningError: When the arm moves at an end in another direction than the segment there.
-    """
-    q, s = points.positions, _parameter_values("chord", points)
-    slopes = np.diff(q, axis=0) / np.diff(s)[:, None]
-    speeds = tuple(
-        _along(slope, velocity, robot)
-        for slope, velocity in zip(slopes[[0, -1]], points.rates[0, [0, -1]], strict=True)
-    )
-    turn = np.abs(np.diff(slopes, axis=0))
-    if not corner.any() or not turn.any():
-        curve = PiecewisePolynomial(s, np.stack([slopes, q[:-1]]))
-        return JointPath(curve, s, np.zeros_like(q), (speeds[0], speeds[1]))
-    wanted = np.zeros(points.count)
-    sharpest = (turn / corner).max(axis=1)
-    wanted[1:-1] = 8 / np.where(sharpest > 0, sharpest, np.inf)
-    room = np.diff(s)
-    limit = np.full(points.count, np.inf)
-    limit[1:-1] = _ROOM * np.minimum(room[:-1], room[1:])
-    used = np.minimum(wanted, limit)
-    motion = blended(s, q, used, ends="inside", start_velocity=slopes[0], end_velocity=slopes[-1])
-    return JointPath(motion.curve, s, motion.missed, (speeds[0], speeds[1]), _shrunk(wanted, used))
-
-
-def _along(slope: Array, velocity: Array, robot: Robot) -> float:
-    """Return sd with which the path of a slope has the velocity."""
-    speed = float(velocity @ slope) / float(slope @ slope)
-    off = np.abs(velocity - speed * slope)
-    if off.max() > _OFF * np.abs(velocity).max() or speed < 0:
-        joint = int(off.argmax())
-        name = robot.joint_names[joint]
-        message = "a polyline is straight at its ends, but {velocity} of {joint} leaves it"
-        hint = "use `path: spline`, or let the move before end at rest"
-        amounts: Amounts = {"joint": name, "velocity": Amount(float(velocity[joint]), 1, joint)}
-        raise PlanningError(Problem(message, hint, joint=name, amounts=amounts))
-    return speed
-
-
-def _shrunk(wanted: Array, used: Array) -> tuple[Event, ...]:
-    less = np.flatnonzero(used[1:-1] < wanted[1:-1])
-    if not less.size:
-        return ()
-    share = used[1:-1][less] / wanted[1:-1][less]
-    worst = int(less[share.argmin()])
-    more = f"; {less.size - 1} more likewise" if less.size > 1 else ""
-    part = f"{100 * share.min():.4g} % of the deviation asked for"
-    text = f"the corner at point {worst + 1} is rounded by {part}: its segments are too short for more{more}"
-    return (Event("shrunk", text),)
 
 
 @comparable
@@ -229,10 +83,11 @@ class PathParameter(FieldType):
 
 
 class TimeOptimal(ThroughPoints):
-    """Through points as fast as velocity and acceleration limits allow, on a path that they fix.
+    """Through points as fast as velocity, acceleration and jerk limits allow, on a path that they fix.
 
     Source: Pham and Pham, A New Approach to Time-Optimal Path Parameterization Based on Reachability
-    Analysis, IEEE Trans. Robotics 34 (2018).
+    Analysis, IEEE Trans. Robotics 34 (2018); Debrouwere et al., Time-optimal path following for robots with
+    convex-concave constraints using sequential convex programming, IEEE Trans. Robotics 29 (2013).
     """
 
     continuity: ClassVar[Literal[1, 2]] = 1
@@ -266,6 +121,19 @@ class TimeOptimal(ThroughPoints):
         ]
         | None
     ) = None
+
+    jerk: Annotated[
+        Literal["keep", "ignore"],
+        Field(
+            description="keep: within the limits of jerk, where joints have them, and without steps in "
+            "acceleration; ignore: as fast as velocity and acceleration limits allow."
+        ),
+    ] = "keep"
+
+    @property
+    def joins(self) -> Literal[1, 2]:
+        """2 where it keeps limits of jerk; where no joint has one, its acceleration steps all the same."""
+        return 2 if self.jerk == "keep" else 1
 
     @model_validator(mode="after")
     def _path_fits(self) -> TimeOptimal:
@@ -312,6 +180,8 @@ class TimeOptimal(ThroughPoints):
             MissingLimitError: When a moving joint has no limit of acceleration.
             PlanningError: When the velocities at the ends do not fit the path, or the duration is too short.
         """
+        if not self._keeps_jerk(robot):  # its acceleration steps anyway
+            start = State(start.position, start.velocity, np.zeros_like(start.acceleration))
         points = self._untimed().waypoints(start, robot)
         moving = np.ptp(points.positions, axis=0) > 0
         if not moving.any():
@@ -322,13 +192,13 @@ class TimeOptimal(ThroughPoints):
             raise missing_limit(
                 self.tag, "acceleration", lacking.tolist(), robot, "to find the fastest motion"
             )
-        path = self._path(points, robot)
-        motion = _solved(path, robot)
+        path, motion = self._solved(points, robot, moving)
+        jerk = robot.limits.jerk if isinstance(motion, JerkLimitedMotion) else None
         duration = motion.trajectory.duration
         factor = 1.0 if self.duration is None else self.duration / duration
         _check_duration(self.duration, duration, points)
         passed = times_at(motion.law, path.s)
-        binding = switching_structure(motion.trajectory, robot.limits.velocity, bounds)
+        binding = switching_structure(motion.trajectory, robot.limits.velocity, bounds, jerk)
         return Planned(
             scale_time(motion.trajectory, factor) if factor != 1 else motion.trajectory,
             points.target,
@@ -337,13 +207,33 @@ class TimeOptimal(ThroughPoints):
                 for b in binding
             ),
             via_points=ViaPoints(passed * factor, points.positions, path.missed),
-            events=(*points.events, *path.events, *_events(motion)),
+            events=(*points.events, *path.events, *events_of_law(motion, fastest=factor == 1.0)),
             binding_phases=True,
             remedies=REMEDIES,
             phase_plane=self._phase_plane(path, motion, robot).scaled(factor),
+            continuity=1 if jerk is None else 2,
         )
 
-    def _phase_plane(self, path: JointPath, motion: TimeOptimalMotion, robot: Robot) -> PhasePlane:
+    def _keeps_jerk(self, robot: Robot) -> bool:
+        return self.jerk == "keep" and bool(np.isfinite(robot.limits.jerk).any())
+
+    def _solved(
+        self, points: PointTable, robot: Robot, moving: NDArray[np.bool_]
+    ) -> tuple[JointPath, TimeOptimalMotion | JerkLimitedMotion]:
+        """Return the path and the fastest motion along it."""
+        if not self._keeps_jerk(robot) or not np.isfinite(robot.limits.jerk[moving]).any():
+            path = self._path(points, robot, smooth=False)
+            return path, solve_second_order(path, robot)
+        if self.path == "spline":
+            require_continuous_curvature(self.rule)
+        path = self._path(points, robot, smooth=True)
+        return solve_within_jerk(
+            path, points.rates[1, 0], robot, bends=self.path == "spline" and self.rule != "quintic"
+        )
+
+    def _phase_plane(
+        self, path: JointPath, motion: TimeOptimalMotion | JerkLimitedMotion, robot: Robot
+    ) -> PhasePlane:
         """Return the law with its limits; the length of chords has a unit where all joints share one."""
         limits, kinds = robot.limits, set(robot.joint_types)
         by_chord = self.path == "polyline" or (self.parameter or "chord") == "chord"
@@ -383,35 +273,10 @@ class TimeOptimal(ThroughPoints):
             return self
         return self.model_copy(update={"through": replace(self.through, times=None)})
 
-    def _path(self, points: PointTable, robot: Robot) -> JointPath:
+    def _path(self, points: PointTable, robot: Robot, *, smooth: bool) -> JointPath:
         if self.path == "polyline":
-            return polyline_through(points, np.array(self.corner or (0.0,)), robot)
+            return polyline_through(points, np.array(self.corner or (0.0,)), robot, smooth=smooth)
         return spline_through(self.rule or "not_a_knot", self.parameter or "chord", points, robot)
-
-
-def _solved(path: JointPath, robot: Robot) -> TimeOptimalMotion:
-    limits = robot.limits
-    further = approach_constraints(path.curve, robot)
-
-    def solve(efforts: tuple[PathConstraint, ...]) -> TimeOptimalMotion:
-        return time_optimal(
-            path.curve,
-            limits.velocity,
-            limits.acceleration,
-            start_velocity=path.speeds[0],
-            end_velocity=path.speeds[1],
-            further=(*further, *efforts),
-        )
-
-    try:
-        return solved_within_efforts(path.curve, robot, solve)
-    except UnreachableSpeedError as error:
-        share = error.allowed / error.speed
-        message = f"time_optimal cannot have so high a velocity at its ends: at most {share:.6g} of it"
-        raise PlanningError(message, hint="lower it, or let the move before end at rest") from None
-    except UnsettledSpeedError as error:
-        message = f"with these velocities at its ends time_optimal passes a limit by {error.over:.9g} times"
-        raise PlanningError(message, hint="lower them a little") from None
 
 
 def _check_duration(wanted: float | None, fastest: float, points: PointTable) -> None:
@@ -424,20 +289,3 @@ def _check_duration(wanted: float | None, fastest: float, points: PointTable) ->
         message = "time_optimal needs {fastest}, it shall last {wanted}"
         amounts = {"fastest": Amount(fastest, rounded="up"), "wanted": Amount(wanted)}
         raise PlanningError(Problem(message, "leave `duration` out for the fastest", amounts=amounts))
-
-
-def _events(motion: TimeOptimalMotion) -> Iterator[Event]:
-    if motion.refinements:
-        yield Event(
-            "refined",
-            f"the grid was refined {'once' if motion.refinements == 1 else f'{motion.refinements} times'}, "
-            f"to {motion.grid.size} grid points of the path",
-        )
-    if motion.stretch > 1 + _STRETCHED:
-        yield stretched(motion.stretch)
-    if motion.stops.size:
-        times = ", ".join(f"{time:.6g}" for time in motion.stop_times[:_MOST_STOPS].tolist())
-        more = ", ..." if motion.stops.size > _MOST_STOPS else ""
-        count = motion.stops.size
-        text = f"stops at {count} corner{'s' * (count != 1)}, at t = {times}{more} s of the move"
-        yield Event("stops", f"{text}: give `corner` to round them")

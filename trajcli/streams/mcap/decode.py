@@ -7,6 +7,7 @@ entry, and taken for all that have the same bytes around the numbers.
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.frozen import comparable, frozen
 from trajcli.streams.mcap.cdr import Bytes
 
-_NAMES = ("position", "velocity", "effort")
+_STATES = ("position", "velocity", "acceleration", "effort")
 
 
 class DamagedMessageError(ValueError):
@@ -44,12 +45,21 @@ class JointSeries:
 
 
 @comparable
-class _StateLayout:
-    """Where the parts of a JointState stand: the names, and offset and count of each sequence."""
+class StateLayout:
+    """Where the parts of a message with one state of joints stand.
+
+    Attributes:
+        order: "<" or ">", of its bytes.
+        names: Of the joints.
+        sequences: Offset and count of positions, velocities, accelerations and efforts.
+        free: Offset and length, in bytes, of all parts but the stamp that differ from message to message.
+        length: Of the message, in bytes.
+    """
 
     order: str
     names: tuple[str, ...]
     sequences: tuple[tuple[int, int], ...]
+    free: tuple[tuple[int, int], ...]
     length: int
 
 
@@ -110,37 +120,85 @@ class _Cursor:
         return np.frombuffer(self.message, self.order + "f8", count, start).astype(np.float64)
 
 
-def _state_layout(message: bytes) -> _StateLayout:
+def joint_state_layout(message: bytes) -> StateLayout:
+    """Return the layout of a sensor_msgs/JointState message.
+
+    Raises:
+        DamagedMessageError: When it is damaged.
+    """
     cursor = _Cursor(message)
     cursor.time()
     cursor.text()
     names = cursor.texts()
-    sequences = tuple(cursor.sequence() for _ in _NAMES)
-    for (_, count), what in zip(sequences, _NAMES, strict=True):
+    position, velocity, effort = (cursor.sequence() for _ in range(3))
+    return _layout(cursor, names, (position, velocity, (cursor.at, 0), effort), (position, velocity, effort))
+
+
+def controller_state_layout(message: bytes, fields: Sequence[str], field: str) -> StateLayout:
+    """Return the layout of a field of a control_msgs/JointTrajectoryControllerState message.
+
+    Args:
+        message: The message.
+        fields: Names of its fields that are points of trajectories, in their order.
+        field: Which of them.
+
+    Raises:
+        DamagedMessageError: When it is damaged.
+    """
+    cursor = _Cursor(message)
+    cursor.time()
+    cursor.text()
+    names = cursor.texts()
+    chosen: tuple[tuple[int, int], ...] = ()
+    every: list[tuple[int, int]] = []
+    for name in fields:
+        sequences = tuple(cursor.sequence() for _ in _STATES)
+        cursor.align(4)
+        duration = (cursor.at, 1)
+        cursor.time()
+        every += [*sequences, duration]
+        chosen = sequences if name == field else chosen
+    return _layout(cursor, names, chosen, every)
+
+
+def _layout(
+    cursor: _Cursor,
+    names: tuple[str, ...],
+    sequences: tuple[tuple[int, int], ...],
+    numbers: Sequence[tuple[int, int]],
+) -> StateLayout:
+    for (_, count), what in zip(sequences, _STATES, strict=True):
         if count not in (0, len(names)):
             raise DamagedMessageError(f"it has {count} values of {what} for {len(names)} joints")
-    return _StateLayout(cursor.order, names, sequences, len(message))
+    free = tuple((at, 8 * count) for at, count in numbers)
+    return StateLayout(cursor.order, names, sequences, free, len(cursor.message))
 
 
-def joint_states(data: Bytes, starts: NDArray[np.int64], lengths: NDArray[np.int64]) -> JointSeries:
-    """Return the states of sensor_msgs/JointState messages; their accelerations are not there.
+def joint_states(
+    data: Bytes,
+    starts: NDArray[np.int64],
+    lengths: NDArray[np.int64],
+    layout_of: Callable[[bytes], StateLayout] = joint_state_layout,
+) -> JointSeries:
+    """Return the states of messages that hold one each; JointState has no accelerations.
 
     Args:
         data: Bytes in which the messages stand.
         starts: Where each starts, shape (N,), N >= 1.
         lengths: Of each, shape (N,).
+        layout_of: Where the parts of a message stand.
 
     Raises:
         DamagedMessageError: When one is damaged, or has other joints or quantities than the first.
     """
     count = starts.size
-    first = _state_layout(data[starts[0] : starts[0] + lengths[0]].tobytes())
+    first = layout_of(data[starts[0] : starts[0] + lengths[0]].tobytes())
     stamps = np.empty(count, np.int64)
     values = [np.empty((count, number)) for _, number in first.sequences]
     left = np.arange(count)
     while left.size:
         start, length = int(starts[left[0]]), int(lengths[left[0]])
-        layout = _state_layout(data[start : start + length].tobytes())
+        layout = layout_of(data[start : start + length].tobytes())
         same = [number for _, number in layout.sequences] == [number for _, number in first.sequences]
         if layout.names != first.names or not same:
             raise DamagedMessageError("it is about other joints or quantities than the first of its topic")
@@ -153,16 +211,16 @@ def joint_states(data: Bytes, starts: NDArray[np.int64], lengths: NDArray[np.int
             part = np.ascontiguousarray(raw[:, at : at + 8 * number])
             out[alike] = part.view(layout.order + "f8") if number else part.astype(np.float64)
         left = np.setdiff1d(left, alike, assume_unique=True)
-    return JointSeries(first.names, stamps, values[0], values[1], np.empty((count, 0)), values[2])
+    return JointSeries(first.names, stamps, *(values[0], values[1], values[2], values[3]))
 
 
-def _fits(raw: Bytes, layout: _StateLayout) -> NDArray[np.bool_]:
+def _fits(raw: Bytes, layout: StateLayout) -> NDArray[np.bool_]:
     """Return which messages (N, length) have the bytes of the first but for stamp and numbers."""
     fits: NDArray[np.bool_] = (raw[:, :4] == raw[0, :4]).all(axis=1)
     low = 12
-    for at, number in (*layout.sequences, (layout.length, 0)):
+    for at, length in (*layout.free, (layout.length, 0)):
         fits = fits & (raw[:, low:at] == raw[0, low:at]).all(axis=1)
-        low = at + 8 * number
+        low = at + length
     return fits
 
 
@@ -190,10 +248,10 @@ def joint_trajectory(message: bytes) -> JointSeries:
     cursor.need(24 * count)
     times, states = np.empty(count, np.int64), []
     for k in range(count):
-        states.append([cursor.values() for _ in range(4)])
+        states.append([cursor.values() for _ in _STATES])
         times[k] = cursor.time()
         sizes = [each.size for each in states[k]]
         if sizes != [each.size for each in states[0]] or not {*sizes} <= {0, len(names)}:
             raise DamagedMessageError(f"its point {k} has {sizes} values for {len(names)} joints")
-    columns = [np.array([state[order] for state in states]).reshape(count, -1) for order in range(4)]
-    return JointSeries(names, times, columns[0], columns[1], columns[2], columns[3])
+    columns = [np.array([state[k] for state in states]).reshape(count, -1) for k in range(len(_STATES))]
+    return JointSeries(names, times, *(columns[0], columns[1], columns[2], columns[3]))

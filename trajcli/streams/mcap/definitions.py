@@ -10,6 +10,7 @@ from __future__ import annotations
 JOINT_STATE = "sensor_msgs/msg/JointState"
 JOINT_TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 JOINT_TRAJECTORY_POINT = "trajectory_msgs/msg/JointTrajectoryPoint"
+CONTROLLER_STATE = "control_msgs/msg/JointTrajectoryControllerState"
 STRING = "std_msgs/msg/String"
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
 PATH = "nav_msgs/msg/Path"
@@ -48,6 +49,7 @@ _MESSAGES = {
     TWIST: "std_msgs/Header header\ngeometry_msgs/Twist twist",
 }
 _RULE = "=" * 80
+_TYPE_AND_NAME = 2  # words of a field
 
 
 def definition_of(message: str) -> str:
@@ -56,6 +58,21 @@ def definition_of(message: str) -> str:
     parts = [text + "\n"]
     parts += [f"{_RULE}\nMSG: {name}\n{_PARTS[name]}\n" for name in _used(text)]
     return "".join(parts)
+
+
+def point_fields(definition: str) -> tuple[str, ...]:
+    """Return the fields of a message, given as ros2msg text, that are points of a trajectory.
+
+    They stand behind a header and the names of joints; none are returned where other fields are between.
+    """
+    lines = definition.partition(_RULE)[0].splitlines()
+    fields = [line.partition("#")[0].split() for line in lines]
+    named = [(field[0].replace("/msg/", "/"), field[1]) for field in fields if len(field) == _TYPE_AND_NAME]
+    if [kind for kind, _ in named[:2]] != ["std_msgs/Header", "string[]"]:
+        return ()
+    points = [kind == "trajectory_msgs/JointTrajectoryPoint" for kind, _ in named[2:]]
+    count = points.index(False) if False in points else len(points)
+    return tuple(name for _, name in named[2 : 2 + count])
 
 
 def _used(text: str) -> list[str]:

@@ -39,7 +39,7 @@ HEAD = _HEAD.itemsize
 
 _READ = (
     *(records.SCHEMA, records.CHANNEL, records.MESSAGE, records.CHUNK, records.MESSAGE_INDEX),
-    *(records.METADATA, records.STATISTICS, records.DATA_END, records.FOOTER),
+    *(records.METADATA, records.METADATA_INDEX, records.STATISTICS, records.DATA_END, records.FOOTER),
 )
 
 
@@ -81,6 +81,7 @@ class LogRecords:
         self.statistics: Any = None
         self.checked = checked
         self._stream, self._position, self._checksum = stream, 0, 0
+        self._metadata_at: list[int] = []  # where metadata stand, as the summary says
         self._walking = walking  # through each chunk, as its index does not name definitions
 
     def wrong(self, what: str, hint: str | None = None) -> InputError:
@@ -124,7 +125,7 @@ class LogRecords:
             raise self._truncated()
 
     def read_summary(self) -> bool:
-        """Note what the end of the file says; return whether that names channels."""
+        """Note what the end of the file says, and the metadata; return whether that names channels."""
         size = self._stream.seek(0, 2)
         if size > _TAIL.size + len(records.MAGIC):
             self._stream.seek(size - _TAIL.size)
@@ -139,8 +140,22 @@ class LogRecords:
                     content = self._content(kind, length)
                     with self._parsing():
                         self._note(kind, content, 0)
+                self._read_metadata(size)
         self._position = self._stream.seek(0)
         return bool(self.channels)
+
+    def _read_metadata(self, size: int) -> None:
+        """Note the metadata at which the summary points."""
+        for offset in self._metadata_at:
+            if offset > size - records.RECORD_HEAD.size:
+                raise self.wrong("the index of metadata points behind the end of the file")
+            self._position = self._stream.seek(offset)
+            kind, length = records.RECORD_HEAD.unpack(self._take(records.RECORD_HEAD.size))
+            if kind != records.METADATA:
+                raise self.wrong("the index of metadata does not point to any")
+            content = self._content(kind, length)
+            with self._parsing():
+                self._note(kind, content, 0)
 
     def _take(self, count: int) -> bytes:
         data = self._stream.read(count)
@@ -195,6 +210,8 @@ class LogRecords:
         elif kind == records.METADATA:
             metadata = _parsed("Metadata", content)
             self.metadata[metadata.name] = metadata.metadata
+        elif kind == records.METADATA_INDEX:
+            self._metadata_at.append(struct.unpack_from("<Q", content)[0])
         elif kind == records.STATISTICS:
             self.statistics = _parsed("Statistics", content)
         elif kind == records.DATA_END and self.checked:

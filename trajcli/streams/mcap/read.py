@@ -2,24 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import FileError, InputError
 from trajcli.frozen import frozen
 from trajcli.streams.mcap import definitions, records
-from trajcli.streams.mcap.decode import DamagedMessageError, JointSeries, joint_states, joint_trajectory
+from trajcli.streams.mcap.decode import (
+    DamagedMessageError,
+    JointSeries,
+    StateLayout,
+    controller_state_layout,
+    joint_state_layout,
+    joint_states,
+    joint_trajectory,
+)
 from trajcli.streams.mcap.log_records import HEAD, LogRecords, MessageBlock, known_channels
 from trajcli.streams.mcap.messages import JOINT_ACCELERATIONS, JOINT_STATES
 from trajcli.suggest import did_you_mean, valid_names
 
 METADATA = "trajcli"
-_READ = (definitions.JOINT_STATE, definitions.JOINT_TRAJECTORY)
+_READ = (definitions.JOINT_STATE, definitions.JOINT_TRAJECTORY, definitions.CONTROLLER_STATE)
+_ARRAYS = ("times", "position", "velocity", "acceleration", "effort")  # of a motion
 _CLOCK = 10**17  # ns: stamps from here on (1973) are times of a clock, and counted from the first
 
 
@@ -48,15 +59,8 @@ class LoggedMotion:
     effort: Array
 
 
-def read_mcap(path: str | Path, topic: str | None = None) -> LoggedMotion:
-    """Read the motion of a topic of sensor_msgs/JointState or trajectory_msgs/JointTrajectory.
-
-    Of a log that trajcli wrote, /joint_states has the accelerations of /joint_accelerations, and times count
-    from its epoch.
-
-    Args:
-        path: The file.
-        topic: The topic; /joint_states unless given, or else the only one that can be read.
+def read_mcap(path: str | Path, topic: str | None = None, field: str | None = None) -> LoggedMotion:
+    """Read the motion of a topic of a file, as `read_log` does.
 
     Raises:
         FileError: When the file cannot be read.
@@ -64,35 +68,149 @@ def read_mcap(path: str | Path, topic: str | None = None) -> LoggedMotion:
     """
     try:
         with Path(path).open("rb") as stream:
-            return _read(stream, str(path), topic)
+            return read_log(stream, str(path), topic, field)
     except OSError as error:
         raise FileError(f"cannot read {path}: {error.strerror or error}") from error
 
 
-def _read(stream: BinaryIO, file: str, topic: str | None) -> LoggedMotion:
+def read_log(stream: BinaryIO, file: str, topic: str | None = None, field: str | None = None) -> LoggedMotion:
+    """Read the motion of a topic of JointState, JointTrajectory or JointTrajectoryControllerState.
+
+    Of a log that trajcli wrote, /joint_states has the accelerations of /joint_accelerations, and times count
+    from its epoch.
+
+    Args:
+        stream: The file, open at its first byte.
+        file: Its name, for messages.
+        topic: The topic; /joint_states unless given, or else the only one that can be read.
+        field: Of JointTrajectoryControllerState, the state that is read, such as "reference".
+
+    Raises:
+        InputError: When it is no whole MCAP file, or has no such topic.
+    """
+    blocks = list(log_blocks(stream, file, topic, field))
+    first = blocks[0]
+    joined = {name: np.concatenate([getattr(block, name) for block in blocks]) for name in _ARRAYS}
+    return LoggedMotion(file, first.topic, first.joint_names, **joined)
+
+
+def log_blocks(
+    stream: BinaryIO, file: str, topic: str | None = None, field: str | None = None
+) -> Iterator[LoggedMotion]:
+    """Yield the motion of a topic block by block, as `read_log` reads it, at least one.
+
+    Raises:
+        InputError: When it is no whole MCAP file, or has no such topic.
+    """
     known = known_channels(stream, file)
     chosen = _chosen(known, topic)
-    log = LogRecords(stream, file)
+    own = known.metadata.get(METADATA, {})
     wanted = {chosen: _channels(known, chosen)}
-    if chosen == JOINT_STATES:
-        wanted[JOINT_ACCELERATIONS] = _channels(known, JOINT_ACCELERATIONS)
-    found: dict[str, list[JointSeries]] = {name: [] for name in wanted}
+    accelerations = _channels(known, JOINT_ACCELERATIONS) if own and chosen == JOINT_STATES else set()
+    if accelerations:
+        wanted[JOINT_ACCELERATIONS] = accelerations
+    clock, before = _Clock(own), 0
+    for series in _same_joints(_states(LogRecords(stream, file), known, wanted, field), file, chosen):
+        motion = _motion(file, chosen, series, clock, before)
+        before += motion.times.size
+        yield motion
+    if not before:
+        raise InputError(f"the topic {chosen} of {file} has no messages")
+
+
+def _states(
+    log: LogRecords, known: LogRecords, wanted: Mapping[str, set[int]], field: str | None
+) -> Iterator[JointSeries]:
+    """Yield the states of the first of some topics, with the accelerations of the second."""
+    layouts = {number: _layouts(known, number, field) for channels in wanted.values() for number in channels}
+    pending: dict[str, list[JointSeries]] = {name: [] for name in wanted}
+    trajectories = 0
     for block in log.blocks():
         for name, channels in wanted.items():
             for channel in channels & block.offsets.keys():
-                kind, count = _type(known, channel), block.offsets[channel].size
-                if kind == definitions.JOINT_TRAJECTORY and count + len(found[name]) > 1:
-                    raise InputError(
-                        f"the topic {name} of {file} holds several trajectories, and one is read"
-                    )
+                count = block.offsets[channel].size
+                trajectories += count if layouts[channel] is None else 0
+                if trajectories > 1:
+                    message = f"the topic {name} of {log.file} holds several trajectories, and one is read"
+                    raise InputError(message)
                 if count:
-                    found[name].append(_decoded(log, block, channel, name, kind))
-    series = _joined(found[chosen], file, chosen)
-    accelerations = found.get(JOINT_ACCELERATIONS, [])
-    own = log.metadata.get(METADATA, {})
-    if own and accelerations and chosen == JOINT_STATES:
-        series = _with_accelerations(series, _joined(accelerations, file, JOINT_ACCELERATIONS))
-    return _motion(file, chosen, series, own)
+                    pending[name].append(_decoded(log, block, channel, name, layouts[channel]))
+        yield from _paired(log.file, *pending.values())
+    if any(part.nanoseconds.size for parts in pending.values() for part in parts):
+        raise _other_stamps(log.file)
+
+
+def _paired(
+    file: str, states: list[JointSeries], accelerations: list[JointSeries] | None = None
+) -> Iterator[JointSeries]:
+    """Yield the states whose accelerations are there, too, and take them out of both lists."""
+    if accelerations is None:
+        yield from states
+        states.clear()
+        return
+    while states and accelerations:
+        first, second = states.pop(0), accelerations.pop(0)
+        count = min(first.nanoseconds.size, second.nanoseconds.size)
+        for parts, series in ((states, first), (accelerations, second)):
+            if series.nanoseconds.size > count:
+                parts.insert(0, _rows(series, slice(count, None)))
+        first, second = _rows(first, slice(count)), _rows(second, slice(count))
+        if first.names != second.names or not np.array_equal(first.nanoseconds, second.nanoseconds):
+            raise _other_stamps(file)
+        yield replace(first, acceleration=second.position)
+
+
+def _rows(series: JointSeries, rows: slice) -> JointSeries:
+    return replace(
+        series,
+        nanoseconds=series.nanoseconds[rows],
+        position=series.position[rows],
+        velocity=series.velocity[rows],
+        acceleration=series.acceleration[rows],
+        effort=series.effort[rows],
+    )
+
+
+def _other_stamps(file: str) -> InputError:
+    return InputError(f"{file}: {JOINT_ACCELERATIONS} has other stamps or joints than {JOINT_STATES}")
+
+
+def _same_joints(parts: Iterable[JointSeries], file: str, topic: str) -> Iterator[JointSeries]:
+    """Yield states; refused where some have other joints or quantities than the first."""
+    first: tuple[object, ...] | None = None
+    for part in parts:
+        form = (part.names, *(getattr(part, name).shape[1:] for name in _ARRAYS[1:]))
+        first = form if first is None else first
+        if form != first:
+            raise InputError(f"the messages of {topic} in {file} are about different joints or quantities")
+        if part.nanoseconds.size:
+            yield part
+
+
+def _layouts(known: LogRecords, channel: int, field: str | None) -> Callable[[bytes], StateLayout] | None:
+    """Return where the parts of a channel's messages stand; None where each holds a trajectory.
+
+    Raises:
+        InputError: When the messages have several states and none is chosen, or have no such field.
+    """
+    kind, topic = _type(known, channel), known.channels[channel].topic
+    if kind != definitions.CONTROLLER_STATE:
+        if field is not None:
+            hint = f"--field is about topics of {definitions.CONTROLLER_STATE}"
+            raise InputError(
+                f"the topic {topic} of {known.file} holds {kind}, which has one state", hint=hint
+            )
+        return joint_state_layout if kind == definitions.JOINT_STATE else None
+    schema = known.schemas[known.channels[channel].schema_id]
+    fields = definitions.point_fields(schema.data.decode("utf-8", "replace"))
+    if not fields:
+        raise InputError(f"the definition of {kind} in {known.file} is of an unknown form")
+    if field not in fields:
+        message = f"the topic {topic} of {known.file} holds the states {', '.join(fields)}"
+        near = None if field is None else did_you_mean(field, fields)
+        message += "" if field is None else f", and no '{field}'"
+        raise InputError(message, hint=near or f"choose one: --field {' or --field '.join(fields)}")
+    return partial(controller_state_layout, fields=fields, field=field)
 
 
 def _type(known: LogRecords, channel: int) -> str:
@@ -133,14 +251,20 @@ def _chosen(known: LogRecords, topic: str | None) -> str:
     return topic
 
 
-def _decoded(log: LogRecords, block: MessageBlock, channel: int, topic: str, kind: str) -> JointSeries:
+def _decoded(
+    log: LogRecords,
+    block: MessageBlock,
+    channel: int,
+    topic: str,
+    layout: Callable[[bytes], StateLayout] | None,
+) -> JointSeries:
     """Return the states in the messages of a channel in a block."""
     heads = block.heads(channel)
     starts = block.offsets[channel] + HEAD
     lengths = heads["length"].astype(np.int64) - (HEAD - records.RECORD_HEAD.size)
     try:
-        if kind == definitions.JOINT_STATE:
-            series = joint_states(block.data, starts, lengths)
+        if layout is not None:
+            series = joint_states(block.data, starts, lengths, layout)
             # where nobody has stamped the messages, the recorder has
             stamped = series.nanoseconds.any() or not heads["time"].any()
             return series if stamped else replace(series, nanoseconds=heads["time"].astype(np.int64))
@@ -149,44 +273,38 @@ def _decoded(log: LogRecords, block: MessageBlock, channel: int, topic: str, kin
         raise log.wrong(f"a message of {topic} cannot be read: {error}") from error
 
 
-def _joined(parts: Sequence[JointSeries], file: str, topic: str) -> JointSeries:
-    """Return all states of a topic in order.
+class _Clock:
+    """The start of the times of a log, which is found with the first stamp.
 
-    Raises:
-        InputError: When there are none, or parts have different joints.
+    Attributes:
+        start: ns.
     """
-    if not parts or not sum(part.nanoseconds.size for part in parts):
-        raise InputError(f"the topic {topic} of {file} has no messages")
-    first = parts[0]
-    shapes = [part.position.shape[1:] + part.velocity.shape[1:] + part.effort.shape[1:] for part in parts]
-    if any(part.names != first.names for part in parts) or len({*shapes}) > 1:
-        raise InputError(f"the messages of {topic} in {file} are about different joints or quantities")
-    arrays = ("nanoseconds", "position", "velocity", "acceleration", "effort")
-    joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in arrays}
-    return JointSeries(names=first.names, **joined)
+
+    def __init__(self, own: Mapping[str, str]) -> None:
+        self._epoch = own.get("epoch", "")
+        self.start: int | None = None
+
+    def seconds(self, stamps: NDArray[np.int64]) -> Array:
+        """Return times (N,) of stamps (N,) in ns."""
+        if self.start is None:
+            first = int(stamps[0])
+            self.start = first if first >= _CLOCK else 0
+            if self._epoch.isdigit() and first >= int(self._epoch):
+                self.start = int(self._epoch)
+        return np.asarray((stamps - self.start) / 1e9)
 
 
-def _with_accelerations(states: JointSeries, accelerations: JointSeries) -> JointSeries:
-    """Return the states of a log of trajcli with the accelerations of its other topic."""
-    same = np.array_equal(states.nanoseconds, accelerations.nanoseconds)
-    if not same or states.names != accelerations.names:
-        return states
-    return replace(states, acceleration=accelerations.position)
-
-
-def _motion(file: str, topic: str, series: JointSeries, own: Mapping[str, str]) -> LoggedMotion:
-    stamps, epoch = series.nanoseconds, own.get("epoch", "")
-    start = int(stamps[0]) if stamps[0] >= _CLOCK else 0
-    if epoch.isdigit() and stamps[0] >= int(epoch):
-        start = int(epoch)
-    parts = (series.position, series.velocity, series.acceleration, series.effort)
-    for what, values in zip(("position", "velocity", "acceleration", "effort"), parts, strict=True):
+def _motion(file: str, topic: str, series: JointSeries, clock: _Clock, before: int) -> LoggedMotion:
+    parts = (series.position, series.velocity, series.acceleration)
+    for what, values in zip(("position", "velocity", "acceleration"), parts, strict=True):
         finite = np.isfinite(values)
         if not finite.all():
             row, joint = np.argwhere(~finite)[0].tolist()
             raise InputError(
-                f"the {what} of {series.names[joint]} in message {row} of {topic} in {file} is "
+                f"the {what} of {series.names[joint]} in message {before + row} of {topic} in {file} is "
                 f"{values[row, joint]}",
                 hint="only finite numbers can be compared",
             )
-    return LoggedMotion(file, topic, series.names, (stamps - start) / 1e9, *parts)
+    # drivers without sensors of effort say NaN
+    effort = series.effort if np.isfinite(series.effort).all() else series.effort[:, :0]
+    return LoggedMotion(file, topic, series.names, clock.seconds(series.nanoseconds), *parts, effort)

@@ -81,7 +81,8 @@ class _StatesReadBack:
         names = ("nanoseconds", "position", "velocity", "effort")
         whole = [np.concatenate([getattr(part, name) for part in parts]) for name in names]
         rest = {name: values[count:] for name, values in zip(names, whole, strict=True)}
-        self._left[topic] = [JointSeries(parts[0].names, **rest, acceleration=rest["position"][:, :0])]
+        none = rest["position"][:, :0]
+        self._left[topic] = [JointSeries(parts[0].names, **rest, acceleration=none)]
         return tuple(values[:count] for values in whole)
 
     def _note(self, block: MessageBlock) -> None:

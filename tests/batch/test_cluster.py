@@ -1,0 +1,132 @@
+"""The workers of a Dask cluster do what the processes of this machine do."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from threading import Thread
+from typing import Any
+
+import pytest
+from extras import require_module
+
+COMMAND = [sys.executable, "-m", "trajcli", "batch"]
+JOB = """\
+version: 1
+units: {angle: deg}
+robot: {file: arm.yaml}
+start: {joints: 0}
+moves:
+  - {planner: quintic, to: {joints: 30}, duration: 1}
+output: {rate: 10, columns: [t, q]}
+"""
+pytestmark = pytest.mark.filterwarnings("ignore")  # what Dask warns of is not ours
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Any]:
+    require_module("distributed", "dask")
+    import dask
+    from distributed import LocalCluster
+
+    dask.config.set({"distributed.scheduler.allowed-failures": 0})
+    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
+        yield cluster
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    Path("jobs").mkdir()
+    Path("jobs/arm.yaml").write_text("joints: [{velocity: 2}]\n")
+    for name, text in {"a": JOB, "b": JOB, "fast": JOB.replace("duration: 1", "duration: 0.1")}.items():
+        Path(f"jobs/{name}.yaml").write_text(text)
+    return tmp_path
+
+
+def run(*words: str) -> tuple[int, dict[str, dict[str, Any]], str]:
+    """Run a batch; return its exit code, its lines by the stems of the jobs, and standard error."""
+    done = subprocess.run([*COMMAND, *words], capture_output=True, text=True, timeout=120, check=False)
+    values = [json.loads(line) for line in done.stdout.splitlines()]
+    return done.returncode, {Path(value["job"]).stem: value for value in values}, done.stderr
+
+
+def on(cluster: Any, *words: str) -> tuple[int, dict[str, dict[str, Any]], str]:
+    return run(*words, "--engine", "dask", "--scheduler", cluster.scheduler_address)
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_cluster_does_what_processes_do(cluster: Any) -> None:
+    code, found, err = on(cluster, "jobs", "-o", "out")
+    assert code == 1
+    assert "3 jobs: 2 written, 1 failed, " in err
+    _, expected, _ = run("jobs", "-o", "other")
+    for values in (found, expected):
+        for value in values.values():
+            del value["seconds"]
+    text = json.dumps(expected).replace("other/", "out/")
+    assert {**found, "fast": None} == {**json.loads(text), "fast": None}
+    assert found["fast"]["error"] == expected["fast"]["error"]
+    for name in ("a.csv", "b.csv"):
+        assert Path("out", name).read_bytes() == Path("other", name).read_bytes()
+    assert {value["outcome"] for value in on(cluster, "jobs", "-o", "out")[1].values()} == {
+        "unchanged",
+        "failed",
+    }
+    assert {value["outcome"] for value in run("jobs", "-o", "out")[1].values()} == {"unchanged", "failed"}
+    Path("jobs/arm.yaml").write_text("joints: [{velocity: 3}]\n")
+    assert {value["outcome"] for value in on(cluster, "jobs", "-o", "out")[1].values()} == {
+        "written",
+        "failed",
+    }
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_killed_worker_costs_its_own_job(cluster: Any) -> None:
+    Path("jobs/fast.yaml").write_text(
+        JOB.replace("rate: 10", "rate: 1e6").replace("duration: 1}", "duration: 1000}")
+    )
+    killer = Thread(target=kill_when_under_way, args=(cluster,))
+    killer.start()
+    code, found, _ = on(cluster, "jobs", "-o", "out")
+    killer.join()
+    assert (code, found["fast"]["outcome"], found["fast"]["exit"]) == (70, "crashed", 70)
+    assert "KilledWorker" in found["fast"]["error"]
+    assert set(found) == {"a", "b", "fast"}
+
+
+def kill_when_under_way(cluster: Any) -> None:
+    """Kill the worker once it does nothing but write the rows of the job that does not end."""
+    end = time.monotonic() + 60
+    while not (Path("out/b.csv").exists() and list(Path("out").glob(".trajcli-*.part"))):
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    os.kill(next(iter(cluster.workers.values())).pid, signal.SIGKILL)
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_scheduler_that_is_not_there() -> None:
+    require_module("distributed", "dask")
+    code, found, err = run("jobs", "--engine", "dask")
+    assert (code, found) == (2, {})
+    assert "the engine dask needs the address of a scheduler" in err
+    code, found, err = run("jobs", "--engine", "dask", "--scheduler", "tcp://127.0.0.1:9")
+    assert (code, found) == (4, {})
+    assert "the scheduler tcp://127.0.0.1:9 cannot be reached" in err
+    assert "Traceback" not in err
+
+
+@pytest.mark.usefixtures("folder")
+def test_without_dask_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    Path("distributed.py").write_text("raise ImportError")
+    monkeypatch.setenv("PYTHONPATH", str(Path.cwd()))
+    code, _, err = run("jobs", "--engine", "dask", "--scheduler", "tcp://127.0.0.1:9")
+    assert code == 2
+    assert "the engine dask needs the packages dask and distributed" in err
+    assert "pip install 'trajcli[dask]'" in err

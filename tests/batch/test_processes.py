@@ -1,0 +1,134 @@
+"""Processes of a batch: whatever becomes of one, the others go on, and none is left behind."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import time
+from contextlib import closing
+from pathlib import Path
+from typing import NoReturn
+
+import pytest
+
+from trajcli.batch import processes
+from trajcli.batch.jobs import BatchJob
+from trajcli.batch.processes import run_in_processes
+from trajcli.batch.task import BatchSetup, JobOutcome, Task
+from trajcli.streams.whole_file import whole_file
+
+SETUP = BatchSetup("csv", {})
+
+
+def killed() -> NoReturn:
+    os.kill(os.getpid(), signal.SIGKILL)
+    raise AssertionError
+
+
+def endless() -> NoReturn:
+    while True:
+        pass
+
+
+def stubborn() -> NoReturn:
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    endless()
+
+
+def half_written() -> NoReturn:
+    with whole_file("half.csv") as out:
+        out.write(b"t\n")
+        out.flush()
+        stubborn()
+    raise AssertionError
+
+
+DEEDS = {
+    "killed": killed,
+    "exit": lambda: os._exit(5),
+    "endless": endless,
+    "stubborn": stubborn,
+    "half_written": half_written,
+}
+
+
+def do(task: Task, setup: BatchSetup) -> JobOutcome:
+    """Stand for `run_task`: do what the name of the job says."""
+    name = task.job.job
+    if name == "memory":
+        return JobOutcome(task.job, "failed", 70, remains=False, inputs=str(os.getpid()))
+    if name in DEEDS:
+        DEEDS[name]()
+    return JobOutcome(task.job, "written", inputs=str(os.getpid()))
+
+
+@pytest.fixture(autouse=True)
+def _in_processes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(processes, "run_task", do)  # forked processes have it, too
+    monkeypatch.setattr(processes, "_GRACE", 0.3)
+
+
+def outcomes(*names: str, count: int = 1, timeout: float | None = None) -> dict[str, JobOutcome]:
+    tasks = [Task(BatchJob(name, f"{name}.csv"), None) for name in names]
+    with closing(run_in_processes(tasks, SETUP, count, timeout)) as done:
+        found = {outcome.job.job: outcome for outcome in done}
+    assert multiprocessing.active_children() == []
+    assert len(found) == len(names)
+    return found
+
+
+def test_one_process_does_all_jobs() -> None:
+    found = outcomes("a", "b", "c")
+    assert [outcome.outcome for outcome in found.values()] == ["written"] * 3
+    assert len({outcome.inputs for outcome in found.values()}) == 1
+    assert str(os.getpid()) not in {outcome.inputs for outcome in found.values()}
+
+
+def test_no_more_processes_than_asked_for_and_than_jobs() -> None:
+    found = outcomes(*map(str, range(40)), count=3)
+    assert 1 <= len({outcome.inputs for outcome in found.values()}) <= 3
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_crash_costs_one_job(count: int) -> None:
+    found = outcomes("a", "killed", "b", "exit", "c", count=count)
+    assert [name for name, outcome in found.items() if outcome.outcome == "crashed"] == [
+        "killed",
+        "exit",
+    ] or count > 1
+    assert {name for name, outcome in found.items() if outcome.outcome == "written"} == {"a", "b", "c"}
+    assert found["killed"].problems[0].message == "the process that planned it was ended by SIGKILL"
+    assert found["exit"].problems[0].message == "the process that planned it ended with exit code 5"
+    assert {found["killed"].exit_code, found["exit"].exit_code} == {70}
+
+
+def test_a_process_without_memory_is_replaced() -> None:
+    found = outcomes("a", "memory", "b")
+    assert found["a"].inputs == found["memory"].inputs != found["b"].inputs
+
+
+@pytest.mark.parametrize("name", ["endless", "stubborn"])
+def test_what_does_not_end_is_ended(name: str) -> None:
+    begun = time.monotonic()
+    found = outcomes("a", name, "b", timeout=0.5)
+    assert time.monotonic() - begun < 10
+    assert (found[name].outcome, found[name].exit_code) == ("timed out", 3)
+    assert found[name].problems[0].message == "it was not done within 0.5 s"
+    assert found["b"].outcome == "written"
+
+
+def test_what_a_killed_process_has_half_written_is_removed() -> None:
+    Path(".trajcli-1-other.part").write_text("of another process")
+    assert outcomes("half_written", "b", timeout=0.5)["half_written"].outcome == "timed out"
+    assert [path.name for path in Path().iterdir()] == [".trajcli-1-other.part"]
+
+
+def test_closing_early_ends_all() -> None:
+    tasks = [Task(BatchJob(name, "x.csv"), None) for name in ("a", "endless", "stubborn", "b")]
+    outcomes = run_in_processes(tasks, SETUP, 3, None)
+    assert next(outcomes).job.job == "a"
+    assert multiprocessing.active_children()
+    outcomes.close()
+    assert multiprocessing.active_children() == []

@@ -1,0 +1,211 @@
+"""`trajcli retime`, `resample`, `concat`, `reverse`, `slice`, `convert`: files in, files out."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from running import EXAMPLES, JOB, call
+
+from trajcli.streams.recorded_motion import open_motion
+
+Capture = pytest.CaptureFixture[str]
+PICK = EXAMPLES / "ur5e_pick.yaml"
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: Capture) -> Path:
+    """A folder with the rows of two jobs."""
+    monkeypatch.chdir(tmp_path)
+    Path("job.yaml").write_text(JOB.replace("[t, q]", "[t, q, qd, qdd]"))
+    assert call(capfd, "plan", "job.yaml", "-q", "-o", "rows.csv").code == 0
+    assert call(capfd, "plan", PICK, "-q", "-o", "pick.csv").code == 0
+    return tmp_path
+
+
+def numbers(path: str) -> tuple[list[str], np.ndarray]:
+    text = Path(path).read_text()
+    return text.split("\n", 1)[0].split(","), np.loadtxt(path, delimiter=",", skiprows=1)
+
+
+pytestmark = pytest.mark.usefixtures("folder")
+
+
+@pytest.mark.parametrize(
+    "words", [("reverse",), ("resample", "--rate", "10"), ("slice", "--from", "0.2"), ("convert",)]
+)
+def test_rows_go_to_standard_output_and_words_to_the_other(words: tuple[str, ...], capfd: Capture) -> None:
+    name, *options = words
+    code, out, err = call(capfd, name, "rows.csv", *options)
+    assert code == 0
+    assert out.startswith("t,q1_deg,qd1_deg,qdd1_deg\n")
+    assert err.startswith("rows.csv: ")
+    call(capfd, name, "rows.csv", *options, "-o", "out.csv", "-q")
+    assert Path("out.csv").read_text() == out
+    assert capfd.readouterr().err == ""
+
+
+def test_laws_on_the_command_line(capfd: Capture) -> None:
+    for words in (
+        ("reverse", "pick.csv", "-o", "back.csv"),
+        ("reverse", "back.csv", "-o", "again.csv"),
+        ("resample", "pick.csv", "--rate", "125", "-o", "same.csv"),
+        ("slice", "pick.csv", "--to", "2.496", "-o", "first.csv"),
+        ("slice", "pick.csv", "--from", "2.496", "-o", "second.csv"),
+        ("concat", "first.csv", "second.csv", "-o", "whole.csv"),
+    ):
+        assert call(capfd, *words).code == 0, words
+    for name in ("again.csv", "same.csv", "whole.csv"):
+        assert Path(name).read_bytes() == Path("pick.csv").read_bytes(), name
+
+
+def test_formats_there_and_back(capfd: Capture) -> None:
+    names, rows = numbers("pick.csv")
+    scale = np.array([np.pi / 180 if name.endswith("_deg") else 1.0 for name in names])
+    for ending in ("mcap", "jsonl"):
+        assert call(capfd, "convert", "pick.csv", "-o", f"there.{ending}").code == 0
+        assert call(capfd, "convert", f"there.{ending}", "-o", "back.csv").code == 0
+        plain, back = numbers("back.csv")
+        kept = [name.removesuffix("_deg") for name in names]
+        assert plain == [name for name in kept if ending == "jsonl" or name != "move"]
+        columns = [kept.index(name) for name in plain]
+        np.testing.assert_allclose(back, (rows * scale)[:, columns], rtol=0, atol=6e-10)
+    lines = [json.loads(line) for line in Path("there.jsonl").read_text().splitlines()]
+    np.testing.assert_array_equal([line["q"] for line in lines], np.deg2rad(rows[:, 1:7]))
+
+
+def test_a_log_keeps_the_names_of_the_joints(capfd: Capture) -> None:
+    assert call(capfd, "plan", PICK, "-q", "-o", "pick.mcap").code == 0
+    assert call(capfd, "reverse", "pick.mcap", "-o", "back.mcap").code == 0
+    before, after = open_motion("pick.mcap"), open_motion("back.mcap")
+    assert after.joints == before.joints
+    assert after.joints is not None
+    np.testing.assert_array_equal(after.whole().q, before.whole().q[::-1])
+
+
+@pytest.mark.parametrize("form", ["ros", "ros-goal"])
+def test_a_message_has_the_rows_as_points(form: str, capfd: Capture) -> None:
+    assert call(capfd, "convert", "rows.csv", "-o", "goal.yaml", "--format", form).code == 0
+    message = yaml.safe_load(Path("goal.yaml").read_text())
+    points = (message["trajectory"] if form == "ros-goal" else message)["points"]
+    _, rows = numbers("rows.csv")
+    times = [point["time_from_start"]["sec"] + 1e-9 * point["time_from_start"]["nanosec"] for point in points]
+    np.testing.assert_allclose(times, rows[:, 0], atol=1e-9)
+    for key, column in (("positions", 1), ("velocities", 2), ("accelerations", 3)):
+        np.testing.assert_allclose(
+            [point[key][0] for point in points], np.deg2rad(rows[:, column]), atol=1e-12
+        )
+    assert call(capfd, "convert", "goal.yaml", "-o", "back.csv").code == 0
+
+
+def test_a_stranger_keeps_names_order_units_and_decimals(capfd: Capture) -> None:
+    text = "Time;q2_deg;q1_mm\n0.000;10.00;1.5\n0.250;20.50;2.5\n0.500;30.00;3.0\n"
+    Path("log.csv").write_text(text)
+    code, out, _ = call(capfd, "reverse", "log.csv")
+    assert code == 0
+    assert out == "Time,q2_deg,q1_mm\n0.000,30.00,3.0\n0.250,20.50,2.5\n0.500,10.00,1.5\n"
+    code, out, _ = call(capfd, "resample", "log.csv", "--rate", "8")
+    assert out.splitlines()[1:3] == ["0.000,10.00,1.5", "0.125,15.25,2.0"]
+
+
+def test_positions_alone_become_a_log_with_a_remark(capfd: Capture) -> None:
+    Path("log.csv").write_text("t,q1_deg\n0,0\n1,10\n2,0\n")
+    code, _, err = call(capfd, "convert", "log.csv", "-o", "log.mcap")
+    assert code == 0
+    assert "no column qd: it is of the curve through the rows" in err
+    velocities = open_motion("log.mcap").whole().qd
+    assert velocities is not None
+    np.testing.assert_allclose(np.rad2deg(velocities[:, 0]), [10, -10, -10])
+
+
+def test_retime_says_factor_joint_and_limit(capfd: Capture) -> None:
+    Path("arm.yaml").write_text("units: {angle: deg}\njoints: [{name: wrist, velocity: 40}]\n")
+    assert call(capfd, "check", "rows.csv", "--robot", "arm.yaml").code == 1
+    code, _, err = call(capfd, "retime", "rows.csv", "--robot", "arm.yaml", "-o", "slow.csv")
+    assert code == 0
+    factor = float(re.search(r"factor ([0-9.]+)", err)[1])  # type: ignore[index]
+    assert factor == pytest.approx(56.25 / 40, rel=1e-4)  # a quintic peaks at 15/8 of its mean
+    assert "by the velocity of wrist, whose limit is 40 deg/s" in err
+    assert f"it takes {factor:.4g}" in err
+    assert call(capfd, "check", "slow.csv", "--robot", "arm.yaml").code == 0
+    names, rows = numbers("rows.csv")
+    assert numbers("slow.csv")[0] == names
+    less = rows / np.array([1 / (0.999 * factor), 1, 0.999 * factor, (0.999 * factor) ** 2])
+    np.savetxt("fast.csv", less, "%.9f", ",", header=",".join(names), comments="")
+    assert call(capfd, "check", "fast.csv", "--robot", "arm.yaml").code == 1
+
+
+def test_retime_by_a_job_and_by_its_moves(capfd: Capture) -> None:
+    code, _, err = call(capfd, "retime", "pick.csv", "--job", PICK, "-o", "same.csv")
+    assert code == 0
+    assert "factor 1, its limits are kept as it is" in err
+    assert Path("same.csv").read_bytes() == Path("pick.csv").read_bytes()
+    assert (
+        call(capfd, "retime", "pick.csv", "--robot", "ur5e", "--fastest", "--per-move", "-o", "f.csv").code
+        == 0
+    )
+    assert call(capfd, "check", "f.csv", "--robot", "ur5e").code == 0
+    assert numbers("f.csv")[1][-1, 0] < 0.7 * numbers("pick.csv")[1][-1, 0]
+
+
+def test_a_jump_is_exit_1_with_the_jump(capfd: Capture) -> None:
+    code, out, err = call(capfd, "concat", "rows.csv", "rows.csv", "-o", "both.csv")
+    assert (code, out) == (1, "")
+    assert "the position of j1 jumps by -30 from the end of rows.csv (30) to the start of rows.csv (0)" in err
+    assert not Path("both.csv").exists()
+
+
+@pytest.mark.parametrize(
+    "words", [("resample", "--rate", "90"), ("resample", "--rate", "300"), ("slice", "--from", "1.2345")]
+)
+def test_rows_between_rows_verify(words: tuple[str, ...], capfd: Capture) -> None:
+    """What the columns of the new file say agrees with itself, and keeps limits as the old one does."""
+    name, *options = words
+    code, _, err = call(capfd, name, "pick.csv", *options, "-o", "out.csv")
+    assert code == 0
+    assert "fewer decimals of qd and qdd are certain" in err
+    assert numbers("out.csv")[0] == numbers("pick.csv")[0]
+    found = json.loads(call(capfd, "check", "out.csv", "--robot", "ur5e", "--format", "json").out)
+    assert found["verdict"] != "exceeded", found["findings"]
+
+
+WRONG = [
+    (("resample", "rows.csv", "--rate", "fast"), 2, "--rate expects rows per second, got 'fast'"),
+    (("resample", "rows.csv", "--rate", "-5"), 2, "--rate expects rows per second"),
+    (("resample", "rows.csv", "--rate", "1e12"), 2, "is too high"),
+    (("slice", "rows.csv", "--from", "soon"), 2, "--from expects seconds, got 'soon'"),
+    (("slice", "rows.csv", "--from", "2"), 2, "--from 2: rows.csv goes from 0 s to 1 s"),
+    (("slice", "rows.csv", "--from", "0.5", "--to", "0.5"), 2, "is not before"),
+    (("concat", "rows.csv"), 2, "concat joins two files at least"),
+    (("concat", "rows.csv", "pick.csv"), 2, "has 1 joint"),
+    (("reverse", "none.csv"), 4, "none.csv"),
+    (("reverse", "job.yaml"), 2, "job.yaml"),
+    (("reverse", "rows.csv", "-o", "rows.csv"), 2, "-o rows.csv would overwrite rows.csv"),
+    (("reverse", "rows.csv", "-o", "out.xyz"), 2, "rows are written as"),
+    (("convert", "rows.csv", "-o", "out.csv", "--format", "mcap"), 2, "contradicts the name of the file"),
+    (("convert", "bare.csv", "-o", "out.mcap"), 2, "--units"),
+    (("retime", "rows.csv"), 2, "by which limits is the motion retimed?"),
+    (("retime", "rows.csv", "--robot", "ur5e"), 2, "expected 6"),
+    (("retime", "rows.csv", "--robot", "arm.yaml", "--per-move"), 2, "no column `move`"),
+    (
+        ("retime", "rows.csv", "--robot", "arm.yaml", "--fastest"),
+        2,
+        "no limit bounds how fast rows.csv may be",
+    ),
+]
+
+
+@pytest.mark.parametrize(("words", "code", "message"), WRONG)
+def test_what_is_wrong(words: tuple[str, ...], code: int, message: str, folder: Path, capfd: Capture) -> None:
+    Path("arm.yaml").write_text("joints: 1\n")
+    Path("bare.csv").write_text("time,Axis 1\n0,0\n1,113\n")
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    outcome = call(capfd, *words)
+    assert (outcome.code, outcome.out) == (code, "")
+    assert message in outcome.err
+    assert "Traceback" not in outcome.err
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before

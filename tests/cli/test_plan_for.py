@@ -1,0 +1,153 @@
+"""`trajcli plan --for`: rows judged by the rules of their consumer as they are written."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from running import call
+
+FR3 = """\
+version: 1
+robot: fr3
+start: {joints: [0, -0.3, 0, -2.0, 0, 1.8, 0.5]}
+moves:
+  - {planner: quintic, to: {joints: [0.5, 0, 0.2, -1.7, 0.2, 2.0, 0.2]}, duration: 2}
+"""
+UR = """\
+version: 1
+robot: ur5e
+start: {joints: [0, -1.2, 1.1, 0.2, 0.4, 0]}
+moves:
+  - {planner: cubic, to: {joints: [0.5, -1, 1, 0.2, 0.4, 0.3]}, duration: 1}
+output: {rate: 500}
+"""
+
+
+def job(tmp_path: Path, text: str, old: str = "", new: str = "") -> str:
+    assert old in text
+    path = tmp_path / "job.yaml"
+    path.write_text(text.replace(old, new, 1) if old else text)
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "profile", "output"),
+    [
+        (FR3, "franka-fr3", None),
+        (FR3, "franka-fr3", "rows.jsonl"),
+        (FR3, "franka-fr3", "rows.mcap"),
+        (FR3, "ros-jtc", "goal.yaml"),
+        (UR, "ur-servoj", "rows.csv"),
+        (UR, "ur-passthrough", "goal.yaml"),
+    ],
+)
+def test_rows_that_their_consumer_takes(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], text: str, profile: str, output: str | None
+) -> None:
+    target = [] if output is None else ["-o", str(tmp_path / output)]
+    code, out, err = call(capfd, "plan", job(tmp_path, text), "--for", profile, *target)
+    assert code == 0, err
+    assert f"for {profile}: all necessary rules are kept" in err
+    assert out if output is None else (tmp_path / output).stat().st_size
+
+
+@pytest.mark.parametrize(
+    ("text", "profile", "old", "new", "rule"),
+    [
+        (FR3, "franka-fr3", "duration: 2}", "duration: 2.0003}", "fr3-period"),
+        (FR3, "franka-fr3", "duration: 2}", "duration: 2}\noutput: {rate: 500}", "fr3-period"),
+        (UR, "ur-servoj", "rate: 500", "rate: 125", "servoj-period"),
+        (UR, "franka-fr3", "rate: 500", "rate: 1000", "fr3-joints"),
+        (FR3, "ur-servoj", "duration: 2}", "duration: 2}\noutput: {rate: 500}", "servoj-joints"),
+    ],
+)
+def test_rows_that_their_consumer_refuses(
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    text: str,
+    profile: str,
+    old: str,
+    new: str,
+    rule: str,
+) -> None:
+    target = tmp_path / "rows.csv"
+    code, _, err = call(capfd, "plan", job(tmp_path, text, old, new), "--for", profile, "-o", str(target))
+    assert code == 1
+    assert f"error: {rule}: " in err
+    assert not target.exists()
+    assert ("align: true" in err) == ("period" in rule)
+
+
+def test_a_jump_in_acceleration_is_jerk_to_the_robot(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A cubic of D over T begins with 6 D / T^2, in one period: its jerk is that over 1 ms."""
+    text = FR3.replace("quintic", "cubic").replace("robot: fr3", "robot: fr3\nlimits: {jerk: null}")
+    code, _, err = call(
+        capfd, "plan", job(tmp_path, text), "--for", "franka-fr3", "--no-output", "--errors", "json"
+    )
+    assert code == 0, err
+    # the first three positions of a cubic are 3 k^2 - 2 k^3 / N: their third difference, the arm at rest before
+    count = 2000
+    first = [3 * k**2 / count**2 - 2 * k**3 / count**3 for k in range(4)]
+    jerk = 0.5 * max(abs(first[1]), abs(first[2] - 3 * first[1])) / 1e-9
+    assert jerk < 5000
+    faster = text.replace("duration: 2", "duration: 0.7")
+    code, _, err = call(capfd, "plan", job(tmp_path, faster), "--for", "franka-fr3", "--no-output")
+    count = 700
+    first = [3 * k**2 / count**2 - 2 * k**3 / count**3 for k in range(4)]
+    jerk = 0.5 * max(abs(first[1]), abs(first[2] - 3 * first[1])) / 1e-9
+    assert jerk > 3000
+    assert (code == 1) == (jerk > 5000 - 1e-3)
+
+
+def test_decimals_count_as_they_are_written(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Nine decimals of a degree are eleven of a radian; of a metre-long unit they would not be."""
+    text = job(tmp_path, FR3)
+    report = tmp_path / "report.json"
+    code, _, _ = call(capfd, "plan", text, "--for", "franka-fr3", "--no-output", "--report", str(report))
+    consumer = json.loads(report.read_text())["consumer"]
+    assert code == 0
+    assert consumer["profile"] == "franka-fr3"
+    assert consumer["accepted"]
+    assert consumer["findings"] == []
+    assert [each["rule"] for each in consumer["unjudged"]] == ["fr3-torque", "fr3-torque-rate"]
+
+
+def test_warnings_and_strict(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    text = job(tmp_path, UR.replace("rate: 500", "rate: 500, columns: [t, q]"))
+    report = tmp_path / "report.json"
+    code, _, err = call(capfd, "plan", text, "--for", "ros-jtc", "--no-output", "--report", str(report))
+    assert code == 0
+    assert "jtc-positions-only" in err
+    findings = json.loads(report.read_text())["consumer"]["findings"]
+    assert {(each["rule"], each["severity"], each["move"]) for each in findings} == {
+        ("jtc-positions-only", "warning", 0)
+    }
+    code, _, err = call(capfd, "plan", text, "--for", "ros-jtc", "--no-output", "--strict")
+    assert code == 1
+    assert "error: jtc-positions-only" in err
+
+
+def test_a_form_may_be_named_for_a_consumer_without_output(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """As rows of positions the motion has steps of velocity; as knots of a goal it has none."""
+    text = job(tmp_path, UR.replace("rate: 500", "rate: 500, columns: [t, q]"))
+    code, out, err = call(capfd, "plan", text, "--for", "ros-jtc", "--no-output", "--format", "ros-goal")
+    assert (code, out) == (0, "")
+    assert "jtc-positions-only" not in err
+    code, _, err = call(capfd, "plan", text, "--no-output", "--format", "ros-goal")
+    assert (code, "--no-output and --format exclude each other" in err) == (2, True)
+
+
+def test_names_and_columns(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    code, _, err = call(capfd, "plan", job(tmp_path, UR), "--for", "ur-servo", "--no-output")
+    assert (code, "did you mean 'ur-servoj'?" in err) == (2, True)
+    text = job(tmp_path, UR.replace("rate: 500", "rate: 500, columns: [t, qd]"))
+    code, _, err = call(capfd, "plan", text, "--for", "ur-servoj", "--no-output")
+    assert code == 2
+    assert "cannot be judged by ur-servoj" in err
+    assert "`output.columns` needs t and q" in err

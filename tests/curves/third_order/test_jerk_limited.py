@@ -1,0 +1,157 @@
+"""Jerk-limited laws along paths: against ruckig, reference durations, copp, and by laws of scale and symmetry."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from jerk_paths import PANDA, both, copp_problem, judged, polyline, spline
+
+from trajcli.curves.operations import reverse
+from trajcli.curves.piecewise import PiecewisePolynomial
+
+ORACLES = Path(__file__).parents[2] / "oracles" / "jerk_limited_splines.yaml"
+LINE = -np.array([1.243052, 0.789568, -0.903823, -0.246486, 1.217614, 0.200619, 0.062846])
+
+
+def ruckig_duration(distance, velocity, acceleration, jerk, start_velocity=0.0):
+    from ruckig import InputParameter, Ruckig, Trajectory
+
+    problem, result = InputParameter(1), Trajectory(1)
+    problem.current_position, problem.target_position = [0.0], [distance]
+    problem.current_velocity = [start_velocity]
+    problem.max_velocity, problem.max_acceleration, problem.max_jerk = [velocity], [acceleration], [jerk]
+    Ruckig(1).calculate(problem, result)
+    return result.duration
+
+
+@pytest.mark.parametrize("factor", [1, 0.1, 0.02, 0.005])
+def test_a_straight_line_takes_what_ruckig_takes_with_its_tightest_joint(factor):
+    V, A, J = PANDA[0], PANDA[1], factor * PANDA[2]
+    path = spline([0, 0.3, 0.7, 1], np.outer([0, 0.3, 0.7, 1], LINE))
+    tightest = [float((limits / np.abs(LINE)).min()) for limits in (V, A, J)]
+    best = ruckig_duration(1.0, *tightest)
+    duration = judged(path, both(V), both(A), both(J)).law.duration
+    assert best * (1 - 1e-9) <= duration <= 1.001 * best
+
+
+@pytest.mark.parametrize("speed", [0.2, 0.5, 0.9])
+@pytest.mark.parametrize("jerk", [10.0, 100.0, 1000.0])
+def test_a_line_that_begins_in_motion_takes_what_ruckig_takes(speed, jerk):
+    path = PiecewisePolynomial(np.array([0.0, 2.0]), np.array([[[1.0]], [[0.0]]]))
+    best = ruckig_duration(2.0, 1.0, 5.0, jerk, speed)
+    bounds = both([1.0]), both([5.0]), both([jerk])
+    duration = judged(path, *bounds, start=(speed, 0.0)).law.duration
+    assert best * (1 - 1e-9) <= duration <= 1.001 * best
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_splines_whose_best_durations_are_known(number):
+    known = yaml.safe_load(ORACLES.read_text())[number]
+    path = spline(known["parameter"], np.array(known["points"]))
+    duration = judged(path, both(PANDA[0]), both(PANDA[1]), both(0.02 * PANDA[2])).law.duration
+    assert duration <= 1.001 * known["best"]
+
+
+@pytest.mark.parametrize("count", [2, 3, 5, 12])
+@pytest.mark.parametrize("factor", [1, 0.02, 0.005])
+def test_reversed_scaled_and_mirrored_paths_take_as_long(count, factor):
+    """The limits are alike in both directions, so time may run backwards, and s may be measured otherwise."""
+    points = np.cumsum(np.random.default_rng(count).uniform(-0.7, 0.7, (count, 7)), axis=0)
+    path = spline(np.linspace(0, 1, count), points)
+    bounds = both(PANDA[0]), both(PANDA[1]), both(factor * PANDA[2])
+    duration = judged(path, *bounds).law.duration
+    scaled = PiecewisePolynomial(
+        path.breaks * 7.0, path.coefficients / 7.0 ** np.arange(path.degree, -1, -1)[:, None, None]
+    )
+    mirrored = PiecewisePolynomial(path.breaks, -path.coefficients)
+    for other in (reverse(path), scaled, mirrored):
+        assert judged(other, *bounds).law.duration == pytest.approx(duration, rel=2e-3)
+
+
+def test_twice_the_time_for_limits_of_slower_joints():
+    """Limits divided by 2, 4 and 8 are those of the same motion at half the speed."""
+    path = spline(np.linspace(0, 1, 6), np.random.default_rng(1).uniform(-1, 1, (6, 7)))
+    fast = judged(path, both(PANDA[0]), both(PANDA[1]), both(0.02 * PANDA[2])).law.duration
+    slow = judged(path, both(PANDA[0] / 2), both(PANDA[1] / 4), both(0.02 * PANDA[2] / 8)).law.duration
+    assert slow == pytest.approx(2 * fast, rel=1e-6)
+
+
+def test_every_corner_is_a_stop_between_motions_from_rest_to_rest():
+    points = np.array([[0.0, 0.0], [1.0, 0.2], [0.3, 1.0], [0.3, 1.5]])
+    bounds = both([1.0, 1.2]), both([5.0, 4.0]), both([60.0, 50.0])
+    motion = judged(polyline(points), *bounds)
+    best = 0.0
+    for step in np.diff(points, axis=0):
+        length = np.linalg.norm(step)
+        with np.errstate(divide="ignore"):
+            tightest = [float((limits[:, 1] / np.abs(step)).min()) * length for limits in bounds]
+        best += ruckig_duration(length, *tightest)
+    assert best * (1 - 1e-9) <= motion.law.duration <= 1.001 * best
+    assert motion.stops.size == 2
+    at_rest = motion.trajectory.evaluate_orders(motion.stop_times, (0, 1, 2))
+    np.testing.assert_allclose(at_rest[:, 0], points[1:3], atol=1e-9)
+    np.testing.assert_allclose(at_rest[:, 1:], 0.0, atol=1e-7)
+
+
+def test_a_loose_limit_of_jerk_costs_next_to_nothing():
+    path = spline(np.linspace(0, 1, 8), np.random.default_rng(3).uniform(-1, 1, (8, 7)))
+    motion = judged(path, both(PANDA[0]), both(PANDA[1]), both(100 * PANDA[2]))
+    assert motion.lower_bound <= motion.law.duration <= 1.003 * motion.second_order.law.duration
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_below_the_stations_of_copp(seed):
+    """COPP keeps the limits at 1001 stations only; figures of its release 0.2.3."""
+    path, *limits = copp_problem(seed)
+    at_stations = (38.9617263, 42.466653)[seed]
+    made_feasible = (40.6169777, 44.9772806)[seed]
+    duration = judged(path, *map(both, limits)).law.duration
+    assert duration <= 1.005 * at_stations < made_feasible
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_random_problems_keep_all_limits(seed):
+    judged(*random_problem(seed))
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("block", range(100))
+def test_a_thousand_random_problems_keep_all_limits(block):
+    for seed in range(1000 + 10 * block, 1010 + 10 * block):
+        judged(*random_problem(seed))
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("seed", range(2, 100))
+def test_the_published_rule_of_copp(seed):
+    path, *limits = copp_problem(seed)
+    motion = judged(path, *map(both, limits))
+    assert motion.law.duration <= 1.05 * motion.second_order.law.duration
+
+
+def random_problem(seed):
+    """Return path and bounds: walks, scattered, collinear and slow points, polylines, joints that do not move."""
+    random = np.random.default_rng(seed)
+    n, count = int(random.integers(1, 8)), int(random.integers(2, 20))
+    kind = random.choice(["walk", "scattered", "collinear", "polyline", "slow"])
+    factor = float(random.choice([10, 1, 0.1, 0.02, 0.005, 0.001]))
+
+    def bounds(limits):
+        high = limits[:n] * random.uniform(0.5, 1.5, n)
+        return np.stack([-high * random.uniform(0.6, 1.4, n), high], axis=1)
+
+    limits = bounds(PANDA[0]), bounds(PANDA[1]), bounds(factor * PANDA[2])
+    step = 0.01 if kind == "slow" else 0.7
+    if kind == "scattered":
+        points = random.uniform(-1, 1, (count, n))
+    elif kind == "collinear":
+        points = np.sort(random.uniform(0, 1, count))[:, None] * random.uniform(-1, 1, n)
+    else:
+        points = np.cumsum(random.uniform(-step, step, (count, n)), axis=0)
+    if n > 2 and random.random() < 0.3:
+        points[:, 1] = 0.3
+    if kind == "polyline":
+        return polyline(points), *limits
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1) + 1e-9)])
+    return spline(s, points), *limits

@@ -1,0 +1,192 @@
+"""Operations on recorded motions, by their laws: each and its inverse give the same bytes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from motions_on_disk import JOB, planned, quintic, table
+
+from trajcli.editing.continuity import new_jumps, worst_deviation
+from trajcli.editing.edited_motion import EditedMotion, ReadingOptions, read_motion
+from trajcli.editing.operations import cut, join, resample, reverse
+from trajcli.editing.writing import write_motion
+from trajcli.errors import InputError, VerificationError
+from trajcli.units import Units
+
+
+def read(path: Path) -> EditedMotion:
+    return read_motion(str(path), ReadingOptions(), declared=Units())
+
+
+def written(motion: EditedMotion, path: Path) -> Path:
+    write_motion(motion, str(path))
+    return path
+
+
+def stranger(path: Path) -> Path:
+    """Write 24 Hz rows of a joint in degrees without a word, stamps with six decimals, values with four."""
+    t = np.arange(49) / 24
+    q, qd, *_ = quintic(t, 40.0, 2.0)
+    rows = "".join(f"{a:.6f}, {b:.4f}, {c:.4f}\n" for a, b, c in zip(t, q, qd, strict=True))
+    path.write_text(
+        "Time, Axis 1, Axis 1 velocity\n".replace("Axis 1 velocity", "v1").replace("Axis 1", "q1") + rows
+    )
+    return path
+
+
+@pytest.fixture(params=["planned", "stranger"])
+def source(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    if request.param == "planned":
+        return planned(tmp_path / "rows.csv")
+    path = stranger(tmp_path / "rows.csv")
+    path.write_text(path.read_text().replace(", ", ","))  # as it is written
+    return path
+
+
+def test_twice_reversed_is_the_same(source: Path, tmp_path: Path) -> None:
+    back = written(reverse(read(source)), tmp_path / "back.csv")
+    assert back.read_bytes() != source.read_bytes()
+    assert written(reverse(read(back)), tmp_path / "again.csv").read_bytes() == source.read_bytes()
+
+
+def test_reversed_derivatives_change_their_signs_in_turn(tmp_path: Path) -> None:
+    names, rows = table(planned(tmp_path / "rows.csv"))
+    _, back = table(written(reverse(read(tmp_path / "rows.csv")), tmp_path / "back.csv"))
+    for column, name in enumerate(names):
+        order = name.count("d") - name.count("deg")
+        expected = (-1.0) ** order * rows[::-1, column]
+        if name == "t":
+            expected = 3.0 - rows[::-1, column]
+        np.testing.assert_allclose(back[:, column], expected, atol=1e-9)
+
+
+def test_the_same_rate_gives_the_same_rows(source: Path, tmp_path: Path) -> None:
+    rate = 100.0 if "move" in source.read_text() else 24.0
+    again = written(resample(read(source), rate), tmp_path / "again.csv")
+    assert again.read_bytes() == source.read_bytes()
+
+
+def test_resampled_rows_are_on_the_polynomial(tmp_path: Path) -> None:
+    """Quintic pieces through q, qd and qdd of a quintic are that quintic."""
+    t = np.linspace(0, 1, 11)
+    q, qd, qdd, _ = quintic(t, 1.5, 1.0)
+    rows = "".join(f"{a:.17g},{b:.17g},{c:.17g},{d:.17g}\n" for a, b, c, d in zip(t, q, qd, qdd, strict=True))
+    path = tmp_path / "rows.csv"
+    path.write_text("t,q1,qd1,qdd1\n" + rows)
+    found = resample(read(path), 37.0)
+    np.testing.assert_allclose(np.diff(found.rows.t[:-1]), 1 / 37, atol=1e-12)
+    assert found.rows.t[-1] == 1
+    expected = quintic(found.rows.t, 1.5, 1.0)
+    for order, values in enumerate((found.rows.q, found.rows.qd, found.rows.qdd)):
+        assert values is not None
+        np.testing.assert_allclose(values[:, 0], expected[order], atol=1e-9)
+    assert worst_deviation(read(path), found)[1] < 1e-9
+    coarse = resample(read(path), 1.0)
+    assert coarse.rows.t.tolist() == [0, 1]
+    assert worst_deviation(read(path), coarse)[1] < 1e-9
+
+
+def test_a_coarse_grid_says_how_far_its_curve_is_off(tmp_path: Path) -> None:
+    """Straight lines over T through sin t are off by 1 - cos(T / 2) at most."""
+    t = np.linspace(0, np.pi, 3142)
+    path = tmp_path / "rows.csv"
+    path.write_text("t,q1\n" + "".join(f"{a:.12f},{np.sin(a):.12f}\n" for a in t))
+    joint, size = worst_deviation(read(path), resample(read(path), 1 / (np.pi / 4)))
+    assert joint == 0
+    assert size == pytest.approx((1 - np.cos(np.pi / 8)) * np.sin(3 * np.pi / 8), rel=1e-3)
+
+
+@pytest.mark.parametrize("time", [0.5, 1.0, 1.23])
+def test_parts_joined_are_the_whole(time: float, tmp_path: Path) -> None:
+    source = planned(tmp_path / "rows.csv")
+    first = written(cut(read(source), 0.0, time), tmp_path / "first.csv")
+    second = written(cut(read(source), time, 3.0), tmp_path / "second.csv")
+    assert table(first)[1][-1, 0] == table(second)[1][0, 0] == time
+    whole = written(join(read(first), read(second)), tmp_path / "whole.csv")
+    assert whole.read_bytes() == source.read_bytes()
+
+
+def test_a_cut_between_rows_has_the_state_of_the_curve(tmp_path: Path) -> None:
+    source = planned(tmp_path / "rows.csv")
+    _, rows = table(written(cut(read(source), 0.1234567891, 0.5), tmp_path / "part.csv"))
+    expected = quintic(np.array([0.1234567891]), 30.0, 1.0)
+    assert rows[0, 0] == pytest.approx(0.1234567891, abs=6e-10)
+    for order, column in enumerate((1, 3, 5)):
+        assert rows[0, column] == pytest.approx(expected[order][0], abs=(1e-9, 1e-6, 1e-4)[order])
+    assert rows[1, 0] == 0.13
+    assert rows[-1, 0] == 0.5
+
+
+def test_motions_one_after_the_other(tmp_path: Path) -> None:
+    """Back and forth: each begins where the last ends, and the time goes on."""
+    source = planned(tmp_path / "rows.csv")
+    motion = read(source)
+    _, rows = table(written(join(motion, reverse(motion)), tmp_path / "both.csv"))
+    assert rows[:, 0] == pytest.approx(np.arange(601) / 100, abs=1e-9)
+    np.testing.assert_allclose(rows[:300], table(source)[1][:300], atol=1e-9)
+    np.testing.assert_allclose(rows[300:, 1:3], rows[300::-1, 1:3], atol=1e-9)
+    assert rows[:, -1].max() == 3  # the moves of the second are counted on
+
+
+def test_states_that_do_not_agree_are_refused_with_the_jump(tmp_path: Path) -> None:
+    source = planned(tmp_path / "rows.csv")
+    motion = read(source)
+    with pytest.raises(VerificationError) as refused:
+        join(motion, motion)
+    messages = [problem.message for problem in refused.value.problems]
+    assert messages[0].startswith("the position of j1 jumps by 10 from the end of")
+    assert messages[1].startswith("the position of j2 jumps by 5 from the end of")
+    assert [problem.kind for problem in refused.value.problems] == ["jump", "jump"]
+    with pytest.raises(VerificationError, match="the velocity of j1 jumps by "):
+        join(cut(motion, 0.0, 0.5), reverse(cut(motion, 0.0, 0.5)))
+
+
+def test_motions_of_other_joints_or_columns_are_not_joined(tmp_path: Path) -> None:
+    one = read(planned(tmp_path / "one.csv"))
+    few = planned(
+        tmp_path / "few.csv", JOB.replace("columns: [t, q, qd, qdd, qddd, move]", "columns: [t, q]")
+    )
+    with pytest.raises(InputError, match=r"few.csv has no columns qd, qdd, qddd, as .*one.csv has"):
+        join(one, read(few))
+    with pytest.raises(InputError, match=r"has 2 joints, .* has 1"):
+        join(one, read(stranger(tmp_path / "other.csv")))
+
+
+@pytest.mark.parametrize(
+    ("ends", "message"),
+    [
+        ((-1.0, 2.0), "--from -1: .*goes from 0 s to 3 s"),
+        ((1.0, 3.1), "--to 3.1: "),
+        ((2.0, 1.0), "is not before"),
+    ],
+)
+def test_a_cut_outside_of_the_file(ends: tuple[float, float], message: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=message):
+        cut(read(planned(tmp_path / "rows.csv")), *ends)
+
+
+def test_an_operation_that_makes_a_jump_is_noticed(tmp_path: Path) -> None:
+    motion = read(planned(tmp_path / "rows.csv"))
+    assert new_jumps(motion, motion) == []
+    quantities = {name: values.copy() for name, values in motion.quantities.items()}
+    quantities["q"][150:, 0] += 0.1
+    broken = motion.with_rows(motion.rows.t, quantities, motion.rows.move)
+    assert {problem.joint for problem in new_jumps(motion, broken)} == {"j1"}
+    assert new_jumps(broken, broken) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("t,q1\n0,0\n", "1 row"),
+        ("t,q1\n0,0\n1,1\n1,2\n", "the time stamp of row 3 is 1 s, that before it 1 s"),
+        ("t,q1\n0,0\n1,nan\n", "nan|finite|number"),
+    ],
+)
+def test_what_is_no_motion(text: str, message: str, tmp_path: Path) -> None:
+    path = tmp_path / "rows.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=message):
+        read(path)

@@ -1,0 +1,217 @@
+"""Retiming: the factor of the closed form, nothing less verifies, and derivatives scale by its powers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from motions_on_disk import JOB, planned, quintic, table
+
+from trajcli.curves.piecewise import Array
+from trajcli.editing.edited_motion import EditedMotion, ReadingOptions, read_motion
+from trajcli.editing.limits import kept_limits
+from trajcli.editing.retiming import Stretch, retime
+from trajcli.editing.writing import write_motion
+from trajcli.errors import InputError, VerificationError
+from trajcli.judge.file import CheckOptions, check_file
+
+PEAKS = (15 / 8, 10 / 3**0.5, 60.0)
+"""Of the quintic over distance 1 in 1 s: velocity, acceleration, jerk."""
+
+
+def rows_of(path: Path, distance: float = 1.0, duration: float = 1.0, rate: float = 100.0) -> Path:
+    """Write a quintic of one joint with all its bits."""
+    t = np.arange(round(duration * rate) + 1) / rate
+    columns = (t, *quintic(t, distance, duration))
+    lines = (",".join(repr(float(value)) for value in row) for row in zip(*columns, strict=True))
+    path.write_text("t,q1,qd1,qdd1,qddd1\n" + "\n".join(lines) + "\n")
+    return path
+
+
+def robot(path: Path, limits: str) -> Path:
+    path.write_text(f"joints: [{{{limits}}}]\n")
+    return path
+
+
+def retimed(source: Path, arm: Path, *, fastest: bool = False) -> tuple[EditedMotion, Stretch]:
+    limits = kept_limits(None, str(arm))
+    found, (stretch,) = retime(
+        read_motion(str(source), ReadingOptions()), limits.requirements, fastest=fastest
+    )
+    return found, stretch
+
+
+def verdict(path: Path, arm: Path) -> str:
+    return check_file(str(path), CheckOptions(robot=str(arm))).judgement.verdict
+
+
+@pytest.mark.parametrize("fastest", [False, True])
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_the_closed_form_for_each_order(order: int, fastest: bool, tmp_path: Path) -> None:
+    """A peak that uses its limit c times asks for the factor c^(1 / order)."""
+    name = ("velocity", "acceleration", "jerk")[order - 1]
+    share = 0.4 if fastest else 2.5
+    arm = robot(tmp_path / "arm.yaml", f"{name}: {PEAKS[order - 1] / share!r}")
+    found, stretch = retimed(rows_of(tmp_path / "rows.csv"), arm, fastest=fastest)
+    expected = share ** (1 / order)
+    assert stretch.factor == pytest.approx(expected, rel=2e-4)
+    assert stretch.binding is not None
+    assert (stretch.binding.kind, stretch.binding.joint) == (name, "j1")
+    assert found.rows.t[-1] == pytest.approx(stretch.factor, abs=1e-9)
+    rows = quintic(np.arange(101) / 100, 1.0, 1.0)
+    for power, key in enumerate(("q", "qd", "qdd", "qddd")):
+        values = getattr(found.rows, key)[:, 0]
+        np.testing.assert_allclose(values, rows[power] / stretch.factor**power, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["velocity", "acceleration", "jerk"])
+def test_a_thousandth_less_does_not_verify(name: str, tmp_path: Path) -> None:
+    order = ("velocity", "acceleration", "jerk").index(name) + 1
+    arm = robot(tmp_path / "arm.yaml", f"{name}: {PEAKS[order - 1] / 3!r}")
+    source = rows_of(tmp_path / "rows.csv")
+    assert verdict(source, arm) == "exceeded"
+    found, stretch = retimed(source, arm)
+    write_motion(found, str(tmp_path / "out.csv"))
+    assert verdict(tmp_path / "out.csv", arm) != "exceeded"
+    less = 0.999 * stretch.factor
+    short = rows_of(tmp_path / "short.csv", 1.0, less, 100 / less)
+    assert verdict(short, arm) == "exceeded"
+
+
+def test_twice_as_long_is_what_a_plan_of_twice_the_time_is(tmp_path: Path) -> None:
+    """The peer is the planner: 30 deg in 1 s peak at 56.25 deg/s, in 2 s at half of that."""
+    job = JOB.replace("  - {planner: septic, to: {joints: [-10, 5]}, duration: 2}\n", "")
+    source = planned(tmp_path / "rows.csv", job)
+    arm = tmp_path / "arm.yaml"
+    arm.write_text("units: {angle: deg}\njoints: [{name: base, velocity: 28.125}, {name: arm}]\n")
+    found, stretch = retimed(source, arm)
+    assert stretch.factor == pytest.approx(2, rel=1e-8)
+    write_motion(found, str(tmp_path / "out.csv"))
+    slow = planned(tmp_path / "slow.csv", job.replace("duration: 1}", "duration: 2}").replace("100", "50"))
+    assert table(tmp_path / "out.csv")[0] == table(slow)[0]
+    np.testing.assert_allclose(table(tmp_path / "out.csv")[1], table(slow)[1], atol=2e-6)
+
+
+def test_a_velocity_by_position_is_a_bound_of_the_velocity(tmp_path: Path) -> None:
+    """A quintic from 0 to 1 under |v| <= sqrt(2 d (1.1 - q)) - o: the largest quotient over time."""
+    d, o = 0.5, 0.1
+    arm = robot(
+        tmp_path / "arm.yaml",
+        f"position: [-1, 1.1], velocity_by_position: {{deceleration: {d}, offset: {o}}}",
+    )
+    t = np.linspace(0, 1, 200001)
+    q, qd, *_ = quintic(t, 1.0, 1.0)
+    expected = float((qd / (np.sqrt(2 * d * (1.1 - q)) - o)).max())
+    found, stretch = retimed(rows_of(tmp_path / "rows.csv"), arm)
+    assert stretch.factor == pytest.approx(expected, rel=3e-4)
+    assert stretch.binding is not None
+    assert stretch.binding.kind == "velocity_by_position"
+    write_motion(found, str(tmp_path / "out.csv"))
+    assert verdict(tmp_path / "out.csv", arm) != "exceeded"
+
+
+def test_a_motion_within_its_limits_keeps_its_time(tmp_path: Path) -> None:
+    source = rows_of(tmp_path / "rows.csv")
+    found, stretch = retimed(source, robot(tmp_path / "arm.yaml", "velocity: 2"))
+    assert stretch == Stretch(1.0, None, None) or (stretch.factor, stretch.binding) == (1.0, None)
+    write_motion(found, str(tmp_path / "out.csv"))
+    np.testing.assert_array_equal(table(tmp_path / "out.csv")[1], table(source)[1])
+
+
+def test_fastest_never_slows_down_what_keeps_its_limits(tmp_path: Path) -> None:
+    source = rows_of(tmp_path / "rows.csv")
+    _, stretch = retimed(source, robot(tmp_path / "arm.yaml", f"velocity: {PEAKS[0]!r}"), fastest=True)
+    assert 0.9998 <= stretch.factor <= 1
+
+
+@pytest.mark.parametrize(
+    ("limits", "message"),
+    [("", "no limit bounds how fast"), ("acceleration: null, position: [-2, 2]", "no limit bounds how fast")],
+)
+def test_without_limits_nothing_is_the_fastest(limits: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=message):
+        retimed(rows_of(tmp_path / "rows.csv"), robot(tmp_path / "arm.yaml", limits), fastest=True)
+
+
+@pytest.mark.parametrize("fastest", [False, True])
+def test_what_no_time_mends_is_refused(fastest: bool, tmp_path: Path) -> None:
+    source = rows_of(tmp_path / "rows.csv")
+    with pytest.raises(VerificationError, match="the position of j1 reaches 1"):
+        retimed(source, robot(tmp_path / "arm.yaml", "position: [0, 0.9], velocity: 1"), fastest=fastest)
+    text = source.read_text().splitlines()
+    text[50] = text[50].replace(text[50].split(",")[1], "0.9")
+    source.write_text("\n".join(text) + "\n")
+    with pytest.raises(VerificationError, match=r"at t = 0\.(48|49)"):
+        retimed(source, robot(tmp_path / "arm.yaml", "velocity: 1"), fastest=fastest)
+
+
+def of_moves(tmp_path: Path, *, fastest: bool, limits: str = "") -> tuple[Array, tuple[Stretch, ...]]:
+    """Retime each move of the two of the job; the first peaks at 56.25, the second at 43.75 deg/s."""
+    source = planned(tmp_path / "rows.csv")
+    job = tmp_path / "job.yaml"
+    job.write_text(JOB.replace("start:", f"limits: {{velocity: {{base: 30}}}}{limits}\nstart:"))
+    job.write_text(
+        job.read_text().replace("duration: 1}", "duration: 10}").replace("duration: 2}", "duration: 10}")
+    )
+    kept = kept_limits(str(job), None)
+    motion = read_motion(
+        str(source), ReadingOptions(), joints=kept.robot.joint_names, joint_types=kept.robot.joint_types
+    )
+    found, stretches = retime(motion, kept.requirements, fastest=fastest, per_move=True)
+    write_motion(found, str(tmp_path / "out.csv"))
+    return table(tmp_path / "out.csv")[1], stretches
+
+
+@pytest.mark.parametrize("fastest", [False, True])
+def test_each_move_by_its_own_factor(fastest: bool, tmp_path: Path) -> None:
+    rows, stretches = of_moves(tmp_path, fastest=fastest)
+    assert [stretch.moves for stretch in stretches] == [(0,), (1,)]
+    factors = [stretch.factor for stretch in stretches]
+    assert factors == pytest.approx([56.25 / 30, 40 * 35 / 16 / 2 / 30], rel=2e-4)
+    assert rows[100, 0] == pytest.approx(factors[0], abs=1e-8)
+    assert rows[-1, 0] == pytest.approx(factors[0] + 2 * factors[1], abs=1e-8)
+    before = table(tmp_path / "rows.csv")[1]
+    np.testing.assert_allclose(rows[:100, 3:5], before[:100, 3:5] / factors[0], atol=1e-7)
+    np.testing.assert_allclose(rows[100:, 3:5], before[100:, 3:5] / factors[1], atol=1e-7)
+    np.testing.assert_array_equal(rows[:, -1], before[:, -1])
+
+
+def test_moves_that_meet_in_motion_share_a_factor(tmp_path: Path) -> None:
+    job = JOB.replace("joints: [30, -20]}", "joints: [30, -20], velocity: [20, 0]}")
+    source = planned(tmp_path / "rows.csv", job)
+    arm = tmp_path / "arm.yaml"
+    arm.write_text("units: {angle: deg}\njoints: [{name: base, velocity: 20}, {name: arm}]\n")
+    found, stretches = retime(
+        read_motion(str(source), ReadingOptions()), kept_limits(None, str(arm)).requirements, per_move=True
+    )
+    assert [stretch.moves for stretch in stretches] == [(0, 1)]
+    assert found.rows.t[-1] == pytest.approx(3 * stretches[0].factor, abs=1e-8)
+
+
+def test_a_file_without_moves_has_none_to_retime(tmp_path: Path) -> None:
+    kept = kept_limits(None, str(robot(tmp_path / "arm.yaml", "velocity: 1")))
+    motion = read_motion(str(rows_of(tmp_path / "rows.csv")), ReadingOptions())
+    with pytest.raises(InputError, match="no column `move`"):
+        retime(motion, kept.requirements, per_move=True)
+
+
+def test_rows_with_nine_decimals_verify_as_they_are_written(tmp_path: Path) -> None:
+    """Numbers that are rounded twice must not disagree: by 37 factors, faster and slower."""
+    job = JOB.replace("qddd, move", "move").replace("rate: 100", "rate: 1000")
+    source = planned(tmp_path / "rows.csv", job)
+    arm = tmp_path / "arm.yaml"
+    for velocity in np.geomspace(15, 200, 8):
+        arm.write_text(
+            f"units: {{angle: deg}}\njoints: [{{name: base, velocity: {velocity}}}, {{name: arm}}]\n"
+        )
+        found, stretch = retimed(source, arm, fastest=True)
+        assert stretch.factor == pytest.approx(56.25 / velocity, rel=2e-4)
+        write_motion(found, str(tmp_path / "out.csv"))
+        assert verdict(tmp_path / "out.csv", arm) != "exceeded"
+
+
+@pytest.mark.parametrize("names", [(None, None), ("a.yaml", "ur5e")])
+def test_limits_are_of_a_job_or_of_a_robot(names: tuple[str | None, str | None]) -> None:
+    with pytest.raises(InputError, match=r"limits|exclude"):
+        kept_limits(*names)

@@ -1,0 +1,145 @@
+"""Tool of recorded motions: branch flips, deviation, singularities, limits, each beside its clean twin."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from recorded_rows import part
+
+import trajcli
+from trajcli.api import PlannedJob
+from trajcli.judge.finding import Judgement
+from trajcli.judge.motion import Requirements, judge_motion
+from trajcli.judge.tool import ToolJudge
+from trajcli.kinematics.robot import ToolLimits
+from trajcli.streams.recorded_motion import RecordedMotion, Resolution
+
+JOB = {
+    "version": 1,
+    "robot": "ur5e",
+    "limits": {"acceleration": 20.0},
+    "start": {"joints": [0.2, -1.2, 1.6, -1.0, -1.3, 0.4]},
+    "moves": [
+        {"planner": "line", "to": {"xyz": [0.45, 0.25, 0.35]}, "law": {"shape": "quintic", "duration": 2}}
+    ],
+}
+PERIOD = 4e-3
+
+
+@cache
+def plan() -> PlannedJob:
+    return trajcli.plan(JOB)
+
+
+def recorded(decimals: int = 9) -> RecordedMotion:
+    rows = plan().trajectory.sample(1 / PERIOD)
+    off = np.full(6, 0.5 * 10.0**-decimals)
+    states = [np.round(values, decimals) for values in (rows.q, rows.qd, rows.qdd)]
+    resolution = Resolution(0.5e-9, off, off, off)
+    return RecordedMotion(
+        np.round(rows.t, 9), *states, None, None, np.zeros(len(rows), int), None, resolution, "rows"
+    )
+
+
+def judged(motion: RecordedMotion, *, by_job: bool = True, **limits: float) -> Judgement:
+    robot = plan().moves[0].robot
+    robot = replace(robot, limits=replace(robot.limits, tcp=ToolLimits(**limits)))
+    paths = {0: plan().moves[0].planned.tool} if by_job else None
+    required = Requirements(robot, tool=lambda: ToolJudge(robot, paths))
+    blocks = [part(motion, slice(low, low + 300)) for low in range(0, len(motion.t), 300)]
+    return judge_motion(lambda: blocks, required)
+
+
+def only(judgement: Judgement, kind: str) -> object:
+    (found,) = [each for each in judgement.findings if each.kind == kind]
+    return found
+
+
+@pytest.mark.parametrize("by_job", [True, False])
+def test_the_line_as_it_was_planned_is_satisfied(by_job: bool) -> None:
+    judgement = judged(recorded(), by_job=by_job)
+    assert judgement.verdict == "satisfied", judgement.findings
+    assert judgement.findings == ()
+
+
+@pytest.mark.parametrize("by_job", [True, False])
+def test_a_branch_flip_is_found(by_job: bool) -> None:
+    """From row 201 on the wrist stands the other way round: the tool goes on as if nothing were."""
+    motion, arm = recorded(), trajcli.load_robot("ur5e")
+    q = motion.q.copy()
+    for row in range(200, len(q)):
+        answers = arm.ik(arm.fk(q[row]), near=q[row])
+        other = next(answer for answer in answers if answer.branch["wrist"] != answers[0].branch["wrist"])
+        q[row] = other.joints
+    assert np.abs(arm.fk(q[200]) - arm.fk(motion.q[200])).max() < 1e-8
+    flipped = replace(motion, q=np.round(q, 9), qd=None, qdd=None)
+    judgement = judged(flipped, by_job=by_job)
+    found = [each for each in judgement.findings if each.kind == "branch"]
+    assert judgement.verdict == "exceeded"
+    assert {each.row for each in found} & {200, 201}
+    assert all(abs(each.time - 200 * PERIOD) <= 1.01 * PERIOD for each in found)
+    assert not [each for each in judgement.findings if each.kind == "deviation"]
+
+
+def test_a_tool_beside_its_line_is_found_by_how_much() -> None:
+    """A millimetre to the side in row 251, by the Jacobian."""
+    motion, arm = recorded(), trajcli.load_robot("ur5e")
+    along = np.array([0.45, 0.25, 0.35]) - arm.fk(motion.q[0])[:3, 3]
+    aside = np.cross(along, [0, 0, 1.0])
+    aside *= 1e-3 / np.linalg.norm(aside)
+    q = motion.q.copy()
+    q[250] += np.linalg.solve(arm.jacobian(q[250]), np.append(aside, np.zeros(3)))
+    judgement = judged(replace(motion, q=q, qd=None, qdd=None))
+    found = only(judgement, "deviation")
+    assert found.value == pytest.approx(1e-3, rel=1e-2)
+    assert (found.row, found.move, found.quantity, found.limit) == (251, 0, "position", 1e-6)
+
+
+def test_a_turned_tool_is_found_by_how_much() -> None:
+    motion = recorded()
+    q = motion.q.copy()
+    q[:, 5] += 2e-3
+    found = only(judged(replace(motion, q=q)), "deviation")
+    assert found.value == pytest.approx(2e-3, rel=1e-3)
+    assert found.quantity == "orientation"
+
+
+def test_rounding_of_rows_is_no_deviation() -> None:
+    """Five decimals leave some 10 um at the tool."""
+    judgement = judged(replace(recorded(5), qd=None, qdd=None))
+    found = [each for each in judgement.findings if each.kind == "deviation"]
+    assert found
+    assert {each.certainty for each in found} == {"within rounding"}
+
+
+def test_the_speed_of_the_tool_is_that_of_its_law() -> None:
+    """A quintic law of 2 s along the line: the peak is 15/8 of the mean speed."""
+    motion, arm = recorded(), trajcli.load_robot("ur5e")
+    length = np.linalg.norm(np.array([0.45, 0.25, 0.35]) - arm.fk(motion.q[0])[:3, 3])
+    peak = 15 / 8 * length / 2
+    found = only(judged(motion, speed=peak * 0.9999), "tool_speed")
+    assert found.value == pytest.approx(peak, rel=1e-5)
+    assert found.time == pytest.approx(1.0, abs=0.02)
+    assert judged(motion, speed=peak * 1.0001).verdict == "satisfied"
+    acceleration = 10 / np.sqrt(3) * length / 4
+    found = only(judged(motion, acceleration=acceleration * 0.999), "tool_acceleration")
+    assert found.value == pytest.approx(acceleration, rel=1e-3)
+    assert judged(motion, acceleration=acceleration * 1.001).verdict == "satisfied"
+
+
+def test_nearness_to_a_singularity_is_a_warning() -> None:
+    """The wrist of the arm is straight where joint 5 is zero."""
+    count = 500
+    q = np.tile([0.2, -1.2, 1.6, -1.0, 0.0, 0.4], (count, 1))
+    q[:, 4] = np.linspace(-0.5, 0.5001, count)
+    nothing = np.zeros(6)
+    exact = Resolution(0.0, nothing, nothing, nothing)
+    motion = RecordedMotion(np.arange(count) * 0.01, q, None, None, None, None, None, None, exact, "rows")
+    judgement = judged(motion, by_job=False)
+    found = only(judgement, "singularity")
+    assert judgement.verdict == "satisfied"
+    assert found.severity == "warning"
+    assert abs(found.time - 2.5) < 0.3

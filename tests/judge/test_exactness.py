@@ -1,0 +1,98 @@
+"""Exact judgement of random rows against dense samples of an independent interpolant, locally refined."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from recorded_rows import judged
+from scipy.interpolate import BPoly, PPoly
+from scipy.optimize import minimize_scalar
+
+from trajcli.kinematics.robot import Limits
+from trajcli.streams.recorded_motion import RecordedMotion, Resolution
+
+KINDS = ("position", "velocity", "acceleration", "jerk")
+ORDERS = {"linear": 1, "cubic": 2, "quintic": 3}
+DENSE = 200
+
+
+def random_rows(rng: np.random.Generator, stated: int, joints: int) -> RecordedMotion:
+    """Return rows of random states at random times: a random piecewise polynomial, unlike any motion."""
+    count = int(rng.integers(2, 12))
+    t = np.cumsum(np.exp(rng.uniform(np.log(0.02), np.log(2.0), count)))
+    states = [rng.normal(size=(count, joints)) * 10.0 ** rng.uniform(-1, 1) for _ in range(stated)]
+    nothing = np.zeros(joints)
+    exact = Resolution(0.0, nothing, nothing, nothing)
+    return RecordedMotion(t, *states, *[None] * (3 - stated), None, None, None, None, exact, "random")
+
+
+def polynomials(motion: RecordedMotion, joint: int, stated: int) -> PPoly:
+    """Return scipy's interpolant of the rows of one joint."""
+    known = [rows[:, joint] for rows in (motion.q, motion.qd, motion.qdd)[:stated]]
+    return PPoly.from_bernstein_basis(BPoly.from_derivatives(motion.t, np.stack(known, axis=1)))
+
+
+def sampled_extremes(curve: PPoly, order: int) -> tuple[float, float]:
+    """Return the lowest and the highest value that is found with dense samples and both sides of breaks."""
+    derivative = curve.derivative(order) if order else curve
+    found: list[float] = []
+    for k, (low, high) in enumerate(zip(curve.x[:-1], curve.x[1:], strict=True)):
+        piece = np.poly1d(derivative.c[:, k])
+        local = np.linspace(0.0, high - low, DENSE)
+        values = piece(local)
+        found += [values.min(), values.max()]
+        for sign, best in ((1.0, int(values.argmin())), (-1.0, int(values.argmax()))):
+            around = (local[max(best - 1, 0)], local[min(best + 1, DENSE - 1)])
+            result = minimize_scalar(
+                lambda x, piece=piece, sign=sign: sign * piece(x),
+                bounds=around,
+                method="bounded",
+                options={"xatol": 1e-14},
+            )
+            found.append(float(piece(result.x)))
+    return min(found), max(found)
+
+
+def tight(extremes: np.ndarray, share: np.ndarray) -> Limits:
+    """Return limits, each a share of the largest magnitude of its quantity and joint, (orders, joints)."""
+    rows = np.full((4, extremes.shape[1], 2), (-np.inf, np.inf))
+    size = np.abs(extremes).max(axis=2) * share
+    rows[: len(size)] = np.stack([-size, size], axis=2)
+    return Limits(*rows)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_the_judgement_is_that_of_dense_samples(seed: int) -> None:
+    """Never less severe, and at most 1e-9 more."""
+    rng = np.random.default_rng(seed)
+    asked = ("linear", "cubic", "quintic")[seed % 3]
+    stated, joints = ORDERS[asked], int(rng.integers(1, 4))
+    motion = random_rows(rng, stated, joints)
+    curves = [polynomials(motion, joint, stated) for joint in range(joints)]
+    extremes = np.array([[sampled_extremes(curve, order) for curve in curves] for order in range(stated + 1)])
+    share = rng.uniform(0.5, 1.2, extremes.shape[:2])
+    judgement = judged(motion, tight(extremes, share), interpolate=asked)
+    found = {(each.kind, each.joint): each for each in judgement.findings if each.rule == "limit"}
+    for order in range(stated + 1):
+        for joint in range(joints):
+            worst = np.abs(extremes[order, joint]).max()
+            finding = found.pop((KINDS[order], f"j{joint + 1}"), None)
+            if share[order, joint] > 1:
+                assert finding is None
+                continue
+            assert finding is not None
+            assert finding.certainty == "exceeded"
+            assert finding.severity == "error"
+            assert abs(finding.value) >= worst * (1 - 1e-12)
+            assert abs(finding.value) <= worst * (1 + 1e-9)
+            at = curves[joint](finding.time, order) if order < stated else None
+            if at is not None:
+                assert at == pytest.approx(finding.value, rel=1e-6, abs=1e-9)
+    assert not found
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("block", range(10))
+def test_the_judgement_is_that_of_dense_samples_at_length(block: int) -> None:
+    for seed in range(100):
+        test_the_judgement_is_that_of_dense_samples(1000 + 100 * block + seed)

@@ -1,0 +1,242 @@
+"""Planted faults: each is found, named and timed, and its clean twin is satisfied."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from recorded_rows import judged, rows_of
+
+from trajcli.curves.hermite import hermite_pieces
+from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.judge.finding import JudgedFinding, Judgement
+from trajcli.kinematics.robot import Limits
+from trajcli.streams.recorded_motion import RecordedMotion
+
+DURATION, DISTANCE = 2.0, 1.2
+PEAKS = (DISTANCE * 1.875 / DURATION, DISTANCE * 10 / 3**0.5 / DURATION**2, DISTANCE * 60 / DURATION**3)
+"""Of a quintic from rest to rest: velocity, acceleration, jerk (Biagiotti and Melchiorri, section 2.1)."""
+AT = (1.0, DURATION * (0.5 - 3**0.5 / 6), 0.0)
+
+
+def quintic(joints: int = 3) -> PiecewisePolynomial:
+    """Return a quintic from rest to rest, the same for each joint but for its size."""
+    derivatives = np.zeros((3, 2, joints))
+    derivatives[0, 1] = DISTANCE / np.arange(1, joints + 1)
+    return hermite_pieces(np.array([0.0, DURATION]), derivatives)
+
+
+def limits(over: float = 1e-9, joints: int = 3, **others: float) -> Limits:
+    """Return limits that the quintic just keeps, or that it breaks by a part."""
+    bounds = {"position": 2.0, "velocity": PEAKS[0], "acceleration": PEAKS[1], "jerk": PEAKS[2], **others}
+    rows = {}
+    for name, bound in bounds.items():
+        size = bound / np.arange(1, joints + 1) * (1 + over) if name != "position" else np.full(joints, bound)
+        rows[name] = np.stack([-size, size], axis=1)
+    return Limits(**rows)
+
+
+def worst(judgement: Judgement, kind: str, joint: str | None = "j1") -> JudgedFinding:
+    found = [each for each in judgement.findings if (each.kind, each.joint) == (kind, joint)]
+    assert len(found) == 1, judgement.findings
+    return found[0]
+
+
+@pytest.mark.parametrize("decimals", [None, 9, 6])
+@pytest.mark.parametrize("orders", [1, 2, 3])
+@pytest.mark.parametrize("period", [1e-3, 4e-3, 0.02])
+def test_a_motion_at_its_limits_is_no_false_alarm(period: float, orders: int, decimals: int | None) -> None:
+    room = 1e-3 if period > 0.01 and orders == 2 else 1e-9  # cubics bend more than the quintic
+    judgement = judged(rows_of(quintic(), period, orders, decimals), limits(room))
+    assert judgement.passed, judgement.findings
+    if orders != 2:  # cubics bend otherwise than the quintic between rows, and a warning says so
+        assert [found for found in judgement.findings if found.severity == "warning"] == []
+
+
+@pytest.mark.parametrize("kind", ["velocity", "acceleration", "jerk"])
+@pytest.mark.parametrize("period", [1e-3, 0.05])
+def test_a_hundredth_of_a_percent_is_seen(kind: str, period: float) -> None:
+    order = ("velocity", "acceleration", "jerk").index(kind)
+    tight = limits(0.1, **{kind: PEAKS[order] / (1 + 1e-4) / 1.1})
+    motion = rows_of(quintic(), period)
+    judgement = judged(motion, tight)
+    found = worst(judgement, kind)
+    assert judgement.verdict == "exceeded"
+    assert found.severity == "error"
+    assert abs(abs(found.value) / PEAKS[order] - 1) < 1e-5
+    assert found.factor == pytest.approx((1 + 1e-4) ** (1 / (order + 1)), rel=1e-5)
+    near = {AT[order], DURATION - AT[order], *([1.0] if kind == "jerk" else [])}
+    assert min(abs(found.time - time) for time in near) < period
+    assert found.row == pytest.approx(found.time / period + 1, abs=1.0)
+
+
+def test_a_peak_between_two_rows_is_found() -> None:
+    """Seven rows of a quintic miss its acceleration's peak by 3 %."""
+    motion = rows_of(quintic(), DURATION / 6)
+    sampled = np.abs(motion.qdd[:, 0]).max()
+    assert sampled < 0.98 * PEAKS[1]
+    judgement = judged(motion, limits(acceleration=sampled * 1.0001))
+    found = worst(judgement, "acceleration")
+    assert abs(found.value) == pytest.approx(PEAKS[1], rel=1e-9)
+    assert min(abs(found.time - AT[1]), abs(found.time - DURATION + AT[1])) < 1e-6
+    assert judged(motion, limits()).verdict == "satisfied"
+
+
+def changed(motion: RecordedMotion, name: str, row: int | slice, joint: int, by: float) -> RecordedMotion:
+    values = getattr(motion, name).copy()
+    values[row, joint] += by
+    return replace(motion, **{name: values})
+
+
+def test_a_jump_in_acceleration_is_found() -> None:
+    """The second half is 2 rad/s^2 higher in acceleration, and moves as that says."""
+    curve, step = quintic(), 2.0
+    halves = hermite_pieces(
+        np.array([0.0, 1.0, 2.0]),
+        curve.evaluate_orders(np.array([0.0, 1.0, 2.0]), (0, 1, 2)).transpose(1, 0, 2),
+    )
+    coefficients = np.array(halves.coefficients)
+    coefficients[3, 1, 1] += step / 2
+    motion = rows_of(PiecewisePolynomial(halves.breaks, coefficients), 1e-3, decimals=9)
+    judgement = judged(motion, limits(1.0))
+    found = worst(judgement, "jump", "j2")
+    assert (found.quantity, found.rule, found.count) == ("acceleration", "continuity", 1)
+    assert found.value == pytest.approx(step, rel=1e-2)
+    assert abs(found.time - 1.0) <= 1.001e-3
+    certain = [each for each in judgement.findings if each.certainty == "exceeded"]
+    assert {each.joint for each in certain} == {"j2"}
+    unlimited = judged(motion, limits(1.0, jerk=np.inf))
+    assert not [each for each in unlimited.findings if each.kind == "jump"]
+
+
+@pytest.mark.parametrize("orders", [1, 2, 3])
+def test_a_jump_in_position_is_found(orders: int) -> None:
+    motion = changed(rows_of(quintic(), 1e-3, orders, 9), "q", slice(700, None), 2, 0.3)
+    found = worst(judged(motion, limits(0.5)), "jump", "j3")
+    assert (found.quantity, found.row, found.count) == ("position", 700, 1)
+    assert found.value == pytest.approx(0.3, rel=1e-2)
+    assert found.time == pytest.approx(0.699)
+
+
+def test_a_doubled_stamp_is_found() -> None:
+    motion = rows_of(quintic(), 1e-3, decimals=9)
+    stamps = motion.t.copy()
+    stamps[500] = stamps[499]
+    judgement = judged(replace(motion, t=stamps), limits())
+    found = worst(judgement, "time", None)
+    assert (found.row, found.time, found.count, found.rule) == (501, pytest.approx(0.499), 1, "time")
+    assert "doubled" in found.message
+    assert judgement.verdict == "exceeded"
+
+
+@pytest.mark.parametrize(("value", "word"), [(np.nan, "nan"), (np.inf, "inf"), (0.1, "earlier")])
+def test_a_bad_stamp_is_found(value: float, word: str) -> None:
+    motion = rows_of(quintic(), 1e-3, decimals=9)
+    stamps = motion.t.copy()
+    stamps[500] = value
+    found = worst(judged(replace(motion, t=stamps), limits()), "time", None)
+    assert found.row == 501
+    assert word in found.message
+
+
+@pytest.mark.parametrize("fault", ["scaled", "degrees", "neighbour", "sign", "shifted"])
+def test_a_wrong_velocity_column_is_found(fault: str) -> None:
+    motion = rows_of(quintic(), 1e-3, decimals=9)
+    qd = motion.qd.copy()
+    qd[:, 1] = {
+        "scaled": qd[:, 1] * 1.02,
+        "degrees": np.degrees(qd[:, 1]),
+        "neighbour": qd[:, 0],
+        "sign": -qd[:, 1],
+        "shifted": np.roll(qd[:, 1], 25),
+    }[fault]
+    judgement = judged(replace(motion, qd=qd), limits(0.5))
+    found = worst(judgement, "derivative", "j2")
+    assert (found.quantity, found.rule) == ("velocity", "derivative")
+    if fault != "shifted":
+        assert abs(found.time - 1.0) < 0.2  # where it is fastest
+    assert not [each for each in judgement.findings if each.kind == "derivative" and each.joint != "j2"]
+    assert not [each for each in judgement.findings if each.kind == "jump" and each.quantity == "position"]
+
+
+def test_a_wrong_acceleration_column_is_found() -> None:
+    motion = rows_of(quintic(), 1e-3, decimals=9)
+    qdd = motion.qdd.copy()
+    qdd[:, 2] *= 1.5
+    found = worst(judged(replace(motion, qdd=qdd), limits(1.0)), "derivative", "j3")
+    assert found.quantity == "acceleration"
+    assert found.value == pytest.approx(1.5 * found.limit, rel=1e-2)
+
+
+def test_degrees_for_radians_are_hinted_at() -> None:
+    motion = rows_of(quintic(), 0.01, 1)
+    found = worst(judged(replace(motion, q=np.degrees(motion.q)), limits()), "position")
+    assert found.hint is not None
+    assert "degrees" in found.hint
+    assert found.value == pytest.approx(np.degrees(DISTANCE))
+
+
+def test_an_irregular_24_hz_file_in_six_decimals_is_taken_as_24_hz() -> None:
+    """Stamps of 0.041667 s: as they stand the velocity is off by up to 1.2e-5 of itself."""
+    motion = rows_of(quintic(), 1 / 24, 1, 9, 6)
+    judgement = judged(motion, limits(0.01))
+    assert judgement.period == pytest.approx(1 / 24, rel=1e-15)
+    assert any("24 Hz" in note for note in judgement.notes)
+    peak = np.abs(np.diff(rows_of(quintic(), 1 / 24, 1).q[:, 0])).max() * 24
+    found = worst(judged(motion, limits(velocity=peak / (1 + 1e-5))), "velocity")
+    assert found.certainty == "exceeded"
+    assert found.value == pytest.approx(peak, rel=1e-7)
+    assert judged(motion, limits(velocity=peak * (1 + 1e-7))).verdict == "satisfied"
+
+
+def test_what_rounding_explains_is_within_rounding() -> None:
+    """Six decimals at 1 kHz leave 1e-3 rad/s of doubt."""
+    motion = rows_of(quintic(), 1e-3, 1, 6)
+    slope = np.abs(np.diff(motion.q[:, 0])).max() * 1000
+    judgement = judged(motion, limits(velocity=slope * (1 - 1e-6)))
+    assert judgement.verdict == "within rounding"
+    assert worst(judgement, "velocity").rounding == pytest.approx(1e-3, rel=1e-6)
+    assert judged(motion, limits(velocity=slope - 1.1e-3)).verdict == "exceeded"
+    assert judged(motion, limits(velocity=slope - 0.9e-3)).verdict == "within rounding"
+
+
+@pytest.mark.parametrize("orders", [1, 2, 3])
+@pytest.mark.parametrize("blocks", [1, 7, 300])
+def test_blocks_change_nothing(orders: int, blocks: int) -> None:
+    motion = changed(rows_of(quintic(), 2e-3, orders, 9), "q", slice(777, None), 2, 0.3)
+    motion = replace(motion, move=np.repeat([0, 1, 2], [400, 300, len(motion.t) - 700]))
+    tight = limits(-0.05)
+    entire, cut = judged(motion, tight), judged(motion, tight, blocks)
+    assert entire.verdict == cut.verdict == "exceeded"
+    views = [
+        {(f.kind, f.quantity, f.joint, f.move): f for f in judgement.findings} for judgement in (entire, cut)
+    ]
+    assert views[0].keys() == views[1].keys()
+    for key, found in views[0].items():
+        other = views[1][key]
+        assert (found.count, found.certainty, found.severity) == (
+            other.count,
+            other.certainty,
+            other.severity,
+        )
+        assert [found.value, found.time] == pytest.approx([other.value, other.time], rel=1e-9)
+    assert (entire.period, entire.rows) == (cut.period, cut.rows)
+
+
+def test_the_stamps_of_a_later_block_may_fit_no_period() -> None:
+    motion = rows_of(quintic(), 2e-3, 2, 9)
+    stamps = motion.t.copy()
+    stamps[850] += 0.0005
+    judgement = judged(replace(motion, t=stamps), limits(0.5), 40)
+    assert judgement.period is None
+    assert judgement.rows == len(stamps)
+
+
+def test_sparse_points_need_not_say_what_happens_between_them() -> None:
+    """A move of 2 s from rest to rest as its two ends: velocities of zero do not say that nothing moves."""
+    motion = rows_of(quintic(), DURATION)
+    assert len(motion.t) == 2
+    assert judged(motion, limits()).verdict == "satisfied"
+    assert judged(motion, limits(jerk=np.inf)).verdict == "satisfied"
+    assert judged(motion, limits(jerk=np.inf, acceleration=np.inf)).verdict == "satisfied"

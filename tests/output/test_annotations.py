@@ -1,0 +1,186 @@
+"""Annotations, read back by other readers: of XML, of the published schema of SARIF, of commands of GitHub."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any
+from urllib.parse import unquote, urlsplit
+from xml.etree import ElementTree as ET
+
+import pytest
+from pydantic_sarif.model import StaticAnalysisResultsFormatSarifVersion210JsonSchema as SarifLog
+
+from trajcli.errors import (
+    FileError,
+    InputError,
+    Place,
+    PlanningError,
+    Problem,
+    TrajcliError,
+    VerificationError,
+)
+from trajcli.output.annotations import Annotation, AnnotationForm, annotations_of, render_annotations
+
+PLACED = Annotation("velocity", "error", "j1 is too fast", "jobs/a.yaml", 6, 5, joint="j1", time=0.125)
+WARNED = Annotation("slowed", "warning", "stretched", "jobs/b.yaml", 3, 1)
+NOTED = Annotation("period", "note", "snapped to 1 ms", "rows.csv", row=12)
+HARD = 'a, b: 50% of "x" <y> & \r\nline two :: \x1b[31m \ud800 \ufffe ü'
+
+
+def sarif(*found: Annotation, **options: Any) -> dict[str, Any]:
+    """Return the one run of a log that keeps the published schema."""
+    text = render_annotations(found, "sarif", **options)
+    SarifLog.model_validate_json(text)
+    log = json.loads(text)
+    assert log["version"] == "2.1.0"
+    (run,) = log["runs"]
+    return run
+
+
+def cases(text: str) -> list[tuple[str, str, list[str]]]:
+    """Return classname, name and failures of the cases of a JUnit document, whose counts are right."""
+    root = ET.fromstring(text.encode("utf-8"))
+    for element in [root, *root.iter("testsuite")]:
+        assert int(element.attrib["tests"]) == len(list(element.iter("testcase")))
+        assert int(element.attrib["failures"]) == len(list(element.iter("failure")))
+    return [
+        (case.attrib["classname"], case.attrib["name"], [f.attrib["message"] for f in case.iter("failure")])
+        for case in root.iter("testcase")
+    ]
+
+
+def command(line: str) -> tuple[str, dict[str, str], str]:
+    """Return kind, properties and message of a command, as the runner of GitHub Actions undoes its escapes."""
+    match = re.fullmatch(r"::(\w+) ([^\n]*?)::([^\n]*)", line)
+    assert match is not None, line
+    pairs = dict(pair.split("=", 1) for pair in match[2].split(","))
+    return match[1], {key: undone(value, of_property=True) for key, value in pairs.items()}, undone(match[3])
+
+
+def undone(text: str, *, of_property: bool = False) -> str:
+    """Return a text without the runner's escapes, the percent sign last."""
+    escapes = [("%3A", ":"), ("%2C", ",")] if of_property else []
+    for escape, character in [*escapes, ("%0D", "\r"), ("%0A", "\n"), ("%25", "%")]:
+        text = text.replace(escape, character)
+    return text
+
+
+def test_commands_of_github() -> None:
+    lines = render_annotations([PLACED, WARNED, NOTED], "github").splitlines()
+    assert lines[0] == "::error file=jobs/a.yaml,line=6,col=5,title=trajcli%3A velocity::j1 is too fast"
+    assert [command(line)[0] for line in lines] == ["error", "warning", "notice"]
+    assert command(lines[2]) == (
+        "notice",
+        {"file": "rows.csv", "title": "trajcli: period"},
+        "snapped to 1 ms (row 12)",
+    )
+    assert render_annotations([], "github") == ""
+
+
+def test_hard_texts_stay_one_command() -> None:
+    (line,) = render_annotations(
+        [Annotation("a,b", "error", HARD, "dir, one/50%:x.yaml", 1)], "github"
+    ).splitlines()
+    kind, given, message = command(line)
+    assert (kind, given["file"], given["line"]) == ("error", "dir, one/50%:x.yaml", "1")
+    assert message == HARD.replace("\x1b", "\\x1b").replace("\ud800", "\\ud800").replace("\ufffe", "\\ufffe")
+    assert "line" in given
+    assert "title" in given
+
+
+def test_standard_input_is_no_file_of_a_repository() -> None:
+    (line,) = render_annotations(
+        [Annotation("input", "error", "wrong", "<stdin>", 3, 4)], "github"
+    ).splitlines()
+    assert line == "::error title=trajcli%3A input::wrong"
+
+
+def test_junit_has_a_suite_for_each_file_also_where_nothing_is_wrong() -> None:
+    text = render_annotations([PLACED, WARNED], "junit", ["jobs/a.yaml", "jobs/b.yaml", "jobs/c.yaml"])
+    assert cases(text) == [
+        ("jobs/a.yaml", "velocity", ["j1 is too fast"]),
+        ("jobs/b.yaml", "verification", []),
+        ("jobs/b.yaml", "slowed", []),
+        ("jobs/c.yaml", "verification", []),
+    ]
+    assert "jobs/a.yaml:6: j1 is too fast" in text
+    assert "warning: jobs/b.yaml:3: stretched" in text
+
+
+def test_junit_names_what_was_judged_and_cases_differ() -> None:
+    rules = {"limit": "Limits hold.", "time": "Time increases."}
+    found = [Annotation("limit", "error", f"j{joint}", "a.csv", joint=f"j{joint}") for joint in (1, 2)]
+    assert cases(render_annotations(found, "junit", ["a.csv"], rules)) == [
+        ("a.csv", "time", []),
+        ("a.csv", "limit 1 of 2", ["j1"]),
+        ("a.csv", "limit 2 of 2", ["j2"]),
+    ]
+    assert [name for _, name, _ in cases(render_annotations([], "junit", ["a.csv"], rules))] == [
+        "limit",
+        "time",
+    ]
+
+
+def test_junit_holds_hard_texts() -> None:
+    (case,) = cases(render_annotations([Annotation("r", "error", HARD, HARD)], "junit"))
+    shown = HARD.replace("\x1b", "\\x1b").replace("\ud800", "\\ud800").replace("\ufffe", "\\ufffe")
+    assert case[2] == [shown]
+
+
+def test_sarif_keeps_the_published_schema() -> None:
+    run = sarif(PLACED, WARNED, NOTED, rules={"limit": "Limits hold."})
+    names = [rule["id"] for rule in run["tool"]["driver"]["rules"]]
+    assert names == ["limit", "velocity", "slowed", "period"]
+    assert run["tool"]["driver"]["rules"][0]["shortDescription"]["text"] == "Limits hold."
+    assert [result["level"] for result in run["results"]] == ["error", "warning", "note"]
+    assert [names[result["ruleIndex"]] for result in run["results"]] == names[1:]
+    first, _, last = run["results"]
+    assert first["locations"][0]["physicalLocation"] == {
+        "artifactLocation": {"uri": "jobs/a.yaml"},
+        "region": {"startLine": 6, "startColumn": 5},
+    }
+    assert first["properties"] == {"joint": "j1", "time": 0.125}
+    assert last["properties"] == {"row": 12}
+    assert "region" not in last["locations"][0]["physicalLocation"]
+    assert sarif()["results"] == []
+
+
+@pytest.mark.parametrize("file", ["a b/ü%.yaml", "/tmp/a b.yaml", "q?x#y.yaml"])
+def test_names_of_files_are_uris(file: str) -> None:
+    (result,) = sarif(Annotation("input", "error", HARD, file, 1))["results"]
+    uri = urlsplit(result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"])
+    assert (uri.scheme, unquote(uri.path), uri.query, uri.fragment) == (
+        "file" if file.startswith("/") else "",
+        file,
+        "",
+        "",
+    )
+
+
+def test_a_time_that_is_not_finite_is_left_out() -> None:
+    (result,) = sarif(Annotation("r", "error", "m", time=float("inf")))["results"]
+    assert "properties" not in result
+    assert "locations" not in result
+
+
+ERRORS = [
+    (VerificationError, "verification"),
+    (InputError, "input"),
+    (PlanningError, "planning"),
+    (FileError, "file"),
+    (TrajcliError, "bug"),
+]
+
+
+@pytest.mark.parametrize(("kind", "rule"), ERRORS)
+def test_problems_of_errors(kind: type[TrajcliError], rule: str) -> None:
+    problem = Problem("wrong", "do this", Place("a.yaml", 3, 7), joint="j2", time=1.5)
+    placed, plain = annotations_of(kind(problem, Problem("more", kind="velocity")), "b.yaml")
+    assert placed == Annotation(rule, "error", "wrong (do this)", "a.yaml", 3, 7, joint="j2", time=1.5)
+    assert plain == Annotation("velocity", "error", "more", "b.yaml")
+
+
+@pytest.mark.parametrize("form", ["github", "junit", "sarif"])
+def test_texts_end_in_a_line_feed(form: AnnotationForm) -> None:
+    assert render_annotations([PLACED], form).endswith("\n")

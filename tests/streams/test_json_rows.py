@@ -1,0 +1,100 @@
+"""JSON lines of anybody, and messages in YAML: numbers, decimals, one clear error for any text."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from trajcli.errors import InputError, TrajcliError
+from trajcli.streams.recorded_motion import open_motion
+from trajcli.streams.ros_messages import read_ros_yaml
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.sampled_from(["a", "1", "'...'"]),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.sampled_from(["t", "q", "joint_names", "points", "positions", "time_from_start", "sec"]), inner, max_size=4),
+    max_leaves=12,
+)  # fmt: skip
+
+
+def opened(path):
+    """Return the motion of a file; None where it is refused, which must be by one problem."""
+    try:
+        return open_motion(path, units="rad,m")
+    except TrajcliError as error:
+        (_,) = error.problems
+        return None
+
+
+def test_decimals_of_json_are_those_of_its_shortest_numbers(tmp_path):
+    path = tmp_path / "a.jsonl"
+    path.write_text("".join(json.dumps({"time": k / 8, "pos": [k * 0.25, 1.5]}) + "\n" for k in range(4)))
+    resolution = open_motion(path, units="rad").resolution
+    assert resolution.time == 0.0005
+    assert resolution.q.tolist() == [0.005, 0.05]
+    path.write_text(json.dumps({"t": 0.5, "q": [1 / 3, 1.5]}) + "\n")
+    resolution = open_motion(path).resolution
+    assert (resolution.time, resolution.q.tolist()) == (0.0, [0.0, 0.0])
+
+
+@pytest.mark.parametrize("number", ["1e999", "1" + "0" * 400, "-1e305", "null", "true", '"1"'])
+def test_values_that_are_no_numbers(number, tmp_path):
+    (tmp_path / "a.jsonl").write_text('{"t": 0, "q": [1]}\n{"t": 1, "q": [' + number + "]}\n")
+    with pytest.raises(InputError) as caught:
+        open_motion(tmp_path / "a.jsonl")
+    assert caught.value.problems[0].place.line == 2
+
+
+MESSAGE = """joint_names: [a, b]
+points:
+- positions: [1e-05, -0.5000]
+  velocities: [0.25, 3]
+  effort: [1.5, 2.5]
+  time_from_start: {secs: 1, nsecs: 500000000}
+- positions: [.5, 2.5e-3]
+  velocities: [0.125, 4]
+  effort: [1.5, 2.5]
+  time_from_start: {secs: 2, nsecs: 1}
+"""
+
+
+def test_decimals_of_a_message_and_numbers_that_yaml_takes_for_texts(tmp_path):
+    (tmp_path / "a.yaml").write_text(MESSAGE + "---\njoint_names: [c]\n")
+    message = read_ros_yaml(tmp_path / "a.yaml")
+    assert message.position.tolist() == [[1e-5, -0.5], [0.5, 2.5e-3]]
+    assert message.times.tolist() == [1.5, 2.000000001]
+    assert message.decimals.tolist() == [9, 5, 4, 3, 0, 1, 1]
+    motion = open_motion(tmp_path / "a.yaml").whole()
+    assert motion.tau.tolist() == [[1.5, 2.5]] * 2
+    assert motion.qdd is None
+    np.testing.assert_allclose(motion.resolution.q, [0.5e-5, 0.5e-4])
+
+
+def test_a_stream_behind_the_first_message_is_not_read(tmp_path):
+    (tmp_path / "a.yaml").write_text(MESSAGE + "---\n" + "x" * (70 << 20))
+    assert open_motion(tmp_path / "a.yaml").rows == 2
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.lists(JSON, max_size=3), st.booleans())
+def test_any_json_is_a_motion_or_one_error(tmp_path_factory, values, as_yaml):
+    path = tmp_path_factory.mktemp("fuzz") / ("a.yaml" if as_yaml else "a.jsonl")
+    lines = [yaml.safe_dump(value) if as_yaml else json.dumps(value) for value in values]
+    path.write_text(("---\n" if as_yaml else "\n").join(lines))
+    found = opened(path)
+    assert found is None or np.isfinite(found.whole().q).all()
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    st.integers(0, len(MESSAGE)), st.text(st.sampled_from("[]{}:,-'. \n0e1x"), max_size=5), st.integers(0, 5)
+)
+def test_a_changed_message_is_a_motion_or_one_error(tmp_path_factory, at, text, removed):
+    path = tmp_path_factory.mktemp("fuzz") / "a.yaml"
+    path.write_text(MESSAGE[:at] + text + MESSAGE[at + removed :])
+    found = opened(path)
+    assert found is None or np.isfinite(found.whole().q).all()

@@ -1,0 +1,129 @@
+"""Jobs of a batch: their discovery in folders, and the files that their rows go to."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from trajcli.batch.ledger import LEDGER_NAME
+from trajcli.errors import FileError, InputError, utf8
+from trajcli.frozen import comparable, frozen
+from trajcli.streams.formats import ENDINGS, FormatName
+from trajcli.streams.whole_file import identity
+
+_YAML = (".yaml", ".yml")
+_KEY_OF_JOBS = re.compile(rb"""(?m)(?:^|^\s*\{\s*|,\s*)["']?(?:version|start|moves)["']?\s*:""")
+_PEEKED = 1 << 20  # bytes of a file that are looked at for what it is
+
+
+@comparable
+class BatchJob:
+    """A job of a batch.
+
+    Attributes:
+        job: Its path, as the user names it.
+        output: The file that its rows go to.
+    """
+
+    job: str
+    output: str
+
+
+@frozen
+class BatchJobs:
+    """The jobs of a batch.
+
+    Attributes:
+        jobs: In the order in which they were named, those of a folder by name.
+        no_jobs: YAML files of folders that hold something else, such as robots.
+    """
+
+    jobs: tuple[BatchJob, ...]
+    no_jobs: tuple[str, ...]
+
+
+def find_jobs(names: Sequence[str], folder: str | None, form: FormatName) -> BatchJobs:
+    """Return the jobs that files and folders hold, each with its output.
+
+    Args:
+        names: Files, which are jobs, and folders, whose YAML files with a key of jobs are.
+        folder: Where the rows go; what is found in a folder keeps its path below it. None: beside each job.
+        form: Of the rows; it says the ending of their files.
+
+    Raises:
+        InputError: When there is no job, or two things would be in one file.
+        FileError: When a folder cannot be read.
+    """
+    ending = next(ending for ending, known in ENDINGS.items() if form in known)
+    jobs: list[BatchJob] = []
+    no_jobs: list[str] = []
+    for name in names:
+        if name == "-":
+            raise InputError("a batch reads no standard input", hint="name files or folders")
+        if not Path(name).is_dir():
+            jobs.append(BatchJob(name, _output(Path(name), Path(Path(name).name), folder, ending)))
+            continue
+        for path in _yaml_files(Path(name), folder):
+            if _is_job(path):
+                jobs.append(BatchJob(str(path), _output(path, path.relative_to(name), folder, ending)))
+            else:
+                no_jobs.append(str(path))
+    if not jobs:
+        raise InputError(
+            f"there is no job in {', '.join(names)}", hint="a job has the keys version and moves"
+        )
+    _check_files_differ(jobs)
+    return BatchJobs(tuple(jobs), tuple(no_jobs))
+
+
+def _output(job: Path, below: Path, folder: str | None, ending: str) -> str:
+    """Return the file of a job's rows, beside it or at the same path below a folder."""
+    base = job if folder is None else Path(folder) / below
+    return str(base.with_name((base.stem or base.name) + ending))
+
+
+def _yaml_files(folder: Path, output: str | None) -> Iterator[Path]:
+    """Yield the YAML files below a folder by name, but no hidden ones and none that a batch has written."""
+    written = None if output is None else Path(output).resolve()
+    try:
+        paths = sorted(path for path in folder.rglob("*") if path.suffix.lower() in _YAML)
+    except OSError as error:
+        raise FileError(f"the folder '{folder}' cannot be read: {error.strerror}") from None
+    for path in paths:
+        hidden = any(part.startswith(".") for part in path.relative_to(folder).parts)
+        below = written is not None and written != folder.resolve() and written in path.resolve().parents
+        if not hidden and not below and not path.is_dir():
+            yield path
+
+
+def _is_job(path: Path) -> bool:
+    """Return whether a file has a key that only jobs have; where it cannot be read, planning says why."""
+    try:
+        with path.open("rb") as file:
+            return _KEY_OF_JOBS.search(file.read(_PEEKED)) is not None
+    except OSError:
+        return True
+
+
+def _check_files_differ(jobs: Sequence[BatchJob]) -> None:
+    """Refuse two jobs with one output, and an output that is a job."""
+    outputs: dict[tuple[object, ...], str] = {}
+    sources = {identity(job.job, 0): job.job for job in jobs}
+    for job in jobs:
+        same = identity(job.output)
+        if same is None:  # a device takes any number of outputs
+            continue
+        if same in outputs:
+            both = f"{utf8(outputs[same])} and {utf8(job.job)}"
+            hint = "name each job once, or give them folders of their own"
+            raise InputError(f"{both} would both be written to {utf8(job.output)}", hint=hint)
+        if same in sources:
+            hint = "write to another folder with -o DIR"
+            raise InputError(f"the rows of {utf8(job.job)} would overwrite {utf8(sources[same])}", hint=hint)
+        outputs[same] = job.job
+
+
+def ledger_folders(jobs: Sequence[BatchJob]) -> dict[str, Path]:
+    """Return the path of the ledger of each job, by the job's output."""
+    return {job.output: Path(job.output).parent / LEDGER_NAME for job in jobs}

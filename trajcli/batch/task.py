@@ -1,0 +1,165 @@
+"""One job of a batch: planned, judged and written unless it is unchanged; its outcome as a value."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from time import monotonic
+from typing import Literal
+
+import numpy as np
+
+from trajcli.batch.jobs import BatchJob
+from trajcli.batch.ledger import LedgerEntry, hash_of_file, hash_of_inputs
+from trajcli.errors import FileError, InputError, Problem, TrajcliError, utf8
+from trajcli.frozen import comparable, frozen
+from trajcli.job.read import files_of, job_of_document
+from trajcli.job.yaml.load import Document, parse_document
+from trajcli.job.yaml.source import read_bytes
+from trajcli.output.write import grid_of, write_rows
+from trajcli.planning.plan import plan_job
+from trajcli.streams.formats import FormatName, format_of
+
+BUG = 70
+OutcomeName = Literal["written", "unchanged", "failed", "crashed", "timed out"]
+
+
+@frozen
+class BatchSetup:
+    """What all jobs of a batch share.
+
+    Attributes:
+        form: The format of the rows.
+        outputs: The job behind each file that will be written, by the file's real path.
+    """
+
+    form: FormatName
+    outputs: Mapping[str, str]
+
+
+@frozen
+class Task:
+    """A job to do.
+
+    Attributes:
+        job: What is read and written.
+        known: What its output was made of when it was written; None to plan it in any case.
+    """
+
+    job: BatchJob
+    known: LedgerEntry | None
+
+
+@comparable
+class JobOutcome:
+    """What came of a job.
+
+    Attributes:
+        job: Its path.
+        outcome: "written", "unchanged", "failed" (its errors say why), "crashed" (its process ended),
+            "timed out".
+        exit_code: That of `trajcli plan` for this job.
+        problems: Why it failed.
+        duration: Of the trajectory, s; None where there is none.
+        output: The file of rows; None where none was written and none is up to date.
+        entry: For the ledger.
+        inputs: Hash of job, files, version and format; None where they could not be read.
+        seconds: That it took.
+        remains: Whether the process may do more jobs: not after it ran out of memory.
+    """
+
+    job: BatchJob
+    outcome: OutcomeName
+    exit_code: int = 0
+    problems: tuple[Problem, ...] = ()
+    duration: float | None = None
+    output: str | None = None
+    entry: LedgerEntry | None = None
+    inputs: str | None = None
+    seconds: float = 0.0
+    remains: bool = True
+
+
+def run_task(task: Task, setup: BatchSetup) -> JobOutcome:
+    """Return what comes of a job; nothing is raised but what ends the process."""
+    begun = monotonic()
+    job, hashed = task.job, _Hash()
+    try:
+        entry = _unchanged(task, setup)
+        outcome: OutcomeName = "unchanged" if entry is not None else "written"
+        if entry is None:
+            entry = _written(task, setup, hashed)
+        seconds = monotonic() - begun
+        return JobOutcome(
+            job, outcome, 0, (), entry.duration, job.output, entry, entry.inputs or hashed.value, seconds
+        )
+    except TrajcliError as error:
+        code, problems, remains = error.exit_code, error.problems, True
+    except MemoryError:
+        hint = "a lower rate or a shorter motion needs less"
+        code, problems, remains = BUG, (Problem("there is not enough memory", hint),), False
+    except Exception as error:  # noqa: BLE001
+        message = f"a bug in trajcli: {type(error).__name__}: {error}"
+        problem = Problem(message, f"`trajcli plan {utf8(job.job)}` says more")
+        code, problems, remains = BUG, (problem,), True
+    seconds = monotonic() - begun
+    return JobOutcome(
+        job, "failed", code, tuple(problems), inputs=hashed.value, seconds=seconds, remains=remains
+    )
+
+
+class _Hash:
+    """The hash of what a job is made of, once it is known."""
+
+    value: str | None = None
+
+
+def _unchanged(task: Task, setup: BatchSetup) -> LedgerEntry | None:
+    """Return the entry of an output that is as it would be written; None where it has to be planned."""
+    known, job = task.known, task.job
+    if known is None or hash_of_file(job.output) != known.output:
+        return None
+    now = hash_of_inputs(Path(job.job).name, read_bytes(job.job), known.files, setup.form)
+    return known if now == known.inputs else None
+
+
+def _written(task: Task, setup: BatchSetup, hashed: _Hash) -> LedgerEntry:
+    """Return the entry of an output that was planned, judged and written."""
+    job = task.job
+    content = read_bytes(job.job)
+    document = parse_document(content, job.job)
+    _check_files_stay(document, setup)
+    files = tuple(path for what, path in files_of(document) if what != "the job")
+    hashed.value = hash_of_inputs(Path(job.job).name, content, files, setup.form)
+    with np.errstate(all="ignore"):  # what is not finite is for the checks to find
+        plan = plan_job(job_of_document(document))
+        grid = grid_of(plan)
+        if not plan.verdict.passed:
+            from trajcli.output.report import verification_error
+
+            raise verification_error(plan)
+        _make_folder(Path(job.output).parent)
+        write_rows(plan, grid, job.output, "fixed", form=format_of(job.output, setup.form))
+    after = hash_of_inputs(Path(job.job).name, content, files, setup.form)
+    # where a file has changed meanwhile, nobody knows of which content the rows were made
+    kept = hashed.value if after == hashed.value else None
+    return LedgerEntry(kept or "", files, hash_of_file(job.output) or "", plan.trajectory.duration)
+
+
+def _check_files_stay(document: Document, setup: BatchSetup) -> None:
+    """Refuse a job that reads what this batch writes."""
+    for what, path in files_of(document):
+        writer = setup.outputs.get(os.path.realpath(path))
+        if writer is not None:
+            hint = "write to another folder with -o DIR, or plan one after the other"
+            message = f"{what} {utf8(path)} is the output of {utf8(writer)} in this batch"
+            raise InputError(message, hint=hint)
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise FileError(f"cannot make the folder '{utf8(str(folder))}': {reason}") from None

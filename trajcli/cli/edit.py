@@ -1,0 +1,245 @@
+"""Tools for files of motions on the command line: retime, resample, concat, reverse, slice, convert."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from trajcli.cli.outcome import print_remark
+from trajcli.editing.continuity import new_jumps, worst_deviation
+from trajcli.editing.edited_motion import EditedMotion, ReadingOptions, read_motion
+from trajcli.editing.operations import cut, join, resample, reverse
+from trajcli.editing.writing import write_motion
+from trajcli.errors import InputError, VerificationError
+from trajcli.frozen import comparable
+from trajcli.streams.formats import FormatName, format_of
+from trajcli.streams.whole_file import identity
+from trajcli.units import Units
+
+if TYPE_CHECKING:
+    from trajcli.editing.retiming import Stretch
+
+
+@comparable
+class EditOptions:
+    """What the command line says beside the files; see `trajcli resample --help`."""
+
+    output: str | None = None
+    form: FormatName | None = None
+    columns: str | None = None
+    units: str | None = None
+    topic: str | None = None
+    field: str | None = None
+    quiet: bool = False
+
+    @property
+    def reading(self) -> ReadingOptions:
+        """How files are read."""
+        return ReadingOptions(self.columns, self.units, self.topic, self.field)
+
+
+def run_reverse(source: str, options: EditOptions) -> int:
+    """Write the motion that goes back; return the exit code.
+
+    Raises:
+        TrajcliError: When anything is wrong; then nothing was written.
+    """
+    return _edited(source, reverse, options, "reversed")
+
+
+def run_slice(source: str, first: str | None, last: str | None, options: EditOptions) -> int:
+    """Write the motion between two times; return the exit code.
+
+    Raises:
+        TrajcliError: When anything is wrong; then nothing was written.
+    """
+
+    def between(motion: EditedMotion) -> EditedMotion:
+        t = motion.rows.t
+        begin = float(t[0]) if first is None else _seconds("--from", first)
+        return cut(motion, begin, float(t[-1]) if last is None else _seconds("--to", last))
+
+    return _edited(source, between, options, "cut")
+
+
+def run_resample(source: str, rate: str, options: EditOptions) -> int:
+    """Write the motion on another grid, and say how far its curve is off then; return the exit code.
+
+    Raises:
+        TrajcliError: When anything is wrong; then nothing was written.
+    """
+    _check_output([source], options)
+    motion = _read(source, options)
+    found = resample(motion, _hertz(rate))
+    _write(found, options)
+    rows = f"{found.rows.t.size} row{'s' * (found.rows.t.size != 1)}"
+    joint, size = worst_deviation(motion, found.as_written())
+    off = f"the curve through them is off by at most {size:.3g} rad or m, in {found.joint_names[joint]}"
+    _say(options, f"{found.rows.source}: resampled at {_hertz(rate):.9g} Hz, {rows}; {off}")
+    return 0
+
+
+def run_concat(sources: Sequence[str], options: EditOptions) -> int:
+    """Write motions one after the other; return the exit code.
+
+    Raises:
+        TrajcliError: When they do not fit; then nothing was written.
+    """
+    if len(sources) < 2:
+        raise InputError("concat joins two files at least, and there is one")
+    if list(sources).count("-") > 1:
+        raise InputError("standard input can be read once")
+    _check_output(sources, options)
+    motions = [_read(source, options) for source in sources]
+    found = motions[0]
+    for motion in motions[1:]:
+        found = join(found, motion)
+    _check_continuity(motions[0], found)
+    _write(found, options)
+    _say(options, f"{' + '.join(sources)}: joined, {_extent(found)}")
+    return 0
+
+
+def run_convert(source: str, options: EditOptions) -> int:
+    """Write the motion in the format that the output's name says; return the exit code.
+
+    Raises:
+        TrajcliError: When anything is wrong; then nothing was written.
+    """
+    _check_output([source], options)
+    units = None if format_of(options.output, options.form).si else Units()
+    motion = read_motion(source, options.reading, declared=units)
+    _write(motion, options)
+    _say(options, f"{motion.rows.source}: converted, {_extent(motion)}")
+    return 0
+
+
+def run_retime(
+    source: str,
+    arm: tuple[str | None, str | None],
+    options: EditOptions,
+    *,
+    fastest: bool,
+    per_move: bool,
+) -> int:
+    """Write the motion over the shortest time that keeps its limits; return the exit code.
+
+    Args:
+        source: The file.
+        arm: A job, or a robot.
+        options: What is said besides.
+        fastest: Whether it may become faster.
+        per_move: Whether each move has its own time.
+
+    Raises:
+        TrajcliError: When anything is wrong; then nothing was written.
+    """
+    from trajcli.editing.limits import kept_limits
+    from trajcli.editing.retiming import retime
+
+    _check_output([source, *(name for name in arm if name is not None)], options)
+    limits = kept_limits(*arm)
+    robot = limits.robot
+    motion = read_motion(
+        source,
+        options.reading,
+        joints=robot.joint_names,
+        joint_types=robot.joint_types,
+        declared=limits.units,
+    )
+    found, stretches = retime(motion, limits.requirements, fastest=fastest, per_move=per_move)
+    _check_continuity(motion, found)
+    _write(found, options)
+    for stretch in stretches:
+        _say(options, f"{motion.rows.source}: {_stretch(stretch, limits.say)}")
+    before, after = (float(each.rows.t[-1] - each.rows.t[0]) for each in (motion, found))
+    _say(options, f"  it takes {after:.9g} s, it took {before:.9g} s")
+    return 0
+
+
+def _stretch(stretch: Stretch, say: Callable[..., str]) -> str:
+    """Return by what factor a motion is longer or shorter, and what binds it."""
+    moves = stretch.moves or ()
+    whose = f"move{'s' * (len(moves) > 1)} {', '.join(map(str, moves))}: " if moves else ""
+    if stretch.binding is None:
+        return f"{whose}factor 1, its limits are kept as it is"
+    how = "stretched" if stretch.factor > 1 else "faster" if stretch.factor < 1 else "kept"
+    limit = stretch.binding.amounts.get("limit")
+    bound = "" if limit is None or isinstance(limit, str) else f", whose limit is {say(limit)}"
+    of_joint = f" of {stretch.binding.joint}" if stretch.binding.joint else " of the tool"
+    kind = stretch.binding.kind.removeprefix("tool_").replace("_", " ")
+    return f"{whose}{how}, factor {stretch.factor:.9g}, by the {kind}{of_joint}{bound}"
+
+
+def _edited(
+    source: str, operation: Callable[[EditedMotion], EditedMotion], options: EditOptions, what: str
+) -> int:
+    _check_output([source], options)
+    motion = _read(source, options)
+    found = operation(motion)
+    _check_continuity(motion, found)
+    _write(found, options)
+    _say(options, f"{motion.rows.source}: {what}, {_extent(found)}")
+    return 0
+
+
+def _read(source: str, options: EditOptions) -> EditedMotion:
+    """Return the motion of a file, whose units do not matter where its format stays."""
+    units = None if format_of(options.output, options.form).si else Units()
+    return read_motion(source, options.reading, declared=units)
+
+
+def _write(motion: EditedMotion, options: EditOptions) -> None:
+    notes = write_motion(motion, options.output, options.form)
+    for note in dict.fromkeys([*motion.notes, *notes]):
+        _say(options, f"  {note}")
+
+
+def _check_continuity(before: EditedMotion, after: EditedMotion) -> None:
+    """Refuse a motion that jumps where the one that it is made of does not."""
+    problems = new_jumps(before, after)
+    if problems:
+        raise VerificationError(*problems)
+
+
+def _check_output(sources: Sequence[str], options: EditOptions) -> None:
+    """Refuse to write over a file that is read."""
+    format_of(options.output, options.form)
+    if options.output in (None, "-"):
+        return
+    same = identity(str(options.output))
+    for source in sources:
+        if same is not None and same == identity(source, 0):
+            raise InputError(f"-o {options.output} would overwrite {source}", hint="name another file")
+
+
+def _extent(motion: EditedMotion) -> str:
+    t = motion.rows.t
+    return f"{t.size} rows from {t[0]:.9g} s to {t[-1]:.9g} s"
+
+
+def _say(options: EditOptions, text: str) -> None:
+    if not options.quiet:
+        print_remark(text)
+
+
+def _seconds(name: str, word: str) -> float:
+    try:
+        value = float(word)
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        raise InputError(f"{name} expects seconds, got '{word}'", hint="times of the file, such as 1.5")
+    return value
+
+
+def _hertz(word: str) -> float:
+    try:
+        value = float(word)
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value) or value <= 0:
+        raise InputError(f"--rate expects rows per second, got '{word}'", hint="a number above 0")
+    return value

@@ -1,0 +1,1 @@
+"""Rules of known consumers of a motion, and its judgement by them."""

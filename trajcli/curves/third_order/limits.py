@@ -1,0 +1,134 @@
+"""Limits along a path of all three orders, what a time law uses of them, and the time that it loses.
+
+At every moment of the fastest motion some limit is met. An interval in which none is met on average holds a
+switching point, or cannot follow a limit that bends; it loses no more of its time than the share by which all
+limits are missed, and less where the acceleration hardly changes in it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side
+from trajcli.curves.third_order.jerk import ThirdOrderConstraint
+from trajcli.curves.third_order.quartic_law import QuarticLaw
+from trajcli.curves.time_optimal.constraints import PathConstraint
+from trajcli.frozen import frozen
+
+SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Of an interval, at which limits are kept."""
+
+_MOST, _MORE = 40, 1000  # nodes: of a piece on average, and of the whole path on top
+_PARTS = 4  # that an interval is cut into at a time
+_SPARING = 1.1  # by which the loss to be reached grows until there is room
+_ORDER_COSTS = np.array([[1.0], [0.5], [1.0 / 3.0]])  # of time for each share by which a limit is passed
+
+
+@frozen
+class LawLimits:
+    """What a law must keep.
+
+    Attributes:
+        second: Limits of velocity and acceleration along the path.
+        third: Limits of jerk.
+    """
+
+    second: tuple[PathConstraint, ...]
+    third: tuple[ThirdOrderConstraint, ...]
+
+    def excess(self, law: QuarticLaw) -> Array:
+        """Return what each piece uses of velocity, acceleration and jerk, in multiples of limits, (3, N)."""
+        pieces = law.pieces
+        second = np.maximum.reduce([constraint.excess(pieces) for constraint in self.second])
+        third = np.maximum.reduce([constraint.excess(pieces) for constraint in self.third])
+        return np.concatenate([second, third[None]])
+
+    def used(self, sample: Sample) -> tuple[Array, Array]:
+        """Return what is used of any limit at a sample, (N,), and the shares of each row of acceleration."""
+        s, v, a, u = sample.state
+        most, rows = [np.zeros(s.size)], []
+        for constraint in self.second:
+            given = constraint.rows(s, sample.side)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                most.append(np.where(v > 0, v**2 / given.cap, 0.0))
+            rows.append((given.a.T * a + given.b.T * v**2) / given.c.T)
+        for jerk in self.third:
+            turn = jerk.rows(s, sample.side)
+            value = turn.first.T * u + 3.0 * turn.second.T * (v * a) + turn.third.T * v**3
+            most.append((value / turn.limit.T).max(axis=0, initial=0.0))
+        shares = np.concatenate(rows)
+        return np.maximum.reduce([*most, shares.max(axis=0, initial=0.0)]), shares
+
+
+@frozen
+class Sample:
+    """The law at the same share of all its intervals; numbers for Hermite's (b, h b', b, h b').
+
+    Attributes:
+        state: s, sd, sdd and sddd, each (N,).
+        side: From which side of breaks the path is seen there.
+        value: Of b, shape (4, 1).
+        slope: Of b', shape (4, N).
+        bend: Of b'', shape (4, N).
+    """
+
+    state: tuple[Array, Array, Array, Array]
+    side: Side
+    value: Array
+    slope: Array
+    bend: Array
+
+
+def sampled(law: QuarticLaw, share: float) -> Sample:
+    """Return the law at a share of its intervals."""
+    x, h = share, law.lengths
+    value = [2 * x**3 - 3 * x**2 + 1, x**3 - 2 * x**2 + x, 3 * x**2 - 2 * x**3, x**3 - x**2]
+    slope = [6 * x**2 - 6 * x, 3 * x**2 - 4 * x + 1, 6 * x - 6 * x**2, 3 * x**2 - 2 * x]
+    bend = [12 * x - 6, 6 * x - 4, 6 - 12 * x, 6 * x - 2]
+    side: Side = "left" if share == 1.0 else "right"
+    return Sample(
+        law.states(share), side, np.array(value)[:, None], np.outer(slope, 1 / h), np.outer(bend, 1 / h**2)
+    )
+
+
+def time_lost(law: QuarticLaw, limits: LawLimits, excess: Array) -> Array:
+    """Return an estimate of the time lost in each interval, shape (N,).
+
+    Args:
+        law: Of N pieces.
+        limits: That it is to keep.
+        excess: What it uses of them, shape (3, N).
+    """
+    unused, ends = np.zeros(law.lengths.size), list[Array]()
+    for share in SHARES:
+        used, accelerations = limits.used(sampled(law, share))
+        unused += np.clip(1.0 - used, 0.0, 1.0) / len(SHARES)
+        ends.append(accelerations)
+    change = np.minimum(np.abs(ends[-1] - ends[0]).max(axis=0, initial=0.0), 1.0)
+    over = (_ORDER_COSTS * np.maximum(excess - 1.0, 0.0)).max(axis=0)
+    return np.asarray(law.lengths * (unused * change + over))
+
+
+def most_nodes(path: PiecewisePolynomial) -> int:
+    """Return how many nodes a law may have: proportional to the number of pieces."""
+    return _MOST * path.pieces + _MORE
+
+
+def parts_for(lost: Array, target: float, room: int) -> NDArray[np.intp]:
+    """Return into how many parts to cut each interval, shape (N,), so that little is lost with few nodes.
+
+    Args:
+        lost: Time that each interval loses, shape (N,).
+        target: What all may lose in the end.
+        room: How many nodes there may be more.
+    """
+    root = np.cbrt(lost)
+    if not root.any():
+        return np.ones(lost.size, dtype=np.intp)
+    unit = (target / root.sum()) ** 0.5
+    while True:
+        parts: NDArray[np.intp] = np.clip(np.rint(root / unit), 1, _PARTS).astype(np.intp)
+        if (parts - 1).sum() <= room:
+            return parts
+        unit *= _SPARING

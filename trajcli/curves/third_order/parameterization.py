@@ -1,0 +1,219 @@
+"""Time-optimal motion along a path within limits of velocity, acceleration and jerk.
+
+The law of second order, without limits of jerk, is the lower bound and the start: its moving average has
+ramps of acceleration. Convex steps make it faster, its nodes are refined where time is lost, and limits are
+lowered in intervals that exceed them between samples. Of all laws on the way, each slowed down as a whole
+until it keeps every limit for all t, the fastest is taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from trajcli.curves.operations import scale_time
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.third_order.convex_step import faster
+from trajcli.curves.third_order.first_law import EndStates, smoothed_law
+from trajcli.curves.third_order.jerk import JointJerkConstraint, ThirdOrderConstraint
+from trajcli.curves.third_order.limits import LawLimits, most_nodes, parts_for, time_lost
+from trajcli.curves.third_order.quartic_law import QuarticLaw, ReversingLawError
+from trajcli.curves.time_optimal.constraints import JointConstraint, PathConstraint
+from trajcli.curves.time_optimal.parameterization import (
+    TimeOptimalMotion,
+    UnsettledSpeedError,
+    time_optimal,
+)
+from trajcli.curves.time_optimal.time_law import law_and_trajectory
+from trajcli.frozen import frozen
+
+_FIRST_GAPS = (1e-3, 1e-4)  # of the duration: what the steps on the first nodes may miss
+_GAP, _LAST_GAP = 1e-4, 1e-5  # the same of those while nodes are refined, and of the last ones
+_REFINEMENTS = 7
+_SETTLING, _MOST_SETTLING = 8, 30  # steps with lowered limits; where nothing can be slowed down
+_LOST = 1e-3  # of the duration, by estimate: finer nodes would not gain more
+_FEW_NEW = 0.02  # of the intervals: fewer new ones are not worth another step
+_LOWERED, _LOWERED_MORE = 1.1, 1.5  # times the excess that limits are lowered by
+_PENALTY = 1.0  # of the duration, for passing a limit by its size at one place
+_STUBBORN = 1.005  # of a limit: where it is passed by more although it was lowered, nodes are missing
+_EXACT = 1e-10  # a limit exceeded by less is kept
+_SETTLED = 2e-5  # of the duration: less is left to slowing down
+_SHARES = (1.0, 0.5, 0.25, 0.1)  # of a step, the largest first that leads forward
+
+
+@frozen
+class JerkLimitedMotion:
+    """A near time-optimal motion.
+
+    Attributes:
+        trajectory: q(t) from t = 0 on.
+        law: s(t), of degree 4.
+        second_order: The optimum without limits of jerk: no motion is faster.
+        stretch: By what factor the law was slowed down as a whole to keep the limits everywhere.
+        steps: Number of convex steps.
+        lost: Estimate of the share of the duration that finer nodes would save.
+        stops: s at the corners of the path, where the motion stops, shape (k,).
+        stop_times: When it does, in seconds, shape (k,).
+    """
+
+    trajectory: PiecewisePolynomial
+    law: PiecewisePolynomial
+    second_order: TimeOptimalMotion
+    stretch: float
+    steps: int
+    lost: float
+    stops: Array
+    stop_times: Array
+
+    @property
+    def lower_bound(self) -> float:
+        """Duration that no motion along the path is shorter than, up to the estimate of what a grid loses."""
+        second = self.second_order
+        return second.law.duration / second.stretch * (1.0 - second.lost)
+
+
+def jerk_limited_time_optimal(
+    path: PiecewisePolynomial,
+    velocity: ArrayLike,
+    acceleration: ArrayLike,
+    jerk: ArrayLike,
+    *,
+    start: tuple[float, float] = (0.0, 0.0),
+    end: tuple[float, float] = (0.0, 0.0),
+    further: Sequence[PathConstraint] = (),
+    further_jerk: Sequence[ThirdOrderConstraint] = (),
+) -> JerkLimitedMotion:
+    """Return the fastest motion that is found along a path within bounds that hold for all t.
+
+    At a corner the motion stops. Where it rests, the acceleration is zero.
+
+    Args:
+        path: q(s) with n joints, of degree at most 5; q'' is continuous but at corners.
+        velocity: Lower and upper bounds, shape (n, 2), lower < 0 < upper, infinite for none; per second.
+        acceleration: The same, per second squared; not all infinite.
+        jerk: The same, per second cubed.
+        start: sd at the start, not negative, and sdd.
+        end: The same at the end.
+        further: Other constraints of velocity and acceleration; kept as far as their excess tells.
+        further_jerk: Other constraints of jerk.
+
+    Raises:
+        UnlimitedSpeedError: When nothing limits the motion somewhere.
+        UnreachableSpeedError: When the velocities at the ends are too high.
+        UnsettledSpeedError: When they leave no room to keep the limits.
+        ValueError: When bounds have another shape or sign.
+    """
+    bounds = [np.asarray(each, dtype=np.float64) for each in (velocity, acceleration, jerk)]
+    ends = EndStates(start, end)
+    second = time_optimal(
+        path, bounds[0], bounds[1], start_velocity=start[0], end_velocity=end[0], further=further
+    )
+    limits = LawLimits(
+        (JointConstraint(path, bounds[0], bounds[1]), *further),
+        (JointJerkConstraint(path, bounds[2]), *further_jerk),
+    )
+    search = _Search(limits, smoothed_law(path, second, (bounds[1], bounds[2]), ends), ends.rests)
+    lost = search.refine(most_nodes(path))
+    search.settle(most_nodes(path))
+    law, stretch = search.best, search.stretch
+    if stretch > 1.0 + _EXACT and not ends.rests:
+        raise search.unsettled()
+    curve, trajectory = law_and_trajectory(path, law.pieces)
+    if stretch > 1.0 + _EXACT:
+        curve, trajectory = scale_time(curve, stretch), scale_time(trajectory, stretch)
+    times = curve.breaks[np.searchsorted(law.s, second.stops)]
+    return JerkLimitedMotion(
+        trajectory, curve, second, stretch, search.steps, lost / law.duration, second.stops, times
+    )
+
+
+class _Search:
+    """The laws on the way to the fastest one.
+
+    Attributes:
+        limits: To be kept.
+        rests: Whether it may be slowed down as a whole.
+        law: The present one.
+        excess: What it uses of the limits, shape (3, N).
+        lowered: By what its limits are divided in each interval, shape (3, N).
+        best: The law that is the fastest once it is slowed down until it keeps the limits.
+        stretch: By what factor that is.
+        steps: How many were made.
+    """
+
+    def __init__(self, limits: LawLimits, law: QuarticLaw, rests: bool) -> None:
+        self.limits, self.rests, self.steps = limits, rests, 0
+        self.lowered = np.ones((3, law.lengths.size))
+        self.best, self.stretch = law, np.inf
+        self._take(law)
+
+    def refine(self, most: int) -> float:
+        """Refine the nodes while that pays; return the estimate of what is lost, in seconds."""
+        for gap in _FIRST_GAPS:
+            self._step(gap)
+        for _ in range(_REFINEMENTS):
+            lost = time_lost(self.law, self.limits, self.excess)
+            duration = self.law.duration
+            if lost.sum() <= _LOST * duration:
+                break
+            parts = parts_for(lost, 0.5 * _LOST * duration, most - lost.size)
+            if (parts - 1).sum() <= _FEW_NEW * parts.size:
+                break
+            self._cut(parts)
+            self._step(_GAP)
+        return float(time_lost(self.law, self.limits, self.excess).sum())
+
+    def settle(self, most: int) -> None:
+        """Lower limits in the intervals that exceed them until little is left."""
+        lowered, enough = (_LOWERED, _SETTLED) if self.rests else (_LOWERED_MORE, _EXACT)
+        for _ in range(_SETTLING if self.rests else _MOST_SETTLING):
+            if _stretch(self.excess) <= 1.0 + enough:
+                break
+            stubborn = ((self.excess > _STUBBORN) & (self.lowered > _STUBBORN)).any(axis=0)
+            if stubborn.any() and self.law.lengths.size + stubborn.sum() <= most:
+                self.lowered[:, stubborn] = 1.0
+                self._cut(np.where(stubborn, 2, 1))
+            self.lowered = self.lowered * (1.0 + lowered * np.maximum(self.excess - 1.0, 0.0))
+            self._step(_LAST_GAP)
+
+    def _cut(self, parts: NDArray[np.intp]) -> None:
+        """Cut each interval into so many (N,) parts."""
+        self.lowered = np.repeat(self.lowered, parts, axis=1)
+        self._take(self.law.cut(parts))
+
+    def _step(self, gap: float) -> None:
+        """Make one convex step, or less of it where the whole leads to no law."""
+        self.steps += 1
+        b, slope = faster(self.law, self.limits, self.lowered, gap, np.inf if self.rests else _PENALTY)
+        for share in _SHARES:
+            try:
+                law = self.law.changed(1.0 + share * (b - 1.0), share * slope)
+            except ReversingLawError:
+                continue
+            self._take(law)
+            return
+
+    def _take(self, law: QuarticLaw) -> None:
+        """Go on from a law, and keep it where it is better than all before."""
+        self.law, self.excess = law, self.limits.excess(law)
+        stretch = max(_stretch(self.excess), 1.0)
+        if self.rests:
+            better = law.duration * stretch < self.best.duration * self.stretch
+        else:
+            kept, best_kept = stretch <= 1.0 + _EXACT, self.stretch <= 1.0 + _EXACT
+            better = law.duration < self.best.duration if kept and best_kept else stretch < self.stretch
+        if better:
+            self.best, self.stretch = law, stretch
+
+    def unsettled(self) -> UnsettledSpeedError:
+        """Return the error of limits that cannot be kept with these states at the ends."""
+        excess = self.limits.excess(self.best).max(axis=0)
+        worst = int(excess.argmax())
+        return UnsettledSpeedError(float(self.best.s[worst]), float(excess[worst]))
+
+
+def _stretch(excess: Array) -> float:
+    """Return by what factor a law must be slowed down that uses so much of its limits, (3, N)."""
+    return float((excess.max(axis=1) ** np.array([1.0, 0.5, 1.0 / 3.0])).max())

@@ -1,0 +1,1 @@
+"""Editing of recorded motions: retimed, resampled, joined, reversed, cut and converted."""

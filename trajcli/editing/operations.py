@@ -1,0 +1,259 @@
+"""Operations on recorded motions: time reversal, cutting, joining, sampling on another grid.
+
+Each keeps the columns. Rows that stay are taken as they are, so that an operation and its inverse give the
+same rows; rows between them are those of the curve that the columns determine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import log10
+
+import numpy as np
+
+from trajcli.curves.piecewise import Array
+from trajcli.editing.edited_motion import ORDERS, EditedMotion, decimals_for
+from trajcli.errors import InputError, Problem, VerificationError
+from trajcli.grids import UniformGrid
+from trajcli.streams.recorded_motion import WrittenColumn
+
+_NO_EFFORT = "the columns of efforts are left out: they would be others"
+_SAME = 1e-9  # rad, m and their rates, beside the rounding of both files: states that agree
+_CARRIED = {1: (3.75, 1.0), 2: (11.55, 8.0, 1.0)}
+"""Largest derivatives of Hermite's quintic basis, for both ends: what rounding of q, qd, qdd does to them."""
+_NEAR = 1e-6  # of an interval: a stamp this near to a row is that of the row
+
+
+def reverse(motion: EditedMotion) -> EditedMotion:
+    """Return the motion that goes back: q(t0 + t1 - t), over the same time."""
+    rows = motion.rows
+    t = (rows.t[0] + rows.t[-1]) - rows.t[::-1]
+    t[0], t[-1] = rows.t[0], rows.t[-1]
+    quantities = {
+        name: (-1.0) ** order * values[::-1] + 0.0
+        for order, name in enumerate(ORDERS)
+        if (values := motion.quantities.get(name)) is not None
+    }
+    move = None if rows.move is None else rows.move[::-1].copy()
+    notes = () if rows.tau is None else (_NO_EFFORT,)
+    return motion.with_rows(t, quantities, move, *notes, decimals=decimals_for(motion, t))
+
+
+def cut(motion: EditedMotion, first: float, last: float) -> EditedMotion:
+    """Return the rows from one time to another, both included; between rows, as the curve is.
+
+    Args:
+        motion: What is cut.
+        first: s, as in the file.
+        last: s, likewise.
+
+    Raises:
+        InputError: When the motion is not there at these times, or they are not in order.
+    """
+    t = motion.rows.t
+    for name, time in (("--from", first), ("--to", last)):
+        if not t[0] - _room(motion) <= time <= t[-1] + _room(motion):
+            extent = f"{motion.rows.source} goes from {t[0]:.9g} s to {t[-1]:.9g} s"
+            raise InputError(f"{name} {time:.9g}: {extent}", hint="give times of the file, s")
+    if not first < last:
+        raise InputError(f"--from {first:.9g} is not before --to {last:.9g}")
+    inside = t[(t > first + _room(motion)) & (t < last - _room(motion))]
+    return _at(motion, np.concatenate([[_snapped(motion, first)], inside, [_snapped(motion, last)]]))
+
+
+def resample(motion: EditedMotion, rate: float) -> EditedMotion:
+    """Return the motion at rows 1 / rate apart, and one at the end.
+
+    Raises:
+        InputError: When there can be no such rows.
+    """
+    t = motion.rows.t
+    grid = UniformGrid(float(t[-1] - t[0]), rate, float(t[0]))
+    times = np.concatenate([stamps for stamps, _ in grid.blocks()])
+    times[-1] = t[-1]
+    nearest = _nearest(motion, times)
+    meant = np.abs(t[nearest] - times) <= _room(motion)
+    return _at(motion, np.where(meant, t[nearest], times))
+
+
+def _room(motion: EditedMotion) -> float:
+    """Return how far a stamp may be off, by its rounding, s."""
+    t, resolution = motion.rows.t, motion.rows.resolution
+    relative = resolution.relative_time * float(np.abs(t).max())
+    return 2 * max(resolution.time, relative) + _NEAR * float(np.diff(t).min())
+
+
+def _nearest(motion: EditedMotion, times: Array) -> np.ndarray:
+    """Return the index of the row nearest to each time."""
+    t = motion.rows.t
+    after = np.clip(np.searchsorted(t, times), 1, t.size - 1)
+    return np.where(times - t[after - 1] <= t[after] - times, after - 1, after)
+
+
+def _snapped(motion: EditedMotion, time: float) -> float:
+    """Return a time, or the stamp of the row there."""
+    t = motion.rows.t
+    nearest = float(t[_nearest(motion, np.array([time]))[0]])
+    return nearest if abs(nearest - time) <= _room(motion) else time
+
+
+def _at(motion: EditedMotion, times: Array) -> EditedMotion:
+    """Return the motion at some times: rows as they are where there is one, else as the curve is."""
+    rows = motion.rows
+    nearest = _nearest(motion, times)
+    between = rows.t[nearest] != times
+    quantities = {name: values[nearest].copy() for name, values in motion.quantities.items()}
+    if between.any():
+        for name, values in _between_rows(motion, times[between]).items():
+            quantities[name][between] = values
+        motion = _certain_decimals(motion, times[between])
+    before = np.clip(np.searchsorted(rows.t, times, side="right") - 1, 0, rows.t.size - 1)
+    move = None if rows.move is None else rows.move[before]
+    return motion.with_rows(times, quantities, move, decimals=decimals_for(motion, times))
+
+
+def _between_rows(motion: EditedMotion, times: Array) -> dict[str, Array]:
+    """Return all quantities at times between rows: of the curve, what it takes from them, others linear."""
+    rows, curve = motion.rows, motion.curve()
+    found = {}
+    for name, values in motion.quantities.items():
+        if name in _of_curve(motion):
+            found[name] = curve.evaluate(times, ORDERS.index(name))
+        else:
+            found[name] = np.stack([np.interp(times, rows.t, column) for column in values.T], axis=1)
+    return found
+
+
+def _of_curve(motion: EditedMotion) -> tuple[str, ...]:
+    """Return the quantities that the curve takes from the rows."""
+    rows = motion.rows
+    return ORDERS[: 1 + (rows.qd is not None) * (1 + (rows.qdd is not None))]
+
+
+def _certain_decimals(motion: EditedMotion, times: Array) -> EditedMotion:
+    """Return a motion whose derivatives have as many decimals as are certain between rows.
+
+    Over an interval of length h, derivatives of the curve carry the rounding e of its ends: velocities e / h,
+    accelerations e / h^2, times the largest derivatives of Hermite's basis for both ends.
+    """
+    rows = motion.rows
+    known = _of_curve(motion)
+    at = np.clip(np.searchsorted(rows.t, times, side="right") - 1, 0, rows.t.size - 2)
+    shortest = float(np.diff(rows.t)[at].min())
+    rounding = [np.asarray(getattr(rows.resolution, name)) for name in ORDERS[:3]]
+    errors: dict[str, Array] = {}
+    for order, name in enumerate(known[1:], 1):
+        carried = enumerate(_CARRIED[order])
+        parts = [factor / shortest ** (order - below) * rounding[below] for below, factor in carried]
+        errors[name] = np.sum(parts, axis=0)
+    columns = tuple(_with_certain(column, errors) for column in motion.columns)
+    if columns == motion.columns:
+        return motion
+    fewer = {column.quantity for column, old in zip(columns, motion.columns, strict=True) if column != old}
+    names = " and ".join(name for name in known if name in fewer)
+    note = f"between rows fewer decimals of {names} are certain, and so many are written"
+    return replace(motion, columns=columns, notes=(*motion.notes, note))
+
+
+def _with_certain(column: WrittenColumn, errors: Mapping[str, Array]) -> WrittenColumn:
+    """Return a column with the decimals whose half unit is about its error."""
+    error = errors.get(column.quantity)
+    if error is None or column.decimals is None or column.joint is None or error[column.joint] <= 0:
+        return column
+    certain = round(-log10(2.0 * float(error[column.joint]) / column.factor))
+    return replace(column, decimals=max(min(column.decimals, certain), 0))
+
+
+def join(first: EditedMotion, second: EditedMotion) -> EditedMotion:
+    """Return one motion after the other: the second begins when the first ends, and where it ends.
+
+    Columns and units are those of the first. Where the accelerations of both differ, the row between them
+    has that of the second.
+
+    Raises:
+        InputError: When they have not the same joints, or the second lacks a column of the first.
+        VerificationError: When position or velocity would jump; with the jump.
+    """
+    a, b = first.rows, second.rows
+    _check_alike(first, second)
+    _check_states_agree(first, second)
+    shift = float(a.t[-1] - b.t[0])
+    t = np.concatenate([a.t, b.t[1:] + shift if shift else b.t[1:]])
+    quantities: Mapping[str, Array] = {
+        name: np.concatenate([values[:-1], second.quantities[name]])
+        for name, values in first.quantities.items()
+    }
+    move = None
+    if a.move is not None and b.move is not None:
+        later = 0 if not shift else int(a.move.max()) + 1 - int(b.move.min())
+        move = np.concatenate([a.move[:-1], b.move + later])
+    return first.with_rows(t, quantities, move, *_step(first, second), decimals=decimals_for(first, t))
+
+
+def _check_alike(first: EditedMotion, second: EditedMotion) -> None:
+    a, b = first.rows, second.rows
+    count, other = a.q.shape[1], b.q.shape[1]
+    if count != other:
+        raise InputError(f"{a.source} has {count} joints, {b.source} has {other}")
+    if a.joints is not None and b.joints is not None and a.joints != b.joints:
+        names = f"{', '.join(a.joints)}; {b.source} has {', '.join(b.joints)}"
+        raise InputError(f"{a.source} has the joints {names}")
+    lacking = [name for name in first.quantities if name not in second.quantities]
+    if lacking:
+        raise InputError(f"{b.source} has no columns {', '.join(lacking)}, as {a.source} has")
+
+
+def _check_states_agree(first: EditedMotion, second: EditedMotion) -> None:
+    """Refuse a jump of position or velocity between two motions, beyond the rounding of both."""
+    problems = []
+    for name, what in (("q", "position"), ("qd", "velocity")):
+        ends = [motion.quantities.get(name) for motion in (first, second)]
+        if ends[0] is None or ends[1] is None:
+            continue
+        before, after = ends[0][-1], ends[1][0]
+        resolutions = [getattr(motion.rows.resolution, name) for motion in (first, second)]
+        relative = sum(motion.rows.resolution.relative for motion in (first, second))
+        room = 2 * sum(resolutions) + relative * np.abs(after) + _SAME * (1 + np.abs(after))
+        problems += [
+            _jump(first, second, joint, what, (float(before[joint]), float(after[joint])))
+            for joint in np.flatnonzero(np.abs(after - before) > room).tolist()
+        ]
+    if problems:
+        raise VerificationError(*problems)
+
+
+def _jump(
+    first: EditedMotion, second: EditedMotion, joint: int, what: str, ends: tuple[float, float]
+) -> Problem:
+    """Return what jumps from one motion to the next, in the units of the first one's columns."""
+    kind = {"position": "q", "velocity": "qd"}[what]
+    column = next(each for each in first.columns if (each.quantity, each.joint) == (kind, joint))
+    before, after = (value / column.factor for value in ends)
+    name = first.joint_names[joint]
+    where = f"from the end of {first.rows.source} ({before:.9g}) to the start of {second.rows.source}"
+    jump = f"jumps by {after - before:.9g} {where} ({after:.9g})"
+    return Problem(
+        f"the {what} of {name} {jump}, in the units of {column.name}",
+        "motions are joined where both are in one state",
+        joint=name,
+        time=float(first.rows.t[-1]),
+        value=ends[1] - ends[0],
+        limit=0.0,
+        kind="jump",
+    )
+
+
+def _step(first: EditedMotion, second: EditedMotion) -> tuple[str, ...]:
+    """Return that an acceleration steps where two motions meet."""
+    before, after = first.quantities.get("qdd"), second.quantities.get("qdd")
+    if before is None or after is None:
+        return ()
+    rounding = 2 * (first.rows.resolution.qdd + second.rows.resolution.qdd)
+    steps = np.abs(after[0] - before[-1]) - rounding - _SAME * (1 + np.abs(after[0]))
+    joint = int(steps.argmax())
+    if steps[joint] <= 0:
+        return ()
+    values = f"from {before[-1, joint]:.9g} to {after[0, joint]:.9g} (SI)"
+    where = f"the acceleration of {first.joint_names[joint]} steps at {first.rows.t[-1]:.9g} s"
+    return (f"{where} {values}; the row there has the later one",)

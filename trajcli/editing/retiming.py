@@ -1,0 +1,281 @@
+"""Retiming of recorded motions: the smallest stretch with which limits are kept, of all or of each move.
+
+A motion q(t) stretched by the factor k is q(t / k): its derivatives of order m are 1 / k^m of what they were.
+So a limit of order m that is used c times needs k = c^(1 / m), and one of velocity by position k = c. The
+factor that follows from all limits is tried on the rows themselves, as `trajcli check` judges them; where
+rounding leaves room, or a limit does not scale, it is bracketed.
+
+Source: Siciliano et al., "Robotics: Modelling, Planning and Control", 7.3, dynamic scaling of trajectories.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from math import isfinite, sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajcli.curves.piecewise import Array
+from trajcli.editing.edited_motion import ORDERS, TIME_DECIMALS, EditedMotion
+from trajcli.errors import InputError, Problem, VerificationError
+from trajcli.frozen import frozen
+from trajcli.judge.finding import JudgedFinding
+from trajcli.judge.motion import Requirements, judge_motion
+from trajcli.streams.recorded_motion import RecordedMotion
+
+STRETCHABLE = (
+    "velocity",
+    "acceleration",
+    "jerk",
+    "velocity_by_position",
+    "tool_speed",
+    "tool_acceleration",
+    "tool_angular_speed",
+    "tool_angular_acceleration",
+    "effort",
+)
+"""Kinds of findings that a longer time may take away."""
+
+_FINE = 1e-4  # relative: how far above the smallest factor the one that is found may be
+_SLOWEST, _FASTEST = 1e6, 1e-9
+_TRIES = 40
+_FEWER = 4  # decimals that rounding twice may cost at most
+_NUDGE = 1e-7  # relative: what the rounding of the rows that are written may ask for besides
+_AT_REST = 1e-9  # of the largest velocity of a joint: below that a border of two moves is at rest
+_MICROSECONDS = 1e-3  # s: intervals below this need stamps with more than nine decimals
+_NO_EFFORT = "the columns of efforts are left out: they would be others"
+
+Judge = Callable[[RecordedMotion], JudgedFinding | None]
+"""Returns what is worst about rows; None where limits are kept."""
+
+
+@frozen
+class Stretch:
+    """A factor of time, and why it is not smaller.
+
+    Attributes:
+        factor: New time over old time.
+        moves: Indices of the moves that have it; None for the whole motion.
+        binding: What a smaller factor breaks; None where the motion keeps its time.
+    """
+
+    factor: float
+    moves: tuple[int, ...] | None
+    binding: JudgedFinding | None
+
+
+def retime(
+    motion: EditedMotion, requirements: Requirements, *, fastest: bool = False, per_move: bool = False
+) -> tuple[EditedMotion, tuple[Stretch, ...]]:
+    """Return a motion over the same positions that keeps its limits, and by what it is stretched.
+
+    Args:
+        motion: What is retimed.
+        requirements: Its limits.
+        fastest: Whether it may also become faster; else it keeps its time where it keeps its limits.
+        per_move: Whether each move has a factor of its own; moves that meet in motion share one.
+
+    Raises:
+        InputError: When there are no moves, or nothing bounds how fast it may be.
+        VerificationError: When something is wrong with it that no time mends.
+    """
+    judge = _judge_of(requirements)
+    ranges = _ranges(motion) if per_move else [(slice(0, motion.rows.t.size), None)]
+    stretches = []
+    for rows, moves in ranges:
+        factor, binding = _smallest(_part(motion.rows, rows), judge, fastest=fastest)
+        stretches.append(Stretch(factor, moves, binding))
+    return _verified(motion, [rows for rows, _ in ranges], stretches, judge)
+
+
+def _judge_of(requirements: Requirements) -> Judge:
+    def judge(rows: RecordedMotion) -> JudgedFinding | None:
+        judgement = judge_motion(lambda: (rows,), requirements)
+        wrong = [f for f in judgement.findings if f.severity == "error" and f.certainty == "exceeded"]
+        for finding in wrong:
+            if finding.kind not in STRETCHABLE:
+                raise VerificationError(
+                    Problem(
+                        finding.text(),
+                        finding.hint or "another time of the motion does not help",
+                        joint=finding.joint,
+                        time=finding.time,
+                        kind=finding.kind,
+                    )
+                )
+        return max(wrong, key=lambda finding: finding.factor or np.inf, default=None)
+
+    return judge
+
+
+def _part(rows: RecordedMotion, part: slice) -> RecordedMotion:
+    """Return some rows, from t = 0 on."""
+    names = (*ORDERS, "tau", "move")
+    values: dict[str, Any] = {
+        name: None if (found := getattr(rows, name)) is None else found[part] for name in names
+    }
+    t = rows.t[part]
+    return replace(rows, t=t - t[0], **values)
+
+
+def _smallest(rows: RecordedMotion, judge: Judge, *, fastest: bool) -> tuple[float, JudgedFinding | None]:
+    """Return the smallest factor with which limits are kept, and what a smaller one breaks."""
+    broken, low, most = judge(rows), 1.0, _SLOWEST
+    if broken is None:
+        most = 1.0
+        if not fastest:
+            return 1.0, None
+        while broken is None:
+            low /= 2.0
+            if low < _FASTEST:
+                what = f"no limit bounds how fast {rows.source} may be"
+                raise InputError(what, hint="it does not move, or its joints have no limits")
+            broken = judge(stretched(rows, low))
+    high = low
+    for _ in range(_TRIES):
+        binding, low = broken, high
+        high *= max(broken.factor, 1 + _FINE / 4) if broken.factor is not None else 2.0
+        if not isfinite(high) or high > _SLOWEST:
+            break
+        high = min(high, most)
+        broken = None if high == 1.0 else judge(stretched(rows, high))
+        if broken is None:
+            return _bracketed(rows, judge, (low, high), binding)
+    raise VerificationError(
+        Problem(f"no stretch keeps the limits: {binding.text()}", joint=binding.joint, kind=binding.kind)
+    )
+
+
+def _bracketed(
+    rows: RecordedMotion, judge: Judge, ends: tuple[float, float], binding: JudgedFinding
+) -> tuple[float, JudgedFinding]:
+    """Return a factor that keeps limits, near to one that does not, and what the latter breaks."""
+    low, high = ends
+    middle = high / (1 + _FINE)  # the factor of the closed form needs this one trial
+    while high > low * (1 + 2 * _FINE) and middle > low:
+        broken = judge(stretched(rows, middle))
+        if broken is None:
+            high = middle
+        else:
+            low, binding = middle, broken
+        middle = sqrt(low * high)
+    return high, binding
+
+
+def stretched(rows: RecordedMotion, factor: float) -> RecordedMotion:
+    """Return rows over a time that is longer by a factor, from their first stamp on."""
+    values: dict[str, Any] = {
+        name: None if (found := getattr(rows, name)) is None else found / factor**order
+        for order, name in enumerate(ORDERS)
+    }
+    known = rows.resolution
+    resolution = replace(known, time=known.time * factor, qd=known.qd / factor, qdd=known.qdd / factor**2)
+    t = rows.t[0] + (rows.t - rows.t[0]) * factor
+    return replace(rows, t=t, tau=None, resolution=resolution, **values)
+
+
+def _ranges(motion: EditedMotion) -> list[tuple[slice, tuple[int, ...]]]:
+    """Return the rows of moves, borders in both, and their indices; moves that meet in motion are together.
+
+    Raises:
+        InputError: When the file has no moves.
+    """
+    move = motion.rows.move
+    if move is None:
+        hint = "leave --per-move out, or plan with `columns: [t, q, qd, qdd, move]`"
+        raise InputError(f"{motion.rows.source} has no column `move`", hint=hint)
+    borders = np.flatnonzero(np.diff(move)) + 1
+    resting = [border for border in borders.tolist() if _rests(motion, border)]
+    edges = [0, *resting, move.size - 1]
+    return [
+        (slice(low, high + 1), tuple(dict.fromkeys(move[low : max(high, low + 1)].tolist())))
+        for low, high in pairwise(edges)
+        if high > low
+    ]
+
+
+def _rests(motion: EditedMotion, row: int) -> bool:
+    """Return whether all joints rest at a row; where nothing says velocities, time may change anywhere."""
+    velocities = motion.rows.qd
+    if velocities is None:
+        return True
+    room = 2 * motion.rows.resolution.qd + _AT_REST * (1 + np.abs(velocities).max(axis=0))
+    return bool((np.abs(velocities[row]) <= room).all())
+
+
+def _verified(
+    motion: EditedMotion, ranges: list[slice], stretches: list[Stretch], judge: Judge
+) -> tuple[EditedMotion, tuple[Stretch, ...]]:
+    """Return the retimed motion, which keeps its limits as it will be read."""
+    tries = coarser = 0
+    while True:
+        found = _assembled(motion, ranges, [stretch.factor for stretch in stretches], coarser)
+        try:
+            broken = judge(found.as_written().rows)
+        except VerificationError:
+            # numbers that are rounded twice are off by more than their decimals say: fewer are certain
+            if coarser == _FEWER:
+                raise
+            coarser += 1
+            continue
+        tries += 1
+        if broken is None:
+            return found, tuple(stretches)
+        if tries > _TRIES:
+            message = f"rounded as it would be written, {broken.text()}"
+            raise VerificationError(Problem(message, joint=broken.joint, kind=broken.kind))
+        stretches = [_longer(stretch, broken) for stretch in stretches]
+
+
+def _longer(stretch: Stretch, broken: JudgedFinding) -> Stretch:
+    """Return a stretch that is longer where something is broken in its moves."""
+    if broken.move is not None and stretch.moves is not None and broken.move not in stretch.moves:
+        return stretch
+    more = 1 + _NUDGE if broken.factor is None else max(broken.factor, 1 + _NUDGE)
+    return replace(stretch, factor=stretch.factor * more, binding=stretch.binding or broken)
+
+
+def _assembled(motion: EditedMotion, ranges: list[slice], factors: list[float], coarser: int) -> EditedMotion:
+    """Return the motion with a factor for each range of rows, its derivatives with fewer decimals."""
+    rows = motion.rows
+    if all(factor == 1.0 for factor in factors):
+        return motion
+    of_row = np.ones(rows.t.size)
+    for part, factor in zip(ranges, factors, strict=True):
+        of_row[part] = factor  # a border has the factor of what follows
+    t = _stamps(rows.t, of_row, uniform=len(factors) == 1)
+    quantities: dict[str, Array] = {
+        name: values / of_row[:, None] ** order
+        for order, name in enumerate(ORDERS)
+        if (values := motion.quantities.get(name)) is not None
+    }
+    notes = () if rows.tau is None else (_NO_EFFORT,)
+    fine = float(np.diff(t).min()) < _MICROSECONDS
+    found = motion.with_rows(t, quantities, rows.move, *notes, decimals=TIME_DECIMALS + 3 * fine)
+    return found if not coarser else _coarser(found, coarser)
+
+
+def _coarser(motion: EditedMotion, fewer: int) -> EditedMotion:
+    """Return a motion whose derivatives are written with fewer decimals."""
+    columns = tuple(
+        replace(column, decimals=max(column.decimals - fewer, 0))
+        if column.quantity in ORDERS[1:] and column.decimals is not None
+        else column
+        for column in motion.columns
+    )
+    note = (
+        f"derivatives are written with {fewer} decimal{'s' * (fewer > 1)} fewer: the others are not certain"
+    )
+    return replace(motion, columns=columns, notes=(*motion.notes, note))
+
+
+def _stamps(t: Array, of_row: NDArray[np.float64], *, uniform: bool) -> Array:
+    """Return stamps whose intervals are longer by the factors of their first rows."""
+    lengths = np.diff(t) * of_row[:-1]
+    local: Array = (t - t[0]) * of_row[0] if uniform else np.append(0.0, np.cumsum(lengths))
+    stamps: Array = t[0] + local
+    return stamps

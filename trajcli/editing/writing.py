@@ -1,0 +1,210 @@
+"""Writing of edited motions: in the columns, units and decimals of their file, or in another format."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from trajcli.columns import JOINT_ORDERS, Column
+from trajcli.curves.piecewise import Array
+from trajcli.editing.edited_motion import ORDERS, EditedMotion, rounded
+from trajcli.errors import InputError
+from trajcli.grids import ROWS
+from trajcli.knots import Deviation, Knots
+from trajcli.streams.csv import encoder_of
+from trajcli.streams.decimals import DECIMALS
+from trajcli.streams.formats import FormatName, Goal, StreamFormat, WriteOptions, format_of, write_verified
+from trajcli.streams.mcap.recording import Recording
+from trajcli.streams.recorded_motion import WrittenColumn
+from trajcli.streams.whole_file import standard_output, whole_file
+from trajcli.units import Quantity
+from trajcli.version import __version__
+
+_PER_SECOND = 1_000_000_000
+_LATEST = 2**31 - 1  # s: what a time of ROS 2 can say
+
+
+def write_motion(motion: EditedMotion, path: str | None, form: FormatName | None = None) -> tuple[str, ...]:
+    """Write a motion; return what a reader should know about what the format cannot hold.
+
+    Args:
+        motion: Its columns are kept where the format has columns.
+        path: The ending of its name says the format; None or "-" is CSV on standard output.
+        form: The format where the name leaves that open.
+
+    Raises:
+        InputError: When the format cannot hold the motion.
+        FileError: When the file cannot be written.
+        BrokenPipeError: When the reader has closed the pipe.
+    """
+    chosen = format_of(path, form)
+    if chosen.name == "CSV":
+        with standard_output() if path in (None, "-") else whole_file(str(path)) as out:
+            write_table(motion, out)
+        return ()
+    options, notes = _options(motion, chosen)
+    columns = _si_columns(motion, chosen)
+    rows = _si_rows(motion, columns) if chosen.content != "knots" else iter(())
+    if path in (None, "-"):
+        with standard_output() as out:
+            chosen.write(rows, columns, out, options)
+    else:
+        write_verified(Path(str(path)), rows, columns, options, chosen)
+    return notes
+
+
+def write_table(motion: EditedMotion, out: BinaryIO) -> None:
+    """Write a motion as comma-separated values: names, order, units and decimals of its columns."""
+    columns = motion.columns if motion.format == "csv" else _plain_columns(motion)
+    out.write(_header([column.name for column in columns]))
+    decimals = [0 if column.quantity == "move" else column.decimals for column in columns]
+    for block in _blocks(motion, columns):
+        out.write(_encoded(block, decimals))
+
+
+def _header(names: Iterable[str]) -> bytes:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerow(names)
+    return text.getvalue().encode()
+
+
+def _encoded(block: Array, decimals: list[int | None]) -> bytes:
+    """Return lines of numbers with the decimals of each column; None for all digits."""
+    whole = [index for index, count in enumerate(decimals) if count == 0]
+    if all(count in (0, DECIMALS) for count in decimals):
+        return encoder_of("fixed")(block, whole)
+    if all(count in (0, None) for count in decimals):
+        return encoder_of("full")(block, whole)
+    cells = block.copy()
+    for index, count in enumerate(decimals):
+        if count is not None:
+            cells[:, index] = rounded(cells[:, index], count)
+    line = ",".join("%r" if count is None else f"%.{count}f" for count in decimals) + "\n"
+    return "".join(line % tuple(row) for row in cells.tolist()).encode()
+
+
+def _plain_columns(motion: EditedMotion) -> tuple[WrittenColumn, ...]:
+    """Return the columns of trajcli's own language, in SI, for a file that has none."""
+    count = motion.rows.q.shape[1]
+    found = [WrittenColumn("t", "t", None, 1.0, DECIMALS)]
+    for name in motion.quantities:
+        found += [WrittenColumn(f"{name}{joint + 1}", name, joint, 1.0, DECIMALS) for joint in range(count)]
+    if motion.rows.move is not None:
+        found.append(WrittenColumn("move", "move", None, 1.0, 0))
+    return tuple(found)
+
+
+def _blocks(motion: EditedMotion, columns: tuple[WrittenColumn, ...]) -> Iterator[Array]:
+    """Yield blocks of rows in the units of the columns."""
+    for low in range(0, motion.rows.t.size, ROWS):
+        part = slice(low, low + ROWS)
+        yield np.stack([_cells(motion, column, part) for column in columns], axis=1)
+
+
+def _cells(motion: EditedMotion, column: WrittenColumn, part: slice) -> Array:
+    if column.quantity == "move" and motion.rows.move is not None:
+        return motion.rows.move[part].astype(np.float64)
+    if column.joint is None:
+        return motion.rows.t[part] / column.factor
+    values: Array = motion.quantities[column.quantity][part, column.joint] / column.factor
+    return values
+
+
+def _si_columns(motion: EditedMotion, form: StreamFormat) -> tuple[Column, ...]:
+    """Return the columns of a format in SI: those there are, or t, q, qd and qdd for a log."""
+    count = motion.rows.q.shape[1]
+    names = [name for name in ORDERS if name in motion.quantities]
+    if form.content == "log":
+        names = list(ORDERS[:3])
+    found = [Column("t", quantity=Quantity("time"))]
+    for name in names:
+        angle = Quantity("angle", JOINT_ORDERS[name])
+        found += [Column(name, joint, None, angle) for joint in range(count)]
+    if motion.rows.move is not None and form.content == "rows":
+        found.append(Column("move", quantity=Quantity("ratio")))
+    return tuple(found)
+
+
+def _si_rows(motion: EditedMotion, columns: tuple[Column, ...]) -> Iterator[Array]:
+    rows, states = motion.rows, _states(motion)
+    for low in range(0, rows.t.size, ROWS):
+        part = slice(low, low + ROWS)
+        cells = [rows.t[part, None]]
+        for name in dict.fromkeys(column.kind for column in columns):
+            if name in ORDERS:
+                cells.append(motion.quantities.get(name, states.get(name, rows.q))[part])
+            elif name == "move" and rows.move is not None:
+                cells.append(rows.move[part, None].astype(np.float64))
+        yield np.concatenate(cells, axis=1)
+
+
+def _states(motion: EditedMotion) -> dict[str, Array]:
+    """Return q, qd and qdd of all rows, those without columns of the curve through them."""
+    missing = [name for name in ORDERS[:3] if name not in motion.quantities]
+    curve = motion.curve() if missing else None
+    return {
+        name: motion.quantities[name]
+        if name in motion.quantities or curve is None
+        else curve.evaluate(motion.rows.t, order)
+        for order, name in enumerate(ORDERS[:3])
+    }
+
+
+def _options(motion: EditedMotion, form: StreamFormat) -> tuple[WriteOptions, tuple[str, ...]]:
+    """Return what a format needs beside rows, and what it makes up or leaves out."""
+    if form.content == "rows":
+        lost = ("the columns of efforts are left out: the format has none",) * (motion.rows.tau is not None)
+        return WriteOptions(), lost
+    missing = [name for name in ORDERS[1:3] if name not in motion.quantities]
+    notes = [f"no column {name}: it is of the curve through the rows" for name in missing]
+    notes += [
+        f"the columns {name} are left out: the format has none"
+        for name in ("qddd", "tau")
+        if name in motion.quantities
+    ]
+    knots = _knots(motion)
+    if form.content == "knots":
+        return WriteOptions(goal=lambda: Goal(motion.joint_names, knots)), tuple(notes)
+    recording = _recording(motion, knots)
+    return WriteOptions(recording=lambda: recording), tuple(notes)
+
+
+def _knots(motion: EditedMotion) -> Knots:
+    """Return the rows as knots: states at whole nanoseconds from the first one on.
+
+    Raises:
+        InputError: When two rows are in one nanosecond.
+    """
+    rows, states = motion.rows, _states(motion)
+    nanoseconds = np.rint((rows.t - rows.t[0]) * _PER_SECOND).astype(np.int64)
+    if (np.diff(nanoseconds) <= 0).any():
+        raise InputError(f"{rows.source} has rows in one nanosecond, which times of ROS cannot tell apart")
+    return Knots(nanoseconds, states["q"], states["qd"], states["qdd"], Deviation(0.0, 0.0, 0.0, (0, 0, 0)))
+
+
+def _recording(motion: EditedMotion, knots: Knots) -> Recording:
+    t = motion.rows.t
+    if t[0] < 0 or t[-1] > _LATEST:
+        extent = f"{motion.rows.source} goes from {t[0]:.9g} s to {t[-1]:.9g} s"
+        raise InputError(f"a log has times from 0 to {_LATEST} s, and {extent}")
+    metadata = {
+        "version": __version__,
+        "source": motion.rows.source,
+        "units": "SI: rad or m by joint, s; epoch in ns",
+    }
+    return Recording(
+        joint_names=motion.joint_names,
+        origin=round(float(t[0]) * _PER_SECOND),
+        epoch=0,
+        duration=round(float(t[-1] - t[0]) * _PER_SECOND),
+        knots=knots,
+        frames=None,
+        path=None,
+        attachments=(),
+        metadata=metadata,
+    )

@@ -1,0 +1,81 @@
+"""Limits of a file of their own: what stands under `limits` in a job, or a joint_limits.yaml of MoveIt."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from trajcli.errors import InputError
+from trajcli.job.files.moveit_limits import read_moveit_limits
+from trajcli.job.limits import with_job_limits
+from trajcli.job.messages import problems_of
+from trajcli.job.model import UnitsSpec
+from trajcli.job.yaml.document import Document
+from trajcli.job.yaml.load import parse_document, read_document
+from trajcli.kinematics.robot import Robot
+from trajcli.language.limits import JobLimitsSpec, LimitsSpec
+from trajcli.language.numbers import ReadingContext
+from trajcli.planners.planner import Event
+from trajcli.units import Units
+
+_MOVEIT = ("joint_limits", "robot_description_planning")
+
+
+def with_limits_file(robot: Robot, path: str, units: Units) -> tuple[Robot, tuple[Event, ...]]:
+    """Return a robot with the limits of a file in force, and what there is to note about them.
+
+    Args:
+        robot: With limits of its own, which those of the file replace.
+        path: Of the file.
+        units: Of its plain numbers, unless it says them itself: `units: {angle: deg}`.
+
+    Raises:
+        InputError: With every flaw of the file.
+        FileError: When it cannot be read.
+    """
+    return _applied(robot, read_document(path), units)
+
+
+def with_limits(robot: Robot, limits: Mapping[str, Any]) -> tuple[Robot, tuple[Event, ...]]:
+    """Return a robot with limits in force that are given as under `limits` in a job, in SI.
+
+    Raises:
+        InputError: With every flaw of them.
+    """
+    from trajcli.job.dump import mapping_text
+
+    return _applied(robot, parse_document(mapping_text(limits), "limits"), Units())
+
+
+def _applied(robot: Robot, document: Document, units: Units) -> tuple[Robot, tuple[Event, ...]]:
+    plain = dict(document.plain())
+    units = _stated_units(plain.pop("units", None), document, units)
+    spec: LimitsSpec | None = None
+    noted: tuple[Event, ...] = ()
+    file = Path(document.file).name if any(key in plain for key in _MOVEIT) else plain.get("file")
+    if not any(key in plain for key in _MOVEIT):
+        context = ReadingContext(units, robot.joint_names, robot.joint_types)
+        try:
+            spec = JobLimitsSpec.model_validate(plain, context=context)
+        except ValidationError as error:
+            raise InputError(*problems_of(error, JobLimitsSpec, document)) from None
+    if file is not None:
+        of_file = read_moveit_limits(file, document, robot)
+        spec, noted = of_file.under(spec or JobLimitsSpec()), of_file.events
+    effective, events = with_job_limits(robot, spec)
+    return effective, (*noted, *events)
+
+
+def _stated_units(value: Any, document: Document, units: Units) -> Units:  # noqa: ANN401
+    """Return the units that a file says, and those known before for what it does not say."""
+    if value is None:
+        return units
+    try:
+        stated = UnitsSpec.model_validate(value)
+    except ValidationError as error:
+        raise InputError(*problems_of(error, UnitsSpec, document, ("units",))) from None
+    given = {name: getattr(stated, name) for name in stated.model_fields_set}
+    return Units(given.get("angle", units.angle), given.get("length", units.length))

@@ -1,0 +1,176 @@
+"""Judgement of motions that are arrays: of notebooks, of robot policies, of gateways."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from trajcli.curves.piecewise import Array
+from trajcli.errors import InputError
+from trajcli.judge.finding import Judgement
+from trajcli.judge.motion import Requirements, judge_motion
+from trajcli.kinematics.robot import Joint, Limits, Robot, unlimited
+from trajcli.streams.recorded_motion import RecordedMotion, Resolution
+
+_SINGLE = 2.0**-24  # half a unit in the last place of single precision, relative
+_NAMES = ("times", "q", "qd", "qdd")
+
+
+def judge_arrays(
+    times: ArrayLike,
+    q: ArrayLike,
+    qd: ArrayLike | None,
+    qdd: ArrayLike | None,
+    requirements: Requirements,
+) -> Judgement:
+    """Return the judgement of rows that are arrays.
+
+    Args:
+        times: s, shape (N,).
+        q: rad or m, shape (N, n).
+        qd: Shape (N, n); None where there are none.
+        qdd: Shape (N, n); likewise.
+        requirements: What they are judged by.
+
+    Raises:
+        InputError: When shapes do not fit, or something is not a finite number.
+    """
+    given = {
+        name: None if values is None else np.asarray(values)
+        for name, values in zip(_NAMES, (times, q, qd, qdd), strict=True)
+    }
+    joints = len(requirements.robot.joints)
+    arrays: dict[str, Array | None] = {}
+    for name, values in given.items():
+        arrays[name] = None if values is None else _checked(name, values)
+    t, positions = arrays["times"], arrays["q"]
+    if t is None or positions is None:
+        raise InputError("times and q are needed")
+    _check_shapes(t, arrays, joints)
+    single = any(values is not None and values.dtype.itemsize < 8 for values in list(given.values())[1:])
+    nothing = np.zeros(joints)
+    resolution = Resolution(
+        0.0,
+        nothing,
+        nothing,
+        nothing,
+        relative=_SINGLE if single else 0.0,
+        relative_time=_SINGLE if given["times"] is not None and given["times"].dtype.itemsize < 8 else 0.0,
+    )
+    motion = RecordedMotion(
+        t, positions, arrays["qd"], arrays["qdd"], None, None, None, None, resolution, "the motion"
+    )
+    return judge_motion(lambda: (motion,), requirements)
+
+
+def _checked(name: str, values: np.ndarray) -> Array:
+    """Return numbers as float64."""
+    if values.dtype.kind not in "fiu":
+        raise InputError(f"{name}: expected an array of numbers, got {values.dtype}")
+    numbers = values.astype(np.float64)
+    if not np.isfinite(numbers).all():
+        where = ", ".join(str(int(index[0])) for index in np.nonzero(~np.isfinite(numbers)))
+        raise InputError(f"{name}[{where}] is not a finite number")
+    return numbers
+
+
+def _check_shapes(t: Array, arrays: Mapping[str, Array | None], joints: int) -> None:
+    if t.ndim != 1 or t.size < 2:
+        raise InputError(f"times: expected shape (N,) with N at least 2, got {t.shape}")
+    for name, values in arrays.items():
+        if name != "times" and values is not None and values.shape != (t.size, joints):
+            expected = f"({t.size}, {joints}), a row for each time and a column for each joint"
+            raise InputError(f"{name}: expected shape {expected}, got {values.shape}")
+
+
+def requirements_of(
+    robot: str | Path | Robot | None,
+    limits: Limits | Mapping[str, Any] | None,
+    interpolate: str | None,
+    q: ArrayLike,
+) -> Requirements:
+    """Return what arrays are judged by; what a name stands for is read once.
+
+    Args:
+        robot: A robot, the name of one, or the path of a file; None for bare joints, as many as q has.
+        limits: That replace those of the robot: as under `limits` in a job, in SI, or as they are.
+        interpolate: How rows are joined.
+        q: The positions, for bare joints.
+
+    Raises:
+        InputError: When there is no such robot, or the limits have flaws.
+        FileError: When a file cannot be read.
+    """
+    if robot is None:
+        shape = np.shape(q)
+        known = _bare(int(shape[-1]) if shape else 0)
+    elif isinstance(robot, Robot):
+        known = robot
+    else:
+        known = _read(str(robot), _changed(str(robot)))
+    if isinstance(limits, Limits):
+        from dataclasses import replace
+
+        known = replace(known, limits=limits)
+    elif limits is not None:
+        known = _limited(_Held(known), _Held(limits, repr(limits)))
+    return Requirements(known, interpolate=interpolate, tool=_tool_of(_Held(known)))
+
+
+class _Held:
+    """A value under a key, for caches of what is made of it."""
+
+    def __init__(self, value: Any, key: str | None = None) -> None:  # noqa: ANN401
+        self.value = value
+        self._key: object = id(value) if key is None else key
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Held) and self._key == other._key
+
+
+@lru_cache(maxsize=16)
+def _bare(joints: int) -> Robot:
+    if joints < 1:
+        raise InputError("q: expected shape (N, n)")
+    names = tuple(Joint(f"j{number}") for number in range(1, joints + 1))
+    return Robot("the motion", names, unlimited(joints), None, np.eye(4), np.eye(4))
+
+
+def _changed(name: str) -> float:
+    """Return when a file was changed, so that it is read anew; 0 for names of the catalogue."""
+    path = Path(name)
+    return path.stat().st_mtime if path.is_file() else 0.0
+
+
+@lru_cache(maxsize=16)
+def _read(name: str, _changed: float) -> Robot:
+    from trajcli.queries.arm import open_sheet
+
+    return open_sheet(name).robot
+
+
+@lru_cache(maxsize=16)
+def _limited(robot: _Held, limits: _Held) -> Robot:
+    from trajcli.job.limits_file import with_limits
+
+    if not isinstance(limits.value, Mapping):
+        raise InputError(f"limits: expected a mapping or Limits, got {type(limits.value).__name__}")
+    return with_limits(robot.value, limits.value)[0]
+
+
+@lru_cache(maxsize=16)
+def _tool_of(robot: _Held) -> Any:  # noqa: ANN401
+    """Return what makes the judge of the tool; None for an arm without geometry."""
+    if robot.value.convention is None:
+        return None
+    from trajcli.judge.tool import ToolJudge
+
+    return lambda: ToolJudge(robot.value)

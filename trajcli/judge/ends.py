@@ -1,0 +1,180 @@
+"""Start, end and order of recorded rows: where they shall begin, how they end, that stamps increase."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajcli.checks.finding import at_time
+from trajcli.curves.piecewise import Array
+from trajcli.errors import Amount
+from trajcli.judge.finding import FindingSeverity, JudgedFinding, JudgedKind, Worst
+from trajcli.judge.intervals import JointAxes
+from trajcli.judge.rounding import stated_errors
+from trajcli.streams.recorded_motion import Resolution
+from trajcli.trajectory import State
+
+EndState = tuple[float, int, tuple[Array | None, ...]]
+"""Time, number and states (1, n) of a row."""
+
+_REST = 1e-6
+"""rad/s or m/s, relative to nothing: what a file of six decimals makes of rest."""
+
+
+def judge_start(
+    row: EndState, start: State, tolerance: Array, resolution: Resolution, axes: JointAxes
+) -> list[JudgedFinding]:
+    """Return where the first row is not the state in which the motion shall begin: the worst joint of each.
+
+    Args:
+        row: The first one.
+        start: Where it shall begin.
+        tolerance: How near, rad or m, shape (n,).
+        resolution: Rounding of the file.
+        axes: The joints.
+    """
+    return [
+        *_position(row, start.position, tolerance, resolution, axes, "start"),
+        *_velocity(row, start.velocity, resolution, axes, "start", "error"),
+    ]
+
+
+def judge_end(
+    row: EndState, end: State | None, tolerance: Array | None, resolution: Resolution, axes: JointAxes
+) -> list[JudgedFinding]:
+    """Return where the last row is not the state in which the motion shall end.
+
+    Where nobody says it, it shall be at rest, and a warning says where it is not.
+
+    Args:
+        row: The last one.
+        end: Where it shall end; None where nobody says.
+        tolerance: How near, rad or m, shape (n,).
+        resolution: Rounding of the file.
+        axes: The joints.
+    """
+    if end is None or tolerance is None:
+        rest = np.zeros(len(axes.names))
+        return _velocity(row, rest, resolution, axes, "end", "warning")
+    return [
+        *_position(row, end.position, tolerance, resolution, axes, "end"),
+        *_velocity(row, end.velocity, resolution, axes, "end", "error"),
+    ]
+
+
+def _position(
+    row: EndState, wanted: Array, tolerance: Array, resolution: Resolution, axes: JointAxes, kind: JudgedKind
+) -> list[JudgedFinding]:
+    time, number, (q, *_) = row
+    if q is None:
+        return []
+    room = stated_errors(q, resolution.q, resolution.relative)[0]
+    over = np.abs(q[0] - wanted) - tolerance
+    joint = int(over.argmax())
+    if over[joint] <= 0:
+        return []
+    value, limit = float(q[0, joint]), float(wanted[joint])
+    which = "first" if kind == "start" else "last"
+    within = Amount(float(tolerance[joint]), 0, joint, axes.dimension(joint), "down")
+    return [
+        JudgedFinding(
+            rule="state",
+            severity="error",
+            kind=kind,
+            joint=axes.names[joint],
+            value=value,
+            limit=limit,
+            time=time,
+            row=number,
+            count=int((over > 0).sum()),
+            quantity="position",
+            certainty="exceeded" if over[joint] > room[joint] else "within rounding",
+            rounding=float(room[joint]),
+            message=f"the {which} row has {{joint}} at {{value}} {at_time(time)}, expected {{limit}} "
+            "within {tolerance}",
+            amounts={**axes.amounts(joint, 0, value, limit), "tolerance": within},
+        )
+    ]
+
+
+def _velocity(
+    row: EndState,
+    wanted: Array,
+    resolution: Resolution,
+    axes: JointAxes,
+    kind: JudgedKind,
+    severity: FindingSeverity,
+) -> list[JudgedFinding]:
+    time, number, (_, qd, _) = row
+    if qd is None or not np.isfinite(qd).all():
+        return []
+    room = stated_errors(qd, resolution.qd, resolution.relative)[0] + _REST
+    over = np.abs(qd[0] - wanted)
+    joint = int(over.argmax())
+    if over[joint] <= room[joint]:
+        return []
+    value, limit = float(qd[0, joint]), float(wanted[joint])
+    which = "first" if kind == "start" else "last"
+    return [
+        JudgedFinding(
+            rule="state",
+            severity=severity,
+            kind=kind,
+            joint=axes.names[joint],
+            value=value,
+            limit=limit,
+            time=time,
+            row=number,
+            count=int((over > room).sum()),
+            quantity="velocity",
+            rounding=float(room[joint]),
+            message=f"the {which} row has a velocity of {{joint}} of {{value}} {at_time(time)}, "
+            "expected {limit}",
+            amounts=axes.amounts(joint, 1, value, limit),
+        )
+    ]
+
+
+def judge_order_of_stamps(
+    t: Array, rows: NDArray[np.int64], before: float, moves: NDArray[np.int64], worst: Worst
+) -> NDArray[np.bool_]:
+    """Return which of some stamps are finite and later than all before them; add the others as findings.
+
+    Args:
+        t: As they are written, s, shape (N,).
+        rows: Their numbers, shape (N,).
+        before: The latest one before them; -inf for none.
+        moves: Index of the move of each, -1 for none.
+        worst: What is added to.
+    """
+    finite = np.isfinite(t)
+    if t[0] > before and finite.all() and (t[1:] > t[:-1]).all():
+        return finite
+    latest = np.maximum.accumulate(np.append(before, np.where(finite, t, -np.inf)))[:-1]
+    increasing = finite & (np.where(finite, t, -np.inf) > latest)
+    wrong = np.flatnonzero(~increasing)
+
+    def make(k: int) -> JudgedFinding:
+        row = int(wrong[k])
+        number, time, last = int(rows[row]), float(t[row]), float(latest[row])
+        text = f"the time stamp of row {number} is {time!r}"
+        if np.isfinite(time):
+            how = "doubled" if time == last else "earlier than the one before"
+            text = f"the time stamp of row {number}, {time:.9g} s, is {how}: the latest is {last:.9g} s"
+        known = (time, last) if np.isfinite(time) else (None, None)
+        return JudgedFinding(
+            rule="time",
+            severity="error",
+            kind="time",
+            joint=None,
+            value=known[0],
+            limit=known[1],
+            time=known[0],
+            row=number,
+            message=text,
+            hint="time stamps must strictly increase",
+        )
+
+    nothing = np.full(wrong.size, -1)
+    worst.add("time", int(moves[wrong[0]]), nothing, np.ones(wrong.size), make)
+    return increasing

@@ -1,0 +1,275 @@
+"""Judgement of a file: what a job or a robot asks of the motion that it holds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from trajcli.curves.piecewise import Array
+from trajcli.errors import InputError, TrajcliError
+from trajcli.frozen import comparable, frozen
+from trajcli.judge.finding import Judgement
+from trajcli.judge.motion import JUDGED_ROWS, Requirements, judge_motion
+from trajcli.kinematics.robot import Robot
+from trajcli.streams.recorded_motion import MotionFile, RecordedMotion, open_motion
+from trajcli.units import Units, joint_quantity
+
+if TYPE_CHECKING:
+    from trajcli.job.read import LoadedJob
+    from trajcli.judge.consumer import ConsumerJudge
+    from trajcli.judge.tool import ToolJudge
+    from trajcli.kinematics.following.motion import ToolMotion
+    from trajcli.planning.plan import Plan
+
+_START_TOLERANCE = 1e-3  # rad or m: what a controller takes for the state that it is in
+_SAME_DURATION = 1e-6  # s: a file that lasts as long as the plan, within that, is taken for its motion
+_ENTIRE = ("jtc-upsampling",)  # interpolations that need all rows at once
+
+
+@comparable
+class CheckOptions:
+    """What is said beside the file; see `trajcli check --help`."""
+
+    job: str | None = None
+    robot: str | None = None
+    limits: str | None = None
+    columns: str | None = None
+    units: str | None = None
+    topic: str | None = None
+    field: str | None = None
+    interpolate: str | None = None
+    profile: str | None = None
+    start_tolerance: str | None = None
+
+
+@frozen
+class CheckedFile:
+    """A file with its judgement.
+
+    Attributes:
+        judgement: Of its motion.
+        robot: With the limits that it was judged by.
+        units: For people.
+        loaded: The job; None without one.
+        plan: Of the job, where it has one.
+        motion: The file, to read from anew.
+    """
+
+    judgement: Judgement
+    robot: Robot
+    units: Units
+    loaded: LoadedJob | None
+    plan: Plan | None
+    motion: MotionFile
+
+
+@frozen
+class _Given:
+    """What a job, or a robot, says of the motion."""
+
+    robot: Robot
+    units: Units
+    events: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+    loaded: LoadedJob | None = None
+    plan: Plan | None = None
+    shown: Units | None = None
+
+
+def check_file(source: str, options: CheckOptions) -> CheckedFile:
+    """Return the judgement of a file.
+
+    Args:
+        source: Its path; "-" is standard input.
+        options: What it is judged by.
+
+    Raises:
+        InputError: When it is no motion, or options do not fit it or each other.
+        FileError: When a file cannot be read.
+    """
+    given = _given(options)
+    robot = given.robot
+    motion = open_motion(
+        source,
+        columns=options.columns,
+        units=options.units,
+        topic=options.topic,
+        field=options.field,
+        joints=robot.joint_names,
+        joint_types=robot.joint_types,
+        declared=_stated_units(options, given),
+    )
+    shown = _shown_units(options, given)
+    consumer = _consumer_of(options.profile, given)
+    requirements = _requirements(options, given, shown, consumer)
+    if consumer is not None and options.interpolate is None and consumer().profile.interpolation is not None:
+        requirements = replace(requirements, interpolate=consumer().profile.interpolation)
+    by_time = None if "move" in motion.quantities else _moves_by_time(given, motion)
+
+    def blocks() -> Iterable[RecordedMotion]:
+        entire = requirements.interpolate in _ENTIRE
+        rows: Iterator[RecordedMotion] = iter((motion.whole(),)) if entire else motion.blocks(JUDGED_ROWS)
+        return rows if by_time is None else map(by_time, rows)
+
+    judgement = judge_motion(blocks, requirements)
+    notes = (*motion.notes, *given.notes, *judgement.notes)
+    if given.loaded is not None and "move" not in motion.quantities and by_time is None:
+        notes = (*notes, "no column `move`: limits and paths of single moves are not judged")
+    judged = replace(judgement, notes=notes, events=given.events, source=motion.source)
+    return CheckedFile(judged, robot, shown, given.loaded, given.plan, motion)
+
+
+def _moves_by_time(given: _Given, motion: MotionFile) -> Callable[[RecordedMotion], RecordedMotion] | None:
+    """Return what names the moves of rows of a file that does not: by the times of the plan.
+
+    None where the file does not last as long as the plan.
+    """
+    if given.plan is None:
+        return None
+    trajectory = given.plan.trajectory
+    stamps = [(rows.t[0], rows.t[-1]) for rows in motion.blocks() if rows.t.size]
+    if not stamps:
+        return None
+    first, last = float(stamps[0][0]), float(stamps[-1][1])
+    alone = len(trajectory.spans) == 1
+    if not alone and not abs(last - first - trajectory.duration) <= _SAME_DURATION + motion.resolution.time:
+        return None
+    starts = np.array([span.start for span in trajectory.spans])
+    indices = np.array([span.index for span in trajectory.spans], dtype=np.int64)
+
+    def named(rows: RecordedMotion) -> RecordedMotion:
+        since = rows.t - first + motion.resolution.time + np.spacing(abs(last))
+        later = np.searchsorted(starts, np.where(np.isfinite(since), since, 0.0), "right") - 1
+        return replace(rows, move=indices[np.clip(later, 0, len(indices) - 1)])
+
+    return named
+
+
+def _given(options: CheckOptions) -> _Given:
+    """Return what the job, or the robot and the limits say.
+
+    Raises:
+        InputError: When neither is named, or both are.
+    """
+    if options.job is not None:
+        if options.robot is not None or options.limits is not None:
+            other = "--robot" if options.robot is not None else "--limits"
+            raise InputError(
+                f"--job says robot and limits itself, and {other} is given", hint="name one of them"
+            )
+        return _of_job(options.job)
+    if options.robot is None:
+        raise InputError(
+            "what is the motion judged by?", hint="name a job with --job, or an arm with --robot"
+        )
+    if options.start_tolerance is not None:
+        raise InputError(
+            "--start-tolerance is about the start that a job says", hint="name it with --job, or leave it out"
+        )
+    from trajcli.queries.arm import open_sheet
+
+    sheet = open_sheet(options.robot)
+    if options.limits is None:
+        return _Given(sheet.robot, sheet.units, ())
+    from trajcli.job.limits_file import with_limits_file
+    from trajcli.queries.arm import parse_units
+
+    units = parse_units(options.units or "")  # as in a job: rad and m, unless somebody says others
+    robot, events = with_limits_file(sheet.robot, options.limits, units)
+    return _Given(robot, sheet.units, tuple(event.text() for event in events if event.concedes), shown=units)
+
+
+def _stated_units(options: CheckOptions, given: _Given) -> Units | None:
+    """Return the units that a job or robot file of the user states: a catalogue does not know his files."""
+    if given.loaded is not None:
+        plain = given.loaded.document.plain()
+    else:
+        from trajcli.job.robot import catalogue_names, is_urdf
+        from trajcli.job.yaml.load import read_document
+
+        name = options.robot or ""
+        if name in catalogue_names() or is_urdf(name):
+            return None
+        plain = read_document(name).plain()
+    return given.units if isinstance(plain, Mapping) and plain.get("units") else None
+
+
+def _of_job(path: str) -> _Given:
+    """Return what a job says: its limits, and where it can be planned its paths, start and end."""
+    from trajcli.job.read import load_job
+    from trajcli.planning.plan import plan_job
+
+    loaded = load_job(path)
+    events = tuple(event.text(loaded.say) for event in loaded.events if event.concedes)
+    try:
+        with np.errstate(all="ignore"):
+            plan = plan_job(loaded)
+    except TrajcliError as error:
+        note = f"the job has no plan, so its paths, start and end are not judged: {error.problems[0].text()}"
+        return _Given(loaded.robot, loaded.units, events, (note,), loaded)
+    return _Given(loaded.robot, loaded.units, events, (), loaded, plan)
+
+
+def _shown_units(options: CheckOptions, given: _Given) -> Units:
+    from trajcli.queries.arm import parse_units
+
+    known = given.shown or given.units
+    return known if options.units is None else parse_units(options.units, known)
+
+
+def _requirements(
+    options: CheckOptions, given: _Given, units: Units, consumer: Callable[[], ConsumerJudge] | None
+) -> Requirements:
+    tool = _tool_of(given)
+    if given.plan is None or given.loaded is None:
+        return Requirements(given.robot, interpolate=options.interpolate, tool=tool, consumer=consumer)
+    tolerance = np.array(_tolerances(options.start_tolerance, given.robot, units))
+    return Requirements(
+        given.robot,
+        {move.index: move.robot for move in given.plan.moves},
+        options.interpolate,
+        given.plan.trajectory.start,
+        tolerance,
+        given.plan.trajectory.end,
+        tool,
+        consumer,
+    )
+
+
+def _tolerances(word: str | None, robot: Robot, units: Units) -> list[float]:
+    """Return how near the first row must be, by joint, SI."""
+    if word is None:
+        return [_START_TOLERANCE] * len(robot.joints)
+    from trajcli.job.inline import inline_number
+
+    found = []
+    for kind in robot.joint_types:
+        value = inline_number(word, "--start-tolerance", joint_quantity(kind), units)
+        if value < 0:
+            raise InputError(f"--start-tolerance: expected a number of at least 0, got {word}")
+        found.append(value)
+    return found
+
+
+def _tool_of(given: _Given) -> Callable[[], ToolJudge] | None:
+    if given.robot.convention is None:
+        return None
+    from trajcli.judge.tool import ToolJudge
+
+    paths: Mapping[int, ToolMotion | None] | None = None
+    if given.loaded is not None:
+        moves = () if given.plan is None else given.plan.moves
+        paths = {move.index: move.planned.tool for move in moves}
+    return lambda: ToolJudge(given.robot, paths)
+
+
+def _consumer_of(profile: str | None, given: _Given) -> Callable[[], ConsumerJudge] | None:
+    if profile is None:
+        return None
+    from trajcli.judge.consumer import ConsumerJudge
+
+    start: Array | None = None if given.plan is None else given.plan.trajectory.start.position
+    return lambda: ConsumerJudge(profile, given.robot, start)

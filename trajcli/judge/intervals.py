@@ -1,0 +1,158 @@
+"""Intervals between recorded rows: a window of rows with the curve through them, that moves along a file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajcli.curves.piecewise import Array, derivative_coefficients, horner
+from trajcli.errors import Amount
+from trajcli.frozen import frozen
+from trajcli.judge.reconstruction import Interpolation, piece_coefficients, stated_orders
+from trajcli.judge.rounding import PieceRows, stated_errors
+from trajcli.kinematics.robot import JointType
+from trajcli.streams.recorded_motion import Resolution
+
+BESIDE = 2  # intervals on either side that are looked at, too
+DENSE = 0.0100001
+"""Seconds between rows that controllers take one by one: they run at 100 Hz or faster."""
+HIGHEST = {"hold": 0, "linear": 1, "cubic": 2, "quintic": 3, "jtc-upsampling": 3}
+"""Highest derivative that pieces of an interpolation determine."""
+
+
+@frozen
+class JointAxes:
+    """Joints of a recorded motion.
+
+    Attributes:
+        names: n names.
+        types: n types.
+    """
+
+    names: tuple[str, ...]
+    types: tuple[JointType, ...]
+
+    def dimension(self, joint: int) -> Literal["length", "angle"]:
+        """Return what a joint's positions measure."""
+        return "length" if self.types[joint] == "prismatic" else "angle"
+
+    def amounts(self, joint: int, order: int, value: float, limit: float) -> Mapping[str, Amount | str]:
+        """Return a joint's name, a value and its limit as amounts of a message."""
+        dimension, outward = self.dimension(joint), value > limit
+        return {
+            "joint": self.names[joint],
+            "value": Amount(value, order, joint, dimension, "up" if outward else "down"),
+            "limit": Amount(limit, order, joint, dimension, "down" if outward else "up"),
+        }
+
+
+@frozen
+class Intervals:
+    """A window of rows that stand in order of time; those between `first` and `last` are judged in it.
+
+    Attributes:
+        t: Time stamps as they are meant, s, shape (N,).
+        lengths: Of the intervals, shape (N - 1,).
+        late: By how much each may be off by rounding, shape (N - 1,).
+        states: Positions, velocities, accelerations (N, n) of the rows, as far as the file has them.
+        rows: Number of each row in the file, shape (N,).
+        moves: Index of the move of each row, shape (N,); -1 where the file has none.
+        interpolation: How the rows are joined.
+        resolution: Rounding of the values.
+        first: Index of the first interval to judge.
+        last: Index of the one after the last.
+        begins: Whether the first row is the first of the file.
+        ends: Whether the last row is the last one.
+    """
+
+    t: Array
+    lengths: Array
+    late: Array
+    states: tuple[Array | None, ...]
+    rows: NDArray[np.int64]
+    moves: NDArray[np.int64]
+    interpolation: Interpolation
+    resolution: Resolution
+    first: int
+    last: int
+    begins: bool
+    ends: bool
+
+    @cached_property
+    def coefficients(self) -> Array:
+        """Of the pieces, (degree + 1, N - 1, n), highest power first."""
+        q, qd, qdd = self.states
+        return piece_coefficients(self.lengths, np.asarray(q), qd, qdd, self.interpolation)
+
+    @cached_property
+    def highest(self) -> NDArray[np.intp]:
+        """Order of the highest derivative that each piece determines, shape (N - 1,)."""
+        known = HIGHEST.get(self.interpolation)
+        if known is not None:
+            return np.full(self.lengths.size, known)
+        q, qd, qdd = self.states
+        counts = stated_orders(np.asarray(q), qd, qdd)
+        return np.minimum(counts[:-1], counts[1:])
+
+    @cached_property
+    def jumps(self) -> tuple[Array, Array]:
+        """Largest jumps of the highest derivative, and of the one after it, near to each piece, (N - 1, n).
+
+        They tell whether the rows resolve the motion: where that changes its law between two rows, the pieces
+        beside each other disagree.
+        """
+        order = int(self.highest.max())
+        return self._jumps_near(order), self._jumps_near(order + 1)
+
+    def _jumps_near(self, order: int) -> Array:
+        top, lengths = derivative_coefficients(self.coefficients, order), self.lengths[:, None]
+        ends = horner(top, lengths)
+        jump = np.abs(top[-1, 1:] - ends[:-1])  # at each inner row
+        outer = np.zeros((2, top.shape[2]))
+        if len(lengths) > 1:  # at the first and the last row, against what the piece beside goes on with
+            outer[0] = np.abs(top[-1, 0] - horner(top[:, 1], -lengths[0]))
+            outer[1] = np.abs(ends[-1] - horner(top[:, -2], lengths[-2] + lengths[-1]))
+        padded = np.concatenate([outer[:1], outer[:1], jump, outer[1:], outer[1:]])
+        return np.asarray(np.max([padded[k : k + len(lengths)] for k in range(4)], axis=0))
+
+    def piece_rows(self, piece: NDArray[np.intp], joint: NDArray[np.intp], count: int) -> PieceRows:
+        """Return what stands at the ends of pieces (m,), for one joint each.
+
+        Args:
+            piece: Indices of pieces.
+            joint: Of each the index of a joint.
+            count: How many of position, velocity and acceleration the pieces use.
+        """
+        roundings = (self.resolution.q, self.resolution.qd, self.resolution.qdd)
+        ends, errors = [], []
+        for values, rounding in zip(self.states[:count], roundings, strict=False):
+            if values is None:
+                break
+            both = np.stack([values[piece, joint], values[piece + 1, joint]])
+            absolute = np.broadcast_to(rounding, values.shape[1:])[joint]
+            ends.append(both)
+            errors.append(stated_errors(both, absolute, self.resolution.relative).max(axis=0))
+        return PieceRows(self.lengths[piece], self.late[piece], tuple(ends), tuple(errors))
+
+    def runs(self) -> Iterator[tuple[tuple[int, int], int, int]]:
+        """Yield the moves before and after intervals, and the first and the last + 1 of neighbours alike."""
+        pairs = np.stack([self.moves[self.first : self.last], self.moves[self.first + 1 : self.last + 1]])
+        if pairs.size and (pairs == pairs[0, 0]).all():
+            yield (int(pairs[0, 0]), int(pairs[0, 0])), self.first, self.last
+            return
+        borders = np.flatnonzero((np.diff(pairs, axis=1) != 0).any(axis=0)) + 1
+        edges = [0, *borders.tolist(), pairs.shape[1]]
+        for low, high in pairwise(edges):
+            if high > low:
+                before, after = pairs[:, low].tolist()
+                yield (before, after), self.first + low, self.first + high
+
+    def row_at(self, piece: int, local: float) -> int:
+        """Return the number of the row at a time within a piece, or before it."""
+        at_end = local >= self.lengths[piece] * (1 - 1e-12)
+        return int(self.rows[piece + 1 if at_end else piece])

@@ -1,0 +1,344 @@
+"""Limits of joints for all t, on the curve through recorded rows.
+
+Three things are told apart. What a row states, or what the difference of two rows makes certain by the mean
+value theorem, holds for every consumer. What the curve does between the rows holds for those who join them by
+it. And where rows stand so dense that controllers take them one by one, a curve that goes beyond a limit only
+because the motion changes its law between two rows is a warning, unless somebody asked for that curve.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajcli.checks.finding import at_time
+from trajcli.checks.tolerances import exceeds
+from trajcli.curves.approach import ROOM, allowed_speed, uses_of_pieces
+from trajcli.curves.bernstein import control_points
+from trajcli.curves.extrema import critical_points
+from trajcli.curves.piecewise import Array, derivative_coefficients, horner
+from trajcli.errors import Amount
+from trajcli.frozen import frozen
+from trajcli.judge.finding import Certainty, FindingSeverity, JudgedFinding, JudgedKind, Worst
+from trajcli.judge.intervals import DENSE, Intervals, JointAxes
+from trajcli.judge.rounding import PieceRows
+from trajcli.kinematics.robot import Limits
+
+_KINDS: tuple[JudgedKind, ...] = ("position", "velocity", "acceleration", "jerk")
+
+_UNRESOLVED, _UNRESOLVED_LAST = 0.2, 1.5
+"""Of the jump of the highest derivative times powers of the length: how far a piece may go beyond a motion
+that changes its law once between two rows (0.143 and 1.5 at most)."""
+_CURVED = 0.1
+"""Likewise of the jump of the derivative after that: how far a piece bends beside a motion that bends on
+(1/12 at most)."""
+_MANY = 20000  # pieces and joints over a limit from which on only the worst of them are looked at closely
+
+
+@frozen
+class _Offences:
+    """Pieces that go beyond one bound of one order, m of them; values are turned so that more is worse.
+
+    Attributes:
+        piece: Index of each, shape (m,).
+        joint: Index of its joint.
+        value: The largest on the piece.
+        local: Seconds from the start of the piece.
+        bound: The limit.
+    """
+
+    piece: NDArray[np.intp]
+    joint: NDArray[np.intp]
+    value: Array
+    local: Array
+    bound: Array
+
+
+def judge_limits(
+    window: Intervals,
+    pieces: slice,
+    limits: Limits,
+    move: int,
+    axes: JointAxes,
+    worst: Worst,
+    *,
+    asked: bool,
+) -> None:
+    """Add where joints go beyond their limits in pieces of one move.
+
+    Args:
+        window: The rows.
+        pieces: Which ones.
+        limits: In force.
+        move: Its index, -1 for none.
+        axes: The joints.
+        worst: What is added to.
+        asked: Whether somebody asked for this curve.
+    """
+    coefficients, lengths = window.coefficients[:, pieces], window.lengths[pieces, None]
+    highest = window.highest[pieces]
+    for order in range(int(highest.max(initial=0)) + 1):
+        bounds = limits.of_order(order)
+        if not np.isfinite(bounds).any():
+            continue
+        derivative = derivative_coefficients(coefficients, order)
+        hull = control_points(derivative, lengths)
+        turned = ((1.0, bounds[:, 1], hull.max(axis=0)), (-1.0, -bounds[:, 0], -hull.min(axis=0)))
+        for sign, bound, most in turned:
+            over = exceeds(most, bound)
+            if not over.any():
+                continue
+            for level in set(highest[over.any(axis=1)].tolist()):
+                side = _Side(window, order, sign, bound, level, pieces.start)
+                alike = over & (highest == level)[:, None]
+                offences = side.offences(sign * derivative, alike, most) if order <= level else None
+                if offences is not None:
+                    side.add(offences, move, axes, worst, asked=asked)
+
+
+@frozen
+class _Side:
+    """The limits of one side of one order, for pieces of one degree.
+
+    Attributes:
+        window: The rows.
+        order: 0 for positions.
+        sign: 1 for upper limits, -1 for lower ones.
+        bound: Times the sign, shape (n,).
+        level: Order of the highest derivative that the pieces determine.
+        first: Index of the first piece.
+    """
+
+    window: Intervals
+    order: int
+    sign: float
+    bound: Array
+    level: int
+    first: int
+
+    def offences(self, polynomials: Array, over: NDArray[np.bool_], most: Array) -> _Offences | None:
+        """Return the pieces whose polynomials go beyond the bound, from those whose control points do."""
+        piece, joint = np.nonzero(over)
+        chosen, length = polynomials[:, piece, joint], self.window.lengths[self.first + piece]
+        start, end, bound = chosen[-1], horner(chosen, length), self.bound[joint]
+        value, local = np.maximum(start, end), np.where(end > start, length, 0.0)
+        if len(chosen) > 2:
+            near = np.arange(piece.size)
+            if piece.size > _MANY:
+                known = np.full(self.bound.size, -np.inf)
+                np.maximum.at(known, joint, value)
+                near = np.flatnonzero(~exceeds(value, bound) | (most[piece, joint] > known[joint]))
+            for low in range(0, near.size, _MANY):
+                _refine(chosen, length, near[low : low + _MANY], value, local)
+        beyond = np.flatnonzero(exceeds(value, bound))
+        if not beyond.size:
+            return None
+        return _Offences(
+            self.first + piece[beyond], joint[beyond], value[beyond], local[beyond], bound[beyond]
+        )
+
+    def add(self, found: _Offences, move: int, axes: JointAxes, worst: Worst, *, asked: bool) -> None:
+        """Add pieces beyond the bound, by what is certain about them."""
+        count = 1 if self.window.interpolation == "jtc-upsampling" else max(self.level, 1)
+        rows = self.window.piece_rows(found.piece, found.joint, count)
+        error = rows.error(self.order)
+        stated, certain_part = _stated(rows, self.order, self.sign)
+        by_rows = exceeds(stated, found.bound) & (certain_part > found.bound)
+        by_curve = found.value - found.bound > error
+        value = np.where(by_rows & ~by_curve, np.minimum(stated, found.value), found.value)
+        certain, warned = by_rows | by_curve, np.zeros(value.shape, dtype=bool)
+        if not asked and by_curve.any():
+            warned = by_curve & ~by_rows & self._unresolved(found, error)
+        excess = value / found.bound if self.order else value - found.bound
+
+        def make(k: int) -> JudgedFinding:
+            return self._finding(found, k, float(value[k]), float(error[k]), axes, warned=bool(warned[k]))
+
+        groups: tuple[tuple[NDArray[np.bool_], FindingSeverity, Certainty], ...] = (
+            (certain & ~warned, "error", "exceeded"),
+            (~certain, "error", "within rounding"),
+            (warned, "warning", "exceeded"),
+        )
+        for chosen, severity, certainty in groups:
+            worst.add(
+                _KINDS[self.order],
+                move,
+                found.joint,
+                excess,
+                make,
+                severity=severity,
+                certainty=certainty,
+                chosen=chosen,
+            )
+
+    def _unresolved(self, found: _Offences, error: Array) -> NDArray[np.bool_]:
+        """Return where a change of the law between two rows explains what the curve goes beyond the bound."""
+        length = self.window.lengths[found.piece]
+        below = self.level - self.order
+        share = _UNRESOLVED if below else _UNRESOLVED_LAST
+        highest, beyond = (jumps[found.piece, found.joint] for jumps in self.window.jumps)
+        explained = share * length**below * highest + _CURVED * length ** (below + 1) * beyond
+        return np.asarray((length <= DENSE) & (found.value - found.bound <= explained + error))
+
+    def _finding(
+        self, found: _Offences, k: int, value: float, error: float, axes: JointAxes, *, warned: bool
+    ) -> JudgedFinding:
+        piece, joint, local = int(found.piece[k]), int(found.joint[k]), float(found.local[k])
+        bound, kind = float(found.bound[k]), _KINDS[self.order]
+        time = float(self.window.t[piece]) + local
+        what = f"the {kind} of {{joint}} reaches {{value}} {at_time(time)}, its limit is {{limit}}"
+        if warned:
+            what += "; between the rows only, where the motion changes its law"
+        return JudgedFinding(
+            rule="limit",
+            severity="error",
+            kind=kind,
+            joint=axes.names[joint],
+            value=self.sign * value,
+            limit=self.sign * bound,
+            time=time,
+            row=self.window.row_at(piece, local),
+            factor=(value / bound) ** (1 / self.order) if self.order else None,
+            rounding=error,
+            message=what,
+            amounts=axes.amounts(joint, self.order, self.sign * value, self.sign * bound),
+        )
+
+
+def _refine(polynomials: Array, lengths: Array, near: NDArray[np.intp], value: Array, local: Array) -> None:
+    """Raise values of some polynomials to their largest ones, and move times to where these are."""
+    chosen, length = polynomials[:, near], lengths[near]
+    (inside,) = critical_points(chosen[:, :, None], length, (0,))
+    times = inside[:, :, 0]
+    values = horner(chosen, times)
+    best, columns = values.argmax(axis=0), np.arange(near.size)
+    top, when = values[best, columns], times[best, columns]
+    better = top > value[near]
+    value[near[better]], local[near[better]] = top[better], when[better]
+
+
+def _stated(rows: PieceRows, order: int, sign: float) -> tuple[Array, Array]:
+    """Return what rows, or their differences, state of a derivative, and what of it is certain."""
+    stated = certain = np.full(rows.length.shape, -np.inf)
+    if order < len(rows.ends):
+        stated = (sign * rows.ends[order]).max(axis=0)
+        certain = stated - rows.errors[order]
+    if 0 < order <= len(rows.ends):
+        slope, error = rows.difference(order - 1)
+        stated = np.where(sign * slope - error > certain, sign * slope, stated)
+        certain = np.maximum(certain, sign * slope - error)
+    return stated, certain
+
+
+_HOPELESS = 1e4  # a stretch that is larger is none
+
+
+def judge_velocity_by_position(
+    window: Intervals, pieces: slice, limits: Limits, move: int, axes: JointAxes, worst: Worst
+) -> None:
+    """Add where joints move faster towards the end of their range than their distance from there allows.
+
+    Args:
+        window: The rows.
+        pieces: Which ones; of a degree of one at least.
+        limits: In force.
+        move: Its index, -1 for none.
+        axes: The joints.
+        worst: What is added to.
+    """
+    if not limits.has_velocity_by_position or int(window.highest[pieces].max(initial=0)) < 1:
+        return
+    used, times = uses_of_pieces(window.coefficients[:, pieces], window.lengths[pieces], limits.approach, 1.0)
+    found = np.nonzero(exceeds(used, 1.0))
+    if not found[0].size:
+        return
+    fast = _fast_approaches(window, pieces, limits, found, (times[found], used[found]))
+    certainties: tuple[Certainty, ...] = ("exceeded", "within rounding")
+    for certainty in certainties:
+        chosen = fast.certain == (certainty == "exceeded")
+        worst.add(
+            "velocity_by_position",
+            move,
+            fast.joint,
+            fast.used,
+            lambda k: fast.finding(window, axes, k),
+            certainty=certainty,
+            chosen=chosen,
+        )
+
+
+@frozen
+class _FastApproaches:
+    """Where joints approach the ends of their ranges too fast, m of them.
+
+    Attributes:
+        piece: Index of each, shape (m,).
+        joint: Index of its joint.
+        local: Seconds from the start of the piece.
+        distance: To the end of the range, SI.
+        speed: Signed, SI.
+        bound: On it, with its sign.
+        rounding: By how much the speed may be off beside its bound.
+        used: Share of the bound.
+    """
+
+    piece: NDArray[np.intp]
+    joint: NDArray[np.intp]
+    local: Array
+    distance: Array
+    speed: Array
+    bound: Array
+    rounding: Array
+    used: Array
+
+    @property
+    def certain(self) -> NDArray[np.bool_]:
+        """Which of them rounding does not explain."""
+        return np.asarray(np.abs(self.speed) - np.abs(self.bound) > self.rounding)
+
+    def finding(self, window: Intervals, axes: JointAxes, k: int) -> JudgedFinding:
+        """Return one of them as a finding."""
+        piece, joint, local = int(self.piece[k]), int(self.joint[k]), float(self.local[k])
+        value, limit = float(self.speed[k]), float(self.bound[k])
+        time = float(window.t[piece]) + local
+        ahead = Amount(abs(float(self.distance[k])), 0, joint, axes.dimension(joint))
+        where = "beyond" if self.distance[k] < 0 else "before"
+        speed = f"the velocity of {{joint}} reaches {{value}} {at_time(time)}, {{distance}} {where} the end"
+        return JudgedFinding(
+            rule="limit",
+            severity="error",
+            kind="velocity_by_position",
+            joint=axes.names[joint],
+            value=value,
+            limit=limit,
+            time=time,
+            row=window.row_at(piece, local),
+            factor=float(self.used[k]) if self.used[k] < _HOPELESS else None,
+            rounding=float(self.rounding[k]),
+            message=f"{speed} of its range, where its limit is {{limit}}",
+            amounts={**axes.amounts(joint, 1, value, limit), "distance": ahead},
+        )
+
+
+def _fast_approaches(
+    window: Intervals,
+    pieces: slice,
+    limits: Limits,
+    found: tuple[NDArray[np.intp], ...],
+    at: tuple[Array, Array],
+) -> _FastApproaches:
+    """Return the states in which limits are used most, from indices of uses, their times and sizes."""
+    limited, (piece, column), (local, used) = limits.approach.limited, found, at
+    joint, piece = limited[column % limited.size], piece + pieces.start
+    chosen = window.coefficients[:, piece, joint]
+    position, speed = horner(chosen, local), horner(derivative_coefficients(chosen, 1), local)
+    rows = window.piece_rows(piece, joint, max(int(window.highest[piece].max()), 1))
+    upwards = column < limited.size
+    low, high = limits.position[joint].T
+    distance = np.where(upwards, high - position, position - low)
+    d, o = limits.approach.deceleration[joint], limits.approach.offset[joint]
+    bound, roomy = (allowed_speed(distance + more, d, o) - ROOM for more in (0.0, rows.error(0)))
+    bound = np.where(bound > ROOM, bound, 0.0)
+    sign = np.where(upwards, 1.0, -1.0)
+    rounding = rows.error(1) + np.maximum(roomy - bound, 0.0)
+    return _FastApproaches(piece, joint, local, distance, speed, sign * bound, rounding, used)

@@ -1,0 +1,164 @@
+"""Time stamps: finite, strictly increasing, and multiples of a period as far as their rounding tells.
+
+Stamps that all lie within their rounding of multiples of one period are such multiples: 0.041667 s with six
+decimals is 1/24 s. The period is the simplest fraction, numerator and denominator smallest, that fits all of
+them.
+
+Source: Graham, Knuth and Patashnik, Concrete Mathematics (1994), section 6.7, for the simplest fraction.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from math import floor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajcli.curves.piecewise import Array
+from trajcli.errors import TrajcliError
+from trajcli.frozen import frozen
+
+_FEW = 3  # rows that make no period
+_ROUNDING = 4.0  # units in the last place that a sum of periods may be off
+_SLACK = 1e-9  # of the period: what adding it up row by row may be off, and nobody's limit notices
+_TERMS = 60  # of a continued fraction
+
+
+class UnfitError(TrajcliError):
+    """A stamp does not fit the period of those before it: all must be taken as they are."""
+
+
+@frozen
+class Lattice:
+    """Multiples of a period.
+
+    Attributes:
+        origin: Of the first stamp, s.
+        period: s.
+        room: By how much stamps may be beside its multiples because the first one was rounded, s.
+    """
+
+    origin: float
+    period: float
+    room: float = 0.0
+
+
+class Stamps:
+    """Time stamps, block by block.
+
+    Attributes:
+        lattice: What all of them lie on; None where they do not, or before the first block.
+        largest_snap: By how much a stamp was moved onto it at most, s.
+        regular: Whether all rows but the last are one period apart.
+    """
+
+    def __init__(self, error: float, relative: float, *, snap: bool = True) -> None:
+        """Begin with no stamps.
+
+        Args:
+            error: Half a unit of their last decimal, s.
+            relative: Rounding as a share of each.
+            snap: Whether they may be moved onto multiples of a period.
+        """
+        self._error, self._relative, self._snap = error, relative, snap
+        self.lattice: Lattice | None = None
+        self.largest_snap, self.regular = 0.0, True
+        self._begun, self._off, self._index = False, False, 0
+
+    def errors(self, t: Array) -> Array:
+        """Return by how much stamps (N,) may be off as they are written."""
+        size = np.abs(t)
+        return np.asarray(self._error + self._relative * size + np.spacing(size))
+
+    def taken(self, t: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Return strictly increasing stamps (N,) as they are meant, and which of them are exact.
+
+        Raises:
+            UnfitError: When they do not fit the period that the first block has.
+        """
+        if not self._begun:
+            self._begun = True
+            self.lattice = lattice_of(t, self.errors(t)) if self._snap else None
+            self.regular = self.lattice is not None
+        if self.lattice is None:
+            return t, np.zeros(t.size, dtype=bool)
+        if self._off:
+            raise UnfitError("a time stamp does not fit the period")
+        origin, period = self.lattice.origin, self.lattice.period
+        steps = np.rint((t - origin) / period)
+        meant = origin + steps * period
+        room = self.errors(t) + _SLACK * period + _ROUNDING * np.spacing(np.abs(meant)) + self.lattice.room
+        fits = np.abs(t - meant) <= room
+        if not fits[:-1].all():
+            raise UnfitError("a time stamp does not fit the period")
+        self._off = not fits[-1]  # the last row may stand at the end of the motion
+        counted = np.diff(np.append(self._index - 1 if steps[0] else -1, steps[fits]))
+        self.regular = self.regular and bool((counted == 1).all())
+        self._index = int(steps[fits][-1]) + 1 if fits.any() else self._index
+        self.largest_snap = max(self.largest_snap, float(np.abs(t - meant)[fits].max(initial=0.0)))
+        return np.where(fits, meant, t), fits
+
+
+def lattice_of(t: Array, errors: Array) -> Lattice | None:
+    """Return what strictly increasing stamps (N,) lie on, the last one perhaps beside it; None for nothing.
+
+    Args:
+        t: Stamps, s.
+        errors: By how much each may be off, shape (N,).
+    """
+    if t.size < _FEW:
+        return None
+    inner = t[:-1] if t.size > _FEW else t
+    period = float(np.median(np.diff(inner)))
+    errors = errors[: inner.size] + _SLACK * period
+    since, error = inner - t[0], 2.0 * float(errors.max())
+    if 4.0 * error > period and np.ptp(np.diff(inner)) <= _SLACK * period:  # equal as they are written
+        errors, error = np.full_like(errors, _SLACK * period), 2.0 * _SLACK * period
+    counted = max(0.2 * period / error, 1.0)  # up to here a guess that is off by rounding miscounts no row
+    while True:
+        steps = np.rint(since / period)
+        near = (steps > 0) & (steps <= max(counted, steps[1]))
+        if not near.any():
+            return None
+        low = float(((since - errors - errors[0])[near] / steps[near]).max())
+        high = float(((since + errors + errors[0])[near] / steps[near]).min())
+        if low > high:
+            return None
+        if counted >= steps[-1]:
+            period = simplest_between(low, high)
+            break
+        period = 0.5 * (low + high)
+        counted *= max(0.1 * period / error, 2.0)
+    origin = _origin(float(t[0]), period, float(errors[0]))
+    room = float(errors[0]) if origin == t[0] else 0.0
+    steps = np.rint(since / period)
+    rest = np.abs(inner - (origin + steps * period)) - room
+    fits = (rest <= errors + _ROUNDING * np.spacing(np.abs(inner))).all() and (np.diff(steps) > 0).all()
+    return Lattice(origin, period, room) if fits else None
+
+
+def _origin(first: float, period: float, error: float) -> float:
+    """Return the multiple of the period that the first stamp is, or the stamp itself."""
+    steps = np.rint(first / period)
+    near = abs(first - steps * period) <= error and abs(steps) < 2**40
+    return float(steps * period) if near else first
+
+
+def simplest_between(low: float, high: float) -> float:
+    """Return the fraction with the smallest denominator between two positive numbers, as a float."""
+    if low <= 0.0:
+        return 0.5 * (low + high)
+    a, b = Fraction(low), Fraction(high)
+    terms: list[int] = []
+    for _ in range(_TERMS):
+        whole = floor(a)
+        if whole == a or whole + 1 <= b:
+            terms.append(whole if whole == a else whole + 1)
+            break
+        terms.append(whole)
+        a, b = 1 / (b - whole), 1 / (a - whole)
+    value = Fraction(terms.pop())
+    while terms:
+        value = terms.pop() + 1 / value
+    return float(value)

@@ -1,0 +1,236 @@
+"""Tool of an arm over recorded rows: its limits, its path, and nearness to singularities."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajcli.checks.finding import at_time
+from trajcli.checks.tolerances import TOOL_RELATIVE
+from trajcli.checks.tool_bound import ToolPeak, tool_bounds
+from trajcli.checks.tool_limits import SPEEDS, limits_tool
+from trajcli.curves.piecewise import Array, derivative_coefficients, horner
+from trajcli.errors import Amount
+from trajcli.judge.finding import JudgedFinding, JudgedKind, Worst
+from trajcli.judge.intervals import Intervals
+from trajcli.judge.tool_path import RecordedPath
+from trajcli.kinematics.dexterity import characteristic_length
+from trajcli.kinematics.following.motion import ToolMotion
+from trajcli.kinematics.forward import forward
+from trajcli.kinematics.jacobian import jacobian
+from trajcli.kinematics.robot import Robot
+
+_PIECES = 2048  # at a time: nine configurations of each are looked at
+_TURN = 0.05  # rad or m that a joint moves between the rows at which nearness to a singularity is looked at
+_NEAR_SINGULAR = (
+    1e-3  # smallest over largest singular value: a joint turns a thousand times as fast as the tool
+)
+_SAME_STEP = 4.0  # times the steps beside it: more is a jump of the tool
+_STEP = 1e-6  # m or rad: a step of the tool that is none
+
+
+class ToolJudge:
+    """What is judged of the tool.
+
+    Attributes:
+        notes: What could not be judged.
+    """
+
+    def __init__(self, robot: Robot, paths: Mapping[int, ToolMotion | None] | None = None) -> None:
+        """Begin with no rows.
+
+        Args:
+            robot: An arm with geometry.
+            paths: By move, where its tool shall go; None for a move in joint space. None without a job.
+        """
+        self._robot, self._paths = robot, paths
+        self._length = characteristic_length(robot)
+        self._recorded: dict[int, RecordedPath] = {}
+        self._worst = Worst()
+        self._moved, self._seen = 0.0, -1
+        self.notes: list[str] = []
+        for move, motion in (paths or {}).items():
+            if motion is not None and motion.path is None:
+                self.notes.append(f"move {move}: its segments overlap, the distance from them is not judged")
+            elif motion is not None:
+                self._recorded[move] = RecordedPath(robot, motion, move, self._worst)
+
+    def see(self, window: Intervals, pieces: slice, robot: Robot, move: int) -> None:
+        """Judge the tool in the pieces of one move.
+
+        Args:
+            window: The rows.
+            pieces: Which ones.
+            robot: The arm with the limits in force.
+            move: Its index, -1 for none.
+        """
+        if limits_tool(robot) and int(window.highest[pieces].max(initial=0)) > 0:
+            for low in range(pieces.start, pieces.stop, _PIECES):
+                self._judge_limits(window, slice(low, min(low + _PIECES, pieces.stop)), robot, move)
+        path = self._recorded.get(move)
+        if path is not None:
+            path.see(window, pieces)
+        if self._paths is None or path is not None:
+            self._judge_singularity(window, pieces, move)
+
+    def findings(self) -> list[JudgedFinding]:
+        """Return what was found."""
+        return self._worst.findings()
+
+    def changes_branch(self, q: Array, jump: int) -> bool:
+        """Return whether the tool goes on smoothly where joints jump.
+
+        Args:
+            q: Rows (N, n) around, rad or m.
+            jump: Index of the row before the jump.
+        """
+        poses = forward(self._robot, q)
+        poses[:, :3, 3] /= self._length
+        steps = np.linalg.norm(np.diff(poses, axis=0), axis=(1, 2))
+        others = np.delete(steps, jump)
+        return bool(steps[jump] <= _SAME_STEP * others.max(initial=0.0) + _STEP)
+
+    def _judge_limits(self, window: Intervals, pieces: slice, robot: Robot, move: int) -> None:
+        coefficients = window.coefficients[:, pieces]
+        breaks = window.t[pieces.start] + np.append(0.0, np.cumsum(window.lengths[pieces]))
+        with np.errstate(over="ignore", invalid="ignore"):
+            bounds = tool_bounds(robot, breaks, coefficients)
+        for (kind, name, order), peak in zip(SPEEDS, bounds, strict=True):
+            limit = float(getattr(robot.limits.tcp, name))
+            if order > int(window.highest[pieces].max()) or peak.most <= limit * (1 + TOOL_RELATIVE):
+                continue
+            self._add_peak(window, pieces, (kind, name, order), peak, limit, move)
+
+    def _add_peak(
+        self,
+        window: Intervals,
+        pieces: slice,
+        what: tuple[str, str, int],
+        peak: ToolPeak,
+        limit: float,
+        move: int,
+    ) -> None:
+        kind, name, order = what
+        piece = int(np.clip(np.searchsorted(window.t, peak.time, "right") - 1, pieces.start, pieces.stop - 1))
+        rounding = self._rounding(window, piece, order)
+        length = not name.startswith("angular")
+        text = (
+            f"the {name.replace('_', ' ')} of the tool reaches {{value}} {at_time(peak.time)}, its limit is "
+        )
+        finding = JudgedFinding(
+            rule="limit",
+            severity="error",
+            kind=_kind(kind),
+            joint=None,
+            value=peak.most,
+            limit=limit,
+            time=peak.time,
+            row=window.row_at(piece, peak.time - float(window.t[piece])),
+            factor=(peak.most / limit) ** (1 / order),
+            method="bounded",
+            rounding=rounding,
+            message=text + ", its limit is {limit}",
+            amounts={
+                "value": Amount(peak.most, order, None, "length" if length else "angle", "up"),
+                "limit": Amount(limit, order, None, "length" if length else "angle", "down"),
+            },
+        )
+        certainty = "exceeded" if peak.most - limit > rounding else "within rounding"
+        count = max(self._over(window, pieces, what, limit), 1)
+        self._worst.add(
+            _kind(kind),
+            move,
+            np.full(count, -1),
+            np.full(count, peak.most / limit),
+            lambda _: finding,
+            certainty="exceeded" if certainty == "exceeded" else "within rounding",
+        )
+
+    def _over(self, window: Intervals, pieces: slice, what: tuple[str, str, int], limit: float) -> int:
+        """Return at how many rows a speed of the tool is over its limit; 0 for accelerations."""
+        _, name, order = what
+        if order != 1:
+            return 0
+        coefficients = window.coefficients[:, pieces]
+        q, qd = coefficients[-1], derivative_coefficients(coefficients, 1)[-1]
+        twist = (jacobian(self._robot, q) @ qd[..., None])[..., 0]
+        part = twist[:, 3:] if name.startswith("angular") else twist[:, :3]
+        return int((np.linalg.norm(part, axis=1) > limit).sum())
+
+    def _rounding(self, window: Intervals, piece: int, order: int) -> float:
+        """Return by how much a speed or acceleration of the tool may be off by the rounding of the rows."""
+        count = max(int(window.highest[piece]), 1)
+        joints = np.arange(window.coefficients.shape[2])
+        rows = window.piece_rows(np.full(joints.size, piece), joints, min(count, 3))
+        errors = [rows.error(k) for k in range(min(order, int(window.highest[piece])) + 1)]
+        arm = self._length
+        rates = [
+            np.abs(horner(derivative_coefficients(window.coefficients[:, piece], k), rows.length)).sum()
+            for k in range(3)
+        ]
+        total = arm * (errors[-1].sum() + errors[0].sum() * rates[order])
+        if order == 2:
+            total += 2.0 * arm * rates[1] * (errors[1].sum() + errors[0].sum() * rates[1])
+        return float(total)
+
+    def _judge_singularity(self, window: Intervals, pieces: slice, move: int) -> None:
+        """Warn where the smallest singular value of the scaled Jacobian is a small part of the largest."""
+        rows = self._sparse_rows(window, pieces)
+        if not rows.size:
+            return
+        q = np.asarray(window.states[0])[rows]
+        scaled = jacobian(self._robot, q)
+        scaled[:, :3] /= self._length
+        values = np.linalg.svd(scaled, compute_uv=False)
+        share = values[:, -1] / values[:, 0]
+        near = np.flatnonzero(share < _NEAR_SINGULAR)
+        if not near.size:
+            return
+
+        def make(k: int) -> JudgedFinding:
+            row, time = int(rows[near[k]]), float(window.t[rows[near[k]]])
+            return JudgedFinding(
+                rule="path",
+                severity="warning",
+                kind="singularity",
+                joint=None,
+                value=float(share[near[k]]),
+                limit=_NEAR_SINGULAR,
+                time=time,
+                row=int(window.rows[row]),
+                method="sampled",
+                message=f"the arm is near to a singularity {at_time(time)}: the smallest singular value of "
+                f"its Jacobian is {share[near[k]]:.3g} of the largest",
+            )
+
+        self._worst.add(
+            "singularity",
+            move,
+            np.full(near.size, -1),
+            1.0 / np.maximum(share[near], 1e-300),
+            make,
+            severity="warning",
+        )
+
+    def _sparse_rows(self, window: Intervals, pieces: slice) -> NDArray[np.intp]:
+        """Return indices of rows between which some joint moves by a twentieth of a radian, and the first."""
+        q = np.asarray(window.states[0])[pieces.start : pieces.stop + 1]
+        steps = np.abs(np.diff(q, axis=0)).max(axis=1)
+        moved = self._moved + np.append(0.0, np.cumsum(steps))
+        number = np.floor(moved / _TURN).astype(np.int64)
+        new = np.flatnonzero(np.diff(number, prepend=self._seen) > 0)
+        self._moved, self._seen = float(moved[-1]), int(number[-1])
+        return np.asarray(new + pieces.start, dtype=np.intp)
+
+
+def _kind(kind: str) -> JudgedKind:
+    """Return the kind of finding about a limit of the tool."""
+    kinds: dict[str, JudgedKind] = {
+        "tool_speed": "tool_speed",
+        "tool_angular_speed": "tool_angular_speed",
+        "tool_acceleration": "tool_acceleration",
+        "tool_angular_acceleration": "tool_angular_acceleration",
+    }
+    return kinds[kind]

@@ -1,0 +1,186 @@
+"""Recorded tool along the line, arc or path of a job: distance, orientation and branch, on rows."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajcli.checks.finding import at_time
+from trajcli.checks.tolerances import exceeds
+from trajcli.curves.piecewise import Array, horner
+from trajcli.errors import Amount
+from trajcli.judge.finding import Certainty, JudgedFinding, Worst
+from trajcli.judge.intervals import Intervals
+from trajcli.judge.rounding import stated_errors
+from trajcli.kinematics.dexterity import characteristic_length
+from trajcli.kinematics.following.motion import ToolMotion
+from trajcli.kinematics.following.tool_path import ToolPath
+from trajcli.kinematics.inverse.target import residual_jacobian, residuals
+from trajcli.kinematics.jacobian import linearisation
+from trajcli.kinematics.robot import Robot
+
+_SAMPLES = 1000  # of a path, where the nearest point is looked for first
+_STEPS = 8  # of Gauss and Newton from there
+_ROWS = 1024  # at a time
+
+
+class RecordedPath:
+    """The tool of one move beside the path on which it shall be."""
+
+    def __init__(self, robot: Robot, motion: ToolMotion, move: int, worst: Worst) -> None:
+        """Begin with no rows.
+
+        Args:
+            robot: An arm with geometry.
+            motion: Where its tool shall go; with a path.
+            move: Index of the move.
+            worst: What is added to.
+        """
+        assert motion.path is not None  # noqa: S101
+        self._robot, self._motion, self._move, self._worst = robot, motion, move, worst
+        self._path: ToolPath = motion.path
+        self._arm = characteristic_length(robot)
+        inner = np.linspace(0.0, self._path.length, _SAMPLES)
+        self._s = np.unique(np.concatenate([inner, self._path.breaks]))
+        self._poses = self._path.poses.evaluate(self._s, "right")[0]
+        self._sign = 0.0
+
+    def see(self, window: Intervals, pieces: slice) -> None:
+        """Judge the rows of some pieces, and the middle between them where the curve is no straight line."""
+        last = pieces.stop + (window.ends and pieces.stop == window.last)
+        q = np.asarray(window.states[0])
+        for low in range(pieces.start, last, _ROWS):
+            rows = np.arange(low, min(low + _ROWS, last))
+            room = self._room(q[rows], window)
+            self._judge(q[rows], window.t[rows], window.rows[rows], room)
+            inner = rows[rows < pieces.stop]
+            if int(window.highest[pieces].max(initial=0)) > 1 and inner.size:
+                half = 0.5 * window.lengths[inner]
+                middle = horner(window.coefficients[:, inner], half[:, None])
+                self._judge(middle, window.t[inner] + half, window.rows[inner], room[: inner.size])
+
+    def _room(self, q: Array, window: Intervals) -> Array:
+        """Return by how much the tool may be off by the rounding of the rows, m and rad alike, (N,)."""
+        off = stated_errors(q, np.asarray(window.resolution.q), window.resolution.relative)
+        return np.asarray(2.0 * max(self._arm, 1.0) * off.sum(axis=1))
+
+    def _judge(self, q: Array, t: Array, numbers: NDArray[np.int64], room: Array) -> None:
+        poses, jacobians = linearisation(self._robot, q)
+        s = self._nearest(poses)
+        target = self._path.at_s(s, "right").target()
+        off, split = residuals(target, poses), sum(target.position)
+        sizes = np.linalg.norm(off[:, :split], axis=1), np.linalg.norm(off[:, split:], axis=1)
+        tolerance = self._motion.tolerance
+        for quantity, size, limit in zip(
+            ("position", "orientation"), sizes, (tolerance.position, tolerance.angle), strict=True
+        ):
+            self._add(quantity, size, limit, t, numbers, room)
+        slopes = residual_jacobian(target, poses, jacobians)
+        if slopes.shape[1] == slopes.shape[2] and target.orientation != "direction":
+            slopes[:, :split] /= self._arm
+            self._watch_branch(np.sign(np.linalg.det(slopes)), t, numbers)
+
+    def _nearest(self, poses: Array) -> Array:
+        """Return the values of s (N,) at which the path is nearest to the tool."""
+        turning = self._path.poses.pure_rotation
+        rows = slice(0, 3)
+        known, own = (
+            (each[:, rows, :3].reshape(len(each), -1) if turning else each[:, :3, 3])
+            for each in (self._poses, poses)
+        )
+        square = (own**2).sum(axis=1)[:, None] - 2.0 * own @ known.T + (known**2).sum(axis=1)
+        s = self._s[square.argmin(axis=1)]
+        step = self._path.length / _SAMPLES
+        for _ in range(_STEPS):
+            reference = self._path.at_s(s, "right")
+            slope = reference.first[:, 3:] if turning else reference.first[:, :3]
+            apart = self._apart(reference.poses, poses, turning=turning)
+            size = np.maximum((slope**2).sum(axis=1), 1e-300)
+            change = np.clip((slope * apart).sum(axis=1) / size, -step, step)
+            s = np.clip(s + change, 0.0, self._path.length)
+        return np.asarray(s)
+
+    @staticmethod
+    def _apart(reference: Array, poses: Array, *, turning: bool) -> Array:
+        """Return the vector from the reference to the tool, or about which it is turned to first order."""
+        if not turning:
+            return np.asarray(poses[:, :3, 3] - reference[:, :3, 3])
+        axes = (np.cross(reference[:, :3, k], poses[:, :3, k]) for k in range(3))
+        return np.asarray(0.5 * sum(axes))
+
+    def _add(
+        self, quantity: str, sizes: Array, limit: float, t: Array, numbers: NDArray[np.int64], room: Array
+    ) -> None:
+        over = np.flatnonzero(exceeds(sizes, limit))
+        if not over.size:
+            return
+        dimension: Literal["length", "angle"] = "length" if quantity == "position" else "angle"
+
+        def make(k: int) -> JudgedFinding:
+            row = over[k]
+            value, time = float(sizes[row]), float(t[row])
+            what = "is beside" if quantity == "position" else "is turned from"
+            return JudgedFinding(
+                rule="path",
+                severity="error",
+                kind="deviation",
+                joint=None,
+                value=value,
+                limit=limit,
+                time=time,
+                row=int(numbers[row]),
+                method="sampled",
+                quantity=quantity,
+                rounding=float(room[row]),
+                message=f"the tool {what} its path by {{value}} {at_time(time)}, promised are {{limit}}",
+                amounts={
+                    "value": Amount(value, 0, None, dimension, "up"),
+                    "limit": Amount(limit, 0, None, dimension, "down"),
+                },
+            )
+
+        certain = sizes[over] - limit > room[over]
+        joints = np.full(over.size, -1)
+        groups: tuple[tuple[NDArray[np.bool_], Certainty], ...] = (
+            (certain, "exceeded"),
+            (~certain, "within rounding"),
+        )
+        for chosen, certainty in groups:
+            self._worst.add(
+                "deviation",
+                self._move,
+                joints,
+                sizes[over],
+                make,
+                quantity=quantity,
+                certainty=certainty,
+                chosen=chosen,
+            )
+
+    def _watch_branch(self, signs: Array, t: Array, numbers: NDArray[np.int64]) -> None:
+        """Note where the determinant of the rows that the path fixes changes its sign."""
+        signs = np.append(self._sign, signs)
+        changes = np.flatnonzero(signs[1:] * signs[:-1] < 0)
+        self._sign = float(signs[-1])
+        if not changes.size:
+            return
+
+        def make(k: int) -> JudgedFinding:
+            time = float(t[changes[k]])
+            return JudgedFinding(
+                rule="path",
+                severity="error",
+                kind="branch",
+                joint=None,
+                value=None,
+                limit=None,
+                time=time,
+                row=int(numbers[changes[k]]),
+                method="sampled",
+                message=f"the arm changes its branch {at_time(time)}: it passes a singularity",
+                hint="move the path",
+            )
+
+        self._worst.add("branch", self._move, np.full(changes.size, -1), np.ones(changes.size), make)

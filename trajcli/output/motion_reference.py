@@ -1,0 +1,169 @@
+"""Comparison of a recorded motion with peers: ruckig between its ends, toppra along its points."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from trajcli.curves.piecewise import Array
+from trajcli.errors import PlanningError
+from trajcli.frozen import frozen
+from trajcli.job.report import PathReferenceReport, ReferenceReport
+from trajcli.judge.finding import JudgedFinding, Judgement, worst_first
+from trajcli.kinematics.robot import Robot
+from trajcli.output.references import (
+    CONTRADICTION_HINT,
+    contradiction,
+    is_faster,
+    use_report,
+    violation_reports,
+)
+from trajcli.planning.lower_bound import NoBound, fastest_duration
+from trajcli.trajectory import State
+
+if TYPE_CHECKING:
+    from trajcli.judge.file import CheckedFile
+    from trajcli.streams.recorded_motion import MotionFile, RecordedMotion
+
+_MOST_ROWS = 20000  # that are kept for the path: more say no more about it
+
+
+@frozen
+class MotionReference:
+    """A recorded motion beside those of peers.
+
+    Attributes:
+        duration: Of the recorded motion, s.
+        reference: Of ruckig, between its ends.
+        path_reference: Of toppra, along its points; None where it does not move or nothing is limited.
+    """
+
+    duration: float
+    reference: ReferenceReport
+    path_reference: PathReferenceReport | None
+
+
+@frozen
+class _Outline:
+    """What a comparison needs of a motion.
+
+    Attributes:
+        first: Its first row, alone.
+        last: Its last row, alone.
+        points: Positions of rows, evenly chosen, shape (m, n).
+    """
+
+    first: RecordedMotion
+    last: RecordedMotion
+    points: Array
+
+
+def compared(checked: CheckedFile) -> tuple[Judgement, MotionReference]:
+    """Return the judgement with what the comparison adds, and the comparison.
+
+    A motion that keeps its limits and is faster than any motion between its ends can be is a contradiction:
+    an error.
+    """
+    outline = _outline(checked.motion, checked.judgement.rows)
+    duration = float(outline.last.t[0] - outline.first.t[0])
+    bound, reference = _between_ends(outline, checked.robot, duration)
+    found = MotionReference(duration, reference, _along_points(outline, checked.robot, duration))
+    judgement = checked.judgement
+    judged = judgement.verdict == "satisfied" and outline.first.qd is not None
+    if bound is not None and judged and is_faster(duration, bound):
+        finding = JudgedFinding(
+            rule="reference",
+            severity="error",
+            kind="time",
+            joint=reference.joint,
+            value=duration,
+            limit=bound,
+            time=float(outline.last.t[0]),
+            row=outline.last.first_row,
+            factor=bound / duration,
+            message=contradiction(duration, bound, reference.joint),
+            hint=CONTRADICTION_HINT,
+        )
+        judgement = replace(judgement, findings=worst_first([*judgement.findings, finding]))
+    return judgement, found
+
+
+def _outline(motion: MotionFile, rows: int) -> _Outline:
+    """Return the ends of a motion and points between them."""
+    stride = max(1, -(-rows // _MOST_ROWS))
+    first = last = None
+    points = []
+    for block in motion.blocks():
+        if block.t.size == 0:
+            continue
+        first = _row(block, 0) if first is None else first
+        last = _row(block, block.t.size - 1)
+        offset = -(block.first_row - 1) % stride
+        points.append(block.q[offset::stride])
+    if first is None or last is None:
+        raise PlanningError("the motion has no rows")
+    return _Outline(first, last, np.concatenate([*points, last.q]))
+
+
+def _row(rows: RecordedMotion, index: int) -> RecordedMotion:
+    one = slice(index, index + 1)
+    cut: dict[str, Any] = {
+        name: None if getattr(rows, name) is None else getattr(rows, name)[one]
+        for name in ("t", "q", "qd", "qdd", "qddd", "tau", "move")
+    }
+    return replace(rows, **cut, first_row=rows.first_row + index)
+
+
+def _state(row: RecordedMotion) -> State:
+    zero = np.zeros(row.q.shape[1])
+    rates = [zero if values is None else values[0] for values in (row.qd, row.qdd)]
+    return State(row.q[0], *rates)
+
+
+def _between_ends(outline: _Outline, robot: Robot, duration: float) -> tuple[float | None, ReferenceReport]:
+    """Return a bound that holds whatever the rounding of the file, and the report of the one without."""
+    start, end = _state(outline.first), _state(outline.last)
+    names = robot.joint_names
+    bound = fastest_duration(start, end, robot.limits)
+    if isinstance(bound, NoBound):
+        report = ReferenceReport(duration=None, ratio=None, joint=names[bound.joint], reason=bound.reason)
+        return None, report
+    report = ReferenceReport(
+        duration=bound.duration,
+        ratio=duration / bound.duration if bound.duration > 0 else None,
+        joint=None if bound.joint is None else names[bound.joint],
+        violations=violation_reports(bound.breaches, robot),
+    )
+    resolution = outline.first.resolution
+    apart = end.position - start.position
+    rounding = 2 * (resolution.q + resolution.relative * np.abs(end.position))
+    nearer = start.position + np.sign(apart) * np.maximum(np.abs(apart) - rounding, 0.0)
+    least = fastest_duration(start, replace(end, position=nearer), robot.limits)
+    late = 2 * (resolution.time + resolution.relative_time * abs(float(outline.last.t[0])))
+    return None if isinstance(least, NoBound) else max(least.duration - late, 0.0), report
+
+
+def _along_points(outline: _Outline, robot: Robot, duration: float) -> PathReferenceReport | None:
+    from trajcli.planning.geometric_path import path_of_points
+    from trajcli.planning.path_reference import reference_along
+
+    path = path_of_points(outline.points)
+    if path is None:
+        return None
+    ends = _state(outline.first).velocity, _state(outline.last).velocity
+    try:
+        other = reference_along(path, robot.limits, ends)
+    except PlanningError as error:
+        return PathReferenceReport(duration=None, ratio=None, use=None, own_use=None, reason=str(error))
+    if other is None:
+        return None
+    return PathReferenceReport(
+        duration=other.duration,
+        ratio=duration / other.duration if other.duration > 0 else None,
+        use=use_report(other.use, robot),
+        own_use=None,
+        violations=violation_reports(other.breaches, robot),
+        deviation=other.deviation,
+    )

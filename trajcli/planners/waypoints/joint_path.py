@@ -1,0 +1,171 @@
+"""Paths of joints through points: splines by their rule, and polylines with rounded corners."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from trajcli.curves.parabolic_blends.blends import blended
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.splines.hermite import parabola_velocities
+from trajcli.curves.splines.shape_preserving import ShapeError
+from trajcli.curves.third_order.rounded_polyline import BESIDE, rounded_polyline
+from trajcli.errors import Amount, Amounts, PlanningError, Problem
+from trajcli.frozen import frozen
+from trajcli.kinematics.robot import Robot
+from trajcli.planners.planner import Event
+from trajcli.planners.waypoints.spline_rules import Rule, curve_through
+from trajcli.planners.waypoints.through_points import PointTable
+
+Parameter = Literal["chord", "centripetal", "uniform"] | tuple[float, ...]
+
+_OFF = 1e-9  # relative: a velocity this little off the path is on it
+_PARABOLA_BESIDE = 1.0 / 8.0  # of the change of slope over the length of a blend
+_ROOM = 0.999  # of a segment that two blends may share: each keeps a straight piece between
+
+
+@frozen
+class JointPath:
+    """A path through points.
+
+    Attributes:
+        curve: q(s).
+        s: Path parameter at each point, shape (m,).
+        missed: By how much each joint passes beside each point, shape (m, n).
+        speeds: sd at the start and at the end.
+        events: What was conceded.
+    """
+
+    curve: PiecewisePolynomial
+    s: Array
+    missed: Array
+    speeds: tuple[float, float]
+    events: tuple[Event, ...] = ()
+
+
+def spline_through(rule: Rule, parameter: Parameter, points: PointTable, robot: Robot) -> JointPath:
+    """Return the spline of a rule; where the arm moves at an end, the path has that direction there.
+
+    A quintic that ends at rest leaves its end towards the next point.
+
+    Raises:
+        PlanningError: When the parameter has another number of values than points, or shape_preserving does
+            not allow the direction.
+    """
+    s = _parameter_values(parameter, points)
+    q, ends = points.positions, points.rates[0, [0, -1]]
+    slopes, speeds = np.zeros_like(ends), [0.0, 0.0]
+    for k, (velocity, piece) in enumerate(zip(ends, (0, -1), strict=True)):
+        speed = float(np.linalg.norm(velocity))
+        chord = np.diff(q, axis=0)[piece] / np.diff(s)[piece]
+        if speed:
+            slopes[k] = velocity / speed * np.linalg.norm(chord)
+            speeds[k] = speed / float(np.linalg.norm(chord))
+        elif rule == "quintic":  # without slope and curvature it would take infinite sd to leave the end
+            slopes[k] = chord
+    rates = np.zeros_like(points.rates)
+    rates[0, [0, -1]] = slopes
+    known = replace(points, rates=rates)
+    try:
+        curve = curve_through(rule, _bent_where_all_turn(known, s) if rule == "quintic" else known, s)
+    except ShapeError as error:
+        name = robot.joint_names[error.component]
+        message = f"the velocity of {name} at the {error.end} point does not let the path be monotone there"
+        raise PlanningError(Problem(message, "use rule not_a_knot", joint=name)) from None
+    return JointPath(curve, s, np.zeros_like(q), (speeds[0], speeds[1]))
+
+
+def _bent_where_all_turn(points: PointTable, s: Array) -> PointTable:
+    """Return the points with the accelerations of parabolas where all joints turn back at once.
+
+    There the computed velocities and accelerations of a quintic vanish, and it would take infinite sd to
+    leave the point as fast as the joints can.
+    """
+    ends = points.rates[0, [0, -1]]
+    computed: Array = parabola_velocities(s, points.positions, *ends)
+    turning = np.logical_not(computed.any(axis=1))
+    turning[[0, -1]] = False
+    if not turning.any():
+        return points
+    slopes = np.diff(points.positions, axis=0) / np.diff(s)[:, None]
+    rates, given = points.rates.copy(), points.given.copy()
+    rates[1, 1:-1][turning[1:-1]] = (2 * np.diff(slopes, axis=0) / (s[2:] - s[:-2])[:, None])[turning[1:-1]]
+    given[1] = given[1] | turning
+    return replace(points, rates=rates, given=given)
+
+
+def _parameter_values(parameter: Parameter, points: PointTable) -> Array:
+    if isinstance(parameter, tuple):
+        if len(parameter) != points.count:
+            message = f"{len(parameter)} values of the parameter for {points.count} points"
+            raise PlanningError(message, hint="give one for each point, or use chord")
+        return np.array(parameter)
+    chords = np.linalg.norm(np.diff(points.positions, axis=0), axis=1)
+    steps = {"chord": chords, "centripetal": np.sqrt(chords), "uniform": np.ones_like(chords)}[parameter]
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def polyline_through(points: PointTable, corner: Array, robot: Robot, *, smooth: bool) -> JointPath:
+    """Return straight segments, corners rounded by curves that stay within `corner` of them.
+
+    Args:
+        points: What to pass.
+        corner: How far each joint may pass from a corner, rad or m, shape (n,): all above zero, or all zero
+            for sharp corners.
+        robot: For the names of joints.
+        smooth: Whether curvature joins, instead of parabolas.
+
+    Raises:
+        PlanningError: When the arm moves at an end in another direction than the segment there.
+    """
+    q, s = points.positions, _parameter_values("chord", points)
+    slopes = np.diff(q, axis=0) / np.diff(s)[:, None]
+    speeds = tuple(
+        _along(slope, velocity, robot)
+        for slope, velocity in zip(slopes[[0, -1]], points.rates[0, [0, -1]], strict=True)
+    )
+    turn = np.abs(np.diff(slopes, axis=0))
+    if not corner.any() or not turn.any():
+        curve = PiecewisePolynomial(s, np.stack([slopes, q[:-1]]))
+        return JointPath(curve, s, np.zeros_like(q), (speeds[0], speeds[1]))
+    wanted, beside = np.zeros(points.count), BESIDE if smooth else _PARABOLA_BESIDE
+    sharpest = (turn / corner).max(axis=1)
+    wanted[1:-1] = 1.0 / beside / np.where(sharpest > 0, sharpest, np.inf)
+    room = np.diff(s)
+    limit = np.full(points.count, np.inf)
+    limit[1:-1] = _ROOM * np.minimum(room[:-1], room[1:])
+    used = np.minimum(wanted, limit)
+    if smooth:
+        curve, missed = rounded_polyline(s, q, used)
+    else:
+        motion = blended(s, q, used, ends="inside", start_velocity=slopes[0], end_velocity=slopes[-1])
+        curve, missed = motion.curve, motion.missed
+    return JointPath(curve, s, missed, (speeds[0], speeds[1]), _shrunk(wanted, used))
+
+
+def _along(slope: Array, velocity: Array, robot: Robot) -> float:
+    """Return sd with which the path of a slope has the velocity."""
+    speed = float(velocity @ slope) / float(slope @ slope)
+    off = np.abs(velocity - speed * slope)
+    if off.max() > _OFF * np.abs(velocity).max() or speed < 0:
+        joint = int(off.argmax())
+        name = robot.joint_names[joint]
+        message = "a polyline is straight at its ends, but {velocity} of {joint} leaves it"
+        hint = "use `path: spline`, or let the move before end at rest"
+        amounts: Amounts = {"joint": name, "velocity": Amount(float(velocity[joint]), 1, joint)}
+        raise PlanningError(Problem(message, hint, joint=name, amounts=amounts))
+    return speed
+
+
+def _shrunk(wanted: Array, used: Array) -> tuple[Event, ...]:
+    less = np.flatnonzero(used[1:-1] < wanted[1:-1])
+    if not less.size:
+        return ()
+    share = used[1:-1][less] / wanted[1:-1][less]
+    worst = int(less[share.argmin()])
+    more = f"; {less.size - 1} more likewise" if less.size > 1 else ""
+    part = f"{100 * share.min():.4g} % of the deviation asked for"
+    text = f"the corner at point {worst + 1} is rounded by {part}: its segments are too short for more{more}"
+    return (Event("shrunk", text),)

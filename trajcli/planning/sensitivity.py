@@ -1,0 +1,196 @@
+"""Sensitivity of durations to limits: for how long each limit binds, and what a higher one would save.
+
+A limit binds where the motion is within a millionth of it, for which the roots of polynomials say the times.
+A time-optimal law is at a limit all the time, at points of its grid exactly and between them a little below:
+there its switching structure says which one binds. What a higher one saves is found by planning the move
+with it.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from trajcli.curves.approach import durations_at_limit
+from trajcli.curves.extrema import Peaks, durations_above
+from trajcli.curves.piecewise import Array, derivative_coefficients
+from trajcli.errors import TrajcliError
+from trajcli.frozen import comparable
+from trajcli.kinematics.robot import QUANTITIES, Limits
+from trajcli.planners.planner import PlannedMove, Planner
+from trajcli.planning.plan import Plan, plan_move_within
+from trajcli.progress import report_progress
+
+BindingQuantity = Literal["velocity", "acceleration", "jerk", "velocity_by_position"]
+_BINDING: tuple[BindingQuantity, ...] = ("velocity", "acceleration", "jerk")
+
+NEAR = 1e-6
+"""Relative: a limit binds where the motion is as near to it as that."""
+RAISED = 1.1
+"""How many times higher a limit is made."""
+SECONDS = 60.0
+"""Longest time that is taken for planning with higher limits, s."""
+
+
+@comparable
+class TimeAtLimit:
+    """For how long a move is at one limit of a joint.
+
+    Attributes:
+        joint: Index.
+        quantity: "velocity", "acceleration", "jerk" or "velocity_by_position".
+        seconds: For how long, in either direction.
+        method: "exact": from roots; "phases": from the switching structure of a time-optimal law.
+    """
+
+    joint: int
+    quantity: BindingQuantity
+    seconds: float
+    method: Literal["exact", "phases"] = "exact"
+
+
+@comparable
+class Saving:
+    """What a higher limit of one joint would save.
+
+    Attributes:
+        move: Index of the move.
+        joint: Index.
+        order: 1 for velocity, 2 acceleration, 3 jerk.
+        saved: Seconds by which the move is faster; None where no motion with the higher limit was found.
+        reason: Why there is none.
+    """
+
+    move: int
+    joint: int
+    order: int
+    saved: float | None
+    reason: str | None = None
+
+
+def times_at_limits(move: PlannedMove, peaks: Sequence[Peaks] | None = None) -> tuple[TimeAtLimit, ...]:
+    """Return for how long a move is at the limits of its joints, the longest first.
+
+    Args:
+        move: The move.
+        peaks: Of position and its three derivatives over the move, where they are known: what is below its
+            limits needs no roots.
+    """
+    if move.planned.binding_phases:
+        return _times_of_phases(move)
+    curve, found = move.planned.curve, []
+    for order in (1, 2, 3):
+        bounds = move.robot.limits.of_order(order)
+        joints = np.arange(curve.dimension) if peaks is None else np.array(_at_limit(bounds, peaks[order]))
+        if not joints.size or order > curve.degree:
+            continue
+        rates = derivative_coefficients(curve.coefficients, order)[:, :, joints]
+        seconds = np.zeros(joints.size)
+        for side, sign in ((0, -1.0), (1, 1.0)):
+            limited = np.isfinite(bounds[joints, side])
+            levels = np.where(limited, sign * bounds[joints, side] * (1 - NEAR), np.inf)
+            some = np.flatnonzero(limited)
+            if some.size:
+                above = durations_above(sign * rates[:, :, some], curve.lengths, levels[some])
+                seconds[some] += above.sum(axis=0)
+        found += [
+            TimeAtLimit(int(joint), _BINDING[order - 1], float(each))
+            for joint, each in zip(joints, seconds, strict=True)
+            if each > 0
+        ]
+    if move.robot.limits.has_velocity_by_position and curve.degree > 1:
+        limits = move.robot.limits.approach
+        seconds = durations_at_limit(curve.coefficients, curve.lengths, limits, NEAR)
+        for joint, each in zip(limits.limited.tolist(), seconds.tolist(), strict=True):
+            found += [TimeAtLimit(joint, "velocity_by_position", each)] if each > 0 else []
+    return tuple(sorted(found, key=lambda one: -one.seconds))
+
+
+def _times_of_phases(move: PlannedMove) -> tuple[TimeAtLimit, ...]:
+    """Return for how long limits of joints bind by the phases of the move."""
+    seconds: dict[tuple[int, BindingQuantity], float] = {}
+    for phase in move.planned.phases:
+        named = [quantity for quantity in _BINDING if phase.name.split()[0] == quantity]
+        if phase.joint is not None and named:
+            key = phase.joint, named[0]
+            seconds[key] = seconds.get(key, 0.0) + phase.end - phase.start
+    times = [TimeAtLimit(*key, each, "phases") for key, each in seconds.items() if each > 0]
+    return tuple(sorted(times, key=lambda one: -one.seconds))
+
+
+def _at_limit(bounds: Array, peaks: Peaks) -> list[int]:
+    """Return the joints that come near to a bound."""
+    high = peaks.high >= bounds[:, 1] * (1 - NEAR)
+    low = peaks.low <= bounds[:, 0] * (1 - NEAR)
+    return [int(joint) for joint in np.flatnonzero(high | low)]
+
+
+def savings_of(plan: Plan, moves: Sequence[int], seconds: float = SECONDS) -> Iterator[Saving]:
+    """Yield what limits that are 10 % higher would save of each move, one joint and quantity at a time.
+
+    Limits that bind are tried. Where a move is at none, all are that its moving joints have: something else
+    holds it, and they may help. A move that is told how long it lasts saves nothing, and is left out.
+
+    Args:
+        plan: A plan.
+        moves: Indices of the moves that are looked at.
+        seconds: After that time no further motion is planned, and a saving says so.
+    """
+    begun = clock.monotonic()
+    todo = [(index, joint, order) for index in moves for joint, order in _tried(plan, index)]
+    for count, (index, joint, order) in enumerate(todo, 1):
+        if clock.monotonic() - begun > seconds:
+            yield Saving(index, joint, order, None, f"not planned: {seconds:g} s have passed")
+            continue
+        move = plan.moves[index]
+        name = f"{QUANTITIES[order]} limit of {move.robot.joint_names[joint]}"
+        report_progress(f"planning move {index} with a higher {name} ({count} of {len(todo)})")
+        yield _saving(plan, move, joint, order)
+
+
+def _tried(plan: Plan, index: int) -> list[tuple[int, int]]:
+    """Return joint and order of the limits of a move that are made higher."""
+    move, peaks = plan.moves[index], plan.verdict.peaks[index]
+    if move.duration == 0 or (_given(plan, move).without_duration() is not None and move.stretch == 1):
+        return []
+    if not (move.planner.finds_duration or move.over_limit == "slow"):
+        return []
+    limits = move.robot.limits
+    binding = [
+        (joint, order) for order in (1, 2, 3) for joint in _at_limit(limits.of_order(order), peaks[order])
+    ]
+    return binding or [
+        (joint, order)
+        for order in (1, 2, 3)
+        for joint in range(len(move.robot.joints))
+        if np.isfinite(limits.of_order(order)[joint]).any() and peaks[order].magnitude[joint] > 0
+    ]
+
+
+def _given(plan: Plan, move: PlannedMove) -> Planner:
+    """Return the planner of a move with the duration that the job gives, where it could not be kept."""
+    asked = plan.loaded.job.moves[move.index].without_duration()
+    if asked is None or move.planner.without_duration() is not None:
+        return move.planner
+    return move.planner.with_duration(asked[0])
+
+
+def _saving(plan: Plan, move: PlannedMove, joint: int, order: int) -> Saving:
+    robot = replace(move.robot, limits=raised(move.robot.limits, joint, order))
+    try:
+        faster = plan_move_within(plan.loaded, move.index, _given(plan, move), move.start, robot)
+    except TrajcliError as error:
+        return Saving(move.index, joint, order, None, error.problems[0].text(plan.loaded.say))
+    return Saving(move.index, joint, order, move.duration - faster.duration)
+
+
+def raised(limits: Limits, joint: int, order: int) -> Limits:
+    """Return limits of which one joint's of one quantity are higher."""
+    kinds = {1: limits.velocity, 2: limits.acceleration, 3: limits.jerk}
+    kinds[order] = np.array(kinds[order])
+    kinds[order][joint] *= RAISED
+    return replace(limits, velocity=kinds[1], acceleration=kinds[2], jerk=kinds[3])

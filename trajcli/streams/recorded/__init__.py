@@ -1,0 +1,1 @@
+"""Recorded motions of anybody: what their columns, units and time stamps say."""

@@ -1,0 +1,419 @@
+"""Roles of columns: which hold the time and which the positions and derivatives of each joint.
+
+What names leave open is refused with the choices, and the text of `--columns` that makes each of them.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import NoReturn
+
+from trajcli.errors import InputError, Place, Problem
+from trajcli.frozen import frozen
+from trajcli.streams.recorded.column_names import (
+    JOINT_QUANTITIES,
+    MOVE,
+    TIME,
+    ColumnName,
+    read_name,
+    split_unit,
+)
+from trajcli.suggest import did_you_mean, valid_names
+
+NONE = "none"
+"""What `--columns qd=none` says: that these columns are left out."""
+
+_SHOWN = 12  # names in a note
+_BESIDE = ("error", "output")  # kinds of values that are no motion where others are
+_JOINT_KEY = re.compile(r"(q|qd|qdd|qddd|tau)([1-9][0-9]*)")
+_ECHO = "field."  # what the names of `rostopic echo -p` begin with
+_STAMP = "field.header.stamp"
+_ECHO_NAME = re.compile(r"field\.(?:joint_)?names?([0-9]+)")
+
+ColumnGroup = dict[int | str, int]
+"""The columns of one quantity and kind: the index of the column by the joint as its name has it."""
+
+
+@frozen
+class ColumnRoles:
+    """What the columns of a file are.
+
+    Attributes:
+        time: Index of the column of time.
+        joints: For each quantity that the file has, the indices of its n columns.
+        move: Index of the column that counts moves; None without one.
+        names: What each column's name says, with the unit that `--columns` gives it.
+        joint_names: n names of joints; None where the file numbers them.
+        fixed: Indices of columns of text that must be the same in all rows.
+        nanoseconds: Whether times without a unit are ns, as `rostopic echo -p` prints them.
+        notes: Sentences about what was taken, and what was left out.
+    """
+
+    time: int
+    joints: Mapping[str, tuple[int, ...]]
+    move: int | None
+    names: tuple[ColumnName, ...]
+    joint_names: tuple[str, ...] | None
+    fixed: tuple[int, ...] = ()
+    nanoseconds: bool = False
+    notes: tuple[str, ...] = ()
+
+    @property
+    def taken(self) -> tuple[int, ...]:
+        """Indices of the columns that are used, rising."""
+        every = [self.time, *(index for found in self.joints.values() for index in found)]
+        return tuple(sorted(every if self.move is None else [*every, self.move]))
+
+
+@frozen
+class NamedFile:
+    """The names of a file's columns, and where they stand.
+
+    Attributes:
+        file: Its name.
+        names: The columns' names.
+        place: Where a column's name stands, or all of them; None in files without a line of names.
+        first: The texts of the first row; nothing where rows have no texts.
+    """
+
+    file: str
+    names: tuple[str, ...]
+    place: Callable[[str | None], Place | None]
+    first: tuple[str, ...] = ()
+
+    def wrong(self, message: str, hint: str | None = None, name: str | None = None) -> InputError:
+        """Return the error that says what is wrong with a column, or with all of them."""
+        place = self.place(name)
+        text = message if place is not None else f"{self.file}: {message}"
+        return InputError(Problem(text, hint, place))
+
+
+def parse_mapping(text: str | Mapping[str, str] | None) -> dict[str, str]:
+    """Return what `--columns` says: "t=timestamp,q=target_q".
+
+    Raises:
+        InputError: When it is none, or names an unknown quantity or one twice.
+    """
+    if text is None:
+        return {}
+    pairs: Iterable[tuple[str, str, str]]
+    pairs = [(k, "=", v) for k, v in text.items()] if isinstance(text, Mapping) else _pairs(text)
+    mapping: dict[str, str] = {}
+    known = (TIME, *JOINT_QUANTITIES, MOVE)
+    for key, sign, value in pairs:
+        name, column = key.strip(), value.strip()
+        if not sign or not name or not column:
+            raise InputError(
+                f"--columns: '{key}{sign}{value}' is no mapping", hint="such as t=time,q=target_q"
+            )
+        if name not in known and _JOINT_KEY.fullmatch(name) is None:
+            hint = did_you_mean(name, known) or valid_names([*known, "q1", "qd1"], "known are")
+            raise InputError(f"--columns: unknown quantity '{name}'", hint=hint)
+        if name in mapping:
+            raise InputError(f"--columns: {name} is mapped twice", hint="map it once")
+        mapping[name] = column
+    return mapping
+
+
+def _pairs(text: str) -> list[tuple[str, str, str]]:
+    return [part.partition("=") for part in text.split(",")]
+
+
+def assign_roles(
+    file: NamedFile, columns: str | Mapping[str, str] | None = None, joints: Sequence[str] | None = None
+) -> ColumnRoles:
+    """Return what the columns of a file are.
+
+    Args:
+        file: Their names.
+        columns: What the user says they are, as in `--columns`.
+        joints: Names of the joints that are expected; a column may have such a name.
+
+    Raises:
+        InputError: When time or positions are missing or ambiguous, or a joint is missing.
+    """
+    return _Assignment(file, parse_mapping(columns), joints).roles()
+
+
+class _Assignment:
+    """The search for the role of each column."""
+
+    def __init__(self, file: NamedFile, mapping: Mapping[str, str], joints: Sequence[str] | None) -> None:
+        self._file, self._mapping = file, dict(mapping)
+        self._joints = tuple(joints or ())
+        self._names = [self._read(name) for name in file.names]
+        self._echo = any(name.startswith(_ECHO) for name in file.names)
+        self._chosen: dict[str, ColumnGroup] = {}
+        self._left_out: list[str] = []
+        self._notes: list[str] = []
+
+    def _read(self, text: str) -> ColumnName:
+        plain, unit = split_unit(text)
+        if plain in self._joints:
+            return ColumnName(text, "q", plain, unit, "", "*")
+        return read_name(text)
+
+    def roles(self) -> ColumnRoles:
+        for key, value in self._mapping.items():
+            if value.lower() != NONE or value in self._file.names:
+                self._map(key, value)
+        positions = self._positions()
+        for quantity in JOINT_QUANTITIES[1:]:
+            if self._mapping.get(quantity, "").lower() != NONE:
+                self._derivative(quantity, positions)
+        time = self._time()
+        keys = self._ordered(positions)
+        joints = {quantity: tuple(found[key] for key in keys) for quantity, found in self._chosen.items()}
+        move = self._move()
+        names, fixed = self._joint_names(keys)
+        self._note_rest({time, move, *fixed, *(index for found in joints.values() for index in found)})
+        return ColumnRoles(
+            time, joints, move, tuple(self._names), names, fixed, self._echo, tuple(self._notes)
+        )
+
+    # --columns
+
+    def _map(self, key: str, value: str) -> None:
+        """Take the columns that the user names for a quantity, or for one of a joint."""
+        found = self._columns_of(value, single=key in (TIME, MOVE) or _JOINT_KEY.fullmatch(key) is not None)
+        single = _JOINT_KEY.fullmatch(key)
+        quantity, joint = (single[1], int(single[2])) if single else (key, None)
+        group: ColumnGroup = {}
+        for index in found:
+            read = self._names[index]
+            own: int | str = len(group) + 1 if read.joint is None else read.joint
+            own = self._number_of(read.text, value) if read.quantity is None else own
+            group[own if joint is None else joint] = index
+            self._names[index] = replace(read, quantity=quantity, unit=split_unit(value)[1] or read.unit)
+        self._chosen.setdefault(quantity, {}).update(group)
+
+    def _columns_of(self, value: str, *, single: bool) -> list[int]:
+        """Return the indices of the columns that a name, or what it begins with, means."""
+        plain = split_unit(value)[0]
+        for wanted in dict.fromkeys((value, plain)):
+            for match in (str, str.casefold):
+                whole = [index for index, name in enumerate(self._file.names) if match(name) == match(wanted)]
+                stems = [k for k, read in enumerate(self._names) if match(read.stem) == match(wanted)]
+                if whole:
+                    return whole
+                if stems and not single:
+                    return stems
+        begun = [
+            k
+            for k, name in enumerate(self._file.names)
+            if re.fullmatch(_numbered_form(plain), split_unit(name)[0])
+        ]
+        if begun and not single:
+            return begun
+        every = dict.fromkeys([*self._file.names, *(read.stem for read in self._names)])
+        hint = did_you_mean(value, every) or valid_names(self._file.names, "its columns are")
+        raise self._file.wrong(f"--columns: there is no column '{value}'", hint)
+
+    def _number_of(self, name: str, stem: str) -> int | str:
+        numbers = re.findall(r"[0-9]+", split_unit(name)[0][len(stem) :] or name)
+        return int(numbers[-1]) if numbers else name
+
+    # positions, derivatives
+
+    def _groups(self, quantity: str) -> dict[tuple[str, str], ColumnGroup]:
+        """Return the columns of a quantity by the kind of their values and their stem."""
+        groups: dict[tuple[str, str], ColumnGroup] = {}
+        taken = {index for found in self._chosen.values() for index in found.values()}
+        numbered = any(read.quantity == "q" and isinstance(read.joint, int) for read in self._names)
+        for index, read in enumerate(self._names):
+            if read.quantity != quantity or read.joint is None or index in taken:
+                continue
+            if isinstance(read.joint, int) or not numbered or read.joint in self._joints:
+                groups.setdefault((read.kind, read.stem), {})[read.joint] = index
+        whole = {key: group for key, group in groups.items() if key[0] not in _BESIDE}
+        return whole or groups
+
+    def _positions(self) -> ColumnGroup:
+        if "q" in self._chosen:
+            return self._chosen["q"]
+        groups = self._groups("q")
+        if len(groups) == 1:
+            self._chosen["q"] = next(iter(groups.values()))
+            return self._chosen["q"]
+        if groups:
+            self._refuse("the positions are ambiguous", groups)
+        hint = None
+        for quantity in ("qdd", "qd"):
+            for (_, stem), group in self._groups(quantity).items():
+                hint = hint or f"--columns q={stem} takes {self._listed(group)} as positions"
+        hint = (
+            hint
+            or f"it has {self._listed(dict(enumerate(range(len(self._names)))))}; name them: --columns q=..."
+        )
+        raise self._file.wrong("no columns are positions of joints, such as q1, q2", hint)
+
+    def _refuse(self, message: str, groups: Mapping[tuple[str, str], ColumnGroup]) -> NoReturn:
+        choices = [f"--columns {self._text(kind, stem)}" for kind, stem in groups]
+        listed = " or ".join(self._listed(group) for group in groups.values())
+        raise self._file.wrong(f"{message}: {listed}", " or ".join(choices))
+
+    def _text(self, kind: str, stem: str) -> str:
+        """Return the mapping that chooses the positions of a stem, and what is of the same kind."""
+        parts = [f"q={stem}"]
+        for quantity in ("qd", "qdd") if kind else ():
+            same = [other for found, other in self._groups(quantity) if found == kind]
+            parts += [f"{quantity}={same[0]}"] if len(same) == 1 else []
+        return ",".join(parts)
+
+    def _listed(self, group: ColumnGroup) -> str:
+        names = [self._file.names[index] for index in group.values()]
+        return ", ".join(names) if len(names) <= 3 else f"{names[0]} .. {names[-1]}"
+
+    def _derivative(self, quantity: str, positions: ColumnGroup) -> None:
+        """Choose the columns of a quantity that belong to the positions."""
+        if quantity not in self._chosen:
+            groups = self._groups(quantity)
+            kind = self._names[next(iter(positions.values()))].kind
+            same = {key: group for key, group in groups.items() if key[0] == kind}
+            if len(same) > 1:
+                self._refuse_derivative(quantity, same)
+            if not same:
+                return
+            self._chosen[quantity] = next(iter(same.values()))
+        found = self._chosen[quantity]
+        if len(found) != len(positions) or (
+            set(found) != set(positions) and not self._fitted(quantity, positions)
+        ):
+            message = (
+                f"{len(positions)} positions ({self._listed(positions)}), but {len(found)} of {quantity} "
+                f"({self._listed(found)})"
+            )
+            raise self._file.wrong(
+                message, f"--columns {quantity}={NONE} leaves these out", self._first_name(found)
+            )
+
+    def _refuse_derivative(self, quantity: str, groups: Mapping[tuple[str, str], ColumnGroup]) -> NoReturn:
+        listed = " or ".join(self._listed(group) for group in groups.values())
+        choices = [f"--columns {quantity}={stem}" for _, stem in groups]
+        raise self._file.wrong(f"two sets of columns are {quantity}: {listed}", " or ".join(choices))
+
+    def _fitted(self, quantity: str, positions: ColumnGroup) -> bool:
+        """Return whether columns can be taken in their order: they are numbered otherwise than positions."""
+        found = self._chosen[quantity]
+        if not all(isinstance(key, int) for key in (*found, *positions)):
+            return False
+        pairs = zip(sorted(positions, key=int), sorted(found, key=int), strict=True)
+        self._chosen[quantity] = {ours: found[theirs] for ours, theirs in pairs}
+        return True
+
+    def _first_name(self, group: ColumnGroup) -> str:
+        return self._file.names[next(iter(group.values()))]
+
+    def _ordered(self, positions: ColumnGroup) -> list[int | str]:
+        """Return the joints in order; refused where one of their numbers is missing."""
+        numbers = [key for key in positions if isinstance(key, int)]
+        if len(numbers) < len(positions):
+            return list(positions)
+        low = min(numbers)
+        missing = sorted(set(range(min(low, 1), max(numbers) + 1)) - set(numbers))
+        if missing or low > 1:
+            stem = self._names[next(iter(positions.values()))].stem
+            number = missing[0] if missing else 1
+            named = stem.replace("*", str(number)) if "*" in stem else f"{stem}{number}"
+            message = f"the positions are {self._listed(positions)}: {named} is missing"
+            raise self._file.wrong(
+                message, "joints are numbered from 0 or from 1", self._first_name(positions)
+            )
+        return sorted(numbers)
+
+    # time, names, notes
+
+    def _time(self) -> int:
+        if TIME in self._chosen:
+            return next(iter(self._chosen.pop(TIME).values()))
+        found = [index for index, read in enumerate(self._names) if read.quantity == TIME]
+        if self._echo and len(found) > 1 and _STAMP in self._file.names:
+            return self._stamp(found)
+        if len(found) == 1:
+            return found[0]
+        names = [self._file.names[index] for index in found]
+        if names:
+            choices = " or ".join(f"--columns t={name}" for name in names)
+            raise self._file.wrong(f"{len(names)} columns are times: {', '.join(names)}", choices)
+        hint = f"name it: --columns t=NAME; the columns are {', '.join(self._file.names[:_SHOWN])}"
+        raise self._file.wrong("no column is the time, such as t or time", hint)
+
+    def _stamp(self, found: Sequence[int]) -> int:
+        """Return the stamp of messages, or the time at which they came where they have none."""
+        stamp = self._file.names.index(_STAMP)
+        text = self._file.first[stamp] if stamp < len(self._file.first) else ""
+        if text.strip().strip("0."):
+            return stamp
+        return next(index for index in found if index != stamp)
+
+    def _move(self) -> int | None:
+        chosen = self._chosen.pop(MOVE, None)
+        if chosen is not None:
+            return next(iter(chosen.values()))
+        if self._mapping.get(MOVE, "").lower() == NONE:
+            return None
+        return next((index for index, read in enumerate(self._names) if read.quantity == MOVE), None)
+
+    def _joint_names(self, keys: Sequence[int | str]) -> tuple[tuple[str, ...] | None, tuple[int, ...]]:
+        """Return the names of the joints, and the columns whose rows hold them."""
+        named = [key for key in keys if isinstance(key, str)]
+        if named:
+            return tuple(str(key) for key in keys), ()
+        in_rows = {
+            int(match[1]): index
+            for index, name in enumerate(self._file.names)
+            if (match := _ECHO_NAME.fullmatch(name)) is not None
+        }
+        if not set(keys) <= in_rows.keys() or len(self._file.first) < len(self._file.names):
+            return None, ()
+        columns = tuple(in_rows[int(key)] for key in keys)
+        return tuple(self._file.first[index].strip().strip('"') for index in columns), columns
+
+    def _note_rest(self, used: set[int | None]) -> None:
+        rest = [name for index, name in enumerate(self._file.names) if index not in used]
+        if rest:
+            more = f" and {len(rest) - _SHOWN} more" if len(rest) > _SHOWN else ""
+            self._notes.append(f"columns that are not read: {', '.join(rest[:_SHOWN])}{more}")
+
+
+def _numbered_form(stem: str) -> str:
+    """Return the pattern of names that begin with a stem and go on with a number."""
+    return re.escape(stem) + r"[ _.\[(]*[0-9]+[\])]?"
+
+
+def ordered_joints(
+    file: NamedFile, roles: ColumnRoles, names: Sequence[str] | None, wanted: Sequence[str] | None
+) -> tuple[list[int], tuple[str, ...] | None, tuple[str, ...]]:
+    """Return which joints of a file are wanted, by index and in order, their names, and notes about it.
+
+    Args:
+        file: The file.
+        roles: What its columns are.
+        names: Names of its joints; None where it numbers them.
+        wanted: Names of the joints that are expected; None where any are.
+
+    Raises:
+        InputError: When the file has other joints, or another number of them.
+    """
+    count = len(roles.joints["q"])
+    everything = list(range(count))
+    if wanted is None:
+        return everything, None if names is None else tuple(names), ()
+    if names is not None and set(wanted) & set(names):
+        missing = [name for name in wanted if name not in names]
+        if missing:
+            hint = did_you_mean(missing[0], names) or valid_names(names, "its joints are")
+            raise file.wrong(f"there is no joint '{missing[0]}'", hint)
+        rest = [name for name in names if name not in wanted]
+        notes = (f"joints that are not of the robot: {', '.join(rest)}",) if rest else ()
+        return [list(names).index(name) for name in wanted], tuple(wanted), notes
+    if count != len(wanted):
+        listed = ", ".join(names or (file.names[index] for index in roles.joints["q"]))
+        message = f"{count} joint{'s' * (count != 1)} ({listed}), expected {len(wanted)}"
+        raise file.wrong(message, f"the robot's joints are {', '.join(wanted)}")
+    if names is None:
+        return everything, tuple(wanted), ()
+    note = f"joints are taken in the order of the file: {', '.join(names)} as {', '.join(wanted)}"
+    return everything, tuple(wanted), (note,)

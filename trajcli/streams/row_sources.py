@@ -1,0 +1,152 @@
+"""Rows as files write them, before anybody knows their units: text, JSON lines, messages, arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajcli.curves.piecewise import Array
+from trajcli.errors import Place
+from trajcli.frozen import frozen
+from trajcli.streams.byte_source import ByteSource
+from trajcli.streams.recorded.column_roles import NamedFile
+from trajcli.streams.table import rows_of
+from trajcli.streams.text_layout import layout_of, read_header
+from trajcli.streams.text_rows import RowReader
+
+EXACT = -1
+"""Decimals of a column whose numbers were not rounded to decimals."""
+
+FULL_DECIMALS = 13
+"""Decimals from which on a writer shows all digits of a float64, and rounds nothing."""
+
+_QUANTITIES = ("q", "qd", "qdd", "tau")  # of messages
+
+
+class RowSource(Protocol):
+    """Rows of a file whose columns have names.
+
+    Attributes:
+        format: Of the file: "csv", "jsonl", "ros", "mcap" or "npy".
+        named: Names of the columns, and where they stand.
+        joint_names: n names; None where the file says none beside its columns.
+        si: Whether the format fixes the units: rad, m and s.
+        relative: Rounding of each column as a share of its values, shape (m,).
+        notes: Sentences about what was taken and what was left out.
+    """
+
+    @property
+    def format(self) -> str: ...  # noqa: D102
+    @property
+    def named(self) -> NamedFile: ...  # noqa: D102
+    @property
+    def joint_names(self) -> tuple[str, ...] | None: ...  # noqa: D102
+    @property
+    def si(self) -> bool: ...  # noqa: D102
+    @property
+    def relative(self) -> Array: ...  # noqa: D102
+    @property
+    def notes(self) -> tuple[str, ...]: ...  # noqa: D102
+
+    def blocks(self, taken: Sequence[int], fixed: Sequence[int]) -> Iterator[Array]:
+        """Yield the rows of some columns, rising indices, block by block, (N, columns); as often as asked.
+
+        The columns `fixed` hold texts that must be the same in all rows.
+        """
+        ...
+
+    def decimals(self, taken: Sequence[int]) -> NDArray[np.int64]:
+        """Return the decimals of some columns, shape (columns,), once all their rows were taken."""
+        ...
+
+
+class TextRows:
+    """Rows of a table in text, which are read anew whenever they are asked for."""
+
+    format = "csv"
+    joint_names: tuple[str, ...] | None = None
+    si = False
+    notes: tuple[str, ...] = ()
+
+    def __init__(self, source: ByteSource) -> None:
+        """Read the names, and the texts of the first row.
+
+        Raises:
+            FileError: When the file cannot be read.
+            InputError: When it is no table of numbers.
+        """
+        self._source = source
+        with source.open() as stream:
+            self._header, text = read_header(stream, source.file)
+            while not text.strip() and (text := stream.readline()):
+                pass
+        line = text.replace(b"\r\n", b"\n").rstrip(b"\n")
+        layout = layout_of(self._header.names, self._header.text, line)
+        cells = [cell for _, cell in layout.cells(line.decode("utf-8", "replace"))]
+        first = tuple(cells) if len(cells) == len(self._header.names) else ()
+        self.named = NamedFile(source.file, self._header.names, self._header.place, first)
+        self.relative = np.zeros(len(self._header.names))
+        self._reader: RowReader | None = None
+
+    def blocks(self, taken: Sequence[int], fixed: Sequence[int]) -> Iterator[Array]:
+        """Yield the rows of some columns."""
+        with self._source.open() as stream:
+            header, text = read_header(stream, self._source.file)
+            self._reader = RowReader(header, taken, fixed)
+            yield from rows_of(stream, text, header, self._reader)
+
+    def decimals(self, taken: Sequence[int]) -> NDArray[np.int64]:
+        """Return the decimals that the columns show."""
+        return np.zeros(len(taken), np.int64) if self._reader is None else self._reader.decimals
+
+
+@frozen
+class ArrayRows:
+    """Rows that are in memory; its attributes are those of `RowSource`.
+
+    Attributes:
+        columns: Shape (N, m); any numbers.
+        written: Decimals of each column, shape (m,), or `EXACT`.
+    """
+
+    format: str
+    named: NamedFile
+    columns: NDArray[np.float64]
+    written: NDArray[np.int64]
+    relative: Array
+    joint_names: tuple[str, ...] | None = None
+    si: bool = False
+    notes: tuple[str, ...] = ()
+
+    def blocks(self, taken: Sequence[int], fixed: Sequence[int]) -> Iterator[Array]:
+        """Yield the rows of some columns."""
+        del fixed  # numbers only
+        yield self.columns[:, list(taken)]
+
+    def decimals(self, taken: Sequence[int]) -> NDArray[np.int64]:
+        """Return the decimals of the columns."""
+        return self.written[list(taken)]
+
+
+def unplaced(name: str | None = None) -> Place | None:
+    """Return the place of a name in a file without a line of names: none."""
+    del name
+    return None
+
+
+def in_columns(file: str, times: Array, states: Sequence[Array]) -> tuple[NamedFile, Array]:
+    """Return a motion under the names of a CSV file in SI, and its rows (N, m).
+
+    Args:
+        file: Name of the file.
+        times: Shape (N,).
+        states: Positions, velocities, accelerations and efforts, each (N, n), or (N, 0) where there are none.
+    """
+    names, parts = ["t"], [times[:, None]]
+    for kind, values in zip(_QUANTITIES, states, strict=True):
+        names += [f"{kind}{joint + 1}" for joint in range(values.shape[1])]
+        parts.append(values)
+    return NamedFile(file, tuple(names), unplaced), np.concatenate(parts, axis=1)

@@ -1,0 +1,215 @@
+"""Layout of tables in text: the line of names, the separator of cells, points or commas in decimals."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from typing import BinaryIO
+
+from trajcli.errors import InputError, Place, Problem
+from trajcli.frozen import comparable
+
+LONGEST_LINE = 1 << 16
+"""Bytes: what has no line feed by then is no table."""
+
+_MOST_COMMENTS = 1000  # lines in front of the names
+_NUMBER = re.compile(rb"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_LOCAL_NUMBER = re.compile(rb"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
+_COMMENT = (b"#", b"%")
+
+
+def is_number(cell: bytes) -> bool:
+    """Return whether a cell is a decimal number, blanks around it left out."""
+    return _NUMBER.fullmatch(cell.strip()) is not None
+
+
+@comparable
+class Header:
+    """The line of names of a table.
+
+    Attributes:
+        names: The columns' names, those at the end without one left out.
+        text: The line as it is written.
+        line: Its number, from 1.
+        file: Name of the file, for messages.
+    """
+
+    names: tuple[str, ...]
+    text: str
+    line: int
+    file: str
+
+    def place(self, name: str | None = None) -> Place:
+        """Return where a name stands, or the whole line."""
+        at = -1 if name is None else self.text.find(name)
+        length = len(self.text) if name is None or at < 0 else len(name)
+        return Place(self.file, self.line, max(at, 0) + 1, self.text, max(length, 1))
+
+
+def read_header(stream: BinaryIO, file: str) -> tuple[Header, bytes]:
+    """Read the names of a table: its first line, or the last of several lines of comments.
+
+    Returns:
+        The names, and what was read behind them.
+
+    Raises:
+        InputError: When there are none, or one is missing, doubled or a number.
+    """
+    line, number, text = _line(stream, file), 1, b""
+    while line.lstrip().startswith(_COMMENT) and number < _MOST_COMMENTS:
+        text = _line(stream, file, number + 1)
+        if not text.lstrip().startswith(_COMMENT) and (not text.strip() or _is_row(text)):
+            break  # the comment is the line of names
+        line, text, number = text, b"", number + 1
+    header = _decoded(line, file)
+    plain = header.lstrip().lstrip("#%") if header.lstrip().startswith(("#", "%")) else header
+    names = _names(plain)
+    _refuse_flaws(names, Header(names, header, number, file))
+    return Header(names, header, number, file), text
+
+
+def _line(stream: BinaryIO, file: str, number: int = 1) -> bytes:
+    line = stream.readline(LONGEST_LINE)
+    hint = "a CSV begins with a line of the columns' names"
+    if not line and number == 1:
+        raise InputError(f"{file} is empty", hint=hint)
+    if b"\0" in line or len(line) == LONGEST_LINE:
+        raise InputError(f"{file} is not text", hint=hint)
+    return line
+
+
+def _decoded(line: bytes, file: str) -> str:
+    try:
+        return line.decode("utf-8-sig").rstrip("\r\n")
+    except UnicodeDecodeError:
+        pass
+    if any(byte < 9 or 0x80 <= byte < 0xA0 for byte in line):  # no letters in any code of a byte each
+        raise InputError(f"{file} is not text", hint="a CSV begins with a line of the columns' names")
+    return line.decode("latin-1").rstrip("\r\n")
+
+
+def _is_row(line: bytes) -> bool:
+    """Return whether a line begins with a number."""
+    return bool(_NUMBER.match(line.lstrip()))
+
+
+def _names(text: str) -> tuple[str, ...]:
+    """Return the names of a line, by the separator that stands in it."""
+    separator = next((mark for mark in ";,\t" if mark in text), None)
+    parts = text.split(separator) if separator else text.split()
+    names = [name.strip().removeprefix('"').removesuffix('"').strip() for name in parts]
+    while len(names) > 1 and not names[-1]:
+        names.pop()
+    return tuple(names) or ("",)
+
+
+def _refuse_flaws(names: Sequence[str], header: Header) -> None:
+    """Refuse a name that is missing, doubled or a number."""
+    for index, name in enumerate(names):
+        message = hint = None
+        if not name:
+            message = f"column {index + 1} of {len(names)} has no name"
+        elif is_number(name.encode()) or _LOCAL_NUMBER.fullmatch(name.encode()):
+            message = f"{name} stands where a column's name should be"
+            hint = "put a line of names on top: t,q1,q2"
+        elif name in names[:index]:
+            message = f"there are two columns '{name}'"
+        if message is not None:
+            place = Place(
+                header.file, header.line, _column_of(header.text, index), header.text, max(len(name), 1)
+            )
+            raise InputError(Problem(message, hint, place))
+
+
+def _column_of(text: str, index: int) -> int:
+    """Return where the name of an index begins in a line, from 1."""
+    separator = next((mark for mark in ";,\t" if mark in text), None)
+    if separator is None:
+        spans = [match.start() for match in re.finditer(r"[^#%\s]\S*", text)]
+        return spans[index] + 1 if index < len(spans) else 1
+    return len(separator.join(text.split(separator)[:index])) + (2 if index else 1)
+
+
+@comparable
+class RowLayout:
+    """How the rows of a table are written.
+
+    Attributes:
+        separator: Between cells: a comma, a semicolon, a tab or a blank.
+        decimal_comma: Whether a comma stands for the decimal point.
+        width: Cells of a row.
+        open_ended: Whether each row ends in a separator.
+    """
+
+    separator: str
+    decimal_comma: bool
+    width: int
+    open_ended: bool
+
+    def plain(self, text: bytes) -> bytes:
+        """Return whole lines with commas between cells, points in decimals and no blanks around cells."""
+        if self.separator == " ":
+            text = text.replace(b"\t", b" ")
+            while b"  " in text:
+                text = text.replace(b"  ", b" ")
+            text = text.replace(b"\n ", b"\n").replace(b" \n", b"\n").removeprefix(b" ").replace(b" ", b",")
+        else:
+            text = _without_blanks(text, self.separator.encode())
+            if self.decimal_comma:
+                text = text.replace(b",", b".")
+            if self.separator != ",":
+                text = text.replace(self.separator.encode(), b",")
+        return text.replace(b",\n", b"\n") if self.open_ended else text
+
+    def cells(self, line: str) -> list[tuple[int, str]]:
+        """Return the cells of a line as they are written, each with its column, from 1."""
+        if self.separator == " ":
+            return [(match.start() + 1, match[0]) for match in re.finditer(r"\S+", line)]
+        return list(_split(line, self.separator))[
+            : -1 if self.open_ended and line.rstrip().endswith(self.separator) else None
+        ]
+
+    def number(self, cell: str) -> bytes:
+        """Return a cell with a point in its decimals."""
+        return cell.strip().replace(",", "." if self.decimal_comma else ",").encode()
+
+
+def _split(line: str, separator: str) -> Iterator[tuple[int, str]]:
+    column = 1
+    for cell in line.split(separator):
+        yield column, cell
+        column += len(cell) + 1
+
+
+def _without_blanks(text: bytes, separator: bytes) -> bytes:
+    """Return a text without blanks beside separators and ends of lines."""
+    if b" " in text or (separator != b"\t" and b"\t" in text):
+        blanks = b" " if separator == b"\t" else b" \t"
+        for blank in (blanks[k : k + 1] for k in range(len(blanks))):
+            for mark in (separator, b"\n"):
+                for pair in (blank + mark, mark + blank):
+                    while pair in text:
+                        text = text.replace(pair, mark)
+        text = text.lstrip(blanks)
+    return text
+
+
+def layout_of(names: Sequence[str], header: str, first: bytes) -> RowLayout:
+    """Return how rows are written whose names and first row are these.
+
+    Args:
+        names: The columns' names.
+        header: The line of names.
+        first: The first row, without its line feed.
+    """
+    named = next((mark for mark in ";,\t" if mark in header), " ")
+    line = first.rstrip(b"\r\n").decode("latin-1")
+    for separator in dict.fromkeys((named, ";", ",", "\t", " ")):
+        cells = line.split() if separator == " " else line.split(separator)
+        open_ended = separator != " " and len(cells) == len(names) + 1 and not cells[-1].strip()
+        if len(cells) == len(names) + open_ended and (len(names) > 1 or separator == named):
+            local = separator != "," and any(
+                _LOCAL_NUMBER.fullmatch(cell.strip().encode("latin-1")) for cell in cells
+            )
+            return RowLayout(separator, local, len(names), open_ended)
+    return RowLayout(named, decimal_comma=False, width=len(names), open_ended=False)

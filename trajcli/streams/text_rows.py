@@ -1,0 +1,230 @@
+"""Rows of numbers in text, block by block, with the decimals that they show."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from math import isfinite
+from typing import BinaryIO, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajcli.columns import parse_column, whole_number_columns
+from trajcli.curves.piecewise import Array
+from trajcli.errors import InputError, Place, Problem
+from trajcli.streams.decimals import DECIMALS, NotFixedError, scan_fixed
+from trajcli.streams.number_cells import decimals_of, scan_decimals
+from trajcli.streams.text_layout import LONGEST_LINE, Header, RowLayout, is_number, layout_of
+
+_SHOWN = 40  # characters of a cell, and
+_SHOWN_LINE = 200  # of a line, in a message
+_QUOTED = re.compile(rb'"[^"]*"')
+_CUT = "the file ends in the middle of a line: it may have been cut"
+
+
+def chunks(stream: BinaryIO, file: str, before: bytes, size: int) -> Iterator[bytes]:
+    """Yield whole lines of a stream, each ending in a line feed, but for the last line where it has none.
+
+    Args:
+        stream: Of text.
+        file: Its name, for messages.
+        before: What was read already, and is part of the lines.
+        size: About as many bytes are yielded at a time.
+
+    Raises:
+        InputError: When a line has no end, so that this is no table.
+    """
+    while text := before + stream.read(size):
+        before = b""
+        if not text.endswith(b"\n"):
+            rest = stream.readline(LONGEST_LINE)
+            if len(rest) == LONGEST_LINE:
+                raise InputError(f"{file} is no table: it has a line of more than {LONGEST_LINE} bytes")
+            text += rest
+        if b"\r" in text:
+            text = text.replace(b"\r\n", b"\n")
+        yield text
+
+
+class RowReader:
+    """Parser of rows, which counts their decimals.
+
+    Attributes:
+        decimals: The most decimals seen, by column that is taken.
+    """
+
+    def __init__(self, header: Header, taken: Sequence[int] | None = None, fixed: Sequence[int] = ()) -> None:
+        """Prepare to read rows under a header.
+
+        Args:
+            header: Names of the columns.
+            taken: Indices of the columns that hold numbers to be taken, rising; all unless given.
+            fixed: Indices of columns whose texts must be those of the first row.
+        """
+        self._header = header
+        self._taken = list(range(len(header.names))) if taken is None else list(taken)
+        self._fixed = list(fixed)
+        self._all = len(self._taken) == len(header.names)
+        self._line = header.line + 1
+        self._layout: RowLayout | None = None
+        self._texts: bytes | None = None  # of the fixed columns in the first row
+        names = [header.names[index] for index in self._taken]
+        self.decimals = np.zeros(len(names), dtype=np.int64)
+        self._nine_decimals = True  # until they are not
+        self._whole_numbers = whole_number_columns(map(parse_column, names))
+        self._fixed_decimals = np.full(len(names), DECIMALS)
+        self._fixed_decimals[list(self._whole_numbers)] = 0
+
+    def read(self, text: bytes) -> Array:
+        """Return the rows (N, columns) of whole lines.
+
+        Raises:
+            InputError: With the place of the first thing that is wrong.
+        """
+        if self._layout is None:
+            first = next((line for line in text.split(b"\n") if line.strip()), None)
+            if first is None:
+                self._line += text.count(b"\n")
+                return np.empty((0, len(self._taken)))
+            self._layout = layout_of(self._header.names, self._header.text, first)
+        layout = self._layout
+        plain = text if text.endswith(b"\n") else text + b"\n"
+        usual = layout.separator == "," and not layout.open_ended and self._nine_decimals
+        plain = plain if usual else layout.plain(plain)
+        try:
+            rows = self._numbers(plain)
+        except NotFixedError:
+            rows = self._numbers_of_any_form(layout.plain(plain) if usual else plain, text, layout)
+        self._line += text.count(b"\n")
+        return rows
+
+    def _numbers(self, text: bytes) -> Array:
+        """Return the rows of lines in a usual form; NotFixedError where they are in another one."""
+        if not self._all:
+            text = self._taken_cells(text)
+        width = len(self._taken)
+        if self._nine_decimals:
+            try:
+                rows = scan_fixed(text, width, self._whole_numbers)
+                self.decimals = np.maximum(self.decimals, self._fixed_decimals)
+            except NotFixedError:
+                self._nine_decimals = False
+            else:
+                return rows
+        rows, decimals = scan_decimals(text, width)
+        self.decimals = np.maximum(self.decimals, decimals)
+        return rows
+
+    def _taken_cells(self, text: bytes) -> bytes:
+        """Return the cells of the columns that are taken; NotFixedError where lines are of another width."""
+        width = len(self._header.names)
+        buffer = np.frombuffer(text, dtype=np.uint8).copy()
+        feeds = buffer == ord("\n")
+        ends = np.flatnonzero(feeds | (buffer == ord(",")))
+        if b'"' in text or ends.size % width or feeds.sum() * width != ends.size:
+            raise NotFixedError
+        if not feeds[ends[width - 1 :: width]].all():
+            raise NotFixedError
+        lengths = np.diff(ends, prepend=-1)
+        self._compare_texts(_cells_of(buffer, lengths, width, self._fixed), ends.size // width)
+        buffer[ends[self._taken[-1] :: width]] = ord("\n")
+        return _cells_of(buffer, lengths, width, self._taken)
+
+    def _compare_texts(self, texts: bytes, count: int) -> None:
+        """Take the texts of the first row of all; NotFixedError where a later row has others."""
+        if self._fixed:
+            first = texts[: len(texts) // count] if self._texts is None else self._texts
+            if texts != first * count:
+                raise NotFixedError
+            self._texts = first
+
+    def _numbers_of_any_form(self, plain: bytes, written: bytes, layout: RowLayout) -> Array:
+        """Return the rows of lines whose numbers are written in any form."""
+        lines = [self._split(line) for line in plain.split(b"\n") if line.strip()]
+        if not lines:
+            return np.empty((0, len(self._taken)))
+        if not all(len(line) == layout.width for line in lines):
+            self._explain(written, layout)
+        cells = [[line[index] for index in self._taken] for line in lines]
+        try:
+            rows = np.array([list(map(_number, line)) for line in cells])
+        except ValueError:
+            self._explain(written, layout)
+        texts = {b",".join(line[index] for index in self._fixed) for line in lines}
+        if not np.isfinite(rows).all() or len(texts) > 1:
+            self._explain(written, layout)
+        self.decimals = np.maximum(self.decimals, _most_decimals(cells))
+        return rows
+
+    def _split(self, line: bytes) -> list[bytes]:
+        """Return the cells of a line; commas between quotation marks do not separate."""
+        if b'"' not in line:
+            return line.split(b",")
+        hidden = _QUOTED.sub(lambda match: match[0].replace(b",", b"\x1f"), line)
+        return [cell.replace(b"\x1f", b",") for cell in hidden.split(b",")]
+
+    def _explain(self, text: bytes, layout: RowLayout) -> NoReturn:
+        """Say what is wrong with the first of some lines that is wrong."""
+        lines = text.split(b"\n")
+        for index, line in enumerate(lines):
+            flaw = self._flaw_of(line, self._line + index, layout) if line.strip() else None
+            if flaw is not None:
+                message, hint, place = flaw
+                last = index == len(lines) - 1  # it has no line feed
+                raise InputError(Problem(message, _CUT if last else hint, place))
+        place = Place(self._header.file, self._line, 1, _shown_line(lines[0]))
+        raise InputError(Problem("the rows are about other joints than the first one", None, place))
+
+    def _flaw_of(self, line: bytes, number: int, layout: RowLayout) -> tuple[str, str | None, Place] | None:
+        """Return what is wrong with a line, what would fix it, and where; None where nothing is."""
+        source, names = line.decode("utf-8", "replace"), self._header.names
+        cells = layout.cells(source) if '"' not in source else list(enumerate(self._text_cells(line), 1))
+        if len(cells) != len(names):
+            place = Place(
+                self._header.file, number, 1, _shown_line(line), max(min(len(source), _SHOWN_LINE), 1)
+            )
+            return (
+                f"the line has {len(cells)} values, expected {len(names)} as in line {self._header.line}",
+                None,
+                place,
+            )
+        for index in self._taken:
+            column, cell = cells[index]
+            text = layout.number(cell)
+            if not (is_number(text) and isfinite(float(text))):
+                shown = cell.strip() if len(cell) <= _SHOWN else cell.strip()[:_SHOWN] + "..."
+                place = Place(self._header.file, number, column, _shown_line(line), max(len(cell), 1))
+                value = f"'{shown}'" if shown else "empty"
+                return f"{names[index]} is {value}, expected a finite number", None, place
+        return None
+
+    def _text_cells(self, line: bytes) -> list[str]:
+        return [cell.decode("latin-1") for cell in self._split(line)]
+
+
+def _cells_of(
+    buffer: NDArray[np.uint8], lengths: NDArray[np.intp], width: int, columns: Sequence[int]
+) -> bytes:
+    """Return the cells of some columns, each with the byte behind it."""
+    if not columns:
+        return b""
+    chosen = np.zeros(width, np.bool_)
+    chosen[list(columns)] = True
+    return buffer[np.repeat(np.tile(chosen, lengths.size // width), lengths)].tobytes()
+
+
+def _number(cell: bytes) -> float:
+    if not is_number(cell):
+        raise ValueError
+    return float(cell)
+
+
+def _shown_line(line: bytes) -> str:
+    text = line.decode("utf-8", "replace")
+    return text if len(text) <= _SHOWN_LINE else text[:_SHOWN_LINE]
+
+
+def _most_decimals(cells: Sequence[Sequence[bytes]]) -> NDArray[np.int64]:
+    """Return how many decimals the numbers of each column show at most, shape (m,)."""
+    return np.array([max(map(decimals_of, column)) for column in zip(*cells, strict=True)])
