@@ -343,14 +343,14 @@ def _efforts(move: ExplainedMove) -> Iterator[str]:
     for effort in move.efforts or ():
         ends = ((effort.low, effort.low_time), (effort.high, effort.high_time))
         extent = " .. ".join(
-            f"{end:.6g} (t = {round(time - move.start, _TIME_DECIMALS):.6g})" for end, time in ends
+            f"{_clean(end):.6g} (t = {round(time - move.start, _TIME_DECIMALS):.6g})" for end, time in ends
         )
         limits = "no limit"
         if effort.used is not None:
             low, high = ("unlimited" if bound is None else f"{bound:.9g}" for bound in effort.limit)
-            left = f"{effort.head_room or 0.0:.6g} {effort.unit} left"
+            left = f"{_clean(effort.head_room or 0.0):.6g} {effort.unit} left"
             limits = f"limits {low} .. {high}, {100 * effort.used:.4g} % used, {left}"
-        gravity = f"{effort.gravity:.6g} {effort.unit} of it against gravity"
+        gravity = f"{_clean(effort.gravity):.6g} {effort.unit} of it against gravity"
         yield f"    {effort.joint} tau: {extent} {effort.unit}; {limits}, {gravity}"
 
 
