@@ -30,7 +30,7 @@ _ROUNDS = 3  # of tangents at the speeds of the motion before: the last one chan
 _TRIES = 4  # of lower limits between moving states
 _LOWERED = 1.5  # times what is proven to be over them
 
-Solve = Callable[["tuple[PathConstraint, ...]"], "TimeOptimalMotion"]
+_Solve = Callable[["tuple[PathConstraint, ...]"], "TimeOptimalMotion"]
 
 
 def lacks_acceleration(robot: Robot) -> NDArray[np.bool_]:
@@ -59,7 +59,7 @@ def effort_constraints(path: PiecewisePolynomial, robot: Robot) -> tuple[EffortC
     return (EffortConstraint(InverseDynamics(robot), path, limits.effort, limits.velocity),)
 
 
-def solved_within_efforts(path: PiecewisePolynomial, robot: Robot, solve: Solve) -> TimeOptimalMotion:
+def solved_within_efforts(path: PiecewisePolynomial, robot: Robot, solve: _Solve) -> TimeOptimalMotion:
     """Return the fastest motion along a path, within limits of effort that are proven for all t.
 
     Args:
@@ -110,7 +110,7 @@ def effort_shares(trajectory: PiecewisePolynomial, robot: Robot) -> Array | None
     return np.concatenate([mean / high, mean / low], axis=1)
 
 
-def _solved(constraint: EffortConstraint, solve: Solve) -> TimeOptimalMotion:
+def _solved(constraint: EffortConstraint, solve: _Solve) -> TimeOptimalMotion:
     """Return the fastest motion, with viscous friction by its tangents at the speeds of the motion."""
     motion = solve((constraint,))
     for _ in range(_ROUNDS - 1 if constraint.has_viscous else 0):
