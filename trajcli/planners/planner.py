@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
@@ -30,6 +31,7 @@ _REMARKS = (
     "fastest_found",
 )  # kinds of events that are about how a curve was computed, and concede nothing
 _GIVEN = ("duration", "velocity", "acceleration", "deceleration", "timed")  # where they say how long it lasts
+_WHOLE = 1e-3  # of a hundredth of a percent: what rounding may put above a proven bound
 LITTLE = 1e-3
 """Relative: a law that is stretched by less still counts as the fastest."""
 
@@ -97,6 +99,7 @@ class Certificate:
         stopping: Duration of the motion that stops at each point, s; infinite where there is none.
         off_chords: By how much each joint leaves the straight chords between the points at most, shape (n,).
         off_times: Where it does, s from the start of the move, shape (n,).
+        polyline: Whether it keeps to the straight chords, so that only such motions are compared.
     """
 
     lower: float
@@ -106,6 +109,27 @@ class Certificate:
     stopping: float
     off_chords: Array
     off_times: Array
+    polyline: bool = False
+
+    def remark(self, duration: float, names: Sequence[str]) -> Event:
+        """Return the event that says this of a motion of `duration` seconds of joints of these names."""
+        near = "nothing is known of the fastest possible"
+        if self.lower > 0:
+            above = max(math.ceil(1e4 * (duration / self.lower - 1) - _WHOLE) / 100, 0.0)
+            where = " along the polyline" if self.polyline else ""
+            near = f"at most {above:.6g} % above the fastest possible{where}, {{lower}}"
+        starts = f"{self.agreeing} of {len(self.found)} starting points agree"
+        stops = "" if np.isinf(self.stopping) else "; stopping at each point takes {stopping}"
+        joint = int(self.off_chords.argmax())
+        amounts: Amounts = {
+            "lower": Amount(self.lower, rounded="down"),
+            "stopping": Amount(self.stopping),
+            "off": Amount(float(self.off_chords[joint]), 0, joint),
+            "joint": names[joint],
+            "time": Amount(float(self.off_times[joint])),
+        }
+        message = f"{near}; {starts}{stops}; it leaves the chords by up to {{off}} ({{joint}} at {{time}})"
+        return Event("fastest_found", message, amounts=amounts)
 
     def scaled(self, factor: float) -> Certificate:
         """Return what is known of the motion that takes `factor` times as long."""

@@ -85,6 +85,10 @@ def plan_job(loaded: LoadedJob, carried: Carried | None = None, *, advise: bool 
     for move in moves:
         events += _events_of(poses.get(move.index), move.index)
         events += [replace(event, move=move.index) for event in move.planned.events]
+        known = move.planned.certificate
+        if known is not None:
+            remark = known.remark(move.duration, move.robot.joint_names)
+            events.append(replace(remark, move=move.index))
     trajectory = _joined(moves, loaded, _first_state(loaded, _first_moving(moves), events))
     report_progress("checking the trajectory")
     verdict = verify(trajectory, [move.robot.limits for move in moves], [move.promise for move in moves])

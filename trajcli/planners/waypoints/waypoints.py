@@ -6,7 +6,6 @@ Source: Berscheid and Kroeger, Jerk-limited Real-time Trajectory Generation with
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 from pydantic.json_schema import JsonSchemaValue
 
-from trajcli.errors import Amount, Amounts, MissingLimitError, PlanningError, Problem
+from trajcli.errors import MissingLimitError, PlanningError, Problem
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.language.numbers import (
@@ -32,7 +31,7 @@ from trajcli.language.numbers import (
 from trajcli.language.per_joint import flawed
 from trajcli.language.recorded import Recorded
 from trajcli.planners.boundary_states import missing_limit, standstill
-from trajcli.planners.planner import Certificate, Event, Planned
+from trajcli.planners.planner import Certificate, Planned
 from trajcli.planners.waypoints.given_points import (
     GivenPoints,
     given_points,
@@ -46,7 +45,6 @@ from trajcli.units import Quantity
 if TYPE_CHECKING:
     from trajcli.planners.fastest_through_points.problem import WaypointProblem
 
-_WHOLE = 1e-3  # of a hundredth of a percent: what rounding may put above a proven bound
 _TIME = Number(Quantity("time"), "Shortest duration of a segment, s.", at_least=0.0)
 
 
@@ -159,14 +157,21 @@ class FastestThroughPoints(PointSequence):
         off, times = off_chords(motion, points.positions, robot.limits.velocity)
         joint = None if fastest.joint is None else int(joints[fastest.joint])
         certificate = Certificate(
-            fastest.lower, joint, fastest.found, fastest.agreeing, fastest.stopping, off, times
+            fastest.lower,
+            joint,
+            fastest.found,
+            fastest.agreeing,
+            fastest.stopping,
+            off,
+            times,
+            self.straight,
         )
         return Planned(
             motion.curve,
             points.target,
             phases=motion.phases,
             via_points=ViaPoints(motion.times, points.positions, np.zeros_like(points.positions)),
-            events=(*points.events, _said(certificate, motion.duration, robot, straight=self.straight)),
+            events=points.events,
             certificate=certificate,
         )
 
@@ -203,27 +208,6 @@ def _problem(points: GivenPoints, robot: Robot, joints: NDArray[np.intp]) -> Way
         points.least,
         limits.position[joints],
     )
-
-
-def _said(certificate: Certificate, duration: float, robot: Robot, *, straight: bool) -> Event:
-    """Return the remark on how near to the fastest a motion is, and how far it leaves the chords."""
-    near = "nothing is known of the fastest possible"
-    if certificate.lower > 0:
-        above = math.ceil(1e4 * (duration / certificate.lower - 1) - _WHOLE) / 100
-        where = " along the polyline" if straight else ""
-        near = f"at most {max(above, 0.0):.4g} % above the fastest possible{where}, {{lower}}"
-    starts = f"{certificate.agreeing} of {len(certificate.found)} starting points agree"
-    stops = "" if np.isinf(certificate.stopping) else "; stopping at each point takes {stopping}"
-    joint = int(certificate.off_chords.argmax())
-    amounts: Amounts = {
-        "lower": Amount(certificate.lower, rounded="down"),
-        "stopping": Amount(certificate.stopping),
-        "off": Amount(float(certificate.off_chords[joint]), 0, joint),
-        "joint": robot.joint_names[joint],
-        "time": Amount(float(certificate.off_times[joint])),
-    }
-    message = f"{near}; {starts}{stops}; it leaves the chords by up to {{off}} ({{joint}} at {{time}})"
-    return Event("fastest_found", message, amounts=amounts)
 
 
 def _require_limits(points: GivenPoints, robot: Robot) -> None:
