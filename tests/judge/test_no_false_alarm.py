@@ -70,6 +70,12 @@ def test_rows_give_no_false_alarm() -> None:
     assert sum(check_rows(seed) for seed in range(160)) > 20
 
 
+@pytest.mark.parametrize("seed", [21674, 23368])
+def test_motions_that_once_were_false_alarms(seed: int) -> None:
+    """A law that changes within the first interval; an acceleration that leaves and returns between two rows."""
+    assert check_rows(seed)
+
+
 @pytest.mark.soak
 @pytest.mark.parametrize("block", range(100))
 def test_rows_give_no_false_alarm_at_length(block: int) -> None:

@@ -91,7 +91,7 @@ def test_24_hz_in_six_decimals_and_in_degrees(tmp_path: Path) -> None:
 
 
 def test_a_chunk_in_single_precision(tmp_path: Path) -> None:
-    judgement = judged("chunk_float32.npy", tmp_path, "{velocity: 2.0}", robot="panda")
+    judgement = judged("chunk_float32.npy", tmp_path, "{velocity: 2.0}", robot="panda", units="rad")
     assert judgement.verdict == "satisfied"
     assert (judgement.rows, judgement.period) == (50, 0.02)
 

@@ -74,9 +74,9 @@ class Changes:
             room[sparse] += further
         return np.asarray(np.abs(self.change - self.stated) > room)
 
-    def isolated(self, piece: NDArray[np.intp], joint: NDArray[np.intp]) -> NDArray[np.bool_]:
-        """Return which of some changes (m,) are much larger than those near to them, but for one beside."""
-        values, near = self.change, piece + np.arange(-_NEAR, _NEAR + 1)[:, None]
+    def isolated(self, piece: NDArray[np.intp], joint: NDArray[np.intp], values: Array) -> NDArray[np.bool_]:
+        """Return which of some values (P, n) are much larger than those near to them, but for one beside."""
+        near = piece + np.arange(-_NEAR, _NEAR + 1)[:, None]
         inside = (near >= 0) & (near < len(values))
         sizes = np.where(inside, np.abs(values[np.clip(near, 0, len(values) - 1), joint]), 0.0)
         own = sizes[_NEAR].copy()
@@ -174,13 +174,16 @@ class _Judge:
         changes = self.changes
         piece, joint = np.nonzero(disagree | over)
         row = piece + first
-        jumps = changes.isolated(row, joint)
+        jumps = changes.isolated(row, joint, changes.change)
         if changes.stated is not None:
             moved, said = (
                 np.abs(self._beside(values, row, joint)) for values in (changes.change, changes.stated)
             )
             jumps &= moved >= said  # else it is the column of the derivative that jumps
         other = disagree[piece, joint] & ~jumps
+        if changes.order == 1 and changes.stated is not None:
+            # an acceleration may leave and return between two rows: a wrong column is wrong in many of them
+            other &= ~changes.isolated(row, joint, changes.change - changes.stated)
         sizes = np.abs(changes.change[row, joint])
         branch = np.zeros(row.size, dtype=bool)
         if changes.order == 0 and changes_branch is not None:

@@ -1,0 +1,94 @@
+"""`trajcli.check`: arrays in, the judgement of `check` out; wrong input is an InputError."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+import trajcli
+from trajcli.kinematics.robot import Limits
+
+T = 0.02 * np.arange(50)
+Q = np.outer(np.sin(T), np.full(7, 0.3)) + np.array([0, 0, 0, -1.5, 0, 1.5, 0])
+QD = np.outer(np.cos(T), np.full(7, 0.3))
+QDD = np.outer(-np.sin(T), np.full(7, 0.3))
+
+
+def test_a_chunk_within_its_limits_is_satisfied() -> None:
+    judgement = trajcli.check(T, Q, robot="panda")
+    assert (judgement.verdict, judgement.findings, judgement.interpolation) == ("satisfied", (), "linear")
+    assert judgement.period == pytest.approx(0.02)
+    assert trajcli.check(T, Q, robot="panda", qd=QD, qdd=QDD).interpolation == "quintic"
+    assert trajcli.check(T.astype(np.float32), Q.astype(np.float32), robot="panda").verdict == "satisfied"
+    assert trajcli.check(T.tolist(), Q.tolist(), robot=trajcli.load_robot("panda")).verdict == "satisfied"
+
+
+def test_limits_are_given_as_in_a_job_in_si() -> None:
+    fastest = float(np.abs(np.diff(Q[:, 0])).max() / 0.02)
+    broken = trajcli.check(T, Q, robot="panda", limits={"velocity": fastest * 0.999})
+    assert broken.verdict == "exceeded"
+    assert {found.kind for found in broken.findings} == {"velocity"}
+    assert broken.findings[0].limit == pytest.approx(fastest * 0.999)
+    fast = Q * [30, 1, 1, 1, 1, 1, 1]
+    limits = {"velocity": {"panda_joint1": None}, "position": {"panda_joint1": None}}
+    assert trajcli.check(T, fast, robot="panda").verdict == "exceeded"
+    assert trajcli.check(T, fast, robot="panda", limits=limits).verdict == "satisfied"
+
+
+def test_bare_joints_have_the_limits_alone() -> None:
+    none = np.tile([-np.inf, np.inf], (7, 1))
+    own = Limits(none, np.tile([-0.2, 0.2], (7, 1)), none, none)
+    assert trajcli.check(T, Q, limits=own).findings[0].joint == "j1"
+    assert trajcli.check(T, Q, limits={"velocity": 0.2}).verdict == "exceeded"
+    assert trajcli.check(T, Q).verdict == "satisfied"
+
+
+def test_degrees_for_radians_are_hinted_at() -> None:
+    judgement = trajcli.check(T, np.degrees(Q), robot="panda")
+    assert "degrees" in (judgement.findings[0].hint or "")
+    assert judgement.findings[0].kind == "position"
+
+
+def test_a_doubled_time_is_a_finding() -> None:
+    times = T.copy()
+    times[20] = times[19]
+    judgement = trajcli.check(times, Q, robot="panda")
+    assert ("time", 21) in {(found.kind, found.row) for found in judgement.findings}
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"q": Q[:, :6]}, r"q: expected shape \(50, 7\)"),
+        ({"q": Q[0]}, r"q: expected shape \(50, 7\)"),
+        ({"times": T[:-1]}, r"q: expected shape \(49, 7\)"),
+        ({"times": T[:1], "q": Q[:1]}, "at least 2"),
+        ({"qd": QD[1:]}, r"qd: expected shape"),
+        ({"q": np.where(Q > 1.7, np.nan, Q)}, r"q\[\d+, \d\] is not a finite number"),
+        ({"times": np.append(T[:-1], np.inf)}, r"times\[49\] is not a finite number"),
+        ({"qdd": np.full_like(Q, np.nan), "qd": QD}, r"qdd\[0, 0\]"),
+        ({"q": Q.astype(str)}, "expected an array of numbers"),
+        ({"robot": "pandaa"}, "no robot"),
+        ({"limits": {"velocty": 1}}, "velocty"),
+        ({"limits": 3}, "expected a mapping"),
+        ({"interpolate": "cubic"}, "cubic pieces need velocities"),
+        ({"interpolate": "spline"}, "no such interpolation"),
+    ],
+)
+def test_wrong_input_is_an_input_error(changes: dict, said: str) -> None:
+    arguments = {"times": T, "q": Q, "robot": "panda"} | changes
+    with pytest.raises(trajcli.InputError, match=said):
+        trajcli.check(**arguments)
+
+
+def test_fifty_rows_of_seven_joints_are_quick() -> None:
+    """2 ms of work is what is asked for; ten times that is a defect on any machine."""
+    trajcli.check(T, Q, robot="panda", qd=QD, qdd=QDD)
+    spent = []
+    for _ in range(10):
+        start = time.process_time()
+        trajcli.check(T, Q, robot="panda", qd=QD, qdd=QDD)
+        spent.append(time.process_time() - start)
+    assert min(spent) < 0.02
