@@ -29,15 +29,18 @@ BENCHMARKS = (
     "inverse_kinematics",
     "calibration",
     "time_optimal",
+    "third_order",
     "dynamics",
     "through_points",
     "operational",
     "long_path",
     "jerk_limited",
+    "waypoints",
     "plotting",
     "viewing",
 )
 OURS = ("trajcli", "numpy", "pydantic", "pyyaml", "typer")
+THEIRS = ("roboticstoolbox-python", "eaik", "toppra", "copp-py", "numpy", "scipy")
 THEIRS = ("roboticstoolbox-python", "eaik", "pin", "toppra", "numpy", "scipy")
 _VERSIONS = """
 import json, platform, sys

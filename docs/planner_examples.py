@@ -170,8 +170,9 @@ times of stopping at each point; (2) the straight motion of each collinear stret
 from eight tenths of those times; (4) central differences of the points, at the best of six speeds; (5) six
 free knots, from the times at the velocity limits; (6) eight, from the times of the best motion so far; (7)
 ten, from equal times; (8) sixteen, from the times of the best so far. The motion that stops at each point
-is always compared, too, so that no result is slower. The lower bound that is named is proven, and so is
-what the motion is at most above the fastest possible.
+is always compared, too, so that no result is slower; once a motion is as fast as the proven bound, no more
+starting points are tried. The lower bound that is named is proven, and so is what the motion is at most
+above the fastest possible.
 
 With `straight` it keeps to the polyline through the points: it passes collinear points without a stop, and
 stops where the polyline turns.""",

@@ -381,3 +381,11 @@ def test_a_plan_from_candidates(arms, tmp_path):
     assert arms.call("calibrate", "-r", "ur5e", "--plan", 41, file).code == 2
     assert arms.call("calibrate", "-r", "ur5e", "--plan", 4, file).code == 2
     assert arms.call("calibrate", "-r", "ur5e", "--plan", 8, "--measure", "position", file).code == 2
+
+
+def test_measurements_that_are_wrong_alike_are_one_error(arms, planar, tmp_path):
+    items = [{"joints": [0.1 * k] * 5, "pose": {"xyz": [1, 1, 0]}} for k in range(30)]
+    outcome = arms.call("calibrate", "-r", planar, listed(tmp_path, items))
+    assert outcome.code == 2
+    assert outcome.err.count("error:") == 1
+    assert "29 more measurements are like this" in outcome.err

@@ -566,3 +566,47 @@ def test_breaches_are_counted_by_move() -> None:
     found = judged(replace(rows, q=q, move=move), "ur-servoj").breaches
     speeds = [each for each in found if each.rule == "servoj-speed"]
     assert [(each.move, each.row, each.count) for each in speeds] == [(0, 101, 1), (1, 301, 1), (2, 311, 1)]
+
+
+def test_a_straight_motion_steps_at_both_ends() -> None:
+    """From rest to a constant velocity and back: all of it at the first and at the last row."""
+    rows = motion(period=0.1, rows=11, columns="q")
+    q = HOME[7] + np.outer(np.arange(11) * 0.1, [0.0, 0.3, 0, 0, 0, 0, 0])
+    found = judged(replace(rows, q=q), "ros-jtc").breaches
+    assert [(each.joint, each.row, each.value, each.count) for each in found] == [
+        ("joint_2", 1, pytest.approx(0.3), 2)
+    ]
+    stopping = replace(rows, q=np.concatenate([q[:1], q[:1], q[:-2]]))  # it starts later, and ends in motion
+    found = judged(stopping, "ros-jtc").breaches
+    assert [(each.row, each.count) for each in found] == [(3, 2)]
+    faster = q.copy()
+    faster[-1, 1] += 0.06
+    found = judged(replace(rows, q=faster), "ros-jtc").breaches
+    assert [(each.row, each.value) for each in found] == [(11, pytest.approx(-0.9))]
+
+
+def test_the_approach_begins_where_the_arm_stands() -> None:
+    """A cubic from rest that arrives in motion backwards overshoots its point, here beyond the range.
+
+    From 0 with velocity 0 to d with velocity -w over T: q = (3 d + w T) u^2 - (2 d + w T) u^3.
+    """
+    rows = motion(period=0.1, rows=21, columns="q,qd")
+    assert rows.qd is not None
+    qd = rows.qd.copy()
+    qd[0, 2] = -1.0
+    later = replace(rows, t=rows.t + 0.5, qd=qd)
+    stands = HOME[7].copy()
+    stands[2] -= 0.2
+    a, b = 3 * 0.2 + 0.5, 2 * 0.2 + 0.5
+    peak = stands[2] + 4 * a**3 / (27 * b**2)  # at u = 2 a / (3 b)
+    free = np.tile([-np.inf, np.inf], (7, 1))
+    for upper, broken in ((peak - 1e-6, True), (peak + 1e-6, False)):
+        position = free.copy()
+        position[2, 1] = upper
+        found = judged(
+            later, "ros-jtc", Surroundings(rows.joints, stands, Limits(position, free, free, free))
+        )
+        own = [each for each in found.breaches if each.rule == "jtc-first-point"]
+        assert [(each.kind, each.joint) for each in own] == [("position", "joint_3")] * broken
+        if broken:
+            assert own[0].value == pytest.approx(peak, rel=1e-9)

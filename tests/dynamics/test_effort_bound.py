@@ -52,6 +52,17 @@ def random_dynamics(rng, friction):
 
 @pytest.mark.parametrize("seed", range(30))
 def test_bounds_are_never_below_samples_and_hardly_above(seed):
+    require_sound_and_tight(seed)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("first", range(0, 1000, 100))
+def test_bounds_of_a_thousand_motions(first):
+    for seed in range(first, first + 100):
+        require_sound_and_tight(seed)
+
+
+def require_sound_and_tight(seed):
     rng = np.random.default_rng(seed)
     dynamics = random_dynamics(rng, friction=seed % 3 == 0)
     breaks, coefficients = random_motion(rng, len(dynamics.links))

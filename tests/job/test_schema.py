@@ -17,7 +17,7 @@ from trajcli.job.read import job_from_text
 from trajcli.job.robot import CATALOGUE
 from trajcli.job.schema import SchemaKind, schema_of, schema_text
 from trajcli.job.yaml.load import read_document
-from trajcli.planners import PLANNERS
+from trajcli.planners import HANDLING, PLANNERS
 
 ROOT = Path(__file__).parents[2]
 JOBS = [*sorted((ROOT / "examples").glob("*.yaml")), STARTER]
@@ -62,8 +62,9 @@ def test_robots_are_accepted(path: Path) -> None:
 
 
 def test_there_is_an_example_for_each_planner() -> None:
-    used = {move["planner"] for path in JOBS[:-1] for move in read_document(str(path)).plain()["moves"]}
-    assert used == set(PLANNERS)
+    moves = [move for path in JOBS[:-1] for move in read_document(str(path)).plain()["moves"]]
+    used = {move.get("planner") or next(iter(move)) for move in moves}
+    assert used == {*PLANNERS, *HANDLING}
 
 
 @settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])

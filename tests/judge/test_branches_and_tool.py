@@ -143,3 +143,24 @@ def test_nearness_to_a_singularity_is_a_warning() -> None:
     assert judgement.verdict == "satisfied"
     assert found.severity == "warning"
     assert abs(found.time - 2.5) < 0.3
+
+
+@pytest.mark.parametrize("orders", [1, 2, 3])
+def test_a_tool_at_its_limits_is_no_false_alarm(orders: int) -> None:
+    """A trapezoid along the line at the limits of the tool, as rows of 250 Hz of any columns."""
+    job = {**JOB, "limits": {"acceleration": 20.0, "tcp": {"speed": 0.12, "acceleration": 0.5}}}
+    job["moves"] = [{"planner": "line", "to": {"xyz": [0.45, 0.25, 0.35]}}]
+    at_limits = trajcli.plan(job)
+    rows = at_limits.trajectory.sample(250)
+    off = np.full(6, 0.5e-9)
+    states = [np.round(values, 9) for values in (rows.q, rows.qd, rows.qdd)[:orders]] + [None] * (3 - orders)
+    resolution = Resolution(0.5e-9, off, off, off)
+    motion = RecordedMotion(
+        np.round(rows.t, 9), *states, None, None, np.zeros(len(rows), int), None, resolution, "rows"
+    )
+    robot = at_limits.moves[0].robot
+    required = Requirements(robot, tool=lambda: ToolJudge(robot, {0: at_limits.moves[0].planned.tool}))
+    judgement = judge_motion(lambda: (motion,), required)
+    assert judgement.passed, [found.text() for found in judgement.findings]
+    tight = replace(robot, limits=replace(robot.limits, tcp=ToolLimits(speed=0.1199)))
+    assert not judge_motion(lambda: (motion,), Requirements(tight, tool=lambda: ToolJudge(tight, {}))).passed

@@ -240,3 +240,29 @@ def test_sparse_points_need_not_say_what_happens_between_them() -> None:
     assert judged(motion, limits()).verdict == "satisfied"
     assert judged(motion, limits(jerk=np.inf)).verdict == "satisfied"
     assert judged(motion, limits(jerk=np.inf, acceleration=np.inf)).verdict == "satisfied"
+
+
+def test_a_joint_too_fast_towards_its_end_is_found() -> None:
+    """|v| <= sqrt(2 d x) - o at the distance x before the end of the range: sampled densely for the oracle."""
+    curve, end, d, o = quintic(1), 1.6, 2.0, 0.1
+    t = np.linspace(0.0, DURATION, 400_001)
+    share = curve.evaluate(t, 1)[:, 0] / (np.sqrt(2 * d * (end - curve.evaluate(t)[:, 0])) - o)
+    worst_share, at = share.max(), t[share.argmax()]
+
+    def near(part: float) -> Limits:
+        """Return limits of which the motion uses a part: k (sqrt(2 d x) - o) has k^2 d and k o."""
+        k = worst_share / part
+        none = np.array([[-np.inf, np.inf]])
+        return Limits(
+            np.array([[-2.0, end]]), none, none, none, velocity_by_position=np.array([[k**2 * d, k * o]])
+        )
+
+    for period in (1e-3, 0.05):
+        motion = rows_of(curve, period, decimals=12)
+        assert judged(motion, near(1 - 1e-6)).verdict == "satisfied"
+        judgement = judged(motion, near(1 + 1e-4))
+        found = worst(judgement, "velocity_by_position")
+        assert judgement.verdict == "exceeded"
+        assert abs(found.time - at) < 0.01
+        assert found.value / found.limit == pytest.approx(1 + 1e-4, rel=1e-6)
+        assert found.factor == pytest.approx(1 + 1e-4, rel=1e-6)

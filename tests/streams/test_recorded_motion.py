@@ -279,6 +279,7 @@ def test_separators_and_forms_of_numbers(separator, form, tmp_path, monkeypatch)
         ("t q1\n0 1\n1 2 3\n", "in.csv:3:1", "the line has 3 values"),
         ("t;q1\n0;1\n1;nan\n", "in.csv:3:3", "q1 is 'nan'"),
         ("t,q1,note\n0,1,a\n1,x,b\n", "in.csv:3:3", "q1 is 'x'"),
+        ("t,q1\n0,1\n1,-1e308\n", "in.csv:1:3", "q1 is -1e+308 in row 2"),
         ("t,q1\n", "in.csv:1:1", "no rows"),
         ("", "", "is empty"),
         ("Dear reader, this is no table.\n" * 30, "in.csv:1:1", "no columns are positions"),
@@ -307,6 +308,28 @@ def test_formats_that_are_not_read_are_named(magic, what, tmp_path):
     _, message, hint = refused(tmp_path, magic)
     assert what in message
     assert hint
+
+
+EXTREMES = [
+    "1e-99999999999999999999",
+    "1e99",
+    "-1e99",
+    "1e-320",
+    "0",
+    "-0",
+    "1e18",
+    "123456789012345678901234567890",
+]
+
+
+@pytest.mark.parametrize("first", EXTREMES)
+@pytest.mark.parametrize("second", EXTREMES)
+@pytest.mark.filterwarnings("error")
+def test_no_number_overflows(first, second, tmp_path):
+    text = table("t,q1,qd1_deg", [[first, second, 1], [second, 1, first], [3, first, second]])
+    found = open_motion(written(tmp_path, text))
+    assert np.isfinite(found.resolution.q).all()
+    assert found.whole().t.tolist() == [float(first), float(second), 3.0]
 
 
 def test_a_cut_file_is_said_to_be_cut(tmp_path):

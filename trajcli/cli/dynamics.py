@@ -20,6 +20,8 @@ from trajcli.streams.decimals import Digits
 from trajcli.streams.whole_file import standard_output
 from trajcli.units import effort_unit
 
+_DECIMALS = 9  # of a part of a limit: below is rounding
+
 
 @comparable
 class DynamicsOptions:
@@ -85,7 +87,9 @@ def _lines(robot: Robot, report: dict[str, Any]) -> Iterator[str]:
 def _used(tau: float, bounds: tuple[float, float]) -> tuple[str, str]:
     """Return the bound on the side of an effort, in force or else the robot's own, and the part used."""
     bound = bounds[tau > 0]
-    return ("-", "-") if np.isinf(bound) else (number(bound), f"{100 * tau / bound:.4g}")
+    return (
+        ("-", "-") if np.isinf(bound) else (number(bound), f"{abs(round(100 * tau / bound, _DECIMALS)):.4g}")
+    )
 
 
 def _stream(arm: ArmInUnits, options: DynamicsOptions) -> int:

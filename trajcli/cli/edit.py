@@ -139,6 +139,7 @@ def run_retime(
     """
     from trajcli.editing.limits import kept_limits
     from trajcli.editing.retiming import retime
+    from trajcli.queries.arm import stated_units
 
     _check_output([source, *(name for name in arm if name is not None)], options)
     limits = kept_limits(*arm)
@@ -148,7 +149,7 @@ def run_retime(
         options.reading,
         joints=robot.joint_names,
         joint_types=robot.joint_types,
-        declared=limits.units,
+        declared=stated_units(arm[0] or arm[1] or ""),
     )
     reader = partial(as_read, path=options.output, form=options.form)
     kept = limits.requirements

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
         PoseReport,
         SegmentReport,
     )
-    from trajcli.job.report import AtLimitReport, PeakReport, SavingReport, ToolReport
+    from trajcli.job.report import PeakReport, ToolReport
+    from trajcli.job.reports.comparisons import AtLimitReport, SavingReport
 
 _MOST_LIMITS = 6  # that bind, in one line
 _MOST_POINTS = 20  # points that are listed one by one
@@ -240,7 +241,7 @@ def run_explain(job: str, overrides: Sequence[str], options: ExplainOptions) -> 
     return 0
 
 
-def _lines(explained: Explanation, count: int, *, peers: bool) -> Iterator[str]:
+def _lines(explained: Explanation, count: int, *, peers: bool = False) -> Iterator[str]:
     units = explained.units
     joints = ", ".join(f"q{i} = {name}" for i, name in enumerate(explained.joints, 1) if name != f"j{i}")
     alone = f"move {explained.moves[0].index} of " if len(explained.moves) < count else ""
@@ -342,14 +343,14 @@ def _efforts(move: ExplainedMove) -> Iterator[str]:
     for effort in move.efforts or ():
         ends = ((effort.low, effort.low_time), (effort.high, effort.high_time))
         extent = " .. ".join(
-            f"{end:.6g} (t = {round(time - move.start, _TIME_DECIMALS):.6g})" for end, time in ends
+            f"{_clean(end):.6g} (t = {round(time - move.start, _TIME_DECIMALS):.6g})" for end, time in ends
         )
         limits = "no limit"
         if effort.used is not None:
             low, high = ("unlimited" if bound is None else f"{bound:.9g}" for bound in effort.limit)
-            left = f"{effort.head_room or 0.0:.6g} {effort.unit} left"
+            left = f"{_clean(effort.head_room or 0.0):.6g} {effort.unit} left"
             limits = f"limits {low} .. {high}, {100 * effort.used:.4g} % used, {left}"
-        gravity = f"{effort.gravity:.6g} {effort.unit} of it against gravity"
+        gravity = f"{_clean(effort.gravity):.6g} {effort.unit} of it against gravity"
         yield f"    {effort.joint} tau: {extent} {effort.unit}; {limits}, {gravity}"
 
 

@@ -6,90 +6,20 @@ field beside it names its unit.
 
 from __future__ import annotations
 
-from functools import cache
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-from trajcli.frozen import comparable
-from trajcli.units import AngleUnit, LengthUnit, Quantity, Units, factor
+from trajcli.job.reports.comparisons import (
+    AtLimitReport,
+    ConsumerReport,
+    PathReferenceReport,
+    ReferenceReport,
+    SavingReport,
+)
+from trajcli.job.reports.part import JointQuantity, MeasuredIn, ReportPart, ReportSeconds, UnitName, in_units
 
-Part = TypeVar("Part", bound="ReportPart")
-ReportSeconds = Annotated[float, Field(description="Seconds.")]
-UnitName = Annotated[str, Field(description="Unit of the numbers beside it, such as rad/s.")]
-JointQuantity = Literal["position", "velocity", "acceleration", "jerk"]
-
-
-@comparable
-class MeasuredIn:
-    """Marks a number of a report, or several of them.
-
-    Attributes:
-        field: Name of the field of the same part that holds the unit; a list holds one for each number.
-    """
-
-    field: str = "unit"
-
-
-class ReportPart(BaseModel):
-    """A part of a report."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
-
-
-def in_units(part: Part, units: Units) -> Part:
-    """Return a report in SI, or a part of one, with all numbers in the units of a job."""
-    changes: dict[str, Any] = {}
-    measured = _measured(type(part))
-    for name, value in part.__dict__.items():
-        if name in measured:
-            changes[name] = _converted(value, getattr(part, measured[name]), units)
-        elif name in measured.values():
-            changes[name] = _named(value, units)
-        elif isinstance(value, ReportPart):
-            changes[name] = in_units(value, units)
-        elif isinstance(value, list | tuple) and value and isinstance(value[0], ReportPart):
-            changes[name] = type(value)(in_units(each, units) for each in value)
-    return part.model_copy(update=changes)
-
-
-@cache
-def _measured(part: type[ReportPart]) -> dict[str, str]:
-    """Return for each number of a kind of part the field that holds its unit."""
-    return {
-        name: mark.field
-        for name, field in part.model_fields.items()
-        for mark in field.metadata
-        if isinstance(mark, MeasuredIn)
-    }
-
-
-def _converted(value: Any, unit: str | list[str], units: Units) -> Any:  # noqa: ANN401
-    """Return a number, or several, in SI, in the units of the job."""
-    if isinstance(value, list | tuple):
-        factors = [_in_job(each, units.angle, units.length)[0] for each in _each(unit, len(value))]
-        pairs = zip(value, factors, strict=True)
-        return type(value)(None if number is None else number / factor for number, factor in pairs)
-    return None if value is None else value / _in_job(str(unit), units.angle, units.length)[0]
-
-
-def _named(unit: str | list[str], units: Units) -> str | list[str]:
-    names = [_in_job(each, units.angle, units.length)[1] for each in _each(unit, 1)]
-    return names[0] if isinstance(unit, str) else names
-
-
-def _each(unit: str | list[str], count: int) -> list[str]:
-    return [unit] * count if isinstance(unit, str) else unit
-
-
-@cache
-def _in_job(unit: str, angle: AngleUnit, length: LengthUnit) -> tuple[float, str]:
-    """Return the SI value of the job's unit that stands for an SI unit, and its name."""
-    start, slash, rest = unit.partition("/")
-    if start not in ("rad", "m"):
-        return 1.0, unit
-    quantity = Quantity("angle" if start == "rad" else "length")
-    return factor(quantity, Units(angle, length)), (angle if start == "rad" else length) + slash + rest
+__all__ = ["MeasuredIn", "Report", "ReportPart", "UnitName", "in_units"]
 
 
 class PeakReport(ReportPart):
@@ -190,86 +120,6 @@ class BindingReport(ReportPart):
     joint: str
     quantity: JointQuantity | Literal["velocity_by_position", "effort"]
     used: Annotated[float, Field(description="Part of the bound that is used: 1 is all of it.")]
-
-
-class AtLimitReport(ReportPart):
-    """For how long a move is at one limit: within a millionth of it, from the roots of polynomials."""
-
-    joint: str
-    quantity: JointQuantity | Literal["velocity_by_position"]
-    seconds: Annotated[float, Field(description="In either direction.")]
-    share: Annotated[float, Field(description="Of the duration of the move.")]
-    method: Annotated[
-        Literal["exact", "phases"],
-        Field(description="phases: from the switching structure of a time-optimal law."),
-    ] = "exact"
-
-
-class SavingReport(ReportPart):
-    """What a limit of one joint would save if it were 10 % higher, found by planning with it."""
-
-    joint: str
-    quantity: JointQuantity
-    saved: Annotated[float | None, Field(description="Seconds; null where no such motion is known.")]
-    share: Annotated[float | None, Field(description="Of the duration of the moves that were planned anew.")]
-    reason: Annotated[str | None, Field(description="Why none is known.")] = None
-
-
-class PeerViolation(ReportPart):
-    """A limit that the motion of a peer breaks, judged for all t as a motion of our own."""
-
-    joint: str
-    quantity: JointQuantity
-    value: Annotated[float, MeasuredIn(), Field(description="SI.")]
-    limit: Annotated[float, MeasuredIn(), Field(description="SI.")]
-    unit: UnitName
-    time: Annotated[float, Field(description="Seconds from the start of the motion.")]
-
-
-class ReferenceReport(ReportPart):
-    """The shortest duration that any point-to-point move may have under the same limits, from ruckig."""
-
-    duration: Annotated[float | None, Field(description="Seconds; null where there is no bound.")]
-    ratio: Annotated[
-        float | None, Field(description="Duration of the move over it; null where that says nothing.")
-    ]
-    joint: Annotated[str | None, Field(description="The joint that needs it, or for which there is none.")]
-    reason: Annotated[str | None, Field(description="Why there is no bound.")] = None
-    violations: Annotated[
-        list[PeerViolation],
-        Field(description="Of ruckig's motions, each joint by itself; it does not know limits of position."),
-    ] = []
-
-
-class LimitUseReport(ReportPart):
-    """The limit of which a motion uses most, for all t."""
-
-    quantity: Literal["velocity", "acceleration"]
-    joint: str
-    used: Annotated[float, Field(description="Part of the limit that is used: 1 is all of it.")]
-    time: Annotated[float, Field(description="Seconds from the start of the motion.")]
-
-
-class PathReferenceReport(ReportPart):
-    """The motion of toppra along the same path, within the same limits of velocity and acceleration."""
-
-    solver: Literal["toppra"] = "toppra"
-    duration: Annotated[float | None, Field(description="Seconds; null where it finds no motion.")]
-    ratio: Annotated[float | None, Field(description="Duration of the move over it.")]
-    use: Annotated[LimitUseReport | None, Field(description="What toppra uses; above 1 it is too fast.")]
-    own_use: Annotated[LimitUseReport | None, Field(description="What the move uses.")]
-    violations: Annotated[
-        list[PeerViolation],
-        Field(description="Of toppra's motion; the limits of jerk are not toppra's, and are not judged."),
-    ] = []
-    deviation: Annotated[
-        float,
-        Field(
-            description="By how much toppra's path misses that of the move, of all joints together; 0 where "
-            "it is the same polynomial."
-        ),
-    ] = 0.0
-    reason: Annotated[str | None, Field(description="Why there is none.")] = None
 
 
 class WaypointReport(ReportPart):
@@ -424,10 +274,10 @@ class MoveReport(ReportPart):
         PayloadReport | None, Field(description="What the tool carries; null for nothing.")
     ] = None
     binding: BindingReport | None
-    at_limit: Annotated[
-        list[AtLimitReport],
-        Field(description="Limits of velocity, acceleration and jerk that bind, and for how long."),
-    ] = []
+    at_limit: list[AtLimitReport] = Field(
+        default_factory=list,
+        description="Limits of velocity, acceleration and jerk that bind, and for how long.",
+    )
     savings: Annotated[
         list[SavingReport] | None,
         Field(description="Asked for by `explain --sensitivity`; empty where the duration is given."),
@@ -535,47 +385,6 @@ class KnotsReport(ReportPart):
     deviation: KnotsDeviation
 
 
-class ConsumerFinding(ReportPart):
-    """A rule of a consumer that the rows break, of one joint: the worst row, and how many there are."""
-
-    rule: Annotated[str, Field(description="Id of the rule in the profile.")]
-    severity: Annotated[
-        Literal["error", "warning"],
-        Field(description="error: the consumer refuses or aborts such a motion; warning: it runs less well."),
-    ]
-    kind: str
-    joint: str | None
-    move: int
-    time: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
-    row: Annotated[int, Field(description="From 1, as written.")]
-    count: Annotated[int, Field(description="Of rows that break it.")]
-    factor: Annotated[
-        float | None, Field(description="The move must last this many times longer; null: no help.")
-    ]
-    method: Annotated[
-        Literal["exact", "differences"],
-        Field(description="differences: of rows, at the period of the consumer."),
-    ]
-    message: Annotated[str, Field(description="What is wrong, in SI.")]
-    hint: Annotated[str | None, Field(description="What would fix it.")] = None
-
-
-class UnjudgedRule(ReportPart):
-    """A rule of a consumer that could not be judged."""
-
-    rule: str
-    reason: str
-
-
-class ConsumerReport(ReportPart):
-    """What the rows do against the rules of their consumer, as they are written."""
-
-    profile: str
-    accepted: Annotated[bool, Field(description="Whether all necessary rules are kept.")]
-    findings: list[ConsumerFinding]
-    unjudged: list[UnjudgedRule]
-
-
 class Report(ReportPart):
     """What became of a job."""
 
@@ -588,12 +397,12 @@ class Report(ReportPart):
     moves: tuple[MoveReport, ...]
     findings: list[FindingReport]
     events: Annotated[list[EventReport], Field(description="Concessions, which `--strict` refuses.")]
-    remarks: Annotated[
-        list[EventReport], Field(description="How curves were computed, where that is worth a word.")
-    ] = []
+    remarks: list[EventReport] = Field(
+        default_factory=list, description="How curves were computed, where that is worth a word."
+    )
     steps: list[StepReport]
     unchecked: list[UncheckedReport]
-    unchecked_of_tool: list[UncheckedToolReport] = []
+    unchecked_of_tool: list[UncheckedToolReport] = Field(default_factory=list)
     savings: Annotated[
         list[SavingReport] | None,
         Field(description="Of all moves together, asked for by `explain --sensitivity`."),

@@ -26,6 +26,7 @@ from trajcli.kinematics.robot import Limits
 
 _ISOLATED = 4.0  # times the changes beside it: a motion that merely is fast changes from row to row alike
 _STEPS = 2.0  # times what one step in acceleration within an interval explains: there may be several
+_MEANT, _MEANT_OF_ALL = 1e-3, 1e-4  # of the joint's peak, and of all: a column that differs by less is meant
 _NEAR = 2  # intervals on each side that a jump is compared with
 _QUANTITIES = ("position", "velocity", "acceleration")
 
@@ -104,7 +105,9 @@ def changes_of(window: Intervals) -> list[Changes]:
             padded = np.concatenate([bend[:1], bend, bend[-1:]])
             near = np.max([padded[k : k + len(change)] for k in range(4)], axis=0)
             room = _STEPS * length ** (2 if order == 0 else 1) * near
-            room = room + 0.5 * length * (off[:-1] + off[1:]) + late * np.abs(mean)
+            largest = np.abs(rates).max(axis=0)
+            meant = _MEANT * largest + _MEANT_OF_ALL * largest.max()
+            room = room + 0.5 * length * (off[:-1] + off[1:]) + late * np.abs(mean) + length * meant
         found.append(Changes(order, change, error, stated, room))
     return found
 

@@ -90,6 +90,8 @@ def check_file(source: str, options: CheckOptions) -> CheckedFile:
         InputError: When it is no motion, or options do not fit it or each other.
         FileError: When a file cannot be read.
     """
+    from trajcli.queries.arm import stated_units
+
     given = _given(options)
     robot = given.robot
     motion = open_motion(
@@ -100,7 +102,7 @@ def check_file(source: str, options: CheckOptions) -> CheckedFile:
         field=options.field,
         joints=robot.joint_names,
         joint_types=robot.joint_types,
-        declared=_stated_units(options, given),
+        declared=stated_units(options.job or options.robot or ""),
     )
     shown = _shown_units(options, given)
     consumer = _consumer_of(options.profile, given)
@@ -180,21 +182,6 @@ def _given(options: CheckOptions) -> _Given:
     units = parse_units(options.units or "")  # as in a job: rad and m, unless somebody says others
     robot, events = with_limits_file(sheet.robot, options.limits, units)
     return _Given(robot, sheet.units, tuple(event.text() for event in events if event.concedes), shown=units)
-
-
-def _stated_units(options: CheckOptions, given: _Given) -> Units | None:
-    """Return the units that a job or robot file of the user states: a catalogue does not know his files."""
-    if given.loaded is not None:
-        plain = given.loaded.document.plain()
-    else:
-        from trajcli.job.robot import catalogue_names, is_urdf
-        from trajcli.job.yaml.load import read_document
-
-        name = options.robot or ""
-        if name in catalogue_names() or is_urdf(name):
-            return None
-        plain = read_document(name).plain()
-    return given.units if isinstance(plain, Mapping) and plain.get("units") else None
 
 
 def _of_job(path: str) -> _Given:

@@ -173,12 +173,8 @@ class _Side:
 
     def _unresolved(self, found: _Offences, error: Array) -> NDArray[np.bool_]:
         """Return where a change of the law between two rows explains what the curve goes beyond the bound."""
-        length = self.window.lengths[found.piece]
-        below = self.level - self.order
-        share = _UNRESOLVED if below else _UNRESOLVED_LAST
-        highest, beyond = (jumps[found.piece, found.joint] for jumps in self.window.jumps)
-        explained = share * length**below * highest + _CURVED * length ** (below + 1) * beyond
-        return np.asarray((length <= DENSE) & (found.value - found.bound <= explained + error))
+        explained = explained_by_law(self.window, found.piece, found.joint, self.order, self.level)
+        return np.asarray(found.value - found.bound <= explained + error)
 
     def _finding(
         self, found: _Offences, k: int, value: float, error: float, axes: JointAxes, *, warned: bool
@@ -203,6 +199,27 @@ class _Side:
             message=what,
             amounts=axes.amounts(joint, self.order, self.sign * value, self.sign * bound),
         )
+
+
+def explained_by_law(
+    window: Intervals, piece: NDArray[np.intp], joint: NDArray[np.intp], order: int, level: int
+) -> Array:
+    """Return how far pieces (m,) may go beyond a motion that changes its law once between two dense rows.
+
+    Minus infinity where rows are not dense.
+
+    Args:
+        window: The rows.
+        piece: Indices of pieces.
+        joint: Of each the index of a joint.
+        order: Of the derivative that is looked at.
+        level: Of the highest derivative that the pieces determine.
+    """
+    length, below = window.lengths[piece], level - order
+    share = _UNRESOLVED if below else _UNRESOLVED_LAST
+    highest, beyond = (jumps[piece, joint] for jumps in window.jumps)
+    explained = share * length**below * highest + _CURVED * length ** (below + 1) * beyond
+    return np.where(length <= DENSE, explained, -np.inf)
 
 
 def _refine(polynomials: Array, lengths: Array, near: NDArray[np.intp], value: Array, local: Array) -> None:
@@ -234,7 +251,14 @@ _HOPELESS = 1e4  # a stretch that is larger is none
 
 
 def judge_velocity_by_position(
-    window: Intervals, pieces: slice, limits: Limits, move: int, axes: JointAxes, worst: Worst
+    window: Intervals,
+    pieces: slice,
+    limits: Limits,
+    move: int,
+    axes: JointAxes,
+    worst: Worst,
+    *,
+    asked: bool,
 ) -> None:
     """Add where joints move faster towards the end of their range than their distance from there allows.
 
@@ -245,6 +269,7 @@ def judge_velocity_by_position(
         move: Its index, -1 for none.
         axes: The joints.
         worst: What is added to.
+        asked: Whether somebody asked for this curve.
     """
     if not limits.has_velocity_by_position or int(window.highest[pieces].max(initial=0)) < 1:
         return
@@ -253,15 +278,27 @@ def judge_velocity_by_position(
     if not found[0].size:
         return
     fast = _fast_approaches(window, pieces, limits, found, (times[found], used[found]))
-    certainties: tuple[Certainty, ...] = ("exceeded", "within rounding")
-    for certainty in certainties:
-        chosen = fast.certain == (certainty == "exceeded")
+    certain, warned = fast.certain, np.zeros(fast.joint.size, dtype=bool)
+    if not asked:
+        level = int(window.highest[fast.piece].max())
+        explained = explained_by_law(window, fast.piece, fast.joint, 1, level)
+        warned = certain & (np.abs(fast.speed) - np.abs(fast.bound) <= explained + fast.rounding)
+        for end in (np.zeros_like(fast.local), window.lengths[fast.piece]):
+            on_row = _fast_approaches(window, pieces, limits, found, (end, fast.used))
+            warned &= ~on_row.certain
+    groups: tuple[tuple[NDArray[np.bool_], FindingSeverity, Certainty], ...] = (
+        (certain & ~warned, "error", "exceeded"),
+        (~certain, "error", "within rounding"),
+        (warned, "warning", "exceeded"),
+    )
+    for chosen, severity, certainty in groups:
         worst.add(
             "velocity_by_position",
             move,
             fast.joint,
             fast.used,
             lambda k: fast.finding(window, axes, k),
+            severity=severity,
             certainty=certainty,
             chosen=chosen,
         )
@@ -294,7 +331,8 @@ class _FastApproaches:
     @property
     def certain(self) -> NDArray[np.bool_]:
         """Which of them rounding does not explain."""
-        return np.asarray(np.abs(self.speed) - np.abs(self.bound) > self.rounding)
+        towards = np.where(np.signbit(self.bound), -self.speed, self.speed)
+        return np.asarray(towards - np.abs(self.bound) > self.rounding)
 
     def finding(self, window: Intervals, axes: JointAxes, k: int) -> JudgedFinding:
         """Return one of them as a finding."""

@@ -235,14 +235,15 @@ class MotionJudge:
         window = self._window(kept, last, ends=ends)
         changes = changes_of(window)
         flips = None if self._tool is None else self._tool.changes_branch
+        asked = self._requirements.interpolate is not None
         for (before, after), low, high in window.runs():
             robot, pieces = self._robot_of(before, after), slice(low, high)
             arguments = (window, pieces, robot.limits, before, self._axes, self._worst)
-            judge_limits(*arguments, asked=self._requirements.interpolate is not None)
-            judge_velocity_by_position(*arguments)
+            judge_limits(*arguments, asked=asked)
+            judge_velocity_by_position(*arguments, asked=asked)
             judge_consistency(*arguments, changes, flips)
             if self._tool is not None:
-                self._tool.see(window, pieces, robot, before)
+                self._tool.see(window, pieces, robot, before, asked=asked)
         gone = max(last - BESIDE, 0)
         self._kept, self._judged = kept.part(slice(gone, None)), last - gone
         self._begins = self._begins and gone == 0

@@ -14,7 +14,7 @@ from trajcli.checks.tool_limits import SPEEDS, limits_tool
 from trajcli.curves.piecewise import Array, derivative_coefficients, horner
 from trajcli.errors import Amount
 from trajcli.judge.finding import JudgedFinding, JudgedKind, Worst
-from trajcli.judge.intervals import Intervals
+from trajcli.judge.intervals import DENSE, Intervals
 from trajcli.judge.tool_path import RecordedPath
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.following.motion import ToolMotion
@@ -27,6 +27,8 @@ _TURN = 0.05  # rad or m that a joint moves between the rows at which nearness t
 _NEAR_SINGULAR = (
     1e-3  # smallest over largest singular value: a joint turns a thousand times as fast as the tool
 )
+_TWICE = 2.0  # times a limit: no interpolation of dense rows that keep it goes so far beyond
+_CLOSE = 1e-6  # relative: what the room of checks leaves of a chord
 _SAME_STEP = 4.0  # times the steps beside it: more is a jump of the tool
 _STEP = 1e-6  # m or rad: a step of the tool that is none
 
@@ -57,7 +59,7 @@ class ToolJudge:
             elif motion is not None:
                 self._recorded[move] = RecordedPath(robot, motion, move, self._worst)
 
-    def see(self, window: Intervals, pieces: slice, robot: Robot, move: int) -> None:
+    def see(self, window: Intervals, pieces: slice, robot: Robot, move: int, *, asked: bool = True) -> None:
         """Judge the tool in the pieces of one move.
 
         Args:
@@ -65,10 +67,12 @@ class ToolJudge:
             pieces: Which ones.
             robot: The arm with the limits in force.
             move: Its index, -1 for none.
+            asked: Whether somebody asked for the curve between the rows.
         """
         if limits_tool(robot) and int(window.highest[pieces].max(initial=0)) > 0:
             for low in range(pieces.start, pieces.stop, _PIECES):
-                self._judge_limits(window, slice(low, min(low + _PIECES, pieces.stop)), robot, move)
+                some = slice(low, min(low + _PIECES, pieces.stop))
+                self._judge_limits(window, some, robot, move, asked=asked)
         path = self._recorded.get(move)
         if path is not None:
             path.see(window, pieces)
@@ -92,7 +96,9 @@ class ToolJudge:
         others = np.delete(steps, jump)
         return bool(steps[jump] <= _SAME_STEP * others.max(initial=0.0) + _STEP)
 
-    def _judge_limits(self, window: Intervals, pieces: slice, robot: Robot, move: int) -> None:
+    def _judge_limits(
+        self, window: Intervals, pieces: slice, robot: Robot, move: int, *, asked: bool
+    ) -> None:
         coefficients = window.coefficients[:, pieces]
         breaks = window.t[pieces.start] + np.append(0.0, np.cumsum(window.lengths[pieces]))
         with np.errstate(over="ignore", invalid="ignore"):
@@ -101,7 +107,8 @@ class ToolJudge:
             limit = float(getattr(robot.limits.tcp, name))
             if order > int(window.highest[pieces].max()) or peak.most <= limit * (1 + TOOL_RELATIVE):
                 continue
-            self._add_peak(window, pieces, (kind, name, order), peak, limit, move)
+            warned = not asked and self._only_between(window, pieces, (kind, name, order), peak, limit)
+            self._add_peak(window, pieces, (kind, name, order), peak, limit, move, warned=warned)
 
     def _add_peak(
         self,
@@ -111,14 +118,14 @@ class ToolJudge:
         peak: ToolPeak,
         limit: float,
         move: int,
+        *,
+        warned: bool,
     ) -> None:
         kind, name, order = what
-        piece = int(np.clip(np.searchsorted(window.t, peak.time, "right") - 1, pieces.start, pieces.stop - 1))
+        piece = self._piece_at(window, pieces, peak.time)
         rounding = self._rounding(window, piece, order)
         length = not name.startswith("angular")
-        text = (
-            f"the {name.replace('_', ' ')} of the tool reaches {{value}} {at_time(peak.time)}, its limit is "
-        )
+        text = f"the {name.replace('_', ' ')} of the tool reaches {{value}} {at_time(peak.time)}"
         finding = JudgedFinding(
             rule="limit",
             severity="error",
@@ -137,7 +144,7 @@ class ToolJudge:
                 "limit": Amount(limit, order, None, "length" if length else "angle", "down"),
             },
         )
-        certainty = "exceeded" if peak.most - limit > rounding else "within rounding"
+        certain = peak.most - limit > rounding
         count = max(self._over(window, pieces, what, limit), 1)
         self._worst.add(
             _kind(kind),
@@ -145,8 +152,38 @@ class ToolJudge:
             np.full(count, -1),
             np.full(count, peak.most / limit),
             lambda _: finding,
-            certainty="exceeded" if certainty == "exceeded" else "within rounding",
+            severity="warning" if warned and certain else "error",
+            certainty="exceeded" if certain else "within rounding",
         )
+
+    @staticmethod
+    def _piece_at(window: Intervals, pieces: slice, time: float) -> int:
+        return int(np.clip(np.searchsorted(window.t, time, "right") - 1, pieces.start, pieces.stop - 1))
+
+    def _only_between(
+        self, window: Intervals, pieces: slice, what: tuple[str, str, int], peak: ToolPeak, limit: float
+    ) -> bool:
+        """Return whether rows that stand dense keep a limit, as far as their differences make it certain."""
+        _, name, order = what
+        lengths = window.lengths[pieces, None]
+        if lengths.max() > DENSE or peak.most > _TWICE * limit:
+            return False
+        room = limit * (1 + _CLOSE) + self._rounding(window, self._piece_at(window, pieces, peak.time), order)
+        rows = slice(pieces.start, pieces.stop + 1)
+        q, qd = np.asarray(window.states[0])[rows], window.states[1]
+        if order == 1:
+            poses = forward(self._robot, q)
+            turns = np.swapaxes(poses[:-1, :3, :3], 1, 2) @ poses[1:, :3, :3]
+            traces = np.clip((np.trace(turns, axis1=1, axis2=2) - 1.0) / 2.0, -1.0, 1.0)
+            angular = name.startswith("angular")
+            moved = np.arccos(traces)[:, None] if angular else np.diff(poses[:, :3, 3], axis=0)
+            return bool((np.linalg.norm(moved / lengths, axis=1) <= room).all())
+        if qd is None:
+            return True
+        twists = (jacobian(self._robot, q) @ qd[rows, :, None])[..., 0]
+        part = twists[:, 3:] if name.startswith("angular") else twists[:, :3]
+        changes = np.linalg.norm(np.diff(part, axis=0) / lengths, axis=1)
+        return bool((changes <= room).all())
 
     def _over(self, window: Intervals, pieces: slice, what: tuple[str, str, int], limit: float) -> int:
         """Return at how many rows a speed of the tool is over its limit; 0 for accelerations."""

@@ -12,7 +12,7 @@ from trajcli.consumers.judgement import ProfileJudgement, judge_by_profile
 from trajcli.consumers.profile import Profile
 from trajcli.errors import InputError, Problem, VerificationError
 from trajcli.grids import Grid
-from trajcli.job.report import ConsumerFinding, ConsumerReport, UnjudgedRule
+from trajcli.job.reports.comparisons import ConsumerFinding, ConsumerReport, UnjudgedRule
 from trajcli.output.write import write_rows
 from trajcli.planning.plan import Plan
 from trajcli.progress import report_progress

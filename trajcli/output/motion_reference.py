@@ -10,11 +10,12 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 from trajcli.errors import PlanningError
 from trajcli.frozen import frozen
-from trajcli.job.report import PathReferenceReport, ReferenceReport
+from trajcli.job.reports.comparisons import PathReferenceReport, ReferenceReport
 from trajcli.judge.finding import JudgedFinding, Judgement, worst_first
 from trajcli.kinematics.robot import Robot
 from trajcli.output.references import (
     CONTRADICTION_HINT,
+    common_unit,
     contradiction,
     is_faster,
     use_report,
@@ -166,4 +167,5 @@ def _along_points(outline: _Outline, robot: Robot, duration: float) -> PathRefer
         own_use=None,
         violations=violation_reports(other.breaches, robot),
         deviation=other.deviation,
+        deviation_unit=common_unit(robot),
     )

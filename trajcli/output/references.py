@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from trajcli.errors import PlanningError
-from trajcli.job.report import (
-    FindingReport,
+from trajcli.job.report import FindingReport
+from trajcli.job.reports.comparisons import (
     LimitUseReport,
     PathReferenceReport,
     PeerViolation,
@@ -84,6 +84,7 @@ def path_reference_of(move: PlannedMove) -> PathReferenceReport | None:
         own_use=use_report(limit_use(move.planned.curve, move.robot.limits), move.robot),
         violations=violation_reports(other.breaches, move.robot),
         deviation=other.deviation,
+        deviation_unit=common_unit(move.robot),
     )
 
 
@@ -100,6 +101,12 @@ def _along_path(move: PlannedMove) -> PathReference | None:
         return None
     velocities = curve.evaluate(curve.start, 1), curve.evaluate(curve.end, 1, side="left")
     return reference_along(path, move.robot.limits, velocities)
+
+
+def common_unit(robot: Robot) -> str:
+    """Return the SI unit of all joints, or nothing where they differ."""
+    units = set(joint_units(robot.joint_types))
+    return units.pop() if len(units) == 1 else ""
 
 
 def use_report(use: LimitUse | None, robot: Robot) -> LimitUseReport | None:

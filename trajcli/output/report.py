@@ -167,7 +167,7 @@ def _move(plan: Plan, index: int, *, reference: bool, peers: bool) -> MoveReport
         efforts=effort_reports(plan, index),
         payload=payload_report(span.payload),
         binding=binding,
-        at_limit=at_limit_of(move, plan.verdict.peaks[index]),
+        at_limit=at_limit_of(move, plan.verdict.peaks[index], plan.verdict.by_position[index]),
         waypoints=_waypoints(move, span),
         outside=_outside(move, plan.verdict, index),
         fastest=_fastest(move, span),

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from trajcli.curves.approach import ApproachUse
 from trajcli.curves.extrema import Peaks
-from trajcli.job.report import AtLimitReport, MoveReport, Report, SavingReport
+from trajcli.job.report import MoveReport, Report
+from trajcli.job.reports.comparisons import AtLimitReport, SavingReport
 from trajcli.kinematics.robot import QUANTITIES
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan
@@ -18,12 +20,15 @@ if TYPE_CHECKING:
 _NOTHING = 1e-9  # relative to the duration: what rounding leaves of no saving
 
 
-def at_limit_of(move: PlannedMove, peaks: Sequence[Peaks]) -> list[AtLimitReport]:
+def at_limit_of(
+    move: PlannedMove, peaks: Sequence[Peaks], uses: Sequence[ApproachUse]
+) -> list[AtLimitReport]:
     """Return for how long a move is at each of its limits, the longest first.
 
     Args:
         move: The move.
         peaks: Of position and its three derivatives over it.
+        uses: Of its limits of the velocity by position.
     """
     names = move.robot.joint_names
     return [
@@ -34,7 +39,7 @@ def at_limit_of(move: PlannedMove, peaks: Sequence[Peaks]) -> list[AtLimitReport
             share=min(1.0, one.seconds / move.duration),
             method=one.method,
         )
-        for one in times_at_limits(move, peaks)
+        for one in times_at_limits(move, peaks, uses)
     ]
 
 

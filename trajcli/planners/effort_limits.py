@@ -30,7 +30,7 @@ _ROUNDS = 3  # of tangents at the speeds of the motion before: the last one chan
 _TRIES = 4  # of lower limits between moving states
 _LOWERED = 1.5  # times what is proven to be over them
 
-Solve = Callable[["tuple[PathConstraint, ...]"], "TimeOptimalMotion"]
+_Solve = Callable[["tuple[PathConstraint, ...]"], "TimeOptimalMotion"]
 
 
 def lacks_acceleration(robot: Robot) -> NDArray[np.bool_]:
@@ -59,7 +59,7 @@ def effort_constraints(path: PiecewisePolynomial, robot: Robot) -> tuple[EffortC
     return (EffortConstraint(InverseDynamics(robot), path, limits.effort, limits.velocity),)
 
 
-def solved_within_efforts(path: PiecewisePolynomial, robot: Robot, solve: Solve) -> TimeOptimalMotion:
+def solved_within_efforts(path: PiecewisePolynomial, robot: Robot, solve: _Solve) -> TimeOptimalMotion:
     """Return the fastest motion along a path, within limits of effort that are proven for all t.
 
     Args:
@@ -91,7 +91,26 @@ def solved_within_efforts(path: PiecewisePolynomial, robot: Robot, solve: Solve)
     return motion
 
 
-def _solved(constraint: EffortConstraint, solve: Solve) -> TimeOptimalMotion:
+def effort_shares(trajectory: PiecewisePolynomial, robot: Robot) -> Array | None:
+    """Return the shares of their upper and lower limits that efforts use, (pieces, 2 n); None without limits.
+
+    They are means over both ends of each piece.
+
+    Args:
+        trajectory: q(t).
+        robot: With the limits in force, and what its tool carries.
+    """
+    if not robot.limits.has_effort:
+        return None
+    from trajcli.dynamics.newton_euler import InverseDynamics
+
+    states = [np.stack(trajectory.piece_ends(order)) for order in range(3)]
+    mean = InverseDynamics(robot).effort(*states).mean(axis=0)
+    low, high = robot.limits.effort.T
+    return np.concatenate([mean / high, mean / low], axis=1)
+
+
+def _solved(constraint: EffortConstraint, solve: _Solve) -> TimeOptimalMotion:
     """Return the fastest motion, with viscous friction by its tangents at the speeds of the motion."""
     motion = solve((constraint,))
     for _ in range(_ROUNDS - 1 if constraint.has_viscous else 0):

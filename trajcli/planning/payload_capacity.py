@@ -71,9 +71,9 @@ def payload_capacity(loaded: LoadedJob, at: int | None = None) -> PayloadCapacit
         TrajcliError: Of the job, when it does not even verify without the payload.
     """
     search = _Search(loaded, _carriers(loaded, at))
-    passing, plan = search.passing_mass()
+    feasible, plan = search.feasible_mass()
     search.require_limits(plan)
-    low, high = search.bracket(passing, plan)
+    low, high = search.bracket(feasible, plan)
     if high is None:
         return PayloadCapacity(None, search.template, search.moves)
     low, high = search.closed(low, high)
@@ -127,7 +127,7 @@ class _Search:
         plan = self.attempt(mass)
         return isinstance(plan, Plan) and plan.verdict.passed
 
-    def passing_mass(self) -> tuple[float, Plan]:
+    def feasible_mass(self) -> tuple[float, Plan]:
         """Return a mass with which the job verifies, and its plan: none, or else that of the job.
 
         Raises:
@@ -154,10 +154,10 @@ class _Search:
             message = "no limit of effort is in force, so there is no largest payload"
             raise InputError(Problem(message, hint, place))
 
-    def bracket(self, passing: float, plan: Plan) -> tuple[float, float | None]:
+    def bracket(self, feasible: float, plan: Plan) -> tuple[float, float | None]:
         """Return a mass that verifies and one above it that does not; None where any does."""
-        low = passing
-        guesses = sorted(mass for mass in self._guesses(plan) if passing < mass < LARGEST)
+        low = feasible
+        guesses = sorted(mass for mass in self._guesses(plan) if feasible < mass < LARGEST)
         near = [mass * factor for mass in guesses for factor in (1 - _GUESS, 1 + _GUESS)]
         beyond = 2.0 ** np.arange(-3, np.ceil(np.log2(LARGEST)) + 1)
         for mass in sorted({*near, *(beyond * max([1.0, *guesses])).tolist()}):
@@ -220,14 +220,27 @@ class _Search:
                 limit=worst.limit,
             )
         problem = failed.problems[0]
+        known = problem.time if problem.time is not None else self._time(low, problem)
         return replace(
             capacity,
             joint=problem.joint,
             move=problem.move,
-            time=problem.time,
+            time=known,
             effort=problem.value,
             limit=problem.limit if problem.limit is not None else _amount(problem, "limit"),
         )
+
+    def _time(self, mass: float, problem: Problem) -> float | None:
+        """Return when the joint of a problem is nearest to its limit in the plan with a mass."""
+        plan, value = self.attempt(mass), problem.value
+        if not isinstance(plan, Plan) or problem.move is None or problem.joint is None or value is None:
+            return None
+        efforts = plan.verdict.efforts[problem.move]
+        if efforts is None:
+            return None
+        joint = plan.trajectory.joint_names.index(problem.joint)
+        peak = (efforts.highest if value > 0 else efforts.lowest)[joint]
+        return peak.time - plan.trajectory.curve.start
 
 
 def _amount(problem: Problem, name: str) -> float | None:

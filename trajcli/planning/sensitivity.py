@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from trajcli.curves.approach import durations_at_limit
+from trajcli.curves.approach import ApproachUse, durations_at_limit
 from trajcli.curves.extrema import Peaks, durations_above
 from trajcli.curves.piecewise import Array, derivative_coefficients
 from trajcli.errors import TrajcliError
@@ -72,13 +72,16 @@ class Saving:
     reason: str | None = None
 
 
-def times_at_limits(move: PlannedMove, peaks: Sequence[Peaks] | None = None) -> tuple[TimeAtLimit, ...]:
+def times_at_limits(
+    move: PlannedMove, peaks: Sequence[Peaks] | None = None, uses: Sequence[ApproachUse] | None = None
+) -> tuple[TimeAtLimit, ...]:
     """Return for how long a move is at the limits of its joints, the longest first.
 
     Args:
         move: The move.
         peaks: Of position and its three derivatives over the move, where they are known: what is below its
             limits needs no roots.
+        uses: How much it uses of limits of the velocity by position, likewise.
     """
     if move.planned.binding_phases:
         return _times_of_phases(move)
@@ -102,7 +105,8 @@ def times_at_limits(move: PlannedMove, peaks: Sequence[Peaks] | None = None) -> 
             for joint, each in zip(joints, seconds, strict=True)
             if each > 0
         ]
-    if move.robot.limits.has_velocity_by_position and curve.degree > 1:
+    near = uses is None or any(use.used >= 1 - NEAR for use in uses)
+    if near and move.robot.limits.has_velocity_by_position and curve.degree > 1:
         limits = move.robot.limits.approach
         seconds = durations_at_limit(curve.coefficients, curve.lengths, limits, NEAR)
         for joint, each in zip(limits.limited.tolist(), seconds.tolist(), strict=True):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
@@ -123,6 +123,26 @@ def open_sheet(name: str) -> RobotSheet:
 
     loaded = load_job(name)
     return RobotSheet(loaded.robot, loaded.units, None, None, f"the robot of the job {loaded.name}", None)
+
+
+def stated_units(name: str) -> Units | None:
+    """Return the units that a user's job or robot file states under `units`; None where it states none.
+
+    A robot of the catalogue states none: it knows nothing of the user's numbers. Nor does standard input,
+    which is read once.
+
+    Raises:
+        InputError: When the file is no YAML.
+        FileError: When it cannot be read.
+    """
+    if name in catalogue_names() or name == "-" or is_urdf(name):
+        return None
+    units = read_document(name).plain().get("units")
+    if not isinstance(units, Mapping) or not units:
+        return None
+    return Units(
+        "deg" if units.get("angle") == "deg" else "rad", "mm" if units.get("length") == "mm" else "m"
+    )
 
 
 def open_arm(

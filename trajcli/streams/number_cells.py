@@ -25,6 +25,8 @@ from trajcli.streams.decimals import NotFixedError, eight_digits
 _FRONT = b"0" * 24  # room for words that begin before the first cell
 _MOST_DIGITS = 19  # below 10^19 < 2^64; zeros in front do not count
 _MOST_CHARACTERS = 24  # three words
+_MOST_DECIMALS = 2000  # that are counted: no float64 has more
+_EXPONENT_DIGITS = 6  # of an exponent that are looked at
 _EXACT_POWER = 22  # 10^22 is a float64
 _LARGEST_POWER = 60
 _POWERS = np.array([float(10**k) for k in range(_LARGEST_POWER + 1)])
@@ -70,9 +72,11 @@ def scan_decimals(text: bytes, width: int) -> tuple[Array, NDArray[np.int64]]:
 
 
 def decimals_of(cell: bytes) -> int:
-    """Return how many decimals a number shows, at least 0."""
+    """Return how many decimals a number shows, from 0 to some that no float64 has."""
     mantissa, _, exponent = cell.strip().lower().partition(b"e")
-    return max(len(mantissa.partition(b".")[2]) - int(exponent or 0), 0)
+    digits = exponent.lstrip(b"+-").lstrip(b"0")[:_EXPONENT_DIGITS] or b"0"
+    power = -int(digits) if exponent.startswith(b"-") else int(digits)
+    return min(max(len(mantissa.partition(b".")[2]) - power, 0), _MOST_DECIMALS)
 
 
 @frozen

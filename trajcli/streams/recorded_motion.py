@@ -27,6 +27,7 @@ from trajcli.streams.row_sources import EXACT, FULL_DECIMALS, RowSource
 from trajcli.units import Units
 
 Names = tuple[str, ...] | None
+_LARGEST = 1e100  # of a number in a file, in whatever unit
 _KEPT = 1 << 23  # numbers that are kept in memory; of a longer file rows are read anew
 
 BLOCK_ROWS = 65536
@@ -160,6 +161,8 @@ class MotionFile:
             if scales.open:
                 self._refuse_open(scales.open, block)
             everywhere.add(block)
+            if everywhere.largest.max() > _LARGEST:
+                self._refuse_far(block)
             fit.add(block[:, self._time] / self._per_second)
             self.rows += len(block)
             kept += block.size
@@ -169,6 +172,13 @@ class MotionFile:
         self.largest = everywhere.largest[self._joints["q"]] * self._factors[self._joints["q"]]
         self.resolution = self._resolution(everywhere)
         self.period = fit.result(self.resolution.time, self.resolution.relative_time)
+
+    def _refuse_far(self, block: Array) -> NoReturn:
+        """Refuse a number that no motion has, and that overflows wherever it is used."""
+        row, column = np.argwhere(np.abs(block) > _LARGEST)[0].tolist()
+        name = self._rows.named.names[self._taken[column]]
+        message = f"{name} is {block[row, column]:.6g} in row {self.rows + row + 1}"
+        raise self._rows.named.wrong(message, "check its exponent", name)
 
     def _refuse_open(self, columns: Sequence[int], block: Array) -> NoReturn:
         """Refuse columns whose unit nothing says; the first rows give a hint."""

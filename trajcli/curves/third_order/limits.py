@@ -22,6 +22,7 @@ SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 _MOST, _MORE = 40, 1000  # nodes: of a piece on average, and of the whole path on top
 _PARTS = 4  # that an interval is cut into at a time
 _SPARING = 1.1  # by which the loss to be reached grows until there is room
+_TINY = 1e-9  # of the limits: less acceleration is none
 _ORDER_COSTS = np.array([[1.0], [0.5], [1.0 / 3.0]])  # of time for each share by which a limit is passed
 
 
@@ -105,7 +106,8 @@ def time_lost(law: QuarticLaw, limits: LawLimits, excess: Array) -> Array:
         used, accelerations = limits.used(sampled(law, share))
         unused += np.clip(1.0 - used, 0.0, 1.0) / len(SHARES)
         ends.append(accelerations)
-    change = np.minimum(np.abs(ends[-1] - ends[0]).max(axis=0, initial=0.0), 1.0)
+    peak = np.minimum(np.abs(ends).max(axis=(0, 2), initial=_TINY), 1.0)
+    change = np.minimum((np.abs(ends[-1] - ends[0]) / peak[:, None]).max(axis=0, initial=0.0), 1.0)
     over = (_ORDER_COSTS * np.maximum(excess - 1.0, 0.0)).max(axis=0)
     return np.asarray(law.lengths * (unused * change + over))
 

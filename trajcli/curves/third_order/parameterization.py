@@ -20,6 +20,7 @@ from trajcli.curves.third_order.first_law import EndStates, smoothed_law
 from trajcli.curves.third_order.jerk import JointJerkConstraint, ThirdOrderConstraint, curvature_jumps
 from trajcli.curves.third_order.limits import LawLimits, most_nodes, parts_for, time_lost
 from trajcli.curves.third_order.quartic_law import QuarticLaw, ReversingLawError
+from trajcli.curves.third_order.turning_bound import turning_bound
 from trajcli.curves.time_optimal.constraints import JointConstraint, PathConstraint
 from trajcli.curves.time_optimal.parameterization import (
     TimeOptimalMotion,
@@ -29,8 +30,11 @@ from trajcli.curves.time_optimal.parameterization import (
 from trajcli.curves.time_optimal.time_law import law_and_trajectory
 from trajcli.frozen import frozen
 
-_FIRST_GAPS = (1e-3, 1e-4)  # of the duration: what the steps on the first nodes may miss
-_MORE_FIRST, _NEARLY = 8, 1.5  # more of them while a law between moving ends is so far above its limits
+_FIRST_GAP = 1e-3  # of the duration: what the first step may miss
+_FIRST_STEPS, _MORE_STEPS = 12, 6  # on the first nodes and on the last ones
+_CHANGED = 3e-4  # of the duration: a step that changes less is the last one
+_STEADY = 0.7  # of the change before: a step that changes more leads nowhere
+_NEARLY = 1.5  # excess that is worth finer nodes
 _GAP, _LAST_GAP = 1e-4, 1e-5  # the same of those while nodes are refined, and of the last ones
 _REFINEMENTS = 7
 _SETTLING, _MOST_SETTLING = 8, 30  # steps with lowered limits; where nothing can be slowed down
@@ -51,16 +55,15 @@ class JerkLimitedMotion(TimeOptimalMotion):
     Attributes:
         second_order: The optimum without limits of jerk: no motion is faster.
         steps: Number of convex steps.
+        lower_bound: Duration that no motion along the path is shorter than, s.
+        bounding_joint: The joint that alone needs so long between its turning points, which is proven; None
+            where it is the optimum without limits of jerk, up to the estimate of what its grid loses.
     """
 
     second_order: TimeOptimalMotion
     steps: int
-
-    @property
-    def lower_bound(self) -> float:
-        """Duration that no motion along the path is shorter than, up to the estimate of what a grid loses."""
-        second = self.second_order
-        return second.law.duration / second.stretch * (1.0 - second.lost)
+    lower_bound: float
+    bounding_joint: int | None
 
 
 def jerk_limited_time_optimal(
@@ -126,7 +129,20 @@ def jerk_limited_time_optimal(
         times,
         second,
         search.steps,
+        *_lower_bound(path, second, (bounds[0], bounds[1], bounds[2]), ends),
     )
+
+
+def _lower_bound(
+    path: PiecewisePolynomial,
+    second: TimeOptimalMotion,
+    bounds: tuple[Array, Array, Array],
+    ends: EndStates,
+) -> tuple[float, int | None]:
+    """Return the higher of two bounds of the duration, and the joint that sets it, if one alone does."""
+    without_jerk = second.law.duration / second.stretch * (1.0 - second.lost)
+    of_joint, joint = turning_bound(path, bounds, (ends.start[0], ends.end[0]))
+    return (of_joint, joint) if of_joint > without_jerk else (without_jerk, None)
 
 
 class _Search:
@@ -152,12 +168,8 @@ class _Search:
 
     def refine(self, most: int) -> float:
         """Refine the nodes while that pays; return the estimate of what is lost, in seconds."""
-        for gap in _FIRST_GAPS:
-            self._step(gap)
-        for _ in range(0 if self.rests else _MORE_FIRST):
-            if self.excess.max() <= _NEARLY:
-                break
-            self._step(_GAP)
+        self._step(_FIRST_GAP)
+        self._converge(_FIRST_STEPS)
         for _ in range(_REFINEMENTS):
             lost = time_lost(self.law, self.limits, self.excess)
             duration = self.law.duration
@@ -168,7 +180,20 @@ class _Search:
                 break
             self._cut(parts)
             self._step(_GAP)
+        self._converge(_MORE_STEPS)
         return float(time_lost(self.law, self.limits, self.excess).sum())
+
+    def _converge(self, most: int) -> None:
+        """Make steps until the duration settles or oscillates, and limits are nearly kept."""
+        last = np.inf
+        for _ in range(most):
+            before = self.law.duration
+            self._step(_GAP)
+            change = abs(self.law.duration - before) / before
+            settled = change <= _CHANGED or change > _STEADY * last
+            if settled and (self.rests or self.excess.max() <= _NEARLY):
+                break
+            last = change
 
     def settle(self, most: int) -> None:
         """Lower limits in the intervals that exceed them until little is left."""

@@ -64,7 +64,7 @@ def fastest_motion(problem: WaypointProblem, names: list[str], starts: int) -> F
     short = problem.only(kept)
     straight = _straight_candidate(short, names)
     states = None if straight is None else _states_of(short, straight)
-    found = search(short, starts, states)
+    found = search(short, starts, states, lower)
     motion = straight
     if straight is None or found.best.duration < straight.duration * (1 - _SLOWER):
         exact = _exact(short, found.best, names)

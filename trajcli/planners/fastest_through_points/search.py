@@ -10,7 +10,9 @@
 8. Free knots, sixteen in each segment, from the times of the best motion so far.
 
 Each gives velocities and accelerations at the points, which are then improved until no more is gained. A
-motion that stops at each point is always among those that are compared.
+motion that stops at each point is always among those that are compared. Once a motion is as fast as the
+proven bound, no further starting points are tried. The states that are found are rounded, so that the last
+bits of linear algebra, which differ between processors, do not show.
 """
 
 from __future__ import annotations
@@ -34,6 +36,8 @@ from trajcli.progress import report_progress
 
 MOST_STARTS = 8
 _SPEEDS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0)  # of central differences
+_PROVEN = 1e-7  # relative: a motion this near to the bound is the fastest
+_GRID, _COST = 2.0**-21, 1e-6  # relative: to what states are rounded, and how much longer that may last
 _ALIKE = 1e-3  # relative: durations this near to the shortest agree with it
 _SHORT = 0.05  # of the longest time at the velocity limits: no segment begins with less
 
@@ -59,16 +63,18 @@ class Found:
         return sum(found <= duration * (1 + _ALIKE) for found in self.durations)
 
 
-def search(problem: WaypointProblem, starts: int, straight: Array | None = None) -> Found:
+def search(problem: WaypointProblem, starts: int, straight: Array | None = None, lower: float = 0.0) -> Found:
     """Return the fastest motion that the first starting points lead to.
 
     Args:
         problem: Points, limits, and what is given.
         starts: How many starting points are tried, 1 to 8.
+        lower: A proven lower bound of the duration, s: once it is met no further starting points are tried.
         straight: States (K + 1, n, 2) of the motion along the polyline, where some points are collinear.
     """
-    found = _found(problem.scaled(), starts, None if straight is None else _scaled(problem, straight))
     time, lengths = problem.units
+    polyline = None if straight is None else _scaled(problem, straight)
+    found = _found(problem.scaled(), starts, polyline, lower / time)
     states = found.best.states * np.stack([lengths / time, lengths / time**2], axis=1)
     best = StateMotion(problem.inside(states), found.best.times * time)
     return Found(best, tuple(time * duration for duration in found.durations), found.stopping * time)
@@ -81,15 +87,18 @@ def _scaled(problem: WaypointProblem, states: Array) -> Array:
     return scaled
 
 
-def _found(problem: WaypointProblem, starts: int, straight: Array | None) -> Found:
+def _found(problem: WaypointProblem, starts: int, straight: Array | None, lower: float) -> Found:
     """Return the fastest motion that is found, all in the units of the problem."""
     stopping = evaluated(problem, problem.stopping())
     if problem.walled and np.isfinite(stopping.duration):
         problem = with_limits_near(problem, stopping.times)
     if problem.segments == 1 or problem.fixed.all():
         return Found(stopping, (stopping.duration,) * starts, stopping.duration)
-    best, durations = stopping, []
+    best = stopping
+    durations: list[float] = []
     for number, start in enumerate(_STARTS[:starts]):
+        if durations and best.duration <= lower * (1 + _PROVEN):
+            break
         report_progress(f"starting point {number + 1} of {starts}")
         if number == 1:
             states = problem.stopping() if straight is None else straight
@@ -99,7 +108,14 @@ def _found(problem: WaypointProblem, starts: int, straight: Array | None) -> Fou
         durations.append(motion.duration)
         if motion.duration < best.duration:
             best = motion
-    return Found(best, tuple(durations), stopping.duration)
+    return Found(_rounded(problem, best), tuple(durations), stopping.duration)
+
+
+def _rounded(problem: WaypointProblem, motion: StateMotion) -> StateMotion:
+    """Return the motion with rounded states, unless that costs more than rounding may."""
+    grid = _GRID * problem.scales
+    rounded = evaluated(problem, np.round(motion.states / grid) * grid)
+    return rounded if rounded.duration <= motion.duration * (1 + _COST) else motion
 
 
 def _usual_times(problem: WaypointProblem, motion: StateMotion) -> Array:

@@ -37,6 +37,7 @@ from trajcli.planners.approach_limits import approach_constraints
 from trajcli.planners.boundary_states import missing_limit
 from trajcli.planners.effort_limits import (
     effort_constraints,
+    effort_shares,
     lacks_acceleration,
     solved_within_efforts,
 )
@@ -93,12 +94,13 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
     )
     motion = motion_along(path, law, law.breaks, tolerance, None)
     jerk = limits.jerk if keeps_jerk else None
-    binding = switching_structure(solved.trajectory, limits.velocity, limits.acceleration, jerk)
+    efforts = effort_shares(solved.trajectory, robot)
+    binding = switching_structure(solved.trajectory, limits.velocity, limits.acceleration, jerk, efforts)
     phases = [
         Phase(f"{b.quantity} {'+' if b.sign > 0 else '-'}", b.start * factor, b.end * factor, b.joint)
         for b in binding
     ]
-    events = _events(solved, remaining, fastest=factor == remaining)
+    events = _events(solved, robot, remaining, fastest=factor == remaining)
     joint_constraint = JointConstraint(curve, limits.velocity, limits.acceleration)
     constraints = (joint_constraint, *further, *effort_constraints(curve, robot))
     breaks = distinct(np.concatenate([curve.breaks, path.breaks]))
@@ -117,11 +119,11 @@ def _moving(curve: PiecewisePolynomial) -> NDArray[np.bool_]:
     return np.asarray(np.abs(curve.piece_ends(1)).max(axis=(0, 1)) > 0)
 
 
-def _events(solved: TimeOptimalMotion, remaining: float, *, fastest: bool) -> tuple[Event, ...]:
+def _events(solved: TimeOptimalMotion, robot: Robot, remaining: float, *, fastest: bool) -> tuple[Event, ...]:
     """Return how a law was found, how good it is, and where it stops."""
     events = []
     if isinstance(solved, JerkLimitedMotion):
-        events += [solved_by_convex_steps(solved)] + [distance_from_bound(solved, remaining)] * fastest
+        events += [solved_by_convex_steps(solved)] + [distance_from_bound(solved, robot, remaining)] * fastest
         if solved.stops.size:
             count = solved.stops.size
             text = f"stops {count} time{'s' * (count != 1)} where the path bends: limits of jerk ask for it"

@@ -141,17 +141,18 @@ def _require_along(across: Array, acceleration: Array, robot: Robot) -> None:
     raise PlanningError(Problem(message, hint, joint=name, value=value, amounts=amounts))
 
 
-def events_of_law(motion: TimeOptimalMotion, *, fastest: bool) -> Iterator[Event]:
+def events_of_law(motion: TimeOptimalMotion, robot: Robot, *, fastest: bool) -> Iterator[Event]:
     """Yield how good a law is, how it was found, and where it stops.
 
     Args:
         motion: With the law.
+        robot: For the names of joints.
         fastest: Whether it is not slowed down.
     """
     if isinstance(motion, JerkLimitedMotion):
         yield solved_by_convex_steps(motion)
         if fastest:
-            yield distance_from_bound(motion)
+            yield distance_from_bound(motion, robot)
     elif motion.refinements:
         yield Event(
             "refined",

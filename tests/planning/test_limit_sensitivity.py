@@ -29,7 +29,8 @@ def planned(move: dict[str, Any], limits: dict[str, Any], joints: int = 1, **mor
 
 
 def at_limits(plan: Plan, index: int = 0) -> dict[tuple[int, int], float]:
-    times = times_at_limits(plan.moves[index], plan.verdict.peaks[index])
+    verdict = plan.verdict
+    times = times_at_limits(plan.moves[index], verdict.peaks[index], verdict.by_position[index])
     assert times == times_at_limits(plan.moves[index])  # peaks only spare work
     orders = ("", "velocity", "acceleration", "jerk", "velocity_by_position")
     return {(one.joint, orders.index(one.quantity)): one.seconds for one in times}
@@ -184,6 +185,27 @@ def test_a_limit_by_position_against_dense_samples() -> None:
             counted[joint] += over.mean() * spans[piece]
     assert (counted > 1).all()
     assert durations_at_limit(coefficients, spans, some, 1e-6) == pytest.approx(counted, abs=1e-3)
+
+
+def test_a_move_that_slides_along_its_limit_by_position() -> None:
+    """Both with and without what the verdict knows: the fastest approach is at the limit for a moment."""
+    arm = {
+        "position": [-2, 2],
+        "velocity": 3,
+        "acceleration": 20,
+        "velocity_by_position": {"deceleration": 1, "offset": 0.1},
+    }
+    plan = trajcli.plan(
+        {
+            "version": 1,
+            "robot": {"joints": [arm]},
+            "start": {"joints": [0]},
+            "moves": [{"planner": "quintic", "to": {"joints": [1.9]}}],
+        }
+    )
+    times = at_limits(plan)
+    assert times.keys() == {(0, 4)}
+    assert 0 < times[0, 4] < 0.05 * plan.trajectory.duration
 
 
 def test_against_dense_samples() -> None:

@@ -1,0 +1,61 @@
+"""Bound between turning points: against ruckig, brute force over free accelerations, and every law found."""
+
+import numpy as np
+import pytest
+from jerk_paths import PANDA, both, judged, spline
+from test_jerk_limited import random_problem, ruckig_duration
+
+from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.curves.third_order.turning_bound import turning_bound
+
+
+def line(distance):
+    return PiecewisePolynomial(np.array([0.0, 1.0]), np.array([[[distance]], [[0.0]]]))
+
+
+@pytest.mark.parametrize("distance", [1e-4, 0.01, 0.3, 5.0])
+@pytest.mark.parametrize("jerk", [1.0, 30.0, 1e4])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_from_rest_to_rest_it_is_the_fastest_motion_of_the_joint(distance, jerk, sign):
+    bounds = both([1.0]), both([4.0]), both([jerk])
+    duration, joint = turning_bound(line(sign * distance), bounds, (0.0, 0.0))
+    assert joint == 0
+    assert duration == pytest.approx(ruckig_duration(distance, 1.0, 4.0, jerk), rel=1e-9)
+
+
+def least_with_free_start(distance, velocity, acceleration, jerk):
+    from ruckig import InputParameter, Ruckig, Trajectory
+
+    best = np.inf
+    for start in np.linspace(0.0, acceleration, 2001):
+        problem, result = InputParameter(1), Trajectory(1)
+        problem.current_position, problem.target_position = [0.0], [distance]
+        problem.current_acceleration = [start]
+        problem.max_velocity, problem.max_acceleration = [velocity], [acceleration]
+        problem.max_jerk = [jerk]
+        if Ruckig(1).calculate(problem, result) >= 0:
+            best = min(best, result.duration)
+    return best
+
+
+@pytest.mark.parametrize("jerk", [5.0, 50.0])
+def test_half_of_a_motion_there_and_back_has_a_free_acceleration(jerk):
+    """A joint that goes out and comes back turns once: two halves, alike in reversed time."""
+    path = PiecewisePolynomial(np.array([0.0, 1.0, 2.0]), np.array([[[0.7], [-0.7]], [[0.0], [0.7]]]))
+    duration, _ = turning_bound(path, (both([1.0]), both([4.0]), both([jerk])), (0.0, 0.0))
+    assert duration == pytest.approx(2 * least_with_free_start(0.7, 1.0, 4.0, jerk), rel=1e-4)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_no_law_is_faster(seed):
+    path, *bounds = random_problem(seed)
+    motion = judged(path, *bounds)
+    assert turning_bound(path, tuple(bounds), (0.0, 0.0))[0] <= motion.law.duration * (1 + 1e-9)
+    assert motion.lower_bound <= motion.law.duration * (1 + 1e-9)
+
+
+def test_a_tight_jerk_is_bounded_by_a_joint():
+    path = spline(np.linspace(0, 1, 4), np.array([[0.0], [0.4], [0.7], [1.0]]))
+    motion = judged(path, both(PANDA[0][:1]), both(PANDA[1][:1]), both([5.0]))
+    assert motion.bounding_joint == 0
+    assert motion.law.duration <= 1.001 * motion.lower_bound

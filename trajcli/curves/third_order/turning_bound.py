@@ -1,0 +1,150 @@
+"""Lower bound of the duration along a path: what each joint alone needs between its turning points.
+
+Where a joint turns back it stands still, at whatever acceleration. So between two turning points it needs at
+least the time of the fastest motion over their distance with speed zero at both and free acceleration there,
+and with the states of the path's ends where that begins or ends. The sum over its monotone stretches bounds
+the motion, and so does the largest sum of all joints. Turning back by next to nothing is left out, which only
+lowers the bound.
+
+The fastest such motion goes up to a peak speed by one ramp and down by another, with a cruise between them
+where the peak is the limit. A ramp with free acceleration at its outer end begins with as much as it may: to
+gain w it takes sqrt(2 w / j), or where that needs more than the limit a, w / a + a / (2 j); from rest without
+acceleration 2 sqrt(w / j), or w / a + a / j.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajcli.curves.extrema import critical_points
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, horner
+from trajcli.frozen import frozen
+
+_NOTHING = 1e-9  # of the range of a joint: turning back by less is rounding
+_UNLIMITED = 1e9  # rad/s or m/s, where no limit is
+_HALVINGS = 64
+_ROUNDING = 1e-12  # relative: taken off, so that a bound stays one
+
+
+@frozen
+class _Stretches:
+    """Monotone stretches, k of them; rates are along each, all positive.
+
+    Attributes:
+        distance: Shape (k,).
+        limit: Speed, shape (k,).
+        rates: Acceleration at which it speeds up, and slows down, shape (2, k).
+        jerk: Shape (k,).
+        speeds: At its start and end, shape (2, k).
+        free: Whether the acceleration is free there, shape (2, k).
+    """
+
+    distance: Array
+    limit: Array
+    rates: Array
+    jerk: Array
+    speeds: Array
+    free: NDArray[np.bool_]
+
+    def least_times(self) -> Array:
+        """Return the least time of each, shape (k,)."""
+        low, high = self.speeds.max(axis=0), np.maximum(self.limit, self.speeds.max(axis=0))
+        known = self._covered(low)[0] <= self.distance  # else nothing is said of how it stops
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            fits = self._covered(middle)[0] <= self.distance
+            low, high = np.where(fits, middle, low), np.where(fits, high, middle)
+        length, time = self._covered(low)
+        rest = np.maximum(self.distance - length, 0.0) / np.maximum(high, low)
+        least = np.where(known, time + rest, self.distance / self.limit)
+        return np.asarray(least * (1.0 - _ROUNDING))
+
+    def _covered(self, peak: Array) -> tuple[Array, Array]:
+        """Return distance and time of both ramps to and from peak speeds (k,)."""
+        change = np.maximum(peak - self.speeds, 0.0)
+        full = self.rates / self.jerk
+        share = np.where(self.free, 0.5, 1.0)  # of a ramp of acceleration over its whole range
+        short = change <= share * self.rates * full
+        time_short = np.where(self.free, np.sqrt(2.0 * change / self.jerk), 2.0 * np.sqrt(change / self.jerk))
+        gain_short = np.where(self.free, 2.0 / 3.0, 0.5) * change * time_short
+        even = np.maximum(change - 0.5 * self.rates * full, 0.0) / self.rates
+        gained = self.rates * even
+        gain_free = 0.5 * gained * even + gained * full + self.rates * full**2 / 3.0
+        time_long = np.where(self.free, even + full, change / self.rates + full)
+        gain_long = np.where(self.free, gain_free, 0.5 * change * time_long)
+        time = np.where(short, time_short, time_long)
+        length = self.speeds * time + np.where(short, gain_short, gain_long)
+        return length.sum(axis=0), time.sum(axis=0)
+
+
+def turning_bound(
+    path: PiecewisePolynomial,
+    bounds: tuple[Array, Array, Array],
+    speeds: tuple[float, float],
+) -> tuple[float, int]:
+    """Return a duration that no motion along a path is shorter than, s, and the joint that needs it.
+
+    Args:
+        path: q(s) with n joints.
+        bounds: Of velocity, acceleration and jerk, each of shape (n, 2).
+        speeds: sd at the start and at the end; zero is rest, without acceleration.
+    """
+    values = _at_breaks_and_turns(path)
+    slopes = path.evaluate(np.array([path.start, path.end]), 1) * np.array(speeds)[:, None]
+    owner, columns = list[int](), list[_Stretches]()
+    for joint in range(path.dimension):
+        turns = _turns(values[:, joint])
+        if turns.size > 1 and np.isfinite(bounds[1][joint]).all():
+            of_joint = tuple(each[joint] for each in bounds)
+            columns.append(_stretches(turns, of_joint, np.abs(slopes[:, joint]), speeds))
+            owner += [joint] * (turns.size - 1)
+    if not columns:
+        return 0.0, 0
+    names = ("distance", "limit", "rates", "jerk", "speeds", "free")
+    joined = _Stretches(*(np.concatenate([getattr(c, name) for c in columns], axis=-1) for name in names))
+    times = np.bincount(owner, weights=joined.least_times(), minlength=path.dimension)
+    return float(times.max()), int(times.argmax())
+
+
+def _at_breaks_and_turns(path: PiecewisePolynomial) -> Array:
+    """Return q at all breaks and wherever a q' vanishes, in order of s for each joint, shape (m, n)."""
+    (inside,) = critical_points(path.coefficients, path.lengths, (0,))
+    points = np.concatenate([np.zeros((1, path.pieces, path.dimension)), inside])
+    values = horner(path.coefficients, points).transpose(1, 0, 2).reshape(-1, path.dimension)
+    return np.concatenate([values, path.evaluate(np.array([path.end]))])
+
+
+def _turns(values: Array) -> Array:
+    """Return the first value, those at which the direction changes, and the last one."""
+    nothing = _NOTHING * float(np.ptp(values))
+    kept = [float(values[0])]
+    for value in values[1:].tolist():
+        if abs(value - kept[-1]) <= nothing:
+            continue
+        if len(kept) > 1 and (value - kept[-1]) * (kept[-1] - kept[-2]) > 0:
+            kept[-1] = value
+        else:
+            kept.append(value)
+    return np.array(kept)
+
+
+def _stretches(
+    turns: Array, bounds: tuple[Array, ...], ends: Array, speeds: tuple[float, float]
+) -> _Stretches:
+    """Return the stretches of one joint between its turning points (k + 1,)."""
+    steps = np.diff(turns)
+    forward = steps > 0
+    up, down = np.where(forward, 1, 0), np.where(forward, 0, 1)
+    velocity, acceleration, jerk = (np.abs(each) for each in bounds)
+    at_ends, free = np.zeros((2, steps.size)), np.ones((2, steps.size), dtype=bool)
+    at_ends[0, 0], at_ends[1, -1] = ends
+    free[0, 0], free[1, -1] = speeds[0] > 0.0, speeds[1] > 0.0
+    return _Stretches(
+        np.abs(steps),
+        np.minimum(velocity[up], _UNLIMITED),
+        np.stack([acceleration[up], acceleration[down]]),
+        np.full(steps.size, float(jerk.max())),
+        at_ends,
+        free,
+    )

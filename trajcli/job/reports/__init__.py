@@ -1,0 +1,1 @@
+"""Parts of the report that several of its models share."""
