@@ -89,10 +89,15 @@ def _run_on_worker(task: Task, setup: BatchSetup) -> JobOutcome:
 
 def _outcome(future: Any, task: Task) -> JobOutcome:  # noqa: ANN401
     """Return what came of a task, under the names that the user gave."""
-    if future.status == "finished":
+    if future.status == "cancelled":
+        return _failed(task, "its task was cancelled")
+    try:
         done: JobOutcome = future.result()
-        output = None if done.output is None else task.job.output
-        return replace(done, job=task.job, output=output)
-    error = future.exception() if future.status == "error" else None
-    message = "its task was cancelled" if error is None else f"{type(error).__name__}: {error}"
+    except Exception as error:  # noqa: BLE001  (whatever the cluster says costs this job only)
+        return _failed(task, f"{type(error).__name__}: {error}")
+    output = None if done.output is None else task.job.output
+    return replace(done, job=task.job, output=output)
+
+
+def _failed(task: Task, message: str) -> JobOutcome:
     return JobOutcome(task.job, "crashed", BUG, (Problem(f"the cluster could not plan it: {message}"),))
