@@ -25,7 +25,12 @@ if TYPE_CHECKING:
     from trajcli.checks.tool_bound import ToolPeak
     from trajcli.consumers.judgement import ProfileJudgement
     from trajcli.consumers.profile import Profile
-    from trajcli.job.report import MoveReport, PathReferenceReport, PeerViolation, ReferenceReport
+    from trajcli.job.report import (
+        MoveReport,
+        PathReferenceReport,
+        PeerViolation,
+        ReferenceReport,
+    )
     from trajcli.output.recording import LogOptions
 
 _STILL = 1e-9  # rad/s or m/s, below which a joint only rounds
@@ -239,7 +244,7 @@ def _report(plan: Plan, options: PlanOptions, judged: ProfileJudgement | None) -
         report = report.model_copy(update={"consumer": consumer_report(plan, judged)})
     if options.report is not None:
         write_text(report.model_dump_json(indent=2) + "\n", options.report)
-    from trajcli.job.report import in_units
+    from trajcli.job.report_parts.part import in_units
 
     compared = options.reference and plan.verdict.passed and not options.quiet
     for move in report.moves if compared else []:

@@ -6,90 +6,15 @@ field beside it names its unit.
 
 from __future__ import annotations
 
-from functools import cache
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-from trajcli.frozen import comparable
-from trajcli.units import AngleUnit, LengthUnit, Quantity, Units, factor
+from trajcli.job.report_parts.efforts import EffortReport, EffortsReport, PayloadReport
+from trajcli.job.report_parts.part import MeasuredIn, ReportPart, UnitName
 
-Part = TypeVar("Part", bound="ReportPart")
 ReportSeconds = Annotated[float, Field(description="Seconds.")]
-UnitName = Annotated[str, Field(description="Unit of the numbers beside it, such as rad/s.")]
 JointQuantity = Literal["position", "velocity", "acceleration", "jerk"]
-
-
-@comparable
-class MeasuredIn:
-    """Marks a number of a report, or several of them.
-
-    Attributes:
-        field: Name of the field of the same part that holds the unit; a list holds one for each number.
-    """
-
-    field: str = "unit"
-
-
-class ReportPart(BaseModel):
-    """A part of a report."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
-
-
-def in_units(part: Part, units: Units) -> Part:
-    """Return a report in SI, or a part of one, with all numbers in the units of a job."""
-    changes: dict[str, Any] = {}
-    measured = _measured(type(part))
-    for name, value in part.__dict__.items():
-        if name in measured:
-            changes[name] = _converted(value, getattr(part, measured[name]), units)
-        elif name in measured.values():
-            changes[name] = _named(value, units)
-        elif isinstance(value, ReportPart):
-            changes[name] = in_units(value, units)
-        elif isinstance(value, list | tuple) and value and isinstance(value[0], ReportPart):
-            changes[name] = type(value)(in_units(each, units) for each in value)
-    return part.model_copy(update=changes)
-
-
-@cache
-def _measured(part: type[ReportPart]) -> dict[str, str]:
-    """Return for each number of a kind of part the field that holds its unit."""
-    return {
-        name: mark.field
-        for name, field in part.model_fields.items()
-        for mark in field.metadata
-        if isinstance(mark, MeasuredIn)
-    }
-
-
-def _converted(value: Any, unit: str | list[str], units: Units) -> Any:  # noqa: ANN401
-    """Return a number, or several, in SI, in the units of the job."""
-    if isinstance(value, list | tuple):
-        factors = [_in_job(each, units.angle, units.length)[0] for each in _each(unit, len(value))]
-        pairs = zip(value, factors, strict=True)
-        return type(value)(None if number is None else number / factor for number, factor in pairs)
-    return None if value is None else value / _in_job(str(unit), units.angle, units.length)[0]
-
-
-def _named(unit: str | list[str], units: Units) -> str | list[str]:
-    names = [_in_job(each, units.angle, units.length)[1] for each in _each(unit, 1)]
-    return names[0] if isinstance(unit, str) else names
-
-
-def _each(unit: str | list[str], count: int) -> list[str]:
-    return [unit] * count if isinstance(unit, str) else unit
-
-
-@cache
-def _in_job(unit: str, angle: AngleUnit, length: LengthUnit) -> tuple[float, str]:
-    """Return the SI value of the job's unit that stands for an SI unit, and its name."""
-    start, slash, rest = unit.partition("/")
-    if start not in ("rad", "m"):
-        return 1.0, unit
-    quantity = Quantity("angle" if start == "rad" else "length")
-    return factor(quantity, Units(angle, length)), (angle if start == "rad" else length) + slash + rest
 
 
 class PeakReport(ReportPart):
@@ -125,63 +50,6 @@ class ByPositionReport(ReportPart):
     ]
     distance_unit: UnitName
     time: Annotated[float, Field(description="Where it is, seconds from the start of the trajectory.")]
-
-
-class EffortReport(ReportPart):
-    """The extremes of what drives one joint in one move: inverse dynamics with what the tool carries."""
-
-    joint: str
-    low: Annotated[float, Field(description="Smallest torque or force, N m or N.")]
-    low_time: Annotated[float, Field(description="Where it is, seconds from the start of the trajectory.")]
-    high: Annotated[float, Field(description="Largest torque or force, N m or N.")]
-    high_time: Annotated[float, Field(description="Where it is, seconds from the start of the trajectory.")]
-    bound: Annotated[
-        tuple[float, float], Field(description="It is proven to lie between these at every time, N m or N.")
-    ]
-    limit: Annotated[
-        tuple[float | None, float | None], Field(description="Bounds, N m or N; null is unlimited.")
-    ]
-    used: Annotated[
-        float | None, Field(description="Largest part of the bound that is used; null if unlimited.")
-    ]
-    head_room: Annotated[
-        float | None, Field(description="What is left of the limit there, N m or N; negative beyond it.")
-    ]
-    gravity: Annotated[
-        float, Field(description="Where most is used, what it takes to hold arm and payload, N m or N.")
-    ]
-    gravity_share: Annotated[
-        float, Field(description="The same as part of the effort: above 1 where the motion helps.")
-    ]
-    unit: Literal["N m", "N"]
-    method: Literal["bounded"] = "bounded"
-
-
-class PayloadReport(ReportPart):
-    """What the tool carries."""
-
-    mass: Annotated[float, Field(description="kg.")]
-    mass_unit: Literal["kg"] = "kg"
-    com: Annotated[
-        list[float], MeasuredIn("com_unit"), Field(description="Centre of mass in the tcp frame, m.")
-    ]
-    com_unit: UnitName = "m"
-    inertia: Annotated[
-        list[float], Field(description="ixx, iyy, izz, ixy, ixz, iyz about the centre of mass, kg m^2.")
-    ]
-    inertia_unit: Literal["kg m^2"] = "kg m^2"
-
-
-class EffortsReport(ReportPart):
-    """Whether torques and forces were judged, and by which numbers."""
-
-    judged: Annotated[bool, Field(description="Whether the effort of some joint was judged in some move.")]
-    reason: Annotated[str | None, Field(description="Why not; null where they were.")] = None
-    inertials: Annotated[
-        str | None, Field(description="Where masses and inertias come from; null where the robot has none.")
-    ] = None
-    gravity: Annotated[list[float], Field(description="Acceleration of a body that falls, in world, m/s^2.")]
-    gravity_unit: Literal["m/s^2"] = "m/s^2"
 
 
 class BindingReport(ReportPart):

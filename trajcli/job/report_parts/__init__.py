@@ -1,0 +1,1 @@
+"""Parts of reports: numbers with their units, and what is said of efforts."""
