@@ -330,6 +330,14 @@ def check(
             autocompletion=profile_words,
         ),
     ] = None,
+    carried: Annotated[
+        str | None,
+        typer.Option(
+            "--payload",
+            metavar="PAYLOAD",
+            help="What the arm of --robot carries, {mass, com?, inertia?} or @FILE; its efforts then count.",
+        ),
+    ] = None,
     start_tolerance: Annotated[
         str | None,
         typer.Option(
@@ -369,6 +377,7 @@ def check(
         interpolate=interpolate,
         profile=profile,
         start_tolerance=start_tolerance,
+        payload=carried,
     )
     return run_check(file, options, form, strict=strict, reference=reference)
 

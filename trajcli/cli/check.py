@@ -104,7 +104,7 @@ def _view(beside: MotionReference) -> dict[str, Any]:
 def _beside(beside: MotionReference, units: Units) -> Iterator[str]:
     """Yield how a motion compares with peers."""
     from trajcli.cli.plan import violation_lines
-    from trajcli.job.report import in_units
+    from trajcli.job.reports.part import in_units
 
     reference, path = in_units(beside.reference, units), beside.path_reference
     if reference.duration is None:

@@ -240,7 +240,7 @@ def _report(plan: Plan, options: PlanOptions, judged: ProfileJudgement | None) -
         report = report.model_copy(update={"consumer": consumer_report(plan, judged)})
     if options.report is not None:
         write_text(report.model_dump_json(indent=2) + "\n", options.report)
-    from trajcli.job.report import in_units
+    from trajcli.job.reports.part import in_units
 
     compared = options.reference and plan.verdict.passed and not options.quiet
     for move in report.moves if compared else []:

@@ -8,15 +8,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, SerializerFunctionWrapHandler, TypeAdapter, model_serializer
 
-from trajcli.job.report import (
-    MeasuredIn,
-    MoveReport,
-    OutsideReport,
-    Report,
-    ReportPart,
-    UnitName,
-    WaypointReport,
-)
+from trajcli.job.report import MoveReport, OutsideReport, Report, WaypointReport
+from trajcli.job.reports.part import MeasuredIn, ReportPart, UnitName
 
 Vector = list[float]
 MoveSeconds = Annotated[float, Field(description="Seconds from the start of the move.")]

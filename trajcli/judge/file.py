@@ -43,6 +43,7 @@ class CheckOptions:
     interpolate: str | None = None
     profile: str | None = None
     start_tolerance: str | None = None
+    payload: str | None = None
 
 
 @frozen
@@ -92,7 +93,7 @@ def check_file(source: str, options: CheckOptions) -> CheckedFile:
     """
     from trajcli.queries.arm import stated_units
 
-    given = _given(options)
+    given = _carrying(_given(options), options)
     robot = given.robot
     motion = open_motion(
         source,
@@ -205,6 +206,31 @@ def _shown_units(options: CheckOptions, given: _Given) -> Units:
 
     known = given.shown or given.units
     return known if options.units is None else parse_units(options.units, known)
+
+
+def _carrying(given: _Given, options: CheckOptions) -> _Given:
+    """Return the same with what the tool carries; the efforts that the arm states are then its limits.
+
+    Raises:
+        InputError: When a job says what is carried, the arm has no inertias, or the payload is none.
+    """
+    if options.payload is None:
+        return given
+    if given.loaded is not None:
+        hint = "the job says what is carried, by `attach`"
+        raise InputError("--job and --payload exclude each other", hint=hint)
+    from trajcli.dynamics.newton_euler import InverseDynamics
+    from trajcli.job.inline import inline_payload
+    from trajcli.job.limits import own_efforts
+
+    payload = inline_payload(options.payload, "--payload", _shown_units(options, given))
+    robot = replace(given.robot, payload=payload)
+    if not robot.limits.has_effort:
+        robot = replace(robot, limits=replace(robot.limits, effort=own_efforts(robot)))
+    if not robot.limits.has_effort:
+        raise InputError(f"{robot.name} states no efforts", hint="give them with --limits: {effort: ...}")
+    InverseDynamics(robot)  # refuses arms without inertias before anything is read
+    return replace(given, robot=robot)
 
 
 def _requirements(

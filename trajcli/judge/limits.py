@@ -12,17 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.checks.finding import at_time
-from trajcli.checks.tolerances import exceeds
+from trajcli.checks.tolerances import EFFORT_RELATIVE, exceeds
 from trajcli.curves.approach import ROOM, allowed_speed, uses_of_pieces
 from trajcli.curves.bernstein import control_points
 from trajcli.curves.extrema import critical_points
 from trajcli.curves.piecewise import Array, derivative_coefficients, horner
-from trajcli.errors import Amount
+from trajcli.dynamics.effort_bound import EffortPeak, EffortSurvey, effort_survey, needed_stretch
+from trajcli.dynamics.newton_euler import InverseDynamics
+from trajcli.errors import Amount, Amounts
 from trajcli.frozen import frozen
 from trajcli.judge.finding import Certainty, FindingSeverity, JudgedFinding, JudgedKind, Worst
 from trajcli.judge.intervals import DENSE, Intervals, JointAxes
 from trajcli.judge.rounding import PieceRows
-from trajcli.kinematics.robot import Limits
+from trajcli.kinematics.robot import Limits, Robot
+from trajcli.units import effort_unit
 
 _KINDS: tuple[JudgedKind, ...] = ("position", "velocity", "acceleration", "jerk")
 
@@ -380,3 +383,134 @@ def _fast_approaches(
     sign = np.where(upwards, 1.0, -1.0)
     rounding = rows.error(1) + np.maximum(roomy - bound, 0.0)
     return _FastApproaches(piece, joint, local, distance, speed, sign * bound, rounding, used)
+
+
+_ACCELERATED = 3  # degree from which on pieces have an acceleration
+
+
+def judge_efforts(
+    window: Intervals, pieces: slice, robot: Robot, move: int, axes: JointAxes, worst: Worst, *, asked: bool
+) -> None:
+    """Add where joints of an arm are over their limits of torque or force in pieces of one move.
+
+    Rows state efforts where they have accelerations, and the mean of one between two velocities else. Where
+    rows stand dense, an effort that only the curve between them has is a warning, as above.
+
+    Args:
+        window: The rows.
+        pieces: Which ones; those that are joined without an acceleration are left out.
+        robot: With the limits in force, gravity, and what its tool carries.
+        move: Its index, -1 for none.
+        axes: The joints.
+        worst: What is added to.
+        asked: Whether somebody asked for this curve.
+
+    Raises:
+        InputError: When a link of the arm has no inertia, or the arm no geometry.
+    """
+    limits = robot.limits.effort
+    curved = np.flatnonzero(window.highest[pieces] >= _ACCELERATED - 1) + pieces.start
+    if not robot.limits.has_effort or not curved.size:
+        return
+    dynamics, coefficients = InverseDynamics(robot), window.coefficients[:, curved]
+    lengths = window.lengths[curved]
+    breaks = np.concatenate([[0.0], np.cumsum(lengths)])
+    survey = effort_survey(dynamics, breaks, coefficients, limits)
+    stated = _stated_efforts(dynamics, window, curved)
+    for joint, bounds in enumerate(limits.tolist()):
+        for sign, limit in ((1, bounds[1]), (-1, -bounds[0])):
+            peak = survey.peak(joint, sign)
+            if peak.most <= limit * (1 + EFFORT_RELATIVE):
+                continue
+            over = _OverEffort(window, dynamics, survey, curved, breaks, joint, sign, limit, peak)
+            rows = float((sign * stated[:, joint]).max())
+            over.add(move, axes, worst, stated=rows, asked=asked)
+
+
+def _stated_efforts(dynamics: InverseDynamics, window: Intervals, curved: NDArray[np.intp]) -> Array:
+    """Return the efforts that rows state, or the mean accelerations between them, shape (m, n)."""
+    q, qd, qdd = (*window.states, None, None)[:3]
+    ends = np.unique(np.concatenate([curved, curved + 1]))
+    if qdd is not None and qd is not None and q is not None:
+        return dynamics.effort(q[ends], qd[ends], qdd[ends])
+    middle = window.lengths[curved, None] / 2
+    chosen = window.coefficients[:, curved]
+    here, rate = (horner(derivative_coefficients(chosen, order), middle) for order in (0, 1))
+    first = derivative_coefficients(chosen, 1)
+    change = (horner(first, 2 * middle) - first[-1]) / (2 * middle)
+    return dynamics.effort(here, rate, change)
+
+
+@frozen
+class _OverEffort:
+    """A joint over its limit in one direction, on the pieces `curved` of a window."""
+
+    window: Intervals
+    dynamics: InverseDynamics
+    survey: EffortSurvey
+    curved: NDArray[np.intp]
+    breaks: Array
+    joint: int
+    sign: int
+    limit: float
+    peak: EffortPeak
+
+    def add(self, move: int, axes: JointAxes, worst: Worst, *, stated: float, asked: bool) -> None:
+        """Add it by what is certain about it."""
+        at = int(np.clip(np.searchsorted(self.breaks, self.peak.time, "right") - 1, 0, self.curved.size - 1))
+        piece, local = int(self.curved[at]), float(self.peak.time - self.breaks[at])
+        rounding = self._rounding(piece, local)
+        beyond = self.peak.most - self.limit
+        dense = float(self.window.lengths[piece]) <= DENSE
+        severity: FindingSeverity = "error"
+        if not asked and dense and stated <= self.limit * (1 + EFFORT_RELATIVE) + rounding:
+            severity = "warning"
+        certainty: Certainty = "exceeded" if beyond > rounding else "within rounding"
+        found = self._finding(piece, local, axes, rounding)
+        worst.add(
+            "effort",
+            move,
+            np.array([self.joint]),
+            np.array([self.peak.most / self.limit]),
+            lambda _: found,
+            severity=severity,
+            certainty=certainty,
+        )
+
+    def _rounding(self, piece: int, local: float) -> float:
+        """Return by how much the effort may be off by the rounding of the accelerations."""
+        count = len(self.dynamics.robot.joints)
+        level = max(int(self.window.highest[piece]), 1)
+        rows = self.window.piece_rows(np.full(count, piece), np.arange(count), level)
+        position = horner(self.window.coefficients[:, piece], np.full(count, local))
+        inertia = np.abs(self.dynamics.mass_matrix(position)[self.joint])
+        return float(inertia @ rows.error(2))
+
+    def _finding(self, piece: int, local: float, axes: JointAxes, rounding: float) -> JudgedFinding:
+        unit = effort_unit(self.dynamics.robot.joint_types[self.joint])
+        value, limit = self.sign * self.peak.most, self.sign * self.limit
+        time = float(self.window.t[piece]) + local
+        amounts: Amounts = {
+            "joint": axes.names[self.joint],
+            "value": Amount(value, unit=unit, rounded="up" if self.sign > 0 else "down"),
+            "limit": Amount(limit, unit=unit, rounded="down" if self.sign > 0 else "up"),
+            "gravity": Amount(self.sign * self.peak.gravity, unit=unit),
+        }
+        what = "force" if unit == "N" else "torque"
+        needed = needed_stretch(self.survey, self.joint, self.sign, self.limit, EFFORT_RELATIVE / 2).factor
+        return JudgedFinding(
+            rule="limit",
+            severity="error",
+            kind="effort",
+            joint=axes.names[self.joint],
+            value=value,
+            limit=limit,
+            time=time,
+            row=self.window.row_at(piece, local),
+            factor=needed if np.isfinite(needed) else None,
+            method="bounded",
+            rounding=rounding,
+            message=f"{{joint}} needs a {what} of {{value}} {at_time(time)}, {{gravity}} of it against "
+            "gravity; its limit is {limit}",
+            amounts=amounts,
+        )

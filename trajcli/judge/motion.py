@@ -16,7 +16,7 @@ from trajcli.judge.consistency import changes_of, judge_consistency
 from trajcli.judge.ends import judge_end, judge_order_of_stamps, judge_start
 from trajcli.judge.finding import JudgedFinding, Judgement, Worst, worst_first
 from trajcli.judge.intervals import BESIDE, Intervals, JointAxes
-from trajcli.judge.limits import judge_limits, judge_velocity_by_position
+from trajcli.judge.limits import judge_efforts, judge_limits, judge_velocity_by_position
 from trajcli.judge.reconstruction import Interpolation, chosen_interpolation
 from trajcli.judge.stamps import Stamps, UnfitError
 from trajcli.kinematics.robot import Limits, Robot
@@ -241,6 +241,8 @@ class MotionJudge:
             arguments = (window, pieces, robot.limits, before, self._axes, self._worst)
             judge_limits(*arguments, asked=asked)
             judge_velocity_by_position(*arguments, asked=asked)
+            if robot.limits.has_effort and self._carries_one(before, after):
+                judge_efforts(window, pieces, robot, before, self._axes, self._worst, asked=asked)
             judge_consistency(*arguments, changes, flips)
             if self._tool is not None:
                 self._tool.see(window, pieces, robot, before, asked=asked)
@@ -275,6 +277,11 @@ class MotionJudge:
         first, second = known.get(before, robot), known.get(after, robot)
         return first if first is second else replace(first, limits=_looser(first.limits, second.limits))
 
+    def _carries_one(self, before: int, after: int) -> bool:
+        """Return whether the tool carries the same in two moves: else no row says when it changed."""
+        known, robot = self._requirements.by_move, self._requirements.robot
+        return known.get(before, robot).payload is known.get(after, robot).payload
+
     def _of_ends(self, first: _Rows, last: _Rows) -> list[JudgedFinding]:
         required, resolution = self._requirements, self._resolution
         assert resolution is not None  # noqa: S101
@@ -305,8 +312,16 @@ def _looser(a: Limits, b: Limits) -> Limits:
         (a_low, a_high), (b_low, b_high) = a.of_order(order).T, b.of_order(order).T
         rows.append(np.stack([np.minimum(a_low, b_low), np.maximum(a_high, b_high)], axis=1))
     tcp = {name: max(value, getattr(b.tcp, name)) for name, value in vars(a.tcp).items()}
+    efforts = np.stack(
+        [
+            np.minimum(a.effort[:, 0], b.effort[:, 0]),
+            np.maximum(a.effort[:, 1], b.effort[:, 1]),
+        ],
+        axis=1,
+    )
     return replace(
         a,
+        effort=efforts,
         **dict(zip(("position", "velocity", "acceleration", "jerk"), rows, strict=True)),
         tcp=type(a.tcp)(**tcp),
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Literal
 
-from trajcli.job.report import EffortReport, EffortsReport, PayloadReport
+from trajcli.job.reports.efforts import EffortReport, EffortsReport, PayloadReport
 from trajcli.kinematics.robot import Payload, Robot
 from trajcli.language.efforts import OF_ROBOT
 from trajcli.planning.plan import Plan

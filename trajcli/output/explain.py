@@ -27,7 +27,8 @@ from trajcli.job.explanation import (
     SegmentReport,
     UnitsReport,
 )
-from trajcli.job.report import MoveReport, WaypointReport, in_units
+from trajcli.job.report import MoveReport, WaypointReport
+from trajcli.job.reports.part import in_units
 from trajcli.output.polynomials import blends_of, knots_of, polynomial_intervals, polynomials_of
 from trajcli.output.report import joint_units, report_of
 from trajcli.output.sensitivity import with_savings

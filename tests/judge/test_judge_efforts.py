@@ -1,0 +1,140 @@
+"""Torques of recorded motions: what is over a limit, where, with which payload, and what rounding explains."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from trajcli.errors import InputError
+from trajcli.job.read import load_job
+from trajcli.judge.file import CheckOptions, check_file
+from trajcli.judge.finding import JudgedFinding
+from trajcli.output.write import write_plan
+from trajcli.planning.plan import plan_job
+
+ARM = """
+name: arm
+convention: standard
+units: {angle: deg, length: mm}
+joints:
+  - {name: a, a: 500, effort: LIMIT, link: {mass: 4, com: [-250, 0, 0], inertia: [0.01, 0.1, 0.1, 0, 0, 0]}}
+  - {name: b, a: 400, link: {mass: 2, com: [-200, 0, 0], inertia: [0.01, 0.05, 0.05, 0, 0, 0]}}
+base: {rpy: [90, 0, 0]}
+"""
+JOB = """
+version: 1
+units: {angle: deg, length: mm}
+robot: {file: arm.yaml}
+limits: {effort: null}
+start: {joints: [0, 0]}
+moves:
+  - {planner: quintic, to: {joints: [90, 20]}, duration: 1}
+  - {attach: {mass: 3}}
+  - {planner: quintic, to: {joints: [0, 90]}, duration: 1}
+output: {rate: 250, columns: [t, q, qd, qdd, move]}
+"""
+
+
+@pytest.fixture
+def rows(tmp_path: Path) -> Path:
+    """Write the arm, the job, and the rows of its motion; return the folder."""
+    (tmp_path / "arm.yaml").write_text(ARM.replace("LIMIT", "1000"))
+    (tmp_path / "job.yaml").write_text(JOB)
+    plan = plan_job(load_job(tmp_path / "job.yaml"))
+    write_plan(plan, str(tmp_path / "rows.csv"), "full")
+    return tmp_path
+
+
+def efforts(folder: Path, limit: float, **options: str) -> list[JudgedFinding]:
+    """Return the findings of efforts with a limit of the first joint."""
+    (folder / "arm.yaml").write_text(ARM.replace("LIMIT", str(limit)))
+    options = options or {"robot": str(folder / "arm.yaml")}
+    judgement = check_file(str(folder / "rows.csv"), CheckOptions(**options)).judgement
+    return [found for found in judgement.findings if found.kind == "effort"]
+
+
+def peak_of(folder: Path, move: int, carried: float) -> tuple[float, float]:
+    """Return the largest torque of joint a in a move and its time, by Lagrange, on dense points of the plan."""
+    plan = plan_job(load_job(folder / "job.yaml"))
+    span = plan.trajectory.spans[move]
+    t = np.linspace(span.start, span.end, 20001)[1:-1]
+    q, qd, qdd = (plan.trajectory(t, order) for order in range(3))
+    m, first = 2 + carried, (2 * 0.2 + carried * 0.4) / (2 + carried)
+    inertia = 0.05 + 2 * (0.2 - first) ** 2 + carried * (0.4 - first) ** 2
+    cosine, sine = np.cos(q[:, 1]), np.sin(q[:, 1])
+    m12 = inertia + m * (first**2 + 0.5 * first * cosine)
+    m11 = 0.1 + 4 * 0.25**2 + m12 + m * (0.25 + 0.5 * first * cosine)
+    h = -m * 0.5 * first * sine
+    gravity = 9.81 * ((4 * 0.25 + m * 0.5) * np.cos(q[:, 0]) + m * first * np.cos(q.sum(axis=1)))
+    tau = m11 * qdd[:, 0] + m12 * qdd[:, 1] + h * (2 * qd[:, 0] * qd[:, 1] + qd[:, 1] ** 2) + gravity
+    return float(tau.max()), float(t[tau.argmax()])
+
+
+def test_a_torque_over_its_limit_is_found_with_its_place(rows: Path) -> None:
+    most, time = peak_of(rows, 0, 0.0)
+    (found,) = [found for found in efforts(rows, 0.9 * most) if found.move == 0]
+    assert (found.joint, found.severity, found.certainty, found.method) == (
+        "a",
+        "error",
+        "exceeded",
+        "bounded",
+    )
+    assert found.value == pytest.approx(most, rel=1e-5)
+    assert found.limit == pytest.approx(0.9 * most)
+    assert found.time == pytest.approx(time, abs=2e-3)
+    assert found.factor is not None
+    assert found.factor > 1
+    assert "needs a torque of" in found.text()
+    assert not [found for found in efforts(rows, 1.0001 * most) if found.move == 0]
+
+
+def test_a_payload_counts(rows: Path) -> None:
+    most, _ = peak_of(rows, 0, 2.0)
+    arm = str(rows / "arm.yaml")
+    heavy = {"robot": arm, "payload": "{mass: 2}"}
+    assert [found.move for found in efforts(rows, 0.999 * most, **heavy)][:1] == [0]
+    assert not [found for found in efforts(rows, 1.001 * most, **heavy) if found.move == 0]
+    assert not [found for found in efforts(rows, 0.999 * most) if found.move == 0]
+
+
+def test_a_job_says_what_each_move_carries(rows: Path) -> None:
+    most = peak_of(rows, 2, 3.0)[0]
+    assert most > peak_of(rows, 2, 0.0)[0] * 1.2
+    for factor, expected in ((0.999, [2]), (1.001, [])):
+        job = JOB.replace("effort: null", f"effort: {{a: {factor * most!r}}}")
+        (rows / "job.yaml").write_text(job)
+        found = efforts(rows, 1000, job=str(rows / "job.yaml"))
+        assert [one.move for one in found] == expected
+
+
+def test_a_planted_peak_between_two_rows_is_found(rows: Path) -> None:
+    """A ten-thousandth over the limit, where no row stands."""
+    most, time = peak_of(rows, 0, 0.0)
+    lines = (rows / "rows.csv").read_text().splitlines()
+    stamps = np.array([float(line.split(",")[0]) for line in lines[1:]])
+    coarse = [lines[0], *[line for line, t in zip(lines[1:], stamps, strict=True) if abs(t - time) > 0.02]]
+    (rows / "rows.csv").write_text("\n".join(coarse) + "\n")
+    options = {"robot": str(rows / "arm.yaml"), "interpolate": "quintic"}
+    over = [found for found in efforts(rows, most * (1 - 1e-4), **options) if found.move == 0]
+    assert [found.joint for found in over] == ["a"]
+    assert not [found for found in efforts(rows, most * (1 + 1e-4), **options) if found.move == 0]
+
+
+def test_lines_between_rows_have_no_acceleration_to_judge(rows: Path) -> None:
+    assert not efforts(rows, 1, robot=str(rows / "arm.yaml"), interpolate="linear")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"job": "job.yaml", "payload": "{mass: 1}"}, "--job and --payload exclude each other"),
+        ({"robot": "planar2r", "payload": "{mass: 1}"}, "states no efforts"),
+        ({"robot": "arm.yaml", "payload": "{mass: -1}"}, "at least 0 kg"),
+    ],
+)
+def test_one_clear_error(rows: Path, options: dict[str, str], message: str) -> None:
+    placed = {key: str(rows / value) if value.endswith(".yaml") else value for key, value in options.items()}
+    with pytest.raises(InputError, match=message):
+        check_file(str(rows / "rows.csv"), CheckOptions(**placed))
