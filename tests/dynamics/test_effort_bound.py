@@ -38,6 +38,17 @@ def dense(dynamics, breaks, coefficients, count=3001):
     return np.concatenate(efforts)
 
 
+def efforts_near(dynamics, breaks, coefficients, time):
+    """Return the efforts just before, at and just behind a time: Coulomb friction jumps where a joint turns back."""
+    efforts = []
+    for t in np.clip(time + np.array([-1e-8, 0.0, 1e-8]), breaks[0], breaks[-1]):
+        p = int(np.clip(np.searchsorted(breaks, t, "right") - 1, 0, len(breaks) - 2))
+        rows = coefficients[:, p].T
+        state = [np.array([np.polyval(np.polyder(row, k), t - breaks[p]) for row in rows]) for k in range(3)]
+        efforts.append(dynamics.effort(*state))
+    return np.array(efforts)
+
+
 def random_motion(rng, joints):
     pieces, degree = int(rng.integers(1, 4)), int(rng.integers(1, 6))
     breaks = np.concatenate([[0.0], np.cumsum(rng.uniform(0.1, 0.8, pieces))]) + rng.uniform(-1, 1)
@@ -52,14 +63,27 @@ def random_dynamics(rng, friction):
 
 @pytest.mark.parametrize("seed", range(30))
 def test_bounds_are_never_below_samples_and_hardly_above(seed):
+    require_sound_and_tight(seed)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("first", range(0, 1000, 100))
+def test_bounds_of_a_thousand_motions(first):
+    for seed in range(first, first + 100):
+        require_sound_and_tight(seed)
+
+
+def require_sound_and_tight(seed):
     rng = np.random.default_rng(seed)
     dynamics = random_dynamics(rng, friction=seed % 3 == 0)
     breaks, coefficients = random_motion(rng, len(dynamics.links))
     survey = effort_survey(dynamics, breaks, coefficients)
     efforts = dense(dynamics, breaks, coefficients)
     scale = np.abs(efforts).max(axis=0)
-    for peaks, sampled in ((survey.highest(), efforts.max(axis=0)), (survey.lowest(), -efforts.min(axis=0))):
+    for sign, peaks in ((1, survey.highest()), (-1, survey.lowest())):
         most = np.array([peak.most for peak in peaks])
+        near = np.array([efforts_near(dynamics, breaks, coefficients, peak.time) for peak in peaks])
+        sampled = np.maximum((sign * efforts).max(axis=0), (sign * near).max(axis=1).diagonal())
         assert (most >= sampled - 1e-9 * scale).all()
         assert (most <= sampled + 1e-4 * scale).all()
         for joint, peak in enumerate(peaks):
@@ -92,6 +116,36 @@ def test_majorants_bound_taylor_coefficients_everywhere(seed):
             true = np.abs(series.deriv(k)(np.linspace(0, length, 101)) if k else values).max() / factorial
             rounding = 1e-15 * np.abs(values).max() * (256 / (length / 2)) ** k
             assert true <= found[k, joint] * (1 + 1e-6) + rounding
+
+
+def two_joints(second: Joint, first_length: float) -> InverseDynamics:
+    """Return a turning joint without mass that carries a second one, in a plane without gravity."""
+    nothing = LinkInertia(1e-12, (0.0, 0.0, 0.0), (0.0,) * 6)
+    joints = (Joint("turn", a=first_length, link=nothing), second)
+    return InverseDynamics(Robot("two", joints, unlimited(2), "modified", np.eye(4), np.eye(4)), np.zeros(3))
+
+
+def test_majorants_know_centripetal_forces():
+    """A point at the end of a short second link of an arm that turns steadily: m a l w^2 sin q2 at the second joint."""
+    far = two_joints(Joint("elbow", a=10.0, link=LinkInertia(2.0, (0.1, 0.0, 0.0), (0.0,) * 6)), 0.0)
+    motion = np.array([[[5.0, 0.0]], [[0.0, np.pi / 2]]])
+    bound = effort_majorants(far, motion[-1], growth(motion, np.array([1e-6]), 4))[0, 0]
+    true = far.effort([0.0, np.pi / 2], [5.0, 0.0], [0.0, 0.0])
+    assert true[1] == pytest.approx(2.0 * 10.0 * 0.1 * 25.0)
+    assert (np.abs(true) <= bound * (1 + 1e-9)).all()
+
+
+def test_majorants_know_coriolis_forces():
+    """A point that slides outwards on a turning arm: 2 m r w v at the turning joint."""
+    slide = Joint(
+        "slide", "prismatic", alpha=np.pi / 2, d=0.1, link=LinkInertia(2.0, (0.0, 0.0, 0.0), (0.0,) * 6)
+    )
+    arm = two_joints(slide, 0.0)
+    motion = np.array([[[1.0, 50.0]], [[0.0, 0.0]]])
+    bound = effort_majorants(arm, motion[-1], growth(motion, np.array([1e-9]), 4))[0, 0]
+    true = arm.effort([0.0, 0.0], [1.0, 50.0], [0.0, 0.0])
+    assert abs(true[0]) == pytest.approx(2.0 * 2.0 * 0.1 * 50.0)
+    assert (np.abs(true) <= bound * (1 + 1e-6)).all()
 
 
 def hidden_peak(size: float) -> tuple[np.ndarray, float]:

@@ -11,6 +11,7 @@ from heavy_arms import energy, gravity_effort, mass_matrix, random_arm, random_p
 
 from trajcli.dynamics.newton_euler import InverseDynamics
 from trajcli.errors import InputError
+from trajcli.kinematics.jacobian import jacobian
 from trajcli.kinematics.robot import Friction, Joint, LinkInertia, Payload, Robot, point_mass, unlimited
 
 CONVENTIONS = ["standard", "modified"]
@@ -49,6 +50,26 @@ def test_two_link_planar_arm_in_closed_form():
         close(dynamics.mass_matrix(q), np.array([[b11, b12], [b12, b22]]))
         close(dynamics.gravity_effort(q), np.array([g1, g2]))
         close(dynamics.coriolis(q, qd), np.array([2 * h * v1 * v2 + h * v2**2, -h * v1**2]))
+
+
+def test_gyroscopic_moment_of_a_wheel_on_a_turntable():
+    """A wheel that spins with w about y on a table that turns with u about z: its precession takes I_y w u about x."""
+    nothing = LinkInertia(1e-12, (0.0, 0.0, 0.0), (0.0,) * 6)
+    wheel = LinkInertia(1.0, (0.0, 0.0, 0.0), (0.01, 0.01, 0.02, 0.0, 0.0, 0.0))
+    joints = (
+        Joint("tilt", link=nothing),
+        Joint("table", alpha=np.pi / 2, link=nothing),
+        Joint("wheel", alpha=np.pi / 2, link=wheel),
+    )
+    robot = Robot("wheel", joints, unlimited(3), "modified", np.eye(4), np.eye(4))
+    dynamics = InverseDynamics(robot, np.zeros(3))
+    # with q2 = pi / 2 the wheel's axis is square to that of the tilt; L = I_z w along it turns with the table
+    q, qd = np.array([0.0, np.pi / 2, 0.0]), np.array([0.0, 3.0, 40.0])
+    turn = jacobian(robot, q)[3:]
+    axis = turn[:, 2]
+    moment = np.cross(turn[:, 1] * 3.0, 0.02 * 40.0 * axis)  # the table's own momentum keeps its direction
+    assert dynamics.effort(q, qd, np.zeros(3)) == pytest.approx(turn.T @ moment, abs=1e-9)
+    assert np.abs(moment).max() > 1.0
 
 
 def test_slide_lifts_its_load():

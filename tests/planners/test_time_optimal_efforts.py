@@ -110,6 +110,17 @@ def test_durations_against_toppra(name, seed):
     assert motion.trajectory.duration <= 1.003 * toppra_duration(robot, points, 800)
 
 
+@pytest.mark.soak
+@pytest.mark.parametrize("name", EFFORTS)
+def test_durations_against_toppra_on_many_splines(name):
+    for seed in range(34):
+        robot = arm(name)
+        path, points = spline_of(robot, seed)
+        motion = solved(path, robot)
+        assert np.abs(shares(motion.trajectory, robot)).max() <= 1 + 1e-6
+        assert motion.trajectory.duration <= 1.003 * toppra_duration(robot, points)
+
+
 @pytest.mark.parametrize("mass", [0.0, 5.0])
 def test_a_joint_is_at_its_limit_nearly_always(mass):
     robot = arm("ur5", mass=mass)
@@ -305,3 +316,30 @@ def read_line(given):
     pose = forward(robot, given["start"]["joints"])
     given["points"] = {"there": {"matrix": pose.tolist()}}
     return plan(given)
+
+
+def test_phases_name_the_efforts_that_bind():
+    """A lift is at its upper limit until it switches, and at its lower one from there on."""
+    given = {
+        "version": 1,
+        "robot": {
+            "convention": "standard",
+            "joints": [
+                {
+                    "name": "lift",
+                    "type": "prismatic",
+                    "link": {"mass": 5, "com": [0, 0, 0], "inertia": [0] * 6},
+                }
+            ],
+        },
+        "limits": {"velocity": 50, "effort": 80},
+        "start": {"joints": [0]},
+        "moves": [{"planner": "time_optimal", "through": [{"joints": [1]}], "to": {"joints": [3]}}],
+    }
+    planned = plan(given)
+    first, second = planned.moves[0].planned.phases
+    up, down = 80 / 5 - 9.81, 80 / 5 + 9.81
+    switch = (2 * 3.0 * down / (up * (up + down))) ** 0.5
+    assert (first.name, second.name) == ("effort +", "effort -")
+    assert first.end == pytest.approx(switch, rel=1e-3)
+    assert second.start == pytest.approx(switch, rel=1e-3)

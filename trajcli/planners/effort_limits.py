@@ -91,6 +91,25 @@ def solved_within_efforts(path: PiecewisePolynomial, robot: Robot, solve: Solve)
     return motion
 
 
+def effort_shares(trajectory: PiecewisePolynomial, robot: Robot) -> Array | None:
+    """Return the shares of their upper and lower limits that efforts use, (pieces, 2 n); None without limits.
+
+    They are means over both ends of each piece.
+
+    Args:
+        trajectory: q(t).
+        robot: With the limits in force, and what its tool carries.
+    """
+    if not robot.limits.has_effort:
+        return None
+    from trajcli.dynamics.newton_euler import InverseDynamics
+
+    states = [np.stack(trajectory.piece_ends(order)) for order in range(3)]
+    mean = InverseDynamics(robot).effort(*states).mean(axis=0)
+    low, high = robot.limits.effort.T
+    return np.concatenate([mean / high, mean / low], axis=1)
+
+
 def _solved(constraint: EffortConstraint, solve: Solve) -> TimeOptimalMotion:
     """Return the fastest motion, with viscous friction by its tangents at the speeds of the motion."""
     motion = solve((constraint,))

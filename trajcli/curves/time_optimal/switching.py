@@ -12,7 +12,6 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.frozen import comparable
 
 _BINDS = 0.95  # of a limit, on average over a piece: its ends reach the limit only as far as the grid is fine
-_QUANTITIES: tuple[Literal["velocity", "acceleration", "jerk"], ...] = ("velocity", "acceleration", "jerk")
 _STAYS = 0.01  # by which another limit must be nearer before it takes over
 
 
@@ -31,7 +30,7 @@ class Binding:
     start: float
     end: float
     joint: int
-    quantity: Literal["velocity", "acceleration", "jerk"]
+    quantity: Literal["velocity", "acceleration", "jerk", "effort"]
     sign: Literal[-1, 1]
 
 
@@ -40,6 +39,7 @@ def switching_structure(
     velocity: ArrayLike,
     acceleration: ArrayLike,
     jerk: ArrayLike | None = None,
+    efforts: Array | None = None,
 ) -> list[Binding]:
     """Return the intervals of time in which a limit binds; where none is named, the motion switches.
 
@@ -50,9 +50,14 @@ def switching_structure(
         velocity: Bounds, shape (n, 2).
         acceleration: Bounds, shape (n, 2).
         jerk: Bounds, shape (n, 2), where it follows them.
+        efforts: Shares of their upper and of their lower limits in use, means over both ends of each piece,
+            shape (pieces, 2 n), where it follows limits of efforts.
     """
     bounds = [velocity, acceleration] if jerk is None else [velocity, acceleration, jerk]
-    used = np.concatenate([_used(trajectory, k + 1, each) for k, each in enumerate(bounds)], axis=1)
+    shares = [_used(trajectory, k + 1, each) for k, each in enumerate(bounds)]
+    names: list[Literal["velocity", "acceleration", "jerk", "effort"]] = ["velocity", "acceleration", "jerk"]
+    names[len(bounds) :] = ["effort"]
+    used = np.concatenate(shares if efforts is None else [*shares, efforts], axis=1)
     labels = _labels(used)
     bindings, times, n = [], trajectory.breaks, trajectory.dimension
     for label, group in groupby(range(trajectory.pieces), labels.__getitem__):
@@ -65,7 +70,7 @@ def switching_structure(
                 float(times[pieces[0]]),
                 float(times[pieces[-1] + 1]),
                 joint,
-                _QUANTITIES[side // 2],
+                names[side // 2],
                 1 if side % 2 == 0 else -1,
             )
         )

@@ -37,6 +37,7 @@ from trajcli.planners.approach_limits import approach_constraints
 from trajcli.planners.boundary_states import missing_limit
 from trajcli.planners.effort_limits import (
     effort_constraints,
+    effort_shares,
     lacks_acceleration,
     solved_within_efforts,
 )
@@ -93,7 +94,8 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
     )
     motion = motion_along(path, law, law.breaks, tolerance, None)
     jerk = limits.jerk if keeps_jerk else None
-    binding = switching_structure(solved.trajectory, limits.velocity, limits.acceleration, jerk)
+    efforts = effort_shares(solved.trajectory, robot)
+    binding = switching_structure(solved.trajectory, limits.velocity, limits.acceleration, jerk, efforts)
     phases = [
         Phase(f"{b.quantity} {'+' if b.sign > 0 else '-'}", b.start * factor, b.end * factor, b.joint)
         for b in binding

@@ -38,7 +38,7 @@ from trajcli.language.poses import read_numbers
 from trajcli.language.recorded import Recorded
 from trajcli.planners.approach_limits import approach_constraints
 from trajcli.planners.boundary_states import missing_limit, same_state, standstill
-from trajcli.planners.effort_limits import effort_constraints, lacks_acceleration
+from trajcli.planners.effort_limits import effort_constraints, effort_shares, lacks_acceleration
 from trajcli.planners.planner import Phase, Planned
 from trajcli.planners.waypoints.fastest_law import (
     events_of_law,
@@ -198,7 +198,8 @@ class TimeOptimal(ThroughPoints):
         factor = 1.0 if self.duration is None else self.duration / duration
         _check_duration(self.duration, duration, points)
         passed = times_at(motion.law, path.s)
-        binding = switching_structure(motion.trajectory, robot.limits.velocity, bounds, jerk)
+        efforts = effort_shares(motion.trajectory, robot)
+        binding = switching_structure(motion.trajectory, robot.limits.velocity, bounds, jerk, efforts)
         return Planned(
             scale_time(motion.trajectory, factor) if factor != 1 else motion.trajectory,
             points.target,
