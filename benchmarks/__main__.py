@@ -40,8 +40,7 @@ BENCHMARKS = (
     "viewing",
 )
 OURS = ("trajcli", "numpy", "pydantic", "pyyaml", "typer")
-THEIRS = ("roboticstoolbox-python", "eaik", "toppra", "copp-py", "numpy", "scipy")
-THEIRS = ("roboticstoolbox-python", "eaik", "pin", "toppra", "numpy", "scipy")
+THEIRS = ("roboticstoolbox-python", "eaik", "pin", "toppra", "copp-py", "numpy", "scipy")
 _VERSIONS = """
 import json, platform, sys
 from importlib.metadata import version

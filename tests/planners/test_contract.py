@@ -56,7 +56,7 @@ def assert_keeps_contract(planner: Planner, start: State, robot: Robot, planned:
         assert np.array_equal(start.position, planned.end.position)
         return
     start = planned.begins or start
-    for order, quantity in enumerate(ATTRIBUTES[: planner.joins + 1]):
+    for order, quantity in enumerate(ATTRIBUTES[: (planned.continuity or planner.joins) + 1]):
         scale = peaks_of(curve, order)
         first, last = curve.piece_ends(order)
         assert (np.abs(first[0] - getattr(start, quantity)) <= MET * scale).all(), (quantity, "start")
@@ -183,7 +183,9 @@ def test_opposite_displacements_are_mirror_images(tag: str) -> None:
         planner, start, robot = only_move(job)
         curves.append(planner.plan(start, robot).curve)
     there, back = curves
-    assert there.duration == back.duration
-    t = np.linspace(0, there.duration, 50)
+    searched = tag == "time_optimal"  # by steps whose rows of both signs come in another order
+    near = 1e-9 if searched else 1e-12
+    assert there.duration == pytest.approx(back.duration, rel=near if searched else 0, abs=0)
+    t = np.linspace(0, min(there.duration, back.duration), 50)
     for order in range(3):
-        np.testing.assert_allclose(back.evaluate(t, order), -there.evaluate(t, order), rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(back.evaluate(t, order), -there.evaluate(t, order), rtol=near, atol=near)
