@@ -5,6 +5,7 @@ ones each time: it sets HYPOTHESIS_PROFILE=random.
 """
 
 import os
+import signal
 
 from hypothesis import settings
 
@@ -12,3 +13,6 @@ from hypothesis import settings
 settings.register_profile("fixed", derandomize=True, deadline=None)
 settings.register_profile("random", deadline=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "fixed"))
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in the background of a shell; the programs that tests start inherit it
+    signal.signal(signal.SIGINT, signal.default_int_handler)

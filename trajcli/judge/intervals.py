@@ -21,6 +21,12 @@ from trajcli.streams.recorded_motion import Resolution
 BESIDE = 2  # intervals on either side that are looked at, too
 DENSE = 0.0100001
 """Seconds between rows that controllers take one by one: they run at 100 Hz or faster."""
+_UNRESOLVED, _UNRESOLVED_LAST = 0.2, 1.5
+"""Of the jump of the highest derivative times powers of the length: how far a piece may go beyond a motion
+that changes its law once between two rows (0.143 and 1.5 at most)."""
+_CURVED = 0.1
+"""Likewise of the jump of the derivative after that: how far a piece bends beside a motion that bends on
+(1/12 at most)."""
 HIGHEST = {"hold": 0, "linear": 1, "cubic": 2, "quintic": 3, "jtc-upsampling": 3}
 """Highest derivative that pieces of an interpolation determine."""
 
@@ -156,3 +162,24 @@ class Intervals:
         """Return the number of the row at a time within a piece, or before it."""
         at_end = local >= self.lengths[piece] * (1 - 1e-12)
         return int(self.rows[piece + 1 if at_end else piece])
+
+
+def explained_by_law(
+    window: Intervals, piece: NDArray[np.intp], joint: NDArray[np.intp], order: int, level: int
+) -> Array:
+    """Return how far pieces (m,) may go beyond a motion that changes its law once between two dense rows.
+
+    Minus infinity where rows are not dense.
+
+    Args:
+        window: The rows.
+        piece: Indices of pieces.
+        joint: Of each the index of a joint.
+        order: Of the derivative that is looked at.
+        level: Of the highest derivative that the pieces determine.
+    """
+    length, below = window.lengths[piece], level - order
+    share = _UNRESOLVED if below else _UNRESOLVED_LAST
+    highest, beyond = (jumps[piece, joint] for jumps in window.jumps)
+    explained = share * length**below * highest + _CURVED * length ** (below + 1) * beyond
+    return np.where(length <= DENSE, explained, -np.inf)

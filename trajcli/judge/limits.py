@@ -22,19 +22,13 @@ from trajcli.dynamics.newton_euler import InverseDynamics
 from trajcli.errors import Amount, Amounts
 from trajcli.frozen import frozen
 from trajcli.judge.finding import Certainty, FindingSeverity, JudgedFinding, JudgedKind, Worst
-from trajcli.judge.intervals import DENSE, Intervals, JointAxes
+from trajcli.judge.intervals import DENSE, Intervals, JointAxes, explained_by_law
 from trajcli.judge.rounding import PieceRows
 from trajcli.kinematics.robot import Limits, Robot
 from trajcli.units import effort_unit
 
 _KINDS: tuple[JudgedKind, ...] = ("position", "velocity", "acceleration", "jerk")
 
-_UNRESOLVED, _UNRESOLVED_LAST = 0.2, 1.5
-"""Of the jump of the highest derivative times powers of the length: how far a piece may go beyond a motion
-that changes its law once between two rows (0.143 and 1.5 at most)."""
-_CURVED = 0.1
-"""Likewise of the jump of the derivative after that: how far a piece bends beside a motion that bends on
-(1/12 at most)."""
 _MANY = 20000  # pieces and joints over a limit from which on only the worst of them are looked at closely
 
 
@@ -202,27 +196,6 @@ class _Side:
             message=what,
             amounts=axes.amounts(joint, self.order, self.sign * value, self.sign * bound),
         )
-
-
-def explained_by_law(
-    window: Intervals, piece: NDArray[np.intp], joint: NDArray[np.intp], order: int, level: int
-) -> Array:
-    """Return how far pieces (m,) may go beyond a motion that changes its law once between two dense rows.
-
-    Minus infinity where rows are not dense.
-
-    Args:
-        window: The rows.
-        piece: Indices of pieces.
-        joint: Of each the index of a joint.
-        order: Of the derivative that is looked at.
-        level: Of the highest derivative that the pieces determine.
-    """
-    length, below = window.lengths[piece], level - order
-    share = _UNRESOLVED if below else _UNRESOLVED_LAST
-    highest, beyond = (jumps[piece, joint] for jumps in window.jumps)
-    explained = share * length**below * highest + _CURVED * length ** (below + 1) * beyond
-    return np.where(length <= DENSE, explained, -np.inf)
 
 
 def _refine(polynomials: Array, lengths: Array, near: NDArray[np.intp], value: Array, local: Array) -> None:
