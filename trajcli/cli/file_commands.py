@@ -80,7 +80,7 @@ def plot(
         typer.Option(
             "--quantities",
             metavar="LIST",
-            help="Some of q,qd,qdd,qddd,tool,path,phase; else those that suit the job.",
+            help="Some of q,qd,qdd,qddd,tau,tool,path,phase; else those that suit the job.",
         ),
     ] = None,
     joints: Annotated[

@@ -192,7 +192,7 @@ def effort_survey(
     """
     long = np.diff(breaks) > 0
     starts, lengths = breaks[:-1][long], np.diff(breaks)[long]
-    pieces = _cut_where_joints_turn(dynamics, starts, lengths, coefficients[:, long])
+    pieces = cut_where_joints_turn(dynamics, starts, lengths, coefficients[:, long])
     least = np.full(len(dynamics.links), np.inf) if limits is None else np.abs(limits).min(axis=1)
     span = float(breaks[0]), float(breaks[-1])
     known = replace(_known(dynamics, *pieces), span=span, limits=least)
@@ -241,10 +241,17 @@ def _known(dynamics: InverseDynamics, starts: Array, lengths: Array, coefficient
     return EffortSurvey((0.0, 0.0), starts, lengths, parts, rest, unknown)
 
 
-def _cut_where_joints_turn(
+def cut_where_joints_turn(
     dynamics: InverseDynamics, starts: Array, lengths: Array, coefficients: Array
 ) -> tuple[Array, Array, Array]:
-    """Return starts, lengths and coefficients of pieces in which no joint with friction turns back."""
+    """Return starts, lengths and coefficients of pieces in which no joint with Coulomb friction turns back.
+
+    Args:
+        dynamics: Of the arm.
+        starts: Of the pieces of the joints' curve, s, shape (P,).
+        lengths: Of the pieces, above 0, s, shape (P,).
+        coefficients: Of the pieces, (degree + 1, P, n), highest power first, from their starts on.
+    """
     rubs = np.array([joint.friction.coulomb > 0.0 for joint in dynamics.robot.joints])
     if not rubs.any() or not lengths.size:
         return starts, lengths, coefficients

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from trajcli.columns import EFFORT, JOINT_GROUPS
 from trajcli.errors import InputError
 from trajcli.suggest import did_you_mean, valid_names
 
@@ -15,13 +16,15 @@ QUANTITY_NAMES: Mapping[str, str] = {
     "qd": "velocity",
     "qdd": "acceleration",
     "qddd": "jerk",
+    EFFORT: "effort",
     TOOL: "speed of the tool",
     PATH: "path of the tool",
     PHASE: "phase plane",
 }
 """What a picture can show, in the order in which it is drawn, and what each is called."""
 
-JOINT_QUANTITIES = ("q", "qd", "qdd", "qddd")
+JOINT_QUANTITIES = JOINT_GROUPS
+"""Quantities that each joint has a panel of."""
 
 
 def split_names(texts: Sequence[str]) -> tuple[str, ...]:

@@ -5,13 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Literal
 
-from trajcli.columns import Column
+from trajcli.columns import EFFORT, JOINT_ORDERS, Column
 from trajcli.errors import InputError
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import JointType
-from trajcli.units import Quantity, Units, factor, joint_quantity, unit_name
+from trajcli.units import Quantity, Units, effort_unit, factor, joint_quantity, unit_name
 
-_EITHER = ("rad or m", "rad/s or m/s", "rad/s^2 or m/s^2", "rad/s^3 or m/s^3")
+_EITHER = {
+    "q": "rad or m",
+    "qd": "rad/s or m/s",
+    "qdd": "rad/s^2 or m/s^2",
+    "qddd": "rad/s^3 or m/s^3",
+    EFFORT: "N m or N",
+}
 _TYPES: dict[str | None, JointType] = {"deg": "revolute", "mm": "prismatic"}
 
 
@@ -30,15 +36,20 @@ class DisplayUnits:
     units: Units
 
     def joint_factor(self, joint: int) -> float:
-        """Return SI per unit of a joint's axis."""
+        """Return SI per unit of a joint's axis; those of efforts are in SI."""
         kind = self.joint_types[joint]
         return 1.0 if kind is None else factor(joint_quantity(kind), self.units)
 
-    def joint_label(self, symbol: str, joint: int, order: int) -> str:
-        """Return the label of the axis of a joint: what is drawn, and its unit."""
+    def joint_label(self, quantity: str, joint: int) -> str:
+        """Return the label of the axis of a joint: "q", "qd", "qdd", "qddd" or "tau", and its unit."""
         kind = self.joint_types[joint]
-        unit = _EITHER[order] if kind is None else unit_name(joint_quantity(kind, order), self.units)
-        return f"{symbol} [{unit}]"
+        if kind is None:
+            unit = _EITHER[quantity]
+        elif quantity == EFFORT:
+            unit = effort_unit(kind)
+        else:
+            unit = unit_name(joint_quantity(kind, JOINT_ORDERS[quantity]), self.units)
+        return f"{quantity} [{unit}]"
 
     def factor(self, dimension: Literal["length", "angle", "ratio"]) -> float:
         """Return SI per unit of an axis."""

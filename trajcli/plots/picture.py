@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from trajcli.columns import EFFORT
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.planners.planner import PlannedMove
@@ -108,6 +109,8 @@ def _sensible(motion: PlannedMotion | None, records: Sequence[DrawnTable]) -> li
     limited = any(np.isfinite(move.robot.limits.jerk).any() for move in motion.moves)
     if limited or all(move.continuity > 1 for move in motion.moves):
         names.append("qddd")  # elsewhere the acceleration steps, and says all
+    if motion.has_effort_limits or any(EFFORT in record.shows() for record in records):
+        names.append(EFFORT)
     along_path = any(move.planned.tool is not None for move in motion.moves)
     tcp = [move.robot.limits.tcp for move in motion.moves]
     if along_path or any(np.isfinite((limits.speed, limits.angular_speed)).any() for limits in tcp):
@@ -118,10 +121,13 @@ def _sensible(motion: PlannedMotion | None, records: Sequence[DrawnTable]) -> li
 def _impossible(motion: PlannedMotion | None, records: Sequence[DrawnTable]) -> dict[str, str]:
     """Return why a quantity cannot be drawn, by its name."""
     if motion is not None:
-        why = {}
+        why, robot = {}, motion.plan.loaded.robot
         if not motion.has_tool:
-            robot = motion.plan.loaded.robot.name
-            why = dict.fromkeys((TOOL, PATH), f"the robot '{robot}' has no geometry (theta, d, a, alpha)")
+            lacking = f"the robot '{robot.name}' has no geometry (theta, d, a, alpha)"
+            why = dict.fromkeys((EFFORT, TOOL, PATH), lacking)
+        elif robot.without_inertia:
+            joints = ", ".join(robot.without_inertia)
+            why = {EFFORT: f"the robot '{robot.name}' has no mass and inertia of the links behind {joints}"}
         if all(move.planned.phase_plane is None for move in motion.moves):
             why[PHASE] = "no move of the job has a time-optimal law"
         return why
@@ -173,26 +179,26 @@ class _Maker:
         return [PanelBlock(tuple(panels), len(kinds), tuple(QUANTITY_NAMES[kind] for kind in kinds))]
 
     def _joint_panel(self, kind: str, joint: int, called: str) -> Panel:
-        name, order, motion = self._display.joint_names[joint], JOINT_QUANTITIES.index(kind), self._motion
+        name, motion = self._display.joint_names[joint], self._motion
         title = f"{name}: {called}" if called else name
-        traces = [] if motion is None else [Trace(0, *motion.joint_trace(joint, order))]
+        traces = [] if motion is None else [Trace(0, *motion.joint_trace(joint, kind))]
         for source, record in self._records:
             values = record.joint(kind, joint)
             if values is not None:
                 traces.append(Trace(source, *thinned(record.times, values)))
-        label = self._display.joint_label(kind, joint, order)
+        label = self._display.joint_label(kind, joint)
         if motion is None:
             return Panel(title, _TIME, label, tuple(traces))
-        limits = motion.joint_limits(joint, order)
+        limits, marked = motion.joint_limits(joint, kind), kind == "q"
         return Panel(
             title,
             _TIME,
             label,
             tuple(traces),
             limits,
-            waypoints=NO_POINTS if order else motion.waypoints(joint),
-            virtual_points=NO_POINTS if order else motion.virtual_points(joint),
-            findings=motion.joint_findings(joint, order),
+            waypoints=motion.waypoints(joint) if marked else NO_POINTS,
+            virtual_points=motion.virtual_points(joint) if marked else NO_POINTS,
+            findings=motion.joint_findings(joint, kind),
             unlimited=bool(np.isnan([line[:, 1] for line in limits]).all()),
         )
 

@@ -6,26 +6,29 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from trajcli.columns import EFFORT, JOINT_ORDERS
 from trajcli.curves.piecewise import Array, derivative_coefficients, horner
 from trajcli.frozen import frozen
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan
 from trajcli.plots.display_units import DisplayUnits
 from trajcli.plots.panel import NO_POINTS, MoveBorders
-from trajcli.plots.sampling import component_points, local_times, thinned
+from trajcli.plots.planned_efforts import EffortSamples, effort_samples
+from trajcli.plots.sampling import component_points, local_times, thinned, without_repeats
 from trajcli.trajectory import ViaPoints
 
 JOINT_KINDS = {
-    "position": 0,
-    "velocity": 1,
-    "velocity_by_position": 1,
-    "acceleration": 2,
-    "jerk": 3,
-    "position_jump": 0,
-    "velocity_jump": 1,
-    "acceleration_jump": 2,
+    "position": "q",
+    "velocity": "qd",
+    "velocity_by_position": "qd",
+    "acceleration": "qdd",
+    "jerk": "qddd",
+    "position_jump": "q",
+    "velocity_jump": "qd",
+    "acceleration_jump": "qdd",
+    "effort": EFFORT,
 }
-"""Order of the derivative that a kind of finding is about."""
+"""The quantity of a joint that a kind of finding is about."""
 
 TOOL_KINDS = ("tool_speed", "tool_angular_speed")
 _TOOL_LIMITS = ("speed", "angular_speed")
@@ -61,6 +64,7 @@ class PlannedMotion:
         self.display = DisplayUnits(robot.joint_names, robot.joint_types, plan.loaded.units)
         self.offset = plan.loaded.job.output.start_time
         self._tool: ToolSamples | None = None
+        self._efforts: EffortSamples | None = None
 
     @property
     def borders(self) -> MoveBorders:
@@ -80,13 +84,26 @@ class PlannedMotion:
         """Its moves."""
         return self.plan.moves
 
-    def joint_trace(self, joint: int, order: int) -> tuple[Array, Array]:
-        """Return times (N,) and values (N,) of a joint, steps and extremes included."""
-        times, values = component_points(self.plan.trajectory.curve, order, joint)
+    @property
+    def has_effort_limits(self) -> bool:
+        """Whether an effort is limited in some move."""
+        return any(move.robot.limits.has_effort for move in self.moves)
+
+    def joint_trace(self, joint: int, quantity: str) -> tuple[Array, Array]:
+        """Return times (N,) and values (N,) of a quantity of a joint, steps and extremes included."""
+        if quantity == EFFORT:
+            efforts = self._known_efforts()
+            points = without_repeats(efforts.times + self.offset, efforts.values[:, joint])
+            return thinned(*points)
+        times, values = component_points(self.plan.trajectory.curve, JOINT_ORDERS[quantity], joint)
         return thinned(times + self.offset, values / self.display.joint_factor(joint))
 
-    def joint_limits(self, joint: int, order: int) -> tuple[Array, Array]:
+    def joint_limits(self, joint: int, quantity: str) -> tuple[Array, Array]:
         """Return the lines (m, 2) of the lower and the upper limit in force; NaN where there is none."""
+        if quantity == EFFORT:
+            efforts = np.array([move.robot.limits.effort[joint] for move in self.moves])
+            return self._steps(efforts[:, 0]), self._steps(efforts[:, 1])
+        order = JOINT_ORDERS[quantity]
         if order == 1 and any(np.isfinite(m.robot.limits.velocity_by_position[joint, 0]) for m in self.moves):
             return self._limits_by_position(joint)
         bounds = np.array([move.robot.limits.of_order(order)[joint] for move in self.moves])
@@ -127,14 +144,17 @@ class PlannedMotion:
         """Return the same of points that a planner added by itself."""
         return self._marks([move.planned.virtual_points for move in self.moves], joint)
 
-    def joint_findings(self, joint: int, order: int) -> Array:
-        """Return when checks fail, and the value where it is one of this joint and order, shape (k, 2)."""
-        name, scale = self.display.joint_names[joint], self.display.joint_factor(joint)
+    def joint_findings(self, joint: int, quantity: str) -> Array:
+        """Return when checks fail, and the value where it is one of this joint and quantity, shape (k, 2)."""
+        name = self.display.joint_names[joint]
+        scale, order = (
+            (1.0, 0) if quantity == EFFORT else (self.display.joint_factor(joint), JOINT_ORDERS[quantity])
+        )
         rows = []
         for finding in self.plan.verdict.findings:
-            own = finding.joint == name and JOINT_KINDS.get(finding.kind) == order
+            own = finding.joint == name and JOINT_KINDS.get(finding.kind) == quantity
             value = finding.value / scale if own and not finding.kind.endswith("_jump") else np.nan
-            if own and np.isnan(value):
+            if own and quantity != EFFORT and np.isnan(value):
                 value = float(self.plan.trajectory.curve.evaluate(finding.time, order)[joint]) / scale
             rows.append((finding.time + self.offset, value))
         return np.array(rows or NO_POINTS)
@@ -165,6 +185,11 @@ class PlannedMotion:
         joints = np.concatenate([self.plan.trajectory.curve.evaluate([0.0]), *points])
         positions = forward(self.plan.loaded.robot, joints)[:, :3, 3]
         return np.asarray(positions / self.display.factor("length"))
+
+    def _known_efforts(self) -> EffortSamples:
+        if self._efforts is None:
+            self._efforts = effort_samples(self.plan)
+        return self._efforts
 
     def _sampled_tool(self) -> ToolSamples:
         from trajcli.kinematics.forward import forward

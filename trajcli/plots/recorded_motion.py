@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from trajcli.columns import Column, parse_column
+from trajcli.columns import EFFORT, Column, parse_column
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import frozen
@@ -55,8 +55,8 @@ class DrawnTable:
         """Return the values (N,) of a joint in the unit of its axis; None where the file has none."""
         for index, column in enumerate(self.columns):
             if column.kind == kind and column.joint == joint:
-                scale = 1.0 if column.unit is None else column.factor
-                return np.asarray(self.table.columns[:, index] * (scale / self.display.joint_factor(joint)))
+                shown = 1.0 if kind == EFFORT else self.display.joint_factor(joint)
+                return np.asarray(self.table.columns[:, index] * (column.factor / shown))
         return None
 
     def tool_speeds(self) -> tuple[Array, Array] | None:
