@@ -248,7 +248,7 @@ def test_the_page_runs_as_it_stands(monkeypatch: pytest.MonkeyPatch, tmp_path: P
             statement, _, promised = line.partition("  # ")
             if promised.strip().startswith(("PlannedJob", "True")):
                 assert repr(eval(statement, names)) == promised.strip()
-    assert len(blocks) == 5
+    assert len(blocks) == 6
     assert (tmp_path / "swing.csv").exists()
 
 

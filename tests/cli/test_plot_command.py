@@ -181,3 +181,38 @@ def test_only_what_is_needed_is_imported(here: Path) -> None:
         "toppra",
     }
     assert not modules & unneeded
+
+
+PEAK = "t,q1_deg,qd1_deg\n0,0,0\n0.5,15,{rate}\n1,30,0\n"  # a job of 90 deg/s at most
+
+
+def test_a_file_that_exceeds_the_job_is_drawn_marked_and_refused(here: Path, capfd: Capture) -> None:
+    (here / "rows.csv").write_text(PEAK.format(rate=95))
+    code, out, err = call(capfd, "plot", "rows.csv", "job.yaml", "-o", "a.svg")
+    assert (code, out) == (1, "")
+    said = "error: rows.csv: the velocity of j1 reaches 95 deg/s at t = 0.5 s, its limit is 90 deg/s"
+    assert err.startswith(f"a.svg written\n{said}\n")
+    assert "rows.csv: EXCEEDED, 1 finding" in (here / "a.svg").read_text()
+    assert 'id="panel1-findings"' in (here / "a.svg").read_text()
+    assert call(capfd, "check", "rows.csv", "--job", "job.yaml").code == 1
+    from_pipe = run("plot", "-", "job.yaml", "-q", "-o", "b.svg", stdin=PEAK.format(rate=95))
+    assert from_pipe.code == 1
+    assert from_pipe.err.startswith(said.replace("rows.csv", "stdin"))
+
+
+def test_a_file_is_judged_by_the_values_that_are_set(here: Path, capfd: Capture) -> None:
+    (here / "rows.csv").write_text(PEAK.format(rate=95))
+    assert call(capfd, "plot", "rows.csv", "job.yaml", "--set", "limits.velocity=96", "-q") == (0, "", "")
+    (here / "rows.csv").write_text(PEAK.format(rate=85))
+    assert call(capfd, "plot", "rows.csv", "job.yaml") == (0, "", "job.svg written\n")
+    assert "EXCEEDED" not in (here / "job.svg").read_text()
+
+
+def test_a_file_that_cannot_be_judged_is_drawn_and_said(here: Path, capfd: Capture) -> None:
+    (here / "rows.csv").write_text("t,qd1_deg\n0,0\n1,30\n")
+    code, out, err = call(capfd, "plot", "rows.csv", "job.yaml")
+    assert (code, out) == (0, "")
+    remark, written = err.splitlines()
+    assert remark.startswith("rows.csv is not judged: ")
+    assert written == "job.svg written"
+    assert call(capfd, "plot", "rows.csv", "job.yaml", "-q") == (0, "", "")

@@ -82,8 +82,27 @@ def test_a_file_of_samples(folder: Path, capfd: pytest.CaptureFixture[str]) -> N
     assert (done.code, done.err.split(", view.html")[0]) == (0, "rows.csv: not judged, 3 rows · 1 s")
     assert b"--robot" in (folder / "view.html").read_bytes()
     done = call(capfd, "view", "rows.csv", "--robot", "two.yaml", "-o", "view.html")
-    assert "not judged, robot · 3 rows" in done.err
+    assert done.code == 1  # the job ends at (1, 1) rad
+    assert "1 finding, robot · 3 rows" in done.err
+    assert "error: rows.csv: the last row has j2 at 0.174532925 rad at t = 1 s, expected 1 rad" in done.err
     assert b'"robot":{"rows":[{"theta":0.0' in (folder / "view.html").read_bytes()
+
+
+def test_a_file_that_breaks_a_limit_of_its_robot_is_shown_and_exits_as_check_does(
+    folder: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "arm.yaml").write_text(
+        "convention: standard\njoints: [{a: 0.5, velocity: 1}, {a: 0.3, velocity: 1}]\n"
+    )
+    for rate, code in ((1.25, 1), (0.75, 0)):
+        (folder / "rows.csv").write_text(f"t,q1,q2,qd1,qd2\n0,0,0,0,0\n1,0,0.5,0,{rate}\n2,0,1,0,0\n")
+        done = call(capfd, "view", "rows.csv", "--robot", "arm.yaml", "-o", "view.html")
+        assert done.code == call(capfd, "check", "rows.csv", "--robot", "arm.yaml").code == code
+        page = (folder / "view.html").read_bytes()
+        assert (b'"state":"violated","text":"1 finding"' in page) == bool(code)
+        assert (b'"findings":[{"time":1.0,"joint":1,"order":1,"value":1.25,' in page) == bool(code)
+        said = "error: rows.csv: the velocity of j2 reaches 1.25 rad/s at t = 1 s, its limit is 1 rad/s"
+        assert (said in done.err) == bool(code)
 
 
 def test_samples_from_standard_input(folder: Path) -> None:

@@ -5,9 +5,13 @@ from __future__ import annotations
 from math import pi
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from trajcli.cli.judged_file import judged_file
+from trajcli.judge.file import CheckOptions
 from trajcli.player.recorded import scene_of_file
+from trajcli.streams.byte_source import ByteSource
 
 
 def scene(folder: Path, text: str, robot: str | None = None) -> dict[str, object]:
@@ -58,3 +62,47 @@ def test_rows_that_are_left_out_are_said(tmp_path: Path) -> None:
 
 def test_one_row_is_a_scene(tmp_path: Path) -> None:
     assert scene(tmp_path, "t,q1,q2\n3,0,0\n", "planar2r")["subtitle"].endswith("· 1 row · 0 s")
+
+
+def judged_scene(folder: Path, duration: float, robot: str) -> dict[str, object]:
+    """Return the scene of a quintic of both joints by 20 deg from 0.4 s on, judged."""
+    t = np.arange(101) / 50
+    s = np.clip((t - 0.4) / duration, 0.0, 1.0)
+    q = 20 * (10 * s**3 - 15 * s**4 + 6 * s**5)
+    qd = 20 / duration * (30 * s**2 - 60 * s**3 + 30 * s**4)
+    qdd = 20 / duration**2 * (60 * s - 180 * s**2 + 120 * s**3)
+    rows = np.stack([t, 0 * q, q, 0 * q, qd, 0 * q, qdd], axis=1)
+    header = "t,q1_deg,q2_deg,qd1_deg,qd2_deg,qdd1_deg,qdd2_deg"
+    file = folder / "rows.csv"
+    np.savetxt(file, rows, "%.9f", delimiter=",", header=header, comments="")
+    (folder / "arm.yaml").write_text(
+        "units: {angle: deg}\nconvention: standard\njoints: [{a: 0.5, velocity: 60}, {a: 0.3, velocity: 60}]\n"
+    )
+    source = ByteSource(str(file))
+    checked = judged_file(source, CheckOptions(robot=robot))
+    return scene_of_file(source, robot, checked)
+
+
+def test_a_peak_between_two_rows_is_listed_at_its_time_and_value(tmp_path: Path) -> None:
+    shown = judged_scene(tmp_path, 0.5, str(tmp_path / "arm.yaml"))
+    assert shown["verdict"] == {"state": "violated", "text": "1 finding"}
+    (finding,) = shown["findings"]
+    assert (finding["joint"], finding["order"]) == (1, 1)
+    assert finding["time"] == pytest.approx(0.65, abs=1e-4)  # rows are at 0.64 s and 0.66 s
+    assert finding["value"] == pytest.approx(15 / 8 * 20 / 0.5 * pi / 180, rel=1e-4)
+    assert finding["message"] == "the velocity of j2 reaches 75 deg/s at t = 0.65 s, its limit is 60 deg/s"
+    assert "not judged" not in " ".join(shown["notes"])
+
+
+def test_its_clean_twin_is_satisfied(tmp_path: Path) -> None:
+    shown = judged_scene(tmp_path, 1.0, str(tmp_path / "arm.yaml"))
+    assert shown["verdict"]["state"] == "verified"
+    assert shown["findings"] == []
+
+
+def test_what_cannot_be_judged_says_why(tmp_path: Path) -> None:
+    (tmp_path / "rows.csv").write_text("t,q1,q2\n0,0,0\n1,1,1\n")
+    shown = scene_of_file(str(tmp_path / "rows.csv"), "planar2r", "it has no limits")
+    assert shown["verdict"] == {"state": "unjudged", "text": "not judged"}
+    assert shown["findings"] == []
+    assert shown["notes"][1] == "Why not: it has no limits."

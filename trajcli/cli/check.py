@@ -172,11 +172,8 @@ def _say(checked: CheckedFile) -> Callable[[Amount], str]:
 
 def _stretch(judgement: Judgement) -> Iterator[str]:
     """Yield by what stretch of all of the motion its limits are kept, where that is what they need."""
-    errors = [
-        found for found in judgement.findings if found.severity == "error" and found.certainty == "exceeded"
-    ]
-    factors = [found.factor for found in errors if found.factor is not None]
-    if factors and len(factors) == len(errors):
+    factors = [found.factor for found in judgement.errors if found.factor is not None]
+    if factors and len(factors) == len(judgement.errors):
         yield f"the motion keeps these limits when it takes {at_least(max(factors))} times as long"
 
 

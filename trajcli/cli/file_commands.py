@@ -93,7 +93,7 @@ def plot(
     ] = False,
     errors: Errors = "text",
 ) -> int:
-    """Draw joints, tool and phase plane with limits. Exit 1: one is broken, and the picture shows where."""
+    """Draw joints, tool and phase plane with limits. Exit 1: the job or a file breaks one, as shown."""
     from trajcli.cli.plot import PlotOptions, run_plot
 
     every = every or errors == "json"
@@ -125,7 +125,7 @@ def view(
     override: Overrides = [],  # noqa: B006
     errors: Errors = "text",
 ) -> int:
-    """Write a page that plays the motion: the arm in 3D with linked plots, in one file for any browser."""
+    """Write a page that plays the motion in any browser: 3D, plots, findings. Exit 1: there are findings."""
     from trajcli.cli.view import ViewOptions, run_view
 
     return run_view(source, override, ViewOptions(output, compress, robot))

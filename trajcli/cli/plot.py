@@ -6,21 +6,25 @@ import logging
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from trajcli.cli.outcome import print_remark
 from trajcli.cli.progress import progress
-from trajcli.errors import InputError
+from trajcli.errors import InputError, Problem, VerificationError
 from trajcli.frozen import comparable
 from trajcli.job.read import files_of, load_job
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.plots.choice import parse_quantities, split_names
 from trajcli.plots.picture import picture_of
 from trajcli.plots.write import format_of_picture, rendered
+from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import holds_motion, read_table
 from trajcli.streams.whole_file import identity, standard_output, whole_file
+
+if TYPE_CHECKING:
+    from trajcli.judge.file import CheckedFile
 
 _OF_JOBS = (".yaml", ".yml", ".json")
 _PEEKED = 4096  # bytes of standard input that are looked at
@@ -42,7 +46,8 @@ def run_plot(words: Sequence[str], overrides: Sequence[str], options: PlotOption
     """Draw a job, files, or files over a job; return the exit code.
 
     Raises:
-        VerificationError: When the job fails its verification: behind the picture, which shows where.
+        VerificationError: When the job fails its verification, or a file over it exceeds what the job asks
+            for: behind the picture, which shows where.
         TrajcliError: When anything else is wrong; then nothing was written.
     """
     kind = format_of_picture(options.output, options.kind)
@@ -56,18 +61,49 @@ def run_plot(words: Sequence[str], overrides: Sequence[str], options: PlotOption
         )
     plan = None if job is None else _planned(job, overrides)
     _check_inputs_stay(plan, rows, target)
-    tables = [read_table(name) for name in rows]
+    sources = [ByteSource(name) for name in rows]
+    tables = [read_table(source) for source in sources]
+    judged = [] if plan is None else _judged(sources, plan, options)
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # where its caches are is nobody's concern
     with np.errstate(all="ignore"):  # what is not finite was found by the checks
-        picture = picture_of(plan, tables, wanted, joints)
+        judgements = [None if checked is None else checked.judgement for checked in judged]
+        picture = picture_of(plan, tables, wanted, joints, judgements)
         _write(rendered(picture, kind), target)
+    _say_written(target, options)
+    _refuse_findings(plan, judged, options)
+    return 0
+
+
+def _judged(sources: Sequence[ByteSource], plan: Plan, options: PlotOptions) -> list[CheckedFile | None]:
+    """Return the judgement of each file by the job; None, with a remark, where it cannot be judged."""
+    if not sources:
+        return []
+    from trajcli.cli.judged_file import judged_file
+    from trajcli.judge.file import CheckOptions
+
+    judged: list[CheckedFile | None] = []
+    for source in sources:
+        checked = judged_file(source, CheckOptions(), plan)
+        if isinstance(checked, str) and not options.quiet:
+            print_remark(f"{source.file} is not judged: {checked}")
+        judged.append(None if isinstance(checked, str) else checked)
+    return judged
+
+
+def _refuse_findings(plan: Plan | None, judged: Sequence[CheckedFile | None], options: PlotOptions) -> None:
+    """Raise what is wrong with the plan, and what is certainly wrong with the files."""
+    problems: list[Problem] = []
     if plan is not None and not plan.verdict.passed:
         from trajcli.output.report import verification_error
 
-        _say_written(target, options)
-        raise verification_error(plan, every=options.every)
-    _say_written(target, options)
-    return 0
+        problems += verification_error(plan, every=options.every).problems
+    for checked in judged:
+        if checked is not None and not checked.judgement.passed:
+            from trajcli.cli.judged_file import problems_of
+
+            problems += problems_of(checked, every=options.every)
+    if problems:
+        raise VerificationError(*problems)
 
 
 def _planned(job: str, overrides: Sequence[str]) -> Plan:

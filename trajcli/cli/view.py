@@ -5,16 +5,21 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from trajcli.cli.outcome import print_remark
 from trajcli.cli.progress import progress
-from trajcli.errors import InputError
+from trajcli.errors import InputError, VerificationError
 from trajcli.frozen import comparable
 from trajcli.player.page import page_of
+from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import holds_motion
 from trajcli.streams.whole_file import identity, is_special, standard_output, whole_file
+
+if TYPE_CHECKING:
+    from trajcli.judge.file import CheckedFile
 
 _ENDINGS = (".html", ".htm")
 
@@ -31,7 +36,8 @@ class ViewOptions:
 def run_view(source: str, overrides: Sequence[str], options: ViewOptions) -> int:
     """Write the page of a job or of a file of rows; return the exit code.
 
-    A job that plans and does not verify has its page, too, and the error after it.
+    A job that plans and does not verify has its page, too, and the error after it; so has a file that its job
+    or robot does not allow.
 
     Raises:
         TrajcliError: When anything is wrong.
@@ -70,11 +76,28 @@ def _view_file(source: str, overrides: Sequence[str], options: ViewOptions) -> i
     if overrides:
         raise InputError("--set is for jobs, and this is a file of samples", hint="leave it out")
     _check_inputs_stay(options.output, [source])
-    scene = scene_of_file(source, options.robot)
+    opened = ByteSource(source)
+    checked = None if options.robot is None else _judged(opened, options.robot)
+    scene = scene_of_file(opened, options.robot, checked)
     page = page_of(scene, compress=options.compress)
     _write(page, options.output)
-    print_remark(f"{scene['title']}: not judged, {scene['subtitle']}{_where(page, options.output)}")
-    return 0
+    state = scene["verdict"]["text"]
+    print_remark(f"{scene['title']}: {state}, {scene['subtitle']}{_where(page, options.output)}")
+    if checked is None or isinstance(checked, str) or checked.judgement.passed:
+        return 0
+    from trajcli.cli.judged_file import problems_of
+
+    raise VerificationError(*problems_of(checked, every=False))
+
+
+def _judged(source: ByteSource, robot: str) -> CheckedFile | str:
+    """Return the judgement of a file by a job, or by the limits of a robot; else why there is none."""
+    from trajcli.cli.judged_file import judged_file
+    from trajcli.judge.file import CheckOptions
+    from trajcli.queries.arm import names_job
+
+    by_job = names_job(robot)
+    return judged_file(source, CheckOptions(job=robot) if by_job else CheckOptions(robot=robot))
 
 
 def _check_output(path: str | None) -> None:

@@ -42,11 +42,7 @@ def _jumps(motion: EditedMotion) -> list[JudgedFinding]:
     joints = tuple(Joint(name) for name in motion.joint_names)
     bare = Robot(motion.rows.source, joints, unlimited(len(joints)), None, np.eye(4), np.eye(4))
     judgement = judge_motion(lambda: (motion.rows,), Requirements(bare))
-    return [
-        finding
-        for finding in judgement.findings
-        if finding.rule in _RULES and finding.severity == "error" and finding.certainty == "exceeded"
-    ]
+    return [finding for finding in judgement.errors if finding.rule in _RULES]
 
 
 def worst_deviation(before: EditedMotion, after: EditedMotion) -> tuple[int, float]:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from trajcli.judge.tool import ToolJudge
     from trajcli.kinematics.following.motion import ToolMotion
     from trajcli.planning.plan import Plan
+    from trajcli.streams.byte_source import ByteSource
 
 _START_TOLERANCE = 1e-3  # rad or m: what a controller takes for the state that it is in
 _SAME_DURATION = 1e-6  # s: a file that lasts as long as the plan, within that, is taken for its motion
@@ -80,12 +81,13 @@ class _Given:
     shown: Units | None = None
 
 
-def check_file(source: str, options: CheckOptions) -> CheckedFile:
+def check_file(source: str | ByteSource, options: CheckOptions, plan: Plan | None = None) -> CheckedFile:
     """Return the judgement of a file.
 
     Args:
-        source: Its path; "-" is standard input.
+        source: Its path; "-" is standard input. An opened one is read from its first byte on.
         options: What it is judged by.
+        plan: Of a job that was planned before; the options then name no job and no robot.
 
     Raises:
         InputError: When it is no motion, or options do not fit it or each other.
@@ -93,7 +95,7 @@ def check_file(source: str, options: CheckOptions) -> CheckedFile:
     """
     from trajcli.queries.arm import stated_units
 
-    given = _carrying(_given(options), options)
+    given = _carrying(_given(options) if plan is None else _of_plan(plan), options)
     robot = given.robot
     motion = open_motion(
         source,
@@ -103,7 +105,7 @@ def check_file(source: str, options: CheckOptions) -> CheckedFile:
         field=options.field,
         joints=robot.joint_names,
         joint_types=robot.joint_types,
-        declared=stated_units(options.job or options.robot or ""),
+        declared=None if plan is not None else stated_units(options.job or options.robot or ""),
     )
     shown = _shown_units(options, given)
     consumer = _consumer_of(options.profile, given)
@@ -191,14 +193,21 @@ def _of_job(path: str) -> _Given:
     from trajcli.planning.plan import plan_job
 
     loaded = load_job(path)
-    events = tuple(event.text(loaded.say) for event in loaded.events if event.concedes)
     try:
         with np.errstate(all="ignore"):
-            plan = plan_job(loaded)
+            return _of_plan(plan_job(loaded))
     except TrajcliError as error:
         note = f"the job has no plan, so its paths, start and end are not judged: {error.problems[0].text()}"
-        return _Given(loaded.robot, loaded.units, events, (note,), loaded)
-    return _Given(loaded.robot, loaded.units, events, (), loaded, plan)
+        return _Given(loaded.robot, loaded.units, _conceded(loaded), (note,), loaded)
+
+
+def _of_plan(plan: Plan) -> _Given:
+    return _Given(plan.loaded.robot, plan.loaded.units, _conceded(plan.loaded), (), plan.loaded, plan)
+
+
+def _conceded(loaded: LoadedJob) -> tuple[str, ...]:
+    """Return what a job takes for granted."""
+    return tuple(event.text(loaded.say) for event in loaded.events if event.concedes)
 
 
 def _shown_units(options: CheckOptions, given: _Given) -> Units:

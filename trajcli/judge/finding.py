@@ -136,6 +136,13 @@ class Judgement:
         return "exceeded" if "exceeded" in errors else "within rounding"
 
     @property
+    def errors(self) -> tuple[JudgedFinding, ...]:
+        """What is certainly wrong: neither a warning, nor what rounding explains."""
+        return tuple(
+            found for found in self.findings if (found.severity, found.certainty) == ("error", "exceeded")
+        )
+
+    @property
     def passed(self) -> bool:
         """Whether nothing is certainly wrong."""
         return self.verdict != "exceeded"

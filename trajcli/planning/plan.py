@@ -16,6 +16,7 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
 from trajcli.errors import (
     Amount,
     Amounts,
+    InputError,
     MissingLimitError,
     Place,
     PlanningError,
@@ -145,7 +146,18 @@ def _plan_moves(
         before, origin = planner, planner.target or origin
     if lacking:
         raise MissingLimitError(*_without_repeats(lacking))
+    _require_start_acceleration(loaded, moves)
     return moves
+
+
+def _require_start_acceleration(loaded: LoadedJob, moves: Sequence[PlannedMove]) -> None:
+    """Refuse a start with an acceleration that the first motion does not take up."""
+    first = _first_moving(moves)
+    if first.continuity == 1 and first.start.acceleration.any():
+        hint = "use quintic or jerk_limited for the first move, or leave it out"
+        message = f"{first.planner.tag} cannot start with an acceleration"
+        place = loaded.document.place(("start",))
+        raise InputError(Problem(message, hint, place=place))
 
 
 def _declared_end(planner: Planner, resolve: Resolve, state: State) -> State | None:

@@ -1,8 +1,8 @@
-"""Scene of a file of samples: joint values that were written before, shown and not judged."""
+"""Scene of a file of samples: joint values that were written before, with what a judge finds in them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +12,17 @@ from numpy.typing import NDArray
 from trajcli.columns import Column, parse_column
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Place, Problem, utf8
-from trajcli.kinematics.robot import JointType, Robot
+from trajcli.judge.file import CheckedFile
+from trajcli.judge.finding import JudgedFinding
+from trajcli.kinematics.robot import QUANTITIES, JointType, Robot
 from trajcli.player.rows import ORDERS, DrawnRows, rows_of_samples
 from trajcli.player.scene import geometry_of, joints_in_units, limits_of, waypoints_of
 from trajcli.queries.arm import open_sheet
 from trajcli.queries.forward import refuse_far
+from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import read_table
 from trajcli.streams.table import Table
-from trajcli.units import AngleUnit, LengthUnit, Units, joint_quantity
+from trajcli.units import AngleUnit, LengthUnit, Units, amount_text, joint_quantity
 from trajcli.version import __version__
 
 _NO_ROBOT = "A file of joint values says nothing of the arm: name it with --robot to see it move."
@@ -27,12 +30,15 @@ _PLAIN_UNITS = ["rad or m", "rad/s or m/s", "rad/s² or m/s²", "rad/s³ or m/s�
 _SUFFIXES: dict[str | None, JointType] = {"deg": "revolute", "mm": "prismatic"}
 
 
-def scene_of_file(source: str, robot_name: str | None = None) -> dict[str, Any]:
+def scene_of_file(
+    source: str | ByteSource, robot_name: str | None = None, checked: CheckedFile | str | None = None
+) -> dict[str, Any]:
     """Return the scene of a file with columns t, q1.. and perhaps qd1.., qdd1.., qddd1.., move.
 
     Args:
         source: Its path; "-" is standard input.
         robot_name: The arm: of the catalogue, a robot file, or a job.
+        checked: The judgement of the file, or why there is none; None where nobody asked for one.
 
     Raises:
         InputError: When a column is missing or does not fit the robot, a time does not increase, or there is
@@ -53,7 +59,7 @@ def scene_of_file(source: str, robot_name: str | None = None) -> dict[str, Any]:
         "version": 1,
         "title": utf8(Path(table.file).name),
         "subtitle": " · ".join(facts if robot is None else [robot.name, *facts]),
-        "verdict": {"state": "unjudged", "text": "not judged"},
+        **_judgement(checked, units, float(times[0])),
         "made_by": f"Made by trajcli {__version__}",
         "joints": _joints(columns, robot, units),
         **geometry_of(robot, rows, units, _NO_ROBOT),
@@ -61,9 +67,44 @@ def scene_of_file(source: str, robot_name: str | None = None) -> dict[str, Any]:
         "moves": [_move(label, times[low], times[high]) for label, low, high in moves],
         "limits": limits_of(limits),
         "waypoints": waypoints_of(waypoints) if robot is not None and robot.convention else [],
-        **{key: [] for key in ("findings", "events", "steps")},
-        "notes": list(_notes(rows, kept, times)),
+        **{key: [] for key in ("events", "steps")},
+        "notes": [*_judgement_notes(checked), *_notes(rows, kept, times)],
     }
+
+
+def _judgement(checked: CheckedFile | str | None, units: Units, start: float) -> dict[str, Any]:
+    """Return the verdict and the errors of a file; what has no time stands at its start, s."""
+    if checked is None or isinstance(checked, str):
+        return {"verdict": {"state": "unjudged", "text": "not judged"}, "findings": []}
+    judgement, count = checked.judgement, len(checked.judgement.errors)
+    state, text = "verified", str(judgement.verdict)
+    if not judgement.passed:
+        state, text = "violated", f"{count} finding{'s' * (count != 1)}"
+    findings = [_finding(found, checked.robot, units, start) for found in judgement.errors]
+    return {"verdict": {"state": state, "text": text}, "findings": findings}
+
+
+def _finding(finding: JudgedFinding, robot: Robot, units: Units, start: float) -> dict[str, Any]:
+    of_limit = finding.kind in QUANTITIES and finding.value is not None
+    return {
+        "time": start if finding.time is None else finding.time,
+        "joint": robot.joint_names.index(finding.joint) if finding.joint in robot.joint_names else None,
+        "order": QUANTITIES.index(finding.kind) if of_limit else None,
+        "value": finding.value,
+        "label": "" if finding.move is None else f"move {finding.move}:",
+        "message": finding.text(lambda amount: amount_text(amount, robot.joint_types, units)),
+        "hint": finding.hint,
+    }
+
+
+def _judgement_notes(checked: CheckedFile | str | None) -> Iterator[str]:
+    """Yield that a file was not judged, and why; else what the judge did not judge, or took for granted."""
+    if isinstance(checked, CheckedFile):
+        yield from checked.judgement.notes
+        return
+    yield "A file of samples: its limits and its continuity were not judged."
+    if checked is not None:
+        yield f"Why not: {checked}."
 
 
 def _times(table: Table) -> Array:
@@ -166,7 +207,7 @@ def _move(label: str, start: float, end: float) -> dict[str, Any]:
 
 
 def _notes(rows: DrawnRows, kept: NDArray[np.intp], times: Array) -> list[str]:
-    notes = ["A file of samples: its limits and its continuity were not judged."]
+    notes = []
     if "qd" not in rows.values:
         notes.append("The file has no velocities: the speed of the tool is that between its rows.")
     if kept.size < times.size:

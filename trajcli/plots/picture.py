@@ -29,6 +29,7 @@ from trajcli.plots.sampling import thinned
 from trajcli.streams.table import Table
 
 if TYPE_CHECKING:
+    from trajcli.judge.finding import Judgement
     from trajcli.plots.recorded_motion import DrawnTable
 
 MOST_PLANES = 12
@@ -45,6 +46,7 @@ def picture_of(
     tables: Sequence[Table] = (),
     quantities: Sequence[str] | None = None,
     joints: Sequence[str] = (),
+    judgements: Sequence[Judgement | None] = (),
 ) -> Picture:
     """Return the picture of a plan and of files, which are drawn over it or alone.
 
@@ -53,6 +55,7 @@ def picture_of(
         tables: Files; without a plan at least one.
         quantities: Of `QUANTITY_NAMES`; None for those that suit.
         joints: Names of the joints to show; all without any.
+        judgements: Of the files over a job, whose errors are marked; None of a file that was not judged.
 
     Raises:
         InputError: When a quantity asked for does not apply, a joint is unknown, or a file does not fit.
@@ -60,7 +63,7 @@ def picture_of(
     if plan is None and not tables:
         raise InputError("there is nothing to plot", hint="give a plan or a file")
     motion = None if plan is None else PlannedMotion(plan)
-    records = _records(motion, tables) if tables else []
+    records = _records(motion, tables, judgements) if tables else []
     display = records[0].display if motion is None else motion.display
     chosen = choose_joints(joints, display.joint_names)
     drawn = choose_quantities(quantities, _sensible(motion, records), _impossible(motion, records))
@@ -85,7 +88,9 @@ def picture_of(
     )
 
 
-def _records(motion: PlannedMotion | None, tables: Sequence[Table]) -> list[DrawnTable]:
+def _records(
+    motion: PlannedMotion | None, tables: Sequence[Table], judgements: Sequence[Judgement | None]
+) -> list[DrawnTable]:
     """Return the files in the units of the job, or in their own."""
     from trajcli.plots.recorded_motion import DrawnTable, columns_of_table
 
@@ -94,7 +99,8 @@ def _records(motion: PlannedMotion | None, tables: Sequence[Table]) -> list[Draw
         for table, of_table in zip(tables, columns, strict=True):
             require_joints(table.file, of_table, motion.display)
         robot, display = motion.plan.loaded.robot, motion.display
-        return [DrawnTable(t, c, display, robot) for t, c in zip(tables, columns, strict=True)]
+        judged = judgements or [None] * len(tables)
+        return [DrawnTable(t, c, display, robot, j) for t, c, j in zip(tables, columns, judged, strict=True)]
     named = [(t.file, column) for t, c in zip(tables, columns, strict=True) for column in c]
     display = units_of_files(named)
     return [DrawnTable(t, c, display) for t, c in zip(tables, columns, strict=True)]
@@ -145,7 +151,12 @@ def _title(motion: PlannedMotion | None, records: Sequence[DrawnTable]) -> str:
     plan = motion.plan
     count = len(plan.verdict.findings)
     verdict = "verified" if plan.verdict.passed else f"NOT VERIFIED, {count} finding{'s' * (count != 1)}"
-    return f"{plan.loaded.name}: {verdict}, {plan.trajectory.duration:.6g} s"
+    title = f"{plan.loaded.name}: {verdict}, {plan.trajectory.duration:.6g} s"
+    for name, record in zip(_names([record.table.file for record in records]), records, strict=True):
+        if record.judgement is not None and not record.judgement.passed:
+            errors = len(record.judgement.errors)
+            title += f"; {name}: EXCEEDED, {errors} finding{'s' * (errors != 1)}"
+    return title
 
 
 def _names(files: Sequence[str]) -> list[str]:
@@ -198,9 +209,15 @@ class _Maker:
             limits,
             waypoints=motion.waypoints(joint) if marked else NO_POINTS,
             virtual_points=motion.virtual_points(joint) if marked else NO_POINTS,
-            findings=motion.joint_findings(joint, kind),
+            findings=self._joint_findings(joint, kind),
             unlimited=bool(np.isnan([line[:, 1] for line in limits]).all()),
         )
+
+    def _joint_findings(self, joint: int, kind: str) -> Array:
+        """Return what checks found in the plan and in the files, shape (k, 2)."""
+        own = [] if self._motion is None else [self._motion.joint_findings(joint, kind)]
+        files = (record.joint_findings(kind, joint) for _, record in self._records)
+        return np.concatenate([*own, *files])
 
     def tool_block(self) -> PanelBlock:
         """Return the speed and the angular speed of the tool."""
@@ -227,7 +244,12 @@ class _Maker:
                     labels[k],
                     tuple(traces[k]),
                     () if limit is None else (limit,),
-                    findings=NO_POINTS if motion is None else motion.tool_findings(bool(k)),
+                    findings=np.concatenate(
+                        [
+                            NO_POINTS if motion is None else motion.tool_findings(bool(k)),
+                            *(record.tool_findings(bool(k)) for _, record in self._records),
+                        ]
+                    ),
                     unlimited=limit is not None and bool(np.isnan(limit[:, 1]).all()),
                 )
             )

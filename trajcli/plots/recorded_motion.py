@@ -1,6 +1,8 @@
-"""Motion recorded in a file: values of joints and tool by the names of its columns."""
+"""Motion recorded in a file: values of joints and tool by the names of columns, and its errors."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -8,13 +10,27 @@ from trajcli.columns import EFFORT, Column, parse_column
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import frozen
+from trajcli.judge.finding import JudgedFinding, Judgement
 from trajcli.kinematics.robot import Robot
 from trajcli.plots.choice import JOINT_QUANTITIES
 from trajcli.plots.display_units import DisplayUnits
+from trajcli.plots.panel import NO_POINTS
 from trajcli.streams.table import Table
 
 _SPEEDS = (("vx", "vy", "vz"), ("wx", "wy", "wz"))
 _POSITION = ("x", "y", "z")
+_EFFORT = "tau"
+_LIMITED: Mapping[str | None, str] = {
+    "position": "q",
+    "velocity": "qd",
+    "velocity_by_position": "qd",
+    "acceleration": "qdd",
+    "jerk": "qddd",
+    "effort": _EFFORT,
+}
+"""Which values of a joint a kind of finding, or the quantity that a finding names, is about."""
+_AT_ENDS = ("start", "end")
+_TOOL_KINDS = ("tool_speed", "tool_angular_speed")
 
 
 def columns_of_table(table: Table) -> tuple[Column, ...]:
@@ -39,12 +55,14 @@ class DrawnTable:
         columns: What they are.
         display: Units and joints of the picture.
         robot: Whose tool it is where the file does not say where that is; None without a job.
+        judgement: What is wrong with its motion; None where it was not judged.
     """
 
     table: Table
     columns: tuple[Column, ...]
     display: DisplayUnits
     robot: Robot | None = None
+    judgement: Judgement | None = None
 
     @property
     def times(self) -> Array:
@@ -86,6 +104,24 @@ class DrawnTable:
             positions = forward(self.robot, motion[0])[:, :3, 3]
         return np.asarray(positions / self.display.factor("length"))
 
+    def joint_findings(self, kind: str, joint: int) -> Array:
+        """Return when errors are, and the value where one is of this joint and kind, shape (k, 2)."""
+        rows = []
+        for time, finding in self._errors():
+            about = _LIMITED.get(finding.kind) or _LIMITED.get(finding.quantity)
+            own = finding.joint == self.display.joint_names[joint] and about == kind
+            rows.append((time, self._marked(finding, time, kind, joint) if own else np.nan))
+        return np.array(rows or NO_POINTS)
+
+    def tool_findings(self, angular: bool) -> Array:
+        """Return the same for the speed of the tool, or its angular speed."""
+        scale = self.display.factor("angle" if angular else "length")
+        rows = []
+        for time, finding in self._errors():
+            own = finding.kind == _TOOL_KINDS[angular] and finding.value is not None
+            rows.append((time, float(finding.value or 0.0) / scale if own else np.nan))
+        return np.array(rows or NO_POINTS)
+
     def shows(self) -> frozenset[str]:
         """Return the quantities of a picture that this file has something to say about."""
         kinds = {column.kind for column in self.columns if column.joint is not None}
@@ -95,6 +131,20 @@ class DrawnTable:
         if self.tool_positions() is not None:
             found.add("path")
         return frozenset(found)
+
+    def _errors(self) -> Iterator[tuple[float, JudgedFinding]]:
+        """Yield the errors that have a time, s."""
+        for finding in () if self.judgement is None else self.judgement.errors:
+            if finding.time is not None:
+                yield finding.time, finding
+
+    def _marked(self, finding: JudgedFinding, time: float, kind: str, joint: int) -> float:
+        """Return where a marker stands: at the offending value; of a jump or a wrong column on its line."""
+        if finding.kind in _LIMITED or finding.kind in _AT_ENDS:
+            scale = 1.0 if kind == _EFFORT else self.display.joint_factor(joint)
+            return np.nan if finding.value is None else finding.value / scale
+        values = self.joint(kind, joint)
+        return np.nan if values is None else float(np.interp(time, self.times, values))
 
     def _has(self, kinds: tuple[str, ...]) -> bool:
         return set(kinds) <= {column.kind for column in self.columns if column.joint is None}

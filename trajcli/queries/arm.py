@@ -117,12 +117,24 @@ def open_sheet(name: str) -> RobotSheet:
     """
     if name in catalogue_names() or not Path(name).is_file() or is_urdf(name):
         return load_sheet(name)
-    if not {"robot", "moves"} & read_document(name).plain().keys():
+    if not names_job(name):
         return load_sheet(Path(name))
     from trajcli.job.read import load_job  # brings the planners
 
     loaded = load_job(name)
     return RobotSheet(loaded.robot, loaded.units, None, None, f"the robot of the job {loaded.name}", None)
+
+
+def names_job(name: str) -> bool:
+    """Return whether the name of an arm is that of a job: of a file with a key `robot` or `moves`.
+
+    Raises:
+        InputError: When the file is no YAML.
+        FileError: When it cannot be read.
+    """
+    if name in catalogue_names() or not Path(name).is_file() or is_urdf(name):
+        return False
+    return bool({"robot", "moves"} & read_document(name).plain().keys())
 
 
 def stated_units(name: str) -> Units | None:

@@ -31,20 +31,22 @@ _OTHERS = {
 """Files that are known by their first bytes and are not read: what they are, and what would be read."""
 
 
-def read_table(path: str | Path, topic: str | None = None) -> Table:
+def read_table(path: str | Path | ByteSource, topic: str | None = None) -> Table:
     """Read all rows of a file: CSV, JSON lines, MCAP, arrays of numpy, or a ROS message in YAML.
 
     What is no CSV file has the columns of one in SI: t, q1.., qd1.., qdd1..
 
     Args:
-        path: The file; "-" is standard input.
+        path: The file; "-" is standard input. An opened one is read from its first byte on.
         topic: Of MCAP, the topic; /joint_states unless given. Other files have none.
 
     Raises:
         FileError: When it cannot be read.
         InputError: When it is no such file, or has no such topic.
     """
-    rows = open_rows_of(path, topic=topic if is_log(path) else None)
+    source = path if isinstance(path, ByteSource) else ByteSource(path)
+    of_log = topic is not None and format_of_rows(source) == "mcap"
+    rows = open_rows_of(source, topic=topic if of_log else None)
     every = range(len(rows.named.names))
     columns = np.concatenate(list(rows.blocks(every, ())))
     decimals = rows.decimals(every)
@@ -54,12 +56,16 @@ def read_table(path: str | Path, topic: str | None = None) -> Table:
 
 
 def open_rows_of(
-    path: str | Path, *, topic: str | None = None, field: str | None = None, joints: int | None = None
+    path: str | Path | ByteSource,
+    *,
+    topic: str | None = None,
+    field: str | None = None,
+    joints: int | None = None,
 ) -> RowSource:
     """Open the rows of a file of any format.
 
     Args:
-        path: The file; "-" is standard input.
+        path: The file; "-" is standard input. An opened one is read from its first byte on.
         topic: Of MCAP, the topic; /joint_states unless given.
         field: Of messages with several states, the one that is read.
         joints: Number of joints that are expected, for arrays without names.
@@ -68,7 +74,7 @@ def open_rows_of(
         FileError: When it cannot be read.
         InputError: When it is no such file, or has no such topic.
     """
-    source = ByteSource(path)
+    source = path if isinstance(path, ByteSource) else ByteSource(path)
     kind = format_of_rows(source)
     if kind != "mcap" and (topic is not None or field is not None):
         option = "--topic" if topic is not None else "--field"

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import JointType
+from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import open_rows_of
 from trajcli.streams.recorded.column_names import MOVE
 from trajcli.streams.recorded.column_roles import ColumnRoles, assign_roles, ordered_joints
@@ -294,7 +295,7 @@ def _of_size(blocks: Iterable[Array], rows: int) -> Iterator[Array]:
 
 
 def open_motion(
-    source: str | Path,
+    source: str | Path | ByteSource,
     *,
     columns: str | Mapping[str, str] | None = None,
     units: str | Units | None = None,
@@ -310,7 +311,7 @@ def open_motion(
     trajcli's own names are in SI), else by `declared`; they are never guessed.
 
     Args:
-        source: Its path.
+        source: Its path, or the file where it is open.
         columns: What the columns are, such as "t=timestamp,q=target_q": names or what they begin with.
         units: Units of numbers whose columns name none, such as "deg,mm".
         topic: Of MCAP, the topic that is read.

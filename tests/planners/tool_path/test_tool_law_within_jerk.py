@@ -46,7 +46,7 @@ def test_limits_of_the_jerk_of_joints_are_kept_without_steps(move):
     without = fastest(move, {"acceleration": 10})
     assert without.trajectory.spans[0].continuity == 1
     assert without.trajectory.duration < made.trajectory.duration < 3 * without.trajectory.duration
-    assert any(event.kind == "bound" for event in made.events)
+    assert any(event.kind == "bound" for event in made.remarks)
 
 
 def test_the_jerk_of_the_tool_along_a_line_is_that_of_ruckig():

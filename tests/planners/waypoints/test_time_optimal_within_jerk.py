@@ -76,7 +76,7 @@ def test_jerk_ignored_is_as_without_limits_of_jerk():
 def test_phases_name_the_limits_of_jerk_and_the_bound_is_told():
     told = explanation(fastest()).model_dump()["moves"][0]
     assert {phase["name"].split()[0] for phase in told["phases"]} >= {"jerk", "velocity"}
-    (bound,) = (event for event in fastest().events if event.kind == "bound")
+    (bound,) = (event for event in fastest().remarks if event.kind == "bound")
     assert bound.message.startswith("at most ")
     assert not bound.concedes
     assert fastest().moves[0].planned.phase_plane.law.dimension == 1

@@ -235,7 +235,7 @@ def test_what_is_said_of_a_stretched_motion_is_about_that_motion():
     plan = trajcli.plan(job)
     known = plan.moves[0].planned.certificate
     assert plan.trajectory.duration == pytest.approx(2 * round(plan.trajectory.duration * 2) / 4)
-    (said,) = [event.message for event in plan.events if event.kind == "fastest_found"]
+    (said,) = [event.message for event in plan.remarks if event.kind == "fastest_found"]
     above = float(said.split("at most ")[1].split(" %")[0])
     assert above == pytest.approx(100 * (plan.trajectory.duration / known.lower - 1), abs=0.01)
     assert above > 1
