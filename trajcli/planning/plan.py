@@ -150,10 +150,14 @@ def _plan_moves(
     return moves
 
 
+_TAKEN_UP = 1e-6  # rad/s^2 or m/s^2, and relative: what rounding leaves of an acceleration at the start
+
+
 def _require_start_acceleration(loaded: LoadedJob, moves: Sequence[PlannedMove]) -> None:
     """Refuse a start with an acceleration that the first motion does not take up."""
     first = _first_moving(moves)
-    if first.continuity == 1 and first.start.acceleration.any():
+    wanted, curve = first.start.acceleration, first.planned.curve
+    if wanted.any() and not np.allclose(curve.evaluate(curve.start, 2), wanted, _TAKEN_UP, _TAKEN_UP):
         hint = "use quintic or jerk_limited for the first move, or leave it out"
         message = f"{first.planner.tag} cannot start with an acceleration"
         place = loaded.document.place(("start",))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from jerk_paths import PANDA, both, judged, spline
-from test_jerk_limited import random_problem, ruckig_duration
+from test_jerk_limited_laws import random_problem, ruckig_duration
 
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.third_order.turning_bound import turning_bound
