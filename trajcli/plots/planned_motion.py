@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,9 +14,11 @@ from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan
 from trajcli.plots.display_units import DisplayUnits
 from trajcli.plots.panel import NO_POINTS, MoveBorders
-from trajcli.plots.planned_efforts import EffortSamples, effort_samples
 from trajcli.plots.sampling import component_points, local_times, thinned, without_repeats
 from trajcli.trajectory import ViaPoints
+
+if TYPE_CHECKING:
+    from trajcli.plots.planned_efforts import EffortSamples
 
 JOINT_KINDS = {
     "position": "q",
@@ -188,6 +191,8 @@ class PlannedMotion:
 
     def _known_efforts(self) -> EffortSamples:
         if self._efforts is None:
+            from trajcli.plots.planned_efforts import effort_samples
+
             self._efforts = effort_samples(self.plan)
         return self._efforts
 
