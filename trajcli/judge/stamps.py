@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
-from trajcli.errors import TrajcliError
 from trajcli.frozen import frozen
 
 _FEW = 3  # rows that make no period
@@ -25,7 +24,7 @@ _SLACK = 1e-9  # of the period: what adding it up row by row may be off, and nob
 _TERMS = 60  # of a continued fraction
 
 
-class UnfitError(TrajcliError):
+class UnfitError(Exception):
     """A stamp does not fit the period of those before it: all must be taken as they are."""
 
 
