@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar, Literal
@@ -70,7 +71,7 @@ class Surroundings:
     limits: Limits | None = None
 
 
-class RuleCheck:
+class RuleCheck(ABC):
     """Judgement of the rows of a motion by one rule, block by block.
 
     Attributes:
@@ -95,10 +96,11 @@ class RuleCheck:
         """Judge what needs the end of the motion."""
         self._finish()
 
+    @abstractmethod
     def _take(self, rows: RecordedMotion) -> None:
-        raise NotImplementedError
+        """Judge the next rows."""
 
-    def _finish(self) -> None:
+    def _finish(self) -> None:  # noqa: B027
         """Do nothing: few rules need the end."""
 
     def breaches(self) -> Iterator[RuleBreach]:

@@ -8,6 +8,7 @@ Source: frankaemika/libfranka, rate_limiting.cpp: velocity, acceleration and jer
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -65,9 +66,9 @@ class _AtPeriod(RuleCheck):
     def _values(self, rows: RecordedMotion) -> Array | None:
         return rows.q
 
+    @abstractmethod
     def _judge(self, rows: RecordedMotion, values: Array) -> None:
         """Judge the values of the block, before which stand the last ones of the block before."""
-        raise NotImplementedError
 
     def _count_intervals(self, rows: RecordedMotion) -> None:
         period = self.number("period")

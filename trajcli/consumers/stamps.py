@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -29,9 +30,9 @@ class _Intervals(RuleCheck):
             # one interval for each row that has one before it; the first row of a file has none
             self._judge(rows, times, int(rows.t.size - (times.size - 1)))
 
+    @abstractmethod
     def _judge(self, rows: RecordedMotion, times: Array, first: int) -> None:
         """Judge the intervals of `times`; the k-th ends at row `first + k` of the block."""
-        raise NotImplementedError
 
     def _note(self, rows: RecordedMotion, over: Any, excess: Array, first: int, fields: Any) -> None:  # noqa: ANN401
         filled = np.zeros(rows.t.size, dtype=bool), np.zeros(rows.t.size)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar
 
@@ -37,9 +38,9 @@ class _OfFirstRow(RuleCheck):
             self._seen = True
             self._judge(rows)
 
+    @abstractmethod
     def _judge(self, rows: RecordedMotion) -> None:
         """Judge the first block."""
-        raise NotImplementedError
 
 
 class JointNames(_OfFirstRow):

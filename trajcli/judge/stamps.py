@@ -3,25 +3,22 @@
 Stamps that all lie within their rounding of multiples of one period are such multiples: 0.041667 s with six
 decimals is 1/24 s. The period is the simplest fraction, numerator and denominator smallest, that fits all of
 them.
-
-Source: Graham, Knuth and Patashnik, Concrete Mathematics (1994), section 6.7, for the simplest fraction.
 """
 
 from __future__ import annotations
 
 from fractions import Fraction
-from math import floor
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
+from trajcli.streams.recorded.stamp_period import simplest_between
 
 _FEW = 3  # rows that make no period
 _ROUNDING = 4.0  # units in the last place that a sum of periods may be off
 _SLACK = 1e-9  # of the period: what adding it up row by row may be off, and nobody's limit notices
-_TERMS = 60  # of a continued fraction
 
 
 class UnfitError(Exception):
@@ -125,7 +122,9 @@ def lattice_of(t: Array, errors: Array) -> Lattice | None:
         if low > high:
             return None
         if counted >= steps[-1]:
-            period = simplest_between(low, high)
+            period = (
+                float(simplest_between(Fraction(low), Fraction(high))) if low > 0.0 else 0.5 * (low + high)
+            )
             break
         period = 0.5 * (low + high)
         counted *= max(0.1 * period / error, 2.0)
@@ -144,20 +143,8 @@ def _origin(first: float, period: float, error: float) -> float:
     return float(steps * period) if near else first
 
 
-def simplest_between(low: float, high: float) -> float:
-    """Return the fraction with the smallest denominator between two positive numbers, as a float."""
+def _simplest_period(low: float, high: float) -> float:
+    """Return the simplest fraction of a second in an interval; its middle where that holds zero."""
     if low <= 0.0:
         return 0.5 * (low + high)
-    a, b = Fraction(low), Fraction(high)
-    terms: list[int] = []
-    for _ in range(_TERMS):
-        whole = floor(a)
-        if whole == a or whole + 1 <= b:
-            terms.append(whole if whole == a else whole + 1)
-            break
-        terms.append(whole)
-        a, b = 1 / (b - whole), 1 / (a - whole)
-    value = Fraction(terms.pop())
-    while terms:
-        value = terms.pop() + 1 / value
-    return float(value)
+    return float(simplest_between(Fraction(low), Fraction(high)))

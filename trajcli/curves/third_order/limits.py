@@ -8,7 +8,6 @@ limits are missed, and less where the acceleration hardly changes in it.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side
 from trajcli.curves.third_order.jerk import ThirdOrderConstraint
@@ -20,8 +19,6 @@ SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Of an interval, at which limits are kept."""
 
 _MOST, _MORE = 40, 1000  # nodes: of a piece on average, and of the whole path on top
-_PARTS = 4  # that an interval is cut into at a time
-_SPARING = 1.1  # by which the loss to be reached grows until there is room
 _TINY = 1e-9  # of the limits: less acceleration is none
 _ORDER_COSTS = np.array([[1.0], [0.5], [1.0 / 3.0]])  # of time for each share by which a limit is passed
 
@@ -115,22 +112,3 @@ def time_lost(law: QuarticLaw, limits: LawLimits, excess: Array) -> Array:
 def most_nodes(path: PiecewisePolynomial) -> int:
     """Return how many nodes a law may have: proportional to the number of pieces."""
     return _MOST * path.pieces + _MORE
-
-
-def parts_for(lost: Array, target: float, room: int) -> NDArray[np.intp]:
-    """Return into how many parts to cut each interval, shape (N,), so that little is lost with few nodes.
-
-    Args:
-        lost: Time that each interval loses, shape (N,).
-        target: What all may lose in the end.
-        room: How many nodes there may be more.
-    """
-    root = np.cbrt(lost)
-    if not root.any():
-        return np.ones(lost.size, dtype=np.intp)
-    unit = (target / root.sum()) ** 0.5
-    while True:
-        parts: NDArray[np.intp] = np.clip(np.rint(root / unit), 1, _PARTS).astype(np.intp)
-        if (parts - 1).sum() <= room:
-            return parts
-        unit *= _SPARING

@@ -128,7 +128,7 @@ class PeriodFit:
         low, high = (best + side * width * _least(fits(side), 0.0, 1.0, 60) for side in (-1.0, 1.0))
         if not 0 < low < high:
             return best
-        period = float(_simplest_between(Fraction(low), Fraction(high)))
+        period = float(simplest_between(Fraction(low), Fraction(high)))
         return period if self._spread(period) <= 2 * allowed else best
 
 
@@ -153,14 +153,17 @@ def _start(low: float, high: float, first: float, allowed: float) -> float:
     return (low + high) / 2
 
 
-def _simplest_between(low: Fraction, high: Fraction) -> Fraction:
-    """Return the fraction of the smallest denominator in an interval of positive numbers."""
+def simplest_between(low: Fraction, high: Fraction) -> Fraction:
+    """Return the fraction of the smallest denominator in an interval of positive numbers.
+
+    Source: Graham, Knuth and Patashnik, Concrete Mathematics (1994), section 6.7.
+    """
     whole = floor(low)
     if whole == low:
         return Fraction(whole)
     if whole + 1 <= high:
         return Fraction(whole + 1)
-    return whole + 1 / _simplest_between(1 / (high - whole), 1 / (low - whole))
+    return whole + 1 / simplest_between(1 / (high - whole), 1 / (low - whole))
 
 
 def _corners(points: Array, side: float) -> NDArray[np.intp]:
