@@ -90,6 +90,9 @@ def plan_job(loaded: LoadedJob, carried: Carried | None = None, *, advise: bool 
         if known is not None:
             remark = known.remark(move.duration, move.robot.joint_names)
             events.append(replace(remark, move=move.index))
+    hint = _unit_hint(loaded) if loaded.has_far_angle else None
+    if hint is not None:
+        events.append(Event("units", hint))
     trajectory = _joined(moves, loaded, _first_state(loaded, _first_moving(moves), events))
     report_progress("checking the trajectory")
     verdict = verify(trajectory, [move.robot.limits for move in moves], [move.promise for move in moves])
