@@ -372,7 +372,7 @@ def _points_of_errors(loaded: LoadedJob, index: int) -> Iterator[None]:
     """Give errors about a target of a move its place, or the name of its point and the place of that."""
     try:
         yield
-    except PlanningError as error:
+    except (InputError, PlanningError) as error:
         raise type(error)(*(_about_point(loaded, index, problem) for problem in error.problems)) from None
 
 
