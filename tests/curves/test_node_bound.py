@@ -135,6 +135,35 @@ def test_pieces_are_halved_until_the_remainder_is_small_in_each_function():
     assert len(node_survey(known, pieces, lambda _: np.array([1e-6, 1e-6]), 1).lengths) == 4
 
 
+@pytest.mark.parametrize(("share", "pieces"), [(0.7, 2), (1.4, 1)])
+def test_a_piece_is_halved_where_its_remainder_is_above_the_slack(share, pieces):
+    def known(coefficients, lengths):
+        return np.ones((len(lengths), 9, 1, 1)), np.ones((len(lengths), 1))
+
+    remainder = BETWEEN_NODES * 3.0**9
+    whole = np.zeros(1), np.array([3.0]), np.zeros((1, 1, 1))
+    assert len(node_survey(known, whole, lambda _: np.array([share * remainder]), 12).lengths) == pieces
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_halves_know_where_they_are(order):
+    """A long piece is halved three times, a short one not at all."""
+    starts, lengths = np.array([2.0, 10.0])[::order], np.array([8.0, 1.0])[::order]
+    pieces = starts, lengths, np.stack([np.ones((2, 1)), starts[:, None]])
+    survey = node_survey(of_powers(3.0), pieces, lambda _: np.array([1e-5]), 12)
+    np.testing.assert_allclose(np.sort(survey.starts), np.arange(2.0, 11.0))
+    t = survey.starts[:, None] + survey.lengths[:, None] * NODES
+    np.testing.assert_allclose(survey.values[:, :, 0, 0], np.cos(3.0 * t), atol=1e-12)
+
+
+def test_a_remainder_that_no_float_holds_is_not_worth_halving():
+    def known(coefficients, lengths):
+        return np.ones((len(lengths), 9, 1, 1)), np.full((len(lengths), 1), np.inf)
+
+    pieces = np.zeros(1), np.ones(1), np.zeros((1, 1, 1))
+    assert len(node_survey(known, pieces, lambda _: np.array([1.0]), 12).lengths) == 1
+
+
 def test_a_slower_piece_that_is_less_well_known_counts_with_what_it_may_be():
     """A piece that rises to 1, and one that stays at 0.9 but may be beside that by 0.5."""
     rising, even = NODES**2, np.full(9, 0.9)
@@ -168,6 +197,21 @@ def test_the_remainder_of_the_piece_is_added_once(remainder):
     assert rest_of(values, (remainder, 0.0), total).most == pytest.approx(2.0 + remainder, rel=1e-8)
     assert rest_of(values, (0.0, remainder), total).most == pytest.approx(2.0, rel=1e-8)
     assert rest_of(values, (0.0, 1.0 + remainder), total).most == pytest.approx(2.0 + remainder, rel=1e-8)
+
+
+def test_parts_of_a_piece_keep_its_remainder():
+    """Both humps are divided; the lower one, near the start of its piece, is the one that is less well known."""
+    humps = np.stack([2.0 - 9.0 * (NODES - 0.7) ** 2, 1.9 - 9.0 * (NODES - 0.2) ** 2])[..., None]
+    for order in (slice(None), slice(None, None, -1)):
+        found = rest_of(humps[order], np.array([0.0, 0.5])[order], total)
+        assert 2.4 - 1e-9 <= found.most <= 2.42
+
+
+def test_functions_of_one_survey_are_apart():
+    values = np.stack([np.full((1, 9, 1), 3.0), np.full((1, 9, 1), 2.0)], axis=2)
+    survey = NodeSurvey(np.zeros(1), np.ones(1), values, np.array([[0.5, 0.25]]))
+    found = [survey.largest(function, total, lambda _: 1e-9) for function in (0, 1)]
+    np.testing.assert_allclose([(one.value, one.most) for one in found], [(3.0, 3.5), (2.0, 2.25)])
 
 
 def test_all_negative_efforts_have_a_negative_peak():
