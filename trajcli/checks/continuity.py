@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.checks.finding import AccelerationSteps, Finding, FindingKind, at_time, joint_amounts
-from trajcli.checks.limits import peaks_by_move
-from trajcli.checks.tolerances import allowed_jump
 from trajcli.curves.extrema import Peaks
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Limits
+from trajcli.limits.joints import peaks_by_move
+from trajcli.tolerances import allowed_jump
 from trajcli.trajectory import Trajectory
 
 JERK_HINT = "use jerk_limited or quintic, or say limits: {jerk: null}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import field, replace
+from dataclasses import field
 from typing import Literal, overload
 
 import numpy as np
@@ -12,15 +12,11 @@ from numpy.typing import NDArray
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount, Amounts, said
 from trajcli.frozen import comparable, frozen
+from trajcli.limits.kinds import LimitName
 from trajcli.trajectory import Trajectory
 
 FindingKind = Literal[
-    "position",
-    "velocity",
-    "acceleration",
-    "jerk",
-    "velocity_by_position",
-    "effort",
+    LimitName,
     "position_jump",
     "velocity_jump",
     "acceleration_jump",
@@ -28,18 +24,11 @@ FindingKind = Literal[
     "target",
     "tool_path",
     "tool_orientation",
-    "tool_speed",
-    "tool_angular_speed",
-    "tool_acceleration",
-    "tool_angular_acceleration",
     "tool_acceleration_jump",
-    "tool_jerk",
     "branch",
 ]
 FindingMethod = Literal["exact", "bounded", "sampled"]
 _RATES = ("", "/s", "/s^2", "/s^3")
-LIMITS_OF_JOINTS = ("position", "velocity", "acceleration", "jerk", "velocity_by_position", "effort")
-"""Kinds of findings about limits of joints."""
 
 
 @comparable
@@ -101,16 +90,6 @@ def joint_amounts(trajectory: Trajectory, joint: int, order: int, **values: floa
     )
     amounts = {name: Amount(value, order, joint, dimension) for name, value in values.items()}
     return {"joint": trajectory.joint_names[joint], **amounts}
-
-
-def excess_amounts(trajectory: Trajectory, joint: int, order: int, value: float, limit: float) -> Amounts:
-    """Return a joint's name, a value beyond its limit, and the limit, rounded so that both pass."""
-    amounts = dict(joint_amounts(trajectory, joint, order, value=value, limit=limit))
-    for name, raised in (("value", value > limit), ("limit", value < limit)):
-        amount = amounts[name]
-        if isinstance(amount, Amount):
-            amounts[name] = replace(amount, rounded="up" if raised else "down")
-    return amounts
 
 
 def at_time(time: float) -> str:

@@ -16,13 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.checks.finding import at_time
-from trajcli.checks.tolerances import JUMP_ABSOLUTE, JUMP_RELATIVE, exceeds
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
 from trajcli.judge.finding import JudgedFinding, JudgedKind, Worst
-from trajcli.judge.intervals import DENSE, Intervals, JointAxes
+from trajcli.judge.intervals import DENSE, Intervals
 from trajcli.judge.rounding import stated_errors
 from trajcli.kinematics.robot import Limits
+from trajcli.limits.kinds import JointAxes
+from trajcli.tolerances import JUMP_ABSOLUTE, JUMP_RELATIVE, exceeds
 
 _ISOLATED = 4.0  # times the changes beside it: a motion that merely is fast changes from row to row alike
 _STEPS = 2.0  # times what one step in acceleration within an interval explains: there may be several

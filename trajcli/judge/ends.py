@@ -9,8 +9,8 @@ from trajcli.checks.finding import at_time
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount
 from trajcli.judge.finding import FindingSeverity, JudgedFinding, JudgedKind, Worst
-from trajcli.judge.intervals import JointAxes
 from trajcli.judge.rounding import stated_errors
+from trajcli.limits.kinds import JointAxes
 from trajcli.streams.recorded_motion import Resolution
 from trajcli.trajectory import State
 

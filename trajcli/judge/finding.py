@@ -9,21 +9,15 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from trajcli.checks.finding import at_time
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amounts, said
 from trajcli.frozen import comparable, frozen
+from trajcli.limits.kinds import LimitExcess, LimitName
 
 JudgedKind = Literal[
-    "position",
-    "velocity",
-    "acceleration",
-    "jerk",
-    "velocity_by_position",
-    "tool_speed",
-    "tool_acceleration",
-    "tool_angular_speed",
-    "tool_angular_acceleration",
-    "effort",
+    LimitName,
+    "tool_acceleration_jump",
     "jump",
     "time",
     "derivative",
@@ -103,6 +97,33 @@ class JudgedFinding:
         """Return the finding as `check --format json` prints it."""
         keys = {name: getattr(self, name) for name in (*_KEYS, *_WHERE)}
         return {**keys, "message": self.text(), "hint": self.hint}
+
+
+def limit_finding(use: LimitExcess, joint: str | None, row: int, rounding: float) -> JudgedFinding:
+    """Return the finding about a limit that rows do not keep.
+
+    Args:
+        use: What they use of it.
+        joint: Name of its joint; None for the tool.
+        row: Number of the row at that time, or before it.
+        rounding: By how much the value may be off by the rounding of the file, SI.
+    """
+    return JudgedFinding(
+        rule="limit",
+        severity="error",
+        kind=use.kind,
+        joint=joint,
+        value=use.value,
+        limit=use.limit,
+        time=use.time,
+        row=row,
+        factor=use.factor,
+        method=use.method,
+        rounding=rounding,
+        message=use.message.replace("{when}", at_time(use.time)),
+        amounts=use.amounts,
+        hint=use.hint,
+    )
 
 
 @frozen

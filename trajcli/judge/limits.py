@@ -8,26 +8,27 @@ because the motion changes its law between two rows is a warning, unless somebod
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.checks.finding import at_time
-from trajcli.checks.tolerances import EFFORT_RELATIVE, exceeds
-from trajcli.curves.approach import ROOM, allowed_speed, uses_of_pieces
+from trajcli.curves.approach import ROOM, ApproachUse, allowed_speed, uses_of_pieces
 from trajcli.curves.bernstein import control_points
 from trajcli.curves.extrema import critical_points
 from trajcli.curves.piecewise import Array, derivative_coefficients, horner
-from trajcli.dynamics.effort_bound import EffortPeak, EffortSurvey, effort_survey, needed_stretch
+from trajcli.dynamics.effort_bound import EffortPeak, EffortSurvey, effort_survey
 from trajcli.dynamics.newton_euler import InverseDynamics
-from trajcli.errors import Amount, Amounts
 from trajcli.frozen import frozen
-from trajcli.judge.finding import Certainty, FindingSeverity, JudgedFinding, JudgedKind, Worst
-from trajcli.judge.intervals import DENSE, Intervals, JointAxes, explained_by_law
+from trajcli.judge.finding import Certainty, FindingSeverity, JudgedFinding, Worst, limit_finding
+from trajcli.judge.intervals import DENSE, Intervals, explained_by_law
 from trajcli.judge.rounding import PieceRows
 from trajcli.kinematics.robot import Limits, Robot
-from trajcli.units import effort_unit
-
-_KINDS: tuple[JudgedKind, ...] = ("position", "velocity", "acceleration", "jerk")
+from trajcli.limits.effort import effort_excess
+from trajcli.limits.joints import joint_excess
+from trajcli.limits.kinds import JOINT_KINDS, JointAxes
+from trajcli.limits.velocity_by_position import approach_excess
+from trajcli.tolerances import EFFORT_RELATIVE, exceeds
 
 _MANY = 20000  # pieces and joints over a limit from which on only the worst of them are looked at closely
 
@@ -158,7 +159,7 @@ class _Side:
         )
         for chosen, severity, certainty in groups:
             worst.add(
-                _KINDS[self.order],
+                JOINT_KINDS[self.order].name,
                 move,
                 found.joint,
                 excess,
@@ -177,25 +178,11 @@ class _Side:
         self, found: _Offences, k: int, value: float, error: float, axes: JointAxes, *, warned: bool
     ) -> JudgedFinding:
         piece, joint, local = int(found.piece[k]), int(found.joint[k]), float(found.local[k])
-        bound, kind = float(found.bound[k]), _KINDS[self.order]
-        time = float(self.window.t[piece]) + local
-        what = f"the {kind} of {{joint}} reaches {{value}} {at_time(time)}, its limit is {{limit}}"
-        if warned:
-            what += "; between the rows only, where the motion changes its law"
-        return JudgedFinding(
-            rule="limit",
-            severity="error",
-            kind=kind,
-            joint=axes.names[joint],
-            value=self.sign * value,
-            limit=self.sign * bound,
-            time=time,
-            row=self.window.row_at(piece, local),
-            factor=(value / bound) ** (1 / self.order) if self.order else None,
-            rounding=error,
-            message=what,
-            amounts=axes.amounts(joint, self.order, self.sign * value, self.sign * bound),
-        )
+        time, limit = float(self.window.t[piece]) + local, self.sign * float(found.bound[k])
+        use = joint_excess(axes, self.order, joint, self.sign * value, limit, time)
+        finding = limit_finding(use, axes.names[joint], self.window.row_at(piece, local), error)
+        between = "; between the rows only, where the motion changes its law" if warned else ""
+        return replace(finding, message=finding.message + between)
 
 
 def _refine(polynomials: Array, lengths: Array, near: NDArray[np.intp], value: Array, local: Array) -> None:
@@ -221,9 +208,6 @@ def _stated(rows: PieceRows, order: int, sign: float) -> tuple[Array, Array]:
         stated = np.where(sign * slope - error > certain, sign * slope, stated)
         certain = np.maximum(certain, sign * slope - error)
     return stated, certain
-
-
-_HOPELESS = 1e4  # a stretch that is larger is none
 
 
 def judge_velocity_by_position(
@@ -313,25 +297,10 @@ class _FastApproaches:
     def finding(self, window: Intervals, axes: JointAxes, k: int) -> JudgedFinding:
         """Return one of them as a finding."""
         piece, joint, local = int(self.piece[k]), int(self.joint[k]), float(self.local[k])
-        value, limit = float(self.speed[k]), float(self.bound[k])
+        rates = float(self.used[k]), float(self.speed[k]), float(self.bound[k])
         time = float(window.t[piece]) + local
-        ahead = Amount(abs(float(self.distance[k])), 0, joint, axes.dimension(joint))
-        where = "beyond" if self.distance[k] < 0 else "before"
-        speed = f"the velocity of {{joint}} reaches {{value}} {at_time(time)}, {{distance}} {where} the end"
-        return JudgedFinding(
-            rule="limit",
-            severity="error",
-            kind="velocity_by_position",
-            joint=axes.names[joint],
-            value=value,
-            limit=limit,
-            time=time,
-            row=window.row_at(piece, local),
-            factor=float(self.used[k]) if self.used[k] < _HOPELESS else None,
-            rounding=float(self.rounding[k]),
-            message=f"{speed} of its range, where its limit is {{limit}}",
-            amounts={**axes.amounts(joint, 1, value, limit), "distance": ahead},
-        )
+        use = approach_excess(axes, ApproachUse(joint, *rates, float(self.distance[k]), time))
+        return limit_finding(use, axes.names[joint], window.row_at(piece, local), float(self.rounding[k]))
 
 
 def _fast_approaches(
@@ -460,30 +429,6 @@ class _OverEffort:
         return float(inertia @ rows.error(2))
 
     def _finding(self, piece: int, local: float, axes: JointAxes, rounding: float) -> JudgedFinding:
-        unit = effort_unit(self.dynamics.robot.joint_types[self.joint])
-        value, limit = self.sign * self.peak.most, self.sign * self.limit
-        time = float(self.window.t[piece]) + local
-        amounts: Amounts = {
-            "joint": axes.names[self.joint],
-            "value": Amount(value, unit=unit, rounded="up" if self.sign > 0 else "down"),
-            "limit": Amount(limit, unit=unit, rounded="down" if self.sign > 0 else "up"),
-            "gravity": Amount(self.sign * self.peak.gravity, unit=unit),
-        }
-        what = "force" if unit == "N" else "torque"
-        needed = needed_stretch(self.survey, self.joint, self.sign, self.limit, EFFORT_RELATIVE / 2).factor
-        return JudgedFinding(
-            rule="limit",
-            severity="error",
-            kind="effort",
-            joint=axes.names[self.joint],
-            value=value,
-            limit=limit,
-            time=time,
-            row=self.window.row_at(piece, local),
-            factor=needed if np.isfinite(needed) else None,
-            method="bounded",
-            rounding=rounding,
-            message=f"{{joint}} needs a {what} of {{value}} {at_time(time)}, {{gravity}} of it against "
-            "gravity; its limit is {limit}",
-            amounts=amounts,
-        )
+        use = effort_excess(axes, self.survey, self.joint, self.sign, self.limit, self.peak)
+        use = replace(use, time=float(self.window.t[piece]) + local)
+        return limit_finding(use, axes.names[self.joint], self.window.row_at(piece, local), rounding)

@@ -15,11 +15,12 @@ from trajcli.frozen import frozen
 from trajcli.judge.consistency import changes_of, judge_consistency
 from trajcli.judge.ends import judge_end, judge_order_of_stamps, judge_start
 from trajcli.judge.finding import JudgedFinding, Judgement, Worst, worst_first
-from trajcli.judge.intervals import BESIDE, Intervals, JointAxes
+from trajcli.judge.intervals import BESIDE, Intervals
 from trajcli.judge.limits import judge_efforts, judge_limits, judge_velocity_by_position
 from trajcli.judge.reconstruction import Interpolation, chosen_interpolation
 from trajcli.judge.stamps import Stamps, UnfitError
 from trajcli.kinematics.robot import Limits, Robot
+from trajcli.limits.kinds import JointAxes
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 from trajcli.trajectory import State
 

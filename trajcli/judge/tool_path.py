@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.checks.finding import at_time
-from trajcli.checks.tolerances import exceeds
 from trajcli.curves.piecewise import Array, horner
 from trajcli.errors import Amount
 from trajcli.judge.finding import Certainty, JudgedFinding, Worst
@@ -20,6 +19,7 @@ from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.inverse.target import residual_jacobian, residuals
 from trajcli.kinematics.jacobian import linearisation
 from trajcli.kinematics.robot import Robot
+from trajcli.tolerances import exceeds
 
 _SAMPLES = 1000  # of a path, where the nearest point is looked for first
 _STEPS = 8  # of Gauss and Newton from there

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from trajcli.checks.finding import LIMITS_OF_JOINTS, Finding
+from trajcli.checks.finding import Finding
 from trajcli.checks.verify import Verdict, longest_factor, verify
 from trajcli.errors import Amount, Problem, TrajcliError, at_least
 from trajcli.kinematics.robot import Robot
+from trajcli.limits.kinds import LIMITS_OF_JOINTS
 from trajcli.planners import changed
 from trajcli.planners.planner import PlannedMove, Planner
 from trajcli.planning.retime import over_limit, slow_to_limits, smallest_stretch

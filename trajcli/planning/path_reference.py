@@ -18,7 +18,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from trajcli.checks.tolerances import exceeds
 from trajcli.curves.extrema import peaks
 from trajcli.curves.operations import compose
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
@@ -28,6 +27,7 @@ from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Limits
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.geometric_path import GeometricPath
+from trajcli.tolerances import exceeds
 
 _UNLIMITED = 1e3  # times the largest limit of its kind: the solver of toppra takes no infinite ones
 _FEWEST, _MOST = 100, 2000  # points of the grid of one smooth path
