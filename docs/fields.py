@@ -25,7 +25,7 @@ from trajcli.language.limits import (
     ToolLimitsSpec,
     VelocityByPosition,
 )
-from trajcli.language.numbers import FieldType, Number
+from trajcli.language.numbers import FieldType, Name, Number
 from trajcli.language.per_joint import JointDistance, PerJoint
 from trajcli.language.poses import Pose
 from trajcli.language.targets import (
@@ -107,7 +107,7 @@ def _annotations(field: FieldInfo) -> list[Any]:
     nested = [
         item
         for arm in get_args(field.annotation)
-        if get_origin(arm) is Annotated
+        if get_origin(arm) is Annotated and get_origin(field.annotation) is not dict
         for item in get_args(arm)[1:]
     ]
     return [*field.metadata, *nested]
@@ -134,6 +134,7 @@ def _reader_form(reader: FieldType) -> str:
         return f"list of {reader.count} numbers"
     forms: dict[type, str] = {
         Direction: "`x` or `y` or `z` or a list of 3 numbers",
+        Name: "text of one line",
         Matrix: "3 rows of 3 numbers, or 4 of 4",
         JointBound: "[bound](#bounds)",
         EffortBound: "[bound](#bounds)",

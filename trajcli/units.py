@@ -71,6 +71,7 @@ _EXAMPLES = {
 }
 _QUOTED = 40  # characters of the user's text that a message repeats
 
+_DECIMAL_COMMA = re.compile(r"\s*([-+]?[0-9]+),([0-9]+)")
 _NUMBER = re.compile(r"\s*([-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*", re.DOTALL)
 _RATE = re.compile(r"([^\s/]+)\s*/\s*([a-z]+)(\^2|\^3|²|³|)")
 
@@ -177,6 +178,9 @@ def parse_quantity(text: str, quantity: Quantity) -> float:
     match = _NUMBER.fullmatch(text)
     if match is None:
         raise UnitError(_expected(quantity, text))
+    comma = _DECIMAL_COMMA.match(text)
+    if comma is not None:
+        raise UnitError(f"{_expected(quantity, text)}: write {comma[1]}.{comma[2]}, decimals have a point")
     number, unit = match.groups()
     if not unit:
         unitless = quantity.dimension == "ratio"

@@ -13,7 +13,7 @@ FLOORS = (
     ("curves", "geometry"),
     ("kinematics", "catalogue"),
     ("dynamics",),
-    ("trajectory", "samples", "columns", "grids", "knots", "tolerances"),
+    ("trajectory", "samples", "columns", "grids", "knots", "findings"),
     ("limits",),
     ("language",),
     ("planners", "checks", "streams", "urdf"),

@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from motions import KINDS, between, limits, sampled_peaks, single_pieces, trajectory
 
-from trajcli.checks.finding import Finding
 from trajcli.checks.verify import check_limits
 from trajcli.curves.piecewise import PiecewisePolynomial, constant
+from trajcli.findings import Finding
 from trajcli.limits.joints import peaks_by_move
 from trajcli.trajectory import Trajectory
 

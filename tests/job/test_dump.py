@@ -101,8 +101,6 @@ output: {rate: 1000.0, start_time: 0.0, align: false, columns: [t, q, qd, qdd]}
         "a: b",
         'q"\\',
         "#",
-        "\x07",
-        "\u2028",
         "\u00e9\u0301",
         "\U0001f600",
         "0x1",

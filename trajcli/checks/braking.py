@@ -16,7 +16,7 @@ from trajcli.curves.extrema import Peaks, peaks_between
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import Limits
-from trajcli.tolerances import BRAKING_RELATIVE, exceeds
+from trajcli.limits.tolerances import BRAKING_RELATIVE, exceeds
 from trajcli.trajectory import Promise, Span, Trajectory
 
 

@@ -8,9 +8,9 @@ from typing import Literal
 
 import numpy as np
 
-from trajcli.checks.finding import Finding, FindingKind, at_time
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount
+from trajcli.findings import Finding, at_time
 from trajcli.frozen import frozen
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.following.motion import ToolMotion
@@ -18,9 +18,9 @@ from trajcli.kinematics.inverse.target import IkTarget, residual_jacobian, resid
 from trajcli.kinematics.jacobian import linearisation
 from trajcli.kinematics.robot import Robot
 from trajcli.limits.kinds import LimitedMove
+from trajcli.limits.tolerances import exceeds
 from trajcli.limits.tool import tool_peaks
 from trajcli.limits.tool_bound import ToolPeak
-from trajcli.tolerances import exceeds
 from trajcli.trajectory import Span, Trajectory
 
 _EACH = 8  # rows of a piece
@@ -88,7 +88,7 @@ def check_tool(tool: SampledTool) -> list[Finding]:
 def _check_path(tool: SampledTool) -> list[Finding]:
     """Return by how much the tool is beside its path, or turned, where that is more than was promised."""
     tolerance, findings = tool.motion.tolerance, []
-    kinds: tuple[tuple[FindingKind, str, Literal["length", "angle"], float], ...] = (
+    kinds: tuple[tuple[str, str, Literal["length", "angle"], float], ...] = (
         ("tool_path", "is beside", "length", tolerance.position),
         ("tool_orientation", "is turned from", "angle", tolerance.angle),
     )

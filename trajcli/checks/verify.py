@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from trajcli.checks.continuity import acceleration_steps, check_continuity
-from trajcli.checks.finding import AccelerationSteps, Finding, at_time
+from trajcli.checks.continuity import AccelerationSteps, acceleration_steps, check_continuity
 from trajcli.checks.target import check_targets
 from trajcli.checks.waypoints import check_waypoints
 from trajcli.curves.extrema import Peaks
 from trajcli.errors import at_least
+from trajcli.findings import Finding
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import QUANTITIES, Limits, ToolLimits
 from trajcli.limits.joints import JointSurvey, peaks_by_move
-from trajcli.limits.kinds import KIND_OF, JointAxes, LimitedMove, LimitSurvey, families, family
-from trajcli.tolerances import LIMIT_RELATIVE, TOOL_RELATIVE
+from trajcli.limits.kinds import KIND_OF, LimitedMove, LimitSurvey, families, family
+from trajcli.limits.tolerances import LIMIT_RELATIVE, TOOL_RELATIVE
 from trajcli.trajectory import Promise, Span, Trajectory
 
 if TYPE_CHECKING:
@@ -162,22 +162,8 @@ def check_limits(
 
 def limit_findings(move: LimitedMove, survey: LimitSurvey) -> Iterator[Finding]:
     """Yield the findings about limits that a move does not keep."""
-    trajectory = move.trajectory
-    for use in survey.over(JointAxes(trajectory.joint_names, trajectory.joint_types)):
-        when = use.time - trajectory.curve.start
-        yield Finding(
-            move=move.span.index,
-            joint=None if use.joint is None else trajectory.joint_names[use.joint],
-            kind=use.kind,
-            value=use.value,
-            limit=use.limit,
-            time=when,
-            method=use.method,
-            factor=use.factor,
-            hint=use.hint,
-            message=use.message.replace("{when}", at_time(when)),
-            amounts=use.amounts,
-        )
+    for finding in survey.over(move.trajectory, move.trajectory.curve.start):
+        yield replace(finding, move=move.span.index)
 
 
 def _limited_moves(
@@ -223,7 +209,7 @@ def _in_order(
         finding
         for k in sorted(of_span)
         for finding in _with_remedies(
-            sorted(of_span[k], key=lambda finding: finding.time),
+            sorted(of_span[k], key=lambda finding: finding.time or 0.0),
             trajectory,
             trajectory.spans[k],
             promises[k] if promises else Promise(),
@@ -341,5 +327,5 @@ def _by_slowing(
 def _over_at_ends(finding: Finding, trajectory: Trajectory, promise: Promise) -> bool:
     """Return whether the limit is broken where the move declares to begin or to end."""
     joint = -1 if finding.joint is None else trajectory.joint_names.index(finding.joint)
-    use = finding.kind, joint, finding.limit
+    use = finding.kind, joint, finding.limit or 0.0
     return family(KIND_OF[finding.kind].family).over_at_ends(promise.robot, promise.ends or (), use)

@@ -10,7 +10,7 @@ import numpy as np
 
 from trajcli.cli.progress import progress
 from trajcli.curves.extrema import peaks
-from trajcli.errors import InputError, Problem, VerificationError
+from trajcli.errors import Amount, InputError, Problem, VerificationError
 from trajcli.frozen import comparable
 from trajcli.grids import Grid
 from trajcli.job.read import LoadedJob, files_of, load_job
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from trajcli.limits.tool_bound import ToolPeak
     from trajcli.output.recording import LogOptions
 
+_FEW_STEPS = 9  # in acceleration: of more the largest says most
 _STILL = 1e-9  # rad/s or m/s, below which a joint only rounds
 
 
@@ -149,7 +150,7 @@ def _judged(
 def _summarise_consumer(judged: ProfileJudgement) -> None:
     from trajcli.output.consumer import counted
 
-    warnings = [f"  {each.rule}: {each.message}{counted(each)}" for each in judged.breaches]
+    warnings = [f"  {each.rule}: {each.message}{counted(each)}" for each in judged.findings]
     unjudged = ", ".join(rule for rule, _ in judged.unjudged)
     lines = [f"for {judged.profile.name}: all necessary rules are kept", *warnings]
     lines += [f"  not judged: {unjudged}"] if unjudged else []
@@ -319,13 +320,23 @@ def summary(plan: Plan, rows: int) -> str:
     if plan.verdict.sampled:
         lines.append(f"  on samples only: distance from the path and branch, {_moves(plan.verdict.sampled)}")
     if plan.verdict.steps:
-        first = plan.verdict.steps[0]
-        more = f" and {len(plan.verdict.steps) - 1} more" if len(plan.verdict.steps) > 1 else ""
-        lines.append(f"  the acceleration steps: {first.joint} at t = {first.time:.6g} s{more}")
+        lines.append(f"  the acceleration steps{_steps(plan)}")
     lines += [
         f"  {event.kind}: {_where(event.move)}{event.message}" for event in (*plan.events, *plan.remarks)
     ]
     return "\n".join(lines)
+
+
+def _steps(plan: Plan) -> str:
+    """Return where the acceleration steps: the first of a few, of many the largest and their number."""
+    steps = plan.verdict.steps
+    if len(steps) <= _FEW_STEPS:
+        more = f" and {len(steps) - 1} more" if len(steps) > 1 else ""
+        return f": {steps[0].joint} at t = {steps[0].time:.6g} s{more}"
+    largest = max(steps, key=lambda step: abs(step.size))
+    joint = plan.trajectory.joint_names.index(largest.joint)
+    size = plan.loaded.say(Amount(abs(largest.size), 2, joint))
+    return f" {len(steps)} times, by up to {size} ({largest.joint} at t = {largest.time:.6g} s)"
 
 
 def _moves(indices: Sequence[int]) -> str:

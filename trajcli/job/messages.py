@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
@@ -10,10 +10,11 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from trajcli.errors import Problem
+from trajcli.job.yaml.document import Node
 from trajcli.job.yaml.load import Document
 from trajcli.language.numbers import AT_KEY, FieldPath, Flaw, shown
 from trajcli.planners import ALSO_CALLED, HANDLING, PLANNERS
-from trajcli.suggest import did_you_mean, valid_names
+from trajcli.suggest import abridged, did_you_mean, valid_names
 
 _KINDS = {
     "bool_parsing": "true or false",
@@ -43,6 +44,41 @@ _LAW_FIELDS = {
     "angular_acceleration": "angular_acceleration",
 }
 """Words that stand beside `to` in other programs, with the field of the law that is meant."""
+_KEYS_ELSEWHERE = {
+    "target": "to",
+    "goal": "to",
+    "end": "to",
+    "position": "xyz",
+    "orientation": "rpy",
+    "accel": "acceleration",
+    "acc": "acceleration",
+    "vel": "velocity",
+    "speed": "velocity",
+    "decel": "deceleration",
+    "time": "duration",
+    "waypoints": "through",
+    "points": "through",
+    "torque": "effort",
+    "tcp": "tool",
+    "waypoint": "to",
+    "wobj": "frames",
+    "uframe": "frames",
+}
+"""Keys of other programs, with that of a job where such a key may stand."""
+_ENTRIES_ELSEWHERE = {
+    "wait": "write `- {{planner: hold, duration: {value}}}`: the arm stands for that long",
+    "sleep": "write `- {{planner: hold, duration: {value}}}`: the arm stands for that long",
+    "dwell": "write `- {{planner: hold, duration: {value}}}`: the arm stands for that long",
+    "pause": "write `- {{planner: hold, duration: {value}}}`: the arm stands for that long",
+    "stop": "every move ends at rest unless its target has a velocity; to stand still for 2 s write "
+    "`- {{planner: hold, duration: 2}}`",
+}
+"""Entries among the moves of other programs, with what says the same."""
+_PLANNERS_ELSEWHERE = {
+    "stop": "every move ends at rest unless its target has a velocity; a moving arm is stopped by "
+    "`{planner: jerk_limited, to: {velocity: 0}}`",
+}
+"""Planners of other programs that are more than another name."""
 _NEEDS_NO_LIMIT = "quintic"  # the shape of a law that a duration is enough for
 
 
@@ -76,13 +112,15 @@ def _flaws(
         return [_flaw((*path, *below), text, hint) for below, text, hint in flaws]
     if kind == "extra_forbidden":
         names = _field_names(model, loc[:-1])
-        known = (
-            _other_place(path, names, document) or did_you_mean(str(path[-1]), names) or valid_names(names)
-        )
-        return [(path, f"unknown key '{path[-1]}'", known, True)]
+        key = str(path[-1])
+        hint = _other_place(path, names, document) or _other_key(key, names) or valid_names(names)
+        return [(path, f"unknown key '{abridged(key)}'", hint, True)]
     if kind == "missing":
-        field = _model_at(model, loc[:-1]).model_fields[str(loc[-1])]
-        return [(path, f"`{loc[-1]}` is missing", _described(field), False)]
+        name = str(loc[-1])
+        if _meant_by_others(name, document.node(path[:-1])):
+            return []  # the key that stands for it is unknown, and says so
+        field = _model_at(model, loc[:-1]).model_fields[name]
+        return [(path, f"`{name}` is missing", _described(field), False)]
     if kind == "union_tag_invalid":
         return [((*path, "planner"), *_unknown_planner(detail["input"]), False)]
     message, hint = _text(kind, context, detail["input"])
@@ -107,9 +145,23 @@ def _unknown_planner(move: object) -> tuple[str, str | None]:
         return f"expected a planner's name, got {shown(tag)}", _every_planner()
     if tag in HANDLING:
         return f"{tag} is no planner", f"write `- {{{tag}: ...}}`: it stands alone between moves"
+    if tag.casefold() in _PLANNERS_ELSEWHERE:
+        return f"unknown planner '{tag}'", _PLANNERS_ELSEWHERE[tag.casefold()]
     meant = ALSO_CALLED.get(tag.strip().casefold().replace("-", "_").replace(" ", "_"))
     own = f"write `planner: {meant}` ({_every_planner()})" if meant else did_you_mean(tag, PLANNERS)
-    return f"unknown planner '{tag}'", own or _every_planner()
+    return f"unknown planner '{abridged(tag)}'", own or _every_planner()
+
+
+def _other_key(key: str, names: Sequence[str]) -> str | None:
+    """Return the key that is meant where another stands: that of other programs, or the nearest name."""
+    meant = _KEYS_ELSEWHERE.get(key.casefold())
+    return f"did you mean '{meant}'?" if meant in names else did_you_mean(key, names)
+
+
+def _meant_by_others(name: str, node: Node | None) -> bool:
+    """Return whether a mapping has a key that stands for one that is missing."""
+    keys = node.value if node is not None and isinstance(node.value, dict) else {}
+    return any(_KEYS_ELSEWHERE.get(key.casefold()) == name for key in keys)
 
 
 def _every_planner() -> str:
@@ -146,11 +198,7 @@ def _other_place(path: FieldPath, names: list[str], document: Document) -> str |
 
 def _text(kind: str, context: Mapping[str, Any], value: object) -> tuple[str, str | None]:
     if kind == "union_tag_not_found":
-        keys = [str(key) for key in value] if isinstance(value, Mapping) else []
-        meant = [near for key in keys if (near := did_you_mean(key, HANDLING))]
-        if meant:
-            return "a move needs `planner`", meant[0]
-        return "a move needs `planner`", f"{_every_planner()}; between moves stand {' and '.join(HANDLING)}"
+        return "a move needs `planner`", _meant_entry(value if isinstance(value, Mapping) else {})
     if kind == "literal_error":
         names = [word.strip().strip("'") for word in context["expected"].replace(" or ", ", ").split(",")]
         quoted = isinstance(value, str) and value in names  # "1" where 1 is meant
@@ -163,6 +211,20 @@ def _text(kind: str, context: Mapping[str, Any], value: object) -> tuple[str, st
     if kind == "string_too_short":
         return "expected a text that is not empty", None
     return f"expected {_KINDS.get(kind, 'another value')}, got {shown(value)}", None
+
+
+def _meant_entry(entry: Mapping[Any, object]) -> str:
+    """Return what an entry of the moves without a planner should be."""
+    for key, value in entry.items():
+        word = str(key).casefold()
+        if word in _ENTRIES_ELSEWHERE:
+            return _ENTRIES_ELSEWHERE[word].format(value=value if isinstance(value, int | float) else "...")
+        if word in PLANNERS or word in ALSO_CALLED:
+            return f"write `- {{planner: {ALSO_CALLED.get(word, word)}, ...}}`"
+        near = did_you_mean(str(key), (*HANDLING, "planner"))
+        if near:
+            return near
+    return f"{_every_planner()}; between moves stand {' and '.join(HANDLING)}"
 
 
 def _described(field: FieldInfo) -> str | None:

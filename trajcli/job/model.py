@@ -32,6 +32,7 @@ from trajcli.language.numbers import (
     FieldType,
     FlawError,
     Model,
+    Name,
     Number,
     ReadingContext,
     refuse,
@@ -227,7 +228,7 @@ class Job(Model):
     """One robot, named points, and the moves to plan."""
 
     version: Annotated[Literal[1], Field(description="Version of the job language: 1.")]
-    name: Annotated[str | None, Field(description="For reports; the file's stem when left out.")] = None
+    name: Annotated[str, Name("For reports; the file's stem when left out.")] | None = None
     units: UnitsSpec = UnitsSpec()
     robot: Annotated[Robot, RobotSource()]
     tool: Annotated[np.ndarray, Pose("T_flange_tcp, instead of the robot's own.")] | None = None
@@ -242,7 +243,9 @@ class Job(Model):
         Gravity("Acceleration of a body that falls, in world, m/s^2 whatever the units."),
     ] = GRAVITY
     limits: Annotated[JobLimitsSpec | None, Field(description="Replace the robot's, then scale.")] = None
-    points: dict[str, NamedTarget] = Field(default_factory=dict, description="Named states.")
+    points: dict[Annotated[str, Name("Name of a point.")], NamedTarget] = Field(
+        default_factory=dict, description="Named states."
+    )
     start: Annotated[
         NamedTarget,
         _FirstRow(),

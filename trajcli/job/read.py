@@ -49,6 +49,7 @@ class LoadedJob:
         document: For the places of later errors.
         events: Concessions, such as a limit looser than the robot's.
         source: Where the numbers of the robot come from.
+        has_far_angle: Whether a pose has an angle in rad that is probably meant in degrees.
     """
 
     job: Job
@@ -57,6 +58,7 @@ class LoadedJob:
     document: Document
     events: tuple[Event, ...]
     source: str = "the job"
+    has_far_angle: bool = False
 
     def __repr__(self) -> str:
         tags = ", ".join(move.tag for move in self.job.moves)
@@ -193,7 +195,7 @@ def _load(document: Document) -> LoadedJob:
     if sheet is not None and sheet.concession is not None:
         events = [Event("angles_snapped", sheet.concession), *events]
     source = "the job" if sheet is None else sheet.source or _named_source(plain["robot"])
-    loaded = LoadedJob(job, name, effective, document, (*noted, *events), source)
+    loaded = LoadedJob(job, name, effective, document, (*noted, *events), source, context.has_far_angle)
     flaws = [
         *_loosened_by_moves(loaded),
         *_loosened_tool_limits(loaded),

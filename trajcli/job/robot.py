@@ -33,6 +33,7 @@ from trajcli.language.limits import JointBound, VelocityByPosition
 from trajcli.language.numbers import (
     MAX_JOINTS,
     Model,
+    Name,
     Number,
     ReadingContext,
     refuse,
@@ -56,9 +57,7 @@ DH_ROW = {"theta": _ANGLE, "d": _LENGTH, "a": _LENGTH, "alpha": _ANGLE, "beta": 
 class JointModel(Model):
     """One joint: its DH row and its limits."""
 
-    name: Annotated[
-        str | None, Field(min_length=1, description="Unique name; j1, j2, ... when left out.")
-    ] = None
+    name: Annotated[str, Name("Unique name; j1, j2, ... when left out.")] | None = None
     type: Annotated[Literal["revolute", "prismatic"], Field(description="How the joint moves.")] = "revolute"
     theta: Annotated[float, Number(_ANGLE, "Angle about z (angle unit).")] = 0.0
     d: Annotated[float, Number(_LENGTH, "Offset along z (length unit).")] = 0.0
@@ -133,7 +132,7 @@ class _Counted:
 class RobotModel(Model):
     """A robot: its joints as a Denavit-Hartenberg table with limits, base and tool."""
 
-    name: Annotated[str, Field(description="For messages and reports.")] = "robot"
+    name: Annotated[str, Name("For messages and reports.")] = "robot"
     units: Annotated[
         UnitsSpec | None, Field(description="Only in a robot file; inline the job's units hold.")
     ] = None
@@ -277,6 +276,8 @@ def find_sheet(value: Any, document: Document, units: Units) -> RobotSheet:  # n
         return _from_file_entry(value, document)
     if not isinstance(value, Mapping):
         raise InputError(_no_robot(value, document))
+    if "joints" not in value and value.get("name") in catalogue_names():
+        raise InputError(_named_with_more(value, document))
     for key in value:
         place = document.place(("robot", key), key=True)
         if key == "units":
@@ -288,6 +289,17 @@ def find_sheet(value: Any, document: Document, units: Units) -> RobotSheet:  # n
             raise InputError(Problem(f"unknown key '{key}'", f"did you mean '{near}'?", place))
     robot = _validated(value, document, ("robot",), units).as_robot()
     return RobotSheet(robot, units, None, None, None, None)
+
+
+def _named_with_more(value: Mapping[str, Any], document: Document) -> Problem:
+    """Return the problem of a robot of the catalogue that is given as if it stood in the job."""
+    name, others = value["name"], [key for key in value if key != "name"]
+    beside = [key for key in others if key in ("base", "tool", "limits", "gravity")]
+    hint = f"write `robot: {name}`"
+    if beside:
+        hint += f", and {' and '.join(f'`{key}`' for key in beside)} beside `robot` in the job"
+    message = f"{name} is a robot of the catalogue, and stands here without its joints"
+    return Problem(message, hint, document.place(("robot", "name")))
 
 
 def load_robot(name: str | Path) -> Robot:

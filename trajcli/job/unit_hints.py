@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from trajcli.job.read import LoadedJob
 from trajcli.job.yaml.document import Node
 from trajcli.kinematics.robot import Robot
+from trajcli.language.numbers import TWO_TURNS
 
-_MANY_TURNS = 4 * math.pi  # rad: two turns; most joints have one
 _FAR = 50.0  # m: no arm reaches as far
 _REACHES = 10.0  # times the length of the arm: far out of reach, and near it where a thousandth is meant
 _ANGLES = ("rpy", "rotvec", "angles", "angle", "yaw", "pitch", "theta", "alpha", "beta")
@@ -26,7 +26,7 @@ def unit_hint(loaded: LoadedJob) -> str | None:
         for is_length, value in _plain_numbers(node, section, loaded.robot):
             (lengths if is_length else angles).append(abs(value))
     units, looks, meant = loaded.units, [], {}
-    if units.angle == "rad" and max(angles) > _MANY_TURNS:
+    if units.angle == "rad" and max(angles) > TWO_TURNS:
         looks.append(f"angles up to {max(angles):.6g} look like degrees")
         meant["angle"] = "deg"
     if units.length == "m" and max(lengths) > min(_FAR, _REACHES * _length_of(loaded.robot)):

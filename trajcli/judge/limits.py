@@ -19,16 +19,16 @@ from trajcli.curves.extrema import critical_points
 from trajcli.curves.piecewise import Array, derivative_coefficients, horner
 from trajcli.dynamics.effort_bound import EffortPeak, EffortSurvey, effort_survey
 from trajcli.dynamics.newton_euler import InverseDynamics
+from trajcli.findings import Certainty, Collector, Finding, FindingSeverity, NamedJoints
 from trajcli.frozen import frozen
-from trajcli.judge.finding import Certainty, FindingSeverity, JudgedFinding, Worst, limit_finding
 from trajcli.judge.intervals import DENSE, Intervals, explained_by_law
 from trajcli.judge.rounding import PieceRows
 from trajcli.kinematics.robot import Limits, Robot
 from trajcli.limits.effort import effort_excess
 from trajcli.limits.joints import joint_excess
-from trajcli.limits.kinds import JOINT_KINDS, JointAxes
+from trajcli.limits.kinds import JOINT_KINDS
+from trajcli.limits.tolerances import EFFORT_RELATIVE, exceeds
 from trajcli.limits.velocity_by_position import approach_excess
-from trajcli.tolerances import EFFORT_RELATIVE, exceeds
 
 _MANY = 20000  # pieces and joints over a limit from which on only the worst of them are looked at closely
 
@@ -57,8 +57,8 @@ def judge_limits(
     pieces: slice,
     limits: Limits,
     move: int,
-    axes: JointAxes,
-    worst: Worst,
+    axes: NamedJoints,
+    worst: Collector,
     *,
     asked: bool,
 ) -> None:
@@ -135,7 +135,7 @@ class _Side:
             self.first + piece[beyond], joint[beyond], value[beyond], local[beyond], bound[beyond]
         )
 
-    def add(self, found: _Offences, move: int, axes: JointAxes, worst: Worst, *, asked: bool) -> None:
+    def add(self, found: _Offences, move: int, axes: NamedJoints, worst: Collector, *, asked: bool) -> None:
         """Add pieces beyond the bound, by what is certain about them."""
         count = 1 if self.window.interpolation == "jtc-upsampling" else max(self.level, 1)
         rows = self.window.piece_rows(found.piece, found.joint, count)
@@ -149,7 +149,7 @@ class _Side:
             warned = by_curve & ~by_rows & self._unresolved(found, error)
         excess = value / found.bound if self.order else value - found.bound
 
-        def make(k: int) -> JudgedFinding:
+        def make(k: int) -> Finding:
             return self._finding(found, k, float(value[k]), float(error[k]), axes, warned=bool(warned[k]))
 
         groups: tuple[tuple[NDArray[np.bool_], FindingSeverity, Certainty], ...] = (
@@ -175,14 +175,14 @@ class _Side:
         return np.asarray(found.value - found.bound <= explained + error)
 
     def _finding(
-        self, found: _Offences, k: int, value: float, error: float, axes: JointAxes, *, warned: bool
-    ) -> JudgedFinding:
+        self, found: _Offences, k: int, value: float, error: float, axes: NamedJoints, *, warned: bool
+    ) -> Finding:
         piece, joint, local = int(found.piece[k]), int(found.joint[k]), float(found.local[k])
         time, limit = float(self.window.t[piece]) + local, self.sign * float(found.bound[k])
-        use = joint_excess(axes, self.order, joint, self.sign * value, limit, time)
-        finding = limit_finding(use, axes.names[joint], self.window.row_at(piece, local), error)
+        found_one = joint_excess(axes, self.order, joint, self.sign * value, limit, time)
         between = "; between the rows only, where the motion changes its law" if warned else ""
-        return replace(finding, message=finding.message + between)
+        row, message = self.window.row_at(piece, local), found_one.message + between
+        return replace(found_one, row=row, rounding=error, message=message)
 
 
 def _refine(polynomials: Array, lengths: Array, near: NDArray[np.intp], value: Array, local: Array) -> None:
@@ -215,8 +215,8 @@ def judge_velocity_by_position(
     pieces: slice,
     limits: Limits,
     move: int,
-    axes: JointAxes,
-    worst: Worst,
+    axes: NamedJoints,
+    worst: Collector,
     *,
     asked: bool,
 ) -> None:
@@ -294,13 +294,13 @@ class _FastApproaches:
         towards = np.where(np.signbit(self.bound), -self.speed, self.speed)
         return np.asarray(towards - np.abs(self.bound) > self.rounding)
 
-    def finding(self, window: Intervals, axes: JointAxes, k: int) -> JudgedFinding:
+    def finding(self, window: Intervals, axes: NamedJoints, k: int) -> Finding:
         """Return one of them as a finding."""
         piece, joint, local = int(self.piece[k]), int(self.joint[k]), float(self.local[k])
         rates = float(self.used[k]), float(self.speed[k]), float(self.bound[k])
         time = float(window.t[piece]) + local
-        use = approach_excess(axes, ApproachUse(joint, *rates, float(self.distance[k]), time))
-        return limit_finding(use, axes.names[joint], window.row_at(piece, local), float(self.rounding[k]))
+        found = approach_excess(axes, ApproachUse(joint, *rates, float(self.distance[k]), time))
+        return replace(found, row=window.row_at(piece, local), rounding=float(self.rounding[k]))
 
 
 def _fast_approaches(
@@ -331,7 +331,14 @@ _ACCELERATED = 3  # degree from which on pieces have an acceleration
 
 
 def judge_efforts(
-    window: Intervals, pieces: slice, robot: Robot, move: int, axes: JointAxes, worst: Worst, *, asked: bool
+    window: Intervals,
+    pieces: slice,
+    robot: Robot,
+    move: int,
+    axes: NamedJoints,
+    worst: Collector,
+    *,
+    asked: bool,
 ) -> None:
     """Add where joints of an arm are over their limits of torque or force in pieces of one move.
 
@@ -397,7 +404,7 @@ class _OverEffort:
     limit: float
     peak: EffortPeak
 
-    def add(self, move: int, axes: JointAxes, worst: Worst, *, stated: float, asked: bool) -> None:
+    def add(self, move: int, axes: NamedJoints, worst: Collector, *, stated: float, asked: bool) -> None:
         """Add it by what is certain about it."""
         at = int(np.clip(np.searchsorted(self.breaks, self.peak.time, "right") - 1, 0, self.curved.size - 1))
         piece, local = int(self.curved[at]), float(self.peak.time - self.breaks[at])
@@ -428,7 +435,7 @@ class _OverEffort:
         inertia = np.abs(self.dynamics.mass_matrix(position)[self.joint])
         return float(inertia @ rows.error(2))
 
-    def _finding(self, piece: int, local: float, axes: JointAxes, rounding: float) -> JudgedFinding:
-        use = effort_excess(axes, self.survey, self.joint, self.sign, self.limit, self.peak)
-        use = replace(use, time=float(self.window.t[piece]) + local)
-        return limit_finding(use, axes.names[self.joint], self.window.row_at(piece, local), rounding)
+    def _finding(self, piece: int, local: float, axes: NamedJoints, rounding: float) -> Finding:
+        peak = replace(self.peak, time=float(self.window.t[piece]) + local)
+        found = effort_excess(axes, self.survey, self.joint, self.sign, self.limit, peak)
+        return replace(found, row=self.window.row_at(piece, local), rounding=rounding)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.checks.finding import at_time
 from trajcli.curves.piecewise import Array, derivative_coefficients, horner
-from trajcli.judge.finding import JudgedFinding, Worst, limit_finding
+from trajcli.findings import Collector, Finding, at_time
 from trajcli.judge.intervals import DENSE, Intervals
 from trajcli.judge.tool_path import RecordedPath
 from trajcli.kinematics.dexterity import characteristic_length
@@ -18,9 +18,9 @@ from trajcli.kinematics.forward import forward
 from trajcli.kinematics.jacobian import jacobian
 from trajcli.kinematics.robot import Robot
 from trajcli.limits.kinds import LimitKind
+from trajcli.limits.tolerances import TOOL_RELATIVE
 from trajcli.limits.tool import BOUNDED, limits_tool, tool_excess
 from trajcli.limits.tool_bound import ToolPeak, tool_bounds
-from trajcli.tolerances import TOOL_RELATIVE
 
 _PIECES = 2048  # at a time: nine configurations of each are looked at
 _TURN = 0.05  # rad or m that a joint moves between the rows at which nearness to a singularity is looked at
@@ -50,7 +50,7 @@ class ToolJudge:
         self._robot, self._paths = robot, paths
         self._length = characteristic_length(robot)
         self._recorded: dict[int, RecordedPath] = {}
-        self._worst = Worst()
+        self._worst = Collector()
         self._moved, self._seen = 0.0, -1
         self.notes: list[str] = []
         for move, motion in (paths or {}).items():
@@ -79,7 +79,7 @@ class ToolJudge:
         if self._paths is None or path is not None:
             self._judge_singularity(window, pieces, move)
 
-    def findings(self) -> list[JudgedFinding]:
+    def findings(self) -> Iterator[Finding]:
         """Return what was found."""
         return self._worst.findings()
 
@@ -123,9 +123,8 @@ class ToolJudge:
     ) -> None:
         piece = self._piece_at(window, pieces, peak.time)
         rounding = self._rounding(window, piece, kind.order or 1)
-        use = tool_excess(kind, peak.most, limit, peak.time)
         row = window.row_at(piece, peak.time - float(window.t[piece]))
-        finding = limit_finding(use, None, row, rounding)
+        finding = replace(tool_excess(kind, peak.most, limit, peak.time), row=row, rounding=rounding)
         certain = peak.most - limit > rounding
         count = max(self._over(window, pieces, kind, limit), 1)
         self._worst.add(
@@ -206,9 +205,9 @@ class ToolJudge:
         if not near.size:
             return
 
-        def make(k: int) -> JudgedFinding:
+        def make(k: int) -> Finding:
             row, time = int(rows[near[k]]), float(window.t[rows[near[k]]])
-            return JudgedFinding(
+            return Finding(
                 rule="path",
                 severity="warning",
                 kind="singularity",

@@ -25,6 +25,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from trajcli.frozen import comparable
 from trajcli.language.recorded import Recorded
+from trajcli.suggest import LONGEST_NAME, abridged, flaw_of_name
 from trajcli.units import (
     Quantity,
     UnitError,
@@ -63,6 +64,7 @@ class ReadingContext:
         joint_types: "revolute" or "prismatic" for each joint.
         points: The file's named points, as plain mappings.
         shifted: Relative points that were resolved, by name: their fields as in a file.
+        has_far_angle: Whether a pose has a plain angle of more than two turns, which is a slip of the unit.
         read_points: Reads a file of recorded joint values, its path relative to the job; raises FlawError.
     """
 
@@ -71,6 +73,7 @@ class ReadingContext:
     joint_types: tuple[str, ...] = ()
     points: Mapping[str, Any] = field(default_factory=dict)
     shifted: dict[str, dict[str, Any]] = field(default_factory=dict)
+    has_far_angle: bool = False
     read_points: Callable[[str], Recorded] | None = None
 
     def joint_quantity(self, joint: int, order: int) -> Quantity:
@@ -80,6 +83,8 @@ class ReadingContext:
 
 
 SI = ReadingContext()
+TWO_TURNS = 4 * math.pi
+"""rad: no pose needs a larger angle, and most joints have a smaller range."""
 _WHOLE = 1e-9  # a ratio that is a whole number but for rounding
 _BEYOND_ANY_ROBOT = "no robot has such a number: check its exponent and its unit"
 
@@ -109,7 +114,7 @@ NULL = _Null()
 def shown(value: object) -> str:
     """Return a value of a file as it is quoted in messages."""
     if isinstance(value, str):
-        return f'"{value}"'
+        return f'"{abridged(value)}"'
     if value is None or value is NULL:
         return "null"
     if isinstance(value, bool):
@@ -312,6 +317,30 @@ class Number(FieldType):
         bounds = {"exclusiveMinimum": self.above, "minimum": self.at_least, "maximum": self.at_most}
         stated = {key: bound for key, bound in bounds.items() if bound is not None}
         return number_schema(self.quantity, **stated)
+
+
+@comparable
+class Name(FieldType):
+    """A name that messages, files and logs of continuous integration can hold: one line, not too long.
+
+    Attributes:
+        description: For the JSON schema.
+    """
+
+    description: str
+
+    def read(self, value: Any, context: ReadingContext) -> str:  # noqa: ANN401
+        """Return the name."""
+        if not isinstance(value, str):
+            raise FlawError(f"expected a text, got {shown(value)}")
+        flaw = flaw_of_name(value)
+        if flaw is not None:
+            raise FlawError(flaw)
+        return value
+
+    def json_schema(self) -> JsonSchemaValue:
+        """Return the schema of a text of one line."""
+        return {"type": "string", "minLength": 1, "maxLength": LONGEST_NAME}
 
 
 class Model(BaseModel):

@@ -13,6 +13,7 @@ from trajcli.errors import InputError
 from trajcli.frozen import comparable
 from trajcli.language.numbers import (
     AT_KEY,
+    TWO_TURNS,
     FieldType,
     FlawError,
     ReadingContext,
@@ -151,6 +152,8 @@ def read_numbers(
             numbers[index] = read_number(item, quantity, context.units)
         except FlawError as error:
             raise FlawError(str(error), *path, index, hint=error.flaws[0][2]) from None
+    if quantity == _ANGLE and context.units.angle == "rad" and max(abs(numbers)) > TWO_TURNS:
+        context.has_far_angle = True
     return numbers
 
 

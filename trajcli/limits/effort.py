@@ -7,6 +7,7 @@ alone are over the limit no duration helps, though a motion that falls fast enou
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,10 +19,11 @@ from trajcli.dynamics.effort_bound import (
 )
 from trajcli.dynamics.newton_euler import InverseDynamics
 from trajcli.errors import Amount, Amounts
+from trajcli.findings import Finding, NamedJoints, at_time
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Robot
-from trajcli.limits.kinds import JointAxes, LimitedMove, LimitExcess, LimitFamily, LimitSurvey
-from trajcli.tolerances import EFFORT_RELATIVE
+from trajcli.limits.kinds import LimitedMove, LimitFamily, LimitSurvey
+from trajcli.limits.tolerances import EFFORT_RELATIVE
 from trajcli.units import effort_unit
 
 
@@ -41,10 +43,11 @@ class MoveEfforts(LimitSurvey):
     highest: tuple[EffortPeak, ...]
     lowest: tuple[EffortPeak, ...]
 
-    def over(self, axes: JointAxes) -> Iterator[LimitExcess]:
+    def over(self, joints: NamedJoints, origin: float = 0.0) -> Iterator[Finding]:
         """Yield the joints that are over their limits of torque or force, in each direction."""
         for joint, sign, limit, peak in self.beyond():
-            yield effort_excess(axes, self.survey, joint, sign, limit, peak)
+            since = replace(peak, time=peak.time - origin)
+            yield effort_excess(joints, self.survey, joint, sign, limit, since)
 
     def excess(self) -> float:
         """Return by how much of a limit the efforts are above it."""
@@ -78,36 +81,36 @@ class MoveEfforts(LimitSurvey):
 
 
 def effort_excess(
-    axes: JointAxes, survey: EffortSurvey, joint: int, sign: int, limit: float, peak: EffortPeak
-) -> LimitExcess:
+    joints: NamedJoints, survey: EffortSurvey, joint: int, sign: int, limit: float, peak: EffortPeak
+) -> Finding:
     """Return where a joint is over its limit in one direction.
 
     Args:
-        axes: The joints.
+        joints: All of them.
         survey: Of the motion.
         joint: Index.
         sign: 1 for upwards, -1 for downwards.
         limit: Its magnitude.
         peak: Of the effort in this direction.
     """
-    unit = effort_unit(axes.types[joint])
+    unit = effort_unit(joints.joint_types[joint])
     factor = needed_stretch(survey, joint, sign, limit, EFFORT_RELATIVE / 2).factor
     amounts: Amounts = {
-        "joint": axes.names[joint],
+        "joint": joints.joint_names[joint],
         "value": Amount(sign * peak.most, unit=unit, rounded="up" if sign > 0 else "down"),
         "limit": Amount(sign * limit, unit=unit, rounded="down" if sign > 0 else "up"),
         "gravity": Amount(sign * peak.gravity, unit=unit),
     }
     what = "force" if unit == "N" else "torque"
-    message = f"{{joint}} needs a {what} of {{value}} {{when}}, {{gravity}} of it against gravity; "
-    return LimitExcess(
+    needs = f"{{joint}} needs a {what} of {{value}} {at_time(peak.time)}, {{gravity}} of it against gravity"
+    return Finding(
         kind="effort",
-        joint=joint,
+        joint=joints.joint_names[joint],
         value=sign * peak.most,
         limit=sign * limit,
         time=peak.time,
         factor=factor if np.isfinite(factor) else None,
-        message=message + "its limit is {limit}",
+        message=needs + "; its limit is {limit}",
         amounts=amounts,
         method="bounded",
     )

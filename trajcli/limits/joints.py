@@ -9,17 +9,15 @@ import numpy as np
 from trajcli.curves.extrema import Peaks, peaks_between
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount, Amounts
+from trajcli.findings import Finding, NamedJoints, at_time, excess_amounts
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import QUANTITIES, Limits, Robot, share_of_limits
 from trajcli.limits.kinds import (
-    JOINT_KINDS,
-    JointAxes,
     LimitedMove,
-    LimitExcess,
     LimitFamily,
     LimitSurvey,
 )
-from trajcli.tolerances import BORDER_UNITS, exceeds
+from trajcli.limits.tolerances import BORDER_UNITS, exceeds
 from trajcli.trajectory import State, Trajectory
 
 _ROOM = 1e-10  # relative; a tenth of the tolerance of limits, so that rounding does not tip the later verdict
@@ -39,19 +37,19 @@ class JointSurvey(LimitSurvey):
     limits: Limits
     moves: bool = True
 
-    def over(self, axes: JointAxes) -> Iterator[LimitExcess]:
+    def over(self, joints: NamedJoints, origin: float = 0.0) -> Iterator[Finding]:
         """Yield the worst excess of each joint and quantity."""
         for order in range(4 if self.moves else 2):
             bounds, extremes = self.limits.of_order(order), self.peaks[order]
             broken = exceeds(extremes.high, bounds[:, 1]) | exceeds(-extremes.low, -bounds[:, 0])
             for joint in np.flatnonzero(broken).tolist():
-                yield self._worst(axes, order, joint, bounds[joint])
+                yield self._worst(joints, order, joint, bounds[joint], origin)
 
     def excess(self) -> float:
         """Return by how much of a limit the joints are above it."""
         return float(share_of_limits([(p.low, p.high) for p in self.peaks], self.limits)) - (1 + _ROOM)
 
-    def _worst(self, axes: JointAxes, order: int, joint: int, bounds: Array) -> LimitExcess:
+    def _worst(self, joints: NamedJoints, order: int, joint: int, bounds: Array, origin: float) -> Finding:
         """Return the use in the direction that is worse: by ratio, or by distance where it is a position."""
         extremes = self.peaks[order]
         low, high = extremes.low[joint], extremes.high[joint]
@@ -61,16 +59,25 @@ class JointSurvey(LimitSurvey):
         downwards = below > above
         value, limit = (low, bounds[0]) if downwards else (high, bounds[1])
         time = extremes.low_time[joint] if downwards else extremes.high_time[joint]
-        return joint_excess(axes, order, joint, float(value), float(limit), float(time), still=not self.moves)
+        return joint_excess(
+            joints, order, joint, float(value), float(limit), float(time) - origin, still=not self.moves
+        )
 
 
 def joint_excess(
-    axes: JointAxes, order: int, joint: int, value: float, limit: float, time: float, *, still: bool = False
-) -> LimitExcess:
+    joints: NamedJoints,
+    order: int,
+    joint: int,
+    value: float,
+    limit: float,
+    time: float,
+    *,
+    still: bool = False,
+) -> Finding:
     """Return where a joint is over a limit of a derivative of its position.
 
     Args:
-        axes: The joints.
+        joints: All of them.
         order: 0 for the position.
         joint: Index.
         value: SI.
@@ -79,15 +86,15 @@ def joint_excess(
         still: Whether the motion has no duration that could be longer.
     """
     name = QUANTITIES[order]
-    return LimitExcess(
-        kind=JOINT_KINDS[order].name,
-        joint=joint,
+    return Finding(
+        kind=name,
+        joint=joints.joint_names[joint],
         value=value,
         limit=limit,
         time=time,
         factor=float(value / limit) ** (1 / order) if order and not still else None,
-        message=f"the {name} of {{joint}} reaches {{value}} {{when}}, its limit is {{limit}}",
-        amounts=axes.amounts(joint, order, value, limit),
+        message=f"the {name} of {{joint}} reaches {{value}} {at_time(time)}, its limit is {{limit}}",
+        amounts=excess_amounts(joints, joint, order, value, limit),
     )
 
 

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from trajcli.curves.piecewise import Array
-from trajcli.errors import Amount, Amounts
+from trajcli.errors import Amounts
+from trajcli.findings import Finding, NamedJoints
 from trajcli.frozen import comparable, frozen
-from trajcli.kinematics.robot import JointType, Limits, Robot
+from trajcli.kinematics.robot import Limits, Robot
 from trajcli.trajectory import Span, State, Trajectory
 
 if TYPE_CHECKING:
@@ -22,17 +23,7 @@ if TYPE_CHECKING:
     from trajcli.curves.time_optimal.constraints import PathConstraint
     from trajcli.kinematics.following.motion import ToolMotion
 
-JointLimit = Literal["position", "velocity", "acceleration", "jerk", "velocity_by_position", "effort"]
 ToolLimit = Literal["speed", "acceleration", "jerk", "angular_speed", "angular_acceleration"]
-LimitName = Literal[
-    JointLimit,
-    "tool_speed",
-    "tool_angular_speed",
-    "tool_acceleration",
-    "tool_angular_acceleration",
-    "tool_jerk",
-]
-"""Kinds of limits as findings name them: those of the tool have `tool_` in front of their key."""
 _RATES = ("", "/s", "/s^2", "/s^3")
 ScaleFactor = Literal["velocity", "acceleration", "jerk"]
 
@@ -54,7 +45,7 @@ class LimitKind:
         on_paths_only: Whether it bounds the law along a path, and nothing in joint space.
     """
 
-    name: LimitName
+    name: str
     family: str
     order: int | None
     factor: ScaleFactor | None = None
@@ -126,67 +117,17 @@ LIMITS_OF_JOINTS = frozenset(kind.name for kind in JOINT_KINDS)
 TOOL_KINDS = tuple(kind for kind in KINDS if kind.of_tool)
 
 
-@frozen
-class JointAxes:
-    """Joints of a motion, planned or recorded.
-
-    Attributes:
-        names: n names.
-        types: n types.
-    """
-
-    names: tuple[str, ...]
-    types: tuple[JointType, ...]
-
-    def dimension(self, joint: int) -> Literal["length", "angle"]:
-        """Return what a joint's positions measure."""
-        return "length" if self.types[joint] == "prismatic" else "angle"
-
-    def amounts(self, joint: int, order: int, value: float, limit: float) -> Mapping[str, Amount | str]:
-        """Return a joint's name, a value and its limit as amounts of a message."""
-        dimension, outward = self.dimension(joint), value > limit
-        return {
-            "joint": self.names[joint],
-            "value": Amount(value, order, joint, dimension, "up" if outward else "down"),
-            "limit": Amount(limit, order, joint, dimension, "down" if outward else "up"),
-        }
-
-
-@comparable
-class LimitExcess:
-    """Where a motion is over one limit, at its worst.
-
-    Attributes:
-        kind: Of the limit, or of a jump that it forbids.
-        joint: Index; None for the tool.
-        value: There, SI, signed.
-        limit: There, SI, signed as the value.
-        time: On the time of the motion, s.
-        factor: How many times longer the motion must last to keep the limit; None where that is no help.
-        message: One sentence, in which `{when}` stands for the time.
-        amounts: What stands for the other names in it.
-        method: "exact": from the roots of derivatives; "bounded": at most that for all t.
-        hint: What helps, where time does not.
-    """
-
-    kind: LimitName | Literal["tool_acceleration_jump"]
-    joint: int | None
-    value: float
-    limit: float
-    time: float
-    factor: float | None
-    message: str
-    amounts: Amounts
-    method: Literal["exact", "bounded"] = "exact"
-    hint: str | None = None
-
-
 class LimitSurvey(ABC):
     """What a motion uses of the limits of one family."""
 
     @abstractmethod
-    def over(self, axes: JointAxes) -> Iterator[LimitExcess]:
-        """Yield the limits that the motion does not keep."""
+    def over(self, joints: NamedJoints, origin: float = 0.0) -> Iterator[Finding]:
+        """Yield a finding for each limit that the motion does not keep.
+
+        Args:
+            joints: Of the motion.
+            origin: Time on its curve from which times of findings count, s.
+        """
 
     @abstractmethod
     def excess(self) -> float:

@@ -10,21 +10,20 @@ import numpy as np
 
 from trajcli.curves.extrema import peaks
 from trajcli.errors import Amount, Amounts
+from trajcli.findings import Finding, NamedJoints, at_time
 from trajcli.frozen import frozen
 from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.kinematics.robot import Limits, Robot
 from trajcli.limits.kinds import (
     KIND_OF,
     TOOL_KINDS,
-    JointAxes,
     LimitedMove,
-    LimitExcess,
     LimitFamily,
     LimitKind,
     LimitSurvey,
 )
+from trajcli.limits.tolerances import JUMP_RELATIVE, TOOL_RELATIVE
 from trajcli.limits.tool_bound import ToolPeak, tool_bounds
-from trajcli.tolerances import JUMP_RELATIVE, TOOL_RELATIVE
 from trajcli.trajectory import State
 
 BOUNDED = tuple(kind for kind in TOOL_KINDS if not kind.on_paths_only)
@@ -39,7 +38,7 @@ class ToolSurvey(LimitSurvey):
     Attributes:
         limits: In force.
         peaks: By the key of their limits, times from the start of the move; none where none is asked for.
-        begins: When the move begins, s on the curve.
+        begins: When the move begins, s from the start of the trajectory.
         moves: Whether it has a duration.
         motion: The reference motion along a path; None in joint space. Speeds and accelerations may differ
             from those of its law, which was planned within the limits, by as much as its tolerance says.
@@ -51,9 +50,9 @@ class ToolSurvey(LimitSurvey):
     moves: bool = True
     motion: ToolMotion | None = None
 
-    def over(self, axes: JointAxes) -> Iterator[LimitExcess]:
+    def over(self, joints: NamedJoints, origin: float = 0.0) -> Iterator[Finding]:
         """Yield the limits of the tool that the move does not keep."""
-        del axes
+        del joints, origin  # times are from the start of the trajectory
         for kind in BOUNDED if self.peaks else ():
             limit, peak = float(getattr(self.limits.tcp, kind.key)), self.peaks[kind.key]
             if not np.isinf(limit) and not peak.most <= limit * (
@@ -75,7 +74,7 @@ class ToolSurvey(LimitSurvey):
         tolerance = self.motion.tolerance
         return tolerance.angle if kind.dimension == "angle" else tolerance.position
 
-    def _law_over(self) -> Iterator[LimitExcess]:
+    def _law_over(self) -> Iterator[Finding]:
         """Yield where the law's jerk breaks its limit, or its acceleration steps although jerk is limited."""
         assert self.motion is not None  # noqa: S101
         limit, law = self.limits.tcp.jerk, self.motion.law
@@ -83,15 +82,14 @@ class ToolSurvey(LimitSurvey):
         steps = np.abs(np.append(after, 0.0) - np.append(0.0, before))
         accelerations, jerks = peaks(law, (2, 3))
         if steps.max() > JUMP_RELATIVE * float(accelerations.magnitude[0]):
-            time, size = float(law.breaks[int(steps.argmax())]), float(steps.max())
-            yield LimitExcess(
+            time, size = self.begins + float(law.breaks[int(steps.argmax())]), float(steps.max())
+            yield Finding(
                 kind="tool_acceleration_jump",
                 joint=None,
                 value=size,
                 limit=0.0,
-                time=self.begins + time,
-                factor=None,
-                message="the acceleration of the tool along its path steps by {value} {when}",
+                time=time,
+                message=f"the acceleration of the tool along its path steps by {{value}} {at_time(time)}",
                 amounts=_amounts(size, 0.0, 2, "length"),
                 hint=_JERK_HINT,
             )
@@ -102,9 +100,7 @@ class ToolSurvey(LimitSurvey):
             yield replace(tool_excess(KIND_OF["tool_jerk"], value, limit, self.begins + time), method="exact")
 
 
-def tool_excess(
-    kind: LimitKind, value: float, limit: float, time: float, *, still: bool = False
-) -> LimitExcess:
+def tool_excess(kind: LimitKind, value: float, limit: float, time: float, *, still: bool = False) -> Finding:
     """Return where the tool is over a limit.
 
     Args:
@@ -116,14 +112,14 @@ def tool_excess(
     """
     order = kind.order or 1
     factor = (value / limit) ** (1 / order)
-    return LimitExcess(
+    return Finding(
         kind=kind.name,
         joint=None,
         value=value,
         limit=limit,
         time=time,
         factor=factor if np.isfinite(factor) and not still else None,
-        message=f"the {kind.words} of the tool reaches {{value}} {{when}}, its limit is {{limit}}",
+        message=f"the {kind.words} of the tool reaches {{value}} {at_time(time)}, its limit is {{limit}}",
         amounts=_amounts(value, limit, order, kind.dimension),
         method="bounded",
     )

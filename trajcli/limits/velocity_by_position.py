@@ -8,6 +8,7 @@ that keeps it. Where a joint moves towards an end to which it is nearer than o^2
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,10 +16,11 @@ import numpy as np
 from trajcli.curves.approach import ApproachUse, approach_uses
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.errors import Amount, Amounts, PlanningError, Problem
+from trajcli.findings import Finding, NamedJoints, at_time, excess_amounts, joint_amounts
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Limits, Robot
-from trajcli.limits.kinds import JointAxes, LimitedMove, LimitExcess, LimitFamily, LimitSurvey
-from trajcli.tolerances import exceeds
+from trajcli.limits.kinds import LimitedMove, LimitFamily, LimitSurvey
+from trajcli.limits.tolerances import exceeds
 from trajcli.trajectory import State
 
 if TYPE_CHECKING:
@@ -35,32 +37,33 @@ class ApproachSurvey(LimitSurvey):
 
     uses: tuple[ApproachUse, ...]
 
-    def over(self, axes: JointAxes) -> Iterator[LimitExcess]:
+    def over(self, joints: NamedJoints, origin: float = 0.0) -> Iterator[Finding]:
         """Yield where a joint moves faster towards the end of its range than its distance allows."""
-        return (approach_excess(axes, use) for use in self.uses if exceeds(abs(use.velocity), abs(use.limit)))
+        over = (use for use in self.uses if exceeds(abs(use.velocity), abs(use.limit)))
+        return (approach_excess(joints, replace(use, time=use.time - origin)) for use in over)
 
     def excess(self) -> float:
         """Return by how much of a limit the joints are above it."""
         return max((use.used - (1 + _ROOM) for use in self.uses), default=-np.inf)
 
 
-def approach_excess(axes: JointAxes, use: ApproachUse) -> LimitExcess:
+def approach_excess(joints: NamedJoints, use: ApproachUse) -> Finding:
     """Return where a joint is over its limit, with the sentence that says it."""
     joint = use.component
     where = "beyond" if use.distance < 0 else "before"
     rule = "where its limit is {limit}" if use.limit else "where it may not move towards it ({limit})"
-    return LimitExcess(
+    return Finding(
         kind="velocity_by_position",
-        joint=joint,
+        joint=joints.joint_names[joint],
         value=use.velocity,
         limit=use.limit,
         time=use.time,
         factor=use.used if use.used < _HOPELESS else None,
-        message=f"the velocity of {{joint}} reaches {{value}} {{when}}, {{distance}} {where} the end "
-        f"of its range, {rule}",
+        message=f"the velocity of {{joint}} reaches {{value}} {at_time(use.time)}, "
+        f"{{distance}} {where} the end of its range, {rule}",
         amounts={
-            **axes.amounts(joint, 1, use.velocity, use.limit),
-            "distance": Amount(abs(use.distance), 0, joint, axes.dimension(joint)),
+            **joint_amounts(joints, joint, 0, distance=abs(use.distance)),
+            **excess_amounts(joints, joint, 1, use.velocity, use.limit),
         },
     )
 

@@ -210,6 +210,7 @@ class Planner(Model):
         handles: Whether it takes up a payload or leaves it, and moves nothing.
         smoother: Changes of its fields that make a move without steps in acceleration, each by the words that
             ask for it; "planner" may be among them.
+        faster: Likewise changes that keep the limits where slowing the whole move costs much more time.
         limits: Tightens the job's limits for this move; applied before `plan` is called.
         when_over_limit: Overrides the job's; applied after `plan` was called.
     """
@@ -220,6 +221,7 @@ class Planner(Model):
     follows_jerk: ClassVar[bool] = False
     handles: ClassVar[bool] = False
     smoother: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
+    faster: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
 
     limits: Annotated[LimitsSpec | None, Field(description="Tighter limits for this move.")] = None
     when_over_limit: Annotated[

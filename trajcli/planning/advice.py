@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from trajcli.checks.finding import Finding
 from trajcli.checks.verify import Verdict, longest_factor, verify
 from trajcli.errors import Amount, Problem, TrajcliError, at_least
+from trajcli.findings import Finding
 from trajcli.kinematics.robot import Robot
 from trajcli.limits.kinds import LIMITS_OF_JOINTS
 from trajcli.planners import changed
@@ -21,6 +21,7 @@ Say = Callable[[Amount], str]
 
 _STEP = "acceleration_jump"
 _NO_HELP = "slowing down does not help"
+_MUCH_LESS = 0.9  # of the time that slowing takes: below it another law is worth naming
 _SLOW = "`when_over_limit: slow`"
 
 
@@ -77,7 +78,17 @@ def _by_slowing(
     if field is None:
         return stretch, f"{text} ({total} s)" + (f": say {_SLOW}" if alone else ", all its times alike")
     where = "" if field == f"`duration: {total}`" else f": {field}"
-    return stretch, f"{text} ({total} s{where})" + (f", or say {_SLOW}" if alone else "")
+    faster = _faster(move, float(total)) if alone else ""
+    return stretch, f"{text} ({total} s{where})" + (f", or say {_SLOW}" if alone else "") + faster
+
+
+def _faster(move: PlannedMove, duration: float) -> str:
+    """Return what keeps the limits in much less time than `duration` seconds, where something does."""
+    for words, change in move.planner.faster.items():
+        other = _changed(move, change)
+        if other is not None and other.duration < _MUCH_LESS * duration and not _kinds(other):
+            return f"; {words} takes {at_least(other.duration)} s"
+    return ""
 
 
 def _field_that_works(move: PlannedMove, duration: float) -> str | None:
@@ -108,7 +119,7 @@ def _without_steps(own: Sequence[Finding], move: PlannedMove, moves: Sequence[Pl
     """Return what makes the acceleration join in a move, or at its border."""
     parts, rough = [], move
     if _STEP not in _kinds(move):
-        border = [f.time for f in own if f.kind == _STEP]
+        border = [f.time or 0.0 for f in own if f.kind == _STEP]
         starts = float(np.sum([m.duration for m in moves[: move.index]]))
         other = move.index + (1 if min(border) > starts + move.duration / 2 else -1)
         if not 0 <= other < len(moves):

@@ -21,10 +21,10 @@ from trajcli.job.read import LoadedJob
 from trajcli.kinematics.robot import Payload, Robot, point_mass
 from trajcli.limits.effort import EffortFamily
 from trajcli.limits.kinds import LimitedMove
+from trajcli.limits.tolerances import EFFORT_RELATIVE
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.progress import report_progress
-from trajcli.tolerances import EFFORT_RELATIVE
 
 LARGEST = 1e6
 """What no arm carries, kg: a job that verifies with it has no largest payload."""
@@ -210,7 +210,7 @@ class _Search:
         failed = self.attempt(high)
         if isinstance(failed, Plan):
             efforts = [found for found in failed.verdict.findings if found.kind == "effort"]
-            worst = max(efforts, key=lambda found: abs(found.value / found.limit), default=None)
+            worst = max(efforts, key=lambda found: found.excess, default=None)
             if worst is None:
                 return capacity
             return replace(

@@ -28,9 +28,9 @@ from trajcli.job.read import LoadedJob
 from trajcli.kinematics.robot import QUANTITIES, Payload, Robot
 from trajcli.language.targets import Target
 from trajcli.limits.kinds import has_further_limits
+from trajcli.limits.tolerances import JUMP_ABSOLUTE
 from trajcli.planners.planner import Event, PlannedMove, Planner, Resolve
 from trajcli.progress import report_progress
-from trajcli.tolerances import JUMP_ABSOLUTE
 from trajcli.trajectory import State, Trajectory
 
 if TYPE_CHECKING:
@@ -90,6 +90,9 @@ def plan_job(loaded: LoadedJob, carried: Carried | None = None, *, advise: bool 
         if known is not None:
             remark = known.remark(move.duration, move.robot.joint_names)
             events.append(replace(remark, move=move.index))
+    hint = _unit_hint(loaded) if loaded.has_far_angle else None
+    if hint is not None:
+        events.append(Event("units", hint))
     trajectory = _joined(moves, loaded, _first_state(loaded, _first_moving(moves), events))
     report_progress("checking the trajectory")
     verdict = verify(trajectory, [move.robot.limits for move in moves], [move.promise for move in moves])
@@ -118,20 +121,20 @@ def _plan_moves(
     with _errors_at(loaded, loaded.document.place(("start",))):
         state = resolve(loaded.job.start, np.zeros(len(loaded.robot.joints)), index=None).as_state()
     before: Planner | None = None
-    robot = loaded.robot
+    robot, begun = loaded.robot, 0.0
     origin: Target | None = loaded.job.start
     for index, planner in enumerate(loaded.job.moves):
         report_progress(f"planning move {index + 1} of {len(loaded.job.moves)} ({planner.tag})")
         start = _handed_over(state, before, planner)
         robot = replace(robot, payload=planner.carried_after(robot.payload)) if planner.handles else robot
         used = robot if carried is None else replace(robot, payload=carried(index, robot.payload))
-        begun = sum(float(done.planned.curve.breaks[-1]) for done in moves)
         try:
             with _errors_of(loaded, index, planner, begun):
                 reachable = planner.with_joint_targets(partial(resolve, index=index), state.position)
                 with _points_of_errors(loaded, index):
                     move = _plan_move(loaded, used, index, reachable.coming_from(origin), start)
             moves.append(move)
+            begun += float(move.planned.curve.breaks[-1])
             state = move.planned.end
         except MissingLimitError as error:
             lacking += error.problems
@@ -369,7 +372,7 @@ def _points_of_errors(loaded: LoadedJob, index: int) -> Iterator[None]:
     """Give errors about a target of a move its place, or the name of its point and the place of that."""
     try:
         yield
-    except PlanningError as error:
+    except (InputError, PlanningError) as error:
         raise type(error)(*(_about_point(loaded, index, problem) for problem in error.problems)) from None
 
 

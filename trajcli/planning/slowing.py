@@ -12,8 +12,8 @@ from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.kinematics.robot import ToolLimits
 from trajcli.limits.joints import JointSurvey, peaks_by_move
 from trajcli.limits.kinds import LimitedMove, families, family
+from trajcli.limits.tolerances import exceeds
 from trajcli.planners.planner import PlannedMove
-from trajcli.tolerances import exceeds
 from trajcli.trajectory import State
 
 _PROBED = (1.5, 4.0, 30.0)  # times the duration: a planner that refuses all of them refuses any

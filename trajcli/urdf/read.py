@@ -22,7 +22,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Place, Problem, utf8
 from trajcli.frozen import frozen
 from trajcli.language.numbers import LARGEST_POSITION, LARGEST_RATE
-from trajcli.suggest import did_you_mean, valid_names
+from trajcli.suggest import did_you_mean, flaw_of_name, valid_names
 
 MAX_BYTES = 10_000_000
 MAX_DEPTH = 100
@@ -178,6 +178,9 @@ def _unique_name(document: UrdfDocument, element: Element, taken: Mapping[str, o
     name = element.attributes.get("name", "")
     if not name.strip():
         raise document.refused(f"a <{element.name}> has no name", element, "name")
+    flaw = flaw_of_name(name)
+    if flaw is not None:
+        raise document.refused(flaw, element, "name")
     if name in taken:
         raise document.refused(f"the name of {element.name} '{name}' stands twice", element, "name")
     return name

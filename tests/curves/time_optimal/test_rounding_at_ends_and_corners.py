@@ -10,7 +10,7 @@ from topp_paths import polyline, spline, symmetric
 
 from trajcli.curves.time_optimal.parameterization import time_optimal
 from trajcli.curves.time_optimal.passes import UnreachableSpeedError
-from trajcli.tolerances import JUMP_ABSOLUTE
+from trajcli.limits.tolerances import JUMP_ABSOLUTE
 
 
 def test_a_joint_that_turns_back_beside_a_fast_one_is_a_corner():

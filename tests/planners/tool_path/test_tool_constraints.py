@@ -184,7 +184,7 @@ def test_a_center_within_a_path_is_moved_with_an_event():
                 "segments": [{"line": {"xyz": [450, 100, 50]}}, {"line": {"xyz": [400, 100, 50]}}],
             },
             "corner 1 of the path, at [450, 100, 50] mm",
-            "corner: stop",
+            "`radius: 0` in segment 0",
         ),
     ],
 )

@@ -179,6 +179,18 @@ class Chain:
         return local
 
 
+class CornerError(PlanningError):
+    """A corner between two segments cannot be rounded as it is asked for.
+
+    Attributes:
+        index: Of the segment that ends in the corner.
+    """
+
+    def __init__(self, index: int, *problems: Problem) -> None:
+        super().__init__(*problems)
+        self.index = index
+
+
 def join(segments: Sequence[PositionCurve], radii: ArrayLike = 0.0) -> Chain:
     """Return the chain of segments, each of which starts where the one before ends.
 
@@ -191,7 +203,7 @@ def join(segments: Sequence[PositionCurve], radii: ArrayLike = 0.0) -> Chain:
 
     Raises:
         InputError: When there is no segment, one does not start where the other ends, or radii do not fit.
-        PlanningError: When a corner to be rounded turns back.
+        CornerError: When a corner to be rounded turns back.
     """
     if not segments:
         raise InputError("a path needs at least one segment")
@@ -254,7 +266,7 @@ def _blend(index: int, before: PositionCurve, after: PositionCurve, radius: floa
         (why,) = error.problems
         text = f"corner {index + 1} of the path, at {{where}}: {why.message}"
         amounts = {**why.amounts, "where": shown_position(after.evaluate(np.zeros(1))[0][0])}
-        raise PlanningError(replace(why, message=text, amounts=amounts)) from error
+        raise CornerError(index, replace(why, message=text, amounts=amounts)) from error
 
 
 def _check_joints(segments: Sequence[PositionCurve]) -> None:

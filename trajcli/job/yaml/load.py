@@ -42,6 +42,7 @@ __all__ = ["MAX_DEPTH", "Document", "Node", "parse_document", "read_document"]
 
 MAX_DEPTH = 32
 
+_CUT_BY_COMMA = re.compile(r"[:\[,]\s*([-+]?\d+),$")
 _MARKER = re.compile(r"[&*!][^\s,\[\]{}]*")
 _REPEATED = "put what is used twice under `points`, and name it there"
 
@@ -252,9 +253,19 @@ class _Walk:
         elif not key.text:
             message = "a key is missing before the colon"
         else:
-            message, hint = f"the key {key.text} is no name", f'write "{key.text}"'
+            message, hint = (
+                f"the key {key.text} is no name",
+                self._decimal_comma(key) or f'write "{key.text}"',
+            )
         self._report(message, key, hint)
         return None
+
+    def _decimal_comma(self, key: Node) -> str | None:
+        """Return the hint where a comma cut a number into a value and a key, as in `duration: 0,2`."""
+        before = _CUT_BY_COMMA.search(self.lines[key.line - 1][: key.column - 1])
+        if before is None or not key.text.isdigit():
+            return None
+        return f"write {before[1]}.{key.text}: decimals have a point"
 
     def _refuse_marker(self, event: Any) -> Node:  # noqa: ANN401
         """Report the anchor, alias or tag at the start of an event, and return it as a node without value."""

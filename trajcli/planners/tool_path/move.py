@@ -132,6 +132,9 @@ class ToolPathMove(Planner):
         "`law: {shape: quintic}`": {"law": {"shape": "quintic"}},
         "jerk_limited": {"law": {"shape": "jerk_limited"}},
     }
+    faster: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "`shape: time_optimal` under `law`": {"law": {"shape": "time_optimal"}},
+    }
 
     def without_duration(self) -> tuple[float, Self] | None:
         """Return the duration of the law, s, and the move whose law finds it itself, if one is given."""

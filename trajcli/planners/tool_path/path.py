@@ -23,7 +23,7 @@ from trajcli.curves.operations import merge_breaks
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side
 from trajcli.errors import Amount, InputError, PlanningError, Problem, TrajcliError
 from trajcli.frozen import frozen
-from trajcli.geometry.paths.chain import Chain, Corner, join
+from trajcli.geometry.paths.chain import Chain, Corner, CornerError, join
 from trajcli.geometry.paths.orientation import turn_vectors
 from trajcli.geometry.paths.pose import PoseCurve
 from trajcli.geometry.paths.position import Line, PositionCurve
@@ -65,7 +65,17 @@ class Segment(Model):
 
     line: Annotated[NamedTarget | None, Field(description="Where a straight segment ends.")] = None
     arc: ArcFields | None = None
-    radius: Radius | None = None
+    radius: (
+        Annotated[
+            float,
+            Number(
+                Quantity("length"),
+                "That of the corner after this segment, instead of the move's; 0 stops there (length unit).",
+                at_least=0.0,
+            ),
+        ]
+        | None
+    ) = None
 
     @model_validator(mode="after")
     def _is_one(self) -> Segment:
@@ -150,8 +160,8 @@ class PathMove(ToolPathMove):
         overlap = self.overlap is not None and len(curves) > 1
         radii = [0.0] * (len(curves) - 1)
         if self.corner == "round":
-            radii = [segment.radius or self.radius or 0.0 for segment in self.segments[:-1]]
-        chain = join(curves, np.array(radii))
+            radii = [_first_given(segment.radius, self.radius) for segment in self.segments[:-1]]
+        chain = _joined(curves, radii)
         how, start = self.orientation, before[:3, :3]
         turning = orientation_along(how, start, targets, chain, chain.progress, self.origin)
         poses = PoseCurve(chain, turning)
@@ -197,17 +207,38 @@ def _segments(before: Array, move: PathMove, robot: Robot) -> tuple[list[Positio
         try:
             curve, target = _segment(segment, pose, robot)
         except TrajcliError as error:
-            raise type(error)(*(problem.within(f"segment {index}") for problem in error.problems)) from None
+            raise type(error)(*(_in_segment(index, problem) for problem in error.problems)) from None
         if targets and (target.orientation, target.tool_axis) != (
             targets[-1].orientation,
             targets[-1].tool_axis,
         ):
             message = f"segment {index} fixes another part of the orientation than the one before"
-            raise InputError(message, hint="give the targets of all segments the same kind of orientation")
+            hint = "give the targets of all segments the same kind of orientation"
+            raise InputError(Problem(message, hint, field=("segments", index)))
         curves.append(curve)
         targets.append(target)
         pose = target.pose
     return curves, targets
+
+
+def _in_segment(index: int, problem: Problem) -> Problem:
+    """Return a problem that stands in a segment, with the place of that."""
+    below = problem.field or ()
+    return replace(problem.within(f"segment {index}"), field=("segments", index, *below))
+
+
+def _joined(curves: Sequence[PositionCurve], radii: Sequence[float]) -> Chain:
+    """Return the chain of segments; what is wrong with a corner stands at the segment that ends in it.
+
+    Raises:
+        PlanningError: When a corner to be rounded turns back.
+    """
+    try:
+        return join(curves, np.array(radii))
+    except CornerError as error:
+        hint = f"stop there: `radius: 0` in segment {error.index}"
+        problems = (replace(p, hint=hint, field=("segments", error.index)) for p in error.problems)
+        raise PlanningError(*problems) from None
 
 
 def _segment(segment: Segment, pose: Array, robot: Robot) -> tuple[PositionCurve, ToolTarget]:
@@ -218,6 +249,11 @@ def _segment(segment: Segment, pose: Array, robot: Robot) -> tuple[PositionCurve
         raise InputError("a segment is either a `line` or an `arc`")
     target = tool_target(segment.line, pose, robot)
     return Line(pose[:3, 3], target.pose[:3, 3]), target
+
+
+def _first_given(*radii: float | None) -> float:
+    """Return the first radius that is given, m; 0 where none is."""
+    return next((radius for radius in radii if radius is not None), 0.0)
 
 
 def _radius_events(chain: Chain) -> tuple[Event, ...]:
