@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from trajcli.job.robot import catalogue_names
     from trajcli.judge.finding import JudgedFinding, Judgement
     from trajcli.kinematics.robot import Joint, Limits, Robot
+    from trajcli.motions import Motion, batch, plot, resample, retime, view
     from trajcli.output.report import report_of, verification_error
     from trajcli.output.write import write_plan
     from trajcli.planning.plan import Plan, plan_job
@@ -69,6 +70,7 @@ _HOMES = {
     "trajcli.job.robot": ("catalogue_names",),
     "trajcli.judge.finding": ("JudgedFinding", "Judgement"),
     "trajcli.kinematics.robot": ("Joint", "Limits", "Robot"),
+    "trajcli.motions": ("Motion", "batch", "plot", "resample", "retime", "view"),
     "trajcli.planning.plan": ("Plan", "plan_job"),
     "trajcli.output.report": ("report_of", "verification_error"),
     "trajcli.output.write": ("write_plan",),
@@ -89,6 +91,7 @@ __all__ = [
     "Limits",
     "LoadedJob",
     "MissingLimitError",
+    "Motion",
     "PiecewisePolynomial",
     "Place",
     "Plan",
@@ -104,6 +107,7 @@ __all__ = [
     "Verdict",
     "VerificationError",
     "__version__",
+    "batch",
     "catalogue_names",
     "check",
     "dump_job",
@@ -112,8 +116,12 @@ __all__ = [
     "load_robot",
     "plan",
     "plan_job",
+    "plot",
     "report_of",
+    "resample",
+    "retime",
     "verification_error",
+    "view",
     "write_plan",
 ]
 

@@ -20,8 +20,8 @@ FLOORS = (
     ("planning", "comparison", "queries", "consumers"),
     ("judge",),
     ("output", "plots", "player", "editing"),
-    ("batch",),
-    ("cli", "api"),
+    ("batches",),
+    ("cli", "api", "motions"),
     ("",),  # trajcli/__init__.py, the public face
     ("__main__",),
 )
