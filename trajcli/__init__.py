@@ -22,7 +22,6 @@ from trajcli.version import __version__
 
 if TYPE_CHECKING:
     from trajcli.api import Arm, InverseSolution, PlannedJob, check, load_robot, plan
-    from trajcli.checks.finding import Finding
     from trajcli.checks.verify import Verdict
     from trajcli.curves.piecewise import PiecewisePolynomial
     from trajcli.errors import (
@@ -35,12 +34,13 @@ if TYPE_CHECKING:
         TrajcliError,
         VerificationError,
     )
+    from trajcli.findings import Finding
     from trajcli.job.dump import dump_job
     from trajcli.job.model import Job
     from trajcli.job.read import LoadedJob, job_from_text, load_job
     from trajcli.job.report import Report
     from trajcli.job.robot import catalogue_names
-    from trajcli.judge.finding import JudgedFinding, Judgement
+    from trajcli.judge.judgement import Judgement
     from trajcli.kinematics.robot import Joint, Limits, Robot
     from trajcli.motions import Motion, batch, plot, resample, retime, view
     from trajcli.output.report import report_of, verification_error
@@ -50,7 +50,6 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "trajcli.api": ("Arm", "InverseSolution", "PlannedJob", "check", "load_robot", "plan"),
-    "trajcli.checks.finding": ("Finding",),
     "trajcli.checks.verify": ("Verdict",),
     "trajcli.curves.piecewise": ("PiecewisePolynomial",),
     "trajcli.errors": (
@@ -63,12 +62,13 @@ _HOMES = {
         "TrajcliError",
         "VerificationError",
     ),
+    "trajcli.findings": ("Finding",),
     "trajcli.job.dump": ("dump_job",),
     "trajcli.job.model": ("Job",),
     "trajcli.job.read": ("LoadedJob", "job_from_text", "load_job"),
     "trajcli.job.report": ("Report",),
     "trajcli.job.robot": ("catalogue_names",),
-    "trajcli.judge.finding": ("JudgedFinding", "Judgement"),
+    "trajcli.judge.judgement": ("Judgement",),
     "trajcli.kinematics.robot": ("Joint", "Limits", "Robot"),
     "trajcli.motions": ("Motion", "batch", "plot", "resample", "retime", "view"),
     "trajcli.planning.plan": ("Plan", "plan_job"),
@@ -86,7 +86,6 @@ __all__ = [
     "InverseSolution",
     "Job",
     "Joint",
-    "JudgedFinding",
     "Judgement",
     "Limits",
     "LoadedJob",
