@@ -21,7 +21,8 @@ from typing import TYPE_CHECKING, Any
 from trajcli.version import __version__
 
 if TYPE_CHECKING:
-    from trajcli.api import Arm, InverseSolution, PlannedJob, check, load_robot, plan
+    from trajcli.api.motions import Motion, batch, plot, resample, retime, view
+    from trajcli.api.plans import Arm, InverseSolution, PlannedJob, check, load_robot, plan
     from trajcli.checks.verify import Verdict
     from trajcli.curves.piecewise import PiecewisePolynomial
     from trajcli.errors import (
@@ -42,14 +43,13 @@ if TYPE_CHECKING:
     from trajcli.job.robot import catalogue_names
     from trajcli.judge.judgement import Judgement
     from trajcli.kinematics.robot import Joint, Limits, Robot
-    from trajcli.motions import Motion, batch, plot, resample, retime, view
     from trajcli.output.report import report_of, verification_error
     from trajcli.output.write import write_plan
     from trajcli.planning.plan import Plan, plan_job
     from trajcli.trajectory import Rows, State, Trajectory
 
 _HOMES = {
-    "trajcli.api": ("Arm", "InverseSolution", "PlannedJob", "check", "load_robot", "plan"),
+    "trajcli.api.plans": ("Arm", "InverseSolution", "PlannedJob", "check", "load_robot", "plan"),
     "trajcli.checks.verify": ("Verdict",),
     "trajcli.curves.piecewise": ("PiecewisePolynomial",),
     "trajcli.errors": (
@@ -70,7 +70,7 @@ _HOMES = {
     "trajcli.job.robot": ("catalogue_names",),
     "trajcli.judge.judgement": ("Judgement",),
     "trajcli.kinematics.robot": ("Joint", "Limits", "Robot"),
-    "trajcli.motions": ("Motion", "batch", "plot", "resample", "retime", "view"),
+    "trajcli.api.motions": ("Motion", "batch", "plot", "resample", "retime", "view"),
     "trajcli.planning.plan": ("Plan", "plan_job"),
     "trajcli.output.report": ("report_of", "verification_error"),
     "trajcli.output.write": ("write_plan",),

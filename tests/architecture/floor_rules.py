@@ -21,7 +21,7 @@ FLOORS = (
     ("judge",),
     ("output", "plots", "player", "editing"),
     ("batches",),
-    ("cli", "api", "motions"),
+    ("cli", "api"),
     ("",),  # trajcli/__init__.py, the public face
     ("__main__",),
 )

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from trajcli.api import plan as planned_job
+from trajcli.api.plans import plan as planned_job
 from trajcli.curves.piecewise import Array
 from trajcli.editing.edited_motion import EditedMotion, ReadingOptions, read_motion
 from trajcli.errors import InputError, VerificationError
