@@ -56,7 +56,7 @@ class CommandLine:
 
     @classmethod
     def fields(cls) -> dict[str, Any]:
-        """Return the type of each field with what typer knows of it; a command's own before inherited ones."""
+        """Return the type of each field with what typer knows; a command's own before inherited ones."""
         hints = get_type_hints(cls, include_extras=True)
         described = cls.__mro__[: cls.__mro__.index(CommandLine)]
         return {name: hints[name] for each in described for name in get_annotations(each)}
