@@ -1,4 +1,4 @@
-"""Judgement of several jobs, and annotations of jobs for continuous integration."""
+"""Plans of jobs: one that is written, or several that are judged, with annotations for CI."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING
 from trajcli.cli.outcome import BUG, report_bug, report_error
 from trajcli.cli.plan import plan_and_write
 from trajcli.errors import InputError, Problem, TrajcliError, VerificationError
-from trajcli.output.annotations import Annotation, AnnotationForm, annotations_of, render_annotations
 from trajcli.planning.plan import Plan
 
 if TYPE_CHECKING:
     from trajcli.cli.job_commands import PlanCommand
+    from trajcli.output.annotations import Annotation, AnnotationForm
 
 _EXCLUDED = ("output", "report", "resolved")
 
 
-def run_gate(options: PlanCommand) -> int:
+def run_plan(options: PlanCommand) -> int:
     """Plan and judge each job, whatever is wrong with the others; return the worst exit code.
 
     Raises:
@@ -57,6 +57,8 @@ def _judged(job: str, options: PlanCommand) -> int:
 
 def _annotated(jobs: Sequence[str], options: PlanCommand, form: AnnotationForm) -> int:
     """Judge jobs; write one document, or a line for each annotation; return the worst exit code."""
+    from trajcli.output.annotations import annotations_of, render_annotations
+
     code = 0
     found: list[Annotation] = []
     quiet = options if form == "github" else options.replaced(quiet=True)  # a document stands alone
@@ -77,6 +79,8 @@ def _annotated(jobs: Sequence[str], options: PlanCommand, form: AnnotationForm) 
 
 def _concessions(plan: Plan, job: str) -> Iterator[Annotation]:
     """Yield what was conceded in a plan that verifies."""
+    from trajcli.output.annotations import annotations_of
+
     for event in plan.events:
         if event.concedes:
             place = None if event.move is None else plan.loaded.place_of_move(event.move)

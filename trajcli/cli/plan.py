@@ -33,20 +33,6 @@ _FEW_STEPS = 9  # in acceleration: of more the largest says most
 _STILL = 1e-9  # rad/s or m/s, below which a joint only rounds
 
 
-def run_plan(options: PlanCommand) -> int:
-    """Plan, judge and write a job, or judge several; return the exit code.
-
-    Raises:
-        TrajcliError: When anything is wrong; then no rows were written.
-    """
-    if options.others or options.errors not in ("text", "json"):
-        from trajcli.cli.gate import run_gate
-
-        return run_gate(options)
-    plan_and_write(options.job, options)
-    return 0
-
-
 def plan_and_write(job: str, options: PlanCommand) -> Plan:
     """Plan, judge and write a job; return the plan, which verifies.
 
