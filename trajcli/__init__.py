@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING, Any
 from trajcli.version import __version__
 
 if TYPE_CHECKING:
-    from trajcli.api import Arm, InverseSolution, PlannedJob, check, load_robot, plan
-    from trajcli.checks.finding import Finding
+    from trajcli.api.motions import Motion, batch, plot, resample, retime, view
+    from trajcli.api.plans import Arm, InverseSolution, PlannedJob, check, load_robot, plan
     from trajcli.checks.verify import Verdict
     from trajcli.curves.piecewise import PiecewisePolynomial
     from trajcli.errors import (
@@ -35,12 +35,13 @@ if TYPE_CHECKING:
         TrajcliError,
         VerificationError,
     )
+    from trajcli.findings import Finding
     from trajcli.job.dump import dump_job
     from trajcli.job.model import Job
     from trajcli.job.read import LoadedJob, job_from_text, load_job
     from trajcli.job.report import Report
     from trajcli.job.robot import catalogue_names
-    from trajcli.judge.finding import JudgedFinding, Judgement
+    from trajcli.judge.judgement import Judgement
     from trajcli.kinematics.robot import Joint, Limits, Robot
     from trajcli.output.report import report_of, verification_error
     from trajcli.output.write import write_plan
@@ -48,8 +49,7 @@ if TYPE_CHECKING:
     from trajcli.trajectory import Rows, State, Trajectory
 
 _HOMES = {
-    "trajcli.api": ("Arm", "InverseSolution", "PlannedJob", "check", "load_robot", "plan"),
-    "trajcli.checks.finding": ("Finding",),
+    "trajcli.api.plans": ("Arm", "InverseSolution", "PlannedJob", "check", "load_robot", "plan"),
     "trajcli.checks.verify": ("Verdict",),
     "trajcli.curves.piecewise": ("PiecewisePolynomial",),
     "trajcli.errors": (
@@ -62,13 +62,15 @@ _HOMES = {
         "TrajcliError",
         "VerificationError",
     ),
+    "trajcli.findings": ("Finding",),
     "trajcli.job.dump": ("dump_job",),
     "trajcli.job.model": ("Job",),
     "trajcli.job.read": ("LoadedJob", "job_from_text", "load_job"),
     "trajcli.job.report": ("Report",),
     "trajcli.job.robot": ("catalogue_names",),
-    "trajcli.judge.finding": ("JudgedFinding", "Judgement"),
+    "trajcli.judge.judgement": ("Judgement",),
     "trajcli.kinematics.robot": ("Joint", "Limits", "Robot"),
+    "trajcli.api.motions": ("Motion", "batch", "plot", "resample", "retime", "view"),
     "trajcli.planning.plan": ("Plan", "plan_job"),
     "trajcli.output.report": ("report_of", "verification_error"),
     "trajcli.output.write": ("write_plan",),
@@ -84,11 +86,11 @@ __all__ = [
     "InverseSolution",
     "Job",
     "Joint",
-    "JudgedFinding",
     "Judgement",
     "Limits",
     "LoadedJob",
     "MissingLimitError",
+    "Motion",
     "PiecewisePolynomial",
     "Place",
     "Plan",
@@ -104,6 +106,7 @@ __all__ = [
     "Verdict",
     "VerificationError",
     "__version__",
+    "batch",
     "catalogue_names",
     "check",
     "dump_job",
@@ -112,8 +115,12 @@ __all__ = [
     "load_robot",
     "plan",
     "plan_job",
+    "plot",
     "report_of",
+    "resample",
+    "retime",
     "verification_error",
+    "view",
     "write_plan",
 ]
 

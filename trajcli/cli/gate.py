@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from trajcli.cli.outcome import BUG, report_bug, report_error
 from trajcli.cli.plan import plan_and_write
-from trajcli.errors import InputError, Problem, TrajcliError, VerificationError
+from trajcli.errors import InputError, Place, Problem, TrajcliError
 from trajcli.planning.plan import Plan
 
 if TYPE_CHECKING:
     from trajcli.cli.job_commands import PlanCommand
-    from trajcli.output.annotations import Annotation, AnnotationForm
+    from trajcli.output.annotations import AnnotationForm
 
 _EXCLUDED = ("output", "report", "resolved")
 
@@ -60,7 +59,7 @@ def _annotated(jobs: Sequence[str], options: PlanCommand, form: AnnotationForm) 
     from trajcli.output.annotations import annotations_of, render_annotations
 
     code = 0
-    found: list[Annotation] = []
+    found: list[Problem] = []
     quiet = options if form == "github" else options.replaced(quiet=True)  # a document stands alone
     for job in jobs:
         try:
@@ -77,13 +76,10 @@ def _annotated(jobs: Sequence[str], options: PlanCommand, form: AnnotationForm) 
     return code
 
 
-def _concessions(plan: Plan, job: str) -> Iterator[Annotation]:
+def _concessions(plan: Plan, job: str) -> Iterator[Problem]:
     """Yield what was conceded in a plan that verifies."""
-    from trajcli.output.annotations import annotations_of
-
     for event in plan.events:
         if event.concedes:
-            place = None if event.move is None else plan.loaded.place_of_move(event.move)
-            problem = Problem(event.text(plan.loaded.say), place=place, kind=event.kind)
-            for annotation in annotations_of(VerificationError(problem), job):
-                yield replace(annotation, severity="warning")
+            place = Place(job, 0, 0) if event.move is None else plan.loaded.place_of_move(event.move)
+            text = event.text(plan.loaded.say)
+            yield Problem(text, place=place, kind=event.kind, severity="warning")

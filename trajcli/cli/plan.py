@@ -21,12 +21,12 @@ from trajcli.streams.formats import StreamFormat, format_of
 from trajcli.streams.whole_file import identity
 
 if TYPE_CHECKING:
-    from trajcli.checks.tool_bound import ToolPeak
     from trajcli.cli.job_commands import PlanCommand
     from trajcli.consumers.judgement import ProfileJudgement
     from trajcli.consumers.profile import Profile
     from trajcli.job.report import MoveReport
     from trajcli.job.reports.comparisons import PathReferenceReport, PeerViolation, ReferenceReport
+    from trajcli.limits.tool_bound import ToolPeak
     from trajcli.output.recording import LogOptions
 
 _FEW_STEPS = 9  # in acceleration: of more the largest says most
@@ -130,7 +130,7 @@ def _judged(
 def _summarise_consumer(judged: ProfileJudgement) -> None:
     from trajcli.output.consumer import counted
 
-    warnings = [f"  {each.rule}: {each.message}{counted(each)}" for each in judged.breaches]
+    warnings = [f"  {each.rule}: {each.message}{counted(each)}" for each in judged.findings]
     unjudged = ", ".join(rule for rule, _ in judged.unjudged)
     lines = [f"for {judged.profile.name}: all necessary rules are kept", *warnings]
     lines += [f"  not judged: {unjudged}"] if unjudged else []

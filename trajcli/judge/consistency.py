@@ -15,14 +15,13 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.checks.finding import at_time
-from trajcli.checks.tolerances import JUMP_ABSOLUTE, JUMP_RELATIVE, exceeds
 from trajcli.curves.piecewise import Array
+from trajcli.findings import Collector, Finding, NamedJoints, at_time, excess_amounts
 from trajcli.frozen import frozen
-from trajcli.judge.finding import JudgedFinding, JudgedKind, Worst
-from trajcli.judge.intervals import DENSE, Intervals, JointAxes
+from trajcli.judge.intervals import DENSE, Intervals
 from trajcli.judge.rounding import stated_errors
 from trajcli.kinematics.robot import Limits
+from trajcli.limits.tolerances import JUMP_ABSOLUTE, JUMP_RELATIVE, exceeds
 
 _ISOLATED = 4.0  # times the changes beside it: a motion that merely is fast changes from row to row alike
 _STEPS = 2.0  # times what one step in acceleration within an interval explains: there may be several
@@ -117,8 +116,8 @@ def judge_consistency(
     pieces: slice,
     limits: Limits,
     move: int,
-    axes: JointAxes,
-    worst: Worst,
+    axes: NamedJoints,
+    worst: Collector,
     changes: list[Changes],
     changes_branch: ChangesBranch | None = None,
 ) -> None:
@@ -148,9 +147,9 @@ class _Judge:
 
     window: Intervals
     changes: Changes
-    axes: JointAxes
+    axes: NamedJoints
     move: int
-    worst: Worst
+    worst: Collector
 
     def over_limit(self, limits: Limits) -> NDArray[np.bool_]:
         """Return where the quantity changes by more than the limit of the next derivative allows, (P, n)."""
@@ -193,7 +192,7 @@ class _Judge:
                 branch[k] = changes_branch(q[low : int(row[k]) + 3], int(row[k]) - low)
         quantity = _QUANTITIES[changes.order]
 
-        def make(kind: JudgedKind) -> Callable[[int], JudgedFinding]:
+        def make(kind: str) -> Callable[[int], Finding]:
             return lambda k: self._finding(kind, int(row[k]), int(joint[k]))
 
         add = self.worst.add
@@ -209,7 +208,7 @@ class _Judge:
         near = np.clip(row + np.arange(-_NEAR, _NEAR + 1)[:, None], 0, len(values) - 1)
         return np.asarray(values[row, joint] - np.median(values[near, joint], axis=0))
 
-    def _finding(self, kind: JudgedKind, row: int, joint: int) -> JudgedFinding:
+    def _finding(self, kind: str, row: int, joint: int) -> Finding:
         changes, length = self.changes, float(self.window.lengths[row])
         order, stated = changes.order, changes.stated
         value, limit = float(changes.change[row, joint]), 0.0 if stated is None else float(stated[row, joint])
@@ -229,11 +228,11 @@ class _Judge:
                 f"the column of the {name} of {{joint}} says {{value}} {at_time(time)}, "
                 f"its {below} changes by {{limit}}"
             )
-        return JudgedFinding(
+        return Finding(
             rule={"jump": "continuity", "derivative": "derivative"}.get(kind, "path"),
             severity="error",
             kind=kind,
-            joint=self.axes.names[joint],
+            joint=self.axes.joint_names[joint],
             value=value,
             limit=limit,
             time=time,
@@ -242,5 +241,5 @@ class _Judge:
             quantity=None if kind == "branch" else _QUANTITIES[order],
             rounding=rounding,
             message=text,
-            amounts=self.axes.amounts(joint, order, value, limit),
+            amounts=excess_amounts(self.axes, joint, order, value, limit),
         )

@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.checks.finding import at_time
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount
-from trajcli.judge.finding import FindingSeverity, JudgedFinding, JudgedKind, Worst
-from trajcli.judge.intervals import JointAxes
+from trajcli.findings import Collector, Finding, FindingSeverity, NamedJoints, at_time, excess_amounts
 from trajcli.judge.rounding import stated_errors
 from trajcli.streams.recorded_motion import Resolution
 from trajcli.trajectory import State
@@ -22,8 +20,8 @@ _REST = 1e-6
 
 
 def judge_start(
-    row: EndState, start: State, tolerance: Array, resolution: Resolution, axes: JointAxes
-) -> list[JudgedFinding]:
+    row: EndState, start: State, tolerance: Array, resolution: Resolution, axes: NamedJoints
+) -> list[Finding]:
     """Return where the first row is not the state in which the motion shall begin: the worst joint of each.
 
     Args:
@@ -40,8 +38,8 @@ def judge_start(
 
 
 def judge_end(
-    row: EndState, end: State | None, tolerance: Array | None, resolution: Resolution, axes: JointAxes
-) -> list[JudgedFinding]:
+    row: EndState, end: State | None, tolerance: Array | None, resolution: Resolution, axes: NamedJoints
+) -> list[Finding]:
     """Return where the last row is not the state in which the motion shall end.
 
     Where nobody says it, it shall be at rest, and a warning says where it is not.
@@ -54,7 +52,7 @@ def judge_end(
         axes: The joints.
     """
     if end is None or tolerance is None:
-        rest = np.zeros(len(axes.names))
+        rest = np.zeros(len(axes.joint_names))
         return _velocity(row, rest, resolution, axes, "end", "warning")
     return [
         *_position(row, end.position, tolerance, resolution, axes, "end"),
@@ -63,8 +61,8 @@ def judge_end(
 
 
 def _position(
-    row: EndState, wanted: Array, tolerance: Array, resolution: Resolution, axes: JointAxes, kind: JudgedKind
-) -> list[JudgedFinding]:
+    row: EndState, wanted: Array, tolerance: Array, resolution: Resolution, axes: NamedJoints, kind: str
+) -> list[Finding]:
     time, number, (q, *_) = row
     if q is None:
         return []
@@ -75,13 +73,19 @@ def _position(
         return []
     value, limit = float(q[0, joint]), float(wanted[joint])
     which = "first" if kind == "start" else "last"
-    within = Amount(float(tolerance[joint]), 0, joint, axes.dimension(joint), "down")
+    within = Amount(
+        float(tolerance[joint]),
+        0,
+        joint,
+        "length" if axes.joint_types[joint] == "prismatic" else "angle",
+        "down",
+    )
     return [
-        JudgedFinding(
+        Finding(
             rule="state",
             severity="error",
             kind=kind,
-            joint=axes.names[joint],
+            joint=axes.joint_names[joint],
             value=value,
             limit=limit,
             time=time,
@@ -92,7 +96,7 @@ def _position(
             rounding=float(room[joint]),
             message=f"the {which} row has {{joint}} at {{value}} {at_time(time)}, expected {{limit}} "
             "within {tolerance}",
-            amounts={**axes.amounts(joint, 0, value, limit), "tolerance": within},
+            amounts={**excess_amounts(axes, joint, 0, value, limit), "tolerance": within},
         )
     ]
 
@@ -101,10 +105,10 @@ def _velocity(
     row: EndState,
     wanted: Array,
     resolution: Resolution,
-    axes: JointAxes,
-    kind: JudgedKind,
+    axes: NamedJoints,
+    kind: str,
     severity: FindingSeverity,
-) -> list[JudgedFinding]:
+) -> list[Finding]:
     time, number, (_, qd, _) = row
     if qd is None or not np.isfinite(qd).all():
         return []
@@ -116,11 +120,11 @@ def _velocity(
     value, limit = float(qd[0, joint]), float(wanted[joint])
     which = "first" if kind == "start" else "last"
     return [
-        JudgedFinding(
+        Finding(
             rule="state",
             severity=severity,
             kind=kind,
-            joint=axes.names[joint],
+            joint=axes.joint_names[joint],
             value=value,
             limit=limit,
             time=time,
@@ -130,13 +134,13 @@ def _velocity(
             rounding=float(room[joint]),
             message=f"the {which} row has a velocity of {{joint}} of {{value}} {at_time(time)}, "
             "expected {limit}",
-            amounts=axes.amounts(joint, 1, value, limit),
+            amounts=excess_amounts(axes, joint, 1, value, limit),
         )
     ]
 
 
 def judge_order_of_stamps(
-    t: Array, rows: NDArray[np.int64], before: float, moves: NDArray[np.int64], worst: Worst
+    t: Array, rows: NDArray[np.int64], before: float, moves: NDArray[np.int64], worst: Collector
 ) -> NDArray[np.bool_]:
     """Return which of some stamps are finite and later than all before them; add the others as findings.
 
@@ -154,7 +158,7 @@ def judge_order_of_stamps(
     increasing = finite & (np.where(finite, t, -np.inf) > latest)
     wrong = np.flatnonzero(~increasing)
 
-    def make(k: int) -> JudgedFinding:
+    def make(k: int) -> Finding:
         row = int(wrong[k])
         number, time, last = int(rows[row]), float(t[row]), float(latest[row])
         text = f"the time stamp of row {number} is {time!r}"
@@ -162,7 +166,7 @@ def judge_order_of_stamps(
             how = "doubled" if time == last else "earlier than the one before"
             text = f"the time stamp of row {number}, {time:.9g} s, is {how}: the latest is {last:.9g} s"
         known = (time, last) if np.isfinite(time) else (None, None)
-        return JudgedFinding(
+        return Finding(
             rule="time",
             severity="error",
             kind="time",

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trajcli.checks.tolerances import JUMP_ABSOLUTE
 from trajcli.checks.verify import Verdict, verify
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
 from trajcli.errors import (
@@ -26,8 +25,10 @@ from trajcli.errors import (
 from trajcli.frozen import frozen
 from trajcli.job.limits import with_move_limits
 from trajcli.job.read import LoadedJob
-from trajcli.kinematics.robot import QUANTITIES, Payload, Robot, ToolLimits
+from trajcli.kinematics.robot import QUANTITIES, Payload, Robot
 from trajcli.language.targets import Target
+from trajcli.limits.kinds import has_further_limits
+from trajcli.limits.tolerances import JUMP_ABSOLUTE
 from trajcli.planners.planner import Event, PlannedMove, Planner, Resolve
 from trajcli.progress import report_progress
 from trajcli.trajectory import State, Trajectory
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from trajcli.planning.resolve_poses import ResolvedPose
 
 Carried = Callable[[int, Payload | None], Payload | None]
-_NO_TOOL_LIMITS = ToolLimits()
 
 
 @frozen
@@ -121,20 +121,20 @@ def _plan_moves(
     with _errors_at(loaded, loaded.document.place(("start",))):
         state = resolve(loaded.job.start, np.zeros(len(loaded.robot.joints)), index=None).as_state()
     before: Planner | None = None
-    robot = loaded.robot
+    robot, begun = loaded.robot, 0.0
     origin: Target | None = loaded.job.start
     for index, planner in enumerate(loaded.job.moves):
         report_progress(f"planning move {index + 1} of {len(loaded.job.moves)} ({planner.tag})")
         start = _handed_over(state, before, planner)
         robot = replace(robot, payload=planner.carried_after(robot.payload)) if planner.handles else robot
         used = robot if carried is None else replace(robot, payload=carried(index, robot.payload))
-        begun = sum(float(done.planned.curve.breaks[-1]) for done in moves)
         try:
             with _errors_of(loaded, index, planner, begun):
                 reachable = planner.with_joint_targets(partial(resolve, index=index), state.position)
                 with _points_of_errors(loaded, index):
                     move = _plan_move(loaded, used, index, reachable.coming_from(origin), start)
             moves.append(move)
+            begun += float(move.planned.curve.breaks[-1])
             state = move.planned.end
         except MissingLimitError as error:
             lacking += error.problems
@@ -256,7 +256,7 @@ def plan_move_within(
 
         move = long_enough(index, planner, start, robot, error)
     limits = robot.limits
-    if limits.tcp != _NO_TOOL_LIMITS or limits.has_velocity_by_position or limits.has_effort:
+    if has_further_limits(limits):
         from trajcli.planning.retime import keep_further_limits
 
         move = keep_further_limits(move)
