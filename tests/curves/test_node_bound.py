@@ -7,7 +7,6 @@ from math import comb, factorial
 import numpy as np
 import pytest
 
-from trajcli.curves.bernstein import control_points
 from trajcli.curves.node_bound import (
     BETWEEN_NODES,
     NodeSurvey,
@@ -15,7 +14,7 @@ from trajcli.curves.node_bound import (
     hull_matrices,
     node_survey,
 )
-from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.curves.piecewise import PiecewisePolynomial, control_points
 
 NODES = np.linspace(0.0, 1.0, 9)
 

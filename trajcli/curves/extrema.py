@@ -18,8 +18,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from trajcli.curves.bernstein import control_points
-from trajcli.curves.piecewise import Array, PiecewisePolynomial, derivative_coefficients, horner
+from trajcli.curves.piecewise import (
+    Array,
+    PiecewisePolynomial,
+    control_points,
+    derivative_coefficients,
+    horner,
+)
 from trajcli.frozen import frozen
 
 _STEP = 2.0**-53  # of a piece: a shorter step of the root finder changes nothing

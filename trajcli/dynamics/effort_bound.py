@@ -16,10 +16,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from trajcli.curves.bernstein import control_points
 from trajcli.curves.extrema import critical_points
 from trajcli.curves.node_bound import NODES_DEGREE, NodeSurvey, at_nodes, hull_matrices, node_survey
-from trajcli.curves.piecewise import Array, derivative_coefficients, distinct, taylor_shift
+from trajcli.curves.piecewise import Array, control_points, derivative_coefficients, distinct, taylor_shift
 from trajcli.dynamics.newton_euler import InverseDynamics, direction
 from trajcli.frozen import frozen
 from trajcli.kinematics.power_series import growth, series_exponential, series_product

@@ -22,9 +22,9 @@ from typing import Any, Literal
 import numpy as np
 
 from trajcli.curves.braking import braking
-from trajcli.curves.double_s import DoubleS, double_s_of, fastest_double_s
 from trajcli.curves.phases import PhaseChain
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.rest_to_rest import DoubleS, double_s_of, fastest_double_s
 from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.frozen import frozen
 from trajcli.planners.planner import Phase
