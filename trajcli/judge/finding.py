@@ -117,6 +117,7 @@ class Judgement:
         source: Name of the file; None of arrays.
         notes: What a reader should know: stamps that were snapped, what could not be judged.
         events: What was taken for granted, which `--strict` does not accept.
+        planned_rows: Whether they are rows of the verified motion of the job; None without a plan.
     """
 
     findings: tuple[JudgedFinding, ...]
@@ -126,6 +127,7 @@ class Judgement:
     source: str | None = None
     notes: tuple[str, ...] = ()
     events: tuple[str, ...] = ()
+    planned_rows: bool | None = None
 
     @property
     def verdict(self) -> VerdictText:
@@ -159,7 +161,9 @@ class Judgement:
         findings = [finding.as_json() for finding in self.findings]
         known = {"verdict": self.verdict, "findings": findings, "interpolation": self.interpolation}
         period = {} if self.period is None else {"period": self.period}
-        return {**known, "rows": self.rows, **period, "notes": list(self.notes), "events": list(self.events)}
+        planned = {} if self.planned_rows is None else {"planned_rows": self.planned_rows}
+        said = {"notes": list(self.notes), "events": list(self.events)}
+        return {**known, "rows": self.rows, **period, **planned, **said}
 
 
 def worst_first(findings: Sequence[JudgedFinding]) -> tuple[JudgedFinding, ...]:
