@@ -22,7 +22,6 @@ from trajcli.version import __version__
 
 if TYPE_CHECKING:
     from trajcli.api import Arm, InverseSolution, PlannedJob, check, load_robot, plan
-    from trajcli.checks.finding import Finding
     from trajcli.checks.verify import Verdict
     from trajcli.curves.piecewise import PiecewisePolynomial
     from trajcli.errors import (
@@ -35,12 +34,13 @@ if TYPE_CHECKING:
         TrajcliError,
         VerificationError,
     )
+    from trajcli.findings import Finding
     from trajcli.job.dump import dump_job
     from trajcli.job.model import Job
     from trajcli.job.read import LoadedJob, job_from_text, load_job
     from trajcli.job.report import Report
     from trajcli.job.robot import catalogue_names
-    from trajcli.judge.finding import JudgedFinding, Judgement
+    from trajcli.judge.judgement import Judgement
     from trajcli.kinematics.robot import Joint, Limits, Robot
     from trajcli.output.report import report_of, verification_error
     from trajcli.output.write import write_plan
@@ -49,7 +49,6 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "trajcli.api": ("Arm", "InverseSolution", "PlannedJob", "check", "load_robot", "plan"),
-    "trajcli.checks.finding": ("Finding",),
     "trajcli.checks.verify": ("Verdict",),
     "trajcli.curves.piecewise": ("PiecewisePolynomial",),
     "trajcli.errors": (
@@ -62,12 +61,13 @@ _HOMES = {
         "TrajcliError",
         "VerificationError",
     ),
+    "trajcli.findings": ("Finding",),
     "trajcli.job.dump": ("dump_job",),
     "trajcli.job.model": ("Job",),
     "trajcli.job.read": ("LoadedJob", "job_from_text", "load_job"),
     "trajcli.job.report": ("Report",),
     "trajcli.job.robot": ("catalogue_names",),
-    "trajcli.judge.finding": ("JudgedFinding", "Judgement"),
+    "trajcli.judge.judgement": ("Judgement",),
     "trajcli.kinematics.robot": ("Joint", "Limits", "Robot"),
     "trajcli.planning.plan": ("Plan", "plan_job"),
     "trajcli.output.report": ("report_of", "verification_error"),
@@ -84,7 +84,6 @@ __all__ = [
     "InverseSolution",
     "Job",
     "Joint",
-    "JudgedFinding",
     "Judgement",
     "Limits",
     "LoadedJob",

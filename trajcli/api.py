@@ -19,7 +19,7 @@ from trajcli.kinematics.robot import Limits, Robot
 from trajcli.planning.plan import Plan, plan_job
 
 if TYPE_CHECKING:
-    from trajcli.judge.finding import Judgement
+    from trajcli.judge.judgement import Judgement
     from trajcli.kinematics.jacobian import ReferenceFrame
     from trajcli.streams.decimals import Digits
 

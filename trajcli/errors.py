@@ -17,7 +17,7 @@ from trajcli.frozen import comparable
 
 @comparable
 class Place:
-    """Part of one line of a file. Lines and columns count from 1."""
+    """Part of one line of a file. Lines and columns count from 1; line 0 is the whole file."""
 
     file: str
     line: int
@@ -113,6 +113,8 @@ class Problem:
         field: Where below the move the value stands that it is about, such as ("to",); None where it is about
             no one value.
         kind: A stable word for programs, such as "velocity", where it comes from a finding.
+        row: Of a table, from 1 without its header.
+        severity: What services of continuous integration make of it: only an error fails their run.
     """
 
     message: str
@@ -126,6 +128,8 @@ class Problem:
     amounts: Amounts = field(default_factory=dict)
     field: tuple[str | int, ...] | None = None
     kind: str | None = None
+    row: int | None = None
+    severity: Literal["error", "warning", "note"] = "error"
 
     def text(self, say: Callable[[Amount], str] = str) -> str:
         """Return the message with its amounts as `say` writes them."""

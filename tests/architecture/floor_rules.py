@@ -13,7 +13,7 @@ FLOORS = (
     ("curves", "geometry"),
     ("kinematics", "catalogue"),
     ("dynamics",),
-    ("trajectory", "samples", "columns", "grids", "knots"),
+    ("trajectory", "samples", "columns", "grids", "knots", "findings"),
     ("language",),
     ("planners", "checks", "streams", "urdf"),
     ("job",),

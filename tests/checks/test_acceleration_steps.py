@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from trajcli.checks.finding import AccelerationStep, AccelerationSteps
+from trajcli.checks.continuity import AccelerationStep, AccelerationSteps
 
 EXPECTED = [
     AccelerationStep(2, "a", 0.5, 1.0),

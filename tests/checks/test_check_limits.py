@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from motions import KINDS, between, limits, sampled_peaks, single_pieces, trajectory
 
-from trajcli.checks.finding import Finding
 from trajcli.checks.limits import check_limits, peaks_by_move
 from trajcli.curves.piecewise import PiecewisePolynomial, constant
+from trajcli.findings import Finding
 from trajcli.trajectory import Trajectory
 
 # Peaks of the septic from 0 to 1 in one second, all of them inside: t = 1/2, (1 -+ 1/sqrt 5)/2, 1/2

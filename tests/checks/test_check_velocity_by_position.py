@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from motions import between, limits, state, trajectory
 
-from trajcli.checks.finding import Finding
 from trajcli.checks.verify import verify
 from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.findings import Finding
 from trajcli.kinematics.robot import Limits
 from trajcli.trajectory import Trajectory
 

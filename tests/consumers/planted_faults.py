@@ -9,8 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from trajcli.consumers.breach import RuleBreach, Surroundings
 from trajcli.consumers.judgement import ProfileJudgement, judge_by_profile, load_profile
+from trajcli.consumers.rule_check import Surroundings
+from trajcli.findings import Finding
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 
 HOME = {
@@ -91,11 +92,11 @@ def judged(rows: RecordedMotion, profile: str, around: Surroundings | None = Non
         if size == 1 and rows.t.size > 1500:
             continue
         parts = judge_by_profile(blocks(rows, size), load_profile(profile), around)
-        assert parts.breaches == whole.breaches, size
+        assert parts.findings == whole.findings, size
     return whole
 
 
-def only(judgement: ProfileJudgement) -> RuleBreach:
+def only(judgement: ProfileJudgement) -> Finding:
     """Return the one breach that there is."""
-    assert len(judgement.breaches) == 1, [(each.rule, each.joint) for each in judgement.breaches]
-    return judgement.breaches[0]
+    assert len(judgement.findings) == 1, [(each.rule, each.joint) for each in judgement.findings]
+    return judgement.findings[0]

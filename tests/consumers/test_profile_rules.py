@@ -17,7 +17,7 @@ from planted_faults import (
     with_value,
 )
 
-from trajcli.consumers.breach import Surroundings
+from trajcli.consumers.rule_check import Surroundings
 from trajcli.kinematics.robot import Limits
 from trajcli.streams.recorded_motion import RecordedMotion
 
@@ -33,7 +33,7 @@ CLEAN = {
 @pytest.mark.parametrize("profile", CLEAN)
 def test_a_clean_motion_breaks_no_rule(profile: str) -> None:
     verdict = judged(CLEAN[profile], profile)
-    assert verdict.breaches == ()
+    assert verdict.findings == ()
     assert verdict.accepted
 
 
@@ -59,7 +59,7 @@ def test_stamps_a_nanosecond_apart_are_accepted() -> None:
     rows = CLEAN["ros-jtc"]
     t = rows.t.copy()
     t[8] = t[7] + 1e-9
-    assert judged(replace(rows, t=t), "ros-jtc").breaches == ()
+    assert judged(replace(rows, t=t), "ros-jtc").findings == ()
 
 
 @pytest.mark.parametrize(
@@ -81,7 +81,7 @@ def test_stamps_that_are_rounded_are_at_their_period() -> None:
     rows = CLEAN["franka-fr3"]
     coarse = replace(rows.resolution, time=5e-4)
     shifted = rows.t + np.random.default_rng(3).uniform(-4e-4, 4e-4, rows.t.size)
-    assert judged(replace(rows, t=shifted, resolution=coarse), "franka-fr3").breaches == ()
+    assert judged(replace(rows, t=shifted, resolution=coarse), "franka-fr3").findings == ()
 
 
 def test_a_segment_that_becomes_zero_microseconds_aborts() -> None:
@@ -91,7 +91,7 @@ def test_a_segment_that_becomes_zero_microseconds_aborts() -> None:
     )
     t[5] += 3e-7
     verdict = judged(replace(rows, t=t, q=q, qd=qd, qdd=qdd), "ur-passthrough")
-    found = {breach.rule: breach for breach in verdict.breaches}
+    found = {breach.rule: breach for breach in verdict.findings}
     breach = found["passthrough-durations"]
     assert (breach.severity, breach.kind, breach.row, breach.count) == ("error", "time", 6, 1)
     assert breach.value == pytest.approx(3e-7, abs=1e-12)
@@ -119,11 +119,21 @@ def test_a_motion_longer_than_an_int32_of_microseconds() -> None:
     rows = CLEAN["ur-passthrough"]
     t = rows.t.copy()
     t[-1] = 2147.5
-    found = {breach.rule: breach for breach in judged(replace(rows, t=t), "ur-passthrough").breaches}
+    found = {breach.rule: breach for breach in judged(replace(rows, t=t), "ur-passthrough").findings}
     breach = found["passthrough-longest"]
     assert (breach.severity, breach.time, breach.row, breach.limit) == ("error", 2147.5, 21, 2147)
     t[-1] = 2147.0
-    assert judged(replace(rows, t=t), "ur-passthrough").breaches == ()
+    assert judged(replace(rows, t=t), "ur-passthrough").findings == ()
+
+
+def test_the_first_of_several_stamps_that_are_too_late_is_named_with_the_latest_as_value() -> None:
+    rows = CLEAN["ur-passthrough"]
+    t = rows.t.copy()
+    t[-3:] += 2147.0
+    found = {each.rule: each for each in judged(replace(rows, t=t), "ur-passthrough").findings}
+    late = found["passthrough-longest"]
+    assert (late.row, late.time, late.value, late.count) == (19, t[-3], t[-1], 3)
+    assert "(row 19) is the first" in late.message
 
 
 # --- joints and points ---
@@ -138,7 +148,7 @@ def test_names_of_joints() -> None:
     empty = only(judged(replace(rows, joints=(*names[:6], " ")), "ros-jtc", Surroundings()))
     assert "no name" in empty.message
     stranger = judged(replace(rows, joints=(*names[:6], "joint_77")), "ros-jtc")
-    messages = [breach.message for breach in stranger.breaches]
+    messages = [breach.message for breach in stranger.findings]
     assert messages == [
         "the robot has no joint 'joint_77'",
         "the joint 'joint_7' is missing",
@@ -161,7 +171,8 @@ def test_a_partial_goal_misses_a_joint() -> None:
         ),
     )
     found = judged(part, "ros-jtc", surroundings(7))
-    assert [breach.message for breach in found.breaches] == ["the joint 'joint_7' is missing"]
+    missing = [(each.kind, each.message) for each in found.findings]
+    assert missing == [("joints", "the joint 'joint_7' is missing")]
 
 
 @pytest.mark.parametrize(
@@ -169,10 +180,12 @@ def test_a_partial_goal_misses_a_joint() -> None:
 )
 def test_the_number_of_joints(profile: str, joints: int) -> None:
     period = {"ur-servoj": 2e-3}.get(profile, 1e-3)
-    found = judged(motion(joints, period), profile).breaches
+    found = judged(motion(joints, period), profile).findings
     assert [
-        (each.rule.split("-", 1)[1], each.severity, each.value) for each in found if "joints" in each.rule
-    ] == [("joints", "error", joints)]
+        (each.rule.split("-", 1)[1], each.severity, each.kind, each.value)
+        for each in found
+        if "joints" in each.rule
+    ] == [("joints", "error", "joints", joints)]
 
 
 @pytest.mark.parametrize("name", ["q", "qd", "qdd"])
@@ -200,7 +213,7 @@ def test_a_last_velocity_above_the_epsilon_of_float32() -> None:
         -1.3e-7,
     )
     assert breach.limit == pytest.approx(epsilon, rel=5e-3)
-    assert judged(with_value(CLEAN["ros-jtc"], "qd", -1, 3, 1.1e-7), "ros-jtc").breaches == ()
+    assert judged(with_value(CLEAN["ros-jtc"], "qd", -1, 3, 1.1e-7), "ros-jtc").findings == ()
 
 
 def test_efforts_are_rejected() -> None:
@@ -217,7 +230,7 @@ def test_efforts_are_rejected() -> None:
 
 def test_positions_alone_step_in_velocity() -> None:
     rows = motion(period=0.1, rows=21, columns="q")
-    found = judged(rows, "ros-jtc").breaches
+    found = judged(rows, "ros-jtc").findings
     assert {(each.rule, each.severity, each.kind) for each in found} == {
         ("jtc-positions-only", "warning", "jump")
     }
@@ -268,7 +281,7 @@ def test_a_later_first_point_is_reached_by_a_spline(columns: str) -> None:
     free = np.tile([-np.inf, np.inf], (7, 1))
     for limit, broken in ((peak * 0.999, True), (peak * 1.001, False)):
         limits = Limits(free, np.tile([-limit, limit], (7, 1)), free, free)
-        found = judged(later, "ros-jtc", Surroundings(rows.joints, stands, limits)).breaches
+        found = judged(later, "ros-jtc", Surroundings(rows.joints, stands, limits)).findings
         found = tuple(each for each in found if each.rule == "jtc-first-point")
         assert bool(found) == broken
         if broken:
@@ -301,7 +314,7 @@ def test_a_bump_of_one_row_is_jerk(profile: str, joint: int) -> None:
     assert breach.joint == f"joint_{joint + 1}"
     assert breach.row in (502, 503)
     assert abs(breach.value) > limit - 1e-3
-    assert judged(with_value(rows, "q", 500, joint, 0.9 * (limit * 1e-9 - quiet) / 3), profile).breaches == ()
+    assert judged(with_value(rows, "q", 500, joint, 0.9 * (limit * 1e-9 - quiet) / 3), profile).findings == ()
 
 
 def ramp(profile: str, joint: int, order: int, share: float) -> RecordedMotion:
@@ -332,7 +345,7 @@ def test_differences_of_velocity_and_acceleration(order: int) -> None:
         if order == 2:
             # with 10 rad/s^2 a quintic of 2 s would be far too fast: shorten it instead
             rows = short(share)
-        found = judged(rows, "franka-fr3", Surroundings(rows.joints, rows.q[0])).breaches
+        found = judged(rows, "franka-fr3", Surroundings(rows.joints, rows.q[0])).findings
         assert [(each.rule, each.kind) for each in found if each.kind == kind] == (
             [(f"fr3-{kind}", kind)] if broken else []
         )
@@ -357,7 +370,7 @@ def short(share: float) -> RecordedMotion:
 def test_six_decimals_make_jerk_that_is_real_to_the_robot() -> None:
     """Third differences of rounded positions: at most 8 half units of 1e-6 over 1 ms are 4000 rad/s^3."""
     rows = motion(decimals=6, columns="q")
-    found = {each.rule: each for each in judged(rows, "franka-fr3").breaches}
+    found = {each.rule: each for each in judged(rows, "franka-fr3").findings}
     decimals = found["fr3-decimals"]
     assert (decimals.kind, decimals.severity) == ("quantisation", "warning")
     assert decimals.value == pytest.approx(4000)
@@ -367,10 +380,10 @@ def test_six_decimals_make_jerk_that_is_real_to_the_robot() -> None:
     # what the robot sees is what is judged, to the last bit
     assert ("fr3-jerk" in found) == (noisy > 5000 - 1e-3)
     coarse = motion(decimals=5, columns="q")
-    jerk = next(each for each in judged(coarse, "franka-fr3").breaches if each.rule == "fr3-jerk")
+    jerk = next(each for each in judged(coarse, "franka-fr3").findings if each.rule == "fr3-jerk")
     assert "decimals" in jerk.message
     assert jerk.factor is None
-    assert judged(motion(decimals=9, columns="q"), "franka-fr3").breaches == ()
+    assert judged(motion(decimals=9, columns="q"), "franka-fr3").findings == ()
 
 
 def test_velocity_by_position() -> None:
@@ -391,7 +404,7 @@ def test_velocity_by_position() -> None:
         )
         found = [
             each
-            for each in judged(moved, "franka-fr3", Surroundings(rows.joints, q[0])).breaches
+            for each in judged(moved, "franka-fr3", Surroundings(rows.joints, q[0])).findings
             if each.rule == "fr3-velocity-by-position"
         ]
         assert bool(found) == (not inside.all())
@@ -409,7 +422,7 @@ def test_a_joint_may_not_move_within_its_dead_zone() -> None:
         q = np.tile(HOME[7], (501, 1))
         q[:, 0] = 2.7501 - 0.007 + 0.001 * (shape if towards else -shape)
         moved = replace(rows, q=q, qd=np.zeros_like(q), qdd=np.zeros_like(q))
-        found = judged(moved, "franka-fr3", Surroundings(rows.joints, q[0])).breaches
+        found = judged(moved, "franka-fr3", Surroundings(rows.joints, q[0])).findings
         assert ["fr3-velocity-by-position"] * towards == [each.rule for each in found]
         if towards:
             assert found[0].limit == 0
@@ -423,7 +436,7 @@ def test_a_position_out_of_range(profile: str) -> None:
     shift[1] = ends[profile] + 1e-6 - (HOME[7] + CHANGE[7])[1]
     rows = motion()
     moved = replace(rows, q=rows.q + shift)
-    found = judged(moved, profile, Surroundings(rows.joints, moved.q[0])).breaches
+    found = judged(moved, profile, Surroundings(rows.joints, moved.q[0])).findings
     breach = next(each for each in found if each.rule.endswith("-position") and each.kind == "position")
     assert (breach.joint, breach.severity, breach.limit, breach.row) == (
         "joint_2",
@@ -437,12 +450,12 @@ def test_room_for_lost_packets() -> None:
     """libfranka takes 3 ms of the largest acceleration off: 2.175 - 1e-3 - 3e-3 (15 - 1e-3) for joint 1."""
     allowed = 2.175 - 1e-3 - 3e-3 * (15 - 1e-3)
     rows = ramp("franka-fer", 0, 1, (allowed + 1e-4) / (2.175 - 1e-3))
-    found = judged(rows, "franka-fer", Surroundings(rows.joints, rows.q[0])).breaches
+    found = judged(rows, "franka-fer", Surroundings(rows.joints, rows.q[0])).findings
     assert [(each.rule, each.severity) for each in found if each.kind == "velocity"] == [
         ("fer-lost-packets", "warning")
     ]
     rows = ramp("franka-fer", 0, 1, (allowed - 1e-4) / (2.175 - 1e-3))
-    found = judged(rows, "franka-fer", Surroundings(rows.joints, rows.q[0])).breaches
+    found = judged(rows, "franka-fer", Surroundings(rows.joints, rows.q[0])).findings
     assert [each for each in found if each.kind == "velocity"] == []
 
 
@@ -465,7 +478,7 @@ def test_rest_at_both_ends(profile: str, name: str, row: int, at: str) -> None:
 def test_rest_without_columns_is_seen_in_differences() -> None:
     rows = motion(rows=1001, columns="q", decimals=None)
     cut = replace(rows, t=rows.t[:900], q=rows.q[:900])
-    found = judged(cut, "franka-fr3").breaches
+    found = judged(cut, "franka-fr3").findings
     assert {each.rule for each in found} == {"fr3-rest-end"}
     assert {each.method for each in found} == {"differences"}
 
@@ -476,7 +489,7 @@ def test_torques_and_their_rate() -> None:
         tau = np.zeros((1001, 7))
         tau[:, 4] = 11.9
         rows = replace(motion(), tau=tau)
-        assert judged(rows, profile).breaches == ()
+        assert judged(rows, profile).findings == ()
         tau[:, 4] = 12.1
         breach = only(judged(rows, profile))
         assert (breach.rule, breach.kind, breach.severity, breach.count) == (
@@ -501,7 +514,7 @@ def test_efforts_that_a_file_does_not_have_are_not_judged() -> None:
 
 def test_rows_at_another_rate_are_not_taken_for_differences() -> None:
     verdict = judged(motion(period=0.01, rows=101), "franka-fr3")
-    assert {each.rule for each in verdict.breaches} == {"fr3-period"}
+    assert {each.rule for each in verdict.findings} == {"fr3-period"}
     assert dict(verdict.unjudged)["fr3-jerk"].startswith("most of its rows are not 0.001 s apart")
 
 
@@ -516,7 +529,7 @@ def test_speeds_of_servoj(speed: float, rules: list[str]) -> None:
     own = float(rows.q[251, 2] - rows.q[250, 2])
     q = rows.q.copy()
     q[251:, 2] += speed * 2e-3 - own
-    found = judged(replace(rows, q=q), "ur-servoj").breaches
+    found = judged(replace(rows, q=q), "ur-servoj").findings
     assert [each.rule for each in found] == rules
     for breach in found:
         assert (breach.severity, breach.row, breach.joint, breach.count) == ("error", 252, "joint_3", 1)
@@ -527,7 +540,7 @@ def test_numbers_beyond_int32() -> None:
     for name, kind in (("q", "position"), ("qd", "velocity"), ("qdd", "acceleration")):
         own = getattr(CLEAN["ur-passthrough"], name)[10, 1]
         rows = with_value(CLEAN["ur-passthrough"], name, 10, 1, 2147.484 - own)
-        found = [each for each in judged(rows, "ur-passthrough").breaches if each.rule == "passthrough-range"]
+        found = [each for each in judged(rows, "ur-passthrough").findings if each.rule == "passthrough-range"]
         assert [(each.kind, each.row, each.joint, each.severity) for each in found] == [
             (kind, 11, "joint_2", "error")
         ]
@@ -538,7 +551,7 @@ def test_rounded_durations_move_the_curve() -> None:
     """Each duration of 1.4 us is sent as 1 us: after k points all come 0.4 k us early."""
     rows = motion(6, 0.1, 21, decimals=6)
     clean = judged(replace(rows, t=np.round(rows.t, 6)), "ur-passthrough")
-    assert clean.breaches == ()
+    assert clean.findings == ()
     count = 2001
     t = np.arange(count) * 1.0004e-3
     base = motion(6, 1.0004e-3, count, decimals=None)
@@ -546,7 +559,7 @@ def test_rounded_durations_move_the_curve() -> None:
     off = np.abs(base.qd * late[:, None])
     found = [
         each
-        for each in judged(replace(base, t=t), "ur-passthrough").breaches
+        for each in judged(replace(base, t=t), "ur-passthrough").findings
         if each.rule == "passthrough-quantisation"
     ]
     assert {each.joint for each in found} == {f"joint_{k + 1}" for k in range(6) if off[:, k].max() > 1.05e-5}
@@ -563,7 +576,7 @@ def test_breaches_are_counted_by_move() -> None:
     q[300:, 2] += 0.05
     q[310:, 2] += 0.03
     move = np.repeat([0, 1, 2], [150, 155, 196]).astype(np.int64)
-    found = judged(replace(rows, q=q, move=move), "ur-servoj").breaches
+    found = judged(replace(rows, q=q, move=move), "ur-servoj").findings
     speeds = [each for each in found if each.rule == "servoj-speed"]
     assert [(each.move, each.row, each.count) for each in speeds] == [(0, 101, 1), (1, 301, 1), (2, 311, 1)]
 
@@ -572,16 +585,16 @@ def test_a_straight_motion_steps_at_both_ends() -> None:
     """From rest to a constant velocity and back: all of it at the first and at the last row."""
     rows = motion(period=0.1, rows=11, columns="q")
     q = HOME[7] + np.outer(np.arange(11) * 0.1, [0.0, 0.3, 0, 0, 0, 0, 0])
-    found = judged(replace(rows, q=q), "ros-jtc").breaches
+    found = judged(replace(rows, q=q), "ros-jtc").findings
     assert [(each.joint, each.row, each.value, each.count) for each in found] == [
         ("joint_2", 1, pytest.approx(0.3), 2)
     ]
     stopping = replace(rows, q=np.concatenate([q[:1], q[:1], q[:-2]]))  # it starts later, and ends in motion
-    found = judged(stopping, "ros-jtc").breaches
+    found = judged(stopping, "ros-jtc").findings
     assert [(each.row, each.count) for each in found] == [(3, 2)]
     faster = q.copy()
     faster[-1, 1] += 0.06
-    found = judged(replace(rows, q=faster), "ros-jtc").breaches
+    found = judged(replace(rows, q=faster), "ros-jtc").findings
     assert [(each.row, each.value) for each in found] == [(11, pytest.approx(-0.9))]
 
 
@@ -606,7 +619,7 @@ def test_the_approach_begins_where_the_arm_stands() -> None:
         found = judged(
             later, "ros-jtc", Surroundings(rows.joints, stands, Limits(position, free, free, free))
         )
-        own = [each for each in found.breaches if each.rule == "jtc-first-point"]
+        own = [each for each in found.findings if each.rule == "jtc-first-point"]
         assert [(each.kind, each.joint) for each in own] == [("position", "joint_3")] * broken
         if broken:
             assert own[0].value == pytest.approx(peak, rel=1e-9)

@@ -34,7 +34,7 @@ def test_one_file_adds_a_consumer(tmp_path: Path) -> None:
     (tmp_path / "table.yaml").write_text(MADE_UP)
     assert profile_names(tmp_path) == ["table"]
     table = load_profile("table", tmp_path)
-    found = judge_by_profile([motion()], table, surroundings(7)).breaches
+    found = judge_by_profile([motion()], table, surroundings(7)).findings
     # a quintic of 0.5 rad in 1 s moves with up to 15/8 of its mean velocity
     joints = {breach.joint for breach in found}
     assert joints == {
@@ -44,7 +44,7 @@ def test_one_file_adds_a_consumer(tmp_path: Path) -> None:
     }
     assert {(breach.rule, breach.severity) for breach in found} == {("table-steps", "warning")}
     slower = replace(table.rules[0], parameters={**table.rules[0].parameters, "limit": 1.0})
-    assert judge_by_profile([motion()], replace(table, rules=(slower,))).breaches == ()
+    assert judge_by_profile([motion()], replace(table, rules=(slower,))).findings == ()
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.judge.finding import Judgement
+from trajcli.judge.judgement import Judgement
 from trajcli.judge.motion import Requirements, judge_motion
 from trajcli.kinematics.robot import Joint, Limits, Robot
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution

@@ -11,7 +11,7 @@ from recorded_rows import part
 
 import trajcli
 from trajcli.api import PlannedJob
-from trajcli.judge.finding import Judgement
+from trajcli.judge.judgement import Judgement
 from trajcli.judge.motion import Requirements, judge_motion
 from trajcli.judge.tool import ToolJudge
 from trajcli.kinematics.robot import ToolLimits

@@ -38,7 +38,7 @@ def test_a_breach_is_a_finding() -> None:
     )
     assert abs(velocity.value + 3.0) < 1e-9
     assert abs(velocity.limit + 2.619) < 1e-12
-    assert velocity.as_json()["hint"] == "make the motion 1.14548 times longer"  # 3 / 2.619, rounded up
+    assert velocity.hint == "make the motion 1.14548 times longer"  # 3 / 2.619, rounded up
     assert notes == (
         "the rule fr3-torque is not judged: the file has no efforts",
         "the rule fr3-torque-rate is not judged: the file has no efforts",

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from trajcli.errors import InputError
+from trajcli.findings import Finding
 from trajcli.job.read import load_job
 from trajcli.judge.file import CheckOptions, check_file
-from trajcli.judge.finding import JudgedFinding
 from trajcli.output.write import write_plan
 from trajcli.planning.plan import plan_job
 
@@ -47,7 +47,7 @@ def rows(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def efforts(folder: Path, limit: float, **options: str) -> list[JudgedFinding]:
+def efforts(folder: Path, limit: float, **options: str) -> list[Finding]:
     """Return the findings of efforts with a limit of the first joint."""
     (folder / "arm.yaml").write_text(ARM.replace("LIMIT", str(limit)))
     options = options or {"robot": str(folder / "arm.yaml")}

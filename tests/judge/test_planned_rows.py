@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from trajcli.errors import TrajcliError
 from trajcli.job.read import load_job
 from trajcli.judge.file import CheckOptions, check_file
-from trajcli.judge.finding import Judgement
+from trajcli.judge.judgement import Judgement
 from trajcli.output.write import write_plan
 from trajcli.planners import PLANNERS
 from trajcli.planning.plan import Plan, plan_job

@@ -10,7 +10,8 @@ from recorded_rows import judged, rows_of
 
 from trajcli.curves.hermite import hermite_pieces
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.judge.finding import JudgedFinding, Judgement
+from trajcli.findings import Finding
+from trajcli.judge.judgement import Judgement
 from trajcli.kinematics.robot import Limits
 from trajcli.streams.recorded_motion import RecordedMotion
 
@@ -37,7 +38,7 @@ def limits(over: float = 1e-9, joints: int = 3, **others: float) -> Limits:
     return Limits(**rows)
 
 
-def worst(judgement: Judgement, kind: str, joint: str | None = "j1") -> JudgedFinding:
+def worst(judgement: Judgement, kind: str, joint: str | None = "j1") -> Finding:
     found = [each for each in judgement.findings if (each.kind, each.joint) == (kind, joint)]
     assert len(found) == 1, judgement.findings
     return found[0]

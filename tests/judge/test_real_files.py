@@ -9,7 +9,7 @@ import pytest
 from scipy.interpolate import BPoly, PPoly
 
 from trajcli.judge.file import CheckOptions, check_file
-from trajcli.judge.finding import Judgement
+from trajcli.judge.judgement import Judgement
 
 FOLDER = Path(__file__).parent.parent / "oracles/recorded"
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from typing import Any
 from urllib.parse import unquote, urlsplit
 from xml.etree import ElementTree as ET
@@ -20,15 +21,15 @@ from trajcli.errors import (
     TrajcliError,
     VerificationError,
 )
-from trajcli.output.annotations import Annotation, AnnotationForm, annotations_of, render_annotations
+from trajcli.output.annotations import AnnotationForm, annotations_of, render_annotations
 
-PLACED = Annotation("velocity", "error", "j1 is too fast", "jobs/a.yaml", 6, 5, joint="j1", time=0.125)
-WARNED = Annotation("slowed", "warning", "stretched", "jobs/b.yaml", 3, 1)
-NOTED = Annotation("period", "note", "snapped to 1 ms", "rows.csv", row=12)
+PLACED = Problem("j1 is too fast", place=Place("jobs/a.yaml", 6, 5), joint="j1", time=0.125, kind="velocity")
+WARNED = Problem("stretched", place=Place("jobs/b.yaml", 3, 1), kind="slowed", severity="warning")
+NOTED = Problem("snapped to 1 ms", place=Place("rows.csv", 0, 0), kind="period", row=12, severity="note")
 HARD = 'a, b: 50% of "x" <y> & \r\nline two :: \x1b[31m \ud800 \ufffe ü'
 
 
-def sarif(*found: Annotation, **options: Any) -> dict[str, Any]:
+def sarif(*found: Problem, **options: Any) -> dict[str, Any]:
     """Return the one run of a log that keeps the published schema."""
     text = render_annotations(found, "sarif", **options)
     SarifLog.model_validate_json(text)
@@ -80,7 +81,7 @@ def test_commands_of_github() -> None:
 
 def test_hard_texts_stay_one_command() -> None:
     (line,) = render_annotations(
-        [Annotation("a,b", "error", HARD, "dir, one/50%:x.yaml", 1)], "github"
+        [Problem(HARD, place=Place("dir, one/50%:x.yaml", 1, 0), kind="a,b")], "github"
     ).splitlines()
     kind, given, message = command(line)
     assert (kind, given["file"], given["line"]) == ("error", "dir, one/50%:x.yaml", "1")
@@ -91,7 +92,7 @@ def test_hard_texts_stay_one_command() -> None:
 
 def test_standard_input_is_no_file_of_a_repository() -> None:
     (line,) = render_annotations(
-        [Annotation("input", "error", "wrong", "<stdin>", 3, 4)], "github"
+        [Problem("wrong", place=Place("<stdin>", 3, 4), kind="input")], "github"
     ).splitlines()
     assert line == "::error title=trajcli%3A input::wrong"
 
@@ -110,7 +111,7 @@ def test_junit_has_a_suite_for_each_file_also_where_nothing_is_wrong() -> None:
 
 def test_junit_names_what_was_judged_and_cases_differ() -> None:
     rules = {"limit": "Limits hold.", "time": "Time increases."}
-    found = [Annotation("limit", "error", f"j{joint}", "a.csv", joint=f"j{joint}") for joint in (1, 2)]
+    found = [Problem(f"j{joint}", place=Place("a.csv", 0, 0), kind="limit") for joint in (1, 2)]
     assert cases(render_annotations(found, "junit", ["a.csv"], rules)) == [
         ("a.csv", "time", []),
         ("a.csv", "limit 1 of 2", ["j1"]),
@@ -123,7 +124,7 @@ def test_junit_names_what_was_judged_and_cases_differ() -> None:
 
 
 def test_junit_holds_hard_texts() -> None:
-    (case,) = cases(render_annotations([Annotation("r", "error", HARD, HARD)], "junit"))
+    (case,) = cases(render_annotations([Problem(HARD, place=Place(HARD, 0, 0), kind="r")], "junit"))
     shown = HARD.replace("\x1b", "\\x1b").replace("\ud800", "\\ud800").replace("\ufffe", "\\ufffe")
     assert case[2] == [shown]
 
@@ -148,7 +149,7 @@ def test_sarif_keeps_the_published_schema() -> None:
 
 @pytest.mark.parametrize("file", ["a b/ü%.yaml", "/tmp/a b.yaml", "q?x#y.yaml"])
 def test_names_of_files_are_uris(file: str) -> None:
-    (result,) = sarif(Annotation("input", "error", HARD, file, 1))["results"]
+    (result,) = sarif(Problem(HARD, place=Place(file, 1, 0), kind="input"))["results"]
     uri = urlsplit(result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"])
     assert (uri.scheme, unquote(uri.path), uri.query, uri.fragment) == (
         "file" if file.startswith("/") else "",
@@ -159,7 +160,7 @@ def test_names_of_files_are_uris(file: str) -> None:
 
 
 def test_a_time_that_is_not_finite_is_left_out() -> None:
-    (result,) = sarif(Annotation("r", "error", "m", time=float("inf")))["results"]
+    (result,) = sarif(Problem("m", time=float("inf"), kind="r"))["results"]
     assert "properties" not in result
     assert "locations" not in result
 
@@ -177,8 +178,13 @@ ERRORS = [
 def test_problems_of_errors(kind: type[TrajcliError], rule: str) -> None:
     problem = Problem("wrong", "do this", Place("a.yaml", 3, 7), joint="j2", time=1.5)
     placed, plain = annotations_of(kind(problem, Problem("more", kind="velocity")), "b.yaml")
-    assert placed == Annotation(rule, "error", "wrong (do this)", "a.yaml", 3, 7, joint="j2", time=1.5)
-    assert plain == Annotation("velocity", "error", "more", "b.yaml")
+    assert placed == replace(problem, kind=rule)
+    assert plain == Problem("more", kind="velocity", place=Place("b.yaml", 0, 0))
+    text = render_annotations([placed, plain], "github")
+    assert text == (
+        f"::error file=a.yaml,line=3,col=7,title=trajcli%3A {rule}::wrong (do this)\n"
+        "::error file=b.yaml,title=trajcli%3A velocity::more\n"
+    )
 
 
 @pytest.mark.parametrize("form", ["github", "junit", "sarif"])

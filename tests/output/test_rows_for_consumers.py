@@ -47,7 +47,7 @@ def test_random_motions_give_no_false_alarm(profile: str, seed: int) -> None:
     forms: tuple[FormatName, ...] = ("ros",) if profile == "ros-jtc" else ("csv", "mcap", "jsonl")
     for form in forms:
         judged = judge_as_written(plan, grid_of(plan), load_profile(profile), FORMATS[form])
-        assert judged.breaches == (), form
+        assert judged.findings == (), form
         assert refusal_of(plan, judged, strict=True) is None
 
 
@@ -62,6 +62,6 @@ def test_decimals_are_those_of_the_file() -> None:
     strict = replace(profile, rules=(replace(tight, parameters={**tight.parameters, "share": 1e-4}),))
     rounded = judge_as_written(plan, grid_of(plan), strict, FORMATS["csv"])
     exact = judge_as_written(plan, grid_of(plan), strict, FORMATS["csv"], digits="full")
-    assert [breach.kind for breach in rounded.breaches] == ["quantisation"]
-    assert rounded.breaches[0].value == pytest.approx(4.0)  # 8 times half of 1e-9, over 1e-9 s^3
-    assert exact.breaches == ()
+    assert [found.kind for found in rounded.findings] == ["quantisation"]
+    assert rounded.findings[0].value == pytest.approx(4.0)  # 8 times half of 1e-9, over 1e-9 s^3
+    assert exact.findings == ()

@@ -9,7 +9,7 @@ import pytest
 
 from trajcli.job.read import job_from_text
 from trajcli.judge.file import CheckOptions, check_file
-from trajcli.judge.finding import Judgement
+from trajcli.judge.judgement import Judgement
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.plots.panel import NO_POINTS, Panel, Picture
 from trajcli.plots.picture import picture_of

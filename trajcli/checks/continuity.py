@@ -7,23 +7,78 @@ and after the last one in its declared end.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.checks.finding import AccelerationSteps, Finding, FindingKind, at_time, joint_amounts
 from trajcli.checks.limits import peaks_by_move
 from trajcli.checks.tolerances import allowed_jump
 from trajcli.curves.extrema import Peaks
 from trajcli.curves.piecewise import Array
-from trajcli.frozen import frozen
+from trajcli.findings import Finding, at_time, joint_amounts
+from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Limits
 from trajcli.trajectory import Trajectory
 
 JERK_HINT = "use jerk_limited or quintic, or say limits: {jerk: null}"
 _SAME = 1e-12  # jumps that differ by less than this part are equal: the earliest is named
 _QUANTITIES = ("position", "velocity", "acceleration")
-_KINDS: tuple[FindingKind, ...] = ("position_jump", "velocity_jump", "acceleration_jump")
+_KINDS: tuple[str, ...] = ("position_jump", "velocity_jump", "acceleration_jump")
+
+
+@comparable
+class AccelerationStep:
+    """A step in a joint's acceleration, which is legal where the joint has no jerk limit.
+
+    Attributes:
+        move: Index of the move it belongs to: the one that begins with it, or the one that ends with it where
+            the acceleration is zero afterwards.
+        joint: Name of the joint.
+        time: Seconds from the start of the trajectory.
+        size: Acceleration after minus before, SI.
+    """
+
+    move: int
+    joint: str
+    time: float
+    size: float
+
+
+@frozen
+class AccelerationSteps(Sequence[AccelerationStep]):
+    """Steps in order of time; a long motion has one for every joint at every break, made when asked for.
+
+    Attributes:
+        moves: Index of the move that each belongs to, shape (k,).
+        joints: Index of the joint, shape (k,).
+        times: Seconds from the start of the trajectory, shape (k,).
+        sizes: Acceleration after minus before, SI, shape (k,).
+        joint_names: Of all joints.
+    """
+
+    moves: NDArray[np.intp]
+    joints: NDArray[np.intp]
+    times: Array
+    sizes: Array
+    joint_names: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return self.times.size
+
+    @overload
+    def __getitem__(self, index: int) -> AccelerationStep: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[AccelerationStep]: ...
+
+    def __getitem__(self, index: int | slice) -> AccelerationStep | list[AccelerationStep]:
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
+        name = self.joint_names[int(self.joints[index])]
+        return AccelerationStep(
+            int(self.moves[index]), name, float(self.times[index]), float(self.sizes[index])
+        )
 
 
 def check_continuity(

@@ -10,7 +10,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from trajcli.checks.finding import Finding, at_time
 from trajcli.checks.tolerances import EFFORT_RELATIVE
 from trajcli.curves.piecewise import Array
 from trajcli.dynamics.effort_bound import (
@@ -22,6 +21,7 @@ from trajcli.dynamics.effort_bound import (
 )
 from trajcli.dynamics.newton_euler import InverseDynamics
 from trajcli.errors import Amount, Amounts
+from trajcli.findings import Finding, at_time
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Robot
 from trajcli.trajectory import Span, Trajectory

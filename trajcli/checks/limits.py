@@ -6,14 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from trajcli.checks.finding import Finding, FindingKind, at_time, excess_amounts
 from trajcli.checks.tolerances import BORDER_UNITS, exceeds
 from trajcli.curves.extrema import Peaks, peaks_between
 from trajcli.curves.piecewise import Array
+from trajcli.findings import Finding, at_time, excess_amounts
 from trajcli.kinematics.robot import Limits
 from trajcli.trajectory import Span, Trajectory
 
-_KINDS: tuple[FindingKind, ...] = ("position", "velocity", "acceleration", "jerk")
+_KINDS: tuple[str, ...] = ("position", "velocity", "acceleration", "jerk")
 
 
 def peaks_by_move(trajectory: Trajectory) -> list[tuple[Peaks, ...]]:

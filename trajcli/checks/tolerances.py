@@ -93,7 +93,7 @@ def allowed_at_end(trajectory: Trajectory, time: float, target: Array) -> Array:
     speed = np.abs(trajectory.before(last, 1)[0])
     late = JUMP_BREAK_UNITS * np.spacing(abs(time)) * speed
     piece = max(int(np.searchsorted(curve.breaks, curve.start + time)) - 1, 0)
-    powers = curve.lengths[piece] ** np.arange(curve.degree, -1, -1)
+    powers = (curve.breaks[piece + 1] - curve.breaks[piece]) ** np.arange(curve.degree, -1, -1)
     summands = (np.abs(curve.coefficients[:, piece]) * powers[:, None]).sum(axis=0)
     rounding = SUM_UNITS * np.spacing(summands)
     tolerance: Array = JUMP_ABSOLUTE + JUMP_RELATIVE * np.maximum(np.abs(target), 1.0) + late + rounding

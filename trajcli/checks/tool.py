@@ -8,12 +8,12 @@ from functools import cached_property
 
 import numpy as np
 
-from trajcli.checks.finding import Finding, FindingKind
 from trajcli.checks.tolerances import JUMP_RELATIVE, TOOL_RELATIVE, exceeds
 from trajcli.checks.tool_bound import ToolPeak
 from trajcli.checks.tool_limits import check_tool_limits, limits_tool, tool_finding, tool_peaks
 from trajcli.curves.extrema import peaks
 from trajcli.curves.piecewise import Array
+from trajcli.findings import Finding
 from trajcli.frozen import frozen
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.following.motion import ToolMotion
@@ -86,7 +86,7 @@ def check_tool(tool: SampledTool) -> list[Finding]:
 def _check_path(tool: SampledTool) -> list[Finding]:
     """Return by how much the tool is beside its path, or turned, where that is more than was promised."""
     tolerance, findings = tool.motion.tolerance, []
-    kinds: tuple[tuple[FindingKind, str, float], ...] = (
+    kinds: tuple[tuple[str, str, float], ...] = (
         ("tool_path", "is beside", tolerance.position),
         ("tool_orientation", "is turned from", tolerance.angle),
     )

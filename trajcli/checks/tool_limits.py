@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from trajcli.checks.finding import Finding, FindingKind, FindingMethod, at_time
 from trajcli.checks.tolerances import TOOL_RELATIVE
 from trajcli.errors import Amount
+from trajcli.findings import Finding, FindingMethod, at_time
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.trajectory import Span, State, Trajectory
 
 if TYPE_CHECKING:
     from trajcli.checks.tool_bound import ToolPeak
 
-SPEEDS: tuple[tuple[FindingKind, str, int], ...] = (
+SPEEDS: tuple[tuple[str, str, int], ...] = (
     ("tool_speed", "speed", 1),
     ("tool_angular_speed", "angular_speed", 1),
     ("tool_acceleration", "acceleration", 2),
@@ -99,7 +99,7 @@ def tool_ends_over_limit(robot: Robot, ends: tuple[State, State]) -> bool:
 
 def tool_finding(
     span: Span,
-    kind: FindingKind,
+    kind: str,
     order: int,
     value: float,
     limit: float,

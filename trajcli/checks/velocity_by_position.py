@@ -11,9 +11,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from trajcli.checks.finding import Finding, at_time, excess_amounts, joint_amounts
 from trajcli.checks.tolerances import exceeds
 from trajcli.curves.approach import ApproachUse, approach_uses
+from trajcli.findings import Finding, at_time, excess_amounts, joint_amounts
 from trajcli.kinematics.robot import Limits
 from trajcli.trajectory import Span, State, Trajectory
 

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trajcli.checks.continuity import acceleration_steps, check_continuity
-from trajcli.checks.finding import LIMITS_OF_JOINTS, AccelerationSteps, Finding
+from trajcli.checks.continuity import AccelerationSteps, acceleration_steps, check_continuity
 from trajcli.checks.limits import check_limits, peaks_by_move
 from trajcli.checks.target import check_targets
 from trajcli.checks.tolerances import LIMIT_RELATIVE, TOOL_RELATIVE
 from trajcli.checks.waypoints import check_waypoints
 from trajcli.curves.extrema import Peaks
 from trajcli.errors import at_least
+from trajcli.findings import LIMITS_OF_JOINTS, Finding
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import QUANTITIES, Limits, ToolLimits
 from trajcli.trajectory import Promise, Span, Trajectory
@@ -193,7 +193,7 @@ def _in_order(
         finding
         for k in sorted(of_span)
         for finding in _with_remedies(
-            sorted(of_span[k], key=lambda finding: finding.time),
+            sorted(of_span[k], key=lambda finding: finding.time or 0.0),
             trajectory,
             trajectory.spans[k],
             promises[k] if promises else Promise(),
@@ -355,4 +355,5 @@ def _ends_over_limit(finding: Finding, joint: int, promise: Promise) -> bool:
     order = QUANTITIES.index(finding.kind)
     rates = [(state.velocity, state.acceleration)[order - 1] for state in promise.ends or () if order < 3]
     ends = [float(values[joint]) for values in rates]
-    return any(abs(value) > abs(finding.limit) and value * finding.limit > 0 for value in ends)
+    limit = finding.limit or 0.0
+    return any(abs(value) > abs(limit) and value * limit > 0 for value in ends)

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from trajcli.cli.numbers import number, table_lines
 from trajcli.cli.outcome import print_json, print_lines, print_remark
-from trajcli.errors import Amount, at_least
+from trajcli.errors import Amount, Place, Problem, at_least
+from trajcli.findings import Finding
 from trajcli.judge.file import CheckedFile, CheckOptions, check_file
-from trajcli.judge.finding import JudgedFinding, Judgement
+from trajcli.judge.judgement import Judgement
 from trajcli.units import Units, amount_text
 
 if TYPE_CHECKING:
-    from trajcli.output.annotations import Annotation
     from trajcli.output.motion_reference import MotionReference
 
 Form = Literal["table", "json", "junit", "sarif", "github"]
@@ -124,7 +124,7 @@ def _beside(beside: MotionReference, units: Units) -> Iterator[str]:
         yield from violation_lines("toppra", path.violations, "  ")
 
 
-def _listed(findings: Sequence[JudgedFinding]) -> Iterator[JudgedFinding]:
+def _listed(findings: Sequence[Finding]) -> Iterator[Finding]:
     """Yield the findings that a table has: the worst of each group."""
     counts = Counter[str]()
     for finding in findings:
@@ -134,12 +134,12 @@ def _listed(findings: Sequence[JudgedFinding]) -> Iterator[JudgedFinding]:
             yield finding
 
 
-def _group(finding: JudgedFinding) -> str:
+def _group(finding: Finding) -> str:
     """Return the word of a table for how sure and how bad a finding is."""
     return "warning" if finding.severity == "warning" else finding.certainty
 
 
-def _table(checked: CheckedFile, findings: Sequence[JudgedFinding]) -> Iterator[list[str]]:
+def _table(checked: CheckedFile, findings: Sequence[Finding]) -> Iterator[list[str]]:
     moves = any(finding.move is not None for finding in findings)
     head = ["", "kind", "joint", *(["move"] * moves), "value", "limit", "t (s)", "row", "times", "stretch"]
     yield head
@@ -160,7 +160,7 @@ def _table(checked: CheckedFile, findings: Sequence[JudgedFinding]) -> Iterator[
         ]
 
 
-def _amount(checked: CheckedFile, finding: JudgedFinding, name: str, value: float | None) -> str:
+def _amount(checked: CheckedFile, finding: Finding, name: str, value: float | None) -> str:
     """Return a number of a finding in the units of the reader."""
     amount = finding.amounts.get(name)
     if isinstance(amount, Amount):
@@ -179,21 +179,10 @@ def _stretch(judgement: Judgement) -> Iterator[str]:
         yield f"the motion keeps these limits when it takes {at_least(max(factors))} times as long"
 
 
-def _annotations(checked: CheckedFile, file: str) -> Iterator[Annotation]:
-    from trajcli.output.annotations import Annotation
-
+def _annotations(checked: CheckedFile, file: str) -> Iterator[Problem]:
     for finding in checked.judgement.findings:
-        text = finding.text(_say(checked))
-        within = finding.certainty == "within rounding"
-        yield Annotation(
-            rule=finding.kind if finding.rule in _RULES else finding.rule,
-            severity="note" if within else finding.severity,
-            message=text + (f" ({finding.hint})" if finding.hint else ""),
-            file=file,
-            row=finding.row,
-            joint=finding.joint,
-            time=finding.time,
-        )
+        kind = finding.kind if finding.rule in _RULES else finding.rule
+        yield replace(finding.problem(finding.text(_say(checked)), Place(file, 0, 0)), kind=kind)
 
 
 _RULES = ("limit", "continuity", "time", "derivative", "state", "path")

@@ -8,8 +8,8 @@ from dataclasses import replace
 
 from trajcli.cli.outcome import BUG, ErrorForm, report_bug, report_error
 from trajcli.cli.plan import PlanOptions, plan_and_write
-from trajcli.errors import InputError, Problem, TrajcliError, VerificationError
-from trajcli.output.annotations import Annotation, AnnotationForm, annotations_of, render_annotations
+from trajcli.errors import InputError, Place, Problem, TrajcliError
+from trajcli.output.annotations import AnnotationForm, annotations_of, render_annotations
 from trajcli.planning.plan import Plan
 
 _EXCLUDED = ("output", "report", "resolved")
@@ -61,7 +61,7 @@ def _annotated(
 ) -> int:
     """Judge jobs; write one document, or a line for each annotation; return the worst exit code."""
     code = 0
-    found: list[Annotation] = []
+    found: list[Problem] = []
     quiet = options if form == "github" else replace(options, quiet=True)  # a document stands alone
     for job in jobs:
         try:
@@ -78,11 +78,10 @@ def _annotated(
     return code
 
 
-def _concessions(plan: Plan, job: str) -> Iterator[Annotation]:
+def _concessions(plan: Plan, job: str) -> Iterator[Problem]:
     """Yield what was conceded in a plan that verifies."""
     for event in plan.events:
         if event.concedes:
-            place = None if event.move is None else plan.loaded.place_of_move(event.move)
-            problem = Problem(event.text(plan.loaded.say), place=place, kind=event.kind)
-            for annotation in annotations_of(VerificationError(problem), job):
-                yield replace(annotation, severity="warning")
+            place = Place(job, 0, 0) if event.move is None else plan.loaded.place_of_move(event.move)
+            text = event.text(plan.loaded.say)
+            yield Problem(text, place=place, kind=event.kind, severity="warning")

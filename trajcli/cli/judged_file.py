@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from trajcli.errors import Problem, TrajcliError
+from trajcli.findings import Finding
 from trajcli.judge.file import CheckedFile, CheckOptions, check_file
-from trajcli.judge.finding import JudgedFinding
 from trajcli.planning.plan import Plan
 from trajcli.streams.byte_source import ByteSource
 from trajcli.units import amount_text
@@ -37,7 +37,7 @@ def problems_of(checked: CheckedFile, *, every: bool) -> Iterator[Problem]:
         checked: The file.
         every: Whether each finding is said; otherwise the worst of each move and kind, with how many more.
     """
-    alike: dict[object, list[JudgedFinding]] = {}
+    alike: dict[object, list[Finding]] = {}
     for number, finding in enumerate(checked.judgement.errors):
         alike.setdefault(number if every else (finding.move, finding.kind), []).append(finding)
     for group in alike.values():
@@ -46,15 +46,6 @@ def problems_of(checked: CheckedFile, *, every: bool) -> Iterator[Problem]:
         yield replace(problem, message=problem.message + more)
 
 
-def _problem(checked: CheckedFile, finding: JudgedFinding) -> Problem:
+def _problem(checked: CheckedFile, finding: Finding) -> Problem:
     text = finding.text(lambda amount: amount_text(amount, checked.robot.joint_types, checked.units))
-    return Problem(
-        f"{checked.motion.source}: {text}",
-        finding.hint,
-        move=finding.move,
-        joint=finding.joint,
-        time=finding.time,
-        value=finding.value,
-        limit=finding.limit,
-        kind=finding.kind,
-    )
+    return finding.problem(f"{checked.motion.source}: {text}")

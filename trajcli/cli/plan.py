@@ -150,7 +150,7 @@ def _judged(
 def _summarise_consumer(judged: ProfileJudgement) -> None:
     from trajcli.output.consumer import counted
 
-    warnings = [f"  {each.rule}: {each.message}{counted(each)}" for each in judged.breaches]
+    warnings = [f"  {each.rule}: {each.message}{counted(each)}" for each in judged.findings]
     unjudged = ", ".join(rule for rule, _ in judged.unjudged)
     lines = [f"for {judged.profile.name}: all necessary rules are kept", *warnings]
     lines += [f"  not judged: {unjudged}"] if unjudged else []

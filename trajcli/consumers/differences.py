@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from trajcli.consumers.breach import RuleCheck, when
+from trajcli.consumers.rule_check import RuleCheck, when
 from trajcli.curves.approach import ApproachLimits
 from trajcli.curves.piecewise import Array
 from trajcli.errors import at_least
@@ -209,7 +209,7 @@ class RoundingNoise(RuleCheck):
             f"{float(limit[joint]):.6g} that {self.joint_name(rows, joint)} may have",
             "hint": "write positions in rad with at least nine decimals",
         }
-        self.note(rows, joint, 0, float(used[joint]), **fields)
+        self.note(rows, joint, 0, float(used[joint]), fields)
 
 
 class EffortRate(_AtPeriod):

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from trajcli.checks.tolerances import exceeds
-from trajcli.consumers.breach import RuleCheck, when
+from trajcli.consumers.rule_check import RuleCheck, when
 from trajcli.curves.extrema import peaks
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.kinematics.robot import QUANTITIES, Limits

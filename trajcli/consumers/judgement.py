@@ -6,10 +6,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from trajcli.consumers.breach import RuleBreach, RuleCheck, Surroundings
 from trajcli.consumers.differences import Differences, EffortRate, RoundingNoise, VelocityTowardsEnds
 from trajcli.consumers.executed import IntegerRange, QuantisedCurve, VelocitySteps
 from trajcli.consumers.profile import Profile, profile_names, read_profile
+from trajcli.consumers.rule_check import RuleCheck, Surroundings
 from trajcli.consumers.stamps import (
     ControllerPeriod,
     FirstPoint,
@@ -28,6 +28,7 @@ from trajcli.consumers.states import (
     PositionRange,
 )
 from trajcli.errors import InputError
+from trajcli.findings import Finding
 from trajcli.frozen import frozen
 from trajcli.streams.recorded_motion import RecordedMotion
 from trajcli.suggest import did_you_mean, valid_names
@@ -63,18 +64,18 @@ class ProfileJudgement:
 
     Attributes:
         profile: The rules.
-        breaches: Errors first, each by time.
+        findings: Errors first, each by time.
         unjudged: Rules that could not be judged, and why.
     """
 
     profile: Profile
-    breaches: tuple[RuleBreach, ...]
+    findings: tuple[Finding, ...]
     unjudged: tuple[tuple[str, str], ...]
 
     @property
     def accepted(self) -> bool:
         """Whether all necessary rules are kept."""
-        return not any(breach.severity == "error" for breach in self.breaches)
+        return not any(found.severity == "error" for found in self.findings)
 
 
 def load_profile(name: str, folder: Path | None = None) -> Profile:
@@ -124,9 +125,9 @@ def judgement_of(profile: Profile, checks: Sequence[RuleCheck]) -> ProfileJudgem
     for check in checks:
         check.finish()
     order = [rule.id for rule in profile.rules]
-    breaches = sorted(
-        (breach for check in checks for breach in check.breaches()),
+    findings = sorted(
+        (found for check in checks for found in check.findings()),
         key=lambda each: (each.severity != "error", each.time, order.index(each.rule), each.joint or ""),
     )
     unjudged = ((check.rule.id, check.unjudged) for check in checks if check.unjudged is not None)
-    return ProfileJudgement(profile, tuple(breaches), tuple(unjudged))
+    return ProfileJudgement(profile, tuple(findings), tuple(unjudged))

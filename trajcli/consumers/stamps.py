@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
 
-from trajcli.consumers.breach import RuleCheck, when
+from trajcli.consumers.rule_check import RuleCheck, when
 from trajcli.curves.piecewise import Array
+from trajcli.findings import Finding
 from trajcli.streams.recorded_motion import RecordedMotion
 
 __all__ = ["ControllerPeriod", "FirstPoint", "IncreasingTimes", "LongestTime", "SegmentDurations"]
@@ -138,22 +140,27 @@ class LongestTime(RuleCheck):
 
     parameters: ClassVar[Mapping[str, Any]] = {"limit": None}
 
+    _latest = 0.0
+
     def _take(self, rows: RecordedMotion) -> None:
         limit = self.number("limit")
         over = rows.t > limit
         if not over.any():
             return
         index = int(over.argmax())
-        last = int(rows.t.argmax())
+        self._latest = max(self._latest, float(rows.t.max()))
         fields = {
             "kind": "time",
-            "value": float(rows.t[last]),
+            "value": self._latest,
             "limit": limit,
-            "count": int(over.sum()),
             "message": f"the row {when(rows, index)} is the first that lies beyond {limit:g} s",
             "hint": "split the motion",
         }
-        self.note(rows, None, index, float(rows.t[last]), **fields)
+        self.note(rows, None, index, -float(rows.t[index]), fields, int(over.sum()))
+
+    def findings(self) -> Iterator[Finding]:
+        """Yield the first row beyond the limit, with the latest stamp as value."""
+        yield from (replace(found, value=self._latest) for found in super().findings())
 
 
 class FirstPoint(RuleCheck):
@@ -214,4 +221,4 @@ class FirstPoint(RuleCheck):
                 f"its limit is {limit:.6g}",
                 "hint": "give the first point a later time, or let the motion begin where the arm stands",
             }
-            self.note(rows, joint, 0, abs(value / limit) if limit else np.inf, **fields)
+            self.note(rows, joint, 0, abs(value / limit) if limit else np.inf, fields)

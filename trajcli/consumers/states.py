@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from trajcli.consumers.breach import RuleCheck, when
 from trajcli.consumers.differences import rounding_noise
+from trajcli.consumers.rule_check import RuleCheck, when
 from trajcli.curves.piecewise import Array
 from trajcli.streams.recorded_motion import RecordedMotion
 from trajcli.suggest import did_you_mean
@@ -63,8 +63,8 @@ class JointNames(_OfFirstRow):
                 self._note(rows, None, f"the joint '{name}' is missing", "a goal names all joints")
 
     def _note(self, rows: RecordedMotion, joint: int | None, message: str, hint: str | None) -> None:
-        fields = {"kind": "position", "value": 1.0, "limit": 0.0, "message": message, "hint": hint}
-        self.note(rows, joint, 0, 1.0, **fields)
+        fields = {"kind": "joints", "value": 1.0, "limit": 0.0, "message": message, "hint": hint}
+        self.note(rows, joint, 0, 1.0, fields)
 
 
 class JointCount(_OfFirstRow):
@@ -76,8 +76,8 @@ class JointCount(_OfFirstRow):
         count, wanted = rows.q.shape[1], int(self.number("count"))
         if count != wanted:
             text = f"the rows have {count} joint{'s' * (count != 1)}, and {wanted} are moved"
-            fields = {"kind": "position", "value": float(count), "limit": float(wanted), "message": text}
-            self.note(rows, None, 0, 1.0, **fields)
+            fields = {"kind": "joints", "value": float(count), "limit": float(wanted), "message": text}
+            self.note(rows, None, 0, 1.0, fields)
 
 
 class CompletePoints(RuleCheck):

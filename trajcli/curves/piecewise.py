@@ -142,15 +142,16 @@ class PiecewisePolynomial:
         """
         if t.size and not (t.min() >= self.start and t.max() <= self.end):  # so written, NaN is outside too
             raise ValueError(f"time outside the curve's domain [{self.start!r}, {self.end!r}]")
-        table = np.concatenate(
-            [_padded(derivative_coefficients(self.coefficients, order), self.degree) for order in orders],
-            axis=2,
-        )
-        rows = np.empty((t.size, table.shape[2]))
         piece = _piece_of(self.breaks, t, side)
+        first, last = (int(piece.min()), int(piece.max())) if t.size else (0, 0)
+        spoken = self.coefficients[:, first : last + 1]  # a time on a long curve costs no look at all pieces
+        table = np.concatenate(
+            [_padded(derivative_coefficients(spoken, order), self.degree) for order in orders], axis=2
+        )
+        rows, breaks, piece = np.empty((t.size, table.shape[2])), self.breaks[first : last + 2], piece - first
         for low in range(0, t.size, _BLOCK):
             block = slice(low, min(low + _BLOCK, t.size))
-            _evaluate_block(self.breaks, table, t[block], piece[block], rows[block])
+            _evaluate_block(breaks, table, t[block], piece[block], rows[block])
         return rows.reshape(t.size, len(orders), self.dimension)
 
     def shifted(self, offset: float) -> PiecewisePolynomial:
@@ -171,8 +172,12 @@ def derivative_coefficients(coefficients: Array, order: int) -> Array:
 
 def horner(coefficients: Array, x: Array) -> Array:
     """Return the polynomials (degree + 1, ...) at `x`, which broadcasts against the trailing shape."""
-    result = np.broadcast_to(coefficients[0], np.broadcast_shapes(coefficients.shape[1:], x.shape)).copy()
-    for row in coefficients[1:]:
+    if coefficients.shape[0] == 1:
+        constant: Array = coefficients[0] * np.ones(x.shape)
+        return constant
+    result: Array = coefficients[0] * x
+    result += coefficients[1]
+    for row in coefficients[2:]:
         result *= x
         result += row
     return result

@@ -6,7 +6,7 @@ import numpy as np
 
 from trajcli.editing.edited_motion import EditedMotion
 from trajcli.errors import Problem
-from trajcli.judge.finding import JudgedFinding
+from trajcli.findings import Finding
 from trajcli.judge.motion import Requirements, judge_motion
 from trajcli.kinematics.robot import Joint, Robot, unlimited
 
@@ -19,25 +19,14 @@ def new_jumps(before: EditedMotion, after: EditedMotion) -> list[Problem]:
     """Return what is discontinuous about a motion, as it is written, and was not before."""
     known = {_kind(finding) for finding in _jumps(before)}
     found = [finding for finding in _jumps(after.as_written()) if _kind(finding) not in known]
-    return [
-        Problem(
-            f"{before.rows.source}: {finding.text()}",
-            finding.hint,
-            joint=finding.joint,
-            time=finding.time,
-            value=finding.value,
-            limit=finding.limit,
-            kind=finding.kind,
-        )
-        for finding in found
-    ]
+    return [finding.problem(f"{before.rows.source}: {finding.text()}") for finding in found]
 
 
-def _kind(finding: JudgedFinding) -> tuple[str, str | None, str | None]:
+def _kind(finding: Finding) -> tuple[str, str | None, str | None]:
     return finding.kind, finding.quantity, finding.joint
 
 
-def _jumps(motion: EditedMotion) -> list[JudgedFinding]:
+def _jumps(motion: EditedMotion) -> list[Finding]:
     """Return jumps, stamps and derivatives that are certainly wrong."""
     joints = tuple(Joint(name) for name in motion.joint_names)
     bare = Robot(motion.rows.source, joints, unlimited(len(joints)), None, np.eye(4), np.eye(4))

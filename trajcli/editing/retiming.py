@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from trajcli.curves.piecewise import Array
 from trajcli.editing.edited_motion import ORDERS, TIME_DECIMALS, EditedMotion
 from trajcli.errors import InputError, Problem, VerificationError
+from trajcli.findings import Finding
 from trajcli.frozen import frozen
-from trajcli.judge.finding import JudgedFinding
 from trajcli.judge.motion import Requirements, judge_motion
 from trajcli.streams.recorded_motion import RecordedMotion
 
@@ -50,7 +50,7 @@ _AT_REST = 1e-9  # of the largest velocity of a joint: below that a border of tw
 _MICROSECONDS = 1e-3  # s: intervals below this need stamps with more than nine decimals
 _NO_EFFORT = "the columns of efforts are left out: they would be others"
 
-Judge = Callable[[RecordedMotion], JudgedFinding | None]
+Judge = Callable[[RecordedMotion], Finding | None]
 """Returns what is worst about rows; None where limits are kept."""
 
 
@@ -66,7 +66,7 @@ class Stretch:
 
     factor: float
     moves: tuple[int, ...] | None
-    binding: JudgedFinding | None
+    binding: Finding | None
 
 
 def retime(
@@ -102,7 +102,7 @@ def retime(
 def _judge_of(requirements: Requirements, *, strict: bool) -> Judge:
     """Return what judges rows: as `trajcli check` does, or strictly where rounding is small."""
 
-    def judge(rows: RecordedMotion) -> JudgedFinding | None:
+    def judge(rows: RecordedMotion) -> Finding | None:
         wrong = [f for f in judge_motion(lambda: (rows,), requirements).findings if _counts(f, strict=strict)]
         for finding in wrong:
             if finding.kind not in STRETCHABLE:
@@ -116,7 +116,7 @@ def _judge_of(requirements: Requirements, *, strict: bool) -> Judge:
     return judge
 
 
-def _counts(finding: JudgedFinding, *, strict: bool) -> bool:
+def _counts(finding: Finding, *, strict: bool) -> bool:
     """Return whether a motion with a finding does not keep its limits."""
     if finding.severity != "error":
         return False
@@ -136,7 +136,7 @@ def _part(rows: RecordedMotion, part: slice) -> RecordedMotion:
 
 def _smallest(
     rows: RecordedMotion, judge: Judge, strictly: Judge, *, fastest: bool
-) -> tuple[float, JudgedFinding | None]:
+) -> tuple[float, Finding | None]:
     """Return the smallest factor with which limits are kept, and what a smaller one breaks.
 
     Whether the motion keeps them as it is, is left to its rounding, as `trajcli check` does.
@@ -168,8 +168,8 @@ def _smallest(
 
 
 def _bracketed(
-    rows: RecordedMotion, judge: Judge, ends: tuple[float, float], binding: JudgedFinding
-) -> tuple[float, JudgedFinding]:
+    rows: RecordedMotion, judge: Judge, ends: tuple[float, float], binding: Finding
+) -> tuple[float, Finding]:
     """Return a factor that keeps limits, near to one that does not, and what the latter breaks."""
     low, high = ends
     middle = high / (1 + _FINE)  # the factor of the closed form needs this one trial
@@ -252,7 +252,7 @@ def _verified(
         stretches = [_longer(stretch, broken) for stretch in stretches]
 
 
-def _longer(stretch: Stretch, broken: JudgedFinding) -> Stretch:
+def _longer(stretch: Stretch, broken: Finding) -> Stretch:
     """Return a stretch that is longer where something is broken in its moves."""
     if broken.move is not None and stretch.moves is not None and broken.move not in stretch.moves:
         return stretch

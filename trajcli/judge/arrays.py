@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
-from trajcli.judge.finding import Judgement
+from trajcli.judge.judgement import Judgement
 from trajcli.judge.motion import Requirements, judge_motion
 from trajcli.kinematics.robot import Joint, Limits, Robot, unlimited
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution

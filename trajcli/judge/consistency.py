@@ -15,11 +15,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.checks.finding import at_time
 from trajcli.checks.tolerances import JUMP_ABSOLUTE, JUMP_RELATIVE, exceeds
 from trajcli.curves.piecewise import Array
+from trajcli.findings import Collector, Finding, at_time
 from trajcli.frozen import frozen
-from trajcli.judge.finding import JudgedFinding, JudgedKind, Worst
 from trajcli.judge.intervals import DENSE, Intervals, JointAxes
 from trajcli.judge.rounding import stated_errors
 from trajcli.kinematics.robot import Limits
@@ -118,7 +117,7 @@ def judge_consistency(
     limits: Limits,
     move: int,
     axes: JointAxes,
-    worst: Worst,
+    worst: Collector,
     changes: list[Changes],
     changes_branch: ChangesBranch | None = None,
 ) -> None:
@@ -150,7 +149,7 @@ class _Judge:
     changes: Changes
     axes: JointAxes
     move: int
-    worst: Worst
+    worst: Collector
 
     def over_limit(self, limits: Limits) -> NDArray[np.bool_]:
         """Return where the quantity changes by more than the limit of the next derivative allows, (P, n)."""
@@ -193,7 +192,7 @@ class _Judge:
                 branch[k] = changes_branch(q[low : int(row[k]) + 3], int(row[k]) - low)
         quantity = _QUANTITIES[changes.order]
 
-        def make(kind: JudgedKind) -> Callable[[int], JudgedFinding]:
+        def make(kind: str) -> Callable[[int], Finding]:
             return lambda k: self._finding(kind, int(row[k]), int(joint[k]))
 
         add = self.worst.add
@@ -209,7 +208,7 @@ class _Judge:
         near = np.clip(row + np.arange(-_NEAR, _NEAR + 1)[:, None], 0, len(values) - 1)
         return np.asarray(values[row, joint] - np.median(values[near, joint], axis=0))
 
-    def _finding(self, kind: JudgedKind, row: int, joint: int) -> JudgedFinding:
+    def _finding(self, kind: str, row: int, joint: int) -> Finding:
         changes, length = self.changes, float(self.window.lengths[row])
         order, stated = changes.order, changes.stated
         value, limit = float(changes.change[row, joint]), 0.0 if stated is None else float(stated[row, joint])
@@ -229,7 +228,7 @@ class _Judge:
                 f"the column of the {name} of {{joint}} says {{value}} {at_time(time)}, "
                 f"its {below} changes by {{limit}}"
             )
-        return JudgedFinding(
+        return Finding(
             rule={"jump": "continuity", "derivative": "derivative"}.get(kind, "path"),
             severity="error",
             kind=kind,

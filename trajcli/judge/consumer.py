@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import cast
-
-from trajcli.consumers.breach import RuleBreach, Surroundings
 from trajcli.consumers.judgement import checks_of, judgement_of, load_profile
 from trajcli.consumers.profile import Profile
+from trajcli.consumers.rule_check import Surroundings
 from trajcli.curves.piecewise import Array
-from trajcli.judge.finding import JudgedFinding, JudgedKind
+from trajcli.findings import Finding
 from trajcli.kinematics.robot import Robot
 from trajcli.streams.recorded_motion import RecordedMotion
 
@@ -41,28 +39,8 @@ class ConsumerJudge:
             for check in self._checks:
                 check.take(rows)
 
-    def result(self) -> tuple[tuple[JudgedFinding, ...], tuple[str, ...]]:
+    def result(self) -> tuple[tuple[Finding, ...], tuple[str, ...]]:
         """Return the findings, and a sentence for each rule that is not judged; once, behind all rows."""
         judgement = judgement_of(self.profile, self._checks)
         notes = tuple(f"the rule {rule} is not judged: {reason}" for rule, reason in judgement.unjudged)
-        return tuple(map(finding_of, judgement.breaches)), notes
-
-
-def finding_of(breach: RuleBreach) -> JudgedFinding:
-    """Return the finding that says of a motion what a breach does."""
-    return JudgedFinding(
-        rule=breach.rule,
-        severity=breach.severity,
-        kind=cast("JudgedKind", breach.kind),
-        joint=breach.joint,
-        value=breach.value,
-        limit=breach.limit,
-        time=breach.time,
-        row=breach.row,
-        factor=breach.factor,
-        method=breach.method,
-        count=breach.count,
-        move=breach.move,
-        message=breach.message,
-        hint=breach.hint,
-    )
+        return judgement.findings, notes

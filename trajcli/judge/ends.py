@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.checks.finding import at_time
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount
-from trajcli.judge.finding import FindingSeverity, JudgedFinding, JudgedKind, Worst
+from trajcli.findings import Collector, Finding, FindingSeverity, at_time
 from trajcli.judge.intervals import JointAxes
 from trajcli.judge.rounding import stated_errors
 from trajcli.streams.recorded_motion import Resolution
@@ -23,7 +22,7 @@ _REST = 1e-6
 
 def judge_start(
     row: EndState, start: State, tolerance: Array, resolution: Resolution, axes: JointAxes
-) -> list[JudgedFinding]:
+) -> list[Finding]:
     """Return where the first row is not the state in which the motion shall begin: the worst joint of each.
 
     Args:
@@ -41,7 +40,7 @@ def judge_start(
 
 def judge_end(
     row: EndState, end: State | None, tolerance: Array | None, resolution: Resolution, axes: JointAxes
-) -> list[JudgedFinding]:
+) -> list[Finding]:
     """Return where the last row is not the state in which the motion shall end.
 
     Where nobody says it, it shall be at rest, and a warning says where it is not.
@@ -63,8 +62,8 @@ def judge_end(
 
 
 def _position(
-    row: EndState, wanted: Array, tolerance: Array, resolution: Resolution, axes: JointAxes, kind: JudgedKind
-) -> list[JudgedFinding]:
+    row: EndState, wanted: Array, tolerance: Array, resolution: Resolution, axes: JointAxes, kind: str
+) -> list[Finding]:
     time, number, (q, *_) = row
     if q is None:
         return []
@@ -77,7 +76,7 @@ def _position(
     which = "first" if kind == "start" else "last"
     within = Amount(float(tolerance[joint]), 0, joint, axes.dimension(joint), "down")
     return [
-        JudgedFinding(
+        Finding(
             rule="state",
             severity="error",
             kind=kind,
@@ -102,9 +101,9 @@ def _velocity(
     wanted: Array,
     resolution: Resolution,
     axes: JointAxes,
-    kind: JudgedKind,
+    kind: str,
     severity: FindingSeverity,
-) -> list[JudgedFinding]:
+) -> list[Finding]:
     time, number, (_, qd, _) = row
     if qd is None or not np.isfinite(qd).all():
         return []
@@ -116,7 +115,7 @@ def _velocity(
     value, limit = float(qd[0, joint]), float(wanted[joint])
     which = "first" if kind == "start" else "last"
     return [
-        JudgedFinding(
+        Finding(
             rule="state",
             severity=severity,
             kind=kind,
@@ -136,7 +135,7 @@ def _velocity(
 
 
 def judge_order_of_stamps(
-    t: Array, rows: NDArray[np.int64], before: float, moves: NDArray[np.int64], worst: Worst
+    t: Array, rows: NDArray[np.int64], before: float, moves: NDArray[np.int64], worst: Collector
 ) -> NDArray[np.bool_]:
     """Return which of some stamps are finite and later than all before them; add the others as findings.
 
@@ -154,7 +153,7 @@ def judge_order_of_stamps(
     increasing = finite & (np.where(finite, t, -np.inf) > latest)
     wrong = np.flatnonzero(~increasing)
 
-    def make(k: int) -> JudgedFinding:
+    def make(k: int) -> Finding:
         row = int(wrong[k])
         number, time, last = int(rows[row]), float(t[row]), float(latest[row])
         text = f"the time stamp of row {number} is {time!r}"
@@ -162,7 +161,7 @@ def judge_order_of_stamps(
             how = "doubled" if time == last else "earlier than the one before"
             text = f"the time stamp of row {number}, {time:.9g} s, is {how}: the latest is {last:.9g} s"
         known = (time, last) if np.isfinite(time) else (None, None)
-        return JudgedFinding(
+        return Finding(
             rule="time",
             severity="error",
             kind="time",

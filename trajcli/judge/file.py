@@ -11,7 +11,7 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, TrajcliError
 from trajcli.frozen import comparable, frozen
-from trajcli.judge.finding import Judgement
+from trajcli.judge.judgement import Judgement
 from trajcli.judge.motion import JUDGED_ROWS, Requirements, judge_motion
 from trajcli.kinematics.robot import Robot
 from trajcli.streams.byte_source import ByteSource

@@ -11,7 +11,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.checks.finding import at_time
 from trajcli.checks.tolerances import EFFORT_RELATIVE, exceeds
 from trajcli.curves.approach import ROOM, allowed_speed, uses_of_pieces
 from trajcli.curves.bernstein import control_points
@@ -20,14 +19,14 @@ from trajcli.curves.piecewise import Array, derivative_coefficients, horner
 from trajcli.dynamics.effort_bound import EffortPeak, EffortSurvey, effort_survey, needed_stretch
 from trajcli.dynamics.newton_euler import InverseDynamics
 from trajcli.errors import Amount, Amounts
+from trajcli.findings import Certainty, Collector, Finding, FindingSeverity, at_time
 from trajcli.frozen import frozen
-from trajcli.judge.finding import Certainty, FindingSeverity, JudgedFinding, JudgedKind, Worst
 from trajcli.judge.intervals import DENSE, Intervals, JointAxes, explained_by_law
 from trajcli.judge.rounding import PieceRows
 from trajcli.kinematics.robot import Limits, Robot
 from trajcli.units import effort_unit
 
-_KINDS: tuple[JudgedKind, ...] = ("position", "velocity", "acceleration", "jerk")
+_KINDS: tuple[str, ...] = ("position", "velocity", "acceleration", "jerk")
 
 _MANY = 20000  # pieces and joints over a limit from which on only the worst of them are looked at closely
 
@@ -57,7 +56,7 @@ def judge_limits(
     limits: Limits,
     move: int,
     axes: JointAxes,
-    worst: Worst,
+    worst: Collector,
     *,
     asked: bool,
 ) -> None:
@@ -134,7 +133,7 @@ class _Side:
             self.first + piece[beyond], joint[beyond], value[beyond], local[beyond], bound[beyond]
         )
 
-    def add(self, found: _Offences, move: int, axes: JointAxes, worst: Worst, *, asked: bool) -> None:
+    def add(self, found: _Offences, move: int, axes: JointAxes, worst: Collector, *, asked: bool) -> None:
         """Add pieces beyond the bound, by what is certain about them."""
         count = 1 if self.window.interpolation == "jtc-upsampling" else max(self.level, 1)
         rows = self.window.piece_rows(found.piece, found.joint, count)
@@ -148,7 +147,7 @@ class _Side:
             warned = by_curve & ~by_rows & self._unresolved(found, error)
         excess = value / found.bound if self.order else value - found.bound
 
-        def make(k: int) -> JudgedFinding:
+        def make(k: int) -> Finding:
             return self._finding(found, k, float(value[k]), float(error[k]), axes, warned=bool(warned[k]))
 
         groups: tuple[tuple[NDArray[np.bool_], FindingSeverity, Certainty], ...] = (
@@ -175,14 +174,14 @@ class _Side:
 
     def _finding(
         self, found: _Offences, k: int, value: float, error: float, axes: JointAxes, *, warned: bool
-    ) -> JudgedFinding:
+    ) -> Finding:
         piece, joint, local = int(found.piece[k]), int(found.joint[k]), float(found.local[k])
         bound, kind = float(found.bound[k]), _KINDS[self.order]
         time = float(self.window.t[piece]) + local
         what = f"the {kind} of {{joint}} reaches {{value}} {at_time(time)}, its limit is {{limit}}"
         if warned:
             what += "; between the rows only, where the motion changes its law"
-        return JudgedFinding(
+        return Finding(
             rule="limit",
             severity="error",
             kind=kind,
@@ -232,7 +231,7 @@ def judge_velocity_by_position(
     limits: Limits,
     move: int,
     axes: JointAxes,
-    worst: Worst,
+    worst: Collector,
     *,
     asked: bool,
 ) -> None:
@@ -310,7 +309,7 @@ class _FastApproaches:
         towards = np.where(np.signbit(self.bound), -self.speed, self.speed)
         return np.asarray(towards - np.abs(self.bound) > self.rounding)
 
-    def finding(self, window: Intervals, axes: JointAxes, k: int) -> JudgedFinding:
+    def finding(self, window: Intervals, axes: JointAxes, k: int) -> Finding:
         """Return one of them as a finding."""
         piece, joint, local = int(self.piece[k]), int(self.joint[k]), float(self.local[k])
         value, limit = float(self.speed[k]), float(self.bound[k])
@@ -318,7 +317,7 @@ class _FastApproaches:
         ahead = Amount(abs(float(self.distance[k])), 0, joint, axes.dimension(joint))
         where = "beyond" if self.distance[k] < 0 else "before"
         speed = f"the velocity of {{joint}} reaches {{value}} {at_time(time)}, {{distance}} {where} the end"
-        return JudgedFinding(
+        return Finding(
             rule="limit",
             severity="error",
             kind="velocity_by_position",
@@ -362,7 +361,14 @@ _ACCELERATED = 3  # degree from which on pieces have an acceleration
 
 
 def judge_efforts(
-    window: Intervals, pieces: slice, robot: Robot, move: int, axes: JointAxes, worst: Worst, *, asked: bool
+    window: Intervals,
+    pieces: slice,
+    robot: Robot,
+    move: int,
+    axes: JointAxes,
+    worst: Collector,
+    *,
+    asked: bool,
 ) -> None:
     """Add where joints of an arm are over their limits of torque or force in pieces of one move.
 
@@ -428,7 +434,7 @@ class _OverEffort:
     limit: float
     peak: EffortPeak
 
-    def add(self, move: int, axes: JointAxes, worst: Worst, *, stated: float, asked: bool) -> None:
+    def add(self, move: int, axes: JointAxes, worst: Collector, *, stated: float, asked: bool) -> None:
         """Add it by what is certain about it."""
         at = int(np.clip(np.searchsorted(self.breaks, self.peak.time, "right") - 1, 0, self.curved.size - 1))
         piece, local = int(self.curved[at]), float(self.peak.time - self.breaks[at])
@@ -459,7 +465,7 @@ class _OverEffort:
         inertia = np.abs(self.dynamics.mass_matrix(position)[self.joint])
         return float(inertia @ rows.error(2))
 
-    def _finding(self, piece: int, local: float, axes: JointAxes, rounding: float) -> JudgedFinding:
+    def _finding(self, piece: int, local: float, axes: JointAxes, rounding: float) -> Finding:
         unit = effort_unit(self.dynamics.robot.joint_types[self.joint])
         value, limit = self.sign * self.peak.most, self.sign * self.limit
         time = float(self.window.t[piece]) + local
@@ -471,7 +477,7 @@ class _OverEffort:
         }
         what = "force" if unit == "N" else "torque"
         needed = needed_stretch(self.survey, self.joint, self.sign, self.limit, EFFORT_RELATIVE / 2).factor
-        return JudgedFinding(
+        return Finding(
             rule="limit",
             severity="error",
             kind="effort",

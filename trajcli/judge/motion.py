@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Problem
+from trajcli.findings import Collector, Finding
 from trajcli.frozen import frozen
 from trajcli.judge.consistency import changes_of, judge_consistency
 from trajcli.judge.ends import judge_end, judge_order_of_stamps, judge_start
-from trajcli.judge.finding import JudgedFinding, Judgement, Worst, worst_first
 from trajcli.judge.intervals import BESIDE, Intervals, JointAxes
+from trajcli.judge.judgement import Judgement, worst_first
 from trajcli.judge.limits import judge_efforts, judge_limits, judge_velocity_by_position
 from trajcli.judge.reconstruction import Interpolation, chosen_interpolation
 from trajcli.judge.stamps import Stamps, UnfitError
@@ -113,7 +114,7 @@ class MotionJudge:
 
     def __init__(self, requirements: Requirements, *, snap: bool = True) -> None:
         """Begin with no rows."""
-        self._requirements, self._snap, self._worst = requirements, snap, Worst()
+        self._requirements, self._snap, self._worst = requirements, snap, Collector()
         robot = requirements.robot
         self._axes = JointAxes(robot.joint_names, robot.joint_types)
         self._stamps: Stamps | None = None
@@ -172,7 +173,7 @@ class MotionJudge:
                 f"{where} has {self._count} row{'s' * (self._count != 1)}, a motion has two at least"
             )
         self._judge(kept.t.size - 1, ends=True)
-        findings = self._worst.findings() + self._of_ends(self._first_state, kept.part(slice(-1, None)))
+        findings = [*self._worst.findings(), *self._of_ends(self._first_state, kept.part(slice(-1, None)))]
         if self._tool is not None:
             findings += self._tool.findings()
         notes = [*_note_on_stamps(stamps), *(() if self._tool is None else self._tool.notes)]
@@ -282,10 +283,10 @@ class MotionJudge:
         known, robot = self._requirements.by_move, self._requirements.robot
         return known.get(before, robot).payload is known.get(after, robot).payload
 
-    def _of_ends(self, first: _Rows, last: _Rows) -> list[JudgedFinding]:
+    def _of_ends(self, first: _Rows, last: _Rows) -> list[Finding]:
         required, resolution = self._requirements, self._resolution
         assert resolution is not None  # noqa: S101
-        findings: list[JudgedFinding] = []
+        findings: list[Finding] = []
         if required.start is not None and required.start_tolerance is not None:
             state = (float(first.t[0]), int(first.rows[0]), first.states)
             findings += judge_start(state, required.start, required.start_tolerance, resolution, self._axes)
@@ -347,7 +348,7 @@ def _note_on_stamps(stamps: Stamps) -> list[str]:
     return [f"the time stamps are taken as multiples of {rate}: that moves them {moved}"]
 
 
-def _causes(findings: list[JudgedFinding]) -> list[JudgedFinding]:
+def _causes(findings: list[Finding]) -> list[Finding]:
     """Return the findings without accelerations that disagree with velocities which are wrong themselves."""
     wrong = {(f.joint, f.move) for f in findings if f.kind == "derivative" and f.quantity == "velocity"}
     return [
@@ -357,7 +358,7 @@ def _causes(findings: list[JudgedFinding]) -> list[JudgedFinding]:
     ]
 
 
-def _with_hint(finding: JudgedFinding, axes: JointAxes) -> JudgedFinding:
+def _with_hint(finding: Finding, axes: JointAxes) -> Finding:
     """Return the finding with what would mend it, where that is known."""
     if finding.hint is not None or finding.joint is None or finding.value is None:
         return finding

@@ -20,7 +20,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import comparable, frozen
 from trajcli.grids import Grid, ListedGrid, UniformGrid
-from trajcli.judge.finding import Judgement, worst_first
+from trajcli.judge.judgement import Judgement, worst_first
 from trajcli.knots import knot_grid, knots_of
 from trajcli.planning.plan import Plan
 from trajcli.samples import sample

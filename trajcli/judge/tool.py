@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.checks.finding import at_time
 from trajcli.checks.tolerances import TOOL_RELATIVE
 from trajcli.checks.tool_bound import ToolPeak, tool_bounds
 from trajcli.checks.tool_limits import SPEEDS, limits_tool
 from trajcli.curves.piecewise import Array, derivative_coefficients, horner
 from trajcli.errors import Amount
-from trajcli.judge.finding import JudgedFinding, JudgedKind, Worst
+from trajcli.findings import Collector, Finding, at_time
 from trajcli.judge.intervals import DENSE, Intervals
 from trajcli.judge.tool_path import RecordedPath
 from trajcli.kinematics.dexterity import characteristic_length
@@ -50,7 +49,7 @@ class ToolJudge:
         self._robot, self._paths = robot, paths
         self._length = characteristic_length(robot)
         self._recorded: dict[int, RecordedPath] = {}
-        self._worst = Worst()
+        self._worst = Collector()
         self._moved, self._seen = 0.0, -1
         self.notes: list[str] = []
         for move, motion in (paths or {}).items():
@@ -79,7 +78,7 @@ class ToolJudge:
         if self._paths is None or path is not None:
             self._judge_singularity(window, pieces, move)
 
-    def findings(self) -> list[JudgedFinding]:
+    def findings(self) -> Iterator[Finding]:
         """Return what was found."""
         return self._worst.findings()
 
@@ -126,7 +125,7 @@ class ToolJudge:
         rounding = self._rounding(window, piece, order)
         length = not name.startswith("angular")
         text = f"the {name.replace('_', ' ')} of the tool reaches {{value}} {at_time(peak.time)}"
-        finding = JudgedFinding(
+        finding = Finding(
             rule="limit",
             severity="error",
             kind=_kind(kind),
@@ -226,9 +225,9 @@ class ToolJudge:
         if not near.size:
             return
 
-        def make(k: int) -> JudgedFinding:
+        def make(k: int) -> Finding:
             row, time = int(rows[near[k]]), float(window.t[rows[near[k]]])
-            return JudgedFinding(
+            return Finding(
                 rule="path",
                 severity="warning",
                 kind="singularity",
@@ -262,9 +261,9 @@ class ToolJudge:
         return np.asarray(new + pieces.start, dtype=np.intp)
 
 
-def _kind(kind: str) -> JudgedKind:
+def _kind(kind: str) -> str:
     """Return the kind of finding about a limit of the tool."""
-    kinds: dict[str, JudgedKind] = {
+    kinds: dict[str, str] = {
         "tool_speed": "tool_speed",
         "tool_angular_speed": "tool_angular_speed",
         "tool_acceleration": "tool_acceleration",

@@ -7,11 +7,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.checks.finding import at_time
 from trajcli.checks.tolerances import exceeds
 from trajcli.curves.piecewise import Array, horner
 from trajcli.errors import Amount
-from trajcli.judge.finding import Certainty, JudgedFinding, Worst
+from trajcli.findings import Certainty, Collector, Finding, at_time
 from trajcli.judge.intervals import Intervals
 from trajcli.judge.rounding import stated_errors
 from trajcli.kinematics.dexterity import characteristic_length
@@ -29,7 +28,7 @@ _ROWS = 1024  # at a time
 class RecordedPath:
     """The tool of one move beside the path on which it shall be."""
 
-    def __init__(self, robot: Robot, motion: ToolMotion, move: int, worst: Worst) -> None:
+    def __init__(self, robot: Robot, motion: ToolMotion, move: int, worst: Collector) -> None:
         """Begin with no rows.
 
         Args:
@@ -118,11 +117,11 @@ class RecordedPath:
             return
         dimension: Literal["length", "angle"] = "length" if quantity == "position" else "angle"
 
-        def make(k: int) -> JudgedFinding:
+        def make(k: int) -> Finding:
             row = over[k]
             value, time = float(sizes[row]), float(t[row])
             what = "is beside" if quantity == "position" else "is turned from"
-            return JudgedFinding(
+            return Finding(
                 rule="path",
                 severity="error",
                 kind="deviation",
@@ -167,9 +166,9 @@ class RecordedPath:
         if not changes.size:
             return
 
-        def make(k: int) -> JudgedFinding:
+        def make(k: int) -> Finding:
             time = float(t[changes[k]])
-            return JudgedFinding(
+            return Finding(
                 rule="path",
                 severity="error",
                 kind="branch",

@@ -10,22 +10,22 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Literal
 
 from trajcli.errors import (
     FileError,
     InputError,
+    Place,
     PlanningError,
     Problem,
     TrajcliError,
     VerificationError,
     utf8,
 )
-from trajcli.frozen import comparable
 from trajcli.version import __version__
 
 AnnotationForm = Literal["github", "junit", "sarif"]
-Severity = Literal["error", "warning", "note"]
 
 _RULES: tuple[tuple[type[TrajcliError], str], ...] = (
     (VerificationError, "verification"),
@@ -40,61 +40,23 @@ _NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _STANDARD_INPUT = ("-", "<stdin>")
 
 
-@comparable
-class Annotation:
-    """Something that was found, and where.
-
-    Attributes:
-        rule: A stable word for programs, such as "velocity".
-        severity: "error" makes a run fail.
-        message: What was found, with the numbers.
-        file: The file it is about, as its user names it; "-" is standard input; None where there is none.
-        line: Of the file, from 1; None where it has no lines, or the whole file is meant.
-        column: In the line, from 1.
-        row: Of a table, from 1 without its header.
-        joint: Name of the joint.
-        time: Seconds.
-    """
-
-    rule: str
-    severity: Severity
-    message: str
-    file: str | None = None
-    line: int | None = None
-    column: int | None = None
-    row: int | None = None
-    joint: str | None = None
-    time: float | None = None
-
-    @property
-    def text(self) -> str:
-        """The message, with the row where it does not name it itself."""
-        named = self.row is None or re.search(rf"\brow {self.row}\b", self.message)
-        return self.message if named else f"{self.message} (row {self.row})"
-
-
-def annotations_of(error: TrajcliError, file: str | None = None) -> tuple[Annotation, ...]:
-    """Return an annotation for each problem of an error.
+def annotations_of(error: TrajcliError, file: str | None = None) -> tuple[Problem, ...]:
+    """Return the problems of an error, each with a kind, and with the file that it is about.
 
     Args:
-        error: Its problems without a kind of their own are of a rule that its class names.
-        file: What a problem is about that has no place in a file.
+        error: Its problems without a kind of their own get that which its class names.
+        file: What a problem is about that has no place in a file; "-" is standard input.
     """
-    rule = next((name for kind, name in _RULES if isinstance(error, kind)), "bug")
-    return tuple(_annotation(problem, rule, file) for problem in error.problems)
-
-
-def _annotation(problem: Problem, rule: str, file: str | None) -> Annotation:
-    where, hint = problem.place, problem.advice()
-    text = problem.text() + (f" ({hint})" if hint else "")
-    found = Annotation(problem.kind or rule, "error", text, file, joint=problem.joint, time=problem.time)
-    if where is None:
-        return found
-    return Annotation(**{**vars(found), "file": where.file, "line": where.line, "column": where.column})
+    kind = next((name for of_class, name in _RULES if isinstance(error, of_class)), "bug")
+    whole = None if file is None else Place(file, 0, 0)
+    return tuple(
+        replace(problem, kind=problem.kind or kind, place=problem.place or whole)
+        for problem in error.problems
+    )
 
 
 def render_annotations(
-    annotations: Sequence[Annotation],
+    problems: Sequence[Problem],
     form: AnnotationForm,
     subjects: Sequence[str] = (),
     rules: Mapping[str, str] | None = None,
@@ -102,28 +64,43 @@ def render_annotations(
     """Return a text for a service of continuous integration; it ends in a line feed unless it is empty.
 
     Args:
-        annotations: What was found.
+        problems: What was found, each with its kind; a place in line 0 is the whole file.
         form: "github" gives one line for each; "junit" and "sarif" one document, whatever was found.
         subjects: The files that were judged: JUnit names those, too, with which nothing is wrong.
         rules: What was judged, with a sentence about each; what is annotated besides is added.
     """
-    rules = rules or {}
+    rules, problems = rules or {}, [_with_all_said(problem) for problem in problems]
     if form == "github":
-        return "".join(f"{_github(annotation)}\n" for annotation in annotations)
+        return "".join(f"{_github(problem)}\n" for problem in problems)
     if form == "junit":
-        return _junit(annotations, subjects, tuple(rules))
-    return json.dumps(_sarif(annotations, rules), ensure_ascii=False, indent=2, allow_nan=False) + "\n"
+        return _junit(problems, subjects, tuple(rules))
+    return json.dumps(_sarif(problems, rules), ensure_ascii=False, indent=2, allow_nan=False) + "\n"
 
 
-def _github(annotation: Annotation) -> str:
+def _with_all_said(problem: Problem) -> Problem:
+    """Return a problem whose message has its numbers, its hint, and its row where it does not name it."""
+    text, hint = problem.text(), problem.advice()
+    text += f" ({hint})" if hint else ""
+    if problem.row is not None and not re.search(rf"\brow {problem.row}\b", text):
+        text += f" (row {problem.row})"
+    return replace(problem, message=text, hint=None, amounts={}, kind=problem.kind or "bug")
+
+
+def _place(problem: Problem) -> Place:
+    """Return the place of a problem; without a name of a file where there is none."""
+    return problem.place or Place("", 0, 0)
+
+
+def _github(problem: Problem) -> str:
     """Return a command that GitHub's runner reads from the output of a step."""
-    kind = "notice" if annotation.severity == "note" else annotation.severity
-    given = {"file": annotation.file, "line": annotation.line, "col": annotation.column}
-    if annotation.file in _STANDARD_INPUT:
+    kind = "notice" if problem.severity == "note" else problem.severity
+    place = _place(problem)
+    given = {"file": place.file, "line": place.line, "col": place.column}
+    if place.file in _STANDARD_INPUT:
         given = {}
-    given["title"] = f"trajcli: {annotation.rule}"
-    pairs = (f"{key}={_github_property(str(value))}" for key, value in given.items() if value is not None)
-    return f"::{kind} {','.join(pairs)}::{_github_data(annotation.text)}"
+    given["title"] = f"trajcli: {problem.kind}"
+    pairs = (f"{key}={_github_property(str(value))}" for key, value in given.items() if value)
+    return f"::{kind} {','.join(pairs)}::{_github_data(problem.message)}"
 
 
 def _github_data(text: str) -> str:
@@ -141,22 +118,22 @@ def _escaped(match: re.Match[str]) -> str:
     return match[0].encode("unicode_escape", "backslashreplace").decode("ascii")
 
 
-def _junit(annotations: Sequence[Annotation], subjects: Sequence[str], rules: Sequence[str]) -> str:
-    """Return a JUnit document: a suite for each file, in it a case for each rule and each annotation."""
+def _junit(problems: Sequence[Problem], subjects: Sequence[str], rules: Sequence[str]) -> str:
+    """Return a JUnit document: a suite for each file, in it a case for each rule and each problem."""
     from xml.etree import ElementTree as ET
 
-    files = dict.fromkeys([*subjects, *(annotation.file or "" for annotation in annotations)])
+    files = dict.fromkeys([*subjects, *(_place(problem).file for problem in problems)])
     root = ET.Element("testsuites", {"name": "trajcli"})
     for file in files or {"": None}:
-        of_file = [annotation for annotation in annotations if (annotation.file or "") == file]
+        of_file = [problem for problem in problems if _place(problem).file == file]
         suite = ET.SubElement(root, "testsuite", {"name": _xml(file) or "trajcli"})
-        broken = {annotation.rule for annotation in of_file}
-        failed = any(annotation.severity == "error" for annotation in of_file)
+        broken = {str(problem.kind) for problem in of_file}
+        failed = any(problem.severity == "error" for problem in of_file)
         for rule in [rule for rule in rules if rule not in broken] or ["verification"][failed:]:
             ET.SubElement(suite, "testcase", _case(file, rule))
-        for name, annotation in _numbered(of_file):
+        for name, problem in _numbered(of_file):
             case = ET.SubElement(suite, "testcase", _case(file, name))
-            _add_outcome(case, annotation)
+            _add_outcome(case, problem)
         _count(suite)
     _count(root)
     ET.indent(root)
@@ -167,26 +144,27 @@ def _case(file: str, name: str) -> dict[str, str]:
     return {"classname": _xml(file) or "trajcli", "name": _xml(name), "time": "0"}
 
 
-def _numbered(annotations: Sequence[Annotation]) -> Iterator[tuple[str, Annotation]]:
+def _numbered(problems: Sequence[Problem]) -> Iterator[tuple[str, Problem]]:
     """Yield each annotation under its rule, with a number where there are several: names of cases differ."""
-    count = Counter(annotation.rule for annotation in annotations)
+    count = Counter(str(problem.kind) for problem in problems)
     used: Counter[str] = Counter()
-    for annotation in annotations:
-        rule = annotation.rule
+    for problem in problems:
+        rule = str(problem.kind)
         used[rule] += 1
-        yield rule if count[rule] == 1 else f"{rule} {used[rule]} of {count[rule]}", annotation
+        yield rule if count[rule] == 1 else f"{rule} {used[rule]} of {count[rule]}", problem
 
 
-def _add_outcome(case: Any, annotation: Annotation) -> None:  # noqa: ANN401
+def _add_outcome(case: Any, problem: Problem) -> None:  # noqa: ANN401
     """Add to a case that it failed, or what it says although it did not."""
     from xml.etree import ElementTree as ET
 
-    where = "" if annotation.line is None else f"{annotation.file}:{annotation.line}: "
-    text = _xml(where + annotation.text)
-    if annotation.severity != "error":
-        ET.SubElement(case, "system-out").text = f"{annotation.severity}: {text}"
+    place = _place(problem)
+    where = f"{place.file}:{place.line}: " if place.line else ""
+    text = _xml(where + problem.message)
+    if problem.severity != "error":
+        ET.SubElement(case, "system-out").text = f"{problem.severity}: {text}"
         return
-    attributes = {"message": _xml(annotation.text), "type": _xml(annotation.rule)}
+    attributes = {"message": _xml(problem.message), "type": _xml(str(problem.kind))}
     ET.SubElement(case, "failure", attributes).text = text
 
 
@@ -201,12 +179,12 @@ def _xml(text: str) -> str:
     return _NO_XML.sub(_escaped, text)
 
 
-def _sarif(annotations: Sequence[Annotation], rules: Mapping[str, str]) -> dict[str, Any]:
+def _sarif(problems: Sequence[Problem], rules: Mapping[str, str]) -> dict[str, Any]:
     """Return a log of the Static Analysis Results Interchange Format.
 
     Source: OASIS, "Static Analysis Results Interchange Format (SARIF) Version 2.1.0", 2020.
     """
-    names = list(dict.fromkeys([*rules, *(annotation.rule for annotation in annotations)]))
+    names = list(dict.fromkeys([*rules, *(str(problem.kind) for problem in problems)]))
     driver = {
         "name": "trajcli",
         "version": __version__,
@@ -215,7 +193,7 @@ def _sarif(annotations: Sequence[Annotation], rules: Mapping[str, str]) -> dict[
     run = {
         "tool": {"driver": driver},
         "columnKind": "unicodeCodePoints",
-        "results": [_sarif_result(annotation, names.index(annotation.rule)) for annotation in annotations],
+        "results": [_sarif_result(problem, names.index(str(problem.kind))) for problem in problems],
     }
     return {"$schema": _SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}
 
@@ -225,23 +203,24 @@ def _sarif_rule(name: str, sentence: str | None) -> dict[str, Any]:
     return {"id": name, "shortDescription": text, "fullDescription": text, "help": text}
 
 
-def _sarif_result(annotation: Annotation, index: int) -> dict[str, Any]:
-    time = annotation.time if annotation.time is not None and math.isfinite(annotation.time) else None
-    known = {"joint": annotation.joint, "time": time, "row": annotation.row}
+def _sarif_result(problem: Problem, index: int) -> dict[str, Any]:
+    time = problem.time if problem.time is not None and math.isfinite(problem.time) else None
+    known = {"joint": problem.joint, "time": time, "row": problem.row}
     result: dict[str, Any] = {
-        "ruleId": annotation.rule,
+        "ruleId": str(problem.kind),
         "ruleIndex": index,
-        "level": annotation.severity,
-        "message": {"text": utf8(annotation.text)},
+        "level": problem.severity,
+        "message": {"text": utf8(problem.message)},
     }
     properties = {key: value for key, value in known.items() if value is not None}
     if properties:
         result["properties"] = properties
-    if annotation.file is not None:
-        physical: dict[str, Any] = {"artifactLocation": {"uri": _uri(annotation.file)}}
-        region = {"startLine": annotation.line, "startColumn": annotation.column}
-        if annotation.line is not None:
-            physical["region"] = {key: value for key, value in region.items() if value is not None}
+    place = _place(problem)
+    if place.file:
+        physical: dict[str, Any] = {"artifactLocation": {"uri": _uri(place.file)}}
+        region = {"startLine": place.line, "startColumn": place.column}
+        if place.line:
+            physical["region"] = {key: value for key, value in region.items() if value}
         result["locations"] = [{"physicalLocation": physical}]
     return result
 

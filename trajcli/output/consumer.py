@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from trajcli.consumers.breach import RuleBreach, Surroundings
 from trajcli.consumers.judgement import ProfileJudgement, judge_by_profile
 from trajcli.consumers.profile import Profile
+from trajcli.consumers.rule_check import Surroundings
 from trajcli.errors import InputError, Problem, VerificationError
+from trajcli.findings import Finding
 from trajcli.grids import Grid
 from trajcli.job.reports.comparisons import ConsumerFinding, ConsumerReport, UnjudgedRule
 from trajcli.output.write import write_rows
@@ -72,35 +73,26 @@ def _ending(form: StreamFormat) -> str:
 def refusal_of(plan: Plan, judged: ProfileJudgement, *, strict: bool) -> VerificationError | None:
     """Return why no rows are written for a consumer: its necessary rules, with `strict` all, are broken."""
     wanted = ("error", "warning") if strict else ("error",)
-    broken = [breach for breach in judged.breaches if breach.severity in wanted]
-    return VerificationError(*(_problem(plan, breach) for breach in broken)) if broken else None
+    broken = [found for found in judged.findings if found.severity in wanted]
+    return VerificationError(*(_problem(plan, found) for found in broken)) if broken else None
 
 
-def _problem(plan: Plan, breach: RuleBreach) -> Problem:
-    index = _move(plan, breach)
-    return Problem(
-        f"{breach.rule}: {breach.message}{counted(breach)}",
-        breach.hint,
-        place=plan.loaded.place_of_move(index),
-        move=index,
-        joint=breach.joint,
-        time=breach.time - plan.trajectory.start_time,
-        value=breach.value,
-        limit=breach.limit,
-        kind=breach.rule,
-    )
+def _problem(plan: Plan, finding: Finding) -> Problem:
+    placed = _placed(plan, finding)
+    text = f"{finding.rule}: {finding.message}{counted(finding)}"
+    return replace(placed.problem(text, plan.loaded.place_of_move(placed.move or 0)), kind=finding.rule)
 
 
-def counted(breach: RuleBreach) -> str:
+def counted(finding: Finding) -> str:
     """Return in brackets how many rows break a rule beside the one that is named; nothing where none does."""
-    return f" (and {breach.count - 1} more row{'s' * (breach.count > 2)})" if breach.count > 1 else ""
+    return f" (and {finding.count - 1} more row{'s' * (finding.count > 2)})" if finding.count > 1 else ""
 
 
-def _move(plan: Plan, breach: RuleBreach) -> int:
-    """Return the move in which a breach is; at a border the later one."""
-    if breach.move is not None:
-        return breach.move
-    return plan.trajectory.span_at(breach.time - plan.trajectory.start_time).index
+def _placed(plan: Plan, finding: Finding) -> Finding:
+    """Return a finding about rows with its time and move in the trajectory, at a border the later move."""
+    time = (finding.time or 0.0) - plan.trajectory.start_time
+    move = plan.trajectory.span_at(time).index if finding.move is None else finding.move
+    return replace(finding, time=time, move=move)
 
 
 def consumer_report(plan: Plan, judged: ProfileJudgement) -> ConsumerReport:
@@ -108,26 +100,6 @@ def consumer_report(plan: Plan, judged: ProfileJudgement) -> ConsumerReport:
     return ConsumerReport(
         profile=judged.profile.name,
         accepted=judged.accepted,
-        findings=_findings(plan, judged.breaches),
+        findings=[ConsumerFinding.model_validate(_placed(plan, found)) for found in judged.findings],
         unjudged=[UnjudgedRule(rule=rule, reason=reason) for rule, reason in judged.unjudged],
     )
-
-
-def _findings(plan: Plan, breaches: Sequence[RuleBreach]) -> list[ConsumerFinding]:
-    return [
-        ConsumerFinding(
-            rule=breach.rule,
-            severity=breach.severity,
-            kind=breach.kind,
-            joint=breach.joint,
-            move=_move(plan, breach),
-            time=breach.time - plan.trajectory.start_time,
-            row=breach.row,
-            count=breach.count,
-            factor=breach.factor,
-            method=breach.method,
-            message=breach.message,
-            hint=breach.hint,
-        )
-        for breach in breaches
-    ]

@@ -11,10 +11,9 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import PlanningError
 from trajcli.frozen import frozen
 from trajcli.job.reports.comparisons import PathReferenceReport, ReferenceReport
-from trajcli.judge.finding import JudgedFinding, Judgement, worst_first
+from trajcli.judge.judgement import Judgement, worst_first
 from trajcli.kinematics.robot import Robot
 from trajcli.output.references import (
-    CONTRADICTION_HINT,
     common_unit,
     contradiction,
     is_faster,
@@ -74,19 +73,8 @@ def compared(checked: CheckedFile) -> tuple[Judgement, MotionReference]:
     judgement = checked.judgement
     judged = judgement.verdict == "satisfied" and outline.first.qd is not None
     if bound is not None and judged and is_faster(duration, bound):
-        finding = JudgedFinding(
-            rule="reference",
-            severity="error",
-            kind="time",
-            joint=reference.joint,
-            value=duration,
-            limit=bound,
-            time=float(outline.last.t[0]),
-            row=outline.last.first_row,
-            factor=bound / duration,
-            message=contradiction(duration, bound, reference.joint),
-            hint=CONTRADICTION_HINT,
-        )
+        finding = contradiction(duration, bound, reference.joint, time=float(outline.last.t[0]))
+        finding = replace(finding, row=outline.last.first_row)
         judgement = replace(judgement, findings=worst_first([*judgement.findings, finding]))
     return judgement, found
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from trajcli.errors import PlanningError
-from trajcli.job.report import FindingReport
+from trajcli.findings import Finding
 from trajcli.job.reports.comparisons import (
     LimitUseReport,
     PathReferenceReport,
@@ -117,9 +118,7 @@ def use_report(use: LimitUse | None, robot: Robot) -> LimitUseReport | None:
     return LimitUseReport(quantity=use.quantity, joint=name, used=use.used, time=use.time)
 
 
-def contradictions_of(
-    spans: Sequence[Span], references: Sequence[ReferenceReport | None]
-) -> list[FindingReport]:
+def contradictions_of(spans: Sequence[Span], references: Sequence[ReferenceReport | None]) -> list[Finding]:
     """Return a finding for each move that keeps its limits and is faster than any motion can be that does.
 
     Either the judgement is wrong then, or the bound.
@@ -133,20 +132,8 @@ def contradictions_of(
         fastest = None if bound is None else bound.duration
         if bound is None or fastest is None or not is_faster(span.duration, fastest):
             continue
-        finding = FindingReport(
-            move=span.index,
-            joint=bound.joint,
-            kind="reference",
-            value=span.duration,
-            limit=fastest,
-            unit="s",
-            time=span.end,
-            method="exact",
-            factor=fastest / span.duration,
-            message=contradiction(span.duration, fastest, bound.joint),
-            hint=CONTRADICTION_HINT,
-        )
-        found.append(finding)
+        finding = contradiction(span.duration, fastest, bound.joint, time=span.end)
+        found.append(replace(finding, move=span.index, kind="reference", unit="s"))
     return found
 
 
@@ -155,12 +142,17 @@ def is_faster(duration: float, bound: float) -> bool:
     return 0 < duration < bound * (1 - _BELOW)
 
 
-CONTRADICTION_HINT = "one of the two is wrong: report it as a bug of trajcli, with the job or the file"
-
-
-def contradiction(duration: float, bound: float, joint: str | None) -> str:
-    """Return the sentence about a motion that is faster than the bound of its duration."""
-    return (
-        f"it keeps its limits and lasts {duration:.9g} s, and ruckig finds no motion of {joint} between its "
-        f"ends within these limits that is faster than {bound:.9g} s"
+def contradiction(duration: float, bound: float, joint: str | None, time: float) -> Finding:
+    """Return the finding that a motion is faster than the bound of its duration; it ends at a time."""
+    return Finding(
+        kind="time",
+        joint=joint,
+        value=duration,
+        limit=bound,
+        time=time,
+        rule="reference",
+        factor=bound / duration,
+        message=f"it keeps its limits and lasts {duration:.9g} s, and ruckig finds no motion of {joint} "
+        f"between its ends within these limits that is faster than {bound:.9g} s",
+        hint="one of the two is wrong: report it as a bug of trajcli, with the job or the file",
     )

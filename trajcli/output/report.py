@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from trajcli.checks.finding import AccelerationSteps, Finding
+from trajcli.checks.continuity import AccelerationSteps
 from trajcli.checks.verify import Verdict
 from trajcli.curves.extrema import Peaks
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.errors import Problem, VerificationError
+from trajcli.findings import Finding
 from trajcli.job.report import (
     BindingReport,
     ByPositionReport,
@@ -83,7 +84,10 @@ def report_of(
         robot=plan.loaded.robot.name,
         duration=plan.trajectory.duration,
         moves=moves,
-        findings=[*(_finding(plan, finding) for finding in verdict.findings), *contradictions],
+        findings=[
+            FindingReport.model_validate(finding.said_by(plan.loaded.say))
+            for finding in (*verdict.findings, *contradictions)
+        ],
         events=[EventReport(kind=e.kind, message=e.message, move=e.move) for e in plan.events],
         remarks=[EventReport(kind=e.kind, message=e.message, move=e.move) for e in plan.remarks],
         steps=_steps(verdict.steps, units),
@@ -117,22 +121,6 @@ def _steps(steps: AccelerationSteps, units: Mapping[str, str]) -> list[StepRepor
         for move, joint, time, size in rows
     ]
     return cast("list[StepReport]", fields)
-
-
-def _finding(plan: Plan, finding: Finding) -> FindingReport:
-    return FindingReport(
-        move=finding.move,
-        joint=finding.joint,
-        kind=finding.kind,
-        value=finding.value,
-        limit=finding.limit,
-        time=finding.time,
-        method=finding.method,
-        factor=finding.factor,
-        hint=finding.hint,
-        message=finding.text(plan.loaded.say),
-        unit=finding.si_unit or "",
-    )
 
 
 def _move(plan: Plan, index: int, *, reference: bool, peers: bool) -> MoveReport:
@@ -407,22 +395,12 @@ def _excess(finding: Finding) -> tuple[float, float]:
     Of findings of one cause those about the position, or about steps, come first.
     """
     first = math.inf if finding.kind in ("position", "acceleration_jump") else 0.0
-    if finding.kind == "position" or finding.limit == 0:
-        return first, abs(finding.value - finding.limit)
-    return first, abs(finding.value / finding.limit)
+    if finding.kind == "position" or not finding.limit:
+        return first, abs((finding.value or 0.0) - (finding.limit or 0.0))
+    return first, finding.excess
 
 
 def _problem(plan: Plan, finding: Finding) -> Problem:
     index = finding.move or 0
-    span = plan.trajectory.spans[index]
-    return Problem(
-        f"move {index} ({span.planner}): {finding.text(plan.loaded.say)}",
-        finding.hint,
-        place=plan.loaded.place_of_move(index),
-        move=index,
-        joint=finding.joint,
-        time=finding.time,
-        value=finding.value,
-        limit=finding.limit,
-        kind=finding.kind,
-    )
+    text = f"move {index} ({plan.trajectory.spans[index].planner}): {finding.text(plan.loaded.say)}"
+    return replace(finding, move=index).problem(text, plan.loaded.place_of_move(index))

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from trajcli.checks.finding import LIMITS_OF_JOINTS, Finding
 from trajcli.checks.verify import Verdict, longest_factor, verify
 from trajcli.errors import Amount, Problem, TrajcliError, at_least
+from trajcli.findings import LIMITS_OF_JOINTS, Finding
 from trajcli.kinematics.robot import Robot
 from trajcli.planners import changed
 from trajcli.planners.planner import PlannedMove, Planner
@@ -118,7 +118,7 @@ def _without_steps(own: Sequence[Finding], move: PlannedMove, moves: Sequence[Pl
     """Return what makes the acceleration join in a move, or at its border."""
     parts, rough = [], move
     if _STEP not in _kinds(move):
-        border = [f.time for f in own if f.kind == _STEP]
+        border = [f.time or 0.0 for f in own if f.kind == _STEP]
         starts = float(np.sum([m.duration for m in moves[: move.index]]))
         other = move.index + (1 if min(border) > starts + move.duration / 2 else -1)
         if not 0 <= other < len(moves):

@@ -208,7 +208,7 @@ class _Search:
         failed = self.attempt(high)
         if isinstance(failed, Plan):
             efforts = [found for found in failed.verdict.findings if found.kind == "effort"]
-            worst = max(efforts, key=lambda found: abs(found.value / found.limit), default=None)
+            worst = max(efforts, key=lambda found: found.excess, default=None)
             if worst is None:
                 return capacity
             return replace(

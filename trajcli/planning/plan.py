@@ -121,20 +121,20 @@ def _plan_moves(
     with _errors_at(loaded, loaded.document.place(("start",))):
         state = resolve(loaded.job.start, np.zeros(len(loaded.robot.joints)), index=None).as_state()
     before: Planner | None = None
-    robot = loaded.robot
+    robot, begun = loaded.robot, 0.0
     origin: Target | None = loaded.job.start
     for index, planner in enumerate(loaded.job.moves):
         report_progress(f"planning move {index + 1} of {len(loaded.job.moves)} ({planner.tag})")
         start = _handed_over(state, before, planner)
         robot = replace(robot, payload=planner.carried_after(robot.payload)) if planner.handles else robot
         used = robot if carried is None else replace(robot, payload=carried(index, robot.payload))
-        begun = sum(float(done.planned.curve.breaks[-1]) for done in moves)
         try:
             with _errors_of(loaded, index, planner, begun):
                 reachable = planner.with_joint_targets(partial(resolve, index=index), state.position)
                 with _points_of_errors(loaded, index):
                     move = _plan_move(loaded, used, index, reachable.coming_from(origin), start)
             moves.append(move)
+            begun += float(move.planned.curve.breaks[-1])
             state = move.planned.end
         except MissingLimitError as error:
             lacking += error.problems

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import ceil, copysign
 
-from trajcli.checks.finding import LIMITS_OF_JOINTS, Finding
 from trajcli.checks.verify import verify
 from trajcli.curves.operations import scale_time
 from trajcli.curves.smallest_feasible import smallest_feasible
 from trajcli.errors import Amount, Amounts, PlanningError, Problem, TrajcliError
+from trajcli.findings import LIMITS_OF_JOINTS, Finding
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.planners.planner import LITTLE, Event, Planned, PlannedMove, Planner
 from trajcli.trajectory import State

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from trajcli.columns import Column, parse_column
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Place, Problem, utf8
+from trajcli.findings import Finding
 from trajcli.judge.file import CheckedFile
-from trajcli.judge.finding import JudgedFinding
 from trajcli.kinematics.robot import QUANTITIES, JointType, Robot
 from trajcli.player.rows import ORDERS, DrawnRows, rows_of_samples
 from trajcli.player.scene import geometry_of, joints_in_units, limits_of, waypoints_of
@@ -84,7 +84,7 @@ def _judgement(checked: CheckedFile | str | None, units: Units, start: float) ->
     return {"verdict": {"state": state, "text": text}, "findings": findings}
 
 
-def _finding(finding: JudgedFinding, robot: Robot, units: Units, start: float) -> dict[str, Any]:
+def _finding(finding: Finding, robot: Robot, units: Units, start: float) -> dict[str, Any]:
     of_limit = finding.kind in QUANTITIES and finding.value is not None
     return {
         "time": start if finding.time is None else finding.time,

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from trajcli.checks.finding import Finding
 from trajcli.curves.piecewise import Array
+from trajcli.findings import Finding
 from trajcli.kinematics.robot import QUANTITIES, JointType, Limits, Robot
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan
@@ -29,9 +29,8 @@ def scene_of_plan(plan: Plan) -> dict[str, Any]:
     """Return the scene of a plan, verified or not, as the player reads it: SI, and the units to show."""
     loaded, trajectory, verdict = plan.loaded, plan.trajectory, plan.verdict
     spans = [span for span in trajectory.spans if span.duration > 0]
-    rows = rows_of_curve(
-        trajectory.curve, [span.start for span in spans], [finding.time for finding in verdict.findings]
-    )
+    when = [finding.time for finding in verdict.findings if finding.time is not None]
+    rows = rows_of_curve(trajectory.curve, [span.start for span in spans], when)
     count = len(verdict.findings)
     state, text = ("verified", "verified") if verdict.passed else ("violated", _counted(count, "finding"))
     moves = _counted(len(plan.moves), "move")

@@ -29,7 +29,7 @@ from trajcli.plots.sampling import thinned
 from trajcli.streams.table import Table
 
 if TYPE_CHECKING:
-    from trajcli.judge.finding import Judgement
+    from trajcli.judge.judgement import Judgement
     from trajcli.plots.recorded_motion import DrawnTable
 
 MOST_PLANES = 12

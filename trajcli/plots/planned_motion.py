@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from trajcli.columns import EFFORT, JOINT_ORDERS
 from trajcli.curves.piecewise import Array, derivative_coefficients, horner
+from trajcli.findings import Finding
 from trajcli.frozen import frozen
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan
@@ -154,25 +155,28 @@ class PlannedMotion:
             (1.0, 0) if quantity == EFFORT else (self.display.joint_factor(joint), JOINT_ORDERS[quantity])
         )
         rows = []
-        for finding in self.plan.verdict.findings:
+        for finding, time, reached in self._findings():
             own = finding.joint == name and JOINT_KINDS.get(finding.kind) == quantity
-            value = finding.value / scale if own and not finding.kind.endswith("_jump") else np.nan
+            value = reached / scale if own and not finding.kind.endswith("_jump") else np.nan
             if own and quantity != EFFORT and np.isnan(value):
-                value = float(self.plan.trajectory.curve.evaluate(finding.time, order)[joint]) / scale
-            rows.append((finding.time + self.offset, value))
+                value = float(self.plan.trajectory.curve.evaluate(time, order)[joint]) / scale
+            rows.append((time + self.offset, value))
         return np.array(rows or NO_POINTS)
 
     def tool_findings(self, angular: bool) -> Array:
         """Return the same for the speed of the tool."""
         scale = self.display.factor("angle" if angular else "length")
         rows = [
-            (
-                finding.time + self.offset,
-                finding.value / scale if finding.kind == TOOL_KINDS[angular] else np.nan,
-            )
-            for finding in self.plan.verdict.findings
+            (time + self.offset, value / scale if finding.kind == TOOL_KINDS[angular] else np.nan)
+            for finding, time, value in self._findings()
         ]
         return np.array(rows or NO_POINTS)
+
+    def _findings(self) -> Iterator[tuple[Finding, float, float]]:
+        """Yield the findings of the verdict with their times, s, and their values, SI."""
+        for finding in self.plan.verdict.findings:
+            if finding.time is not None and finding.value is not None:
+                yield finding, finding.time, finding.value
 
     def tool(self) -> ToolSamples:
         """Return where the tool is and how fast, at both sides of breaks and where a check saw a peak."""

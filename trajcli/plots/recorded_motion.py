@@ -9,8 +9,9 @@ import numpy as np
 from trajcli.columns import EFFORT, Column, parse_column
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
+from trajcli.findings import Finding
 from trajcli.frozen import frozen
-from trajcli.judge.finding import JudgedFinding, Judgement
+from trajcli.judge.judgement import Judgement
 from trajcli.kinematics.robot import Robot
 from trajcli.plots.choice import JOINT_QUANTITIES
 from trajcli.plots.display_units import DisplayUnits
@@ -132,13 +133,13 @@ class DrawnTable:
             found.add("path")
         return frozenset(found)
 
-    def _errors(self) -> Iterator[tuple[float, JudgedFinding]]:
+    def _errors(self) -> Iterator[tuple[float, Finding]]:
         """Yield the errors that have a time, s."""
         for finding in () if self.judgement is None else self.judgement.errors:
             if finding.time is not None:
                 yield finding.time, finding
 
-    def _marked(self, finding: JudgedFinding, time: float, kind: str, joint: int) -> float:
+    def _marked(self, finding: Finding, time: float, kind: str, joint: int) -> float:
         """Return where a marker stands: at the offending value; of a jump or a wrong column on its line."""
         if finding.kind in _LIMITED or finding.kind in _AT_ENDS:
             scale = 1.0 if kind == _EFFORT else self.display.joint_factor(joint)

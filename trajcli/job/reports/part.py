@@ -30,7 +30,7 @@ class MeasuredIn:
 class ReportPart(BaseModel):
     """A part of a report."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True, from_attributes=True)
 
 
 def in_units(part: Part, units: Units) -> Part:

@@ -6,6 +6,7 @@ Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), sectio
 
 from __future__ import annotations
 
+from functools import cache
 from math import factorial
 from typing import ClassVar, Literal
 
@@ -89,17 +90,27 @@ def fastest_duration(planner: str, start: Array, end: Array, robot: Robot) -> fl
 
 def _from_rest_to_rest(start: Array, end: Array, limits: Limits) -> float:
     """Peaks of the normalised polynomial scale with displacement / duration^order; limits give durations."""
-    k, displacement = start.shape[0], end[0] - start[0]
-    unit_end = np.zeros((k, 1))
-    unit_end[0] = 1.0
-    unit = hermite_coefficients(np.zeros((k, 1)), unit_end, np.array(1.0))[:, None, :]
-    longest = 0.0
-    for order, (low, high) in enumerate(piece_extremes(unit, np.ones(1), (1, 2, 3)), 1):
+    displacement, longest = end[0] - start[0], 0.0
+    for order, peaks in enumerate(_normalised_peaks(start.shape[0]), 1):
         bounds = limits.of_order(order)
-        for peak in (float(low[0, 0]), float(high[0, 0])):
+        for peak in peaks:
             allowed = np.where(peak * displacement < 0, -bounds[:, 0], bounds[:, 1])
             longest = max(longest, float(np.max((np.abs(peak * displacement) / allowed) ** (1 / order))))
     return longest
+
+
+@cache
+def _normalised_peaks(conditions: int) -> tuple[tuple[float, float], ...]:
+    """Return the least and largest value of each derivative, order 1 to 3, from 0 to 1 in the time 1.
+
+    Args:
+        conditions: How many derivatives each end gives, the position counted; all but that are zero.
+    """
+    unit_end = np.zeros((conditions, 1))
+    unit_end[0] = 1.0
+    unit = hermite_coefficients(np.zeros((conditions, 1)), unit_end, np.array(1.0))[:, None, :]
+    extremes = piece_extremes(unit, np.ones(1), (1, 2, 3))
+    return tuple((float(low[0, 0]), float(high[0, 0])) for low, high in extremes)
 
 
 def _by_search(planner: str, start: Array, end: Array, robot: Robot) -> float:

@@ -1,0 +1,54 @@
+"""Cost of jobs of many moves: linear in their number."""
+
+from __future__ import annotations
+
+import sys
+import tracemalloc
+
+import numpy as np
+
+from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.job.read import job_from_text
+from trajcli.planning.plan import plan_job
+
+
+def _calls(moves: int) -> int:
+    """Return how many functions, those of C counted, a job of so many moves calls."""
+    lines = [f"  - {{planner: quintic, to: {{joints: [{k % 7}, {k % 5}]}}}}" for k in range(moves)]
+    head = "version: 1\nrobot: {joints: 2}\nlimits: {velocity: 2, acceleration: 15, jerk: 100}\n"
+    loaded = job_from_text(head + "start: {joints: [9, 9]}\nmoves:\n" + "\n".join(lines))
+    count = 0
+
+    def counted(frame: object, event: str, arg: object) -> None:
+        nonlocal count
+        count += event in ("call", "c_call")
+
+    sys.setprofile(counted)
+    try:
+        plan_job(loaded)
+    finally:
+        sys.setprofile(None)
+    return count
+
+
+def test_calls_grow_as_the_number_of_moves() -> None:
+    _calls(5)  # what is made once
+    few, more, many = (_calls(moves) for moves in (35, 105, 315))
+    assert many - more < 1.02 * 3 * (more - few)
+
+
+def test_one_time_on_a_curve_of_many_pieces_costs_no_look_at_all_of_them() -> None:
+    pieces = 200_000
+    rng = np.random.default_rng(5)
+    curve = PiecewisePolynomial(np.arange(pieces + 1.0), rng.normal(size=(6, pieces, 2)))
+    tracemalloc.start()
+    try:
+        value = curve.evaluate(np.array([0.25, 0.75]) + pieces // 3, 1)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    expected = np.array(
+        [np.polyval(np.polyder(column), [0.25, 0.75]) for column in curve.coefficients[:, pieces // 3].T]
+    )
+    np.testing.assert_allclose(value, expected.T, rtol=1e-12)
+    assert peak < curve.coefficients.nbytes / 100

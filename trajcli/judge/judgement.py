@@ -1,0 +1,90 @@
+"""Judgement of a recorded motion: its findings and the verdict that they add up to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Literal
+
+from trajcli.findings import Finding
+from trajcli.frozen import frozen
+
+VerdictText = Literal["satisfied", "within rounding", "exceeded"]
+
+_KEYS = (
+    *("rule", "severity", "kind", "quantity", "joint", "move", "value", "limit", "rounding", "certainty"),
+    *("time", "row", "factor", "method", "count"),
+)
+
+
+@frozen
+class Judgement:
+    """What a check says of a recorded motion.
+
+    Attributes:
+        findings: Worst first.
+        interpolation: How the rows were joined: hold, linear, cubic, quintic, jtc or jtc-upsampling.
+        rows: How many were judged.
+        period: Seconds between rows, where it is constant; None where it is not.
+        source: Name of the file; None of arrays.
+        notes: What a reader should know: stamps that were snapped, what could not be judged.
+        events: What was taken for granted, which `--strict` does not accept.
+        planned_rows: Whether they are rows of the verified motion of the job; None without a plan.
+    """
+
+    findings: tuple[Finding, ...]
+    interpolation: str
+    rows: int
+    period: float | None = None
+    source: str | None = None
+    notes: tuple[str, ...] = ()
+    events: tuple[str, ...] = ()
+    planned_rows: bool | None = None
+
+    @property
+    def verdict(self) -> VerdictText:
+        """The word for it: warnings do not change it."""
+        errors = {finding.certainty for finding in self.findings if finding.severity == "error"}
+        if not errors:
+            return "satisfied"
+        return "exceeded" if "exceeded" in errors else "within rounding"
+
+    @property
+    def errors(self) -> tuple[Finding, ...]:
+        """What is certainly wrong: neither a warning, nor what rounding explains."""
+        return tuple(
+            found for found in self.findings if (found.severity, found.certainty) == ("error", "exceeded")
+        )
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing is certainly wrong."""
+        return self.verdict != "exceeded"
+
+    def __repr__(self) -> str:
+        named = [
+            f"{found.kind} of {found.joint}" if found.joint else found.kind for found in self.findings[:2]
+        ]
+        more = ["..."] if len(self.findings) > len(named) else []
+        return f"Judgement({self.verdict}{': ' * bool(named)}{', '.join(named + more)})"
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the judgement as `check --format json` prints it."""
+        findings = [
+            {**{name: getattr(found, name) for name in _KEYS}, "message": found.text(), "hint": found.hint}
+            for found in self.findings
+        ]
+        known = {"verdict": self.verdict, "findings": findings, "interpolation": self.interpolation}
+        period = {} if self.period is None else {"period": self.period}
+        planned = {} if self.planned_rows is None else {"planned_rows": self.planned_rows}
+        said = {"notes": list(self.notes), "events": list(self.events)}
+        return {**known, "rows": self.rows, **period, **planned, **said}
+
+
+def worst_first(findings: Sequence[Finding]) -> tuple[Finding, ...]:
+    """Return the findings in order: errors, certain ones, those furthest beyond their limits."""
+
+    def key(finding: Finding) -> tuple[bool, bool, float, float]:
+        time = finding.time if finding.time is not None else -1.0
+        return finding.severity != "error", finding.certainty != "exceeded", -finding.excess, time
+
+    return tuple(sorted(findings, key=key))
