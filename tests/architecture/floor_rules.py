@@ -20,7 +20,7 @@ FLOORS = (
     ("planning", "comparison", "queries", "consumers"),
     ("judge",),
     ("output", "plots", "player", "editing"),
-    ("batch",),
+    ("batches",),
     ("cli", "api"),
     ("",),  # trajcli/__init__.py, the public face
     ("__main__",),

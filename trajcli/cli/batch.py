@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -11,9 +10,8 @@ from contextlib import closing
 from time import monotonic
 from typing import Any, BinaryIO, Literal
 
-from trajcli.batch.jobs import BatchJob, BatchJobs, find_jobs, ledger_folders
-from trajcli.batch.ledger import LedgerEntry, read_ledger, write_ledger
-from trajcli.batch.task import BatchSetup, JobOutcome, Task
+from trajcli.batches.jobs import BatchJobs, Ledgers, find_jobs
+from trajcli.batches.task import BatchSetup, JobOutcome, Task
 from trajcli.cli.frames import problem_as_json
 from trajcli.cli.outcome import print_remark
 from trajcli.cli.progress import ERASE, WIDTH, is_terminal
@@ -23,7 +21,6 @@ from trajcli.streams.formats import FormatName
 from trajcli.streams.whole_file import standard_output
 
 _TIMEOUT = 600.0  # s
-_LEDGER_PERIOD = 5.0  # s after which finished jobs are entered, whatever happens to this process then
 _SHOWN = 5  # names of files in a remark
 
 
@@ -51,11 +48,11 @@ def run_batch(names: Sequence[str], options: BatchOptions) -> int:
     """
     count, timeout = _processes(options), _timeout(options)
     found = find_jobs(names, options.folder, options.form)
-    known = _known(found.jobs, force=options.force)
+    record = Ledgers(found.jobs)
+    known = {} if options.force else record.known()
     tasks = [Task(job, known.get(job.output)) for job in found.jobs]
-    setup = BatchSetup(options.form, {os.path.realpath(job.output): job.job for job in found.jobs})
+    setup = BatchSetup(options.form, found.owners())
     progress = _Progress(len(tasks))
-    record = _Record(found.jobs)
     try:
         with closing(_outcomes(tasks, setup, options, (count, timeout), progress.show)) as outcomes:
             _print_outcomes(outcomes, progress, record)
@@ -76,10 +73,10 @@ def _outcomes(
 ) -> Generator[JobOutcome, None, None]:
     """Return the outcomes of tasks as they are done, from this machine or from a cluster."""
     if options.engine == "dask":
-        from trajcli.batch.cluster import run_on_cluster
+        from trajcli.batches.cluster import run_on_cluster
 
         return run_on_cluster(tasks, setup, options.scheduler, on_tick)
-    from trajcli.batch.processes import run_in_processes
+    from trajcli.batches.processes import run_in_processes
 
     count, timeout = limits
     return run_in_processes(tasks, setup, min(count, len(tasks)), timeout, on_tick)
@@ -87,7 +84,7 @@ def _outcomes(
 
 def _processes(options: BatchOptions) -> int:
     """Return how many processes there are at most."""
-    from trajcli.batch.processes import usable_cores
+    from trajcli.batches.processes import usable_cores
 
     given = {"-j": options.jobs, "--timeout": options.timeout}
     for name in (name for name, value in given.items() if value is not None and options.engine == "dask"):
@@ -116,25 +113,12 @@ def _timeout(options: BatchOptions) -> float | None:
     return seconds or None
 
 
-def _known(jobs: Sequence[BatchJob], *, force: bool) -> dict[str, LedgerEntry]:
-    """Return what outputs were made of, as the ledgers of their folders say."""
-    if force:
-        return {}
-    paths = ledger_folders(jobs)
-    ledgers = {path: read_ledger(path) for path in set(paths.values())}
-    entries = ((job.output, ledgers[paths[job.output]].get(_name(job))) for job in jobs)
-    return {output: entry for output, entry in entries if entry is not None}
-
-
-def _name(job: BatchJob) -> str:
-    return job.output.replace("\\", "/").rpartition("/")[2]
-
-
-def _print_outcomes(outcomes: Iterator[JobOutcome], progress: _Progress, record: _Record) -> None:
+def _print_outcomes(outcomes: Iterator[JobOutcome], progress: _Progress, record: Ledgers) -> None:
     """Print a line for each outcome as soon as it is there."""
     with standard_output() as out:
         for outcome in outcomes:
-            record.add(outcome)
+            if outcome.entry is not None and outcome.outcome == "written":
+                record.add(outcome.job, outcome.entry)
             progress.erase()
             _print_line(out, _as_json(outcome))
             progress.add(outcome)
@@ -170,29 +154,6 @@ def _say_what_came(found: BatchJobs, progress: _Progress) -> None:
         more = f" and {len(found.no_jobs) - _SHOWN} more" if len(found.no_jobs) > _SHOWN else ""
         print_remark(f"no jobs, left out: {shown}{more}")
     print_remark(f"{progress.total} job{'s' * (progress.total != 1)}: {progress.text}")
-
-
-class _Record:
-    """Entries of ledgers that are not written yet."""
-
-    def __init__(self, jobs: Sequence[BatchJob]) -> None:
-        self._paths, self._entries = ledger_folders(jobs), dict[str, tuple[str, LedgerEntry]]()
-        self._written = monotonic()
-
-    def add(self, outcome: JobOutcome) -> None:
-        """Take the entry of an outcome, and write all there are now and then."""
-        if outcome.entry is not None and outcome.outcome == "written":
-            self._entries[outcome.job.output] = (_name(outcome.job), outcome.entry)
-        if monotonic() - self._written > _LEDGER_PERIOD:
-            self.write()
-
-    def write(self) -> None:
-        """Write all entries into the ledgers of their folders."""
-        for path in {self._paths[output] for output in self._entries}:
-            of_folder = [value for output, value in self._entries.items() if self._paths[output] == path]
-            write_ledger(path, dict(of_folder))
-        self._entries.clear()
-        self._written = monotonic()
 
 
 class _Progress:
