@@ -156,9 +156,9 @@ class KnotGrid:
             motion: Shape (N, orders, n), SI.
         """
         low, high = np.searchsorted(self.at, (first, first + len(motion)))
-        for place, order in enumerate(orders):
+        for position, order in enumerate(orders):
             if order < len(self.states):
-                motion[self.at[low:high] - first, place] = self.states[order, low:high]
+                motion[self.at[low:high] - first, position] = self.states[order, low:high]
 
 
 Grid = UniformGrid | ListedGrid | KnotGrid

@@ -11,7 +11,7 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, TrajcliError
 from trajcli.frozen import comparable, frozen
-from trajcli.judge.judgement import Judgement
+from trajcli.judge.judgement import Judgement, as_planned
 from trajcli.judge.motion import JUDGED_ROWS, Requirements, judge_motion
 from trajcli.kinematics.robot import Robot
 from trajcli.streams.byte_source import ByteSource
@@ -125,7 +125,7 @@ def _opened(source: ByteSource, options: CheckOptions, given: _Given, declared: 
     """Return the motion of a file; joints that it does not have are found back from its poses."""
     joints, types = given.robot.joint_names, given.robot.joint_types
     if given.plan is not None and options.columns is None and options.topic is None:
-        from trajcli.judge.tool_rows import joints_found_back
+        from trajcli.judge.rows.tool_rows import joints_found_back
 
         found = joints_found_back(source, given.robot, given.plan.trajectory.start.position)
         if found is not None:
@@ -146,7 +146,7 @@ def _beside_plan(judgement: Judgement, source: ByteSource, given: _Given, option
     """Return the judgement that says whether the rows are those of the motion that the job plans."""
     if given.plan is None or not given.plan.verdict.passed:
         return judgement
-    from trajcli.judge.planned_rows import as_planned, compare_with_plan
+    from trajcli.judge.rows.planned_rows import compare_with_plan
 
     found = compare_with_plan(source, given.plan, options.topic, options.field)
     if found.planned and options.interpolate is None and options.profile is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Literal
 
 from trajcli.findings import Finding
@@ -88,3 +89,28 @@ def worst_first(findings: Sequence[Finding]) -> tuple[Finding, ...]:
         return finding.severity != "error", finding.certainty != "exceeded", -finding.excess, time
 
     return tuple(sorted(findings, key=key))
+
+
+_RATES_OF_ROWS = ("continuity", "derivative", "time")
+
+
+def as_planned(judgement: Judgement) -> Judgement:
+    """Return the judgement of rows that are those of a verified motion, whose curve is proven already.
+
+    They hold no jumps and no false derivatives, whatever their rate, and what rounding explains is nothing.
+    What the curve that joins them passes is a warning, and an event.
+    """
+    findings = [
+        replace(finding, severity="warning")
+        for finding in judgement.findings
+        if finding.severity == "warning"
+        or (finding.rule not in _RATES_OF_ROWS and finding.certainty == "exceeded")
+    ]
+    over = [f for f in findings if f.rule != "state" and f.limit]
+    events = judgement.events
+    if over:
+        worst = max(over, key=lambda finding: finding.excess)
+        what = worst.kind.replace("_", " ") + ("" if worst.joint is None else f" of {worst.joint}")
+        said = f"joined_over_limit: the rows, joined between them, pass the limit of the {what}"
+        events = (*events, f"{said}, by a factor of {worst.excess:.4g}")
+    return replace(judgement, findings=worst_first(findings), events=events, planned_rows=True)

@@ -44,8 +44,8 @@ def joints_found_back(source: ByteSource, robot: Robot, start: Array) -> ArrayRo
         return None
     rows = open_rows_of(source)
     columns = tuple(map(parse_column, rows.named.names))
-    place = {column.kind: index for index, column in enumerate(columns)}
-    if any(column.joint is not None for column in columns) or not {"t", "x", "y", "z"} <= place.keys():
+    at = {column.kind: index for index, column in enumerate(columns)}
+    if any(column.joint is not None for column in columns) or not {"t", "x", "y", "z"} <= at.keys():
         return None
     values = np.concatenate(list(rows.blocks(range(len(columns)), ())))
     poses = TableBlocks(rows.named.names, iter([values]), source.file)
@@ -53,21 +53,21 @@ def joints_found_back(source: ByteSource, robot: Robot, start: Array) -> ArrayRo
         list(joints_of(ArmInUnits(robot, Units()), poses, start, _TOLERANCE).blocks)
     )
     decimals = rows.decimals(range(len(columns)))
-    of_pose = int(decimals[place["x"]]) + (3 if columns[place["x"]].unit == "mm" else 0)
+    of_pose = int(decimals[at["x"]]) + (3 if columns[at["x"]].unit == "mm" else 0)
     q = times_and_joints[:, 1:]
     groups = [("q", q, of_pose - _LOST)]
     groups += [
         (kind, rates, of_pose - _RATES_LOST)
         for kind, rates in zip(("qd", "qdd"), _rates(robot, q, values, columns), strict=False)
     ]
-    names, parts, written = ["t"], [times_and_joints[:, :1]], [int(decimals[place["t"]])]
+    names, parts, written = ["t"], [times_and_joints[:, :1]], [int(decimals[at["t"]])]
     for kind, rates, digits in groups:
         names += [f"{kind}{joint + 1}" for joint in range(q.shape[1])]
         parts.append(rates)
-        written += [digits if decimals[place["x"]] != EXACT else EXACT] * q.shape[1]
-    if "move" in place:
+        written += [digits if decimals[at["x"]] != EXACT else EXACT] * q.shape[1]
+    if "move" in at:
         names.append("move")
-        parts.append(values[:, [place["move"]]])
+        parts.append(values[:, [at["move"]]])
         written.append(0)
     note = "the joints are found back from the poses, from the job's start on"
     return ArrayRows(
@@ -98,9 +98,9 @@ def _rates(robot: Robot, q: Array, values: Array, columns: tuple[Column, ...]) -
 
 def _of_group(group: str, values: Array, columns: tuple[Column, ...]) -> Array | None:
     """Return the columns of a group in SI, (N, 6); None where one is missing."""
-    place = {column.kind: index for index, column in enumerate(columns)}
+    at = {column.kind: index for index, column in enumerate(columns)}
     kinds = kinds_of(group)
-    if not set(kinds) <= place.keys():
+    if not set(kinds) <= at.keys():
         return None
-    index = [place[kind] for kind in kinds]
+    index = [at[kind] for kind in kinds]
     return np.asarray(values[:, index] * [columns[k].factor for k in index])

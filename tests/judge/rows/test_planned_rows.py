@@ -18,7 +18,7 @@ from trajcli.output.write import write_plan
 from trajcli.planners import PLANNERS
 from trajcli.planning.plan import Plan, plan_job
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
+EXAMPLES = Path(__file__).parents[3] / "examples"
 TAGS = [tag for tag in sorted(PLANNERS) if tag not in random_jobs.ALONG_PATHS]
 Rows = NDArray[np.float64]
 

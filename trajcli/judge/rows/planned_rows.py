@@ -2,14 +2,13 @@
 
 They are when each number is that of the planned curve to half a unit of its last decimal, and the stamps are
 all times of one rate from the start to the end, the times that the job lists, its knots, or its knots and all
-times of the job's rate. The start time may be another. A row that is missing, doubled or out of place makes
+times of the job's rate. The start time may be another. A row that is missing, doubled or out of order makes
 them a motion of its own.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -20,7 +19,6 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import comparable, frozen
 from trajcli.grids import Grid, ListedGrid, UniformGrid
-from trajcli.judge.judgement import Judgement, worst_first
 from trajcli.knots import knot_grid, knots_of
 from trajcli.planning.plan import Plan
 from trajcli.samples import sample
@@ -97,31 +95,6 @@ class _Rows:
             yield block * self.factors
 
 
-_RATES_OF_ROWS = ("continuity", "derivative", "time")
-
-
-def as_planned(judgement: Judgement) -> Judgement:
-    """Return the judgement of rows that are those of a verified motion, whose curve is proven already.
-
-    They hold no jumps and no false derivatives, whatever their rate, and what rounding explains is nothing.
-    What the curve that joins them passes is a warning, and an event.
-    """
-    findings = [
-        replace(finding, severity="warning")
-        for finding in judgement.findings
-        if finding.severity == "warning"
-        or (finding.rule not in _RATES_OF_ROWS and finding.certainty == "exceeded")
-    ]
-    over = [f for f in findings if f.rule in ("limit", "path") and f.limit]
-    events = judgement.events
-    if over:
-        worst = max(over, key=lambda finding: finding.excess)
-        what = worst.kind.replace("_", " ") + ("" if worst.joint is None else f" of {worst.joint}")
-        said = f"joined_over_limit: the rows, joined between them, pass the limit of the {what}"
-        events = (*events, f"{said}, by a factor of {worst.excess:.4g}")
-    return replace(judgement, findings=worst_first(findings), events=events, planned_rows=True)
-
-
 def compare_with_plan(
     source: ByteSource, plan: Plan, topic: str | None = None, field: str | None = None
 ) -> RowComparison:
@@ -176,15 +149,15 @@ def _known(
         every = columns_of(groups, robot.joint_types, Units())
     except InputError:
         every = ()
-    places = {(column.kind, column.joint): place for place, column in enumerate(every)}
+    where = {(column.kind, column.joint): at for at, column in enumerate(every)}
     for column in columns:
-        if (column.kind, column.joint) not in places:
+        if (column.kind, column.joint) not in where:
             return f"the column {column.name} is none that `plan` writes"
     if not any(column.kind == "t" for column in columns) or len(columns) < 2:
         return "it has no column of time"
     if robot.convention is None and {"pose", "twist", "twistd"} & set(groups):
         return "its columns are about a tool, and the robot has no geometry"
-    index = np.array([places[column.kind, column.joint] for column in columns], dtype=np.intp)
+    index = np.array([where[column.kind, column.joint] for column in columns], dtype=np.intp)
     return tuple(groups), index
 
 
