@@ -22,11 +22,11 @@ from trajcli.streams.formats import FormatName, StreamFormat, format_of
 from trajcli.streams.whole_file import identity
 
 if TYPE_CHECKING:
-    from trajcli.checks.tool_bound import ToolPeak
     from trajcli.consumers.judgement import ProfileJudgement
     from trajcli.consumers.profile import Profile
     from trajcli.job.report import MoveReport
     from trajcli.job.reports.comparisons import PathReferenceReport, PeerViolation, ReferenceReport
+    from trajcli.limits.tool_bound import ToolPeak
     from trajcli.output.recording import LogOptions
 
 _FEW_STEPS = 9  # in acceleration: of more the largest says most
