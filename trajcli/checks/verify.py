@@ -12,7 +12,6 @@ from trajcli.checks.continuity import AccelerationSteps, acceleration_steps, che
 from trajcli.checks.limits import check_limits, peaks_by_move
 from trajcli.checks.target import check_targets
 from trajcli.checks.tolerances import LIMIT_RELATIVE, TOOL_RELATIVE
-from trajcli.checks.waypoints import check_waypoints
 from trajcli.curves.extrema import Peaks
 from trajcli.errors import at_least
 from trajcli.findings import LIMITS_OF_JOINTS, Finding
@@ -111,7 +110,7 @@ def verify(
     findings += _check_efforts(trajectory, promises, efforts)
     findings += check_continuity(trajectory, limits_by_move, peaks)
     if promises is not None:
-        findings += check_waypoints(trajectory, [promise.via_points for promise in promises])
+        findings += _check_via_points(trajectory, promises)
         findings += check_targets(trajectory, promises)
         findings += _check_tools(trajectory, promises, tool_peaks)
     return Verdict(
@@ -239,6 +238,14 @@ def _tool_peaks(
             known = tool_peaks(trajectory, span, robot) if limits_tool(robot) else None
         peaks.append(known)
     return tuple(peaks)
+
+
+def _check_via_points(trajectory: Trajectory, promises: Sequence[Promise]) -> Sequence[Finding]:
+    if all(promise.via_points is None for promise in promises):
+        return ()
+    from trajcli.checks.waypoints import check_waypoints
+
+    return check_waypoints(trajectory, [promise.via_points for promise in promises])
 
 
 def _check_tools(
