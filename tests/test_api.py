@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import trajcli
-from trajcli.api import _is_yaml
+from trajcli.api.plans import _is_yaml
 from trajcli.streams.reading import read_table
 
 ROOT = Path(__file__).parents[1]
@@ -248,8 +248,17 @@ def test_the_page_runs_as_it_stands(monkeypatch: pytest.MonkeyPatch, tmp_path: P
             statement, _, promised = line.partition("  # ")
             if promised.strip().startswith(("PlannedJob", "True")):
                 assert repr(eval(statement, names)) == promised.strip()
-    assert len(blocks) == 6
-    assert (tmp_path / "swing.csv").exists()
+    assert len(blocks) == 7
+    for name in (
+        "swing.csv",
+        "faster.csv",
+        "swing_500.csv",
+        "pick.svg",
+        "swing.html",
+        "out/cubic.csv",
+        "out/quintic.csv",
+    ):
+        assert (tmp_path / name).exists()
 
 
 def test_a_rounded_pose_is_projected_and_a_wrong_one_refused() -> None:

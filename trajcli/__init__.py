@@ -21,7 +21,8 @@ from typing import TYPE_CHECKING, Any
 from trajcli.version import __version__
 
 if TYPE_CHECKING:
-    from trajcli.api import Arm, InverseSolution, PlannedJob, check, load_robot, plan
+    from trajcli.api.motions import Motion, batch, plot, resample, retime, view
+    from trajcli.api.plans import Arm, InverseSolution, PlannedJob, check, load_robot, plan
     from trajcli.checks.verify import Verdict
     from trajcli.curves.piecewise import PiecewisePolynomial
     from trajcli.errors import (
@@ -48,7 +49,7 @@ if TYPE_CHECKING:
     from trajcli.trajectory import Rows, State, Trajectory
 
 _HOMES = {
-    "trajcli.api": ("Arm", "InverseSolution", "PlannedJob", "check", "load_robot", "plan"),
+    "trajcli.api.plans": ("Arm", "InverseSolution", "PlannedJob", "check", "load_robot", "plan"),
     "trajcli.checks.verify": ("Verdict",),
     "trajcli.curves.piecewise": ("PiecewisePolynomial",),
     "trajcli.errors": (
@@ -69,6 +70,7 @@ _HOMES = {
     "trajcli.job.robot": ("catalogue_names",),
     "trajcli.judge.judgement": ("Judgement",),
     "trajcli.kinematics.robot": ("Joint", "Limits", "Robot"),
+    "trajcli.api.motions": ("Motion", "batch", "plot", "resample", "retime", "view"),
     "trajcli.planning.plan": ("Plan", "plan_job"),
     "trajcli.output.report": ("report_of", "verification_error"),
     "trajcli.output.write": ("write_plan",),
@@ -88,6 +90,7 @@ __all__ = [
     "Limits",
     "LoadedJob",
     "MissingLimitError",
+    "Motion",
     "PiecewisePolynomial",
     "Place",
     "Plan",
@@ -103,6 +106,7 @@ __all__ = [
     "Verdict",
     "VerificationError",
     "__version__",
+    "batch",
     "catalogue_names",
     "check",
     "dump_job",
@@ -111,8 +115,12 @@ __all__ = [
     "load_robot",
     "plan",
     "plan_job",
+    "plot",
     "report_of",
+    "resample",
+    "retime",
     "verification_error",
+    "view",
     "write_plan",
 ]
 

@@ -187,6 +187,14 @@ def test_the_remainder_covers_a_peak_that_no_row_shows(length, monkeypatch):
     assert found.most - 5.0 < 5.0 * size * 0.5  # ten times too small a remainder would be noticed above
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_first_look_knows_of_a_peak_that_no_row_shows(sign):
+    survey = effort_survey(lift(gravity=0.0), np.array([0.0, 1.0]), sign * hidden_motion(1e-8, 1.0))
+    limit = 5.0 * (1.0 + 0.9e-8)
+    found = list(survey.doubtful(np.array([[-limit, limit]]), 1e-10))
+    assert found == [(0, sign, limit)]
+
+
 def test_coulomb_friction_jumps_where_a_joint_turns_back():
     dynamics = lift(2.0, Friction(coulomb=3.0))
     coefficients = np.array([1.0, -1.0, 0.0])[:, None, None]  # qd = 2 t - 1, qdd = 2
@@ -209,6 +217,40 @@ def test_what_no_float_holds_is_not_proven():
     with np.errstate(over="ignore", invalid="ignore"):
         survey = effort_survey(lift(), np.array([0.0, 1.0]), np.full((3, 1, 1), 1e308))
     assert survey.highest()[0].most == np.inf
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("joint", [0, 1, 2])
+@pytest.mark.parametrize("room", [1e-9, 1e-6, 1e-3])
+def test_a_first_look_sees_a_limit_that_is_passed_by_more_than_its_slack(room, joint, sign):
+    """Three slides in a row hold masses steadily; the second piece is the heavier one of two."""
+    slides = tuple(replace(lift(2.0).robot.joints[0], name=f"slide{i}") for i in range(3))
+    robot = Robot("lift", slides, unlimited(3), "standard", np.eye(4), np.eye(4))
+    dynamics = InverseDynamics(robot, np.array([0.0, 0.0, -9.81 * sign]))
+    pieces = np.zeros((3, 2, 3))
+    pieces[0, 1, 0] = 0.5 * sign  # the first slide, and all that it carries, by 1 m/s^2
+    survey = effort_survey(dynamics, np.array([0.0, 1.0, 2.0]), pieces)
+    efforts = sign * np.array([6.0, 4.0, 2.0]) * 10.81
+    for share, seen in ((0.5, []), (1.5, [joint])):
+        limits = np.tile([-1e3, 1e3], (3, 1))
+        limits[joint, int(sign > 0)] = efforts[joint] / (1.0 + share * room)
+        found = list(survey.doubtful(limits, room))
+        assert [index for index, *_ in found] == seen
+        assert all(each == (joint, sign, abs(limits[joint, int(sign > 0)])) for each in found)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_first_look_overlooks_nothing_that_dense_samples_show(seed):
+    rng = np.random.default_rng(700 + seed)
+    dynamics = random_dynamics(rng, friction=seed % 2 == 0)
+    breaks, coefficients = random_motion(rng, len(dynamics.links))
+    efforts, survey = dense(dynamics, breaks, coefficients), effort_survey(dynamics, breaks, coefficients)
+    for joint in range(len(dynamics.links)):
+        for sign, side in ((1, 1), (-1, 0)):
+            peak = (sign * efforts[:, joint]).max()
+            limits = np.tile([-np.inf, np.inf], (len(dynamics.links), 1))
+            limits[joint, side] = sign * peak / (1.0 + 2e-6 * np.sign(peak))
+            assert [found[:2] for found in survey.doubtful(limits, 1e-6)] == [(joint, sign)] or peak <= 0
 
 
 def test_stretch_of_a_lift_in_closed_form():

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from trajcli.api import load_robot
+from trajcli.api.plans import load_robot
 from trajcli.job import robot as robots
 
 ROBOT = "joints: [{velocity: 1}, {velocity: 2}]\n"

@@ -10,7 +10,7 @@ import pytest
 from recorded_rows import part
 
 import trajcli
-from trajcli.api import PlannedJob
+from trajcli.api.plans import PlannedJob
 from trajcli.judge.judgement import Judgement
 from trajcli.judge.motion import Requirements, judge_motion
 from trajcli.judge.tool import ToolJudge

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from trajcli.api import plan
+from trajcli.api.plans import plan
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.time_optimal.parameterization import time_optimal
 from trajcli.curves.time_optimal.time_law import LawPieces

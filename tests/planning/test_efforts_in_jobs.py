@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from trajcli.api import plan
+from trajcli.api.plans import plan
 from trajcli.dynamics.newton_euler import InverseDynamics
 from trajcli.errors import PlanningError
 

@@ -3,45 +3,29 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing
 from time import monotonic
-from typing import Any, BinaryIO, Literal
+from typing import TYPE_CHECKING, Any, BinaryIO
 
-from trajcli.batch.jobs import BatchJob, BatchJobs, find_jobs, ledger_folders
-from trajcli.batch.ledger import LedgerEntry, read_ledger, write_ledger
-from trajcli.batch.task import BatchSetup, JobOutcome, Task
+from trajcli.batches.jobs import BatchJobs, Ledgers, find_jobs
+from trajcli.batches.task import BatchSetup, JobOutcome, Task
 from trajcli.cli.frames import problem_as_json
 from trajcli.cli.outcome import print_remark
 from trajcli.cli.progress import ERASE, WIDTH, is_terminal
 from trajcli.errors import InputError, utf8
-from trajcli.frozen import comparable
-from trajcli.streams.formats import FormatName
 from trajcli.streams.whole_file import standard_output
 
+if TYPE_CHECKING:
+    from trajcli.cli.motion_commands import BatchCommand
+
 _TIMEOUT = 600.0  # s
-_LEDGER_PERIOD = 5.0  # s after which finished jobs are entered, whatever happens to this process then
 _SHOWN = 5  # names of files in a remark
 
 
-@comparable
-class BatchOptions:
-    """What the command line says beside the jobs; see `trajcli batch --help`."""
-
-    folder: str | None = None
-    jobs: str | None = None
-    form: FormatName = "csv"
-    force: bool = False
-    timeout: str | None = None
-    engine: Literal["processes", "dask"] = "processes"
-    scheduler: str | None = None
-    quiet: bool = False
-
-
-def run_batch(names: Sequence[str], options: BatchOptions) -> int:
+def run_batch(options: BatchCommand) -> int:
     """Plan jobs, and print a line for each; return the worst exit code.
 
     Raises:
@@ -50,12 +34,12 @@ def run_batch(names: Sequence[str], options: BatchOptions) -> int:
         BrokenPipeError: When the reader has closed the pipe.
     """
     count, timeout = _processes(options), _timeout(options)
-    found = find_jobs(names, options.folder, options.form)
-    known = _known(found.jobs, force=options.force)
+    found = find_jobs(options.jobs, options.output, options.form)
+    record = Ledgers(found.jobs)
+    known = {} if options.force else record.known()
     tasks = [Task(job, known.get(job.output)) for job in found.jobs]
-    setup = BatchSetup(options.form, {os.path.realpath(job.output): job.job for job in found.jobs})
+    setup = BatchSetup(options.form, found.owners())
     progress = _Progress(len(tasks))
-    record = _Record(found.jobs)
     try:
         with closing(_outcomes(tasks, setup, options, (count, timeout), progress.show)) as outcomes:
             _print_outcomes(outcomes, progress, record)
@@ -70,38 +54,38 @@ def run_batch(names: Sequence[str], options: BatchOptions) -> int:
 def _outcomes(
     tasks: Sequence[Task],
     setup: BatchSetup,
-    options: BatchOptions,
+    options: BatchCommand,
     limits: tuple[int, float | None],
     on_tick: Callable[[], None],
 ) -> Generator[JobOutcome, None, None]:
     """Return the outcomes of tasks as they are done, from this machine or from a cluster."""
     if options.engine == "dask":
-        from trajcli.batch.cluster import run_on_cluster
+        from trajcli.batches.cluster import run_on_cluster
 
         return run_on_cluster(tasks, setup, options.scheduler, on_tick)
-    from trajcli.batch.processes import run_in_processes
+    from trajcli.batches.processes import run_in_processes
 
     count, timeout = limits
     return run_in_processes(tasks, setup, min(count, len(tasks)), timeout, on_tick)
 
 
-def _processes(options: BatchOptions) -> int:
+def _processes(options: BatchCommand) -> int:
     """Return how many processes there are at most."""
-    from trajcli.batch.processes import usable_cores
+    from trajcli.batches.processes import usable_cores
 
-    given = {"-j": options.jobs, "--timeout": options.timeout}
+    given = {"-j": options.count, "--timeout": options.timeout}
     for name in (name for name, value in given.items() if value is not None and options.engine == "dask"):
         raise InputError(f"{name} is about processes of this machine, not of a cluster", hint="leave it out")
     if options.scheduler is not None and options.engine != "dask":
         raise InputError("--scheduler is about a cluster", hint="add --engine dask")
-    if options.jobs is None:
+    if options.count is None:
         return usable_cores()
-    if not options.jobs.isascii() or not options.jobs.isdigit() or not 1 <= int(options.jobs) <= 1024:
-        raise InputError(f"-j expects 1 to 1024 processes, got '{options.jobs}'")
-    return int(options.jobs)
+    if not options.count.isascii() or not options.count.isdigit() or not 1 <= int(options.count) <= 1024:
+        raise InputError(f"-j expects 1 to 1024 processes, got '{options.count}'")
+    return int(options.count)
 
 
-def _timeout(options: BatchOptions) -> float | None:
+def _timeout(options: BatchCommand) -> float | None:
     """Return how long a job may take, s; None for ever."""
     if options.timeout is None:
         return _TIMEOUT
@@ -116,25 +100,12 @@ def _timeout(options: BatchOptions) -> float | None:
     return seconds or None
 
 
-def _known(jobs: Sequence[BatchJob], *, force: bool) -> dict[str, LedgerEntry]:
-    """Return what outputs were made of, as the ledgers of their folders say."""
-    if force:
-        return {}
-    paths = ledger_folders(jobs)
-    ledgers = {path: read_ledger(path) for path in set(paths.values())}
-    entries = ((job.output, ledgers[paths[job.output]].get(_name(job))) for job in jobs)
-    return {output: entry for output, entry in entries if entry is not None}
-
-
-def _name(job: BatchJob) -> str:
-    return job.output.replace("\\", "/").rpartition("/")[2]
-
-
-def _print_outcomes(outcomes: Iterator[JobOutcome], progress: _Progress, record: _Record) -> None:
+def _print_outcomes(outcomes: Iterator[JobOutcome], progress: _Progress, record: Ledgers) -> None:
     """Print a line for each outcome as soon as it is there."""
     with standard_output() as out:
         for outcome in outcomes:
-            record.add(outcome)
+            if outcome.entry is not None and outcome.outcome == "written":
+                record.add(outcome.job, outcome.entry)
             progress.erase()
             _print_line(out, _as_json(outcome))
             progress.add(outcome)
@@ -170,29 +141,6 @@ def _say_what_came(found: BatchJobs, progress: _Progress) -> None:
         more = f" and {len(found.no_jobs) - _SHOWN} more" if len(found.no_jobs) > _SHOWN else ""
         print_remark(f"no jobs, left out: {shown}{more}")
     print_remark(f"{progress.total} job{'s' * (progress.total != 1)}: {progress.text}")
-
-
-class _Record:
-    """Entries of ledgers that are not written yet."""
-
-    def __init__(self, jobs: Sequence[BatchJob]) -> None:
-        self._paths, self._entries = ledger_folders(jobs), dict[str, tuple[str, LedgerEntry]]()
-        self._written = monotonic()
-
-    def add(self, outcome: JobOutcome) -> None:
-        """Take the entry of an outcome, and write all there are now and then."""
-        if outcome.entry is not None and outcome.outcome == "written":
-            self._entries[outcome.job.output] = (_name(outcome.job), outcome.entry)
-        if monotonic() - self._written > _LEDGER_PERIOD:
-            self.write()
-
-    def write(self) -> None:
-        """Write all entries into the ledgers of their folders."""
-        for path in {self._paths[output] for output in self._entries}:
-            of_folder = [value for output, value in self._entries.items() if self._paths[output] == path]
-            write_ledger(path, dict(of_folder))
-        self._entries.clear()
-        self._written = monotonic()
 
 
 class _Progress:

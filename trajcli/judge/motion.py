@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Problem
-from trajcli.findings import Collector, Finding
+from trajcli.findings import Collector, Finding, NamedJoints
 from trajcli.frozen import frozen
 from trajcli.judge.consistency import changes_of, judge_consistency
 from trajcli.judge.ends import judge_end, judge_order_of_stamps, judge_start
-from trajcli.judge.intervals import BESIDE, Intervals, JointAxes
+from trajcli.judge.intervals import BESIDE, Intervals
 from trajcli.judge.judgement import Judgement, worst_first
 from trajcli.judge.limits import judge_efforts, judge_limits, judge_velocity_by_position
 from trajcli.judge.reconstruction import Interpolation, chosen_interpolation
@@ -116,7 +116,7 @@ class MotionJudge:
         """Begin with no rows."""
         self._requirements, self._snap, self._worst = requirements, snap, Collector()
         robot = requirements.robot
-        self._axes = JointAxes(robot.joint_names, robot.joint_types)
+        self._axes = robot
         self._stamps: Stamps | None = None
         self._interpolation: Interpolation = "linear"
         self._kept: _Rows | None = None
@@ -188,7 +188,7 @@ class MotionJudge:
 
     def _begin(self, block: RecordedMotion) -> None:
         """Decide what the first rows decide for all: how they are joined, and the period."""
-        count, joints = block.q.shape[1], len(self._axes.names)
+        count, joints = block.q.shape[1], len(self._axes.joint_names)
         if count != joints:
             robot = self._requirements.robot.name
             raise InputError(
@@ -358,11 +358,11 @@ def _causes(findings: list[Finding]) -> list[Finding]:
     ]
 
 
-def _with_hint(finding: Finding, axes: JointAxes) -> Finding:
+def _with_hint(finding: Finding, axes: NamedJoints) -> Finding:
     """Return the finding with what would mend it, where that is known."""
     if finding.hint is not None or finding.joint is None or finding.value is None:
         return finding
-    turning = axes.types[axes.names.index(finding.joint)] == "revolute"
+    turning = axes.joint_types[axes.joint_names.index(finding.joint)] == "revolute"
     if finding.kind == "position" and turning and abs(finding.value) > _TURNS:
         size = f"{abs(finding.value):.6g}"
         return replace(finding, hint=f"values up to {size}: degrees? then say --units deg")

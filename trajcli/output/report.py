@@ -48,7 +48,7 @@ from trajcli.trajectory import Span, Trajectory
 from trajcli.version import __version__
 
 if TYPE_CHECKING:
-    from trajcli.checks.tool_bound import ToolPeak
+    from trajcli.limits.tool_bound import ToolPeak
 
 _ROUNDING = 1e-12  # rad or m: what leaves the range by less does not leave it
 _HELD = 0.999  # of the wanted speed: that much counts as holding it
@@ -294,18 +294,20 @@ def _tool(trajectory: Trajectory, span: Span, move: PlannedMove) -> ToolReport |
 
 
 def _tool_peaks(peaks: Mapping[str, ToolPeak], span: Span, robot: Robot) -> list[ToolPeakReport]:
-    from trajcli.checks.tool_limits import SPEEDS
+    from trajcli.limits.kinds import TOOL_KINDS
 
     reports = []
-    for _, name, order in SPEEDS:
-        peak, limit = peaks[name], float(getattr(robot.limits.tcp, name))
+    for kind in TOOL_KINDS:
+        if kind.key not in peaks:
+            continue
+        peak, limit = peaks[kind.key], float(getattr(robot.limits.tcp, kind.key))
         report = ToolPeakReport(
-            quantity=name,
+            quantity=kind.key,
             value=peak.value,
             bound=peak.most,
             time=span.start + peak.time,
             limit=None if math.isinf(limit) else limit,
-            unit=("rad" if name.startswith("angular_") else "m") + _RATES[order],
+            unit=kind.unit,
             negligible=peak.value <= _AT_REST,
         )
         reports.append(report)

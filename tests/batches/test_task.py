@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from trajcli.batch import task
-from trajcli.batch.jobs import BatchJob
-from trajcli.batch.task import BatchSetup, JobOutcome, Task, run_task
+from trajcli.batches import task
+from trajcli.batches.jobs import BatchJob
+from trajcli.batches.task import BatchSetup, JobOutcome, Task, run_task
 
 JOB = """\
 version: 1

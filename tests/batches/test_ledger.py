@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from trajcli.batch.ledger import LedgerEntry, hash_of_file, hash_of_inputs, read_ledger, write_ledger
+from trajcli.batches.ledger import LedgerEntry, hash_of_file, hash_of_inputs, read_ledger, write_ledger
 
 ENTRY = LedgerEntry("aa", ("robot.yaml",), "bb", 1.5)
 
@@ -28,7 +28,7 @@ def test_every_part_of_the_inputs_changes_the_hash(tmp_path: Path, monkeypatch: 
     one.write_bytes(b"abcd")
     two.write_bytes(b"ef")  # the same bytes in a row
     hashes.append(hash_of_inputs("a.yaml", b"job", files, "csv"))
-    monkeypatch.setattr("trajcli.batch.ledger.__version__", "0.0.0")
+    monkeypatch.setattr("trajcli.batches.ledger.__version__", "0.0.0")
     hashes.append(hash_of_inputs("a.yaml", b"job", files, "csv"))
     assert None not in hashes
     assert len(set(hashes)) == len(hashes)

@@ -9,8 +9,8 @@ from pathlib import Path
 from threading import Lock
 from typing import Any
 
-from trajcli.batch.jobs import BatchJob
-from trajcli.batch.task import BUG, BatchSetup, JobOutcome, Task, run_task
+from trajcli.batches.jobs import BatchJob
+from trajcli.batches.task import BUG, BatchSetup, JobOutcome, Task, run_task
 from trajcli.errors import FileError, InputError, Problem
 
 _CONNECTING = 10.0  # s until a scheduler that does not answer is given up

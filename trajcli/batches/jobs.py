@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from time import monotonic
 
-from trajcli.batch.ledger import LEDGER_NAME
+from trajcli.batches.ledger import LEDGER_NAME, LedgerEntry, read_ledger, write_ledger
 from trajcli.errors import FileError, InputError, utf8
 from trajcli.frozen import comparable, frozen
 from trajcli.streams.formats import ENDINGS, FormatName
@@ -14,6 +16,7 @@ from trajcli.streams.whole_file import identity
 
 _YAML = (".yaml", ".yml")
 _KEY_OF_JOBS = re.compile(rb"""(?m)(?:^|^\s*\{\s*|,\s*)["']?(?:version|start|moves)["']?\s*:""")
+_PERIOD = 5.0  # s after which finished jobs are entered, whatever happens to this process then
 _PEEKED = 1 << 20  # bytes of a file that are looked at for what it is
 
 
@@ -41,6 +44,10 @@ class BatchJobs:
 
     jobs: tuple[BatchJob, ...]
     no_jobs: tuple[str, ...]
+
+    def owners(self) -> dict[str, str]:
+        """Return the job of each output, by the output's real path."""
+        return {os.path.realpath(job.output): job.job for job in self.jobs}
 
 
 def find_jobs(names: Sequence[str], folder: str | None, form: FormatName) -> BatchJobs:
@@ -124,6 +131,36 @@ def _check_files_differ(jobs: Sequence[BatchJob]) -> None:
         outputs[same] = job.job
 
 
-def ledger_folders(jobs: Sequence[BatchJob]) -> dict[str, Path]:
-    """Return the path of the ledger of each job, by the job's output."""
-    return {job.output: Path(job.output).parent / LEDGER_NAME for job in jobs}
+class Ledgers:
+    """Ledgers of the folders that the rows of a batch go to, with the entries that are not written yet."""
+
+    def __init__(self, jobs: Sequence[BatchJob]) -> None:
+        self._paths = {job.output: Path(job.output).parent / LEDGER_NAME for job in jobs}
+        self._entries = dict[str, LedgerEntry]()
+        self._written = monotonic()
+
+    def known(self) -> dict[str, LedgerEntry]:
+        """Return what outputs were made of, as far as the ledgers say."""
+        ledgers = {path: read_ledger(path) for path in set(self._paths.values())}
+        entries = ((output, ledgers[path].get(_name(output))) for output, path in self._paths.items())
+        return {output: entry for output, entry in entries if entry is not None}
+
+    def add(self, job: BatchJob, entry: LedgerEntry) -> None:
+        """Take the entry of an output that was written, and write all there are now and then."""
+        self._entries[job.output] = entry
+        if monotonic() - self._written > _PERIOD:
+            self.write()
+
+    def write(self) -> None:
+        """Write all entries into the ledgers of their folders."""
+        for path in {self._paths[output] for output in self._entries}:
+            of_folder = {
+                _name(output): entry for output, entry in self._entries.items() if self._paths[output] == path
+            }
+            write_ledger(path, of_folder)
+        self._entries.clear()
+        self._written = monotonic()
+
+
+def _name(output: str) -> str:
+    return output.replace("\\", "/").rpartition("/")[2]

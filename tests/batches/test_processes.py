@@ -12,10 +12,10 @@ from typing import NoReturn
 
 import pytest
 
-from trajcli.batch import processes
-from trajcli.batch.jobs import BatchJob
-from trajcli.batch.processes import run_in_processes
-from trajcli.batch.task import BatchSetup, JobOutcome, Task
+from trajcli.batches import processes
+from trajcli.batches.jobs import BatchJob
+from trajcli.batches.processes import run_in_processes
+from trajcli.batches.task import BatchSetup, JobOutcome, Task
 from trajcli.streams.whole_file import whole_file
 
 SETUP = BatchSetup("csv", {})

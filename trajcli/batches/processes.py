@@ -14,7 +14,7 @@ from threading import Thread
 from time import monotonic
 from typing import Any, NoReturn
 
-from trajcli.batch.task import BUG, BatchSetup, JobOutcome, Task, run_task
+from trajcli.batches.task import BUG, BatchSetup, JobOutcome, Task, run_task
 from trajcli.errors import PlanningError, Problem
 from trajcli.streams.whole_file import remove_unfinished
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from trajcli.batch.jobs import BatchJob, find_jobs
+from trajcli.batches.jobs import BatchJob, find_jobs
 from trajcli.errors import InputError
 
 JOB = "version: 1\nrobot: 1\nmoves: []\n"

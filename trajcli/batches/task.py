@@ -10,8 +10,8 @@ from typing import Literal
 
 import numpy as np
 
-from trajcli.batch.jobs import BatchJob
-from trajcli.batch.ledger import LedgerEntry, hash_of_file, hash_of_inputs
+from trajcli.batches.jobs import BatchJob
+from trajcli.batches.ledger import LedgerEntry, hash_of_file, hash_of_inputs
 from trajcli.errors import FileError, InputError, Problem, TrajcliError, utf8
 from trajcli.frozen import comparable, frozen
 from trajcli.job.read import files_of, job_of_document

@@ -1,0 +1,292 @@
+"""Files of motions from Python: retimed, resampled, drawn, shown, and planned by the batch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from trajcli.api.plans import plan as planned_job
+from trajcli.curves.piecewise import Array
+from trajcli.editing.edited_motion import EditedMotion, ReadingOptions, read_motion
+from trajcli.errors import InputError, VerificationError
+from trajcli.frozen import frozen
+from trajcli.planning.plan import Plan
+from trajcli.streams.reading import holds_motion
+from trajcli.streams.whole_file import whole_file
+
+if TYPE_CHECKING:
+    from trajcli.batches.task import JobOutcome
+    from trajcli.editing.retiming import Stretch
+    from trajcli.streams.formats import FormatName
+
+JobSource = str | Path | Mapping[str, Any] | Plan
+
+
+@frozen
+class Motion:
+    """A motion that was read from a file, or made of one.
+
+    Attributes:
+        edited: Its rows, and how its file wrote them.
+        stretches: By what it was stretched, and what binds it; empty where its time was kept.
+    """
+
+    edited: EditedMotion
+    stretches: tuple[Stretch, ...] = ()
+
+    def __repr__(self) -> str:
+        rows, joints = self.q.shape
+        return f"Motion({rows} rows, {joints} joint{'s' * (joints != 1)}, {self.duration:.6g} s)"
+
+    @property
+    def t(self) -> Array:
+        """Times of the rows, s, shape (N,)."""
+        return self.edited.rows.t
+
+    @property
+    def q(self) -> Array:
+        """Positions, rad or m, shape (N, n)."""
+        return self.edited.rows.q
+
+    @property
+    def qd(self) -> Array | None:
+        """Velocities, shape (N, n); None where the file has none."""
+        return self.edited.rows.qd
+
+    @property
+    def qdd(self) -> Array | None:
+        """Accelerations, shape (N, n); None where the file has none."""
+        return self.edited.rows.qdd
+
+    @property
+    def duration(self) -> float:
+        """From the first row to the last, s."""
+        return float(self.t[-1] - self.t[0])
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was taken for what in reading, and what was left out."""
+        return self.edited.notes
+
+    def save(self, path: str | Path) -> tuple[str, ...]:
+        """Write the motion; return what a reader should know about what the format cannot hold.
+
+        Args:
+            path: The file, whose ending says the format; it appears whole or not at all.
+
+        Raises:
+            InputError: When the ending is that of no format, or the format cannot hold the motion.
+            FileError: When the file cannot be written.
+        """
+        from trajcli.editing.writing import write_motion
+
+        return write_motion(self.edited, str(path))
+
+
+def retime(
+    file: str | Path,
+    *,
+    job: str | Path | None = None,
+    robot: str | Path | None = None,
+    fastest: bool = False,
+    per_move: bool = False,
+    output: str | Path | None = None,
+) -> Motion:
+    """Return the motion of a file over the shortest time that keeps its limits, as `trajcli retime` does.
+
+    Args:
+        file: Rows in any format that `trajcli check` reads.
+        job: By whose limits; either this or `robot`.
+        robot: The name of a robot, or the path of its file.
+        fastest: Whether it may become faster.
+        per_move: Whether each move has its own time.
+        output: Where it is written; its decimals are then those that are judged.
+
+    Raises:
+        InputError: When the file is no motion, or neither a job nor a robot is named.
+        VerificationError: When no time keeps the limits.
+        FileError: When a file cannot be read or written.
+    """
+    from trajcli.editing.limits import kept_limits
+    from trajcli.editing.retiming import retime as retimed
+    from trajcli.editing.writing import as_read
+
+    limits = kept_limits(*(None if name is None else str(name) for name in (job, robot)))
+    arm = limits.robot
+    before = read_motion(
+        str(file),
+        ReadingOptions(),
+        joints=arm.joint_names,
+        joint_types=arm.joint_types,
+        declared=limits.units,
+    )
+    reader = EditedMotion.as_written if output is None else partial(as_read, path=str(output))
+    found, stretches = retimed(
+        before, limits.requirements, fastest=fastest, per_move=per_move, as_read=reader
+    )
+    return _continuous(before, Motion(found, stretches), output)
+
+
+def resample(file: str | Path, rate: float, *, output: str | Path | None = None) -> Motion:
+    """Return the motion of a file on another grid, as `trajcli resample` does.
+
+    Args:
+        file: Rows in any format that `trajcli check` reads; their units are kept.
+        rate: Hz.
+        output: Where it is written.
+
+    Raises:
+        InputError: When the file is no motion, or the rate is not above zero.
+        FileError: When a file cannot be read or written.
+    """
+    from trajcli.editing.operations import resample as resampled
+    from trajcli.units import Units
+
+    if not (np.isfinite(rate) and rate > 0):
+        raise InputError(f"rate: expected rows per second above 0, got {rate}")
+    before = read_motion(str(file), ReadingOptions(), declared=Units())
+    return _continuous(before, Motion(resampled(before, float(rate))), output)
+
+
+def _continuous(before: EditedMotion, motion: Motion, output: str | Path | None) -> Motion:
+    """Return a motion, written where that is asked for; refuse one that jumps where the file does not."""
+    from trajcli.editing.continuity import new_jumps
+
+    problems = new_jumps(before, motion.edited)
+    if problems:
+        raise VerificationError(*problems)
+    if output is not None:
+        motion.save(output)
+    return motion
+
+
+def plot(
+    source: JobSource,
+    output: str | Path,
+    *,
+    over: Sequence[str | Path] = (),
+    quantities: Sequence[str] | None = None,
+    joints: Sequence[str] = (),
+) -> None:
+    """Draw a job, a plan or a file of rows, as `trajcli plot` does.
+
+    Args:
+        source: A plan, a job as `trajcli.plan` takes it, or the path of a file of rows.
+        output: An SVG, PNG or PDF file; it appears whole or not at all.
+        over: Files of rows that are drawn over it.
+        quantities: Of q, qd, qdd, qddd, tau, tool, path, phase; those that suit where left out.
+        joints: Names of the joints to show; all where left out.
+
+    Raises:
+        InputError: When a file or a quantity does not fit.
+        PlanningError: When a move has no curve.
+        FileError: When a file cannot be read or written.
+    """
+    from trajcli.plots.choice import parse_quantities
+    from trajcli.plots.picture import picture_of
+    from trajcli.plots.write import format_of_picture, rendered
+    from trajcli.streams.reading import read_table
+
+    kind = format_of_picture(str(output), None)
+    plan = None if _is_motion(source) else _plan_of(source)
+    files = [*([str(source)] if plan is None else []), *map(str, over)]
+    wanted = None if quantities is None else parse_quantities(",".join(quantities))
+    with np.errstate(all="ignore"):  # what is not finite was found by the checks
+        picture = picture_of(plan, [read_table(name) for name in files], wanted, tuple(joints))
+        content = rendered(picture, kind)
+    with whole_file(str(output)) as out:
+        out.write(content)
+
+
+def view(
+    source: JobSource, output: str | Path, *, robot: str | Path | None = None, compress: bool = False
+) -> None:
+    """Write the page that plays a motion in any browser, as `trajcli view` does.
+
+    Args:
+        source: A plan, a job as `trajcli.plan` takes it, or the path of a file of rows.
+        output: An HTML file; it appears whole or not at all.
+        robot: The arm that a file of rows moves: a name, a robot file, or a job.
+        compress: Whether script and data are packed.
+
+    Raises:
+        InputError: When the file does not fit.
+        PlanningError: When a move has no curve.
+        FileError: When a file cannot be read or written.
+    """
+    from trajcli.player.page import page_of
+
+    with np.errstate(all="ignore"):
+        if _is_motion(source) or robot is not None:
+            from trajcli.player.recorded import scene_of_file
+
+            scene = scene_of_file(str(source), None if robot is None else str(robot))
+        else:
+            from trajcli.player.scene import scene_of_plan
+
+            scene = scene_of_plan(_plan_of(source))
+    page = page_of(scene, compress=compress)
+    with whole_file(str(output)) as out:
+        out.write(page)
+
+
+def batch(
+    jobs: Sequence[str | Path],
+    output: str | Path | None = None,
+    *,
+    form: FormatName = "csv",
+    processes: int | None = None,
+    force: bool = False,
+    timeout: float | None = 600.0,
+) -> list[JobOutcome]:
+    """Plan many jobs in processes of their own, as `trajcli batch` does; return what came of each.
+
+    Args:
+        jobs: Job files, and folders of them.
+        output: The folder of the rows; beside their jobs where left out.
+        form: Their format.
+        processes: At most; one a core where left out.
+        force: Whether unchanged jobs are planned again.
+        timeout: What a job may take, s; None for ever.
+
+    Raises:
+        InputError: When there is no job, or two have one output.
+        FileError: When a folder cannot be read.
+    """
+    from trajcli.batches.jobs import Ledgers, find_jobs
+    from trajcli.batches.processes import run_in_processes, usable_cores
+    from trajcli.batches.task import BatchSetup, Task
+
+    if processes is not None and processes < 1:
+        raise InputError(f"processes: expected 1 at least, got {processes}")
+    found = find_jobs([str(job) for job in jobs], None if output is None else str(output), form)
+    ledgers = Ledgers(found.jobs)
+    known = {} if force else ledgers.known()
+    tasks = [Task(job, known.get(job.output)) for job in found.jobs]
+    setup = BatchSetup(form, found.owners())
+    outcomes: list[JobOutcome] = []
+    count = min(processes or usable_cores(), len(tasks))
+    try:
+        with closing(run_in_processes(tasks, setup, count, timeout, lambda: None)) as done:
+            for outcome in done:
+                if outcome.entry is not None and outcome.outcome == "written":
+                    ledgers.add(outcome.job, outcome.entry)
+                outcomes.append(outcome)
+    finally:
+        ledgers.write()
+    order = {job.job: index for index, job in enumerate(found.jobs)}
+    return sorted(outcomes, key=lambda outcome: order[outcome.job.job])
+
+
+def _is_motion(source: JobSource) -> bool:
+    """Return whether a source is a file of rows, and no job."""
+    return isinstance(source, str | Path) and "\n" not in str(source) and holds_motion(str(source))
+
+
+def _plan_of(source: JobSource) -> Plan:
+    return source if isinstance(source, Plan) else planned_job(source)
