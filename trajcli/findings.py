@@ -17,8 +17,6 @@ FindingMethod = Literal["exact", "bounded", "sampled", "differences"]
 FindingSeverity = Literal["error", "warning"]
 Certainty = Literal["exceeded", "within rounding"]
 
-LIMITS_OF_JOINTS = ("position", "velocity", "acceleration", "jerk", "velocity_by_position", "effort")
-"""Kinds of findings about limits of joints."""
 _RATES = ("", "/s", "/s^2", "/s^3")
 _UNORDERED = ("jump", "time", "derivative")
 """Kinds whose value is no part of their limit."""

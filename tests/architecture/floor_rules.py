@@ -14,6 +14,7 @@ FLOORS = (
     ("kinematics", "catalogue"),
     ("dynamics",),
     ("trajectory", "samples", "columns", "grids", "knots", "findings"),
+    ("limits",),
     ("language",),
     ("planners", "checks", "streams", "urdf"),
     ("job",),

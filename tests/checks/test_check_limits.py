@@ -11,9 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from motions import KINDS, between, limits, sampled_peaks, single_pieces, trajectory
 
-from trajcli.checks.limits import check_limits, peaks_by_move
+from trajcli.checks.verify import check_limits
 from trajcli.curves.piecewise import PiecewisePolynomial, constant
 from trajcli.findings import Finding
+from trajcli.limits.joints import peaks_by_move
 from trajcli.trajectory import Trajectory
 
 # Peaks of the septic from 0 to 1 in one second, all of them inside: t = 1/2, (1 -+ 1/sqrt 5)/2, 1/2

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from trajcli.checks.tool import SampledTool, check_tool
-from trajcli.checks.verify import verify
+from trajcli.checks.verify import limit_findings, verify
 from trajcli.curves.hermite import hermite_pieces
 from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import PiecewisePolynomial, concatenate, constant
@@ -23,6 +23,8 @@ from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.jacobian import tcp_acceleration, tcp_twist
 from trajcli.kinematics.robot import Limits, Robot, ToolLimits, unlimited
+from trajcli.limits.kinds import LimitedMove
+from trajcli.limits.tool import ToolFamily
 from trajcli.planners.tool_path.follow import followed
 from trajcli.trajectory import Promise, Span, Trajectory, resting
 
@@ -87,7 +89,10 @@ ROOMY = {
 
 
 def judged(rows: SampledTool, **fields) -> list:
-    return check_tool(dataclasses.replace(rows, **fields))
+    tool = dataclasses.replace(rows, **fields)
+    move = LimitedMove(tool.trajectory, tool.span, tool.robot.limits, tool.robot, tool.motion)
+    survey = ToolFamily().survey(move)
+    return [*check_tool(tool), *([] if survey is None else limit_findings(move, survey))]
 
 
 def kinds(findings) -> list[str]:

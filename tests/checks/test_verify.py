@@ -7,8 +7,7 @@ import pytest
 from motions import between, limits, state, trajectory
 
 from trajcli.checks.continuity import acceleration_steps, check_continuity
-from trajcli.checks.limits import check_limits
-from trajcli.checks.verify import verify
+from trajcli.checks.verify import check_limits, verify
 from trajcli.curves.piecewise import PiecewisePolynomial
 
 

@@ -13,7 +13,8 @@ import typer
 import yaml
 from running import Outcome
 
-from trajcli.cli.arm_commands import register
+from trajcli.cli.arm_commands import ARM_COMMANDS
+from trajcli.cli.command import register
 
 ORACLES = Path(__file__).parents[1] / "oracles"
 
@@ -21,7 +22,7 @@ ORACLES = Path(__file__).parents[1] / "oracles"
 @cache
 def arm_app() -> typer.Typer:
     app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
-    register(app)
+    register(app, ARM_COMMANDS)
     return app
 
 

@@ -121,9 +121,10 @@ def test_a_refusal_of_toppra_is_said(monkeypatch):
 
 
 def test_the_command_prints_both(capfd):
-    from trajcli.cli.plan import PlanOptions, run_plan
+    from trajcli.cli.gate import run_plan
+    from trajcli.cli.job_commands import PlanCommand
 
-    run_plan(str(EXAMPLES / "time_optimal.yaml"), [], PlanOptions(reference=True, no_output=True))
+    run_plan(PlanCommand(job=str(EXAMPLES / "time_optimal.yaml"), reference=True, no_output=True))
     err = capfd.readouterr().err
     assert "x toppra along the same path (1.3" in err
     assert "most used of a limit: 100 % (acceleration of" in err

@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from trajcli.cli.job_commands import PayloadCommand
 from trajcli.cli.payload import run_payload
 from trajcli.dynamics.newton_euler import InverseDynamics
 from trajcli.errors import InputError, TrajcliError
@@ -166,11 +167,11 @@ def test_gravity_that_is_too_much_without_any_payload_is_the_error_of_the_job() 
 def test_the_command_for_people_and_programs(tmp_path, capsys) -> None:  # type: ignore[no-untyped-def]
     job = tmp_path / "job.yaml"
     job.write_text(CARRYING.replace("MASS", "0.5"))
-    assert run_payload(str(job), [], None, as_json=True) == 0
+    assert run_payload(PayloadCommand(job=str(job), as_json=True)) == 0
     told = json.loads(capsys.readouterr().out)
     assert list(told) == ["mass", "joint", "move", "time", "effort", "limit"]
     assert (told["joint"], told["move"]) in (("a", 2), ("b", 2))
-    assert run_payload(str(job), ["moves.1.attach.mass=0.1"], 2, as_json=False) == 0
+    assert run_payload(PayloadCommand(job=str(job), override=["moves.1.attach.mass=0.1"], at=2)) == 0
     first, second = capsys.readouterr().out.splitlines()
     assert first.startswith("largest mass at [60, 20, 0] mm of the tcp in move 2: ")
     shown = float(first.rsplit(" ", 2)[1])

@@ -11,12 +11,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from trajcli.checks.tolerances import BRAKING_RELATIVE, exceeds
 from trajcli.curves.braking import Braking, braking
 from trajcli.curves.extrema import Peaks, peaks_between
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import Limits
+from trajcli.limits.tolerances import BRAKING_RELATIVE, exceeds
 from trajcli.trajectory import Promise, Span, Trajectory
 
 

@@ -12,13 +12,13 @@ from typing import overload
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.checks.limits import peaks_by_move
-from trajcli.checks.tolerances import allowed_jump
 from trajcli.curves.extrema import Peaks
 from trajcli.curves.piecewise import Array
 from trajcli.findings import Finding, at_time, joint_amounts
 from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Limits
+from trajcli.limits.joints import peaks_by_move
+from trajcli.limits.tolerances import allowed_jump
 from trajcli.trajectory import Trajectory
 
 JERK_HINT = "use jerk_limited or quintic, or say limits: {jerk: null}"

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from trajcli.checks.tolerances import TARGET_CLOSURE, TARGET_ON_PATH, allowed_at_end, exceeds
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount
 from trajcli.findings import Finding, at_time, joint_amounts
+from trajcli.limits.tolerances import TARGET_CLOSURE, TARGET_ON_PATH, allowed_at_end, exceeds
 from trajcli.trajectory import Promise, Span, Trajectory
 
 if TYPE_CHECKING:

@@ -1,25 +1,26 @@
-"""Tool along its path: deviation, limits and branch, by forward kinematics of the trajectory."""
+"""Tool along its path: deviation and branch, by forward kinematics of the trajectory."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
-from trajcli.checks.tolerances import JUMP_RELATIVE, TOOL_RELATIVE, exceeds
-from trajcli.checks.tool_bound import ToolPeak
-from trajcli.checks.tool_limits import check_tool_limits, limits_tool, tool_finding, tool_peaks
-from trajcli.curves.extrema import peaks
 from trajcli.curves.piecewise import Array
-from trajcli.findings import Finding
+from trajcli.errors import Amount
+from trajcli.findings import Finding, at_time
 from trajcli.frozen import frozen
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.kinematics.inverse.target import IkTarget, residual_jacobian, residuals
 from trajcli.kinematics.jacobian import linearisation
 from trajcli.kinematics.robot import Robot
+from trajcli.limits.kinds import LimitedMove
+from trajcli.limits.tolerances import exceeds
+from trajcli.limits.tool import tool_peaks
+from trajcli.limits.tool_bound import ToolPeak
 from trajcli.trajectory import Span, Trajectory
 
 _EACH = 8  # rows of a piece
@@ -69,8 +70,9 @@ class SampledTool:
 
     @cached_property
     def peaks(self) -> Mapping[str, ToolPeak]:
-        """Largest magnitude of each of `SPEEDS`, from the start of the move, by the name of its limit."""
-        return tool_peaks(self.trajectory, self.span, self.robot)
+        """Largest speeds and accelerations, from the start of the move, by the keys of their limits."""
+        robot = self.robot
+        return tool_peaks(LimitedMove(self.trajectory, self.span, robot.limits, robot, self.motion), robot)
 
     @cached_property
     def _joints(self) -> Array:
@@ -79,57 +81,38 @@ class SampledTool:
 
 
 def check_tool(tool: SampledTool) -> list[Finding]:
-    """Return where the tool leaves its path or its limits, and where the arm changes its branch."""
-    return [*_check_path(tool), *_check_limits(tool), *_check_jerk(tool), *_check_branch(tool)]
+    """Return where the tool leaves its path, and where the arm changes its branch."""
+    return [*_check_path(tool), *_check_branch(tool)]
 
 
 def _check_path(tool: SampledTool) -> list[Finding]:
     """Return by how much the tool is beside its path, or turned, where that is more than was promised."""
     tolerance, findings = tool.motion.tolerance, []
-    kinds: tuple[tuple[str, str, float], ...] = (
-        ("tool_path", "is beside", tolerance.position),
-        ("tool_orientation", "is turned from", tolerance.angle),
+    kinds: tuple[tuple[str, str, Literal["length", "angle"], float], ...] = (
+        ("tool_path", "is beside", "length", tolerance.position),
+        ("tool_orientation", "is turned from", "angle", tolerance.angle),
     )
-    for (kind, what, limit), sizes in zip(kinds, tool.deviation, strict=True):
+    for (kind, what, dimension, limit), sizes in zip(kinds, tool.deviation, strict=True):
         if exceeds(sizes.max(), limit):
             worst = int(sizes.argmax())
-            message = f"the tool {what} its path by {{value}} {{time}}, promised were {{limit}}"
-            value, time = float(sizes[worst]), float(tool.times[worst])
-            finding = tool_finding(tool.span, kind, 0, value, limit, time, None, message)
-            findings.append(replace(finding, hint="this is a bug: report it"))
+            value, when = float(sizes[worst]), tool.span.start + float(tool.times[worst])
+            finding = Finding(
+                move=tool.span.index,
+                joint=None,
+                kind=kind,
+                value=value,
+                limit=limit,
+                time=when,
+                method="sampled",
+                hint="this is a bug: report it",
+                message=f"the tool {what} its path by {{value}} {at_time(when)}, promised were {{limit}}",
+                amounts={
+                    "value": Amount(value, 0, None, dimension, "up"),
+                    "limit": Amount(limit, 0, None, dimension, "down"),
+                },
+            )
+            findings.append(finding)
     return findings
-
-
-def _check_limits(tool: SampledTool) -> list[Finding]:
-    if not limits_tool(tool.robot):
-        return []
-    tolerance = tool.motion.tolerance
-    promised = tolerance.position, tolerance.angle
-    return check_tool_limits(tool.span, tool.robot.limits.tcp, tool.peaks, promised)
-
-
-def _check_jerk(tool: SampledTool) -> list[Finding]:
-    """Return where the law's jerk breaks its limit, or its acceleration steps although jerk is limited."""
-    limit, law = tool.robot.limits.tcp.jerk, tool.motion.law
-    if np.isinf(limit) or tool.motion.pure_rotation:
-        return []
-    before, after = law.piece_ends(2)[1][:, 0], law.piece_ends(2)[0][:, 0]
-    steps = np.abs(np.append(after, 0.0) - np.append(0.0, before))
-    accelerations, jerks = peaks(law, (2, 3))
-    if steps.max() > JUMP_RELATIVE * float(accelerations.magnitude[0]):
-        time = float(law.breaks[int(steps.argmax())])
-        message = "the acceleration of the tool along its path steps by {value} {time}"
-        step = tool_finding(
-            tool.span, "tool_acceleration_jump", 2, float(steps.max()), 0.0, time, None, message
-        )
-        hint = "use shape jerk_limited or quintic, or leave the limit of the tool's jerk out"
-        return [replace(step, method="exact", hint=hint)]
-    value = float(jerks.magnitude[0])
-    if value <= limit * (1 + TOOL_RELATIVE):
-        return []
-    time = float(jerks.high_time[0] if jerks.high[0] >= value else jerks.low_time[0])
-    factor = (value / limit) ** (1 / 3)
-    return [tool_finding(tool.span, "tool_jerk", 3, value, limit, time, factor, method="exact")]
 
 
 def _check_branch(tool: SampledTool) -> list[Finding]:
@@ -143,6 +126,16 @@ def _check_branch(tool: SampledTool) -> list[Finding]:
     changes = np.flatnonzero(signs[1:] * signs[:-1] < 0)
     if not changes.size:
         return []
-    message = "the arm changes its branch {time}: it passes a singularity"
-    finding = tool_finding(tool.span, "branch", 0, 0.0, 0.0, float(tool.times[changes[0]]), None, message)
-    return [replace(finding, hint="move the path", amounts={})]
+    when = tool.span.start + float(tool.times[changes[0]])
+    finding = Finding(
+        move=tool.span.index,
+        joint=None,
+        kind="branch",
+        value=0.0,
+        limit=0.0,
+        time=when,
+        method="sampled",
+        hint="move the path",
+        message=f"the arm changes its branch {at_time(when)}: it passes a singularity",
+    )
+    return [finding]

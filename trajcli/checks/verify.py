@@ -4,34 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from trajcli.checks.continuity import AccelerationSteps, acceleration_steps, check_continuity
-from trajcli.checks.limits import check_limits, peaks_by_move
 from trajcli.checks.target import check_targets
-from trajcli.checks.tolerances import LIMIT_RELATIVE, TOOL_RELATIVE
-from trajcli.checks.waypoints import check_waypoints
 from trajcli.curves.extrema import Peaks
 from trajcli.errors import at_least
-from trajcli.findings import LIMITS_OF_JOINTS, Finding
+from trajcli.findings import Finding
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import QUANTITIES, Limits, ToolLimits
+from trajcli.limits.joints import JointSurvey, peaks_by_move
+from trajcli.limits.kinds import KIND_OF, LimitedMove, LimitSurvey, families, family
+from trajcli.limits.tolerances import LIMIT_RELATIVE, TOOL_RELATIVE
 from trajcli.trajectory import Promise, Span, Trajectory
 
 if TYPE_CHECKING:
-    from trajcli.checks.effort import MoveEfforts
-    from trajcli.checks.tool_bound import ToolPeak
     from trajcli.curves.approach import ApproachUse
+    from trajcli.limits.effort import MoveEfforts
+    from trajcli.limits.tool_bound import ToolPeak
 
-_TOOL_LIMITS = (
-    "tool_speed",
-    "tool_angular_speed",
-    "tool_acceleration",
-    "tool_angular_acceleration",
-    "tool_jerk",
-)
 _NO_TOOL_LIMITS = ToolLimits()
 _PART = 0.25  # of that room: a third of it is a third power's
 _NO_HELP = "slowing down does not help"
@@ -47,31 +40,49 @@ class Verdict:
         steps: Legal steps in acceleration, in order of time.
         peaks: For each span the extremes of position, velocity, acceleration and jerk, times on the curve.
         unchecked: (joint, quantity) that some move leaves unlimited in at least one direction.
-        tool_peaks: For each span the largest speeds and accelerations of the tool by the name of their limit,
-            times from the start of the move; None on a path, and where no limit asks for them.
         unchecked_of_tool: Limits of the tool that are stated and cannot be judged in some move: of an arm
             without geometry, and of the jerk in joint space.
         sampled: Moves along a path: the distance from it and the branch are judged on rows alone, which is no
             proof of what lies between them.
-        by_position: For each span where joints use most of their limits of velocity by position, one for each
-            joint that has such, times on the curve.
-        efforts: For each span the largest efforts, times on the curve; None where no limit asks for them.
+        surveys: For each span what it uses of further limits, by their family.
     """
 
     findings: tuple[Finding, ...]
     steps: AccelerationSteps
     peaks: tuple[tuple[Peaks, ...], ...]
     unchecked: tuple[tuple[str, str], ...]
-    tool_peaks: tuple[Mapping[str, ToolPeak] | None, ...] = ()
     unchecked_of_tool: tuple[str, ...] = ()
     sampled: tuple[int, ...] = ()
-    by_position: tuple[tuple[ApproachUse, ...], ...] = ()
-    efforts: tuple[MoveEfforts | None, ...] = ()
+    surveys: tuple[Mapping[str, LimitSurvey], ...] = ()
 
     def __repr__(self) -> str:
         worst = [f"{found.kind} of {found.joint or 'the tool'}" for found in self.findings[:2]]
         more = ["..."] if len(self.findings) > len(worst) else []
         return f"Verdict({self.text}{': ' * bool(worst)}{', '.join(worst + more)})"
+
+    @property
+    def tool_peaks(self) -> tuple[Mapping[str, ToolPeak] | None, ...]:
+        """For each span the largest speeds and accelerations of the tool by the keys of their limits.
+
+        Times count from the start of the move; None on a path, and where no limit asks for them.
+        """
+        known: list[Any] = [of_span.get("tool") for of_span in self.surveys]
+        return tuple(None if each is None or each.motion is not None else each.peaks for each in known)
+
+    @property
+    def by_position(self) -> tuple[tuple[ApproachUse, ...], ...]:
+        """For each span where joints use most of their limits of velocity by position.
+
+        One for each joint that has such, times on the curve.
+        """
+        known: list[Any] = [of_span.get("velocity_by_position") for of_span in self.surveys]
+        return tuple(() if each is None else each.uses for each in known)
+
+    @property
+    def efforts(self) -> tuple[MoveEfforts | None, ...]:
+        """For each span the largest efforts, times on the curve; None where no limit asks for them."""
+        known: list[Any] = [of_span.get("effort") for of_span in self.surveys]
+        return tuple(known)
 
     @property
     def passed(self) -> bool:
@@ -100,71 +111,75 @@ def verify(
     Raises:
         ValueError: When there are more or fewer limits than spans.
     """
-    peaks, tool_peaks = tuple(peaks_by_move(trajectory)), _tool_peaks(trajectory, promises)
+    moves = _limited_moves(trajectory, limits_by_move, promises)
+    peaks, surveys = tuple(peaks_by_move(trajectory)), tuple(map(_further_surveys, moves))
     findings = check_limits(trajectory, limits_by_move, _judged(trajectory, limits_by_move, promises, peaks))
-    by_position = _by_position(trajectory, limits_by_move)
-    if any(by_position):
-        from trajcli.checks.velocity_by_position import check_velocity_by_position
-
-        findings += check_velocity_by_position(trajectory, by_position)
-    efforts = _efforts(trajectory, promises)
-    findings += _check_efforts(trajectory, promises, efforts)
+    for move, of_span in zip(moves, surveys, strict=True):
+        for survey in of_span.values():
+            findings += limit_findings(move, survey)
     findings += check_continuity(trajectory, limits_by_move, peaks)
     if promises is not None:
-        findings += check_waypoints(trajectory, [promise.via_points for promise in promises])
+        findings += _check_via_points(trajectory, promises)
         findings += check_targets(trajectory, promises)
-        findings += _check_tools(trajectory, promises, tool_peaks)
+        findings += _check_tools(moves)
     return Verdict(
         findings=_in_order(trajectory, findings, promises),
         steps=acceleration_steps(trajectory, limits_by_move, peaks),
         peaks=peaks,
         unchecked=_unchecked(trajectory, limits_by_move),
-        tool_peaks=tool_peaks,
-        sampled=tuple(
-            span.index
-            for span, promise in zip(trajectory.spans, promises or (), strict=False)
-            if promise.tool is not None
-        ),
-        unchecked_of_tool=_unchecked_of_tool(limits_by_move, promises, peaks),
-        by_position=by_position,
-        efforts=efforts,
+        sampled=tuple(move.span.index for move in moves if move.motion is not None),
+        unchecked_of_tool=_unchecked_of_tool(moves, peaks),
+        surveys=surveys,
     )
 
 
-def _by_position(
-    trajectory: Trajectory, limits_by_move: Sequence[Limits]
-) -> tuple[tuple[ApproachUse, ...], ...]:
-    """Return for each span where joints use most of their limits of velocity by position."""
-    if not any(limits.has_velocity_by_position for limits in limits_by_move):
-        return ((),) * len(trajectory.spans)
-    from trajcli.checks.velocity_by_position import velocity_by_position_uses
+def check_limits(
+    trajectory: Trajectory,
+    limits_by_move: Sequence[Limits],
+    peaks: Sequence[tuple[Peaks, ...]] | None = None,
+) -> list[Finding]:
+    """Return where a joint breaks a limit of its position or a derivative of it.
 
-    pairs = zip(trajectory.spans, limits_by_move, strict=True)
-    return tuple(velocity_by_position_uses(trajectory, span, limits) for span, limits in pairs)
+    For each move, joint and quantity it is the worst excess, if any. A move of no length is judged by its
+    position and velocity: it has no time to accelerate in.
+
+    Args:
+        trajectory: What to judge.
+        limits_by_move: One for each span.
+        peaks: `peaks_by_move(trajectory)`, where that is known already.
+
+    Raises:
+        ValueError: When there are more or fewer limits than spans.
+    """
+    known = peaks_by_move(trajectory) if peaks is None else peaks
+    findings: list[Finding] = []
+    for span, limits, of_span in zip(trajectory.spans, limits_by_move, known, strict=True):
+        survey = JointSurvey(tuple(of_span), limits, span.duration > 0)
+        findings += limit_findings(LimitedMove(trajectory, span, limits), survey)
+    return findings
 
 
-def _efforts(trajectory: Trajectory, promises: Sequence[Promise] | None) -> tuple[MoveEfforts | None, ...]:
-    """Return for each span the largest efforts, where the arm has limits of them."""
-    efforts: list[MoveEfforts | None] = []
-    for span, promise in zip(trajectory.spans, promises or [Promise()] * len(trajectory.spans), strict=True):
-        robot, known = promise.robot, None
-        if robot is not None and robot.limits.has_effort:
-            from trajcli.checks.effort import move_efforts
-
-            known = move_efforts(trajectory, span, robot)
-        efforts.append(known)
-    return tuple(efforts)
+def limit_findings(move: LimitedMove, survey: LimitSurvey) -> Iterator[Finding]:
+    """Yield the findings about limits that a move does not keep."""
+    for finding in survey.over(move.trajectory, move.trajectory.curve.start):
+        yield replace(finding, move=move.span.index)
 
 
-def _check_efforts(
-    trajectory: Trajectory, promises: Sequence[Promise] | None, efforts: Sequence[MoveEfforts | None]
-) -> Iterator[Finding]:
-    """Yield the findings about torques and forces."""
-    for span, promise, of_span in zip(trajectory.spans, promises or (), efforts, strict=False):
-        if of_span is not None and promise.robot is not None:
-            from trajcli.checks.effort import check_efforts
+def _limited_moves(
+    trajectory: Trajectory, limits_by_move: Sequence[Limits], promises: Sequence[Promise] | None
+) -> list[LimitedMove]:
+    """Return the moves of a trajectory with their limits."""
+    known = promises or [Promise()] * len(trajectory.spans)
+    return [
+        LimitedMove(trajectory, span, limits, promise.robot, promise.tool)
+        for span, limits, promise in zip(trajectory.spans, limits_by_move, known, strict=True)
+    ]
 
-            yield from check_efforts(trajectory, span, promise.robot, of_span)
+
+def _further_surveys(move: LimitedMove) -> Mapping[str, LimitSurvey]:
+    """Return what a move uses of limits besides those of derivatives of joints, by their family."""
+    surveys = {name: each.survey(move) for name, each in families(move.limits, further=True)}
+    return {name: survey for name, survey in surveys.items() if survey is not None}
 
 
 def _judged(
@@ -226,55 +241,31 @@ def longest_factor(findings: Sequence[Finding]) -> float | None:
     )
 
 
-def _tool_peaks(
-    trajectory: Trajectory, promises: Sequence[Promise] | None
-) -> tuple[Mapping[str, ToolPeak] | None, ...]:
-    """Return for each span the peaks of the tool in joint space, where it has limits and can be judged."""
-    peaks: list[Mapping[str, ToolPeak] | None] = []
-    for span, promise in zip(trajectory.spans, promises or [Promise()] * len(trajectory.spans), strict=True):
-        robot, known = promise.robot, None
-        if robot is not None and promise.tool is None and robot.limits.tcp != _NO_TOOL_LIMITS:
-            from trajcli.checks.tool_limits import limits_tool, tool_peaks
+def _check_via_points(trajectory: Trajectory, promises: Sequence[Promise]) -> Sequence[Finding]:
+    if all(promise.via_points is None for promise in promises):
+        return ()
+    from trajcli.checks.waypoints import check_waypoints
 
-            known = tool_peaks(trajectory, span, robot) if limits_tool(robot) else None
-        peaks.append(known)
-    return tuple(peaks)
+    return check_waypoints(trajectory, [promise.via_points for promise in promises])
 
 
-def _check_tools(
-    trajectory: Trajectory,
-    promises: Sequence[Promise],
-    tool_peaks: Sequence[Mapping[str, ToolPeak] | None],
-) -> list[Finding]:
-    findings: list[Finding] = []
-    for span, promise, peaks in zip(trajectory.spans, promises, tool_peaks, strict=True):
-        if promise.robot is None:
-            continue
-        if promise.tool is not None:
+def _check_tools(moves: Sequence[LimitedMove]) -> Iterator[Finding]:
+    """Yield where the tool leaves its path, and where the arm changes its branch."""
+    for move in moves:
+        if move.robot is not None and move.motion is not None:
             from trajcli.checks.tool import SampledTool, check_tool
 
-            findings += check_tool(SampledTool(trajectory, span, promise.robot, promise.tool))
-        elif peaks is not None:
-            from trajcli.checks.tool_limits import check_tool_limits
-
-            findings += check_tool_limits(span, promise.robot.limits.tcp, peaks)
-    return findings
+            yield from check_tool(SampledTool(move.trajectory, move.span, move.robot, move.motion))
 
 
-def _unchecked_of_tool(
-    limits_by_move: Sequence[Limits], promises: Sequence[Promise] | None, peaks: Sequence[tuple[Peaks, ...]]
-) -> tuple[str, ...]:
+def _unchecked_of_tool(moves: Sequence[LimitedMove], peaks: Sequence[tuple[Peaks, ...]]) -> tuple[str, ...]:
     """Return the limits of the tool that are stated and cannot be judged in some move where the arm moves."""
     names: set[str] = set()
-    for k, (limits, of_span) in enumerate(zip(limits_by_move, peaks, strict=True)):
-        if limits.tcp == _NO_TOOL_LIMITS or not of_span[1].magnitude.any():
-            continue
-        from trajcli.checks.tool_limits import stated_limits
+    for move, of_span in zip(moves, peaks, strict=True):
+        if move.limits.tcp != _NO_TOOL_LIMITS and of_span[1].magnitude.any():
+            from trajcli.limits.tool import unjudged
 
-        promise = promises[k] if promises else Promise()
-        whole = promise.robot is None or promise.robot.convention is None
-        on_path = promise.tool is not None and not promise.tool.pure_rotation
-        names |= {name for name in stated_limits(limits.tcp) if whole or (name == "jerk" and not on_path)}
+            names |= unjudged(move.limits, move.robot, move.motion)
     return tuple(name for name in vars(_NO_TOOL_LIMITS) if name in names)
 
 
@@ -312,7 +303,7 @@ def _with_remedy(
         alone: Whether a longer move has no finding left: else `slow` is no answer.
     """
     hint = promise.remedies.get(finding.kind, finding.hint)
-    if hint is None and (finding.kind in LIMITS_OF_JOINTS or finding.kind in _TOOL_LIMITS):
+    if hint is None and finding.kind in KIND_OF:
         hint = _by_slowing(finding, trajectory, span, promise, factor, alone=alone)
     return finding if hint == finding.hint else replace(finding, hint=hint)
 
@@ -332,28 +323,16 @@ def _by_slowing(
     if promise.ends is None or all(state.at_rest for state in promise.ends):
         longer = f"{at_least(factor)} times longer ({at_least(span.duration * factor)} s)"
         return f"it must last {longer}" + (f", or {_SLOW}" if promise.over_limit and alone else "")
+    over = _over_at_ends(finding, trajectory, promise)
     if finding.joint is None:
-        from trajcli.checks.tool_limits import tool_ends_over_limit
-
-        over = promise.robot is not None and tool_ends_over_limit(promise.robot, promise.ends)
         return f"{_NO_HELP}: the tool is too fast where the move starts or ends" if over else _SLOW
-    if _ends_over_limit(finding, trajectory.joint_names.index(finding.joint), promise):
+    if over:
         return f"{_NO_HELP}: the move starts or ends over its limit"
     return f"{_SLOW}: it finds the shortest duration between these moving states"
 
 
-def _ends_over_limit(finding: Finding, joint: int, promise: Promise) -> bool:
-    """Return whether the joint is over its limit where the move declares to begin or to end."""
-    if finding.kind == "velocity_by_position":
-        from trajcli.checks.velocity_by_position import ends_over_velocity_by_position
-
-        return promise.robot is not None and (
-            ends_over_velocity_by_position(promise.robot.limits, promise.ends or ()) is not None
-        )
-    if finding.kind == "effort":
-        return False
-    order = QUANTITIES.index(finding.kind)
-    rates = [(state.velocity, state.acceleration)[order - 1] for state in promise.ends or () if order < 3]
-    ends = [float(values[joint]) for values in rates]
-    limit = finding.limit or 0.0
-    return any(abs(value) > abs(limit) and value * limit > 0 for value in ends)
+def _over_at_ends(finding: Finding, trajectory: Trajectory, promise: Promise) -> bool:
+    """Return whether the limit is broken where the move declares to begin or to end."""
+    joint = -1 if finding.joint is None else trajectory.joint_names.index(finding.joint)
+    use = finding.kind, joint, finding.limit or 0.0
+    return family(KIND_OF[finding.kind].family).over_at_ends(promise.robot, promise.ends or (), use)

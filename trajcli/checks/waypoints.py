@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from trajcli.checks.tolerances import waypoint_tolerance
 from trajcli.findings import Finding, at_time, joint_amounts
+from trajcli.limits.tolerances import waypoint_tolerance
 from trajcli.trajectory import Trajectory, ViaPoints
 
 

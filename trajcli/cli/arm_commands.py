@@ -12,11 +12,11 @@ from typing import Annotated, Literal
 import typer
 import typer.core
 
+from trajcli.cli.command import Command
 from trajcli.cli.options import (
     ArmUnits,
     Base,
     DigitsOption,
-    Errors,
     Joints,
     Json,
     RobotName,
@@ -24,22 +24,13 @@ from trajcli.cli.options import (
     Tool,
     robot_names,
 )
-from trajcli.cli.outcome import guarded
 
 _NUMBER_LIKE = re.compile(r"[-+]?(?:\.?[0-9][^=]*|\.?nan|\.?inf(?:inity)?)", re.IGNORECASE)
 JOINED = ("--qd", "--qdd", "--near", "--point", "--s")
 """Options that take all the numbers behind them."""
 
-_EXAMPLES = {
-    "fk": "trajcli fk --robot ur5e 0 -90 90 0 90 0",
-    "ik": "trajcli ik -r ur5e --pose '{xyz: [0.4, 0.1, 0.3]}'",
-    "jacobian": "trajcli jacobian --robot ur5e 0 -90 90 0 90 0",
-    "dynamics": "trajcli dynamics -r ur5e --payload '{mass: 5}' 0 -45 90 0 90 0",
-    "pose": "trajcli pose --units deg '{rpy: [0, 0, 90]}' '{xyz: [1, 0, 0]}'",
-}
 
-
-class NumbersCommand(typer.core.TyperCommand):
+class NumbersParser(typer.core.TyperCommand):
     """Takes `--qd 1 -2 3` as one option and `-90` as a number, with or without `--` before it."""
 
     def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]
@@ -97,74 +88,34 @@ def sorted_words(args: list[str], takes: Mapping[str, int]) -> list[str]:
     return [*options, "--", *others, *rest[1:]]
 
 
-def register(app: typer.Typer) -> None:
-    """Add the commands fk, ik, jacobian, dynamics, pose, robots, urdf, calibrate and mobility."""
-    for command in (fk, ik, jacobian, dynamics, pose):
-        app.command(cls=NumbersCommand, epilog=f"Example: {_EXAMPLES[command.__name__]}")(command)
-    app.command(epilog="Example: trajcli robots ur5e")(robots)
-    app.command(epilog="Example: trajcli urdf arm.urdf -o robot.yaml")(urdf)
-    app.command(epilog="Example: trajcli calibrate -r ur5e --plan 20")(calibrate)
-    app.command(epilog="Example: trajcli mobility --links 4 --joints 1x4 --space planar")(mobility)
+class NumbersCommand(Command):
+    """A command whose words may be numbers."""
+
+    parser = NumbersParser
 
 
-@guarded
-def fk(
-    robot: RobotName,
-    joints: Joints,
-    tool: Tool = None,
-    frame: Annotated[
-        Literal["world", "base"], typer.Option("--frame", help="Where the pose is counted from.")
-    ] = "world",
-    links: Annotated[bool, typer.Option("--links", help="Also the frame of each link.")] = False,
-    units: ArmUnits = None,
-    si: Si = False,
-    as_json: Json = False,
-    digits: DigitsOption = "fixed",
-    errors: Errors = "text",
-) -> int:
+class FkCommand(NumbersCommand):
     """Say where the tool is: its pose for given joint values, or for each row of a CSV.
 
     Joint values outside the robot's limits have a pose too; a line on stderr says which they are.
     """
-    from trajcli.cli.fk import FkOptions, run_fk
 
-    return run_fk(robot, joints, FkOptions(tool, frame, links, units, si, as_json, digits))
+    example = "trajcli fk --robot ur5e 0 -90 90 0 90 0"
+
+    robot: RobotName
+    joints: Joints
+    tool: Tool = None
+    frame: Annotated[
+        Literal["world", "base"], typer.Option("--frame", help="Where the pose is counted from.")
+    ] = "world"
+    links: Annotated[bool, typer.Option("--links", help="Also the frame of each link.")] = False
+    units: ArmUnits = None
+    si: Si = False
+    as_json: Json = False
+    digits: DigitsOption = "fixed"
 
 
-@guarded
-def ik(
-    robot: RobotName,
-    rows: Annotated[list[str] | None, typer.Argument(metavar="-", help="- reads poses from a CSV.")] = None,
-    pose: Annotated[
-        str | None,
-        typer.Option(
-            "--pose", metavar="POSE", help="T_world_tcp as YAML or @FILE; what it leaves out is free."
-        ),
-    ] = None,
-    near: Annotated[
-        str | None,
-        typer.Option(
-            "--near", metavar="Q...", help="Joint values to be near to, instead of zero; -- ends them."
-        ),
-    ] = None,
-    every: Annotated[
-        bool,
-        typer.Option("--all", help="Also answers outside the limits; of a CSV every branch of each pose."),
-    ] = False,
-    turns: Annotated[
-        bool, typer.Option("--turns", help="Also every full turn of a joint that its limits allow.")
-    ] = False,
-    tolerance: Annotated[
-        float,
-        typer.Option("--tolerance", metavar="TOL", help="What an answer may miss by, m and rad: 1e-12 to 1."),
-    ] = 1e-6,
-    tool: Tool = None,
-    units: ArmUnits = None,
-    si: Si = False,
-    as_json: Json = False,
-    digits: DigitsOption = "fixed",
-    errors: Errors = "text",
-) -> int:
+class IkCommand(NumbersCommand):
     """Find all joint values that bring the tool to a pose; of a CSV of poses, the way that stays nearest.
 
     An answer is singular where the tool can move in fewer directions, of those that the pose fixes, than it
@@ -173,20 +124,56 @@ def ik(
     Exit codes: 0 an answer lies within the limits; 3 the pose is out of reach, or all its answers lie outside
     the limits (they are printed with --all); 2 robot, pose or rows are wrong; 4 a file cannot be read.
     """
-    from trajcli.cli.ik import IkOptions, run_ik
 
-    options = IkOptions(pose, near, every, turns, tolerance, tool, units, si, as_json, digits)
-    return run_ik(robot, rows or [], options)
+    example = "trajcli ik -r ur5e --pose '{xyz: [0.4, 0.1, 0.3]}'"
+
+    robot: RobotName
+    rows: Annotated[list[str] | None, typer.Argument(metavar="-", help="- reads poses from a CSV.")] = None
+    pose: Annotated[
+        str | None,
+        typer.Option(
+            "--pose", metavar="POSE", help="T_world_tcp as YAML or @FILE; what it leaves out is free."
+        ),
+    ] = None
+    near: Annotated[
+        str | None,
+        typer.Option(
+            "--near", metavar="Q...", help="Joint values to be near to, instead of zero; -- ends them."
+        ),
+    ] = None
+    every: Annotated[
+        bool,
+        typer.Option("--all", help="Also answers outside the limits; of a CSV every branch of each pose."),
+    ] = False
+    turns: Annotated[
+        bool, typer.Option("--turns", help="Also every full turn of a joint that its limits allow.")
+    ] = False
+    tolerance: Annotated[
+        float,
+        typer.Option("--tolerance", metavar="TOL", help="What an answer may miss by, m and rad: 1e-12 to 1."),
+    ] = 1e-6
+    tool: Tool = None
+    units: ArmUnits = None
+    si: Si = False
+    as_json: Json = False
+    digits: DigitsOption = "fixed"
 
 
-@guarded
-def jacobian(
-    robot: RobotName,
-    joints: Joints,
-    tool: Tool = None,
+class JacobianCommand(NumbersCommand):
+    """Say how the tool moves with the joints: the Jacobian, manipulability, rank, what is lost.
+
+    The Jacobian is the one of textbooks: angular rows in rad, columns per rad, whatever the unit of angles
+    is; lengths are in the unit of lengths. Joint values and --qd are in the units of the robot's file.
+    """
+
+    example = "trajcli jacobian --robot ur5e 0 -90 90 0 90 0"
+
+    robot: RobotName
+    joints: Joints
+    tool: Tool = None
     frame: Annotated[
         Literal["world", "base", "tcp"], typer.Option("--frame", help="In whose axes the rows are written.")
-    ] = "world",
+    ] = "world"
     rates: Annotated[
         str | None,
         typer.Option(
@@ -194,106 +181,91 @@ def jacobian(
             metavar="V...",
             help="A rate for each joint, for the acceleration they cause; -- ends them.",
         ),
-    ] = None,
-    units: ArmUnits = None,
-    si: Si = False,
-    as_json: Json = False,
-    errors: Errors = "text",
-) -> int:
-    """Say how the tool moves with the joints: the Jacobian, manipulability, rank, what is lost.
-
-    The Jacobian is the one of textbooks: angular rows in rad, columns per rad, whatever the unit of angles
-    is; lengths are in the unit of lengths. Joint values and --qd are in the units of the robot's file.
-    """
-    from trajcli.cli.jacobian import JacobianOptions, run_jacobian
-
-    return run_jacobian(robot, joints, JacobianOptions(tool, frame, rates, units, si, as_json))
+    ] = None
+    units: ArmUnits = None
+    si: Si = False
+    as_json: Json = False
 
 
-@guarded
-def dynamics(
-    robot: RobotName,
-    joints: Joints,
-    tool: Tool = None,
-    base: Base = None,
-    payload: Annotated[
-        str | None,
-        typer.Option(
-            "--payload", metavar="PAYLOAD", help="What the tool carries, {mass, com?, inertia?} or @FILE."
-        ),
-    ] = None,
-    rates: Annotated[
-        str | None,
-        typer.Option("--qd", metavar="V...", help="A velocity for each joint; -- ends them."),
-    ] = None,
-    accelerations: Annotated[
-        str | None,
-        typer.Option("--qdd", metavar="A...", help="An acceleration for each joint; -- ends them."),
-    ] = None,
-    units: ArmUnits = None,
-    si: Si = False,
-    as_json: Json = False,
-    digits: DigitsOption = "fixed",
-    errors: Errors = "text",
-) -> int:
+class DynamicsCommand(NumbersCommand):
     """Say what drives the joints: torques (N m) and forces (N) of a motion, and what they are made of.
 
     tau = M(q) qdd + C(q, qd) qd + g(q) + friction, with the rotors in M. Joint values and rates are in the
     units of the robot's file, everything else is SI. Rows of q, qd and qdd become rows of tau.
     """
-    from trajcli.cli.dynamics import DynamicsOptions, run_dynamics
 
-    options = DynamicsOptions(tool, base, payload, rates, accelerations, units, si, as_json, digits)
-    return run_dynamics(robot, joints, options)
+    example = "trajcli dynamics -r ur5e --payload '{mass: 5}' 0 -45 90 0 90 0"
+
+    robot: RobotName
+    joints: Joints
+    tool: Tool = None
+    base: Base = None
+    payload: Annotated[
+        str | None,
+        typer.Option(
+            "--payload", metavar="PAYLOAD", help="What the tool carries, {mass, com?, inertia?} or @FILE."
+        ),
+    ] = None
+    rates: Annotated[
+        str | None,
+        typer.Option("--qd", metavar="V...", help="A velocity for each joint; -- ends them."),
+    ] = None
+    accelerations: Annotated[
+        str | None,
+        typer.Option("--qdd", metavar="A...", help="An acceleration for each joint; -- ends them."),
+    ] = None
+    units: ArmUnits = None
+    si: Si = False
+    as_json: Json = False
+    digits: DigitsOption = "fixed"
 
 
-@guarded
-def pose(
+class PoseCommand(NumbersCommand):
+    """Multiply rotations and displacements about fixed and current axes; print every representation."""
+
+    example = "trajcli pose --units deg '{rpy: [0, 0, 90]}' '{xyz: [1, 0, 0]}'"
+
     steps: Annotated[
         list[str],
         typer.Argument(metavar="STEP...", help="Poses as YAML or @FILE, with `frame` and `invert` beside."),
-    ],
+    ]
     units: Annotated[
         str,
         typer.Option("--units", metavar="UNITS", help="Of plain numbers, such as deg,mm; else rad and m."),
-    ] = "",
-    inverse: Annotated[bool, typer.Option("--inverse", help="Take the inverse of the result.")] = False,
+    ] = ""
+    inverse: Annotated[bool, typer.Option("--inverse", help="Take the inverse of the result.")] = False
     point: Annotated[
         str | None,
         typer.Option(
             "--point", metavar="X Y Z", help="A point in the pose's frame, to be said in the first."
         ),
-    ] = None,
+    ] = None
     euler: Annotated[
         str | None,
         typer.Option("--euler", metavar="ZYZ[:fixed]", help="Also both triples of these angles."),
-    ] = None,
+    ] = None
     to: Annotated[
         str | None, typer.Option("--to", metavar="POSE", help="Print poses on the way to this one.")
-    ] = None,
-    s: Annotated[
-        str | None, typer.Option("--s", metavar="S,...", help="Where on the way, from 0 to 1.")
-    ] = None,
+    ] = None
+    s: Annotated[str | None, typer.Option("--s", metavar="S,...", help="Where on the way, from 0 to 1.")] = (
+        None
+    )
     path: Annotated[
         Literal["line", "screw"] | None,
         typer.Option("--path", help="line: the origin goes straight; screw: constant twist."),
-    ] = None,
+    ] = None
     orientation: Annotated[
         Literal["axis_angle", "euler"] | None,
         typer.Option("--orientation", help="On a line: about one axis, or by even Euler angles."),
-    ] = None,
-    as_json: Json = False,
-    errors: Errors = "text",
-) -> int:
-    """Multiply rotations and displacements about fixed and current axes; print every representation."""
-    from trajcli.cli.pose import PoseOptions, run_pose
-
-    options = PoseOptions(units, inverse, point, euler, to, s, path, orientation, as_json)
-    return run_pose(steps, options)
+    ] = None
+    as_json: Json = False
 
 
-@guarded
-def robots(
+class RobotsCommand(Command):
+    """List the catalogue, or show a robot: DH table, limits, reach, inverse kinematics, source."""
+
+    example = "trajcli robots ur5e"
+
     name: Annotated[
         str | None,
         typer.Argument(
@@ -301,125 +273,61 @@ def robots(
             help="One robot, or a job's; without it all are listed.",
             autocompletion=robot_names,
         ),
-    ] = None,
+    ] = None
     kind: Annotated[
         str | None,
         typer.Option(
             "--kind", metavar="KIND", help="List those with joints such as 6R or RRPR; real; textbook."
         ),
-    ] = None,
+    ] = None
     joints: Annotated[
         int | None, typer.Option("--joints", metavar="N", min=1, help="List those with that many joints.")
-    ] = None,
+    ] = None
     maker: Annotated[
         str | None,
         typer.Option("--maker", metavar="TEXT", help="List those of a maker; part of the name will do."),
-    ] = None,
-    search: Annotated[
+    ] = None
+    text: Annotated[
         str | None, typer.Option("--search", metavar="TEXT", help="List those with this in their names.")
-    ] = None,
+    ] = None
     as_yaml: Annotated[
         bool, typer.Option("--yaml", help="Print the robot's file, to start a new one from.")
-    ] = False,
-    as_urdf: Annotated[
-        bool, typer.Option("--urdf", help="Print the robot as URDF, for viewers and ROS.")
-    ] = False,
-    as_json: Json = False,
-    errors: Errors = "text",
-) -> int:
-    """List the catalogue, or show a robot: DH table, limits, reach, inverse kinematics, source."""
-    from trajcli.cli.robots import run_robots
-    from trajcli.queries.robot_card import Selection
-
-    selection = Selection(kind, joints, maker, search)
-    return run_robots(name, selection, as_yaml=as_yaml, as_urdf=as_urdf, as_json=as_json)
+    ] = False
+    as_urdf: Annotated[bool, typer.Option("--urdf", help="Print the robot as URDF, for viewers and ROS.")] = (
+        False
+    )
+    as_json: Json = False
 
 
-@guarded
-def urdf(
-    file: Annotated[str, typer.Argument(metavar="FILE", help="The URDF; - is standard input.")],
+class UrdfCommand(Command):
+    """Make a robot file of a URDF: DH table, base, tool, limits, inertias. What was decided is on stderr."""
+
+    example = "trajcli urdf arm.urdf -o robot.yaml"
+
+    file: Annotated[str, typer.Argument(metavar="FILE", help="The URDF; - is standard input.")]
     root: Annotated[
         str | None,
         typer.Option("--root", metavar="LINK", help="Where the chain begins; else the outermost link."),
-    ] = None,
+    ] = None
     tip: Annotated[
         str | None,
         typer.Option(
             "--tip", metavar="LINK", help="Where it ends, the tcp; else the longest chain without a gripper."
         ),
-    ] = None,
+    ] = None
     exact: Annotated[
         bool, typer.Option("--exact", help="Keep angles within 1e-3 rad of right angles as they are.")
-    ] = False,
+    ] = False
     soft: Annotated[
         bool, typer.Option("--soft", help="Tighten ranges to the soft limits of <safety_controller>.")
-    ] = False,
+    ] = False
     output: Annotated[
         str | None,
         typer.Option("--output", "-o", metavar="FILE", help="Write the robot file instead of printing it."),
-    ] = None,
-    errors: Errors = "text",
-) -> int:
-    """Make a robot file of a URDF: DH table, base, tool, limits, inertias. What was decided is on stderr."""
-    from trajcli.cli.urdf import UrdfOptions, run_urdf
-
-    return run_urdf(file, UrdfOptions(root, tip, exact, soft, output))
+    ] = None
 
 
-@guarded
-def calibrate(
-    robot: RobotName,
-    file: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="FILE",
-            help="Measured poses: a YAML list of {joints, pose}, or a CSV, - on stdin; candidates of --plan.",
-        ),
-    ] = None,
-    free: Annotated[
-        str,
-        typer.Option(
-            "--free",
-            metavar="all|NAME,...",
-            help="Parameters: all, dh, base, tool, a joint, or such as j1.theta,j2.d,base.x,tool.rz.",
-        ),
-    ] = "all",
-    output: Annotated[
-        str | None,
-        typer.Option("--output", "-o", metavar="FILE", help="The corrected robot's file; a plan's CSV."),
-    ] = None,
-    scale: Annotated[
-        str | None,
-        typer.Option(
-            "--scale", metavar="L", help="Length that counts like a radian; else all lengths of the arm."
-        ),
-    ] = None,
-    loss: Annotated[
-        Literal["linear", "huber", "cauchy"],
-        typer.Option("--loss", help="How a measurement far off counts: squared, or less."),
-    ] = "linear",
-    loss_scale: Annotated[
-        float | None,
-        typer.Option(
-            "--loss-scale",
-            metavar="K",
-            help="Times the median residual: what is beyond counts less; 1.5 if left out.",
-        ),
-    ] = None,
-    plan: Annotated[
-        int | None,
-        typer.Option("--plan", metavar="N", help="Propose N configurations to measure, as CSV or JSON."),
-    ] = None,
-    measure: Annotated[
-        Literal["pose", "position"] | None,
-        typer.Option("--measure", help="What --plan expects to be measured; pose if left out."),
-    ] = None,
-    tool: Tool = None,
-    units: ArmUnits = None,
-    si: Si = False,
-    as_json: Json = False,
-    errors: Errors = "text",
-) -> int:
+class CalibrateCommand(Command):
     """Find the parameters of an arm from measured poses: DH rows, base and tool.
 
     What the measurements cannot tell keeps its nominal value, and is named. JSON is in rad and m.
@@ -427,14 +335,66 @@ def calibrate(
     Exit codes: 0 done; 2 robot, parameters or measurements are wrong, or too few; 4 a file cannot be read or
     written.
     """
-    from trajcli.cli.calibrate import CalibrateOptions, run_calibrate
 
-    options = CalibrateOptions(free, output, scale, loss, loss_scale, plan, measure, tool, units, si, as_json)
-    return run_calibrate(robot, file, options)
+    example = "trajcli calibrate -r ur5e --plan 20"
+
+    robot: RobotName
+    file: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="FILE",
+            help="Measured poses: a YAML list of {joints, pose}, or a CSV, - on stdin; candidates of --plan.",
+        ),
+    ] = None
+    free: Annotated[
+        str,
+        typer.Option(
+            "--free",
+            metavar="all|NAME,...",
+            help="Parameters: all, dh, base, tool, a joint, or such as j1.theta,j2.d,base.x,tool.rz.",
+        ),
+    ] = "all"
+    output: Annotated[
+        str | None,
+        typer.Option("--output", "-o", metavar="FILE", help="The corrected robot's file; a plan's CSV."),
+    ] = None
+    scale: Annotated[
+        str | None,
+        typer.Option(
+            "--scale", metavar="L", help="Length that counts like a radian; else all lengths of the arm."
+        ),
+    ] = None
+    loss: Annotated[
+        Literal["linear", "huber", "cauchy"],
+        typer.Option("--loss", help="How a measurement far off counts: squared, or less."),
+    ] = "linear"
+    loss_scale: Annotated[
+        float | None,
+        typer.Option(
+            "--loss-scale",
+            metavar="K",
+            help="Times the median residual: what is beyond counts less; 1.5 if left out.",
+        ),
+    ] = None
+    plan: Annotated[
+        int | None,
+        typer.Option("--plan", metavar="N", help="Propose N configurations to measure, as CSV or JSON."),
+    ] = None
+    measure: Annotated[
+        Literal["pose", "position"] | None,
+        typer.Option("--measure", help="What --plan expects to be measured; pose if left out."),
+    ] = None
+    tool: Tool = None
+    units: ArmUnits = None
+    si: Si = False
+    as_json: Json = False
 
 
-@guarded
-def mobility(
+class MobilityCommand(Command):
+    """Count the freedoms of a robot or a linkage by the formula of Gruebler and Kutzbach."""
+
+    example = "trajcli mobility --links 4 --joints 1x4 --space planar"
+
     robot: Annotated[
         str | None,
         typer.Option(
@@ -444,10 +404,10 @@ def mobility(
             help="The open chain of a robot, or of a job's.",
             autocompletion=robot_names,
         ),
-    ] = None,
+    ] = None
     links: Annotated[
         int | None, typer.Option("--links", metavar="N", help="Number of links, the frame counted.")
-    ] = None,
+    ] = None
     joints: Annotated[
         str | None,
         typer.Option(
@@ -455,17 +415,24 @@ def mobility(
             metavar="F|FxCOUNT,...",
             help="Freedoms of the joints: 1x4,3x2, or by kind: Rx4,Sx2 (R P H: 1, C U: 2, S: 3).",
         ),
-    ] = None,
+    ] = None
     space: Annotated[
         Literal["spatial", "planar"], typer.Option("--space", help="Where the links move: lambda 6 or 3.")
-    ] = "spatial",
+    ] = "spatial"
     passive: Annotated[
         int, typer.Option("--passive", metavar="F0", help="Freedoms that change nothing for the others.")
-    ] = 0,
-    as_json: Json = False,
-    errors: Errors = "text",
-) -> int:
-    """Count the freedoms of a robot or a linkage by the formula of Gruebler and Kutzbach."""
-    from trajcli.cli.mobility import MobilityOptions, run_mobility
+    ] = 0
+    as_json: Json = False
 
-    return run_mobility(MobilityOptions(robot, links, joints, space, passive, as_json))
+
+ARM_COMMANDS = (
+    FkCommand,
+    IkCommand,
+    JacobianCommand,
+    DynamicsCommand,
+    PoseCommand,
+    RobotsCommand,
+    UrdfCommand,
+    CalibrateCommand,
+    MobilityCommand,
+)

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing
 from time import monotonic
-from typing import Any, BinaryIO, Literal
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from trajcli.batches.jobs import BatchJobs, Ledgers, find_jobs
 from trajcli.batches.task import BatchSetup, JobOutcome, Task
@@ -16,29 +16,16 @@ from trajcli.cli.frames import problem_as_json
 from trajcli.cli.outcome import print_remark
 from trajcli.cli.progress import ERASE, WIDTH, is_terminal
 from trajcli.errors import InputError, utf8
-from trajcli.frozen import comparable
-from trajcli.streams.formats import FormatName
 from trajcli.streams.whole_file import standard_output
+
+if TYPE_CHECKING:
+    from trajcli.cli.motion_commands import BatchCommand
 
 _TIMEOUT = 600.0  # s
 _SHOWN = 5  # names of files in a remark
 
 
-@comparable
-class BatchOptions:
-    """What the command line says beside the jobs; see `trajcli batch --help`."""
-
-    folder: str | None = None
-    jobs: str | None = None
-    form: FormatName = "csv"
-    force: bool = False
-    timeout: str | None = None
-    engine: Literal["processes", "dask"] = "processes"
-    scheduler: str | None = None
-    quiet: bool = False
-
-
-def run_batch(names: Sequence[str], options: BatchOptions) -> int:
+def run_batch(options: BatchCommand) -> int:
     """Plan jobs, and print a line for each; return the worst exit code.
 
     Raises:
@@ -47,7 +34,7 @@ def run_batch(names: Sequence[str], options: BatchOptions) -> int:
         BrokenPipeError: When the reader has closed the pipe.
     """
     count, timeout = _processes(options), _timeout(options)
-    found = find_jobs(names, options.folder, options.form)
+    found = find_jobs(options.jobs, options.output, options.form)
     record = Ledgers(found.jobs)
     known = {} if options.force else record.known()
     tasks = [Task(job, known.get(job.output)) for job in found.jobs]
@@ -67,7 +54,7 @@ def run_batch(names: Sequence[str], options: BatchOptions) -> int:
 def _outcomes(
     tasks: Sequence[Task],
     setup: BatchSetup,
-    options: BatchOptions,
+    options: BatchCommand,
     limits: tuple[int, float | None],
     on_tick: Callable[[], None],
 ) -> Generator[JobOutcome, None, None]:
@@ -82,23 +69,23 @@ def _outcomes(
     return run_in_processes(tasks, setup, min(count, len(tasks)), timeout, on_tick)
 
 
-def _processes(options: BatchOptions) -> int:
+def _processes(options: BatchCommand) -> int:
     """Return how many processes there are at most."""
     from trajcli.batches.processes import usable_cores
 
-    given = {"-j": options.jobs, "--timeout": options.timeout}
+    given = {"-j": options.count, "--timeout": options.timeout}
     for name in (name for name, value in given.items() if value is not None and options.engine == "dask"):
         raise InputError(f"{name} is about processes of this machine, not of a cluster", hint="leave it out")
     if options.scheduler is not None and options.engine != "dask":
         raise InputError("--scheduler is about a cluster", hint="add --engine dask")
-    if options.jobs is None:
+    if options.count is None:
         return usable_cores()
-    if not options.jobs.isascii() or not options.jobs.isdigit() or not 1 <= int(options.jobs) <= 1024:
-        raise InputError(f"-j expects 1 to 1024 processes, got '{options.jobs}'")
-    return int(options.jobs)
+    if not options.count.isascii() or not options.count.isdigit() or not 1 <= int(options.count) <= 1024:
+        raise InputError(f"-j expects 1 to 1024 processes, got '{options.count}'")
+    return int(options.count)
 
 
-def _timeout(options: BatchOptions) -> float | None:
+def _timeout(options: BatchCommand) -> float | None:
     """Return how long a job may take, s; None for ever."""
     if options.timeout is None:
         return _TIMEOUT

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,10 +14,9 @@ from trajcli.cli.outcome import print_json, print_lines, print_remark
 from trajcli.columns import columns_of
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
-from trajcli.frozen import comparable
 from trajcli.job.inline import inline_number
-from trajcli.kinematics.calibration.fit import Loss, Options
-from trajcli.kinematics.calibration.measuring_plan import MeasuredPart, MeasuringPlan
+from trajcli.kinematics.calibration.fit import Options
+from trajcli.kinematics.calibration.measuring_plan import MeasuringPlan
 from trajcli.kinematics.calibration.parameters import ArmParameter
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.queries.arm import ArmInUnits, open_arm, open_sheet
@@ -33,40 +32,26 @@ from trajcli.queries.calibration import (
 from trajcli.streams.whole_file import identity, whole_file
 from trajcli.units import Quantity
 
+if TYPE_CHECKING:
+    from trajcli.cli.arm_commands import CalibrateCommand
+
 _FEW = 12  # names in a line
 _DECIMALS = {"rad": 8, "m": 8, "deg": 6, "mm": 5}  # of a parameter: finer than anything is measured
 
 
-@comparable
-class CalibrateOptions:
-    """What the command line says beside the robot; see `trajcli calibrate --help`."""
-
-    free: str = "all"
-    output: str | None = None
-    scale: str | None = None
-    loss: Loss = "linear"
-    loss_scale: float | None = None
-    plan: int | None = None
-    measure: MeasuredPart | None = None
-    tool: str | None = None
-    units: str | None = None
-    si: bool = False
-    as_json: bool = False
-
-
-def run_calibrate(robot: str, file: str | None, options: CalibrateOptions) -> int:
+def run_calibrate(options: CalibrateCommand) -> int:
     """Print calibrated parameters and write the robot's file, or plan measurements; return the exit code.
 
     Raises:
         InputError: When robot, parameters, measurements or options are not as they should be.
         FileError: When a file cannot be read or written.
     """
-    arm = open_arm(robot, options.tool, units=options.units, si=options.si)
-    _check(robot, file, options)
+    arm = open_arm(options.robot, options.tool, units=options.units, si=options.si)
+    _check(options)
     length = _scale(arm, options)
     if options.plan is not None:
-        return _plan(arm, file, length, options)
-    if file is None:
+        return _plan(arm, length, options)
+    if options.file is None:
         hint = "a YAML list of {joints, pose}, or a CSV; --plan N proposes what to measure"
         raise InputError("the file of measurements is missing", hint=hint)
     chosen = Options(
@@ -74,9 +59,9 @@ def run_calibrate(robot: str, file: str | None, options: CalibrateOptions) -> in
         options.loss,
         _loss_scale(options),
     )
-    calibration = calibration_of(arm, file, options.free, chosen)
+    calibration = calibration_of(arm, options.file, options.free, chosen)
     if options.output is not None:
-        _write(calibrated_text(calibration, open_sheet(robot)).encode(), options.output)
+        _write(calibrated_text(calibration, open_sheet(options.robot)).encode(), options.output)
     if options.as_json:
         print_json(calibration_report(calibration))
         return 0
@@ -88,7 +73,7 @@ def run_calibrate(robot: str, file: str | None, options: CalibrateOptions) -> in
     return 0
 
 
-def _check(robot: str, file: str | None, options: CalibrateOptions) -> None:
+def _check(options: CalibrateCommand) -> None:
     """Refuse options that do not go together, and an output that is an input."""
     if options.plan is None and options.measure is not None:
         raise InputError("--measure is for --plan: a file says itself what was measured", hint="leave it out")
@@ -102,19 +87,19 @@ def _check(robot: str, file: str | None, options: CalibrateOptions) -> None:
     if not options.output.lower().endswith(endings):
         raise InputError(f"-o {options.output}: expected a name that ends in {' or '.join(endings)}")
     same = identity(options.output)
-    for what, path in (("the robot's file", robot), ("the measurements", file)):
+    for what, path in (("the robot's file", options.robot), ("the measurements", options.file)):
         if path is not None and same is not None and Path(path).exists() and same == identity(path, 0):
             raise InputError(f"-o would overwrite {what} {path}", hint="name another file")
 
 
-def _scale(arm: ArmInUnits, options: CalibrateOptions) -> float | None:
+def _scale(arm: ArmInUnits, options: CalibrateCommand) -> float | None:
     """Return the metres that count like a radian; None where they are not given."""
     if options.scale is None:
         return None
     return _positive(inline_number(options.scale, "--scale", Quantity("length"), arm.units), "--scale")
 
 
-def _loss_scale(options: CalibrateOptions) -> float:
+def _loss_scale(options: CalibrateCommand) -> float:
     if options.loss_scale is None:
         return Options(1.0).loss_scale
     return _positive(options.loss_scale, "--loss-scale")
@@ -190,13 +175,13 @@ def _combination_lines(arm: ArmInUnits, combinations: Sequence[Sequence[dict[str
         yield "  " + "  ".join(f"{each['weight']:+.4g} {each['joint']}.{each['name']}" for each in shares)
 
 
-def _plan(arm: ArmInUnits, file: str | None, length: float | None, options: CalibrateOptions) -> int:
+def _plan(arm: ArmInUnits, length: float | None, options: CalibrateCommand) -> int:
     """Print the configurations to measure at, as CSV in the arm's units or as JSON in SI."""
     count = options.plan or 0
     if count < 1:
         raise InputError(f"--plan must be at least 1, got {count}")
     part = options.measure or "pose"
-    joints, plan, parameters = planned_measurements(arm, count, options.free, length, file, part)
+    joints, plan, parameters = planned_measurements(arm, count, options.free, length, options.file, part)
     rows = _csv(arm, joints)
     if options.output is not None:
         _write(rows, options.output)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from trajcli.cli.numbers import number, table_lines
 from trajcli.cli.outcome import print_json, print_lines, print_remark
@@ -16,9 +16,9 @@ from trajcli.judge.judgement import Judgement
 from trajcli.units import Units, amount_text
 
 if TYPE_CHECKING:
+    from trajcli.cli.job_commands import CheckCommand
     from trajcli.output.motion_reference import MotionReference
 
-Form = Literal["table", "json", "junit", "sarif", "github"]
 _MOST, _FEW = 30, 4  # findings that a table lists: of those that are certain, and of each other group
 _JOINED = {
     "hold": "held from row to row",
@@ -30,44 +30,36 @@ _JOINED = {
 }
 
 
-def run_check(
-    source: str, options: CheckOptions, form: Form, *, strict: bool, reference: bool = False
-) -> int:
+def run_check(options: CheckCommand) -> int:
     """Judge a file and print what was found; return 0 when nothing is certainly wrong, else 1.
-
-    Args:
-        source: The file.
-        options: What it is judged by.
-        form: Of what is printed.
-        strict: Whether what rounding explains, and events, count as wrong.
-        reference: Whether the motion is compared with peers.
 
     Raises:
         InputError: When the file is no trajectory, or options do not fit.
         FileError: When a file cannot be read.
     """
-    checked = check_file(source, options)
+    checked = check_file(options.file, options.part(CheckOptions))
     beside = None
-    if reference:
+    if options.reference:
         from trajcli.output.motion_reference import compared
 
         judgement, beside = compared(checked)
         checked = replace(checked, judgement=judgement)
     judgement = checked.judgement
-    if form == "json":
+    if options.form == "json":
         print_json(judgement.as_json() | ({} if beside is None else {"reference": _view(beside)}))
-    elif form == "table":
+    elif options.form == "table":
         print_lines([*_lines(checked), *([] if beside is None else _beside(beside, checked.units))])
     else:
         from trajcli.output.annotations import render_annotations
 
-        text = render_annotations([*_annotations(checked, source)], form, [source])
+        text = render_annotations([*_annotations(checked, options.file)], options.form, [options.file])
         if text:
             print_lines([text.removesuffix("\n")])
     for event in judgement.events:
         print_remark(f"  event: {event}")
     return int(
-        not judgement.passed or (strict and (judgement.verdict != "satisfied" or bool(judgement.events)))
+        not judgement.passed
+        or (options.strict and (judgement.verdict != "satisfied" or bool(judgement.events)))
     )
 
 
@@ -76,7 +68,9 @@ def _lines(checked: CheckedFile) -> Iterator[str]:
     rows = f"{judgement.rows} row{'s' * (judgement.rows != 1)}"
     period = "" if judgement.period is None else f", every {judgement.period:.9g} s"
     source = judgement.source or "-"
-    yield f"{source}: {judgement.verdict} ({rows}{period}, {_JOINED[judgement.interpolation]})"
+    planned = ", rows of the motion that the job plans" if judgement.planned_rows else ""
+    joined = _JOINED[judgement.interpolation]
+    yield f"{source}: {judgement.verdict} ({rows}{period}, {joined}{planned})"
     listed = [*_listed(judgement.findings)]
     if listed:
         yield from table_lines([*_table(checked, listed)])

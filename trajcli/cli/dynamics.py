@@ -2,56 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from trajcli.cli.numbers import matrix_lines, number, table_lines
 from trajcli.cli.outcome import print_json, print_lines, print_remark
 from trajcli.errors import InputError
-from trajcli.frozen import comparable
 from trajcli.job.inline import inline_payload
 from trajcli.kinematics.robot import Robot
 from trajcli.queries.arm import ArmInUnits, LimitWatch, beyond_two_turns, open_arm
 from trajcli.queries.dynamics import dynamics_report, efforts_of, left_out
-from trajcli.streams.decimals import Digits
 from trajcli.streams.whole_file import standard_output
 from trajcli.units import effort_unit
+
+if TYPE_CHECKING:
+    from trajcli.cli.arm_commands import DynamicsCommand
 
 _DECIMALS = 9  # of a part of a limit: below is rounding
 
 
-@comparable
-class DynamicsOptions:
-    """What the command line says beside robot and joints; see `trajcli dynamics --help`."""
-
-    tool: str | None = None
-    base: str | None = None
-    payload: str | None = None
-    rates: str | None = None
-    accelerations: str | None = None
-    units: str | None = None
-    si: bool = False
-    as_json: bool = False
-    digits: Digits = "fixed"
-
-
-def run_dynamics(robot: str, words: Sequence[str], options: DynamicsOptions) -> int:
+def run_dynamics(options: DynamicsCommand) -> int:
     """Print the efforts of a state, or those of each row of standard input; return the exit code.
 
     Raises:
         InputError: When robot, joints, rates, payload or rows are not as they should be.
         FileError: When a file cannot be read, or standard output not written.
     """
-    arm = open_arm(robot, options.tool, base=options.base, units=options.units, si=options.si)
+    arm = open_arm(options.robot, options.tool, base=options.base, units=options.units, si=options.si)
     if options.payload is not None:
         payload = inline_payload(options.payload, "--payload", arm.units)
         arm = replace(arm, robot=replace(arm.robot, payload=payload))
-    if list(words) == ["-"]:
+    if options.joints == ["-"]:
         return _stream(arm, options)
-    q = arm.joint_values(words)
+    q = arm.joint_values(options.joints)
     given = (("--qd", options.rates, 1), ("--qdd", options.accelerations, 2))
     qd, qdd = (
         np.zeros_like(q) if text is None else arm.joint_values([text], name, order)
@@ -92,7 +78,7 @@ def _used(tau: float, bounds: tuple[float, float]) -> tuple[str, str]:
     )
 
 
-def _stream(arm: ArmInUnits, options: DynamicsOptions) -> int:
+def _stream(arm: ArmInUnits, options: DynamicsCommand) -> int:
     from trajcli.streams.csv import write_csv
     from trajcli.streams.table import open_rows
 

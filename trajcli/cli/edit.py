@@ -14,43 +14,33 @@ from trajcli.editing.edited_motion import EditedMotion, ReadingOptions, read_mot
 from trajcli.editing.operations import cut, join, resample, reverse
 from trajcli.editing.writing import as_read, write_motion
 from trajcli.errors import InputError, VerificationError
-from trajcli.frozen import comparable
-from trajcli.streams.formats import FormatName, format_of
+from trajcli.streams.formats import format_of
 from trajcli.streams.whole_file import identity
 from trajcli.units import Units
 
 if TYPE_CHECKING:
+    from trajcli.cli.motion_commands import (
+        ConcatCommand,
+        ConvertCommand,
+        EditCommand,
+        ResampleCommand,
+        RetimeCommand,
+        ReverseCommand,
+        SliceCommand,
+    )
     from trajcli.editing.retiming import Stretch
 
 
-@comparable
-class EditOptions:
-    """What the command line says beside the files; see `trajcli resample --help`."""
-
-    output: str | None = None
-    form: FormatName | None = None
-    columns: str | None = None
-    units: str | None = None
-    topic: str | None = None
-    field: str | None = None
-    quiet: bool = False
-
-    @property
-    def reading(self) -> ReadingOptions:
-        """How files are read."""
-        return ReadingOptions(self.columns, self.units, self.topic, self.field)
-
-
-def run_reverse(source: str, options: EditOptions) -> int:
+def run_reverse(options: ReverseCommand) -> int:
     """Write the motion that goes back; return the exit code.
 
     Raises:
         TrajcliError: When anything is wrong; then nothing was written.
     """
-    return _edited(source, reverse, options, "reversed")
+    return _edited(options.file, reverse, options, "reversed")
 
 
-def run_slice(source: str, first: str | None, last: str | None, options: EditOptions) -> int:
+def run_slice(options: SliceCommand) -> int:
     """Write the motion between two times; return the exit code.
 
     Raises:
@@ -59,38 +49,41 @@ def run_slice(source: str, first: str | None, last: str | None, options: EditOpt
 
     def between(motion: EditedMotion) -> EditedMotion:
         t = motion.rows.t
-        begin = float(t[0]) if first is None else _seconds("--from", first)
-        return cut(motion, begin, float(t[-1]) if last is None else _seconds("--to", last))
+        begin = float(t[0]) if options.first is None else _seconds("--from", options.first)
+        end = float(t[-1]) if options.last is None else _seconds("--to", options.last)
+        return cut(motion, begin, end)
 
-    return _edited(source, between, options, "cut")
+    return _edited(options.file, between, options, "cut")
 
 
-def run_resample(source: str, rate: str, options: EditOptions) -> int:
+def run_resample(options: ResampleCommand) -> int:
     """Write the motion on another grid, and say how far its curve is off then; return the exit code.
 
     Raises:
         TrajcliError: When anything is wrong; then nothing was written.
     """
-    _check_output([source], options)
-    motion = _read(source, options)
-    found = resample(motion, _hertz(rate))
+    _check_output([options.file], options)
+    motion = _read(options.file, options)
+    hertz = _hertz(options.rate)
+    found = resample(motion, hertz)
     _write(found, options)
     rows = f"{found.rows.t.size} row{'s' * (found.rows.t.size != 1)}"
     joint, size = worst_deviation(motion, found.as_written())
     off = f"the curve through them is off by at most {size:.3g} rad or m, in {found.joint_names[joint]}"
-    _say(options, f"{found.rows.source}: resampled at {_hertz(rate):.9g} Hz, {rows}; {off}")
+    _say(options, f"{found.rows.source}: resampled at {hertz:.9g} Hz, {rows}; {off}")
     return 0
 
 
-def run_concat(sources: Sequence[str], options: EditOptions) -> int:
+def run_concat(options: ConcatCommand) -> int:
     """Write motions one after the other; return the exit code.
 
     Raises:
         TrajcliError: When they do not fit; then nothing was written.
     """
+    sources = options.files
     if len(sources) < 2:
         raise InputError("concat joins two files at least, and there is one")
-    if list(sources).count("-") > 1:
+    if sources.count("-") > 1:
         raise InputError("standard input can be read once")
     _check_output(sources, options)
     motions = [_read(source, options) for source in sources]
@@ -103,36 +96,21 @@ def run_concat(sources: Sequence[str], options: EditOptions) -> int:
     return 0
 
 
-def run_convert(source: str, options: EditOptions) -> int:
+def run_convert(options: ConvertCommand) -> int:
     """Write the motion in the format that the output's name says; return the exit code.
 
     Raises:
         TrajcliError: When anything is wrong; then nothing was written.
     """
-    _check_output([source], options)
-    units = None if format_of(options.output, options.form).si else Units()
-    motion = read_motion(source, options.reading, declared=units)
+    _check_output([options.file], options)
+    motion = _read(options.file, options)
     _write(motion, options)
     _say(options, f"{motion.rows.source}: converted, {_extent(motion)}")
     return 0
 
 
-def run_retime(
-    source: str,
-    arm: tuple[str | None, str | None],
-    options: EditOptions,
-    *,
-    fastest: bool,
-    per_move: bool,
-) -> int:
+def run_retime(options: RetimeCommand) -> int:
     """Write the motion over the shortest time that keeps its limits; return the exit code.
-
-    Args:
-        source: The file.
-        arm: A job, or a robot.
-        options: What is said besides.
-        fastest: Whether it may become faster.
-        per_move: Whether each move has its own time.
 
     Raises:
         TrajcliError: When anything is wrong; then nothing was written.
@@ -141,19 +119,22 @@ def run_retime(
     from trajcli.editing.retiming import retime
     from trajcli.queries.arm import stated_units
 
-    _check_output([source, *(name for name in arm if name is not None)], options)
-    limits = kept_limits(*arm)
+    arm = [name for name in (options.job, options.robot) if name is not None]
+    _check_output([options.file, *arm], options)
+    limits = kept_limits(options.job, options.robot)
     robot = limits.robot
     motion = read_motion(
-        source,
-        options.reading,
+        options.file,
+        options.part(ReadingOptions),
         joints=robot.joint_names,
         joint_types=robot.joint_types,
-        declared=stated_units(arm[0] or arm[1] or ""),
+        declared=stated_units(arm[0] if arm else ""),
     )
     reader = partial(as_read, path=options.output, form=options.form)
     kept = limits.requirements
-    found, stretches = retime(motion, kept, fastest=fastest, per_move=per_move, as_read=reader)
+    found, stretches = retime(
+        motion, kept, fastest=options.fastest, per_move=options.per_move, as_read=reader
+    )
     _check_continuity(motion, found)
     _write(found, options)
     for stretch in stretches:
@@ -178,7 +159,7 @@ def _stretch(stretch: Stretch, say: Callable[..., str]) -> str:
 
 
 def _edited(
-    source: str, operation: Callable[[EditedMotion], EditedMotion], options: EditOptions, what: str
+    source: str, operation: Callable[[EditedMotion], EditedMotion], options: EditCommand, what: str
 ) -> int:
     _check_output([source], options)
     motion = _read(source, options)
@@ -189,13 +170,13 @@ def _edited(
     return 0
 
 
-def _read(source: str, options: EditOptions) -> EditedMotion:
+def _read(source: str, options: EditCommand) -> EditedMotion:
     """Return the motion of a file, whose units do not matter where its format stays."""
     units = None if format_of(options.output, options.form).si else Units()
-    return read_motion(source, options.reading, declared=units)
+    return read_motion(source, options.part(ReadingOptions), declared=units)
 
 
-def _write(motion: EditedMotion, options: EditOptions) -> None:
+def _write(motion: EditedMotion, options: EditCommand) -> None:
     notes = write_motion(motion, options.output, options.form)
     for note in dict.fromkeys([*motion.notes, *notes]):
         _say(options, f"  {note}")
@@ -208,7 +189,7 @@ def _check_continuity(before: EditedMotion, after: EditedMotion) -> None:
         raise VerificationError(*problems)
 
 
-def _check_output(sources: Sequence[str], options: EditOptions) -> None:
+def _check_output(sources: Sequence[str], options: EditCommand) -> None:
     """Refuse to write over a file that is read."""
     format_of(options.output, options.form)
     if options.output in (None, "-"):
@@ -224,7 +205,7 @@ def _extent(motion: EditedMotion) -> str:
     return f"{t.size} rows from {t[0]:.9g} s to {t[-1]:.9g} s"
 
 
-def _say(options: EditOptions, text: str) -> None:
+def _say(options: EditCommand, text: str) -> None:
     if not options.quiet:
         print_remark(text)
 

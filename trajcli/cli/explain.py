@@ -6,11 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from trajcli.cli.numbers import numbers
-from trajcli.cli.plan import peer_lines
 from trajcli.cli.polynomials import amount, blend_lines, knot_lines, law_lines, polynomial_lines
 from trajcli.cli.progress import progress
 from trajcli.errors import InputError
-from trajcli.frozen import comparable
 from trajcli.job.read import load_job
 from trajcli.output.explain import explanation
 from trajcli.planners import HANDLING
@@ -18,6 +16,7 @@ from trajcli.planning.plan import plan_job
 from trajcli.streams.whole_file import standard_output
 
 if TYPE_CHECKING:
+    from trajcli.cli.job_commands import ExplainCommand
     from trajcli.job.explanation import (
         ChoiceReport,
         CornerReport,
@@ -198,25 +197,14 @@ def _choice(chosen: ChoiceReport, origin: str) -> str:
     return answers + (f"{count} have {named}; of these {nearest}" if count > 1 else f"1 has {named}")
 
 
-@comparable
-class ExplainOptions:
-    """What the command line says beside the job; see `trajcli explain --help`."""
-
-    move: int | None = None
-    derivatives: bool = False
-    sensitivity: bool = False
-    reference: bool = False
-    as_json: bool = False
-
-
-def run_explain(job: str, overrides: Sequence[str], options: ExplainOptions) -> int:
+def run_explain(options: ExplainCommand) -> int:
     """Print what there is to say about each move, or about one; return the exit code.
 
     Raises:
         VerificationError: After printing, when the trajectory breaks a limit.
         TrajcliError: When there is nothing to explain.
     """
-    loaded = load_job(job, overrides)
+    loaded = load_job(options.job, options.override)
     count = len(loaded.job.moves)
     if options.move is not None and not 0 <= options.move < count:
         known = "its only move is 0" if count == 1 else f"its moves are 0 to {count - 1}"
@@ -268,7 +256,7 @@ def _lines(explained: Explanation, count: int, *, peers: bool = False) -> Iterat
         yield from _by_position(move)
         yield from _efforts(move)
         yield from _speed(move)
-        yield from peer_lines(move, "  ") if peers else ()
+        yield from _peers(move) if peers else ()
         yield from (f"  {event.kind}: {event.message}" for event in noted if event.move == move.index)
     if explained.savings is not None and len(explained.moves) > 1:
         yield ""
@@ -280,6 +268,12 @@ def _lines(explained: Explanation, count: int, *, peers: bool = False) -> Iterat
     if efforts is not None and efforts.inertials is not None:
         how = "judged for all t" if efforts.judged else f"not judged, {efforts.reason}"
         yield f"efforts: {how}; masses and inertias from {efforts.inertials}"
+
+
+def _peers(move: ExplainedMove) -> Iterator[str]:
+    from trajcli.cli.plan import peer_lines
+
+    return peer_lines(move, "  ")
 
 
 def _phases(move: ExplainedMove) -> Iterator[str]:

@@ -9,35 +9,29 @@ from typing import Annotated, Literal
 
 import typer
 
-from trajcli.cli.options import Errors, Json, Overrides, profile_words
-from trajcli.cli.outcome import guarded
+from trajcli.cli.command import Command
+from trajcli.cli.options import Json, Overrides, profile_words
 
 
-def register_file_commands(app: typer.Typer) -> None:
-    """Add the commands diff, plot, view, profiles and schema."""
-    app.command(epilog="Example: trajcli diff old.csv new.csv --atol 1e-9")(diff)
-    app.command(epilog="Example: trajcli plot examples/ur5e_pick.yaml -o pick.svg")(plot)
-    app.command(epilog="Example: trajcli view examples/ur5e_pick.yaml -o view.html")(view)
-    app.command(epilog="Example: trajcli profiles ros-jtc")(profiles)
-    app.command(epilog="Example: trajcli schema job")(schema)
+class DiffCommand(Command):
+    """Compare two files column by column. Exit 0: equal, 1: different, 2: cannot be compared."""
 
+    example = "trajcli diff old.csv new.csv --atol 1e-9"
 
-@guarded
-def diff(
-    a: Annotated[str, typer.Argument(metavar="A", help="A CSV or MCAP file; - is CSV from standard input.")],
-    b: Annotated[str, typer.Argument(metavar="B", help="The file to compare it with.")],
+    a: Annotated[str, typer.Argument(metavar="A", help="A CSV or MCAP file; - is CSV from standard input.")]
+    b: Annotated[str, typer.Argument(metavar="B", help="The file to compare it with.")]
     atol: Annotated[
         str,
         typer.Option(
             "--atol", metavar="TOL", help="Absolute tolerance: 1e-9, or by column: q=1e-9,qd1=1e-6."
         ),
-    ] = "",
+    ] = ""
     rtol: Annotated[
         str, typer.Option("--rtol", metavar="TOL", help="Relative tolerance, in the same form.")
-    ] = "",
+    ] = ""
     resample: Annotated[
         bool, typer.Option("--resample", help="Interpolate B at the times of A when they differ.")
-    ] = False,
+    ] = False
     topic: Annotated[
         str | None,
         typer.Option(
@@ -46,23 +40,20 @@ def diff(
             help="MCAP: the topic, of JointState or JointTrajectory.",
             show_default="/joint_states",
         ),
-    ] = None,
-    errors: Errors = "text",
-) -> int:
-    """Compare two files column by column. Exit 0: equal, 1: different, 2: cannot be compared."""
-    from trajcli.cli.diff import run_diff
-
-    return run_diff(a, b, atol, rtol, resample=resample, topic=topic)
+    ] = None
 
 
-@guarded
-def plot(
+class PlotCommand(Command):
+    """Draw joints, tool and phase plane with limits. Exit 1: the job or a file breaks one, as shown."""
+
+    example = "trajcli plot examples/ur5e_pick.yaml -o pick.svg"
+
     files: Annotated[
         list[str],
         typer.Argument(
             metavar="JOB|FILE...", help="A job, files of rows or messages, or such over a job; - is stdin."
         ),
-    ],
+    ]
     output: Annotated[
         str | None,
         typer.Option(
@@ -71,10 +62,10 @@ def plot(
             metavar="FILE",
             help="FILE.svg, .png or .pdf; - is stdout. Else the first name's stem with .svg, in this folder.",
         ),
-    ] = None,
+    ] = None
     kind: Annotated[
         Literal["svg", "png", "pdf"] | None, typer.Option("--format", help="Where no name says it; else svg.")
-    ] = None,
+    ] = None
     quantities: Annotated[
         str | None,
         typer.Option(
@@ -82,37 +73,33 @@ def plot(
             metavar="LIST",
             help="Some of q,qd,qdd,qddd,tau,tool,path,phase; else those that suit the job.",
         ),
-    ] = None,
+    ] = None
     joints: Annotated[
         list[str], typer.Option("--joints", metavar="NAME...", help="Only these, as a,b or a b; else all.")
-    ] = [],  # noqa: B006
-    override: Overrides = [],  # noqa: B006
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Do not say what was written.")] = False,
+    ] = []
+    override: Overrides = []
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Do not say what was written.")] = False
     every: Annotated[
         bool, typer.Option("--all", help="Every finding, not only the worst of each move and kind.")
-    ] = False,
-    errors: Errors = "text",
-) -> int:
-    """Draw joints, tool and phase plane with limits. Exit 1: the job or a file breaks one, as shown."""
-    from trajcli.cli.plot import PlotOptions, run_plot
-
-    every = every or errors == "json"
-    return run_plot(files, override, PlotOptions(output, kind, quantities, tuple(joints), quiet, every))
+    ] = False
 
 
-@guarded
-def view(
+class ViewCommand(Command):
+    """Write a page that plays the motion in any browser: 3D, plots, findings. Exit 1: there are findings."""
+
+    example = "trajcli view examples/ur5e_pick.yaml -o view.html"
+
     source: Annotated[
         str,
         typer.Argument(metavar="JOB|FILE", help="A job, or a file of rows or messages; - is standard input."),
-    ],
+    ]
     output: Annotated[
         str | None,
         typer.Option("--output", "-o", metavar="FILE", help="Write the page to FILE.html instead of stdout."),
-    ] = None,
-    compress: Annotated[
-        bool, typer.Option("--compress", help="Half the size, for browsers since 2023.")
-    ] = False,
+    ] = None
+    compress: Annotated[bool, typer.Option("--compress", help="Half the size, for browsers since 2023.")] = (
+        False
+    )
     robot: Annotated[
         str | None,
         typer.Option(
@@ -121,45 +108,42 @@ def view(
             metavar="NAME|FILE|JOB",
             help="The arm of a file: of the catalogue, a robot file, a URDF, or a job.",
         ),
-    ] = None,
-    override: Overrides = [],  # noqa: B006
-    errors: Errors = "text",
-) -> int:
-    """Write a page that plays the motion in any browser: 3D, plots, findings. Exit 1: there are findings."""
-    from trajcli.cli.view import ViewOptions, run_view
-
-    return run_view(source, override, ViewOptions(output, compress, robot))
+    ] = None
+    override: Overrides = []
 
 
-@guarded
-def profiles(
+class ProfilesCommand(Command):
+    """List the consumers whose rules are known, or the rules of one, with their sources."""
+
+    example = "trajcli profiles ros-jtc"
+
     name: Annotated[
         str | None,
         typer.Argument(
             metavar="NAME", help="One consumer; without it all are listed.", autocompletion=profile_words
         ),
-    ] = None,
-    as_json: Json = False,
-    errors: Errors = "text",
-) -> int:
-    """List the consumers whose rules are known, or the rules of one, with their sources."""
-    from trajcli.cli.profiles import run_profiles
-
-    return run_profiles(name, as_json=as_json)
+    ] = None
+    as_json: Json = False
 
 
-@guarded
-def schema(
+class SchemaCommand(Command):
+    """Print a JSON Schema, for completion and checking in an editor."""
+
+    example = "trajcli schema job"
+
     kind: Annotated[
         Literal["job", "robot", "report", "explanation"],
         typer.Argument(help="Which schema.", show_default=True),
-    ] = "job",
-    errors: Errors = "text",
-) -> int:
-    """Print a JSON Schema, for completion and checking in an editor."""
-    from trajcli.job.schema import schema_text
-    from trajcli.streams.whole_file import standard_output
+    ] = "job"
 
-    with standard_output() as out:
-        out.write(schema_text(kind).encode())
-    return 0
+
+class InitCommand(Command):
+    """Write a commented starter job that plans as it stands."""
+
+    example = "trajcli init job.yaml"
+
+    file: Annotated[str, typer.Argument(metavar="FILE", help="The file to write; - is stdout.")] = "job.yaml"
+    force: Annotated[bool, typer.Option("--force", help="Overwrite the file if it exists.")] = False
+
+
+FILE_COMMANDS = (DiffCommand, PlotCommand, ViewCommand, ProfilesCommand, SchemaCommand, InitCommand)

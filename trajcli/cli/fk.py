@@ -2,45 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from trajcli.cli.numbers import pose_lines
 from trajcli.cli.outcome import print_json, print_lines, print_remark
 from trajcli.errors import InputError
-from trajcli.frozen import comparable
 from trajcli.kinematics.forward import forward, link_poses
 from trajcli.queries.arm import ArmInUnits, LimitWatch, open_arm
 from trajcli.queries.pose import pose_view
 from trajcli.streams.csv import write_csv
-from trajcli.streams.decimals import Digits
 from trajcli.streams.whole_file import standard_output
 
-
-@comparable
-class FkOptions:
-    """What the command line says beside robot and joints; see `trajcli fk --help`."""
-
-    tool: str | None = None
-    frame: Literal["world", "base"] = "world"
-    links: bool = False
-    units: str | None = None
-    si: bool = False
-    as_json: bool = False
-    digits: Digits = "fixed"
+if TYPE_CHECKING:
+    from trajcli.cli.arm_commands import FkCommand
 
 
-def run_fk(robot: str, words: Sequence[str], options: FkOptions) -> int:
+def run_fk(options: FkCommand) -> int:
     """Print the pose of the tcp, or one for each row of standard input; return the exit code.
 
     Raises:
         InputError: When robot, joints, tool or rows are not as they should be.
         FileError: When a file cannot be read, or standard output not written.
     """
-    arm = open_arm(robot, options.tool, units=options.units, si=options.si, frame=options.frame)
-    if list(words) == ["-"]:
+    arm = open_arm(options.robot, options.tool, units=options.units, si=options.si, frame=options.frame)
+    if options.joints == ["-"]:
         return _stream(arm, options)
-    q = arm.joint_values(words)
+    q = arm.joint_values(options.joints)
     report: dict[str, Any] = pose_view(forward(arm.robot, q), arm.units)
     if options.links:
         frames = link_poses(arm.robot, q)[1:-1]
@@ -65,7 +52,7 @@ def _lines(arm: ArmInUnits, report: dict[str, Any], frame: str) -> list[str]:
     return lines
 
 
-def _stream(arm: ArmInUnits, options: FkOptions) -> int:
+def _stream(arm: ArmInUnits, options: FkCommand) -> int:
     from trajcli.queries.forward import poses_of
     from trajcli.streams.table import open_rows
 

@@ -1,40 +1,38 @@
-"""Judgement of several jobs, and annotations of jobs for continuous integration."""
+"""Plans of jobs: one that is written, or several that are judged, with annotations for CI."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from trajcli.cli.outcome import BUG, ErrorForm, report_bug, report_error
-from trajcli.cli.plan import PlanOptions, plan_and_write
+from trajcli.cli.outcome import BUG, report_bug, report_error
+from trajcli.cli.plan import plan_and_write
 from trajcli.errors import InputError, Place, Problem, TrajcliError
-from trajcli.output.annotations import AnnotationForm, annotations_of, render_annotations
 from trajcli.planning.plan import Plan
+
+if TYPE_CHECKING:
+    from trajcli.cli.job_commands import PlanCommand
+    from trajcli.output.annotations import AnnotationForm
 
 _EXCLUDED = ("output", "report", "resolved")
 
 
-def run_gate(jobs: Sequence[str], overrides: Sequence[str], options: PlanOptions, form: ErrorForm) -> int:
+def run_plan(options: PlanCommand) -> int:
     """Plan and judge each job, whatever is wrong with the others; return the worst exit code.
-
-    Args:
-        jobs: Several are judged only.
-        overrides: Of each of them.
-        options: What the command line says beside the jobs.
-        form: How errors are written.
 
     Raises:
         InputError: When several jobs would be written.
     """
+    jobs, form = [options.job, *options.others], options.errors
     if len(jobs) > 1:
         _check_nothing_is_written(options)
     if form == "text" or form == "json":
-        return max(_judged(job, overrides, options, form) for job in jobs)
-    return _annotated(jobs, overrides, options, form)
+        return max(_judged(job, options) for job in jobs)
+    return _annotated(jobs, options, form)
 
 
-def _check_nothing_is_written(options: PlanOptions) -> None:
+def _check_nothing_is_written(options: PlanCommand) -> None:
     if not options.no_output:
         hint = "only judge them with --no-output, or write them with `trajcli batch`"
         raise InputError("several jobs cannot be written to one stream", hint=hint)
@@ -42,30 +40,30 @@ def _check_nothing_is_written(options: PlanOptions) -> None:
         raise InputError(f"--{name} is about one job, and there are several", hint="name one job")
 
 
-def _judged(job: str, overrides: Sequence[str], options: PlanOptions, form: ErrorForm) -> int:
+def _judged(job: str, options: PlanCommand) -> int:
     """Judge one of several jobs; report what is wrong with it, and return its exit code."""
     try:
-        plan_and_write(job, overrides, options)
+        plan_and_write(job, options)
     except TrajcliError as error:
-        report_error(error, form)
+        report_error(error, options.errors)
         return error.exit_code
     except OSError:
         raise
     except Exception as error:  # noqa: BLE001
-        return report_bug(error, form)
+        return report_bug(error, options.errors)
     return 0
 
 
-def _annotated(
-    jobs: Sequence[str], overrides: Sequence[str], options: PlanOptions, form: AnnotationForm
-) -> int:
+def _annotated(jobs: Sequence[str], options: PlanCommand, form: AnnotationForm) -> int:
     """Judge jobs; write one document, or a line for each annotation; return the worst exit code."""
+    from trajcli.output.annotations import annotations_of, render_annotations
+
     code = 0
     found: list[Problem] = []
-    quiet = options if form == "github" else replace(options, quiet=True)  # a document stands alone
+    quiet = options if form == "github" else options.replaced(quiet=True)  # a document stands alone
     for job in jobs:
         try:
-            found += _concessions(plan_and_write(job, overrides, quiet), job)
+            found += _concessions(plan_and_write(job, quiet), job)
         except TrajcliError as error:
             found += annotations_of(error, job)
             code = max(code, error.exit_code)

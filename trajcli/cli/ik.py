@@ -3,41 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from trajcli.cli.numbers import number, numbers
 from trajcli.cli.outcome import print_json, print_lines, print_remark
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, PlanningError
-from trajcli.frozen import comparable
 from trajcli.job.inline import inline_target
 from trajcli.kinematics.inverse.solutions import Solutions
 from trajcli.language.targets import ik_target
 from trajcli.queries.arm import ArmInUnits, LimitWatch, open_arm
 from trajcli.queries.inverse import answer_reports, find_answers, require_answer
-from trajcli.streams.decimals import Digits
+
+if TYPE_CHECKING:
+    from trajcli.cli.arm_commands import IkCommand
 
 _FINEST = 1e-12  # m and rad: what rounding leaves of an exact answer is below
 _COARSEST = 1.0  # m and rad: an arm that misses by more has not answered
 
 
-@comparable
-class IkOptions:
-    """What the command line says beside the robot; see `trajcli ik --help`."""
-
-    pose: str | None = None
-    near: str | None = None
-    every: bool = False
-    turns: bool = False
-    tolerance: float = 1e-6
-    tool: str | None = None
-    units: str | None = None
-    si: bool = False
-    as_json: bool = False
-    digits: Digits = "fixed"
-
-
-def run_ik(robot: str, words: Sequence[str], options: IkOptions) -> int:
+def run_ik(options: IkCommand) -> int:
     """Print all joint values for a pose, or one row of them for each pose of a CSV; return the exit code.
 
     Raises:
@@ -45,8 +30,8 @@ def run_ik(robot: str, words: Sequence[str], options: IkOptions) -> int:
         PlanningError: After printing, when no answer is within the limits.
         FileError: When a file cannot be read, or standard output not written.
     """
-    _check(words, options)
-    arm = open_arm(robot, options.tool, units=options.units, si=options.si)
+    _check(options)
+    arm = open_arm(options.robot, options.tool, units=options.units, si=options.si)
     near = None if options.near is None else arm.joint_values([options.near], "--near")
     if near is not None:
         _remark_on(arm, near)
@@ -76,8 +61,9 @@ def _remark_on(arm: ArmInUnits, near: Array) -> None:
         print_remark(f"--near is outside the limits of {arm.robot.name}: {what}")
 
 
-def _check(words: Sequence[str], options: IkOptions) -> None:
-    if list(words) not in ([], ["-"]):
+def _check(options: IkCommand) -> None:
+    words = options.rows or []
+    if words not in ([], ["-"]):
         raise InputError(
             f"there is no place for {words[0]}", hint="poses are given by --pose, or as - for a CSV"
         )
@@ -110,7 +96,7 @@ def _lines(arm: ArmInUnits, solutions: Solutions, reports: Sequence[dict[str, An
     yield f"they miss the pose by at most {number(worst) if worst > 1e-12 else '1e-12'} (m, rad)"
 
 
-def _stream(arm: ArmInUnits, near: Array | None, options: IkOptions) -> int:
+def _stream(arm: ArmInUnits, near: Array | None, options: IkCommand) -> int:
     from trajcli.queries.inverse_stream import EveryAnswer, joints_of
     from trajcli.streams.csv import write_csv
     from trajcli.streams.table import open_rows

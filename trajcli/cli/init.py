@@ -4,26 +4,31 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from trajcli.errors import InputError
 from trajcli.streams.whole_file import standard_output, whole_file
 
+if TYPE_CHECKING:
+    from trajcli.cli.file_commands import InitCommand
+
 STARTER = Path(__file__).parent / "starter.yaml"
 
 
-def run_init(file: str, *, force: bool) -> int:
+def run_init(options: InitCommand) -> int:
     """Write the starter job; return the exit code.
 
     Raises:
         InputError: When the file exists and `force` is not given.
         FileError: When it cannot be written.
     """
+    file = options.file
     text = STARTER.read_bytes()
     if file == "-":
         with standard_output() as out:
             out.write(text)
         return 0
-    if not force and Path(file).exists():
+    if not options.force and Path(file).exists():
         raise InputError(f"{file} exists", hint="name another file, or say --force to overwrite it")
     with whole_file(file) as out:
         out.write(text)

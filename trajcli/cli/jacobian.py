@@ -3,43 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from trajcli.cli.numbers import matrix_lines, number, numbers
 from trajcli.cli.outcome import print_json, print_lines, print_remark
 from trajcli.errors import InputError
-from trajcli.frozen import comparable
-from trajcli.kinematics.jacobian import ReferenceFrame
 from trajcli.queries.arm import ArmInUnits, LimitWatch, beyond_two_turns, open_arm
 from trajcli.queries.jacobian import jacobian_report
 from trajcli.streams.whole_file import standard_output
 
+if TYPE_CHECKING:
+    from trajcli.cli.arm_commands import JacobianCommand
+
 _COMPONENTS = ("vx", "vy", "vz", "wx", "wy", "wz")
 
 
-@comparable
-class JacobianOptions:
-    """What the command line says beside robot and joints; see `trajcli jacobian --help`."""
-
-    tool: str | None = None
-    frame: ReferenceFrame = "world"
-    rates: str | None = None
-    units: str | None = None
-    si: bool = False
-    as_json: bool = False
-
-
-def run_jacobian(robot: str, words: Sequence[str], options: JacobianOptions) -> int:
+def run_jacobian(options: JacobianCommand) -> int:
     """Print the Jacobian and what it says about the arm; return the exit code.
 
     Raises:
         InputError: When robot, joints, rates, tool or rows are not as they should be.
         FileError: When a file cannot be read, or standard output not written.
     """
-    arm = open_arm(robot, options.tool, units=options.units, si=options.si)
-    if list(words) == ["-"]:
+    arm = open_arm(options.robot, options.tool, units=options.units, si=options.si)
+    if options.joints == ["-"]:
         return _stream(arm, options)
-    q = arm.joint_values(words)
+    q = arm.joint_values(options.joints)
     qd = None if options.rates is None else arm.joint_values([options.rates], "--qd", 1)
     remark = beyond_two_turns(arm.robot, q[None], [arm.joint_unit(i) for i in range(len(q))])
     if remark is not None:
@@ -80,7 +69,7 @@ def _sum(factors: Sequence[float], names: Sequence[str]) -> str:
     return text.removeprefix("+ ")
 
 
-def _stream(arm: ArmInUnits, options: JacobianOptions) -> int:
+def _stream(arm: ArmInUnits, options: JacobianCommand) -> int:
     from trajcli.queries.forward import jacobians_of
     from trajcli.streams.csv import write_csv
     from trajcli.streams.table import open_rows

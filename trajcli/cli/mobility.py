@@ -2,33 +2,24 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from trajcli.cli.outcome import print_json, print_lines
 from trajcli.errors import InputError
-from trajcli.frozen import comparable
 from trajcli.queries.arm import open_sheet
 from trajcli.queries.mobility import (
     Linkage,
-    Space,
     checked,
     linkage_of,
     mobility_report,
     parse_joints,
 )
 
-
-@comparable
-class MobilityOptions:
-    """What the command line says; see `trajcli mobility --help`."""
-
-    robot: str | None
-    links: int | None
-    joints: str | None
-    space: Space = "spatial"
-    passive: int = 0
-    as_json: bool = False
+if TYPE_CHECKING:
+    from trajcli.cli.arm_commands import MobilityCommand
 
 
-def run_mobility(options: MobilityOptions) -> int:
+def run_mobility(options: MobilityCommand) -> int:
     """Print the number of freedoms of a robot or a linkage, and how it is counted; return the exit code.
 
     Raises:
@@ -50,7 +41,7 @@ def run_mobility(options: MobilityOptions) -> int:
     return 0
 
 
-def _linkage(options: MobilityOptions) -> Linkage:
+def _linkage(options: MobilityCommand) -> Linkage:
     """Return the linkage that the options describe."""
     described = options.links is not None or options.joints is not None
     if options.robot is not None:

@@ -9,18 +9,8 @@ from typing import Annotated, Literal
 
 import typer
 
-from trajcli.cli.options import Errors, robot_names
-from trajcli.cli.outcome import guarded
-
-_EXAMPLES = {
-    "batch": "trajcli batch examples/cubic.yaml examples/quintic.yaml -o rows",
-    "retime": "trajcli retime rows.csv --job examples/ur5e_pick.yaml -o slower.csv",
-    "resample": "trajcli resample rows.csv --rate 500 -o coarse.csv",
-    "concat": "trajcli concat there.csv back.csv -o both.csv",
-    "reverse": "trajcli reverse rows.csv -o back.csv",
-    "slice": "trajcli slice rows.csv --from 0.25 --to 0.75 -o part.csv",
-    "convert": "trajcli convert rows.csv -o rows.mcap",
-}
+from trajcli.cli.command import Command
+from trajcli.cli.options import robot_names
 
 MotionSource = Annotated[
     str, typer.Argument(metavar="FILE", help="CSV, MCAP, ROS messages, JSON lines, .npy; - is stdin.")
@@ -49,38 +39,49 @@ FieldName = Annotated[
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Nothing on stderr but errors.")]
 
 
-def register_tools(app: typer.Typer) -> None:
-    """Add these commands to an application."""
-    for command in (batch, retime, resample, concat, reverse, slice, convert):
-        name = command.__name__
-        app.command(name, epilog=f"Example: {_EXAMPLES[name]}")(guarded(command))
+class EditCommand(Command):
+    """A tool that reads a motion and writes one."""
+
+    module = "edit"
+
+    output: MotionOutput = None
+    form: MotionForm = None
+    columns: ColumnMap = None
+    units: FileUnits = None
+    topic: TopicName = None
+    field: FieldName = None
+    quiet: Quiet = False
 
 
-def batch(
+class BatchCommand(Command):
+    """Plan many jobs, and write each; unchanged ones are skipped. Prints a line of JSON for each job."""
+
+    example = "trajcli batch examples/cubic.yaml examples/quintic.yaml -o rows"
+
     jobs: Annotated[
         list[str], typer.Argument(metavar="JOB|DIR...", help="Job files, and folders with job files.")
-    ],
+    ]
     output: Annotated[
         str | None,
         typer.Option(
             "--output", "-o", metavar="DIR", help="Where the rows go; else beside each job, under its name."
         ),
-    ] = None,
+    ] = None
     count: Annotated[
         str | None, typer.Option("-j", metavar="N", help="Processes at a time; else one a core.")
-    ] = None,
+    ] = None
     form: Annotated[
         Literal["csv", "mcap", "jsonl", "ros", "ros-goal"], typer.Option("--format", help="Of the rows.")
-    ] = "csv",
-    force: Annotated[bool, typer.Option("--force", help="Plan unchanged jobs, too.")] = False,
+    ] = "csv"
+    force: Annotated[bool, typer.Option("--force", help="Plan unchanged jobs, too.")] = False
     timeout: Annotated[
         str | None,
         typer.Option("--timeout", metavar="SECONDS", help="For each job; 0 for no end.", show_default="600"),
-    ] = None,
+    ] = None
     engine: Annotated[
         Literal["processes", "dask"],
         typer.Option("--engine", help="Processes of this machine, or the workers of a Dask cluster."),
-    ] = "processes",
+    ] = "processes"
     scheduler: Annotated[
         str | None,
         typer.Option(
@@ -88,22 +89,19 @@ def batch(
             metavar="ADDRESS",
             help="Of the cluster, such as tcp://10.0.0.5:8786; else that of Dask's configuration.",
         ),
-    ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on stderr.")] = False,
-    errors: Errors = "text",
-) -> int:
-    """Plan many jobs, and write each; unchanged ones are skipped. Prints a line of JSON for each job."""
-    from trajcli.cli.batch import BatchOptions, run_batch
-
-    options = BatchOptions(output, count, form, force, timeout, engine, scheduler, quiet)
-    return run_batch(jobs, options)
+    ] = None
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on stderr.")] = False
 
 
-def retime(
-    file: MotionSource,
+class RetimeCommand(EditCommand):
+    """Stretch a motion by the smallest factor that keeps the limits, and say the factor, joint and limit."""
+
+    example = "trajcli retime rows.csv --job examples/ur5e_pick.yaml -o slower.csv"
+
+    file: MotionSource
     job: Annotated[
         str | None, typer.Option("--job", "-j", metavar="JOB", help="The job whose limits are kept.")
-    ] = None,
+    ] = None
     robot: Annotated[
         str | None,
         typer.Option(
@@ -113,124 +111,71 @@ def retime(
             help="The arm whose limits are kept.",
             autocompletion=robot_names,
         ),
-    ] = None,
+    ] = None
     fastest: Annotated[
         bool, typer.Option("--fastest", help="Also faster: over the shortest time that keeps the limits.")
-    ] = False,
+    ] = False
     per_move: Annotated[
         bool, typer.Option("--per-move", help="A factor for each move, by the column `move`.")
-    ] = False,
-    output: MotionOutput = None,
-    form: MotionForm = None,
-    columns: ColumnMap = None,
-    units: FileUnits = None,
-    topic: TopicName = None,
-    field: FieldName = None,
-    quiet: Quiet = False,
-    errors: Errors = "text",
-) -> int:
-    """Stretch a motion by the smallest factor that keeps the limits, and say the factor, joint and limit."""
-    from trajcli.cli.edit import EditOptions, run_retime
-
-    options = EditOptions(output, form, columns, units, topic, field, quiet)
-    return run_retime(file, (job, robot), options, fastest=fastest, per_move=per_move)
+    ] = False
 
 
-def resample(
-    file: MotionSource,
-    rate: Annotated[str, typer.Option("--rate", metavar="HZ", help="Rows per second.")],
-    output: MotionOutput = None,
-    form: MotionForm = None,
-    columns: ColumnMap = None,
-    units: FileUnits = None,
-    topic: TopicName = None,
-    field: FieldName = None,
-    quiet: Quiet = False,
-    errors: Errors = "text",
-) -> int:
+class ResampleCommand(EditCommand):
     """Write a motion at rows of another rate, on the curve through its rows."""
-    from trajcli.cli.edit import EditOptions, run_resample
 
-    options = EditOptions(output, form, columns, units, topic, field, quiet)
-    return run_resample(file, rate, options)
+    example = "trajcli resample rows.csv --rate 500 -o coarse.csv"
+
+    file: MotionSource
+    rate: Annotated[str, typer.Option("--rate", metavar="HZ", help="Rows per second.")]
 
 
-def concat(
+class ConcatCommand(EditCommand):
+    """Join motions one after the other, in the columns and units of the first; their states must agree."""
+
+    example = "trajcli concat there.csv back.csv -o both.csv"
+
     files: Annotated[
         list[str],
         typer.Argument(metavar="FILE...", help="Motions, each of which begins where the last ends."),
-    ],
-    output: MotionOutput = None,
-    form: MotionForm = None,
-    columns: ColumnMap = None,
-    units: FileUnits = None,
-    topic: TopicName = None,
-    field: FieldName = None,
-    quiet: Quiet = False,
-    errors: Errors = "text",
-) -> int:
-    """Join motions one after the other, in the columns and units of the first; their states must agree."""
-    from trajcli.cli.edit import EditOptions, run_concat
-
-    options = EditOptions(output, form, columns, units, topic, field, quiet)
-    return run_concat(files, options)
+    ]
 
 
-def reverse(
-    file: MotionSource,
-    output: MotionOutput = None,
-    form: MotionForm = None,
-    columns: ColumnMap = None,
-    units: FileUnits = None,
-    topic: TopicName = None,
-    field: FieldName = None,
-    quiet: Quiet = False,
-    errors: Errors = "text",
-) -> int:
+class ReverseCommand(EditCommand):
     """Write a motion that goes back over the same time."""
-    from trajcli.cli.edit import EditOptions, run_reverse
 
-    options = EditOptions(output, form, columns, units, topic, field, quiet)
-    return run_reverse(file, options)
+    example = "trajcli reverse rows.csv -o back.csv"
+
+    file: MotionSource
 
 
-def slice(  # noqa: A001
-    file: MotionSource,
+class SliceCommand(EditCommand):
+    """Write the part of a motion between two times, with a row at each of them."""
+
+    example = "trajcli slice rows.csv --from 0.25 --to 0.75 -o part.csv"
+
+    file: MotionSource
     first: Annotated[
         str | None, typer.Option("--from", metavar="T", help="Time of the file, s; else its start.")
-    ] = None,
+    ] = None
     last: Annotated[
         str | None, typer.Option("--to", metavar="T", help="Time of the file, s; else its end.")
-    ] = None,
-    output: MotionOutput = None,
-    form: MotionForm = None,
-    columns: ColumnMap = None,
-    units: FileUnits = None,
-    topic: TopicName = None,
-    field: FieldName = None,
-    quiet: Quiet = False,
-    errors: Errors = "text",
-) -> int:
-    """Write the part of a motion between two times, with a row at each of them."""
-    from trajcli.cli.edit import EditOptions, run_slice
-
-    options = EditOptions(output, form, columns, units, topic, field, quiet)
-    return run_slice(file, first, last, options)
+    ] = None
 
 
-def convert(
-    file: MotionSource,
-    output: MotionOutput = None,
-    form: MotionForm = None,
-    columns: ColumnMap = None,
-    units: FileUnits = None,
-    topic: TopicName = None,
-    field: FieldName = None,
-    quiet: Quiet = False,
-    errors: Errors = "text",
-) -> int:
+class ConvertCommand(EditCommand):
     """Write a motion in another format."""
-    from trajcli.cli.edit import EditOptions, run_convert
 
-    options = EditOptions(output, form, columns, units, topic, field, quiet)
-    return run_convert(file, options)
+    example = "trajcli convert rows.csv -o rows.mcap"
+
+    file: MotionSource
+
+
+MOTION_COMMANDS = (
+    BatchCommand,
+    RetimeCommand,
+    ResampleCommand,
+    ConcatCommand,
+    ReverseCommand,
+    SliceCommand,
+    ConvertCommand,
+)

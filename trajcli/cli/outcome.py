@@ -6,8 +6,7 @@ import json
 import os
 import sys
 from collections.abc import Callable, Iterable
-from functools import wraps
-from typing import Any, Literal, NoReturn
+from typing import Any, Literal
 
 from trajcli.errors import Problem, TrajcliError
 
@@ -16,26 +15,25 @@ ErrorForm = Literal["text", "json", "github", "junit", "sarif"]
 FILE_FAILED, BUG, INTERRUPTED, PIPE_CLOSED = 4, 70, 130, 141
 
 
-def guarded(command: Callable[..., int]) -> Callable[..., NoReturn]:
-    """Return the command so that it exits with its code, and renders its errors on standard error."""
+def exit_code(run: Callable[[Any], int], options: Any, form: ErrorForm) -> int:  # noqa: ANN401
+    """Return the exit code of a command; its errors are rendered on standard error.
 
-    @wraps(command)
-    def run(*args: Any, **options: Any) -> NoReturn:  # noqa: ANN401
-        try:
-            code = _outcome(command, args, options)
-        except BrokenPipeError:  # nobody reads the errors either
-            code = PIPE_CLOSED
-        except OSError:  # standard error cannot be written
-            code = FILE_FAILED
-        sys.exit(code)
-
-    return run
-
-
-def _outcome(command: Callable[..., int], args: tuple[Any, ...], options: dict[str, Any]) -> int:
-    form = options.get("errors", "text")
+    Args:
+        run: What the command does.
+        options: What the command line says.
+        form: How errors are written.
+    """
     try:
-        return command(*args, **options)
+        return _outcome(run, options, form)
+    except BrokenPipeError:  # nobody reads the errors either
+        return PIPE_CLOSED
+    except OSError:  # standard error cannot be written
+        return FILE_FAILED
+
+
+def _outcome(run: Callable[[Any], int], options: Any, form: ErrorForm) -> int:  # noqa: ANN401
+    try:
+        return run(options)
     except TrajcliError as error:
         report_error(error, form)
         return error.exit_code

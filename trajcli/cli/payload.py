@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 from trajcli.cli.numbers import numbers
 from trajcli.cli.outcome import print_json, print_lines
@@ -11,18 +12,21 @@ from trajcli.job.read import LoadedJob, load_job
 from trajcli.planning.payload_capacity import PayloadCapacity, payload_capacity
 from trajcli.units import Quantity, effort_unit, to_user
 
+if TYPE_CHECKING:
+    from trajcli.cli.job_commands import PayloadCommand
 
-def run_payload(job: str, overrides: Sequence[str], at: int | None, *, as_json: bool) -> int:
+
+def run_payload(options: PayloadCommand) -> int:
     """Print the largest mass with which a job verifies, and what binds; return the exit code.
 
     Raises:
         InputError: When there is no such move, or no effort is limited.
         TrajcliError: Of the job.
     """
-    loaded = load_job(job, overrides)
+    loaded = load_job(options.job, options.override)
     with progress():
-        capacity = payload_capacity(loaded, at)
-    if as_json:
+        capacity = payload_capacity(loaded, options.at)
+    if options.as_json:
         names = ("mass", "joint", "move", "time", "effort", "limit")
         print_json({name: getattr(capacity, name) for name in names})
     else:

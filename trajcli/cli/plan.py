@@ -4,66 +4,36 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from trajcli.cli.progress import progress
 from trajcli.curves.extrema import peaks
 from trajcli.errors import Amount, InputError, Problem, VerificationError
-from trajcli.frozen import comparable
 from trajcli.grids import Grid
 from trajcli.job.read import LoadedJob, files_of, load_job
 from trajcli.kinematics.robot import QUANTITIES
 from trajcli.output.write import grid_of, write_rows, write_text
 from trajcli.planners.planner import Event, PlannedMove
 from trajcli.planning.plan import Plan, plan_job
-from trajcli.streams.formats import FormatName, StreamFormat, format_of
+from trajcli.streams.formats import StreamFormat, format_of
 from trajcli.streams.whole_file import identity
 
 if TYPE_CHECKING:
-    from trajcli.checks.tool_bound import ToolPeak
+    from trajcli.cli.job_commands import PlanCommand
     from trajcli.consumers.judgement import ProfileJudgement
     from trajcli.consumers.profile import Profile
     from trajcli.job.report import MoveReport
     from trajcli.job.reports.comparisons import PathReferenceReport, PeerViolation, ReferenceReport
+    from trajcli.limits.tool_bound import ToolPeak
     from trajcli.output.recording import LogOptions
 
 _FEW_STEPS = 9  # in acceleration: of more the largest says most
 _STILL = 1e-9  # rad/s or m/s, below which a joint only rounds
 
 
-@comparable
-class PlanOptions:
-    """What the command line says beside the job; see `trajcli plan --help`."""
-
-    rate: str | None = None
-    output: str | None = None
-    report: str | None = None
-    resolved: str | None = None
-    form: FormatName | None = None
-    digits: Literal["fixed", "full"] | None = None
-    log: LogOptions | None = None
-    strict: bool = False
-    reference: bool = False
-    consumer: str | None = None
-    no_output: bool = False
-    quiet: bool = False
-    every: bool = True
-    si: bool = False
-
-
-def run_plan(job: str, overrides: Sequence[str], options: PlanOptions) -> int:
-    """Plan, judge and write a job; return the exit code.
-
-    Raises:
-        TrajcliError: When anything is wrong; then no rows were written.
-    """
-    plan_and_write(job, overrides, options)
-    return 0
-
-
-def plan_and_write(job: str, overrides: Sequence[str], options: PlanOptions) -> Plan:
+def plan_and_write(job: str, options: PlanCommand) -> Plan:
     """Plan, judge and write a job; return the plan, which verifies.
 
     Raises:
@@ -71,12 +41,13 @@ def plan_and_write(job: str, overrides: Sequence[str], options: PlanOptions) -> 
     """
     form = _check_options(options)
     profile = _profile(options)
-    loaded = load_job(job, overrides, rate=options.rate, si=options.si)
+    loaded = load_job(job, options.override, rate=options.rate, si=options.si)
     _check_inputs_stay(loaded, options)
-    if options.log is not None:
+    log = _log_options(options)
+    if log is not None:
         from trajcli.output.recording import check_log_options
 
-        check_log_options(options.log, loaded.robot, loaded.job.output.start_time)
+        check_log_options(log, loaded.robot, loaded.job.output.start_time)
     if options.resolved is not None:
         _write_resolved(loaded, options.resolved)
     with progress(to_terminal=options.output in (None, "-") and not options.no_output):
@@ -91,7 +62,7 @@ def plan_and_write(job: str, overrides: Sequence[str], options: PlanOptions) -> 
         if refusal is None and profile is not None:
             judged, refusal = _judged(plan, grid, profile, form, options)
         if refusal is None and not options.no_output:
-            write_rows(plan, grid, options.output, options.digits or "fixed", form=form, log=options.log)
+            write_rows(plan, grid, options.output, options.digits or "fixed", form=form, log=log)
     if options.report is not None or options.reference:
         _report(plan, options, judged)  # behind the rows: where it stands, they do
     if refusal is not None:
@@ -105,7 +76,16 @@ def plan_and_write(job: str, overrides: Sequence[str], options: PlanOptions) -> 
     return plan
 
 
-def _profile(options: PlanOptions) -> Profile | None:
+def _log_options(options: PlanCommand) -> LogOptions | None:
+    """Return what is said about a log; None where nothing is."""
+    if options.topics is None and options.epoch is None and options.compression is None:
+        return None
+    from trajcli.output.recording import LogOptions
+
+    return options.part(LogOptions)
+
+
+def _profile(options: PlanCommand) -> Profile | None:
     """Return the rules of the consumer that is named."""
     if options.consumer is None:
         return None
@@ -137,13 +117,13 @@ def _contradicted(plan: Plan) -> VerificationError | None:
 
 
 def _judged(
-    plan: Plan, grid: Grid, profile: Profile, form: StreamFormat, options: PlanOptions
+    plan: Plan, grid: Grid, profile: Profile, form: StreamFormat, options: PlanCommand
 ) -> tuple[ProfileJudgement, VerificationError | None]:
     """Return what the rows do against the rules of their consumer, and why they are not written."""
     from trajcli.output.consumer import judge_as_written, refusal_of
 
     digits = options.digits or "fixed"
-    judged = judge_as_written(plan, grid, profile, form, digits=digits, log=options.log)
+    judged = judge_as_written(plan, grid, profile, form, digits=digits, log=_log_options(options))
     return judged, refusal_of(plan, judged, strict=options.strict)
 
 
@@ -157,12 +137,12 @@ def _summarise_consumer(judged: ProfileJudgement) -> None:
     print("\n".join(lines), file=sys.stderr)  # noqa: T201
 
 
-def _refusal(plan: Plan, options: PlanOptions) -> VerificationError | None:
+def _refusal(plan: Plan, options: PlanCommand) -> VerificationError | None:
     """Return why no rows are written: the findings, or the concessions that `--strict` refuses."""
     if not plan.verdict.passed:
         from trajcli.output.report import verification_error
 
-        return verification_error(plan, every=options.every)
+        return verification_error(plan, every=options.every or options.errors != "text")
     if options.strict and plan.events:
         return VerificationError(*(_problem(plan, event) for event in plan.events))
     return None
@@ -174,9 +154,10 @@ def _problem(plan: Plan, event: Event) -> Problem:
     return Problem(f"{event.kind}: {event.message}", hint, place, event.move, kind=event.kind)
 
 
-def _check_options(options: PlanOptions) -> StreamFormat:
+def _check_options(options: PlanCommand) -> StreamFormat:
     """Return the format of the output; refuse options that do not fit it, or each other."""
-    log = () if options.log is None else options.log.given
+    given_of_log = _log_options(options)
+    log = () if given_of_log is None else given_of_log.given
     if options.no_output:
         # a consumer is judged by the form in which the motion would come to it
         named = options.form if options.consumer is None else None
@@ -198,7 +179,7 @@ def _check_options(options: PlanOptions) -> StreamFormat:
     return form
 
 
-def _check_outputs(options: PlanOptions) -> None:
+def _check_outputs(options: PlanCommand) -> None:
     taken: dict[tuple[object, ...], str] = {}
     for name, path in _outputs(options):
         same = identity(path)
@@ -207,7 +188,7 @@ def _check_outputs(options: PlanOptions) -> None:
             raise InputError(f"{name} and {other} cannot both go to {path}", hint="name another file")
 
 
-def _outputs(options: PlanOptions) -> Iterator[tuple[str, str]]:
+def _outputs(options: PlanCommand) -> Iterator[tuple[str, str]]:
     """Yield what is written, and where to."""
     if not options.no_output:
         yield "the rows", options.output or "-"
@@ -216,7 +197,7 @@ def _outputs(options: PlanOptions) -> Iterator[tuple[str, str]]:
             yield name, path
 
 
-def _check_inputs_stay(loaded: LoadedJob, options: PlanOptions) -> None:
+def _check_inputs_stay(loaded: LoadedJob, options: PlanCommand) -> None:
     """Refuse to write over a file that the job was read from."""
     read = {identity(path, 0): f"{what} {path}" for what, path in files_of(loaded.document)}
     for name, path in _outputs(options):
@@ -231,7 +212,7 @@ def _write_resolved(loaded: LoadedJob, path: str) -> None:
     write_text(dump_job(loaded), path)
 
 
-def _report(plan: Plan, options: PlanOptions, judged: ProfileJudgement | None) -> None:
+def _report(plan: Plan, options: PlanCommand, judged: ProfileJudgement | None) -> None:
     from trajcli.output.report import report_of
 
     report = report_of(plan, peers=options.reference)

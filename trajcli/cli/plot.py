@@ -6,14 +6,13 @@ import logging
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from trajcli.cli.outcome import print_remark
 from trajcli.cli.progress import progress
 from trajcli.errors import InputError, Problem, VerificationError
-from trajcli.frozen import comparable
 from trajcli.job.read import files_of, load_job
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.plots.choice import parse_quantities, split_names
@@ -24,25 +23,14 @@ from trajcli.streams.reading import holds_motion, read_table
 from trajcli.streams.whole_file import identity, standard_output, whole_file
 
 if TYPE_CHECKING:
+    from trajcli.cli.file_commands import PlotCommand
     from trajcli.judge.file import CheckedFile
 
 _OF_JOBS = (".yaml", ".yml", ".json")
 _PEEKED = 4096  # bytes of standard input that are looked at
 
 
-@comparable
-class PlotOptions:
-    """What the command line says beside the files; see `trajcli plot --help`."""
-
-    output: str | None = None
-    kind: Literal["svg", "png", "pdf"] | None = None
-    quantities: str | None = None
-    joints: tuple[str, ...] = ()
-    quiet: bool = False
-    every: bool = True
-
-
-def run_plot(words: Sequence[str], overrides: Sequence[str], options: PlotOptions) -> int:
+def run_plot(options: PlotCommand) -> int:
     """Draw a job, files, or files over a job; return the exit code.
 
     Raises:
@@ -52,14 +40,14 @@ def run_plot(words: Sequence[str], overrides: Sequence[str], options: PlotOption
     """
     kind = format_of_picture(options.output, options.kind)
     wanted = None if options.quantities is None else parse_quantities(options.quantities)
-    files, joints = _files_and_joints(words, split_names(options.joints))
-    job, rows = _sorted_out(files, overrides)
+    files, joints = _files_and_joints(options.files, split_names(tuple(options.joints)))
+    job, rows = _sorted_out(files, options.override)
     target = options.output or f"{_stem(job or rows[0])}.{kind}"
     if target == "-" and kind != "svg" and sys.stdout is not None and sys.stdout.isatty():
         raise InputError(
             f"a terminal shows no {kind}", hint=f"name a file: -o {_stem(job or rows[0])}.{kind}"
         )
-    plan = None if job is None else _planned(job, overrides)
+    plan = None if job is None else _planned(job, options.override)
     _check_inputs_stay(plan, rows, target)
     sources = [ByteSource(name) for name in rows]
     tables = [read_table(source) for source in sources]
@@ -74,7 +62,7 @@ def run_plot(words: Sequence[str], overrides: Sequence[str], options: PlotOption
     return 0
 
 
-def _judged(sources: Sequence[ByteSource], plan: Plan, options: PlotOptions) -> list[CheckedFile | None]:
+def _judged(sources: Sequence[ByteSource], plan: Plan, options: PlotCommand) -> list[CheckedFile | None]:
     """Return the judgement of each file by the job; None, with a remark, where it cannot be judged."""
     if not sources:
         return []
@@ -90,18 +78,19 @@ def _judged(sources: Sequence[ByteSource], plan: Plan, options: PlotOptions) -> 
     return judged
 
 
-def _refuse_findings(plan: Plan | None, judged: Sequence[CheckedFile | None], options: PlotOptions) -> None:
+def _refuse_findings(plan: Plan | None, judged: Sequence[CheckedFile | None], options: PlotCommand) -> None:
     """Raise what is wrong with the plan, and what is certainly wrong with the files."""
     problems: list[Problem] = []
+    every = options.every or options.errors == "json"
     if plan is not None and not plan.verdict.passed:
         from trajcli.output.report import verification_error
 
-        problems += verification_error(plan, every=options.every).problems
+        problems += verification_error(plan, every=every).problems
     for checked in judged:
         if checked is not None and not checked.judgement.passed:
             from trajcli.cli.judged_file import problems_of
 
-            problems += problems_of(checked, every=options.every)
+            problems += problems_of(checked, every=every)
     if problems:
         raise VerificationError(*problems)
 
@@ -178,6 +167,6 @@ def _write(content: bytes, target: str) -> None:
         out.write(content)
 
 
-def _say_written(target: str, options: PlotOptions) -> None:
+def _say_written(target: str, options: PlotCommand) -> None:
     if target != "-" and not options.quiet:
         print_remark(f"{target} written")

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import Any, Literal
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
 from trajcli.cli.numbers import number, numbers, pose_lines
 from trajcli.cli.outcome import print_json, print_lines
 from trajcli.errors import InputError
-from trajcli.frozen import comparable
 from trajcli.geometry.pose import invert
 from trajcli.geometry.rotation import rotation_defect
 from trajcli.job.inline import inline_number
 from trajcli.queries.arm import parse_units
 from trajcli.queries.pose import (
-    OrientationInterpolation,
     PoseAtEnd,
     composed,
     parse_fractions,
@@ -26,25 +24,13 @@ from trajcli.queries.pose import (
 )
 from trajcli.units import Quantity, Units
 
+if TYPE_CHECKING:
+    from trajcli.cli.arm_commands import PoseCommand
+
 _ROUNDING = 1e-9  # of R^T R: above it is reported, since it comes from rounded entries
 
 
-@comparable
-class PoseOptions:
-    """What the command line says beside the steps; see `trajcli pose --help`."""
-
-    units: str = ""
-    inverse: bool = False
-    point: str | None = None
-    euler: str | None = None
-    to: str | None = None
-    s: str | None = None
-    path: Literal["line", "screw"] | None = None
-    orientation: OrientationInterpolation | None = None
-    as_json: bool = False
-
-
-def run_pose(words: Sequence[str], options: PoseOptions) -> int:
+def run_pose(options: PoseCommand) -> int:
     """Print the pose that the steps lead to, or poses on the way to another; return the exit code.
 
     Raises:
@@ -54,7 +40,7 @@ def run_pose(words: Sequence[str], options: PoseOptions) -> int:
     units = parse_units(options.units)
     euler = None if options.euler is None else parse_sequence(options.euler)
     point = None if options.point is None else _point(options.point, units)
-    start = _start(words, options, units)
+    start = _start(options, units)
     if options.to is None:
         _require_target(options)
         report = pose_report(start.pose, units, euler, point)
@@ -84,8 +70,8 @@ def run_pose(words: Sequence[str], options: PoseOptions) -> int:
     return 0
 
 
-def _start(words: Sequence[str], options: PoseOptions, units: Units) -> PoseAtEnd:
-    steps = read_steps(words, units)
+def _start(options: PoseCommand, units: Units) -> PoseAtEnd:
+    steps = read_steps(options.steps, units)
     pose = composed(steps)
     if options.inverse:
         return PoseAtEnd(invert(pose), None)
@@ -102,13 +88,13 @@ def _point(text: str, units: Units) -> list[float]:
     return [inline_number(word, name, length, units) for word, name in zip(words, names, strict=True)]
 
 
-def _require_target(options: PoseOptions) -> None:
+def _require_target(options: PoseCommand) -> None:
     for name, value in (("--s", options.s), ("--path", options.path), ("--orientation", options.orientation)):
         if value is not None:
             raise InputError(f"{name} is about the way to another pose", hint="name that pose with --to")
 
 
-def _lines(report: dict[str, Any], units: Units, options: PoseOptions, defect: float = 0.0) -> Iterator[str]:
+def _lines(report: dict[str, Any], units: Units, options: PoseCommand, defect: float = 0.0) -> Iterator[str]:
     yield from pose_lines(report, units, "")
     about = report["axis_angle"]
     yield f"axis_angle: axis {numbers(about['axis'])}, angle {number(about['angle'])} {units.angle}"
@@ -125,6 +111,6 @@ def _lines(report: dict[str, Any], units: Units, options: PoseOptions, defect: f
         yield f"{name}: {text}"
 
 
-def _point_lines(report: dict[str, Any], units: Units, options: PoseOptions) -> Iterator[str]:
+def _point_lines(report: dict[str, Any], units: Units, options: PoseCommand) -> Iterator[str]:
     yield f"s = {number(report['s'])}"
     yield from ("  " + line for line in _lines(report, units, options))

@@ -4,24 +4,28 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from trajcli.cli.numbers import table_lines
 from trajcli.cli.outcome import print_json, print_lines
 from trajcli.consumers.judgement import load_profile
 from trajcli.consumers.profile import ConsumerRule, Profile, profile_names
 
+if TYPE_CHECKING:
+    from trajcli.cli.file_commands import ProfilesCommand
+
 _WIDTH = 100
 
 
-def run_profiles(name: str | None, *, as_json: bool) -> int:
+def run_profiles(options: ProfilesCommand) -> int:
     """Print the profiles that there are, or the rules of one; return the exit code.
 
     Raises:
         InputError: When there is no such profile.
     """
+    name = options.name
     profiles = [load_profile(each) for each in profile_names()] if name is None else [load_profile(name)]
-    if as_json:
+    if options.as_json:
         views = [profile_view(profile) for profile in profiles]
         print_json(views if name is None else views[0])
     else:

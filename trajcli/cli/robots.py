@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from trajcli.cli.numbers import number, numbers, table_lines
 from trajcli.cli.outcome import print_json, print_lines, print_remark
@@ -14,27 +14,31 @@ from trajcli.job.robot import catalogue_names, is_urdf
 from trajcli.queries.arm import open_sheet
 from trajcli.queries.robot_card import Selection, robot_card, robot_row, selected
 
+if TYPE_CHECKING:
+    from trajcli.cli.arm_commands import RobotsCommand
+
 _WIDTH, _CALLED = 100, 35  # columns of a paragraph, and of a robot's own name in the list
 _DH = ("theta", "d", "a", "alpha", "beta")
 _LIMITS = ("position", "velocity", "acceleration", "jerk")
 
 
-def run_robots(name: str | None, selection: Selection, *, as_yaml: bool, as_urdf: bool, as_json: bool) -> int:
+def run_robots(options: RobotsCommand) -> int:
     """Print the catalogue, or what there is to say about one robot; return the exit code.
 
     Raises:
         InputError: When there is no such robot, or the options exclude each other.
         FileError: When a file cannot be read, or standard output not written.
     """
-    _check_forms(name, {"--yaml": as_yaml, "--urdf": as_urdf, "--json": as_json})
+    name, selection = options.name, options.part(Selection)
+    _check_forms(name, {"--yaml": options.as_yaml, "--urdf": options.as_urdf, "--json": options.as_json})
     if name is None:
-        return _print_list(selection, as_json=as_json)
+        return _print_list(selection, as_json=options.as_json)
     if selection != Selection():
         raise InputError(
             f"--kind, --joints, --maker and --search choose from the list, and {name} is one robot"
         )
     sheet = open_sheet(name)
-    if as_yaml:
+    if options.as_yaml:
         if sheet.text is None and is_urdf(name):
             from trajcli.job.dump import dump_robot
 
@@ -43,11 +47,11 @@ def run_robots(name: str | None, selection: Selection, *, as_yaml: bool, as_urdf
             hint = f"`trajcli plan {name} --no-output --resolved FILE` writes the job with its robot"
             raise InputError(f"{name} is a job, and no robot file", hint=hint)
         print_lines([sheet.text.rstrip("\n")])
-    elif as_urdf:
+    elif options.as_urdf:
         from trajcli.urdf.write import urdf_of
 
         print_lines([urdf_of(sheet.robot).rstrip("\n")])
-    elif as_json:
+    elif options.as_json:
         print_json(robot_card(name, sheet))
     else:
         print_lines(_card_lines(robot_card(name, sheet)))

@@ -2,42 +2,37 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from trajcli.cli.outcome import print_lines, print_remark
 from trajcli.errors import InputError, Place
-from trajcli.frozen import comparable
 from trajcli.job.dump import dump_robot
 from trajcli.job.robot import read_urdf, urdf_sheet
 from trajcli.streams.whole_file import identity, whole_file
 
-
-@comparable
-class UrdfOptions:
-    """What the command line says; see `trajcli urdf --help`."""
-
-    root: str | None = None
-    tip: str | None = None
-    exact: bool = False
-    soft: bool = False
-    output: str | None = None
+if TYPE_CHECKING:
+    from trajcli.cli.arm_commands import UrdfCommand
 
 
-def run_urdf(file: str, options: UrdfOptions) -> int:
+def run_urdf(options: UrdfCommand) -> int:
     """Print or write the robot file of a URDF, and what was decided on the way to it; return the exit code.
 
     Raises:
         InputError: When the file is no URDF, has no such chain, or would be overwritten.
         FileError: When it cannot be read, or the robot file not written.
     """
-    name = "<stdin>" if file == "-" else file
+    name = "<stdin>" if options.file == "-" else options.file
     try:
-        read = read_urdf(file, root=options.root, tip=options.tip, exact=options.exact, soft=options.soft)
+        read = read_urdf(
+            options.file, root=options.root, tip=options.tip, exact=options.exact, soft=options.soft
+        )
     except InputError as error:
         raise error.located(place=Place(name, 1, 1)) from None
     text = dump_robot(urdf_sheet(name, read))
     if options.output in (None, "-"):
         print_lines([text.rstrip("\n")])
     else:
-        _write(text, file, str(options.output))
+        _write(text, options.file, str(options.output))
     for remark in read.remarks:
         print_remark(f"{name}: {remark}")
     return 0

@@ -12,28 +12,19 @@ import numpy as np
 from trajcli.cli.outcome import print_remark
 from trajcli.cli.progress import progress
 from trajcli.errors import InputError, VerificationError
-from trajcli.frozen import comparable
 from trajcli.player.page import page_of
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import holds_motion
 from trajcli.streams.whole_file import identity, is_special, standard_output, whole_file
 
 if TYPE_CHECKING:
+    from trajcli.cli.file_commands import ViewCommand
     from trajcli.judge.file import CheckedFile
 
 _ENDINGS = (".html", ".htm")
 
 
-@comparable
-class ViewOptions:
-    """What the command line says beside the source; see `trajcli view --help`."""
-
-    output: str | None = None
-    compress: bool = False
-    robot: str | None = None
-
-
-def run_view(source: str, overrides: Sequence[str], options: ViewOptions) -> int:
+def run_view(options: ViewCommand) -> int:
     """Write the page of a job or of a file of rows; return the exit code.
 
     A job that plans and does not verify has its page, too, and the error after it; so has a file that its job
@@ -43,17 +34,17 @@ def run_view(source: str, overrides: Sequence[str], options: ViewOptions) -> int
         TrajcliError: When anything is wrong.
     """
     _check_output(options.output)
-    if options.robot is not None or holds_motion(source):
-        return _view_file(source, overrides, options)
-    return _view_job(source, overrides, options)
+    if options.robot is not None or holds_motion(options.source):
+        return _view_file(options)
+    return _view_job(options)
 
 
-def _view_job(source: str, overrides: Sequence[str], options: ViewOptions) -> int:
+def _view_job(options: ViewCommand) -> int:
     from trajcli.job.read import files_of, load_job
     from trajcli.planning.plan import plan_job
     from trajcli.player.scene import scene_of_plan
 
-    loaded = load_job(source, overrides)
+    loaded = load_job(options.source, options.override)
     _check_inputs_stay(options.output, [path for _, path in files_of(loaded.document)])
     with progress(), np.errstate(all="ignore"):  # what is not finite is for the checks to find
         plan = plan_job(loaded)
@@ -70,13 +61,13 @@ def _view_job(source: str, overrides: Sequence[str], options: ViewOptions) -> in
     raise verification_error(plan, every=False)
 
 
-def _view_file(source: str, overrides: Sequence[str], options: ViewOptions) -> int:
+def _view_file(options: ViewCommand) -> int:
     from trajcli.player.recorded import scene_of_file
 
-    if overrides:
+    if options.override:
         raise InputError("--set is for jobs, and this is a file of samples", hint="leave it out")
-    _check_inputs_stay(options.output, [source])
-    opened = ByteSource(source)
+    _check_inputs_stay(options.output, [options.source])
+    opened = ByteSource(options.source)
     checked = None if options.robot is None else _judged(opened, options.robot)
     scene = scene_of_file(opened, options.robot, checked)
     page = page_of(scene, compress=options.compress)

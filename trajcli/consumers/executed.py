@@ -7,11 +7,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from trajcli.checks.tolerances import exceeds
 from trajcli.consumers.rule_check import RuleCheck, when
 from trajcli.curves.extrema import peaks
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.kinematics.robot import QUANTITIES, Limits
+from trajcli.limits.tolerances import exceeds
 from trajcli.streams.recorded_motion import RecordedMotion
 
 __all__ = ["IntegerRange", "QuantisedCurve", "VelocitySteps"]

@@ -15,13 +15,13 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.checks.tolerances import JUMP_ABSOLUTE, JUMP_RELATIVE, exceeds
 from trajcli.curves.piecewise import Array
-from trajcli.findings import Collector, Finding, at_time
+from trajcli.findings import Collector, Finding, NamedJoints, at_time, excess_amounts
 from trajcli.frozen import frozen
-from trajcli.judge.intervals import DENSE, Intervals, JointAxes
+from trajcli.judge.intervals import DENSE, Intervals
 from trajcli.judge.rounding import stated_errors
 from trajcli.kinematics.robot import Limits
+from trajcli.limits.tolerances import JUMP_ABSOLUTE, JUMP_RELATIVE, exceeds
 
 _ISOLATED = 4.0  # times the changes beside it: a motion that merely is fast changes from row to row alike
 _STEPS = 2.0  # times what one step in acceleration within an interval explains: there may be several
@@ -116,7 +116,7 @@ def judge_consistency(
     pieces: slice,
     limits: Limits,
     move: int,
-    axes: JointAxes,
+    axes: NamedJoints,
     worst: Collector,
     changes: list[Changes],
     changes_branch: ChangesBranch | None = None,
@@ -147,7 +147,7 @@ class _Judge:
 
     window: Intervals
     changes: Changes
-    axes: JointAxes
+    axes: NamedJoints
     move: int
     worst: Collector
 
@@ -232,7 +232,7 @@ class _Judge:
             rule={"jump": "continuity", "derivative": "derivative"}.get(kind, "path"),
             severity="error",
             kind=kind,
-            joint=self.axes.names[joint],
+            joint=self.axes.joint_names[joint],
             value=value,
             limit=limit,
             time=time,
@@ -241,5 +241,5 @@ class _Judge:
             quantity=None if kind == "branch" else _QUANTITIES[order],
             rounding=rounding,
             message=text,
-            amounts=self.axes.amounts(joint, order, value, limit),
+            amounts=excess_amounts(self.axes, joint, order, value, limit),
         )

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount
-from trajcli.findings import Collector, Finding, FindingSeverity, at_time
-from trajcli.judge.intervals import JointAxes
+from trajcli.findings import Collector, Finding, FindingSeverity, NamedJoints, at_time, excess_amounts
 from trajcli.judge.rounding import stated_errors
 from trajcli.streams.recorded_motion import Resolution
 from trajcli.trajectory import State
@@ -21,7 +20,7 @@ _REST = 1e-6
 
 
 def judge_start(
-    row: EndState, start: State, tolerance: Array, resolution: Resolution, axes: JointAxes
+    row: EndState, start: State, tolerance: Array, resolution: Resolution, axes: NamedJoints
 ) -> list[Finding]:
     """Return where the first row is not the state in which the motion shall begin: the worst joint of each.
 
@@ -39,7 +38,7 @@ def judge_start(
 
 
 def judge_end(
-    row: EndState, end: State | None, tolerance: Array | None, resolution: Resolution, axes: JointAxes
+    row: EndState, end: State | None, tolerance: Array | None, resolution: Resolution, axes: NamedJoints
 ) -> list[Finding]:
     """Return where the last row is not the state in which the motion shall end.
 
@@ -53,7 +52,7 @@ def judge_end(
         axes: The joints.
     """
     if end is None or tolerance is None:
-        rest = np.zeros(len(axes.names))
+        rest = np.zeros(len(axes.joint_names))
         return _velocity(row, rest, resolution, axes, "end", "warning")
     return [
         *_position(row, end.position, tolerance, resolution, axes, "end"),
@@ -62,7 +61,7 @@ def judge_end(
 
 
 def _position(
-    row: EndState, wanted: Array, tolerance: Array, resolution: Resolution, axes: JointAxes, kind: str
+    row: EndState, wanted: Array, tolerance: Array, resolution: Resolution, axes: NamedJoints, kind: str
 ) -> list[Finding]:
     time, number, (q, *_) = row
     if q is None:
@@ -74,13 +73,19 @@ def _position(
         return []
     value, limit = float(q[0, joint]), float(wanted[joint])
     which = "first" if kind == "start" else "last"
-    within = Amount(float(tolerance[joint]), 0, joint, axes.dimension(joint), "down")
+    within = Amount(
+        float(tolerance[joint]),
+        0,
+        joint,
+        "length" if axes.joint_types[joint] == "prismatic" else "angle",
+        "down",
+    )
     return [
         Finding(
             rule="state",
             severity="error",
             kind=kind,
-            joint=axes.names[joint],
+            joint=axes.joint_names[joint],
             value=value,
             limit=limit,
             time=time,
@@ -91,7 +96,7 @@ def _position(
             rounding=float(room[joint]),
             message=f"the {which} row has {{joint}} at {{value}} {at_time(time)}, expected {{limit}} "
             "within {tolerance}",
-            amounts={**axes.amounts(joint, 0, value, limit), "tolerance": within},
+            amounts={**excess_amounts(axes, joint, 0, value, limit), "tolerance": within},
         )
     ]
 
@@ -100,7 +105,7 @@ def _velocity(
     row: EndState,
     wanted: Array,
     resolution: Resolution,
-    axes: JointAxes,
+    axes: NamedJoints,
     kind: str,
     severity: FindingSeverity,
 ) -> list[Finding]:
@@ -119,7 +124,7 @@ def _velocity(
             rule="state",
             severity=severity,
             kind=kind,
-            joint=axes.names[joint],
+            joint=axes.joint_names[joint],
             value=value,
             limit=limit,
             time=time,
@@ -129,7 +134,7 @@ def _velocity(
             rounding=float(room[joint]),
             message=f"the {which} row has a velocity of {{joint}} of {{value}} {at_time(time)}, "
             "expected {limit}",
-            amounts=axes.amounts(joint, 1, value, limit),
+            amounts=excess_amounts(axes, joint, 1, value, limit),
         )
     ]
 

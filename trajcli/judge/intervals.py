@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from functools import cached_property
 from itertools import pairwise
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array, derivative_coefficients, horner
-from trajcli.errors import Amount
 from trajcli.frozen import frozen
 from trajcli.judge.reconstruction import Interpolation, piece_coefficients, stated_orders
 from trajcli.judge.rounding import PieceRows, stated_errors
-from trajcli.kinematics.robot import JointType
 from trajcli.streams.recorded_motion import Resolution
 
 BESIDE = 2  # intervals on either side that are looked at, too
@@ -29,32 +26,6 @@ _CURVED = 0.1
 (1/12 at most)."""
 HIGHEST = {"hold": 0, "linear": 1, "cubic": 2, "quintic": 3, "jtc-upsampling": 3}
 """Highest derivative that pieces of an interpolation determine."""
-
-
-@frozen
-class JointAxes:
-    """Joints of a recorded motion.
-
-    Attributes:
-        names: n names.
-        types: n types.
-    """
-
-    names: tuple[str, ...]
-    types: tuple[JointType, ...]
-
-    def dimension(self, joint: int) -> Literal["length", "angle"]:
-        """Return what a joint's positions measure."""
-        return "length" if self.types[joint] == "prismatic" else "angle"
-
-    def amounts(self, joint: int, order: int, value: float, limit: float) -> Mapping[str, Amount | str]:
-        """Return a joint's name, a value and its limit as amounts of a message."""
-        dimension, outward = self.dimension(joint), value > limit
-        return {
-            "joint": self.names[joint],
-            "value": Amount(value, order, joint, dimension, "up" if outward else "down"),
-            "limit": Amount(limit, order, joint, dimension, "down" if outward else "up"),
-        }
 
 
 @frozen

@@ -8,25 +8,27 @@ because the motion changes its law between two rows is a warning, unless somebod
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.checks.tolerances import EFFORT_RELATIVE, exceeds
-from trajcli.curves.approach import ROOM, allowed_speed, uses_of_pieces
+from trajcli.curves.approach import ROOM, ApproachUse, allowed_speed, uses_of_pieces
 from trajcli.curves.bernstein import control_points
 from trajcli.curves.extrema import critical_points
 from trajcli.curves.piecewise import Array, derivative_coefficients, horner
-from trajcli.dynamics.effort_bound import EffortPeak, EffortSurvey, effort_survey, needed_stretch
+from trajcli.dynamics.effort_bound import EffortPeak, EffortSurvey, effort_survey
 from trajcli.dynamics.newton_euler import InverseDynamics
-from trajcli.errors import Amount, Amounts
-from trajcli.findings import Certainty, Collector, Finding, FindingSeverity, at_time
+from trajcli.findings import Certainty, Collector, Finding, FindingSeverity, NamedJoints
 from trajcli.frozen import frozen
-from trajcli.judge.intervals import DENSE, Intervals, JointAxes, explained_by_law
+from trajcli.judge.intervals import DENSE, Intervals, explained_by_law
 from trajcli.judge.rounding import PieceRows
 from trajcli.kinematics.robot import Limits, Robot
-from trajcli.units import effort_unit
-
-_KINDS: tuple[str, ...] = ("position", "velocity", "acceleration", "jerk")
+from trajcli.limits.effort import effort_excess
+from trajcli.limits.joints import joint_excess
+from trajcli.limits.kinds import JOINT_KINDS
+from trajcli.limits.tolerances import EFFORT_RELATIVE, exceeds
+from trajcli.limits.velocity_by_position import approach_excess
 
 _MANY = 20000  # pieces and joints over a limit from which on only the worst of them are looked at closely
 
@@ -55,7 +57,7 @@ def judge_limits(
     pieces: slice,
     limits: Limits,
     move: int,
-    axes: JointAxes,
+    axes: NamedJoints,
     worst: Collector,
     *,
     asked: bool,
@@ -133,7 +135,7 @@ class _Side:
             self.first + piece[beyond], joint[beyond], value[beyond], local[beyond], bound[beyond]
         )
 
-    def add(self, found: _Offences, move: int, axes: JointAxes, worst: Collector, *, asked: bool) -> None:
+    def add(self, found: _Offences, move: int, axes: NamedJoints, worst: Collector, *, asked: bool) -> None:
         """Add pieces beyond the bound, by what is certain about them."""
         count = 1 if self.window.interpolation == "jtc-upsampling" else max(self.level, 1)
         rows = self.window.piece_rows(found.piece, found.joint, count)
@@ -157,7 +159,7 @@ class _Side:
         )
         for chosen, severity, certainty in groups:
             worst.add(
-                _KINDS[self.order],
+                JOINT_KINDS[self.order].name,
                 move,
                 found.joint,
                 excess,
@@ -173,28 +175,14 @@ class _Side:
         return np.asarray(found.value - found.bound <= explained + error)
 
     def _finding(
-        self, found: _Offences, k: int, value: float, error: float, axes: JointAxes, *, warned: bool
+        self, found: _Offences, k: int, value: float, error: float, axes: NamedJoints, *, warned: bool
     ) -> Finding:
         piece, joint, local = int(found.piece[k]), int(found.joint[k]), float(found.local[k])
-        bound, kind = float(found.bound[k]), _KINDS[self.order]
-        time = float(self.window.t[piece]) + local
-        what = f"the {kind} of {{joint}} reaches {{value}} {at_time(time)}, its limit is {{limit}}"
-        if warned:
-            what += "; between the rows only, where the motion changes its law"
-        return Finding(
-            rule="limit",
-            severity="error",
-            kind=kind,
-            joint=axes.names[joint],
-            value=self.sign * value,
-            limit=self.sign * bound,
-            time=time,
-            row=self.window.row_at(piece, local),
-            factor=(value / bound) ** (1 / self.order) if self.order else None,
-            rounding=error,
-            message=what,
-            amounts=axes.amounts(joint, self.order, self.sign * value, self.sign * bound),
-        )
+        time, limit = float(self.window.t[piece]) + local, self.sign * float(found.bound[k])
+        found_one = joint_excess(axes, self.order, joint, self.sign * value, limit, time)
+        between = "; between the rows only, where the motion changes its law" if warned else ""
+        row, message = self.window.row_at(piece, local), found_one.message + between
+        return replace(found_one, row=row, rounding=error, message=message)
 
 
 def _refine(polynomials: Array, lengths: Array, near: NDArray[np.intp], value: Array, local: Array) -> None:
@@ -222,15 +210,12 @@ def _stated(rows: PieceRows, order: int, sign: float) -> tuple[Array, Array]:
     return stated, certain
 
 
-_HOPELESS = 1e4  # a stretch that is larger is none
-
-
 def judge_velocity_by_position(
     window: Intervals,
     pieces: slice,
     limits: Limits,
     move: int,
-    axes: JointAxes,
+    axes: NamedJoints,
     worst: Collector,
     *,
     asked: bool,
@@ -309,28 +294,13 @@ class _FastApproaches:
         towards = np.where(np.signbit(self.bound), -self.speed, self.speed)
         return np.asarray(towards - np.abs(self.bound) > self.rounding)
 
-    def finding(self, window: Intervals, axes: JointAxes, k: int) -> Finding:
+    def finding(self, window: Intervals, axes: NamedJoints, k: int) -> Finding:
         """Return one of them as a finding."""
         piece, joint, local = int(self.piece[k]), int(self.joint[k]), float(self.local[k])
-        value, limit = float(self.speed[k]), float(self.bound[k])
+        rates = float(self.used[k]), float(self.speed[k]), float(self.bound[k])
         time = float(window.t[piece]) + local
-        ahead = Amount(abs(float(self.distance[k])), 0, joint, axes.dimension(joint))
-        where = "beyond" if self.distance[k] < 0 else "before"
-        speed = f"the velocity of {{joint}} reaches {{value}} {at_time(time)}, {{distance}} {where} the end"
-        return Finding(
-            rule="limit",
-            severity="error",
-            kind="velocity_by_position",
-            joint=axes.names[joint],
-            value=value,
-            limit=limit,
-            time=time,
-            row=window.row_at(piece, local),
-            factor=float(self.used[k]) if self.used[k] < _HOPELESS else None,
-            rounding=float(self.rounding[k]),
-            message=f"{speed} of its range, where its limit is {{limit}}",
-            amounts={**axes.amounts(joint, 1, value, limit), "distance": ahead},
-        )
+        found = approach_excess(axes, ApproachUse(joint, *rates, float(self.distance[k]), time))
+        return replace(found, row=window.row_at(piece, local), rounding=float(self.rounding[k]))
 
 
 def _fast_approaches(
@@ -365,7 +335,7 @@ def judge_efforts(
     pieces: slice,
     robot: Robot,
     move: int,
-    axes: JointAxes,
+    axes: NamedJoints,
     worst: Collector,
     *,
     asked: bool,
@@ -434,7 +404,7 @@ class _OverEffort:
     limit: float
     peak: EffortPeak
 
-    def add(self, move: int, axes: JointAxes, worst: Collector, *, stated: float, asked: bool) -> None:
+    def add(self, move: int, axes: NamedJoints, worst: Collector, *, stated: float, asked: bool) -> None:
         """Add it by what is certain about it."""
         at = int(np.clip(np.searchsorted(self.breaks, self.peak.time, "right") - 1, 0, self.curved.size - 1))
         piece, local = int(self.curved[at]), float(self.peak.time - self.breaks[at])
@@ -465,31 +435,7 @@ class _OverEffort:
         inertia = np.abs(self.dynamics.mass_matrix(position)[self.joint])
         return float(inertia @ rows.error(2))
 
-    def _finding(self, piece: int, local: float, axes: JointAxes, rounding: float) -> Finding:
-        unit = effort_unit(self.dynamics.robot.joint_types[self.joint])
-        value, limit = self.sign * self.peak.most, self.sign * self.limit
-        time = float(self.window.t[piece]) + local
-        amounts: Amounts = {
-            "joint": axes.names[self.joint],
-            "value": Amount(value, unit=unit, rounded="up" if self.sign > 0 else "down"),
-            "limit": Amount(limit, unit=unit, rounded="down" if self.sign > 0 else "up"),
-            "gravity": Amount(self.sign * self.peak.gravity, unit=unit),
-        }
-        what = "force" if unit == "N" else "torque"
-        needed = needed_stretch(self.survey, self.joint, self.sign, self.limit, EFFORT_RELATIVE / 2).factor
-        return Finding(
-            rule="limit",
-            severity="error",
-            kind="effort",
-            joint=axes.names[self.joint],
-            value=value,
-            limit=limit,
-            time=time,
-            row=self.window.row_at(piece, local),
-            factor=needed if np.isfinite(needed) else None,
-            method="bounded",
-            rounding=rounding,
-            message=f"{{joint}} needs a {what} of {{value}} {at_time(time)}, {{gravity}} of it against "
-            "gravity; its limit is {limit}",
-            amounts=amounts,
-        )
+    def _finding(self, piece: int, local: float, axes: NamedJoints, rounding: float) -> Finding:
+        peak = replace(self.peak, time=float(self.window.t[piece]) + local)
+        found = effort_excess(axes, self.survey, self.joint, self.sign, self.limit, peak)
+        return replace(found, row=self.window.row_at(piece, local), rounding=rounding)

@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Problem
-from trajcli.findings import Collector, Finding
+from trajcli.findings import Collector, Finding, NamedJoints
 from trajcli.frozen import frozen
 from trajcli.judge.consistency import changes_of, judge_consistency
 from trajcli.judge.ends import judge_end, judge_order_of_stamps, judge_start
-from trajcli.judge.intervals import BESIDE, Intervals, JointAxes
+from trajcli.judge.intervals import BESIDE, Intervals
 from trajcli.judge.judgement import Judgement, worst_first
 from trajcli.judge.limits import judge_efforts, judge_limits, judge_velocity_by_position
 from trajcli.judge.reconstruction import Interpolation, chosen_interpolation
 from trajcli.judge.stamps import Stamps, UnfitError
-from trajcli.kinematics.robot import Limits, Robot
+from trajcli.kinematics.robot import QUANTITIES, Limits, Robot
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 from trajcli.trajectory import State
 
@@ -116,7 +116,7 @@ class MotionJudge:
         """Begin with no rows."""
         self._requirements, self._snap, self._worst = requirements, snap, Collector()
         robot = requirements.robot
-        self._axes = JointAxes(robot.joint_names, robot.joint_types)
+        self._axes = robot
         self._stamps: Stamps | None = None
         self._interpolation: Interpolation = "linear"
         self._kept: _Rows | None = None
@@ -188,7 +188,7 @@ class MotionJudge:
 
     def _begin(self, block: RecordedMotion) -> None:
         """Decide what the first rows decide for all: how they are joined, and the period."""
-        count, joints = block.q.shape[1], len(self._axes.names)
+        count, joints = block.q.shape[1], len(self._axes.joint_names)
         if count != joints:
             robot = self._requirements.robot.name
             raise InputError(
@@ -308,24 +308,13 @@ def _joined(blocks: list[RecordedMotion]) -> RecordedMotion:
 
 def _looser(a: Limits, b: Limits) -> Limits:
     """Return limits that two moves both keep."""
-    rows = []
-    for order in range(4):
-        (a_low, a_high), (b_low, b_high) = a.of_order(order).T, b.of_order(order).T
-        rows.append(np.stack([np.minimum(a_low, b_low), np.maximum(a_high, b_high)], axis=1))
+    both = {name: (getattr(a, name), getattr(b, name)) for name in (*QUANTITIES, "effort")}
+    rows = {
+        name: np.stack([np.minimum(one[:, 0], other[:, 0]), np.maximum(one[:, 1], other[:, 1])], axis=1)
+        for name, (one, other) in both.items()
+    }
     tcp = {name: max(value, getattr(b.tcp, name)) for name, value in vars(a.tcp).items()}
-    efforts = np.stack(
-        [
-            np.minimum(a.effort[:, 0], b.effort[:, 0]),
-            np.maximum(a.effort[:, 1], b.effort[:, 1]),
-        ],
-        axis=1,
-    )
-    return replace(
-        a,
-        effort=efforts,
-        **dict(zip(("position", "velocity", "acceleration", "jerk"), rows, strict=True)),
-        tcp=type(a.tcp)(**tcp),
-    )
+    return replace(a, **rows, tcp=type(a.tcp)(**tcp))
 
 
 def _check_finite(rows: Array | None, block: RecordedMotion, numbers: NDArray[np.int64]) -> None:
@@ -358,11 +347,11 @@ def _causes(findings: list[Finding]) -> list[Finding]:
     ]
 
 
-def _with_hint(finding: Finding, axes: JointAxes) -> Finding:
+def _with_hint(finding: Finding, axes: NamedJoints) -> Finding:
     """Return the finding with what would mend it, where that is known."""
     if finding.hint is not None or finding.joint is None or finding.value is None:
         return finding
-    turning = axes.types[axes.names.index(finding.joint)] == "revolute"
+    turning = axes.joint_types[axes.joint_names.index(finding.joint)] == "revolute"
     if finding.kind == "position" and turning and abs(finding.value) > _TURNS:
         size = f"{abs(finding.value):.6g}"
         return replace(finding, hint=f"values up to {size}: degrees? then say --units deg")

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.checks.tolerances import TOOL_RELATIVE
-from trajcli.checks.tool_bound import ToolPeak, tool_bounds
-from trajcli.checks.tool_limits import SPEEDS, limits_tool
 from trajcli.curves.piecewise import Array, derivative_coefficients, horner
-from trajcli.errors import Amount
 from trajcli.findings import Collector, Finding, at_time
 from trajcli.judge.intervals import DENSE, Intervals
 from trajcli.judge.tool_path import RecordedPath
@@ -20,6 +17,10 @@ from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.jacobian import jacobian
 from trajcli.kinematics.robot import Robot
+from trajcli.limits.kinds import LimitKind
+from trajcli.limits.tolerances import TOOL_RELATIVE
+from trajcli.limits.tool import BOUNDED, limits_tool, tool_excess
+from trajcli.limits.tool_bound import ToolPeak, tool_bounds
 
 _PIECES = 2048  # at a time: nine configurations of each are looked at
 _TURN = 0.05  # rad or m that a joint moves between the rows at which nearness to a singularity is looked at
@@ -102,51 +103,32 @@ class ToolJudge:
         breaks = window.t[pieces.start] + np.append(0.0, np.cumsum(window.lengths[pieces]))
         with np.errstate(over="ignore", invalid="ignore"):
             bounds = tool_bounds(robot, breaks, coefficients)
-        for (kind, name, order), peak in zip(SPEEDS, bounds, strict=True):
-            limit = float(getattr(robot.limits.tcp, name))
+        for kind, peak in zip(BOUNDED, bounds, strict=True):
+            limit, order = float(getattr(robot.limits.tcp, kind.key)), kind.order or 1
             if order > int(window.highest[pieces].max()) or peak.most <= limit * (1 + TOOL_RELATIVE):
                 continue
-            warned = not asked and self._only_between(window, pieces, (kind, name, order), peak, limit)
-            self._add_peak(window, pieces, (kind, name, order), peak, limit, move, warned=warned)
+            warned = not asked and self._only_between(window, pieces, kind, peak, limit)
+            self._add_peak(window, pieces, kind, peak, limit, move, warned=warned)
 
     def _add_peak(
         self,
         window: Intervals,
         pieces: slice,
-        what: tuple[str, str, int],
+        kind: LimitKind,
         peak: ToolPeak,
         limit: float,
         move: int,
         *,
         warned: bool,
     ) -> None:
-        kind, name, order = what
         piece = self._piece_at(window, pieces, peak.time)
-        rounding = self._rounding(window, piece, order)
-        length = not name.startswith("angular")
-        text = f"the {name.replace('_', ' ')} of the tool reaches {{value}} {at_time(peak.time)}"
-        finding = Finding(
-            rule="limit",
-            severity="error",
-            kind=_kind(kind),
-            joint=None,
-            value=peak.most,
-            limit=limit,
-            time=peak.time,
-            row=window.row_at(piece, peak.time - float(window.t[piece])),
-            factor=(peak.most / limit) ** (1 / order),
-            method="bounded",
-            rounding=rounding,
-            message=text + ", its limit is {limit}",
-            amounts={
-                "value": Amount(peak.most, order, None, "length" if length else "angle", "up"),
-                "limit": Amount(limit, order, None, "length" if length else "angle", "down"),
-            },
-        )
+        rounding = self._rounding(window, piece, kind.order or 1)
+        row = window.row_at(piece, peak.time - float(window.t[piece]))
+        finding = replace(tool_excess(kind, peak.most, limit, peak.time), row=row, rounding=rounding)
         certain = peak.most - limit > rounding
-        count = max(self._over(window, pieces, what, limit), 1)
+        count = max(self._over(window, pieces, kind, limit), 1)
         self._worst.add(
-            _kind(kind),
+            kind.name,
             move,
             np.full(count, -1),
             np.full(count, peak.most / limit),
@@ -160,10 +142,10 @@ class ToolJudge:
         return int(np.clip(np.searchsorted(window.t, time, "right") - 1, pieces.start, pieces.stop - 1))
 
     def _only_between(
-        self, window: Intervals, pieces: slice, what: tuple[str, str, int], peak: ToolPeak, limit: float
+        self, window: Intervals, pieces: slice, kind: LimitKind, peak: ToolPeak, limit: float
     ) -> bool:
         """Return whether rows that stand dense keep a limit, as far as their differences make it certain."""
-        _, name, order = what
+        order, angular = kind.order or 1, kind.dimension == "angle"
         lengths = window.lengths[pieces, None]
         if lengths.max() > DENSE or peak.most > _TWICE * limit:
             return False
@@ -174,25 +156,23 @@ class ToolJudge:
             poses = forward(self._robot, q)
             turns = np.swapaxes(poses[:-1, :3, :3], 1, 2) @ poses[1:, :3, :3]
             traces = np.clip((np.trace(turns, axis1=1, axis2=2) - 1.0) / 2.0, -1.0, 1.0)
-            angular = name.startswith("angular")
             moved = np.arccos(traces)[:, None] if angular else np.diff(poses[:, :3, 3], axis=0)
             return bool((np.linalg.norm(moved / lengths, axis=1) <= room).all())
         if qd is None:
             return True
         twists = (jacobian(self._robot, q) @ qd[rows, :, None])[..., 0]
-        part = twists[:, 3:] if name.startswith("angular") else twists[:, :3]
+        part = twists[:, 3:] if angular else twists[:, :3]
         changes = np.linalg.norm(np.diff(part, axis=0) / lengths, axis=1)
         return bool((changes <= room).all())
 
-    def _over(self, window: Intervals, pieces: slice, what: tuple[str, str, int], limit: float) -> int:
+    def _over(self, window: Intervals, pieces: slice, kind: LimitKind, limit: float) -> int:
         """Return at how many rows a speed of the tool is over its limit; 0 for accelerations."""
-        _, name, order = what
-        if order != 1:
+        if kind.order != 1:
             return 0
         coefficients = window.coefficients[:, pieces]
         q, qd = coefficients[-1], derivative_coefficients(coefficients, 1)[-1]
         twist = (jacobian(self._robot, q) @ qd[..., None])[..., 0]
-        part = twist[:, 3:] if name.startswith("angular") else twist[:, :3]
+        part = twist[:, 3:] if kind.dimension == "angle" else twist[:, :3]
         return int((np.linalg.norm(part, axis=1) > limit).sum())
 
     def _rounding(self, window: Intervals, piece: int, order: int) -> float:
@@ -259,14 +239,3 @@ class ToolJudge:
         new = np.flatnonzero(np.diff(number, prepend=self._seen) > 0)
         self._moved, self._seen = float(moved[-1]), int(number[-1])
         return np.asarray(new + pieces.start, dtype=np.intp)
-
-
-def _kind(kind: str) -> str:
-    """Return the kind of finding about a limit of the tool."""
-    kinds: dict[str, str] = {
-        "tool_speed": "tool_speed",
-        "tool_angular_speed": "tool_angular_speed",
-        "tool_acceleration": "tool_acceleration",
-        "tool_angular_acceleration": "tool_angular_acceleration",
-    }
-    return kinds[kind]

@@ -7,7 +7,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.checks.tolerances import exceeds
 from trajcli.curves.piecewise import Array, horner
 from trajcli.errors import Amount
 from trajcli.findings import Certainty, Collector, Finding, at_time
@@ -19,6 +18,7 @@ from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.inverse.target import residual_jacobian, residuals
 from trajcli.kinematics.jacobian import linearisation
 from trajcli.kinematics.robot import Robot
+from trajcli.limits.tolerances import exceeds
 
 _SAMPLES = 1000  # of a path, where the nearest point is looked for first
 _STEPS = 8  # of Gauss and Newton from there

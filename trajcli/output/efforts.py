@@ -12,8 +12,8 @@ from trajcli.planning.plan import Plan
 from trajcli.units import effort_unit
 
 if TYPE_CHECKING:
-    from trajcli.checks.effort import MoveEfforts
     from trajcli.dynamics.effort_bound import EffortPeak
+    from trajcli.limits.effort import MoveEfforts
 
 
 def payload_report(payload: Payload | None) -> PayloadReport | None:

@@ -36,7 +36,6 @@ from trajcli.job.report import (
     UncheckedToolReport,
     WaypointReport,
 )
-from trajcli.job.unit_hints import unit_hint
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.knots import Knots, knots_of
 from trajcli.output.efforts import effort_reports, efforts_report, most_used, payload_report
@@ -49,7 +48,7 @@ from trajcli.trajectory import Span, Trajectory
 from trajcli.version import __version__
 
 if TYPE_CHECKING:
-    from trajcli.checks.tool_bound import ToolPeak
+    from trajcli.limits.tool_bound import ToolPeak
 
 _ROUNDING = 1e-12  # rad or m: what leaves the range by less does not leave it
 _HELD = 0.999  # of the wanted speed: that much counts as holding it
@@ -295,18 +294,20 @@ def _tool(trajectory: Trajectory, span: Span, move: PlannedMove) -> ToolReport |
 
 
 def _tool_peaks(peaks: Mapping[str, ToolPeak], span: Span, robot: Robot) -> list[ToolPeakReport]:
-    from trajcli.checks.tool_limits import SPEEDS
+    from trajcli.limits.kinds import TOOL_KINDS
 
     reports = []
-    for _, name, order in SPEEDS:
-        peak, limit = peaks[name], float(getattr(robot.limits.tcp, name))
+    for kind in TOOL_KINDS:
+        if kind.key not in peaks:
+            continue
+        peak, limit = peaks[kind.key], float(getattr(robot.limits.tcp, kind.key))
         report = ToolPeakReport(
-            quantity=name,
+            quantity=kind.key,
             value=peak.value,
             bound=peak.most,
             time=span.start + peak.time,
             limit=None if math.isinf(limit) else limit,
-            unit=("rad" if name.startswith("angular_") else "m") + _RATES[order],
+            unit=kind.unit,
             negligible=peak.value <= _AT_REST,
         )
         reports.append(report)
@@ -363,6 +364,8 @@ def verification_error(plan: Plan, *, every: bool = True) -> VerificationError:
     findings = plan.verdict.findings
     if every:
         return VerificationError(*(_problem(plan, finding) for finding in findings))
+    from trajcli.job.unit_hints import unit_hint
+
     alike: dict[tuple[int | str | None, ...], list[Finding]] = {}
     units = unit_hint(plan.loaded)
     for finding in findings:

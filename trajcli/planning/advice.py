@@ -10,8 +10,9 @@ import numpy as np
 
 from trajcli.checks.verify import Verdict, longest_factor, verify
 from trajcli.errors import Amount, Problem, TrajcliError, at_least
-from trajcli.findings import LIMITS_OF_JOINTS, Finding
+from trajcli.findings import Finding
 from trajcli.kinematics.robot import Robot
+from trajcli.limits.kinds import LIMITS_OF_JOINTS
 from trajcli.planners import changed
 from trajcli.planners.planner import PlannedMove, Planner
 from trajcli.planning.retime import over_limit, slow_to_limits, smallest_stretch

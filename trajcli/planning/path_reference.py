@@ -18,7 +18,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from trajcli.checks.tolerances import exceeds
 from trajcli.curves.extrema import peaks
 from trajcli.curves.operations import compose
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
@@ -26,6 +25,7 @@ from trajcli.curves.time_optimal.constraints import JointConstraint, is_at_rest
 from trajcli.errors import PlanningError
 from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Limits
+from trajcli.limits.tolerances import exceeds
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.geometric_path import GeometricPath
 

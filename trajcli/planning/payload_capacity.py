@@ -13,14 +13,15 @@ from functools import partial
 
 import numpy as np
 
-from trajcli.checks.effort import move_efforts
-from trajcli.checks.tolerances import EFFORT_RELATIVE
 from trajcli.curves.piecewise import Array
 from trajcli.dynamics.newton_euler import InverseDynamics
 from trajcli.errors import Amount, InputError, Problem, TrajcliError, VerificationError
 from trajcli.frozen import frozen
 from trajcli.job.read import LoadedJob
 from trajcli.kinematics.robot import Payload, Robot, point_mass
+from trajcli.limits.effort import EffortFamily
+from trajcli.limits.kinds import LimitedMove
+from trajcli.limits.tolerances import EFFORT_RELATIVE
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.progress import report_progress
@@ -197,8 +198,9 @@ class _Search:
             robot = replace(move.robot, payload=Payload(mass, own.com, own.inertia))
             if not robot.limits.has_effort:
                 continue
-            efforts = move_efforts(plan.trajectory, plan.trajectory.spans[index], robot)
-            if efforts is not None and efforts.share(robot.limits.effort) > 1 + EFFORT_RELATIVE:
+            span = plan.trajectory.spans[index]
+            efforts = EffortFamily().survey(LimitedMove(plan.trajectory, span, robot.limits, robot))
+            if efforts is not None and efforts.share() > 1 + EFFORT_RELATIVE:
                 return False
         return True
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trajcli.checks.tolerances import JUMP_ABSOLUTE
 from trajcli.checks.verify import Verdict, verify
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
 from trajcli.errors import (
@@ -26,8 +25,10 @@ from trajcli.errors import (
 from trajcli.frozen import frozen
 from trajcli.job.limits import with_move_limits
 from trajcli.job.read import LoadedJob
-from trajcli.kinematics.robot import QUANTITIES, Payload, Robot, ToolLimits
+from trajcli.kinematics.robot import QUANTITIES, Payload, Robot
 from trajcli.language.targets import Target
+from trajcli.limits.kinds import has_further_limits
+from trajcli.limits.tolerances import JUMP_ABSOLUTE
 from trajcli.planners.planner import Event, PlannedMove, Planner, Resolve
 from trajcli.progress import report_progress
 from trajcli.trajectory import State, Trajectory
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from trajcli.planning.resolve_poses import ResolvedPose
 
 Carried = Callable[[int, Payload | None], Payload | None]
-_NO_TOOL_LIMITS = ToolLimits()
 
 
 @frozen
@@ -257,7 +257,7 @@ def plan_move_within(
 
         move = long_enough(index, planner, start, robot, error)
     limits = robot.limits
-    if limits.tcp != _NO_TOOL_LIMITS or limits.has_velocity_by_position or limits.has_effort:
+    if has_further_limits(limits):
         from trajcli.planning.retime import keep_further_limits
 
         move = keep_further_limits(move)

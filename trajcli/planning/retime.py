@@ -8,10 +8,10 @@ from math import ceil, copysign
 
 from trajcli.checks.verify import verify
 from trajcli.curves.operations import scale_time
-from trajcli.curves.smallest_feasible import smallest_feasible
 from trajcli.errors import Amount, Amounts, PlanningError, Problem, TrajcliError
-from trajcli.findings import LIMITS_OF_JOINTS, Finding
-from trajcli.kinematics.robot import Robot, ToolLimits
+from trajcli.findings import Finding
+from trajcli.kinematics.robot import Robot
+from trajcli.limits.kinds import KIND_OF, LIMITS_OF_JOINTS, LimitedMove, has_further_limits
 from trajcli.planners.planner import LITTLE, Event, Planned, PlannedMove, Planner
 from trajcli.trajectory import State
 from trajcli.units import effort_unit
@@ -21,8 +21,6 @@ LONGEST = 1e4
 _ONE_BY_ONE = 1  # factors tried at once: each costs a plan of its own
 _WHOLE = 1e-9  # of a period: what is this close to whole is whole
 _TRIES = 50
-_NO_TOOL_LIMITS = ToolLimits()
-_BY_POSITION, _EFFORT = "velocity_by_position", "effort"
 
 
 def with_duration(move: PlannedMove, duration: float) -> PlannedMove:
@@ -65,26 +63,18 @@ def keep_further_limits(move: PlannedMove) -> PlannedMove:
     force says how fast a move may be, whichever it is.
     """
     finds = move.planner.finds_duration and move.planner.without_duration() is None and move.duration > 0
-    limits = move.robot.limits
-    further = limits.tcp != _NO_TOOL_LIMITS or limits.has_velocity_by_position or limits.has_effort
-    if not (finds and further):
+    if not (finds and has_further_limits(move.robot.limits)):
         return move
-    in_joint_space = move.planned.tool is None
-    over = [
-        finding
-        for finding in over_limit(move)
-        if (finding.joint is None and in_joint_space) or finding.kind in (_BY_POSITION, _EFFORT)
-    ]
+    left = {"never", "on paths"} if move.planned.tool is None else {"never"}
+    over = [f for f in over_limit(move) if f.kind in KIND_OF and KIND_OF[f.kind].planned in left]
     factor = smallest_stretch(move, over) if over else None
     if factor is None or isinstance(factor, Problem):
         return move
-    kinds = {finding.kind for finding in over}
-    if kinds & {_BY_POSITION, _EFFORT} and factor <= 1 + LITTLE:
+    if factor <= 1 + LITTLE and any(KIND_OF[finding.kind].planned == "never" for finding in over):
         return _stretched(move, factor, over, "refined")
     if move.planner.one_shape and move.at_rest:
         worst = max(over, key=lambda finding: finding.factor or 0.0).kind
-        kind = f"within_{worst if worst in (_BY_POSITION, _EFFORT) else 'tool'}"
-        return _stretched(move, factor, over, kind if worst == _BY_POSITION else f"{kind}_limits")
+        return _stretched(move, factor, over, KIND_OF[worst].event)
     return _stretched(move, factor, over, "stretched", "; a faster motion may exist")
 
 
@@ -149,6 +139,7 @@ def smallest_stretch(move: PlannedMove, over: Sequence[Finding]) -> float | Prob
         if None in factors:
             return Problem("change the target, the start or the limit")
         return max(f for f in factors if f is not None)
+    from trajcli.curves.smallest_feasible import smallest_feasible
     from trajcli.planning.slowing import StretchSearch, why_no_duration
 
     reason = why_no_duration(move)
@@ -165,7 +156,7 @@ def _stretched(
     """Return the move that lasts `factor` times longer, with an event that names the worst finding."""
     slower = with_duration(move, move.duration * factor)
     worst = max(over, key=lambda finding: finding.factor or 0.0)
-    limit = worst.kind.removeprefix("tool_").replace("_", " ")
+    limit = KIND_OF[worst.kind].words
     message = (
         f"stretched {slower.duration / move.duration:.6g} times, from {{before}} to {{after}}, "
         f"to keep the {limit} limit of {{whose}}{remark}"
@@ -194,11 +185,12 @@ def require_holdable(move: PlannedMove) -> None:
         PlanningError: With the joint, the place and by how much.
         InputError: When a link of the arm has no inertia, or the arm no geometry.
     """
-    from trajcli.checks.effort import held_over_limit, move_efforts
+    from trajcli.limits.effort import EffortFamily
 
     trajectory = move.alone()
-    efforts = move_efforts(trajectory, trajectory.spans[0], move.robot)
-    over = None if efforts is None else held_over_limit(move.robot, efforts)
+    limited = LimitedMove(trajectory, trajectory.spans[0], move.robot.limits, move.robot)
+    efforts = EffortFamily().survey(limited)
+    over = None if efforts is None else efforts.held_over()
     if over is None:
         return
     joint, limit, peak = over

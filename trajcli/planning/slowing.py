@@ -7,73 +7,37 @@ from collections.abc import Callable
 import numpy as np
 
 from trajcli.checks.braking import judged_peaks
-from trajcli.checks.limits import peaks_by_move
-from trajcli.checks.tolerances import EFFORT_RELATIVE, exceeds
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount, Amounts, PlanningError, Problem
-from trajcli.kinematics.robot import QUANTITIES, ToolLimits, share_of_limits
+from trajcli.kinematics.robot import ToolLimits
+from trajcli.limits.joints import JointSurvey, peaks_by_move
+from trajcli.limits.kinds import LimitedMove, families, family
+from trajcli.limits.tolerances import exceeds
 from trajcli.planners.planner import PlannedMove
 from trajcli.trajectory import State
 
-_ROOM = 1e-10  # relative; a tenth of the tolerance of limits, so that rounding does not tip the later verdict
 _PROBED = (1.5, 4.0, 30.0)  # times the duration: a planner that refuses all of them refuses any
-_NO_TOOL_LIMITS = ToolLimits()
 
 
 def why_no_duration(move: PlannedMove) -> Problem | None:
     """Return why no motion whatever between the ends of a move keeps the limits, where that is plain."""
-    if move.robot.limits.tcp != _NO_TOOL_LIMITS:
-        from trajcli.checks.tool_limits import tool_ends_over_limit
-
-        if tool_ends_over_limit(move.robot, (move.start, move.planned.end)):
-            return Problem("the tool is too fast where the move starts or ends")
+    limits, ends = move.robot.limits, (move.start, move.planned.end)
+    if limits.tcp != ToolLimits() and family("tool").over_at_ends(move.robot, ends, ("tool_speed", -1, 0.0)):
+        return Problem("the tool is too fast where the move starts or ends")
     if move.planned.begins is not None or move.planned.origin:
         return None  # where the curve begins and ends depends on its duration
     if move.planned.braking is not None:
         return None  # it may start outside its limits
-    for state, verb in ((move.start, "starts"), (move.planned.end, "ends")):
-        reason = _beyond(move, state, verb) or _too_near(move, state, verb) or _no_room(move, state, verb)
-        if reason is not None:
-            return reason
+    judges = [family("joints"), *(each for _, each in families(limits, further=True))]
+    for state, verb in zip(ends, ("starts", "ends"), strict=True):
+        for judge in judges:
+            reason = judge.why_not_in_state(move.robot, state)
+            if reason is not None:
+                return Problem(reason[0].replace("{verb}", verb), amounts=reason[1])
+        short = _no_room(move, state, verb)
+        if short is not None:
+            return short
     return None
-
-
-def _beyond(move: PlannedMove, state: State, verb: str) -> Problem | None:
-    """Return that a joint is over a limit in the state in which the move starts, or ends."""
-    for order, values in enumerate((state.position, state.velocity, state.acceleration)):
-        low, high = move.robot.limits.of_order(order).T
-        over = exceeds(values, high) | exceeds(-values, -low)
-        if over.any():
-            joint = int(np.flatnonzero(over)[0])
-            value = float(values[joint])
-            amounts: Amounts = {
-                "joint": move.robot.joint_names[joint],
-                "value": Amount(value, order, joint),
-                "limit": Amount(float(high[joint] if value > high[joint] else low[joint]), order, joint),
-            }
-            message = f"{{joint}} {verb} with {QUANTITIES[order]} {{value}}, its limit is {{limit}}"
-            return Problem(message, amounts=amounts)
-    return None
-
-
-def _too_near(move: PlannedMove, state: State, verb: str) -> Problem | None:
-    """Return that a joint is too fast for its distance from its limit where the move starts, or ends."""
-    if not move.robot.limits.has_velocity_by_position:
-        return None
-    from trajcli.checks.velocity_by_position import ends_over_velocity_by_position
-
-    joint = ends_over_velocity_by_position(move.robot.limits, [state])
-    if joint is None:
-        return None
-    velocity = float(state.velocity[joint])
-    bound = move.robot.limits.approach.bounds(state.position)[int(velocity > 0)]
-    amounts: Amounts = {
-        "joint": move.robot.joint_names[joint],
-        "value": Amount(velocity, 1, joint),
-        "limit": Amount(float(bound[joint]), 1, joint),
-    }
-    message = f"{{joint}} {verb} with {{value}}; so near to its position limit at most {{limit}} is allowed"
-    return Problem(message, amounts=amounts)
 
 
 def _no_room(move: PlannedMove, state: State, verb: str) -> Problem | None:
@@ -160,26 +124,10 @@ class StretchSearch:
         alone, robot = longer.alone(), longer.robot
         (peaks,) = judged_peaks(alone, [robot.limits], [longer.promise], peaks_by_move(alone))
         self._learn(factor, peaks[0].low, peaks[0].high)
-        joints = float(share_of_limits([(p.low, p.high) for p in peaks], robot.limits)) - (1 + _ROOM)
-        if robot.limits.has_velocity_by_position:
-            from trajcli.checks.velocity_by_position import velocity_by_position_uses
-
-            uses = velocity_by_position_uses(alone, alone.spans[0], robot.limits)
-            joints = max([joints, *(use.used - (1 + _ROOM) for use in uses)])
-        if robot.limits.has_effort:
-            from trajcli.checks.effort import move_efforts
-
-            efforts = move_efforts(alone, alone.spans[0], robot)
-            used = 0.0 if efforts is None else efforts.share(robot.limits.effort)
-            joints = max(joints, used - (1 + EFFORT_RELATIVE / 2))
-        if robot.limits.tcp == _NO_TOOL_LIMITS:
-            return joints
-        from trajcli.checks.tool_limits import limits_tool, share_of_tool_limits, tool_peaks
-
-        if not limits_tool(robot):
-            return joints
-        of_tool = tool_peaks(alone, alone.spans[0], robot)
-        return max(joints, share_of_tool_limits(robot.limits.tcp, of_tool) - 1)
+        limited = LimitedMove(alone, alone.spans[0], robot.limits, robot)
+        further = (each.survey(limited) for _, each in families(robot.limits, further=True))
+        surveys = (JointSurvey(tuple(peaks), robot.limits), *further)
+        return max(survey.excess() for survey in surveys if survey is not None)
 
     def _learn(self, factor: float, lowest: Array, highest: Array) -> None:
         """Note from which factor on the range of a joint is left, and ever more so."""

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from topp_paths import polyline, spline, symmetric
 
-from trajcli.checks.tolerances import JUMP_ABSOLUTE
 from trajcli.curves.time_optimal.parameterization import time_optimal
 from trajcli.curves.time_optimal.passes import UnreachableSpeedError
+from trajcli.limits.tolerances import JUMP_ABSOLUTE
 
 
 def test_a_joint_that_turns_back_beside_a_fast_one_is_a_corner():

@@ -33,7 +33,7 @@ from trajcli.kinematics.following.motion import motion_along
 from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.robot import Robot, ToolLimits
-from trajcli.planners.approach_limits import approach_constraints
+from trajcli.limits.kinds import path_constraints
 from trajcli.planners.boundary_states import missing_limit
 from trajcli.planners.effort_limits import (
     effort_constraints,
@@ -74,7 +74,7 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
     tcp = _limits(spec, robot.limits.tcp)
     limits = robot.limits
     with joints.diagnosed():
-        further = (ToolConstraint(joints.executed, tcp), *approach_constraints(curve, robot))
+        further = (ToolConstraint(joints.executed, tcp), *path_constraints(curve, robot))
 
         of_law = _jerk_of_law(tcp, angular=path.poses.pure_rotation)
         keeps_jerk = bool(of_law) or _moving(curve)[np.isfinite(limits.jerk).any(axis=1)].any()

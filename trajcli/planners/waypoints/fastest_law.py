@@ -17,7 +17,7 @@ from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion, Unse
 from trajcli.curves.time_optimal.passes import UnreachableSpeedError
 from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.kinematics.robot import Robot
-from trajcli.planners.approach_limits import approach_constraints
+from trajcli.limits.kinds import path_constraints
 from trajcli.planners.effort_limits import solved_within_efforts
 from trajcli.planners.law_events import distance_from_bound, solved_by_convex_steps
 from trajcli.planners.planner import Event, stretched
@@ -67,7 +67,7 @@ def solve_within_jerk(
     if not (bends and path.speeds[0]):
         _require_along(across, acceleration, robot)
     limits = robot.limits
-    curve, speeds, further = path.curve, path.speeds, approach_constraints(path.curve, robot)
+    curve, speeds, further = path.curve, path.speeds, path_constraints(path.curve, robot)
 
     def solve(efforts: tuple[PathConstraint, ...]) -> TimeOptimalMotion:
         return jerk_limited_time_optimal(
@@ -112,7 +112,7 @@ def solve_second_order(path: JointPath, robot: Robot) -> TimeOptimalMotion:
         PlanningError: When the velocities at the ends are too high.
     """
     limits = robot.limits
-    further = approach_constraints(path.curve, robot)
+    further = path_constraints(path.curve, robot)
 
     def solve(efforts: tuple[PathConstraint, ...]) -> TimeOptimalMotion:
         return time_optimal(

@@ -36,7 +36,7 @@ from trajcli.language.numbers import (
 from trajcli.language.per_joint import JointDistance
 from trajcli.language.poses import read_numbers
 from trajcli.language.recorded import Recorded
-from trajcli.planners.approach_limits import approach_constraints
+from trajcli.limits.kinds import path_constraints
 from trajcli.planners.boundary_states import missing_limit, same_state, standstill
 from trajcli.planners.effort_limits import effort_constraints, effort_shares, lacks_acceleration
 from trajcli.planners.planner import Phase, Planned
@@ -242,7 +242,7 @@ class TimeOptimal(ThroughPoints):
         )
         joints = JointConstraint(path.curve, limits.velocity, limits.acceleration)
         curve = path.curve
-        constraints = (joints, *approach_constraints(curve, robot), *effort_constraints(curve, robot))
+        constraints = (joints, *path_constraints(curve, robot), *effort_constraints(curve, robot))
         return PhasePlane(motion.law, constraints, path.curve.breaks, motion.stops, dimension)
 
     def _in_one_point(self, start: State, points: PointTable, robot: Robot) -> Planned:

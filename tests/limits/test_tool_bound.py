@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from trajcli.checks import tool_bound
-from trajcli.checks.tool_bound import tool_bounds
 from trajcli.job.robot import load_robot
 from trajcli.kinematics.jacobian import tcp_acceleration, tcp_twist
 from trajcli.kinematics.robot import Robot
+from trajcli.limits import tool_bound
+from trajcli.limits.tool_bound import tool_bounds
 
 RNG = np.random.default_rng(5)
 WITHIN = 1e-6  # relative, what is promised

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from trajcli.checks import tool_bound
-from trajcli.checks.tool_bound import tool_bounds
 from trajcli.job.robot import load_robot
+from trajcli.limits import tool_bound
+from trajcli.limits.tool_bound import tool_bounds
 
 NODES = np.linspace(0.0, 1.0, 9)
 HIDDEN = 1e-7  # of what the rows show: as little is not worth halving the piece

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from trajcli.checks.tolerances import allowed_jump, exceeds
+from trajcli.limits.tolerances import allowed_jump, exceeds
 
 
 @pytest.mark.parametrize("bound", [1e-3, 1.0, 2e4])

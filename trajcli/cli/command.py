@@ -1,0 +1,109 @@
+"""Descriptions of commands: one class a command, whose fields are its arguments and options for typer.
+
+Only typer is imported here: `--help` must stay fast.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from functools import cached_property
+from importlib import import_module
+from inspect import Parameter, Signature, get_annotations
+from typing import Any, ClassVar, NoReturn, Self, TypeVar, dataclass_transform, get_type_hints
+
+import typer
+import typer.core
+
+from trajcli.cli.options import Errors
+from trajcli.cli.outcome import ErrorForm, exit_code
+
+P = TypeVar("P")
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True)
+class CommandLine:
+    """What a command line says; a subclass states each argument and option once, its docstring is the help.
+
+    `trajcli NAME` is what the class `NameCommand` describes, and `run_name` in the module of that name does.
+
+    Attributes:
+        example: A command line that runs.
+        module: Where the function stands; the command's name where it is empty.
+        parser: How typer takes the words apart.
+    """
+
+    example: ClassVar[str]
+    module: ClassVar[str] = ""
+    parser: ClassVar[type[typer.core.TyperCommand]] = typer.core.TyperCommand
+    errors: ErrorForm
+
+    def __init__(self, **given: Any) -> None:  # noqa: ANN401
+        vars(self).update(given)
+
+    def replaced(self, **given: Any) -> Self:  # noqa: ANN401
+        """Return the same with other values for some fields."""
+        return type(self)(**{**vars(self), **given})
+
+    def part(self, kind: type[P]) -> P:
+        """Return a frozen value whose fields are those of the same names here."""
+        return kind(**{name: getattr(self, name) for name in kind.__match_args__})  # type: ignore[attr-defined]
+
+    @classmethod
+    def word(cls) -> str:
+        """Return the command's name."""
+        return cls.__name__.removesuffix("Command").lower()
+
+    @classmethod
+    def fields(cls) -> dict[str, Any]:
+        """Return the type of each field with what typer knows; a command's own before inherited ones."""
+        hints = get_type_hints(cls, include_extras=True)
+        described = cls.__mro__[: cls.__mro__.index(CommandLine)]
+        return {name: hints[name] for each in described for name in get_annotations(each)}
+
+
+class Command(CommandLine):
+    """A command whose errors are for people, or for programs as JSON."""
+
+    errors: Errors = "text"
+
+
+class Callback:
+    """A command as the function that typer asks for; its options are read when typer makes the command."""
+
+    def __init__(self, command: type[CommandLine]) -> None:
+        self._command = command
+        self.__name__, self.__doc__ = command.word(), command.__doc__
+
+    @cached_property
+    def __annotations__(self) -> dict[str, Any]:  # type: ignore[override]
+        return self._command.fields()
+
+    @cached_property
+    def __signature__(self) -> Signature:
+        command = self._command
+        return Signature(
+            [
+                Parameter(
+                    name,
+                    Parameter.KEYWORD_ONLY,
+                    default=getattr(command, name, Parameter.empty),
+                    annotation=hint,
+                )
+                for name, hint in self.__annotations__.items()
+            ]
+        )
+
+    def __call__(self, **given: Any) -> NoReturn:  # noqa: ANN401
+        """Leave with the exit code of the command."""
+        command = self._command(**given)
+        module = import_module(f"trajcli.cli.{command.module or command.word()}")
+        sys.exit(exit_code(getattr(module, f"run_{command.word()}"), command, command.errors))
+
+
+def register(app: typer.Typer, commands: Iterable[type[CommandLine]]) -> None:
+    """Add commands to an application, in their order."""
+    for command in commands:
+        app.command(command.word(), cls=command.parser, epilog=f"Example: {command.example}")(
+            Callback(command)
+        )

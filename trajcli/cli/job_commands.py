@@ -1,0 +1,247 @@
+"""Commands about jobs, and the judge of anybody's samples.
+
+Only typer is imported here: `--help` must stay fast.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import typer
+
+from trajcli.cli.command import Command, CommandLine
+from trajcli.cli.options import JobErrors, JobFile, Json, Overrides, profile_words, robot_names
+
+
+class PlanCommand(CommandLine):
+    """Plan a job, verify it, and write it: rows as CSV or JSON lines, a log, or a goal for a controller."""
+
+    example = "trajcli plan examples/ur5e_pick.yaml -o rows.csv"
+    module = "gate"
+
+    job: JobFile
+    others: Annotated[
+        list[str], typer.Argument(metavar="JOB", help="More jobs, which are only judged: with --no-output.")
+    ] = []
+    output: Annotated[
+        str | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="FILE.csv, .mcap, .jsonl or .yaml (a ROS message).",
+        ),
+    ] = None
+    form: Annotated[
+        Literal["csv", "mcap", "jsonl", "ros", "ros-goal"] | None,
+        typer.Option("--format", help="Of stdout, and which message a .yaml holds.", show_default="csv"),
+    ] = None
+    report: Annotated[
+        str | None, typer.Option("--report", metavar="FILE", help="Write the verification report as JSON.")
+    ] = None
+    resolved: Annotated[
+        str | None,
+        typer.Option(
+            "--resolved", metavar="FILE", help="Write the job as it was understood: names, units and limits."
+        ),
+    ] = None
+    rate: Annotated[str | None, typer.Option("--rate", metavar="HZ", help="Rows per second.")] = None
+    override: Overrides = []
+    digits: Annotated[
+        Literal["fixed", "full"] | None,
+        typer.Option("--digits", help="fixed: nine decimals; full: every bit.", show_default="fixed"),
+    ] = None
+    topics: Annotated[
+        str | None,
+        typer.Option(
+            "--topics",
+            metavar="/A,/B",
+            help="MCAP: topics beside the usual ones, /joint_trajectory_point or /tool_twist.",
+        ),
+    ] = None
+    epoch: Annotated[
+        str | None,
+        typer.Option("--epoch", metavar="SECONDS", help="MCAP: time of the log at t = 0.", show_default="0"),
+    ] = None
+    compression: Annotated[
+        Literal["zstd", "lz4", "none"] | None,
+        typer.Option("--compression", help="MCAP: of the messages.", show_default="zstd"),
+    ] = None
+    strict: Annotated[
+        bool,
+        typer.Option("--strict", help="Exit 1 when there is an event: a concession, or a warning of --for."),
+    ] = False
+    reference: Annotated[
+        bool,
+        typer.Option(
+            "--reference",
+            help="Compare each move with the fastest under the same limits, along a path with toppra.",
+        ),
+    ] = False
+    consumer: Annotated[
+        str | None,
+        typer.Option(
+            "--for",
+            metavar="PROFILE",
+            help="Judge the rows as written by the rules of a consumer, such as ros-jtc: `trajcli profiles`.",
+            autocompletion=profile_words,
+        ),
+    ] = None
+    no_output: Annotated[bool, typer.Option("--no-output", help="Only judge: write no rows.")] = False
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on stderr.")] = False
+    si: Annotated[
+        bool, typer.Option("--si", help="Rows in rad and m, whatever units the job has: plain column names.")
+    ] = False
+    every: Annotated[
+        bool, typer.Option("--all", help="Every finding, not only the worst of each move and kind.")
+    ] = False
+    errors: JobErrors = "text"
+
+
+class ExplainCommand(Command):
+    """Say each move in words and formulas: polynomials, phases, peaks, branches, and how fast it could be."""
+
+    example = "trajcli explain examples/cubic.yaml"
+
+    job: JobFile
+    override: Overrides = []
+    move: Annotated[
+        int | None, typer.Option("--move", metavar="N", help="Only this move, counted from 0.")
+    ] = None
+    derivatives: Annotated[
+        bool, typer.Option("--derivatives", help="Also the polynomials of velocity and acceleration.")
+    ] = False
+    sensitivity: Annotated[
+        bool,
+        typer.Option(
+            "--sensitivity", help="What each limit that is 10 % higher would save: plans the moves anew."
+        ),
+    ] = False
+    reference: Annotated[
+        bool,
+        typer.Option(
+            "--reference", help="Compare each move along a path with toppra, and judge what peers return."
+        ),
+    ] = False
+    as_json: Json = False
+
+
+class PayloadCommand(Command):
+    """Find the largest mass with which a job still verifies, and which joint then is at its limit, and when.
+
+    It is the mass of what the job attaches, at its centre of mass and with its inertia; where it attaches
+    nothing, of a point at the tcp. Moves that find their durations are planned anew for each mass.
+
+    Exit codes: 0 found; 1, 2, 3 as of plan, where the job does not verify even without it.
+    """
+
+    example = "trajcli payload examples/pick_carry_place.yaml"
+
+    job: JobFile
+    override: Overrides = []
+    at: Annotated[
+        int | None,
+        typer.Option("--at", metavar="MOVE", help="Only what is carried in this move, counted from 0."),
+    ] = None
+    as_json: Json = False
+
+
+class CheckCommand(Command):
+    """Judge anybody's trajectory for all t. Exit 0: satisfied or within rounding, 1: exceeded."""
+
+    example = "trajcli check rows.csv --job examples/ur5e_pick.yaml"
+
+    file: Annotated[
+        str, typer.Argument(metavar="FILE", help="A CSV, JSON lines, ROS, MCAP or .npy file; - is stdin.")
+    ]
+    job: Annotated[
+        str | None,
+        typer.Option("--job", metavar="JOB", help="Robot, limits, start, end and paths that it shall keep."),
+    ] = None
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            "--robot",
+            "-r",
+            metavar="NAME|FILE",
+            help="Instead of a job: a robot of the catalogue, a robot file or a URDF.",
+            autocompletion=robot_names,
+        ),
+    ] = None
+    limits: Annotated[
+        str | None,
+        typer.Option(
+            "--limits",
+            metavar="FILE",
+            help="Of the joints and the tool instead of the robot's: as under `limits` in a job.",
+        ),
+    ] = None
+    columns: Annotated[
+        str | None,
+        typer.Option(
+            "--columns",
+            metavar="MAP",
+            help="What columns are, such as t=timestamp,q=target_q: prefixes or names.",
+        ),
+    ] = None
+    units: Annotated[
+        str | None, typer.Option("--units", metavar="UNITS", help="Of columns that name none, as deg,mm.")
+    ] = None
+    topic: Annotated[
+        str | None,
+        typer.Option("--topic", metavar="T", help="MCAP: the topic.", show_default="/joint_states"),
+    ] = None
+    field: Annotated[
+        str | None,
+        typer.Option("--field", metavar="F", help="Of messages with several states, such as reference."),
+    ] = None
+    interpolate: Annotated[
+        Literal["hold", "linear", "cubic", "quintic", "jtc", "jtc-upsampling"] | None,
+        typer.Option(
+            "--interpolate",
+            help="How the consumer joins the rows.",
+            show_default="the highest degree that the columns allow",
+        ),
+    ] = None
+    profile: Annotated[
+        str | None,
+        typer.Option(
+            "--for",
+            metavar="PROFILE",
+            help="Also the rules of a consumer: `trajcli profiles` lists them.",
+            autocompletion=profile_words,
+        ),
+    ] = None
+    payload: Annotated[
+        str | None,
+        typer.Option(
+            "--payload",
+            metavar="PAYLOAD",
+            help="What the arm of --robot carries, {mass, com?, inertia?} or @FILE; its efforts then count.",
+        ),
+    ] = None
+    start_tolerance: Annotated[
+        str | None,
+        typer.Option(
+            "--start-tolerance",
+            metavar="X",
+            help="How near the first row must be to the job's start.",
+            show_default="0.001 rad or m",
+        ),
+    ] = None
+    form: Annotated[
+        Literal["table", "json", "junit", "sarif", "github"],
+        typer.Option("--format", help="Of what is printed."),
+    ] = "table"
+    reference: Annotated[
+        bool,
+        typer.Option(
+            "--reference", help="Compare with ruckig between its ends, and with toppra along its points."
+        ),
+    ] = False
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Exit 1 also within rounding, and when there are events.")
+    ] = False
+
+
+JOB_COMMANDS: tuple[type[CommandLine], ...] = (PlanCommand, ExplainCommand, PayloadCommand, CheckCommand)
