@@ -1,11 +1,12 @@
 """Laws from rest to rest in closed form: the cycloid, and the phases of the double S.
 
 The cycloid is s(u) = u - sin(2 pi u) / (2 pi), whose acceleration is a sine: zero at both ends. It is no
-polynomial: pieces of the ninth degree follow it, each the law's own Taylor series at its start. Over a piece of width h the series is off by s^(10) h^10 / 10!, which at 64 pieces is 4e-18 of the
-displacement; where pieces meet, the acceleration jumps by 2e-13 of its peak. Taking the coefficients from
-the series, and not from conditions at both ends, divides no difference of nearly equal numbers by a power
-of h: their last bits stay last bits, and files stay the same from machine to machine. Breaks stand where
-velocity, acceleration and jerk have their peaks (quarters), so the peaks 2, 2 pi and 4 pi^2 are met.
+polynomial: pieces of the ninth degree follow it, each the law's own Taylor series at its start. Over a piece
+of width h the series is off by s^(10) h^10 / 10!, which at 64 pieces is 4e-18 of the displacement; where
+pieces meet, the acceleration jumps by 2e-13 of its peak. Taking the coefficients from the series, and not
+from conditions at both ends, divides no difference of nearly equal numbers by a power of h: their last bits
+stay last bits, and files stay the same from machine to machine. Breaks stand where velocity, acceleration and
+jerk have their peaks (quarters), so the peaks 2, 2 pi and 4 pi^2 are met.
 
 The double S has seven phases. Velocity rises by jerk, constant acceleration and jerk, stays, and falls the
 same way. `t_j` is the duration of each of the four phases with jerk, `t_a` that of each of the two with

@@ -12,7 +12,6 @@ from trajcli.columns import Column, require_finite, whole_number_columns
 from trajcli.curves.piecewise import Array
 from trajcli.errors import TrajcliError
 from trajcli.streams.decimals import Digits, NotFixedError, encode_fixed, scan_fixed
-from trajcli.streams.number_cells import scan_decimals
 
 _CHUNK = 1 << 18  # bytes read back at a time
 _HALF_UNIT = 0.5e-9 + 1e-12  # the last decimal's half, and the first of the two roundings
@@ -135,6 +134,8 @@ class _RowsReadBack:
         with suppress(NotFixedError):
             return scan_fixed(text, self._width, self._whole_numbers)
         if text.endswith(b"\n"):
+            from trajcli.streams.number_cells import scan_decimals
+
             with suppress(NotFixedError):
                 return scan_decimals(text, self._width)[0]
         return self._scan_any(text)
