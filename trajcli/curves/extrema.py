@@ -326,8 +326,6 @@ def _surveyed(
     shape = (2, windows.piece.size, curve.dimension)
     ends, worth = np.empty((len(orders), *shape)), np.full(shape[1:], windows.piece.size < _MANY)
     few = bool(worth.all())
-    if not few:
-
     begin, end = windows.start - windows.origin, windows.end - windows.origin
     for at_ends, order in zip(ends, orders, strict=True):
         hull = np.empty((0, *shape[1:]) if few else shape)
