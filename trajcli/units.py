@@ -135,6 +135,13 @@ def effort_quantity(joint_type: str) -> Quantity:
     return Quantity("force" if joint_type == "prismatic" else "torque")
 
 
+def joint_units(joint_types: Sequence[str], order: int = 0) -> list[str]:
+    """Return the SI unit of each joint's position, or of its time derivative of an order."""
+    return [
+        ("m" if kind == "prismatic" else "rad") + ("", "/s", "/s^2", "/s^3")[order] for kind in joint_types
+    ]
+
+
 def effort_unit(joint_type: str) -> str:
     """Return the unit of what drives a joint, the same in all units of a job."""
     return _FIXED[effort_quantity(joint_type).dimension]

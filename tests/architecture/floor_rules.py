@@ -20,6 +20,7 @@ FLOORS = (
     ("job",),
     ("planning", "comparison", "queries", "consumers"),
     ("judge",),
+    ("peers",),
     ("output", "plots", "player", "editing"),
     ("batches",),
     ("cli", "api"),
@@ -51,7 +52,7 @@ SAME_WORDS = {
 """Literals that are compared with, and are the name of a planner by chance: file and literal."""
 
 SOLVERS: dict[str, str] = {
-    "planning/lower_bound.py trajcli.planners.ruckig": "the bound of a duration is ruckig's own solution",
+    "peers/lower_bound.py trajcli.planners.ruckig": "the bound of a duration is ruckig's own solution",
 }
 """Why a file above the planners needs more of them than their contract: file and module."""
 

@@ -12,8 +12,8 @@ from independent_judge import broken_limits, extremes, step_breakers
 from random_jobs import MOST_JOINTS, RATES, TAGS, loaded, random_job
 
 from trajcli.errors import InputError, PlanningError
-from trajcli.output.report import reference_of
-from trajcli.planning.lower_bound import LowerBound, fastest_duration
+from trajcli.peers.lower_bound import LowerBound, fastest_duration
+from trajcli.peers.move_reference import reference_of
 from trajcli.planning.plan import Plan, plan_job
 
 SEEDS = st.integers(0, 2**32 - 1)

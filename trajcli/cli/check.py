@@ -17,7 +17,7 @@ from trajcli.units import Units, amount_text
 
 if TYPE_CHECKING:
     from trajcli.cli.job_commands import CheckCommand
-    from trajcli.output.motion_reference import MotionReference
+    from trajcli.peers.motion_reference import MotionReference
 
 _MOST, _FEW = 30, 4  # findings that a table lists: of those that are certain, and of each other group
 _JOINED = {
@@ -40,7 +40,7 @@ def run_check(options: CheckCommand) -> int:
     checked = check_file(options.file, options.part(CheckOptions))
     beside = None
     if options.reference:
-        from trajcli.output.motion_reference import compared
+        from trajcli.peers.motion_reference import compared
 
         judgement, beside = compared(checked)
         checked = replace(checked, judgement=judgement)

@@ -96,7 +96,7 @@ def _profile(options: PlanCommand) -> Profile | None:
 
 def _contradicted(plan: Plan) -> VerificationError | None:
     """Return the error of moves that are faster than any motion within their limits can be."""
-    from trajcli.output.references import contradictions_of, reference_of
+    from trajcli.peers.move_reference import contradictions_of, reference_of
 
     found = contradictions_of(plan.trajectory.spans, [reference_of(move) for move in plan.moves])
     problems = [

@@ -30,11 +30,11 @@ from trajcli.job.explanation import (
 from trajcli.job.report import MoveReport, WaypointReport
 from trajcli.job.reports.part import in_units
 from trajcli.output.polynomials import blends_of, knots_of, polynomial_intervals, polynomials_of
-from trajcli.output.report import joint_units, report_of
+from trajcli.output.report import report_of
 from trajcli.output.sensitivity import with_savings
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan
-from trajcli.units import Quantity, Units, factor
+from trajcli.units import Quantity, Units, factor, joint_units
 
 if TYPE_CHECKING:
     from trajcli.geometry.paths.chain import Corner

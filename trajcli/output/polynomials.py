@@ -17,9 +17,8 @@ from trajcli.curves.piecewise import Array, derivative_coefficients, taylor_shif
 from trajcli.geometry.rotation import Flags
 from trajcli.job.explanation import BlendReport, KnotReport, PolynomialReport, polynomial_reports
 from trajcli.job.reports.part import in_units
-from trajcli.output.report import joint_units
 from trajcli.planners.planner import Phase, PlannedMove
-from trajcli.units import Units
+from trajcli.units import Units, joint_units
 
 _NOTHING = 1e-12  # of the largest term of a piece: what is smaller came from rounding
 _NOTHING_OF_ALL = 1e-14  # of the largest term of all pieces: likewise

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -39,12 +39,11 @@ from trajcli.job.report import (
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.knots import Knots, knots_of
 from trajcli.output.efforts import effort_reports, efforts_report, most_used, payload_report
-from trajcli.output.references import contradictions_of, path_reference_of, reference_of
-from trajcli.output.references import joint_units as joint_units  # noqa: PLC0414
 from trajcli.output.sensitivity import at_limit_of
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan
 from trajcli.trajectory import Span, Trajectory
+from trajcli.units import joint_units
 from trajcli.version import __version__
 
 if TYPE_CHECKING:
@@ -73,8 +72,7 @@ def report_of(
     moves = tuple(
         _move(plan, index, reference=reference or peers, peers=peers) for index in range(len(plan.moves))
     )
-    references = [move.reference for move in moves]
-    contradictions = contradictions_of(plan.trajectory.spans, references) if verdict.passed else []
+    contradictions = _contradictions(plan, moves) if verdict.passed and (reference or peers) else []
     units = dict(zip(plan.trajectory.joint_names, joint_units(plan.trajectory.joint_types, 2), strict=True))
     return Report(
         trajcli=__version__,
@@ -160,9 +158,25 @@ def _move(plan: Plan, index: int, *, reference: bool, peers: bool) -> MoveReport
         fastest=_fastest(move, span),
         tool=_tool(plan.trajectory, span, move),
         tool_peaks=None if of_tool is None else _tool_peaks(of_tool, span, move.robot),
-        reference=reference_of(move) if reference else None,
-        path_reference=path_reference_of(move) if peers or (reference and move.planned.phase_plane) else None,
+        **_beside(move, reference=reference, peers=peers),
     )
+
+
+def _beside(move: PlannedMove, *, reference: bool, peers: bool) -> dict[str, Any]:
+    """Return the fields of a move's report that compare it with peers."""
+    if not reference:
+        return {"reference": None, "path_reference": None}
+    from trajcli.peers.move_reference import path_reference_of, reference_of
+
+    along = path_reference_of(move) if peers or move.planned.phase_plane else None
+    return {"reference": reference_of(move), "path_reference": along}
+
+
+def _contradictions(plan: Plan, moves: Sequence[MoveReport]) -> list[Finding]:
+    """Return a finding for each move that is faster than any motion can be."""
+    from trajcli.peers.move_reference import contradictions_of
+
+    return contradictions_of(plan.trajectory.spans, [move.reference for move in moves])
 
 
 def _peak(move: PlannedMove, joint: int, order: int, peaks: Peaks) -> PeakReport:

@@ -8,8 +8,8 @@ import pytest
 import trajcli
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.kinematics.robot import Limits
-from trajcli.planning.geometric_path import path_of_curve, path_of_points
-from trajcli.planning.path_reference import breaches_of, path_reference, reference_along
+from trajcli.peers.geometric_path import path_of_curve, path_of_points
+from trajcli.peers.path_reference import breaches_of, path_reference, reference_along
 
 
 def limits(velocity: float, acceleration: float, joints: int) -> Limits:

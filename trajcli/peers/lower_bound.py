@@ -11,8 +11,8 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import PlanningError
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import QUANTITIES, Limits
+from trajcli.peers.path_reference import LimitBreach, breaches_of
 from trajcli.planners.ruckig import BoundaryProblem, fastest
-from trajcli.planning.path_reference import LimitBreach, breaches_of
 from trajcli.trajectory import State
 
 _ROUNDING = 1e-12

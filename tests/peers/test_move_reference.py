@@ -11,9 +11,9 @@ import pytest
 
 import trajcli
 from trajcli.job.report import ReferenceReport
-from trajcli.output import references
 from trajcli.output.report import report_of
-from trajcli.planning.lower_bound import LowerBound
+from trajcli.peers import move_reference
+from trajcli.peers.lower_bound import LowerBound
 
 JOB: dict[str, Any] = {
     "version": 1,
@@ -26,7 +26,7 @@ JOB: dict[str, Any] = {
 
 def test_ruckig_does_not_know_limits_of_position() -> None:
     """From 1 rad/s at 0.9 to rest at 1.0 it must run past 1.0 by about v^2 / 2 a, and return."""
-    from trajcli.planning.lower_bound import fastest_duration
+    from trajcli.peers.lower_bound import fastest_duration
     from trajcli.trajectory import State, resting
 
     robot = trajcli.plan(JOB).loaded.robot
@@ -78,7 +78,7 @@ def test_what_toppra_breaks_is_judged_for_all_t() -> None:
     plan = trajcli.plan(job)
     beside = report_of(plan, peers=True).moves[0].path_reference
     assert beside is not None
-    from trajcli.planning.path_reference import path_reference
+    from trajcli.peers.path_reference import path_reference
 
     other = path_reference(plan.moves[0])
     assert other is not None
@@ -94,13 +94,13 @@ def test_what_toppra_breaks_is_judged_for_all_t() -> None:
 @pytest.fixture
 def slow_ruckig(monkeypatch: pytest.MonkeyPatch) -> None:
     """A ruckig that takes twice as long as it needs: no bound at all."""
-    right = references.fastest_duration
+    right = move_reference.fastest_duration
 
     def wrong(*arguments: Any) -> Any:
         bound = right(*arguments)
         return LowerBound(2 * bound.duration, bound.joint) if isinstance(bound, LowerBound) else bound
 
-    monkeypatch.setattr(references, "fastest_duration", wrong)
+    monkeypatch.setattr(move_reference, "fastest_duration", wrong)
 
 
 @pytest.mark.usefixtures("slow_ruckig")
@@ -127,10 +127,10 @@ def test_a_motion_faster_than_its_bound_is_an_error(
 
 
 def test_what_rounding_leaves_below_a_bound_is_none() -> None:
-    assert not references.is_faster(1.0, 1.0 + 1e-10)
-    assert references.is_faster(1.0, 1.0 + 1e-8)
+    assert not move_reference.is_faster(1.0, 1.0 + 1e-10)
+    assert move_reference.is_faster(1.0, 1.0 + 1e-8)
     plan = trajcli.plan(JOB)
     span = plan.trajectory.spans[0]
     bound = ReferenceReport(duration=span.duration * (1 + 1e-10), ratio=1.0, joint="j1")
-    assert references.contradictions_of([span], [bound]) == []
-    assert references.contradictions_of([span], [None]) == []
+    assert move_reference.contradictions_of([span], [bound]) == []
+    assert move_reference.contradictions_of([span], [None]) == []

@@ -1,8 +1,8 @@
-"""Comparison of moves with peers in reports: ruckig from state to state, toppra along a path."""
+"""Comparison of moves with peers: ruckig from state to state, toppra along a path."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from trajcli.errors import PlanningError
@@ -13,10 +13,9 @@ from trajcli.job.reports.comparisons import (
     PeerViolation,
     ReferenceReport,
 )
-from trajcli.kinematics.robot import QUANTITIES, JointType, Robot
-from trajcli.planners.planner import PlannedMove
-from trajcli.planning.lower_bound import NoBound, fastest_duration
-from trajcli.planning.path_reference import (
+from trajcli.kinematics.robot import QUANTITIES, Robot
+from trajcli.peers.lower_bound import LowerBound, NoBound, fastest_duration
+from trajcli.peers.path_reference import (
     LimitBreach,
     LimitUse,
     PathReference,
@@ -24,15 +23,11 @@ from trajcli.planning.path_reference import (
     path_reference,
     reference_along,
 )
+from trajcli.planners.planner import PlannedMove
 from trajcli.trajectory import Span
+from trajcli.units import joint_units
 
-_RATES = ("", "/s", "/s^2", "/s^3")
 _BELOW = 1e-9  # relative to a bound: what is below it by less is rounding
-
-
-def joint_units(joint_types: tuple[JointType, ...], order: int = 0) -> list[str]:
-    """Return the SI unit of each joint's position, or of its time derivative of an order."""
-    return [("m" if kind == "prismatic" else "rad") + _RATES[order] for kind in joint_types]
 
 
 def reference_of(move: PlannedMove) -> ReferenceReport:
@@ -42,15 +37,23 @@ def reference_of(move: PlannedMove) -> ReferenceReport:
         return ReferenceReport(duration=None, ratio=None, joint=move.robot.joint_names[0], reason=reason)
     begins = move.planned.begins or move.start
     bound = fastest_duration(begins, move.planned.end, move.robot.limits)
-    name = None if bound.joint is None else move.robot.joint_names[bound.joint]
+    return bound_report(bound, move.duration, move.robot)
+
+
+def bound_report(bound: LowerBound | NoBound, duration: float, robot: Robot) -> ReferenceReport:
+    """Return how a motion of a robot that lasts `duration` seconds compares with a bound of its duration."""
+    name = None if bound.joint is None else robot.joint_names[bound.joint]
     if isinstance(bound, NoBound):
         return ReferenceReport(duration=None, ratio=None, joint=name, reason=bound.reason)
-    ratio = move.duration / bound.duration if bound.duration > 0 else None
-    violations = violation_reports(bound.breaches, move.robot)
-    return ReferenceReport(duration=bound.duration, ratio=ratio, joint=name, violations=violations)
+    return ReferenceReport(
+        duration=bound.duration,
+        ratio=duration / bound.duration if bound.duration > 0 else None,
+        joint=name,
+        violations=_violations(bound.breaches, robot),
+    )
 
 
-def violation_reports(breaches: Sequence[LimitBreach], robot: Robot) -> list[PeerViolation]:
+def _violations(breaches: Sequence[LimitBreach], robot: Robot) -> list[PeerViolation]:
     """Return the reports of limits that a peer breaks."""
     return [
         PeerViolation(
@@ -71,21 +74,37 @@ def path_reference_of(move: PlannedMove) -> PathReferenceReport | None:
     The path of a time-optimal move is the polynomial that it was planned on; that of another move is found
     from its motion.
     """
+    own = limit_use(move.planned.curve, move.robot.limits)
+    return path_report(lambda: _along_path(move), move.duration, move.robot, own)
+
+
+def path_report(
+    along: Callable[[], PathReference | None], duration: float, robot: Robot, own: LimitUse | None = None
+) -> PathReferenceReport | None:
+    """Return how a motion compares with toppra's along its path; None where there is no path.
+
+    Args:
+        along: Plans toppra's motion; it may raise a `PlanningError`, which is reported.
+        duration: Of the motion, s.
+        robot: With the limits in force.
+        own: What the motion uses of them, where that is known.
+    """
     try:
-        other = _along_path(move)
+        other = along()
     except PlanningError as error:
-        own = use_report(limit_use(move.planned.curve, move.robot.limits), move.robot)
-        return PathReferenceReport(duration=None, ratio=None, use=None, own_use=own, reason=str(error))
+        return PathReferenceReport(
+            duration=None, ratio=None, use=None, own_use=_use(own, robot), reason=str(error)
+        )
     if other is None:
         return None
     return PathReferenceReport(
         duration=other.duration,
-        ratio=move.duration / other.duration if other.duration > 0 else None,
-        use=use_report(other.use, move.robot),
-        own_use=use_report(limit_use(move.planned.curve, move.robot.limits), move.robot),
-        violations=violation_reports(other.breaches, move.robot),
+        ratio=duration / other.duration if other.duration > 0 else None,
+        use=_use(other.use, robot),
+        own_use=_use(own, robot),
+        violations=_violations(other.breaches, robot),
         deviation=other.deviation,
-        deviation_unit=common_unit(move.robot),
+        deviation_unit=_common_unit(robot),
     )
 
 
@@ -94,7 +113,7 @@ def _along_path(move: PlannedMove) -> PathReference | None:
         return path_reference(move)
     if (move.planned.via_points is None and move.planned.tool is None) or move.duration == 0:
         return None
-    from trajcli.planning.geometric_path import path_of_curve
+    from trajcli.peers.geometric_path import path_of_curve
 
     curve = move.planned.curve
     path = path_of_curve(curve)
@@ -104,13 +123,13 @@ def _along_path(move: PlannedMove) -> PathReference | None:
     return reference_along(path, move.robot.limits, velocities)
 
 
-def common_unit(robot: Robot) -> str:
+def _common_unit(robot: Robot) -> str:
     """Return the SI unit of all joints, or nothing where they differ."""
     units = set(joint_units(robot.joint_types))
     return units.pop() if len(units) == 1 else ""
 
 
-def use_report(use: LimitUse | None, robot: Robot) -> LimitUseReport | None:
+def _use(use: LimitUse | None, robot: Robot) -> LimitUseReport | None:
     """Return the report of the limit of which a motion uses most; None where there is none."""
     if use is None:
         return None

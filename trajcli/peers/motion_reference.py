@@ -13,14 +13,9 @@ from trajcli.frozen import frozen
 from trajcli.job.reports.comparisons import PathReferenceReport, ReferenceReport
 from trajcli.judge.judgement import Judgement, worst_first
 from trajcli.kinematics.robot import Robot
-from trajcli.output.references import (
-    common_unit,
-    contradiction,
-    is_faster,
-    use_report,
-    violation_reports,
-)
-from trajcli.planning.lower_bound import NoBound, fastest_duration
+from trajcli.peers.lower_bound import NoBound, fastest_duration
+from trajcli.peers.move_reference import bound_report, contradiction, is_faster, path_report
+from trajcli.peers.path_reference import PathReference, reference_along
 from trajcli.trajectory import State
 
 if TYPE_CHECKING:
@@ -69,7 +64,8 @@ def compared(checked: CheckedFile) -> tuple[Judgement, MotionReference]:
     outline = _outline(checked.motion, checked.judgement.rows)
     duration = float(outline.last.t[0] - outline.first.t[0])
     bound, reference = _between_ends(outline, checked.robot, duration)
-    found = MotionReference(duration, reference, _along_points(outline, checked.robot, duration))
+    along = path_report(lambda: _along_points(outline, checked.robot), duration, checked.robot)
+    found = MotionReference(duration, reference, along)
     judgement = checked.judgement
     judged = judgement.verdict == "satisfied" and outline.first.qd is not None
     if bound is not None and judged and is_faster(duration, bound):
@@ -114,17 +110,10 @@ def _state(row: RecordedMotion) -> State:
 def _between_ends(outline: _Outline, robot: Robot, duration: float) -> tuple[float | None, ReferenceReport]:
     """Return a bound that holds whatever the rounding of the file, and the report of the one without."""
     start, end = _state(outline.first), _state(outline.last)
-    names = robot.joint_names
     bound = fastest_duration(start, end, robot.limits)
+    report = bound_report(bound, duration, robot)
     if isinstance(bound, NoBound):
-        report = ReferenceReport(duration=None, ratio=None, joint=names[bound.joint], reason=bound.reason)
         return None, report
-    report = ReferenceReport(
-        duration=bound.duration,
-        ratio=duration / bound.duration if bound.duration > 0 else None,
-        joint=None if bound.joint is None else names[bound.joint],
-        violations=violation_reports(bound.breaches, robot),
-    )
     resolution = outline.first.resolution
     apart = end.position - start.position
     rounding = 2 * (resolution.q + resolution.relative * np.abs(end.position))
@@ -134,26 +123,12 @@ def _between_ends(outline: _Outline, robot: Robot, duration: float) -> tuple[flo
     return None if isinstance(least, NoBound) else max(least.duration - late, 0.0), report
 
 
-def _along_points(outline: _Outline, robot: Robot, duration: float) -> PathReferenceReport | None:
-    from trajcli.planning.geometric_path import path_of_points
-    from trajcli.planning.path_reference import reference_along
+def _along_points(outline: _Outline, robot: Robot) -> PathReference | None:
+    """Return toppra's motion along the points; None where they are one, or nothing is limited."""
+    from trajcli.peers.geometric_path import path_of_points
 
     path = path_of_points(outline.points)
     if path is None:
         return None
     ends = _state(outline.first).velocity, _state(outline.last).velocity
-    try:
-        other = reference_along(path, robot.limits, ends)
-    except PlanningError as error:
-        return PathReferenceReport(duration=None, ratio=None, use=None, own_use=None, reason=str(error))
-    if other is None:
-        return None
-    return PathReferenceReport(
-        duration=other.duration,
-        ratio=duration / other.duration if other.duration > 0 else None,
-        use=use_report(other.use, robot),
-        own_use=None,
-        violations=violation_reports(other.breaches, robot),
-        deviation=other.deviation,
-        deviation_unit=common_unit(robot),
-    )
+    return reference_along(path, robot.limits, ends)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from trajcli.kinematics.robot import Limits
-from trajcli.planning.lower_bound import LowerBound, NoBound, fastest_duration
+from trajcli.peers.lower_bound import LowerBound, NoBound, fastest_duration
 from trajcli.trajectory import State
 
 

@@ -73,8 +73,8 @@ def test_a_contradiction_is_an_error(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A bound that is wrong on purpose: ruckig that takes three times as long as it needs."""
-    from trajcli.output import motion_reference
-    from trajcli.planning.lower_bound import LowerBound
+    from trajcli.peers import motion_reference
+    from trajcli.peers.lower_bound import LowerBound
 
     right = motion_reference.fastest_duration
 

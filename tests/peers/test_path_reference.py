@@ -11,7 +11,7 @@ from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.job.read import job_from_text, load_job
 from trajcli.kinematics.robot import Limits
 from trajcli.output.report import report_of
-from trajcli.planning.path_reference import limit_use, path_reference
+from trajcli.peers.path_reference import limit_use, path_reference
 from trajcli.planning.plan import plan_job
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -26,8 +26,8 @@ from trajcli.errors import PlanningError
 from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Limits
 from trajcli.limits.tolerances import exceeds
+from trajcli.peers.geometric_path import GeometricPath
 from trajcli.planners.planner import PlannedMove
-from trajcli.planning.geometric_path import GeometricPath
 
 _UNLIMITED = 1e3  # times the largest limit of its kind: the solver of toppra takes no infinite ones
 _FEWEST, _MOST = 100, 2000  # points of the grid of one smooth path
