@@ -184,7 +184,7 @@ FAMILY = ToolFamily()
 
 
 def peaks_in(move: LimitedMove, robot: Robot) -> Mapping[str, ToolPeak]:
-    """Return the largest speeds and accelerations of the tool in a move by their keys, times from its start."""
+    """Return `tool_peaks` of a move; times count from its start."""
     breaks, coefficients = move.pieces
     return tool_peaks(robot, breaks - move.span.start, coefficients)
 
