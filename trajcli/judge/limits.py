@@ -16,9 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.curves.bernstein import control_points
 from trajcli.curves.extrema import critical_points
-from trajcli.curves.piecewise import Array, derivative_coefficients, horner
+from trajcli.curves.piecewise import Array, control_points, derivative_coefficients, horner
 from trajcli.findings import Certainty, Collector, Finding, FindingSeverity
 from trajcli.frozen import frozen
 from trajcli.judge.intervals import DENSE, Intervals, explained_by_law
