@@ -26,7 +26,7 @@ _Indices = NDArray[np.intp]
 
 
 def encode_full(rows: Array, whole_numbers: Sequence[int] = ()) -> bytes:
-    """Return `rows` (N, m), finite, as lines separated by commas, with the fewest digits that restore each value.
+    """Return `rows` (N, m), finite, as lines of values with the fewest digits that restore each.
 
     Args:
         rows: Values.
@@ -55,45 +55,45 @@ def scan_decimals(text: bytes, width: int) -> tuple[Array, NDArray[np.int64]]:
     Raises:
         NotFixedError: When it has other lines, or a cell is no finite number.
     """
-    blank_behind = b" ," in text or b" \n" in text
-    if blank_behind or not text.endswith(b"\n") or text.translate(None, _CHARACTERS):
+    if text.translate(None, _CHARACTERS) or b" ," in text or b" \n" in text:
+        raise NotFixedError
+    buffer = np.frombuffer(text, dtype=np.uint8)
+    ends = np.flatnonzero((buffer == ord(",")) | (buffer == ord("\n")))
+    if ends.size == 0 or ends.size % width or ends[-1] != buffer.size - 1:
+        raise NotFixedError
+    lines = (buffer[ends] == ord("\n")).reshape(-1, width)
+    if lines[:, :-1].any() or not lines[:, -1].all():
         raise NotFixedError
     try:
-        rows = _rows_of_json(text)
-    except ValueError:
-        rows = _rows_of_any_form(text)
-    if rows.ndim != 2 or rows.shape != (text.count(b"\n"), width) or not np.isfinite(rows).all():
+        values = _numbers_of_json(text)
+    except (ValueError, OverflowError):  # the latter of a whole number that no float64 holds
+        values = _numbers_of_any_form(text)
+    if values.size != ends.size or not np.isfinite(values).all():
         raise NotFixedError
-    return rows, _decimals(text).reshape(-1, width).max(axis=0)
+    return values.reshape(lines.shape), _decimals(buffer, ends).reshape(lines.shape).max(axis=0)
 
 
-def _rows_of_json(text: bytes) -> Array:
-    """Return the rows of lines; ValueError where a cell is no number of JSON."""
+def _numbers_of_json(text: bytes) -> Array:
+    """Return the numbers of lines; ValueError where a cell is no number of JSON."""
     from pydantic_core import from_json
 
-    if any(form in text for form in _NOT_OF_JSON):
+    values = np.array(from_json(b"[" + text[:-1].replace(b"\n", b",") + b"]"), dtype=np.float64)
+    if not values.all() and any(form in text for form in _NOT_OF_JSON):
         raise ValueError
-    try:
-        return np.array(from_json(b"[[" + text[:-1].replace(b"\n", b"],[") + b"]]"), dtype=np.float64)
-    except OverflowError as error:  # a whole number that no float64 holds
-        raise ValueError from error
+    return values
 
 
-def _rows_of_any_form(text: bytes) -> Array:
-    """Return the rows of lines; NotFixedError where a cell is no number."""
-    if not text.strip():
-        raise NotFixedError
+def _numbers_of_any_form(text: bytes) -> Array:
+    """Return the numbers of lines; NotFixedError where a cell is none."""
     try:
         rows: Array = np.loadtxt(BytesIO(text), delimiter=",", comments=None, ndmin=2)
     except ValueError:
         raise NotFixedError from None
-    return rows
+    return rows.reshape(-1)
 
 
-def _decimals(text: bytes) -> NDArray[np.int64]:
-    """Return how many decimals each cell of lines shows, (cells,); negative before a large exponent."""
-    buffer = np.frombuffer(text, dtype=np.uint8)
-    ends = np.flatnonzero((buffer == ord(",")) | (buffer == ord("\n")))
+def _decimals(buffer: NDArray[np.uint8], ends: _Indices) -> NDArray[np.int64]:
+    """Return how many decimals each cell shows, (cells,), where `ends` says where they end."""
     letters = np.flatnonzero((buffer | 32) == ord("e"))
     mantissa_ends, decimals = ends.copy(), np.zeros(ends.size, dtype=np.int64)
     if letters.size:
@@ -118,8 +118,8 @@ def _exponents(buffer: NDArray[np.uint8], letters: _Indices, ends: _Indices) -> 
     negative = buffer[letters + 1] == ord("-")
     digits = ends - letters - 1 - (negative | (buffer[letters + 1] == ord("+")))
     sizes = np.zeros(ends.size, dtype=np.int64)
-    for place in range(min(int(digits.max()), _EXPONENT_DIGITS)):
-        sizes += np.where(place < digits, buffer[ends - 1 - place] - np.int64(ord("0")), 0) * 10**place
+    for power in range(min(int(digits.max()), _EXPONENT_DIGITS)):
+        sizes += np.where(power < digits, buffer[ends - 1 - power] - np.int64(ord("0")), 0) * 10**power
     return np.where(negative, -sizes, sizes)
 
 
