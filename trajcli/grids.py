@@ -1,4 +1,4 @@
-"""Times of rows: a uniform grid, or a list of times.
+"""Times of rows: a uniform grid, a list of times, or knots.
 
 A grid knows the duration of what is sampled, and yields its times block by block, so that memory does not
 grow with their number.
@@ -6,10 +6,11 @@ grow with their number.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import ceil, isfinite
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array, read_only
 from trajcli.errors import InputError
@@ -117,7 +118,50 @@ class ListedGrid:
             yield times, np.clip(times - self.start_time, 0.0, self.duration)
 
 
-Grid = UniformGrid | ListedGrid
+@frozen
+class KnotGrid:
+    """Rows at knots, and where asked for at other times between them.
+
+    Attributes:
+        duration: Seconds, at least 0.
+        local: Times of all rows from the start, s, shape (N,), strictly increasing.
+        at: Which of the rows are knots, rising indices, shape (m,).
+        states: Position, velocity and acceleration of these in SI, shape (3, m, n).
+        start_time: Time of the first row, s.
+    """
+
+    duration: float
+    local: Array
+    at: NDArray[np.intp]
+    states: Array
+    start_time: float = 0.0
+
+    @property
+    def count(self) -> int:
+        """Number of rows, at least 1."""
+        return int(self.local.size)
+
+    def blocks(self, size: int = ROWS) -> Iterator[tuple[Array, Array]]:
+        """Yield, for `size` rows at a time, their times as written and from the start, each (N,), s."""
+        for low in range(0, self.count, size):
+            local = self.local[low : low + size]
+            yield self.start_time + local, np.minimum(local, self.duration)
+
+    def put_states(self, first: int, orders: Sequence[int], motion: Array) -> None:
+        """Write the states of the knots into some rows.
+
+        Args:
+            first: Index of the first of these rows.
+            orders: Of the derivatives that they hold.
+            motion: Shape (N, orders, n), SI.
+        """
+        low, high = np.searchsorted(self.at, (first, first + len(motion)))
+        for position, order in enumerate(orders):
+            if order < len(self.states):
+                motion[self.at[low:high] - first, position] = self.states[order, low:high]
+
+
+Grid = UniformGrid | ListedGrid | KnotGrid
 
 
 def onto_breaks(local: Array, breaks: Array) -> Array:

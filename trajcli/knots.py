@@ -17,6 +17,7 @@ from trajcli.curves.extrema import piece_extremes
 from trajcli.curves.hermite import hermite_coefficients
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, distinct, read_only, taylor_shift
 from trajcli.frozen import comparable, frozen
+from trajcli.grids import KnotGrid, UniformGrid
 from trajcli.trajectory import Trajectory
 
 Nanoseconds = NDArray[np.int64]
@@ -97,6 +98,37 @@ def knots_of(trajectory: Trajectory) -> Knots:
         if not inserted.size:
             return Knots(whole, states[0], states[1], states[2], _deviation(missed))
         whole = np.sort(np.concatenate([whole, inserted]))
+
+
+def knot_grid(
+    trajectory: Trajectory, knots: Knots, rate: float | None = None, start_time: float = 0.0
+) -> KnotGrid:
+    """Return the grid of rows at the knots of a trajectory, with a rate also at its times between them.
+
+    A time of the rate that is nearer to a knot than a microsecond has no row of its own.
+
+    Args:
+        trajectory: Whose knots they are.
+        knots: From `knots_of`.
+        rate: Hz; None for the knots alone.
+        start_time: Time of the first row, s.
+
+    Raises:
+        InputError: When the rate is too high for the times of the rows.
+    """
+    states = np.stack([knots.position, knots.velocity, knots.acceleration])
+    times, duration = knots.times, trajectory.duration
+    if rate is None:
+        return KnotGrid(duration, times, np.arange(times.size), states, start_time)
+    uniform = np.concatenate([local for _, local in UniformGrid(duration, rate, start_time).blocks()])
+    after = np.clip(np.searchsorted(times, uniform), 1, max(times.size - 1, 1))
+    nearest = np.minimum(
+        np.abs(uniform - times[after - 1]), np.abs(times[np.minimum(after, times.size - 1)] - uniform)
+    )
+    local = np.concatenate([times, uniform[nearest > _NEAREST / _PER_SECOND]])
+    order = np.argsort(local, kind="stable")
+    at = np.flatnonzero(order < times.size)
+    return KnotGrid(duration, local[order], at, states, start_time)
 
 
 def _deviation(missed: Array) -> Deviation:

@@ -22,7 +22,7 @@ from trajcli.columns import (
 )
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import InputError
-from trajcli.grids import AT_BREAK, ROWS, Grid, onto_breaks
+from trajcli.grids import AT_BREAK, ROWS, Grid, KnotGrid, onto_breaks
 from trajcli.kinematics.robot import Robot
 from trajcli.trajectory import Trajectory
 from trajcli.units import Units
@@ -61,10 +61,15 @@ def sample(
     check_groups(groups)
     factors = joint_factors(trajectory.joint_types, units)
     curve, starts = trajectory.curve, _Starts(trajectory)
-    orders, last = _orders(groups), None
+    orders, last, first = _orders(groups), None, 0
     for times, local in grid.blocks(size):
         local = onto_breaks(local, curve.breaks)
         motion = _in_units(_window(curve, local), factors).evaluate_orders(local, orders)
+        if isinstance(grid, KnotGrid):
+            motion = motion * factors
+            grid.put_states(first, orders, motion)
+            motion = motion / factors
+        first += len(local)
         parts = []
         for group in groups:
             if group in JOINT_ORDERS:

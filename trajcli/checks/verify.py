@@ -10,7 +10,6 @@ import numpy as np
 
 from trajcli.checks.continuity import AccelerationSteps, acceleration_steps, check_continuity
 from trajcli.checks.target import check_targets
-from trajcli.checks.waypoints import check_waypoints
 from trajcli.curves.extrema import Peaks
 from trajcli.errors import at_least
 from trajcli.findings import Finding
@@ -120,7 +119,7 @@ def verify(
             findings += limit_findings(move, survey)
     findings += check_continuity(trajectory, limits_by_move, peaks)
     if promises is not None:
-        findings += check_waypoints(trajectory, [promise.via_points for promise in promises])
+        findings += _check_via_points(trajectory, promises)
         findings += check_targets(trajectory, promises)
         findings += _check_tools(moves)
     return Verdict(
@@ -240,6 +239,14 @@ def longest_factor(findings: Sequence[Finding]) -> float | None:
     return max(
         (f.factor * (1 - rooms[f.method] * _PART) for f in findings if f.factor is not None), default=None
     )
+
+
+def _check_via_points(trajectory: Trajectory, promises: Sequence[Promise]) -> Sequence[Finding]:
+    if all(promise.via_points is None for promise in promises):
+        return ()
+    from trajcli.checks.waypoints import check_waypoints
+
+    return check_waypoints(trajectory, [promise.via_points for promise in promises])
 
 
 def _check_tools(moves: Sequence[LimitedMove]) -> Iterator[Finding]:

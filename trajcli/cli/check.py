@@ -68,7 +68,9 @@ def _lines(checked: CheckedFile) -> Iterator[str]:
     rows = f"{judgement.rows} row{'s' * (judgement.rows != 1)}"
     period = "" if judgement.period is None else f", every {judgement.period:.9g} s"
     source = judgement.source or "-"
-    yield f"{source}: {judgement.verdict} ({rows}{period}, {_JOINED[judgement.interpolation]})"
+    planned = ", rows of the motion that the job plans" if judgement.planned_rows else ""
+    joined = _JOINED[judgement.interpolation]
+    yield f"{source}: {judgement.verdict} ({rows}{period}, {joined}{planned})"
     listed = [*_listed(judgement.findings)]
     if listed:
         yield from table_lines([*_table(checked, listed)])

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from trajcli.cli.numbers import numbers
-from trajcli.cli.plan import peer_lines
 from trajcli.cli.polynomials import amount, blend_lines, knot_lines, law_lines, polynomial_lines
 from trajcli.cli.progress import progress
 from trajcli.errors import InputError
@@ -257,7 +256,7 @@ def _lines(explained: Explanation, count: int, *, peers: bool = False) -> Iterat
         yield from _by_position(move)
         yield from _efforts(move)
         yield from _speed(move)
-        yield from peer_lines(move, "  ") if peers else ()
+        yield from _peers(move) if peers else ()
         yield from (f"  {event.kind}: {event.message}" for event in noted if event.move == move.index)
     if explained.savings is not None and len(explained.moves) > 1:
         yield ""
@@ -269,6 +268,12 @@ def _lines(explained: Explanation, count: int, *, peers: bool = False) -> Iterat
     if efforts is not None and efforts.inertials is not None:
         how = "judged for all t" if efforts.judged else f"not judged, {efforts.reason}"
         yield f"efforts: {how}; masses and inertias from {efforts.inertials}"
+
+
+def _peers(move: ExplainedMove) -> Iterator[str]:
+    from trajcli.cli.plan import peer_lines
+
+    return peer_lines(move, "  ")
 
 
 def _phases(move: ExplainedMove) -> Iterator[str]:

@@ -10,7 +10,7 @@ import numpy as np
 from trajcli.errors import Amount, InputError
 from trajcli.frozen import frozen
 from trajcli.judge.motion import Requirements
-from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.units import Units, amount_text
 
 
@@ -65,13 +65,9 @@ def _kept(requirements: Requirements, units: Units) -> KeptLimits:
 
     robot = requirements.robot
     arms = [robot, *requirements.by_move.values()]
-    if robot.convention is not None and any(_limits_its_tool(arm) for arm in arms):
+    if robot.convention is not None and any(arm.limits.tcp != ToolLimits() for arm in arms):
         from trajcli.judge.tool import ToolJudge
 
         requirements = replace(requirements, tool=lambda: ToolJudge(robot))
     say = partial(amount_text, joint_types=robot.joint_types, units=units)
     return KeptLimits(robot, requirements, units, say)
-
-
-def _limits_its_tool(robot: Robot) -> bool:
-    return bool(np.isfinite(list(vars(robot.limits.tcp).values())).any())

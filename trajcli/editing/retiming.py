@@ -25,20 +25,8 @@ from trajcli.errors import InputError, Problem, VerificationError
 from trajcli.findings import Finding
 from trajcli.frozen import frozen
 from trajcli.judge.motion import Requirements, judge_motion
+from trajcli.limits.kinds import STRETCHABLE
 from trajcli.streams.recorded_motion import RecordedMotion
-
-STRETCHABLE = (
-    "velocity",
-    "acceleration",
-    "jerk",
-    "velocity_by_position",
-    "tool_speed",
-    "tool_acceleration",
-    "tool_angular_speed",
-    "tool_angular_acceleration",
-    "effort",
-)
-"""Kinds of findings that a longer time may take away."""
 
 _FINE = 1e-4  # relative: how far above the smallest factor the one that is found may be
 _SLOWEST, _FASTEST = 1e6, 1e-9

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Iterator
 from itertools import filterfalse
 from math import inf
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from trajcli.language.efforts import OF_ROBOT, EffortBounds
 from trajcli.language.limits import LimitsSpec
 from trajcli.language.numbers import FieldPath
 from trajcli.language.per_joint import UNLIMITED
+from trajcli.limits.kinds import JOINT_KINDS, KIND_OF, TOOL_KINDS
 from trajcli.planners.planner import Event
 from trajcli.units import effort_unit
 
@@ -29,7 +30,6 @@ _INERTIA = (
     "or one of `trajcli robots`"
 )
 _GEOMETRY = "give each joint its DH row (theta, d, a, alpha) and the robot its convention"
-_TOOL_ORDERS = {"speed": 1, "acceleration": 2, "jerk": 3}
 
 
 class LooserBound(NamedTuple):
@@ -142,8 +142,9 @@ def looser_problem(robot: Robot, looser: LooserBound, move: int) -> Problem:
 
 def _with_limits(robot: Robot, spec: LimitsSpec) -> Robot:
     rows = {
-        name: _replaced(robot.limits.of_order(order), spec, order) * getattr(spec.scale, name, 1.0)
-        for order, name in enumerate(QUANTITIES)
+        kind.key: _replaced(robot.limits.of_order(order), spec, order)
+        * getattr(spec.scale, kind.factor or "", 1.0)
+        for order, kind in enumerate(JOINT_KINDS[: len(QUANTITIES)])
     }
     k = spec.scale.velocity  # k (sqrt(2 d x) - o) is the same limit with k^2 d and k o
     by_position = robot.limits.velocity_by_position * [k**2, k]
@@ -167,13 +168,7 @@ def with_efforts(robot: Robot, spec: LimitsSpec) -> Array:
 def _tool_limits(before: ToolLimits, spec: LimitsSpec) -> ToolLimits:
     """Return the limits of the tool, scaled as those of the joints are."""
     given = {} if spec.tcp is None else spec.tcp.model_dump(exclude_none=True)
-    scales = {
-        "speed": spec.scale.velocity,
-        "angular_speed": spec.scale.velocity,
-        "acceleration": spec.scale.acceleration,
-        "angular_acceleration": spec.scale.acceleration,
-        "jerk": spec.scale.jerk,
-    }
+    scales = {kind.key: getattr(spec.scale, kind.factor or "", 1.0) for kind in TOOL_KINDS}
     return ToolLimits(**{name: given.get(name, getattr(before, name)) * k for name, k in scales.items()})
 
 
@@ -182,9 +177,9 @@ def looser_tool_bounds(robot: Robot, spec: LimitsSpec) -> Iterator[tuple[str, tu
     for name, value in ({} if spec.tcp is None else spec.tcp.model_dump(exclude_none=True)).items():
         before = getattr(robot.limits.tcp, name)
         if value > before * (1 + _ROUNDING):
-            order = _TOOL_ORDERS[name.removeprefix("angular_")]
-            kind: Literal["angle", "length"] = "angle" if name.startswith("angular_") else "length"
-            yield name, (Amount(before, order, None, kind), Amount(value, order, None, kind))
+            kind = KIND_OF[f"tool_{name}"]
+            order, measured = kind.order or 1, kind.dimension
+            yield name, (Amount(before, order, None, measured), Amount(value, order, None, measured))
 
 
 def _replaced(bounds: Array, spec: LimitsSpec, order: int) -> Array:

@@ -21,7 +21,6 @@ from trajcli.job.limits import (
     looser_tool_bounds,
     with_job_limits,
 )
-from trajcli.job.messages import problems_of
 from trajcli.job.model import Job, UnitsSpec
 from trajcli.job.robot import RobotSheet, find_sheet
 from trajcli.job.yaml.document import Node
@@ -181,6 +180,8 @@ def _load(document: Document) -> LoadedJob:
     try:
         job = Job.model_validate({**plain, **given}, context=context)
     except ValidationError as error:
+        from trajcli.job.messages import problems_of
+
         problems += problems_of(error, Job, document)
     if problems or robot is None:
         raise InputError(*sorted(problems, key=_position))

@@ -19,6 +19,7 @@ from trajcli.job.reports.comparisons import (
 )
 from trajcli.job.reports.efforts import EffortReport, EffortsReport, PayloadReport
 from trajcli.job.reports.part import JointQuantity, MeasuredIn, ReportPart, ReportSeconds, UnitName, in_units
+from trajcli.limits.kinds import BoundedToolLimit, ToolLimit
 
 __all__ = ["MeasuredIn", "Report", "ReportPart", "UnitName", "in_units"]
 
@@ -134,7 +135,7 @@ class FastestReport(ReportPart):
 class ToolPeakReport(ReportPart):
     """The largest magnitude of one quantity of the tool in one move."""
 
-    quantity: Literal["speed", "acceleration", "angular_speed", "angular_acceleration"]
+    quantity: BoundedToolLimit
     value: Annotated[float, MeasuredIn(), Field(description="SI, of the tool as forward kinematics has it.")]
     bound: Annotated[
         float, MeasuredIn(), Field(description="It is proven to be at most this at every time, SI.")
@@ -306,7 +307,7 @@ class UncheckedReport(ReportPart):
 class UncheckedToolReport(ReportPart):
     """A limit of the tool that is stated, but cannot be judged in some move."""
 
-    quantity: Literal["speed", "acceleration", "jerk", "angular_speed", "angular_acceleration"]
+    quantity: ToolLimit
 
 
 class KnotsDeviation(ReportPart):

@@ -22,7 +22,6 @@ from pydantic_core import CoreSchema, core_schema
 
 from trajcli.errors import FileError, InputError, Place, Problem, utf8
 from trajcli.frozen import frozen
-from trajcli.job.messages import problems_of
 from trajcli.job.model import UnitsSpec
 from trajcli.job.yaml.load import Document, parse_document
 from trajcli.job.yaml.source import STDIN, read_bytes
@@ -490,4 +489,6 @@ def _validated(value: Mapping[str, Any], document: Document, at: tuple[str, ...]
     try:
         return RobotModel.model_validate(value, context=ReadingContext(units))
     except ValidationError as error:
+        from trajcli.job.messages import problems_of
+
         raise InputError(*problems_of(error, RobotModel, document, at)) from None

@@ -11,10 +11,11 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, TrajcliError
 from trajcli.frozen import comparable, frozen
-from trajcli.judge.judgement import Judgement
+from trajcli.judge.judgement import Judgement, as_planned
 from trajcli.judge.motion import JUDGED_ROWS, Requirements, judge_motion
 from trajcli.kinematics.robot import Robot
-from trajcli.streams.recorded_motion import MotionFile, RecordedMotion, open_motion
+from trajcli.streams.byte_source import ByteSource
+from trajcli.streams.recorded_motion import MotionFile, RecordedMotion, motion_of, open_motion
 from trajcli.units import Units, joint_quantity
 
 if TYPE_CHECKING:
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from trajcli.judge.tool import ToolJudge
     from trajcli.kinematics.following.motion import ToolMotion
     from trajcli.planning.plan import Plan
-    from trajcli.streams.byte_source import ByteSource
 
 _START_TOLERANCE = 1e-3  # rad or m: what a controller takes for the state that it is in
 _SAME_DURATION = 1e-6  # s: a file that lasts as long as the plan, within that, is taken for its motion
@@ -97,16 +97,9 @@ def check_file(source: str | ByteSource, options: CheckOptions, plan: Plan | Non
 
     given = _carrying(_given(options) if plan is None else _of_plan(plan), options)
     robot = given.robot
-    motion = open_motion(
-        source,
-        columns=options.columns,
-        units=options.units,
-        topic=options.topic,
-        field=options.field,
-        joints=robot.joint_names,
-        joint_types=robot.joint_types,
-        declared=None if plan is not None else stated_units(options.job or options.robot or ""),
-    )
+    opened = source if isinstance(source, ByteSource) else ByteSource(source)
+    declared = None if plan is not None else stated_units(options.job or options.robot or "")
+    motion = _opened(opened, options, given, declared)
     shown = _shown_units(options, given)
     consumer = _consumer_of(options.profile, given)
     requirements = _requirements(options, given, shown, consumer)
@@ -124,7 +117,44 @@ def check_file(source: str | ByteSource, options: CheckOptions, plan: Plan | Non
     if given.loaded is not None and "move" not in motion.quantities and by_time is None:
         notes = (*notes, "no column `move`: limits and paths of single moves are not judged")
     judged = replace(judgement, notes=notes, events=given.events, source=motion.source)
+    judged = _beside_plan(judged, opened, given, options)
     return CheckedFile(judged, robot, shown, given.loaded, given.plan, motion)
+
+
+def _opened(source: ByteSource, options: CheckOptions, given: _Given, declared: Units | None) -> MotionFile:
+    """Return the motion of a file; joints that it does not have are found back from its poses."""
+    joints, types = given.robot.joint_names, given.robot.joint_types
+    if given.plan is not None and options.columns is None and options.topic is None:
+        from trajcli.judge.rows.tool_rows import joints_found_back
+
+        found = joints_found_back(source, given.robot, given.plan.trajectory.start.position)
+        if found is not None:
+            return motion_of(found, joints=joints, joint_types=types)
+    return open_motion(
+        source,
+        columns=options.columns,
+        units=options.units,
+        topic=options.topic,
+        field=options.field,
+        joints=joints,
+        joint_types=types,
+        declared=declared,
+    )
+
+
+def _beside_plan(judgement: Judgement, source: ByteSource, given: _Given, options: CheckOptions) -> Judgement:
+    """Return the judgement that says whether the rows are those of the motion that the job plans."""
+    if given.plan is None or not given.plan.verdict.passed:
+        return judgement
+    from trajcli.judge.rows.planned_rows import compare_with_plan
+
+    found = compare_with_plan(source, given.plan, options.topic, options.field)
+    if found.planned and options.interpolate is None and options.profile is None:
+        return as_planned(judgement)
+    if found.planned:
+        return replace(judgement, planned_rows=True)
+    note = f"these are no rows of the motion that the job plans: {found.difference}"
+    return replace(judgement, notes=(*judgement.notes, note), planned_rows=False)
 
 
 def _moves_by_time(given: _Given, motion: MotionFile) -> Callable[[RecordedMotion], RecordedMotion] | None:

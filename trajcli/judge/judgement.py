@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Literal
 
 from trajcli.findings import Finding
@@ -28,6 +29,7 @@ class Judgement:
         source: Name of the file; None of arrays.
         notes: What a reader should know: stamps that were snapped, what could not be judged.
         events: What was taken for granted, which `--strict` does not accept.
+        planned_rows: Whether they are rows of the verified motion of the job; None without a plan.
     """
 
     findings: tuple[Finding, ...]
@@ -37,6 +39,7 @@ class Judgement:
     source: str | None = None
     notes: tuple[str, ...] = ()
     events: tuple[str, ...] = ()
+    planned_rows: bool | None = None
 
     @property
     def verdict(self) -> VerdictText:
@@ -73,7 +76,9 @@ class Judgement:
         ]
         known = {"verdict": self.verdict, "findings": findings, "interpolation": self.interpolation}
         period = {} if self.period is None else {"period": self.period}
-        return {**known, "rows": self.rows, **period, "notes": list(self.notes), "events": list(self.events)}
+        planned = {} if self.planned_rows is None else {"planned_rows": self.planned_rows}
+        said = {"notes": list(self.notes), "events": list(self.events)}
+        return {**known, "rows": self.rows, **period, **planned, **said}
 
 
 def worst_first(findings: Sequence[Finding]) -> tuple[Finding, ...]:
@@ -84,3 +89,28 @@ def worst_first(findings: Sequence[Finding]) -> tuple[Finding, ...]:
         return finding.severity != "error", finding.certainty != "exceeded", -finding.excess, time
 
     return tuple(sorted(findings, key=key))
+
+
+_RATES_OF_ROWS = ("continuity", "derivative", "time")
+
+
+def as_planned(judgement: Judgement) -> Judgement:
+    """Return the judgement of rows that are those of a verified motion, whose curve is proven already.
+
+    They hold no jumps and no false derivatives, whatever their rate, and what rounding explains is nothing.
+    What the curve that joins them passes is a warning, and an event.
+    """
+    findings = [
+        replace(finding, severity="warning")
+        for finding in judgement.findings
+        if finding.severity == "warning"
+        or (finding.rule not in _RATES_OF_ROWS and finding.certainty == "exceeded")
+    ]
+    over = [f for f in findings if f.rule != "state" and f.limit]
+    events = judgement.events
+    if over:
+        worst = max(over, key=lambda finding: finding.excess)
+        what = worst.kind.replace("_", " ") + ("" if worst.joint is None else f" of {worst.joint}")
+        said = f"joined_over_limit: the rows, joined between them, pass the limit of the {what}"
+        events = (*events, f"{said}, by a factor of {worst.excess:.4g}")
+    return replace(judgement, findings=worst_first(findings), events=events, planned_rows=True)

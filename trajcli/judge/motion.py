@@ -20,7 +20,7 @@ from trajcli.judge.judgement import Judgement, worst_first
 from trajcli.judge.limits import judge_efforts, judge_limits, judge_velocity_by_position
 from trajcli.judge.reconstruction import Interpolation, chosen_interpolation
 from trajcli.judge.stamps import Stamps, UnfitError
-from trajcli.kinematics.robot import Limits, Robot
+from trajcli.kinematics.robot import QUANTITIES, Limits, Robot
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 from trajcli.trajectory import State
 
@@ -308,24 +308,13 @@ def _joined(blocks: list[RecordedMotion]) -> RecordedMotion:
 
 def _looser(a: Limits, b: Limits) -> Limits:
     """Return limits that two moves both keep."""
-    rows = []
-    for order in range(4):
-        (a_low, a_high), (b_low, b_high) = a.of_order(order).T, b.of_order(order).T
-        rows.append(np.stack([np.minimum(a_low, b_low), np.maximum(a_high, b_high)], axis=1))
+    both = {name: (getattr(a, name), getattr(b, name)) for name in (*QUANTITIES, "effort")}
+    rows = {
+        name: np.stack([np.minimum(one[:, 0], other[:, 0]), np.maximum(one[:, 1], other[:, 1])], axis=1)
+        for name, (one, other) in both.items()
+    }
     tcp = {name: max(value, getattr(b.tcp, name)) for name, value in vars(a.tcp).items()}
-    efforts = np.stack(
-        [
-            np.minimum(a.effort[:, 0], b.effort[:, 0]),
-            np.maximum(a.effort[:, 1], b.effort[:, 1]),
-        ],
-        axis=1,
-    )
-    return replace(
-        a,
-        effort=efforts,
-        **dict(zip(("position", "velocity", "acceleration", "jerk"), rows, strict=True)),
-        tcp=type(a.tcp)(**tcp),
-    )
+    return replace(a, **rows, tcp=type(a.tcp)(**tcp))
 
 
 def _check_finite(rows: Array | None, block: RecordedMotion, numbers: NDArray[np.int64]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from importlib import import_module
 from math import isfinite
@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from trajcli.kinematics.following.motion import ToolMotion
 
 ToolLimit = Literal["speed", "acceleration", "jerk", "angular_speed", "angular_acceleration"]
+"""Keys of the limits of the tool."""
+BoundedToolLimit = Literal["speed", "acceleration", "angular_speed", "angular_acceleration"]
+"""Those of which reports state the largest value in every move, proven for all t."""
 _RATES = ("", "/s", "/s^2", "/s^3")
 ScaleFactor = Literal["velocity", "acceleration", "jerk"]
 
@@ -83,11 +86,6 @@ class LimitKind:
         """Of a limit of the tool, SI."""
         return ("rad" if self.dimension == "angle" else "m") + _RATES[self.order or 0]
 
-    @property
-    def stretchable(self) -> bool:
-        """Whether a longer time may help against what is over it."""
-        return self.order != 0
-
     def stated(self, limits: Limits) -> bool:
         """Return whether somebody stated such a limit."""
         if self.of_tool:
@@ -114,7 +112,11 @@ KINDS = (
 KIND_OF: Mapping[str, LimitKind] = {kind.name: kind for kind in KINDS}
 JOINT_KINDS = tuple(kind for kind in KINDS if not kind.of_tool)
 LIMITS_OF_JOINTS = frozenset(kind.name for kind in JOINT_KINDS)
+STRETCHABLE = frozenset(kind.name for kind in KINDS if kind.order != 0)
+"""Kinds of findings that a longer time may take away."""
 TOOL_KINDS = tuple(kind for kind in KINDS if kind.of_tool)
+SPEED_KINDS = tuple(kind for kind in TOOL_KINDS if kind.picture)
+"""Those of the tool that pictures show: its speed and its angular speed."""
 
 
 class LimitSurvey(ABC):
@@ -162,6 +164,10 @@ class LimitedMove:
         return curve.breaks[first : last + 1], curve.coefficients[:, first:last]
 
 
+Narrowing = Callable[[Array], tuple[Array, Array]]
+"""Returns the least and the largest value allowed, each (N,), where all joints are at positions (N, n)."""
+
+
 class LimitFamily(ABC):
     """Judge of some kinds of limits. Those that stand alone have a family of one."""
 
@@ -181,6 +187,14 @@ class LimitFamily(ABC):
         """
         del robot, ends, use
         return False
+
+    def narrowing(self, limits: Limits, joint: int, order: int) -> Narrowing | None:
+        """Return by what the limits of a derivative of a joint are narrowed; None where they are not.
+
+        Pictures show it.
+        """
+        del limits, joint, order
+        return None
 
     def why_not_in_state(self, robot: Robot, state: State) -> tuple[str, Amounts] | None:
         """Return what is said of a joint that is over a limit in a state; None where none is.
@@ -212,6 +226,12 @@ def path_constraints(path: PiecewisePolynomial, robot: Robot) -> tuple[PathConst
     """
     known = (each for _, each in families(robot.limits, further=True))
     return tuple(row for each in known for row in each.path_constraints(path, robot))
+
+
+def narrowings(limits: Limits, joint: int, order: int) -> list[Narrowing]:
+    """Return all by which the limits of a derivative of a joint are narrowed."""
+    every = (each.narrowing(limits, joint, order) for _, each in families(limits, further=True))
+    return [each for each in every if each is not None]
 
 
 def family(name: str) -> LimitFamily:

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trajcli.curves.approach import ApproachUse, approach_uses
-from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.findings import Finding, NamedJoints, at_time, excess_amounts, joint_amounts
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Limits, Robot
-from trajcli.limits.kinds import LimitedMove, LimitFamily, LimitSurvey
+from trajcli.limits.kinds import LimitedMove, LimitFamily, LimitSurvey, Narrowing
 from trajcli.limits.tolerances import exceeds
 from trajcli.trajectory import State
 
@@ -83,6 +83,17 @@ class ApproachFamily(LimitFamily):
         """Return whether a joint is over its limit where the move declares to begin or to end."""
         del use
         return robot is not None and any(_joint_over(robot.limits, state) is not None for state in ends)
+
+    def narrowing(self, limits: Limits, joint: int, order: int) -> Narrowing | None:
+        """Return the velocities with which a joint may approach the ends of its range."""
+        if order != 1 or not np.isfinite(limits.velocity_by_position[joint, 0]):
+            return None
+
+        def allowed(positions: Array) -> tuple[Array, Array]:
+            low, high = limits.approach.bounds(positions)
+            return low[:, joint], high[:, joint]
+
+        return allowed
 
     def why_not_in_state(self, robot: Robot, state: State) -> tuple[str, Amounts] | None:
         """Return which joint is too fast for its distance from the end of its range."""

@@ -164,25 +164,25 @@ def _pose(plan: Plan, index: int | None) -> PoseReport | None:
 def _resolved(pose: ResolvedPose, plan: Plan) -> PoseReport:
     """Return how a pose was reached, in SI."""
     from trajcli.planning.resolve_poses import asked_names
-    from trajcli.queries.arm import ArmInUnits
     from trajcli.queries.inverse import free_directions, ranks
-    from trajcli.queries.pose import plain
 
     solutions, joints, robot = pose.solutions, pose.joints, plan.loaded.robot
     asked, units = asked_names(pose.target.configuration), joint_units(robot.joint_types)
     here, nearby = ranks(robot, joints[None], pose.ik_target)
     free = None
     if solutions.free[pose.branch].any():
-        free = plain(next(free_directions(ArmInUnits(robot, plan.loaded.units), joints, pose.ik_target)))
+        from trajcli.queries.arm import ArmInUnits
+
+        free = _plain(next(free_directions(ArmInUnits(robot, plan.loaded.units), joints, pose.ik_target)))
     return PoseReport(
-        joints=plain(joints),
+        joints=_plain(joints),
         units=units,
         branch={key: name for key, name in asdict(solutions.names[pose.branch]).items() if name},
         method=solutions.method.name,
         chosen=ChoiceReport(
             by="configuration" if asked else "nearest",
             configuration=asked,
-            near=plain(pose.near),
+            near=_plain(pose.near),
             units=units,
             candidates=int(np.count_nonzero(pose.usable)),
             within_limits=int(np.count_nonzero(solutions.within_limits)),

@@ -36,7 +36,6 @@ from trajcli.job.report import (
     UncheckedToolReport,
     WaypointReport,
 )
-from trajcli.job.unit_hints import unit_hint
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.knots import Knots, knots_of
 from trajcli.output.efforts import effort_reports, efforts_report, most_used, payload_report
@@ -365,6 +364,8 @@ def verification_error(plan: Plan, *, every: bool = True) -> VerificationError:
     findings = plan.verdict.findings
     if every:
         return VerificationError(*(_problem(plan, finding) for finding in findings))
+    from trajcli.job.unit_hints import unit_hint
+
     alike: dict[tuple[int | str | None, ...], list[Finding]] = {}
     units = unit_hint(plan.loaded)
     for finding in findings:

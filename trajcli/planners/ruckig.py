@@ -21,8 +21,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from trajcli.curves.braking import braking
-from trajcli.curves.double_s import DoubleS, double_s_of, fastest_double_s
 from trajcli.curves.phases import PhaseChain
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount, Amounts, PlanningError, Problem
@@ -244,6 +242,8 @@ def _double_s(problem: BoundaryProblem, duration: float | None) -> PhaseProfile 
     sizes = abs(displacement), highest if displacement > 0 else -lowest, high, min(-jerks[0], jerks[1])
     if low != -high or not all(1 / _COMMON < size < _COMMON for size in sizes):
         return None
+    from trajcli.curves.double_s import DoubleS, double_s_of, fastest_double_s
+
     distance, velocity, acceleration, jerk = sizes
     if duration is None:
         found: DoubleS | None = fastest_double_s(distance, velocity, acceleration, jerk)
@@ -427,6 +427,8 @@ def _lead(problem: BoundaryProblem) -> PhaseChain | None:
     """Return the phases that bring the start inside the bounds; None where ruckig does it, or none do."""
     if not problem.brake or problem.control != "velocity":
         return None
+    from trajcli.curves.braking import braking
+
     phases = braking(*problem.initial[1:], problem.bounds).phases
     initial = np.array([0.0, *problem.initial[1:]])[: problem.order]
     times, constants = np.array(phases).reshape(-1, 2).T

@@ -8,7 +8,6 @@ from math import ceil, copysign
 
 from trajcli.checks.verify import verify
 from trajcli.curves.operations import scale_time
-from trajcli.curves.smallest_feasible import smallest_feasible
 from trajcli.errors import Amount, Amounts, PlanningError, Problem, TrajcliError
 from trajcli.findings import Finding
 from trajcli.kinematics.robot import Robot
@@ -140,6 +139,7 @@ def smallest_stretch(move: PlannedMove, over: Sequence[Finding]) -> float | Prob
         if None in factors:
             return Problem("change the target, the start or the limit")
         return max(f for f in factors if f is not None)
+    from trajcli.curves.smallest_feasible import smallest_feasible
     from trajcli.planning.slowing import StretchSearch, why_no_duration
 
     reason = why_no_duration(move)

@@ -11,6 +11,7 @@ import numpy as np
 from trajcli.columns import EFFORT
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
+from trajcli.limits.kinds import SPEED_KINDS
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan
 from trajcli.plots.choice import (
@@ -118,8 +119,7 @@ def _sensible(motion: PlannedMotion | None, records: Sequence[DrawnTable]) -> li
     if motion.has_effort_limits or any(EFFORT in record.shows() for record in records):
         names.append(EFFORT)
     along_path = any(move.planned.tool is not None for move in motion.moves)
-    tcp = [move.robot.limits.tcp for move in motion.moves]
-    if along_path or any(np.isfinite((limits.speed, limits.angular_speed)).any() for limits in tcp):
+    if along_path or any(kind.stated(move.robot.limits) for move in motion.moves for kind in SPEED_KINDS):
         names.append(TOOL)
     return [*names, *([PATH] if along_path else []), PHASE]
 

@@ -11,6 +11,7 @@ from trajcli.columns import EFFORT, JOINT_ORDERS
 from trajcli.curves.piecewise import Array, derivative_coefficients, horner
 from trajcli.findings import Finding
 from trajcli.frozen import frozen
+from trajcli.limits.kinds import KINDS, SPEED_KINDS, narrowings
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan
 from trajcli.plots.display_units import DisplayUnits
@@ -21,21 +22,9 @@ from trajcli.trajectory import ViaPoints
 if TYPE_CHECKING:
     from trajcli.plots.planned_efforts import EffortSamples
 
-JOINT_KINDS = {
-    "position": "q",
-    "velocity": "qd",
-    "velocity_by_position": "qd",
-    "acceleration": "qdd",
-    "jerk": "qddd",
-    "position_jump": "q",
-    "velocity_jump": "qd",
-    "acceleration_jump": "qdd",
-    "effort": EFFORT,
-}
-"""The quantity of a joint that a kind of finding is about."""
-
-TOOL_KINDS = ("tool_speed", "tool_angular_speed")
-_TOOL_LIMITS = ("speed", "angular_speed")
+_JUMPS = {"position_jump": "q", "velocity_jump": "qd", "acceleration_jump": "qdd"}
+_SHOWN_IN = {kind.name: kind.picture for kind in KINDS} | _JUMPS
+"""The quantity of a joint, or of the tool, that a kind of finding is about."""
 
 
 @frozen
@@ -108,14 +97,14 @@ class PlannedMotion:
             efforts = np.array([move.robot.limits.effort[joint] for move in self.moves])
             return self._steps(efforts[:, 0]), self._steps(efforts[:, 1])
         order = JOINT_ORDERS[quantity]
-        if order == 1 and any(np.isfinite(m.robot.limits.velocity_by_position[joint, 0]) for m in self.moves):
-            return self._limits_by_position(joint)
+        if any(narrowings(move.robot.limits, joint, order) for move in self.moves):
+            return self._narrowed_limits(joint, order)
         bounds = np.array([move.robot.limits.of_order(order)[joint] for move in self.moves])
         low, high = (self._steps(side / self.display.joint_factor(joint)) for side in bounds.T)
         return low, high
 
-    def _limits_by_position(self, joint: int) -> tuple[Array, Array]:
-        """Return the lines (m, 2) of a joint's velocity limits, narrowed by where it is on the trajectory."""
+    def _narrowed_limits(self, joint: int, order: int) -> tuple[Array, Array]:
+        """Return the lines (m, 2) of a joint's limits, narrowed by where it is on the trajectory."""
         curve, scale = self.plan.trajectory.curve, self.display.joint_factor(joint)
         piece, local = local_times(curve)
         times = np.minimum(curve.breaks[piece] + local, curve.breaks[piece + 1])
@@ -125,9 +114,10 @@ class PlannedMotion:
         low, high = np.empty(times.size), np.empty(times.size)
         for k, move in enumerate(self.moves):
             rows, limits = owner == k, move.robot.limits
-            bounds = limits.approach.bounds(positions[rows])
-            low[rows] = np.maximum(bounds[0][:, joint], limits.velocity[joint, 0])
-            high[rows] = np.minimum(bounds[1][:, joint], limits.velocity[joint, 1])
+            low[rows], high[rows] = limits.of_order(order)[joint]
+            for each in narrowings(limits, joint, order):
+                below, above = each(positions[rows])
+                low[rows], high[rows] = np.maximum(below, low[rows]), np.minimum(above, high[rows])
         lines = [
             np.stack(thinned(times + self.offset, np.where(np.isfinite(side), side, np.nan) / scale), axis=1)
             for side in (low, high)
@@ -137,7 +127,7 @@ class PlannedMotion:
     def tool_limit(self, angular: bool) -> Array:
         """Return the line (m, 2) of the limit of the tool's speed."""
         scale = self.display.factor("angle" if angular else "length")
-        limits = [getattr(move.robot.limits.tcp, _TOOL_LIMITS[angular]) for move in self.moves]
+        limits = [getattr(move.robot.limits.tcp, SPEED_KINDS[angular].key) for move in self.moves]
         return self._steps(np.array(limits) / scale)
 
     def waypoints(self, joint: int) -> Array:
@@ -156,7 +146,7 @@ class PlannedMotion:
         )
         rows = []
         for finding, time, reached in self._findings():
-            own = finding.joint == name and JOINT_KINDS.get(finding.kind) == quantity
+            own = finding.joint == name and _SHOWN_IN.get(finding.kind) == quantity
             value = reached / scale if own and not finding.kind.endswith("_jump") else np.nan
             if own and quantity != EFFORT and np.isnan(value):
                 value = float(self.plan.trajectory.curve.evaluate(time, order)[joint]) / scale
@@ -167,7 +157,7 @@ class PlannedMotion:
         """Return the same for the speed of the tool."""
         scale = self.display.factor("angle" if angular else "length")
         rows = [
-            (time + self.offset, value / scale if finding.kind == TOOL_KINDS[angular] else np.nan)
+            (time + self.offset, value / scale if finding.kind == SPEED_KINDS[angular].name else np.nan)
             for finding, time, value in self._findings()
         ]
         return np.array(rows or NO_POINTS)
@@ -225,10 +215,10 @@ class PlannedMotion:
         spans, known = self.plan.trajectory.spans, self.plan.verdict.tool_peaks
         return np.array(
             [
-                span.start + peaks[name].time
+                span.start + peaks[kind.key].time
                 for span, peaks in zip(spans, known, strict=False)
                 if peaks is not None
-                for name in _TOOL_LIMITS
+                for kind in SPEED_KINDS
             ]
         )
 

@@ -13,6 +13,7 @@ from trajcli.findings import Finding
 from trajcli.frozen import frozen
 from trajcli.judge.judgement import Judgement
 from trajcli.kinematics.robot import Robot
+from trajcli.limits.kinds import JOINT_KINDS, SPEED_KINDS
 from trajcli.plots.choice import JOINT_QUANTITIES
 from trajcli.plots.display_units import DisplayUnits
 from trajcli.plots.panel import NO_POINTS
@@ -20,18 +21,9 @@ from trajcli.streams.table import Table
 
 _SPEEDS = (("vx", "vy", "vz"), ("wx", "wy", "wz"))
 _POSITION = ("x", "y", "z")
-_EFFORT = "tau"
-_LIMITED: Mapping[str | None, str] = {
-    "position": "q",
-    "velocity": "qd",
-    "velocity_by_position": "qd",
-    "acceleration": "qdd",
-    "jerk": "qddd",
-    "effort": _EFFORT,
-}
+_LIMITED: Mapping[str | None, str | None] = {kind.name: kind.picture for kind in JOINT_KINDS}
 """Which values of a joint a kind of finding, or the quantity that a finding names, is about."""
 _AT_ENDS = ("start", "end")
-_TOOL_KINDS = ("tool_speed", "tool_angular_speed")
 
 
 def columns_of_table(table: Table) -> tuple[Column, ...]:
@@ -119,7 +111,7 @@ class DrawnTable:
         scale = self.display.factor("angle" if angular else "length")
         rows = []
         for time, finding in self._errors():
-            own = finding.kind == _TOOL_KINDS[angular] and finding.value is not None
+            own = finding.kind == SPEED_KINDS[angular].name and finding.value is not None
             rows.append((time, float(finding.value or 0.0) / scale if own else np.nan))
         return np.array(rows or NO_POINTS)
 
@@ -142,7 +134,7 @@ class DrawnTable:
     def _marked(self, finding: Finding, time: float, kind: str, joint: int) -> float:
         """Return where a marker stands: at the offending value; of a jump or a wrong column on its line."""
         if finding.kind in _LIMITED or finding.kind in _AT_ENDS:
-            scale = 1.0 if kind == _EFFORT else self.display.joint_factor(joint)
+            scale = 1.0 if kind == EFFORT else self.display.joint_factor(joint)
             return np.nan if finding.value is None else finding.value / scale
         values = self.joint(kind, joint)
         return np.nan if values is None else float(np.interp(time, self.times, values))

@@ -13,7 +13,6 @@ from trajcli.columns import joint_factors
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount, InputError
 from trajcli.frozen import comparable, frozen
-from trajcli.job.inline import inline_number, inline_pose
 from trajcli.job.robot import RobotSheet, catalogue_names, is_urdf, load_sheet
 from trajcli.job.yaml.load import read_document
 from trajcli.kinematics.inverse.joint_turns import beyond
@@ -89,6 +88,8 @@ class ArmInUnits:
                 f"{self.robot.name} has {count} joint{'s' * (count != 1)}",
                 hint=f"they are {units}",
             )
+        from trajcli.job.inline import inline_number
+
         names = [f"{name} of {joint}" for joint in self.robot.joint_names]
         return np.array(
             [
@@ -187,10 +188,13 @@ def open_arm(
     shown = Units() if si else parse_units(units or "", sheet.units)
     robot = sheet.robot
     links_of(robot)  # refuses bare joints before anything is read or written
-    if tool is not None:
-        robot = replace(robot, tool=inline_pose(tool, "--tool", shown))
-    if base is not None:
-        robot = replace(robot, base=inline_pose(base, "--base", shown))
+    if tool is not None or base is not None:
+        from trajcli.job.inline import inline_pose
+
+        own = robot.tool if tool is None else inline_pose(tool, "--tool", shown)
+        robot = replace(
+            robot, tool=own, base=robot.base if base is None else inline_pose(base, "--base", shown)
+        )
     return ArmInUnits(replace(robot, base=np.eye(4)) if frame == "base" else robot, shown)
 
 

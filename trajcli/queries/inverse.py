@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +21,9 @@ from trajcli.kinematics.inverse.target import IkTarget, residual_jacobian
 from trajcli.kinematics.jacobian import jacobian
 from trajcli.kinematics.robot import Robot
 from trajcli.language.targets import Configuration
-from trajcli.queries.arm import ArmInUnits
-from trajcli.queries.jacobian import simplest
-from trajcli.queries.pose import plain
+
+if TYPE_CHECKING:
+    from trajcli.queries.arm import ArmInUnits
 
 _LOST = max(RANK_TOLERANCE, 1e-7)  # of the largest singular value: answers meet their target within rounding
 _AROUND, _SPREAD = 4, 0.1  # configurations, rad or m: an arm is regular almost everywhere around
@@ -141,6 +141,8 @@ def require_answer(
 def _answer(
     arm: ArmInUnits, solutions: Solutions, branch: int, joints: Array, target: IkTarget, singular: bool
 ) -> dict[str, Any]:
+    from trajcli.queries.pose import plain
+
     names = {choice: name for choice, name in asdict(solutions.names[branch]).items() if name is not None}
     report = {
         "joints": plain(joints / arm.joint_factors),
@@ -157,6 +159,8 @@ def _answer(
 def free_directions(arm: ArmInUnits, joints: Array, target: IkTarget) -> Iterator[Array]:
     """Yield unit vectors (n,) of joint values, in the user's units, that leave what is fixed of the pose."""
     _, values, right = np.linalg.svd(_held(arm.robot, joints[None], target)[0])
+    from trajcli.queries.jacobian import simplest
+
     rank = min(int(_rank(values)), len(joints) - 1)
     for direction in simplest(right[rank:]):
         shown = direction / arm.joint_factors

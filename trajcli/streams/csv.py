@@ -12,7 +12,6 @@ from trajcli.columns import Column, require_finite, whole_number_columns
 from trajcli.curves.piecewise import Array
 from trajcli.errors import TrajcliError
 from trajcli.streams.decimals import Digits, NotFixedError, encode_fixed, scan_fixed
-from trajcli.streams.number_cells import encode_full, scan_decimals
 
 _CHUNK = 1 << 18  # bytes read back at a time
 _HALF_UNIT = 0.5e-9 + 1e-12  # the last decimal's half, and the first of the two roundings
@@ -80,6 +79,8 @@ def encoder_of(digits: Digits) -> Callable[[Array, Sequence[int]], bytes]:
     """Return the function that makes lines of rows (N, m), given which columns are whole numbers."""
     if digits == "fixed":
         return encode_fixed
+    from trajcli.streams.number_cells import encode_full
+
     return encode_full
 
 
@@ -131,6 +132,8 @@ class _RowsReadBack:
         text += b"" if text.endswith(b"\n") else self._stream.readline()
         with suppress(NotFixedError):
             return scan_fixed(text, self._width, self._whole_numbers)
+        from trajcli.streams.number_cells import scan_decimals
+
         try:
             return scan_decimals(text, self._width)[0]
         except NotFixedError as error:

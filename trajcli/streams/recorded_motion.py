@@ -191,7 +191,7 @@ class MotionFile:
     def blocks(self, rows: int = BLOCK_ROWS) -> Iterator[RecordedMotion]:
         """Yield all rows, at most `rows` at a time; as often as it is asked for."""
         first = 1
-        for block in _of_size(self._blocks(), rows):
+        for block in blocks_of_size(self._blocks(), rows):
             yield self._motion(block, first)
             first += len(block)
 
@@ -278,8 +278,8 @@ class _Magnitudes:
         np.maximum(self.largest, np.maximum(block.max(axis=0), -block.min(axis=0)), out=self.largest)
 
 
-def _of_size(blocks: Iterable[Array], rows: int) -> Iterator[Array]:
-    """Yield the same rows, `rows` at a time, and what is left."""
+def blocks_of_size(blocks: Iterable[Array], rows: int) -> Iterator[Array]:
+    """Yield the same rows (N, m), `rows` at a time, and what is left."""
     held: list[Array] = []
     count = 0
     for block in blocks:
@@ -324,8 +324,28 @@ def open_motion(
         FileError: When it cannot be read.
         InputError: When it is not such a file, with the place of what is wrong.
     """
-    said = parse_units(units)
     rows = open_rows_of(source, topic=topic, field=field, joints=None if joints is None else len(joints))
+    return motion_of(
+        rows, columns=columns, units=units, joints=joints, joint_types=joint_types, declared=declared
+    )
+
+
+def motion_of(
+    rows: RowSource,
+    *,
+    columns: str | Mapping[str, str] | None = None,
+    units: str | Units | None = None,
+    joints: Sequence[str] | None = None,
+    joint_types: Sequence[JointType] | None = None,
+    declared: Units | None = None,
+) -> MotionFile:
+    """Return the motion in rows that are open; as `open_motion`, which says what its arguments are.
+
+    Raises:
+        FileError: When they cannot be read.
+        InputError: When they are no motion.
+    """
+    said = parse_units(units)
     roles = assign_roles(rows.named, columns, joints)
     names = rows.joint_names or roles.joint_names
     order, ordered, notes = ordered_joints(rows.named, roles, names, joints)

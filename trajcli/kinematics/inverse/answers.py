@@ -12,8 +12,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.families.method import Branch, IkMethod
-from trajcli.kinematics.inverse.link_products import poses_and_jacobians
-from trajcli.kinematics.inverse.numeric import FEW, refine
+from trajcli.kinematics.inverse.link_products import FEW, poses_and_jacobians
 from trajcli.kinematics.inverse.target import IkTarget, closure_of
 from trajcli.kinematics.robot import Robot
 
@@ -113,6 +112,8 @@ def polish(
     poor = rough(miss) | (degenerate[rows] & (near[0] < _NEAR) & (miss > _EXACT))
     branches, columns = np.nonzero(poor)
     if len(columns):
+        from trajcli.kinematics.inverse.numeric import refine
+
         poses = rows[columns]
         some = target.rows(poses)
         better = refine(robot, some, joints[:, branches, poses].T)

@@ -21,8 +21,8 @@ from trajcli.kinematics.inverse.families.held_joint import poses_for_the_others
 from trajcli.kinematics.inverse.families.method import IkMethod
 from trajcli.kinematics.inverse.families.screw_axes import axis_geometry
 from trajcli.kinematics.inverse.joint_turns import FULL, beyond, choose_turns
-from trajcli.kinematics.inverse.link_products import poses_and_jacobians
-from trajcli.kinematics.inverse.numeric import FEW, damped_step
+from trajcli.kinematics.inverse.link_products import FEW, poses_and_jacobians
+from trajcli.kinematics.inverse.numeric import damped_step
 from trajcli.kinematics.inverse.target import IkTarget
 from trajcli.kinematics.jacobian import linearisation
 from trajcli.kinematics.robot import Robot

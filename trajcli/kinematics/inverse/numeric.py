@@ -29,7 +29,7 @@ from trajcli.frozen import frozen
 from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.inverse.joint_turns import FULL, revolute
-from trajcli.kinematics.inverse.link_products import poses_and_jacobians
+from trajcli.kinematics.inverse.link_products import FEW, poses_and_jacobians
 from trajcli.kinematics.inverse.target import IkTarget, residual_jacobian, residuals
 from trajcli.kinematics.jacobian import linearisation
 from trajcli.kinematics.robot import Robot
@@ -37,7 +37,6 @@ from trajcli.kinematics.robot import Robot
 SEEDS = 64  # where any point of a manifold will do
 SEEDS_OF_ALL = 192  # where all solutions are wanted: with 64 one pose in a hundred lacks one
 ROUNDS = 3  # of seeds, for targets that no seed met; the last one disregards limits
-FEW = 32  # configurations of a redundant arm up to which products of matrices are faster
 _BLOCK = 128  # targets at a time, so that memory does not grow with their number
 ITERATIONS = 60
 DONE = 1e-13  # of the scaled error: a few roundings

@@ -15,7 +15,6 @@ import numpy as np
 from trajcli.curves.extrema import piece_extremes
 from trajcli.curves.hermite import hermite_coefficients
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.curves.smallest_feasible import smallest_feasible
 from trajcli.errors import PlanningError, Problem, TrajcliError
 from trajcli.kinematics.robot import QUANTITIES, Limits, Robot, share_of_limits
 from trajcli.language.targets import Duration
@@ -124,6 +123,8 @@ def _by_search(planner: str, start: Array, end: Array, robot: Robot) -> float:
 
     def excess(durations: Array) -> Array:
         return _share(start, end, durations, robot.limits) - (1 + _ROOM)
+
+    from trajcli.curves.smallest_feasible import smallest_feasible
 
     duration = smallest_feasible(excess, low, high)
     if duration is None:

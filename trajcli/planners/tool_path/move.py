@@ -41,7 +41,6 @@ from trajcli.kinematics.inverse.target import (
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.language.numbers import FieldPath, Flaw, Model, Number
 from trajcli.language.targets import Configuration, Target, ik_target
-from trajcli.planners.boundary_states import standstill, start_in_motion
 from trajcli.planners.planner import Event, Planned, Planner
 from trajcli.planners.tool_path.follow import (
     JointMotion,
@@ -181,9 +180,13 @@ class ToolPathMove(Planner):
             hint = "give its joints theta, d, a and alpha"
             raise InputError(f"{robot.name} has no geometry, so its tool has no path", hint=hint)
         if not start.at_rest:
+            from trajcli.planners.boundary_states import start_in_motion
+
             raise start_in_motion(self.tag, start, robot)
         planned = self.path_from(forward(robot, start.position), robot)
         if planned.path.length == 0:
+            from trajcli.planners.boundary_states import standstill
+
             check_arrival(planned, start.position, robot)
             return standstill(start, self.law.duration or self.law.minimum_duration or 0.0, REMEDIES)
         try:

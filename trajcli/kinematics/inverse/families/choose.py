@@ -8,7 +8,6 @@ import numpy as np
 
 from trajcli.kinematics.dexterity import RANK_TOLERANCE, characteristic_length
 from trajcli.kinematics.inverse.families import planar, positioning, spherical_wrist, three_parallel
-from trajcli.kinematics.inverse.families.held_joint import without_last_joint
 from trajcli.kinematics.inverse.families.method import IkMethod
 from trajcli.kinematics.inverse.families.screw_axes import AxisGeometry, axis_geometry
 from trajcli.kinematics.jacobian import jacobian
@@ -42,6 +41,8 @@ def method_for(robot: Robot) -> IkMethod:
 
 def _held_method(robot: Robot) -> IkMethod | None:
     """Return the method of seven joints whose first six have a closed form; None for other arms."""
+    from trajcli.kinematics.inverse.families.held_joint import without_last_joint
+
     held = without_last_joint(robot)
     method = None if held is None else method_for(held)
     if method is None or method.solve is None:
