@@ -95,6 +95,24 @@ def job(kind: str) -> dict[str, Any]:
                 }
             ],
         ),
+        "ends_moving": (
+            {**FREE_JERK, "start": {"joints": [0], "velocity": [0.5]}},
+            [
+                {
+                    "planner": "spline",
+                    "rule": "natural",
+                    "through": [{"joints": [0.3], "time": 1}, {"joints": [0], "time": 2}],
+                }
+            ],
+        ),
+        "units": (
+            {
+                "robot": "ur5e",
+                "limits": {"acceleration": 5, "jerk": 50},
+                "start": {"joints": [0, -1.5, 1, 0, 1, 0]},
+            },
+            [{"planner": "jerk_limited", "to": {"xyz": [0.4, 0.1, 0.2], "rpy": [180, 0, 0]}}],
+        ),
         "begins_before": (
             {**FREE_JERK, "start": {"joints": [0], "velocity": [0.5]}},
             [

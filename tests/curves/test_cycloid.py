@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from trajcli.curves.cycloid import PEAKS, cycloid_law
+from trajcli.curves.rest_to_rest import PEAKS, cycloid_law
 
 ERRORS = (1e-15, 1e-14, 5e-13, 2e-11)  # of the peaks of s and its derivatives
 

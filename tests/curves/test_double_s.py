@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import ruckig
 
-from trajcli.curves.double_s import DoubleS, double_s_of, fastest_double_s
+from trajcli.curves.rest_to_rest import DoubleS, double_s_of, fastest_double_s
 
 CASES = {
     "all phases": (3.0, 1.0, 2.0, 8.0),

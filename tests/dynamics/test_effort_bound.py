@@ -9,6 +9,7 @@ import pytest
 from heavy_arms import random_arm, random_payload
 from scipy.optimize import minimize_scalar
 
+from trajcli.curves import node_bound
 from trajcli.dynamics import effort_bound
 from trajcli.dynamics.effort_bound import effort_majorants, effort_survey, needed_stretch
 from trajcli.dynamics.newton_euler import InverseDynamics
@@ -182,7 +183,7 @@ def test_the_remainder_covers_a_peak_that_no_row_shows(length, monkeypatch):
     monkeypatch.setattr(effort_bound, "_HALVINGS", 0)
     found = effort_survey(dynamics, np.array([0.0, length]), motion).highest()[0]
     assert 5.0 * size * (1 - 1e-5) <= found.most - 5.0 <= 2.1 * 5.0 * size
-    monkeypatch.setattr(effort_bound, "BETWEEN_NODES", effort_bound.BETWEEN_NODES / 10)
+    monkeypatch.setattr(node_bound, "BETWEEN_NODES", node_bound.BETWEEN_NODES / 10)
     found = effort_survey(dynamics, np.array([0.0, length]), motion).highest()[0]
     assert found.most - 5.0 < 5.0 * size * 0.5  # ten times too small a remainder would be noticed above
 

@@ -52,16 +52,16 @@ def test_between_rows_the_tool_is_as_near_as_is_said(monkeypatch: pytest.MonkeyP
     """A steady turn by 5 rad on one piece: the interpolation is beside it by up to a fifth of what is said."""
     robot, length = load_robot("planar2r"), 1.0
     coefficients = on_a_crank([5.0, 0.0])
-    rows, rest = tool_bound._known(robot, coefficients, np.array([length]))
+    monkeypatch.setattr(tool_bound, "_HALVINGS", 0)
     t = np.linspace(0, length, 2001)
     velocity = tcp_twist(robot, np.outer(t, [5.0, 0.0]), np.tile([5.0, 0.0], (t.size, 1)))[:, :2]
     nodes = np.linspace(0, length, 9)
-    beside = np.stack([np.polyval(np.polyfit(nodes, rows[0, 0, :, k], 8), t) for k in range(2)], axis=1)
+    rows = tcp_twist(robot, np.outer(nodes, [5.0, 0.0]), np.tile([5.0, 0.0], (9, 1)))[:, :2]
+    beside = np.stack([np.polyval(np.polyfit(nodes, rows[:, k], 8), t) for k in range(2)], axis=1)
     apart = np.linalg.norm(beside - velocity, axis=1).max()
-    assert 0.1 * rest[0, 0] < apart <= rest[0, 0]
-    monkeypatch.setattr(tool_bound, "_HALVINGS", 0)
     (speed, *_) = tool_bounds(robot, np.array([0.0, length]), coefficients)
-    assert speed.most >= np.linalg.norm(velocity, axis=1).max() + 0.9 * rest[0, 0]
+    largest = np.linalg.norm(beside, axis=1).max()
+    assert apart <= speed.most - largest < 10 * apart
 
 
 @pytest.mark.parametrize("name", ["ur5e", "panda", "cobra600", "planar3r", "scorbot"])
@@ -85,17 +85,3 @@ def test_a_tool_that_rests_has_no_speed() -> None:
     for breaks in ([1.0, 2.0], [1.0, 1.0]):
         for one in tool_bounds(robot, np.array(breaks), still):
             assert one.value == one.most == 0.0
-
-
-def test_a_slower_piece_that_is_less_well_known_counts_with_what_it_may_be() -> None:
-    """A piece whose speed rises to 1, and one that stays at 0.9 but may be beside that by 0.5."""
-    rising, even = np.linspace(0, 1, 9) ** 2, np.full(9, 0.9)
-    rows = np.zeros((2, 9, 3))
-    rows[:, :, 1] = rising, even
-    found = tool_bound._largest(rows, np.array([1e-9, 0.5]), np.array([0.0, 1.0]), np.ones(2))
-    assert found.value == pytest.approx(1.0, rel=1e-12)
-    assert found.most == pytest.approx(1.4, rel=1e-12)
-    wavy = rows[:1] + [0, 0, 1] * np.sin(np.linspace(0, 5, 9))[:, None]
-    rows = np.concatenate([wavy, np.array([0, 0.9, 0]) + 0 * wavy])
-    found = tool_bound._largest(rows, np.array([1e-9, 0.5]), np.array([0.0, 1.0]), np.ones(2))
-    assert found.most == pytest.approx(1.4, rel=1e-12)

@@ -21,9 +21,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.curves.bernstein import control_points
 from trajcli.curves.extrema import critical_points
-from trajcli.curves.piecewise import Array, derivative_coefficients, horner
+from trajcli.curves.piecewise import Array, control_points, derivative_coefficients, horner
 from trajcli.frozen import comparable, frozen
 
 ROOM = 1e-12

@@ -18,7 +18,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from trajcli.curves.piecewise import Array, PiecewisePolynomial, derivative_coefficients, horner
+from trajcli.curves.piecewise import (
+    Array,
+    PiecewisePolynomial,
+    control_points,
+    derivative_coefficients,
+    horner,
+)
 from trajcli.frozen import frozen
 
 _STEP = 2.0**-53  # of a piece: a shorter step of the root finder changes nothing
@@ -320,9 +326,6 @@ def _surveyed(
     shape = (2, windows.piece.size, curve.dimension)
     ends, worth = np.empty((len(orders), *shape)), np.full(shape[1:], windows.piece.size < _MANY)
     few = bool(worth.all())
-    if not few:
-        from trajcli.curves.bernstein import control_points
-
     begin, end = windows.start - windows.origin, windows.end - windows.origin
     for at_ends, order in zip(ends, orders, strict=True):
         hull = np.empty((0, *shape[1:]) if few else shape)

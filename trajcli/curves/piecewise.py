@@ -6,7 +6,7 @@ A joint path q(s), a time law s(t) and a trajectory q(t) are this type in three 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import perm
+from math import comb, perm
 from typing import Literal
 
 import numpy as np
@@ -191,6 +191,29 @@ def taylor_shift(coefficients: Array, x: Array) -> Array:
         for power in range(1, last + 1):
             shifted[power] += x * shifted[power - 1]
     return shifted
+
+
+def control_points(coefficients: Array, lengths: Array) -> Array:
+    """Return the Bernstein coefficients (degree + 1, ...) of polynomials, each from 0 to its own length.
+
+    Args:
+        coefficients: Shape (degree + 1, ...), highest power first.
+        lengths: Broadcasts against the trailing shape.
+
+    On its interval a polynomial lies within their range; the first and the last are its values at the ends.
+
+    Source: Farouki, The Bernstein polynomial basis: a centennial retrospective, Computer Aided Geometric
+    Design 29 (2012), section 3.
+    """
+    degree = coefficients.shape[0] - 1
+    points = coefficients[::-1].copy()
+    power = np.ones_like(lengths)
+    for k in range(1, degree + 1):
+        power = power * lengths
+        points[k] *= power / comb(degree, k)
+    for k in range(1, degree + 1):
+        points[k:] = points[k:] + points[k - 1 : -1]
+    return points
 
 
 def distinct(values: Array) -> Array:

@@ -1,14 +1,12 @@
-"""Bounds of the joints' efforts for all t: samples, and a proof of what is between them.
+"""Bounds of the joints' efforts for all t, from nine nodes of each piece of a motion.
 
-On each piece of the curve nine rows give a polynomial of degree 8. What an effort does between the rows is
-off it by at most f^(9) / 9! times 8! / 4 (h / 8)^9, and that derivative is bounded by the recursion of Newton
-and Euler itself, run on power series that bound the sizes of its vectors: a turn multiplies by the
-exponential of the joint's growth, a cross product by a product. The polynomial lies within the hull of its
-control points, which closes in on it when it is divided.
+The ninth derivative of an effort is bounded by the recursion of Newton and Euler itself, run on power series
+that bound the sizes of its vectors: a rotation multiplies by the exponential of the joint's growth, a cross
+product by a product.
 
 Coulomb friction jumps where a joint turns back: pieces are cut there, and each of them has one sign.
 
-Source: as of `trajcli/curves/bernstein.py` and `trajcli/kinematics/power_series.py`.
+Source: as of `trajcli/curves/node_bound.py` and `trajcli/kinematics/power_series.py`.
 """
 
 from __future__ import annotations
@@ -18,16 +16,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from trajcli.curves.bernstein import BETWEEN_NODES, NODES_DEGREE, control_points, hull_matrices
 from trajcli.curves.extrema import critical_points
-from trajcli.curves.piecewise import Array, derivative_coefficients, distinct, horner, taylor_shift
+from trajcli.curves.node_bound import NODES_DEGREE, NodeSurvey, at_nodes, hull_matrices, node_survey
+from trajcli.curves.piecewise import Array, control_points, derivative_coefficients, distinct, taylor_shift
 from trajcli.dynamics.newton_euler import InverseDynamics, direction
 from trajcli.frozen import frozen
 from trajcli.kinematics.power_series import growth, series_exponential, series_product
 
 _CLOSE = 1e-7  # relative: of the remainder, and of the hull
 _SMALL = 1e-6  # N m or N: what is smaller need not be known so well
-_HALVINGS, _DIVISIONS, _MOST = 12, 24, 1 << 16
+_HALVINGS = 12
 _EDGE = 1e-12  # of a piece: a joint that turns back nearer to its end does so there
 _STEPS = 60  # of the search of a stretch
 _LEAST = 1e-9  # by which a stretch grows at least, from step to step
@@ -63,29 +61,17 @@ class EffortPeak:
 
 @frozen
 class EffortSurvey:
-    """Efforts at nine rows of each of P pieces, and how far off they may be between them.
+    """Efforts of a motion at the nodes of its pieces, and how far off they may be between them.
 
     Attributes:
         span: Where the curve begins and ends, s.
-        starts: Of the pieces, s, shape (P,); in no order.
-        lengths: Of the pieces, s, shape (P,).
-        parts: As those of `EffortPeak`, shape (P, 9, n, 4).
-        rest: Of the sum, shape (P, n).
+        nodes: Values of n joints, with the parts of `EffortPeak`; remainders of their sums.
         limits: Bounds of the joints: the smaller magnitudes, for which efforts are to be known, shape (n,).
     """
 
     span: tuple[float, float]
-    starts: Array
-    lengths: Array
-    parts: Array
-    rest: Array
+    nodes: NodeSurvey
     limits: Array
-
-    @property
-    def room(self) -> Array:
-        """How near to the efforts of each joint their bounds are to come, shape (n,)."""
-        largest: Array = np.abs(self.parts.sum(axis=3)).max(axis=(0, 1), initial=0.0)
-        return _CLOSE * np.maximum(np.minimum(largest, self.limits), _SMALL)
 
     def doubtful(self, limits: Array, room: float) -> Iterator[tuple[int, int, float]]:
         """Yield index, direction and magnitude of the limits that a first look at the hull does not prove.
@@ -94,9 +80,10 @@ class EffortSurvey:
             limits: Lower and upper bounds, shape (n, 2).
             room: By what part of a limit it may be passed.
         """
-        points = np.tensordot(hull_matrices()[0], self.parts.sum(axis=3), axes=(1, 1))
-        high = (points.max(axis=0) + self.rest).max(axis=0, initial=0.0)
-        low = (points.min(axis=0) - self.rest).min(axis=0, initial=0.0)
+        points = np.tensordot(hull_matrices()[0], self.nodes.values.sum(axis=3), axes=(1, 1))
+        remainder = self.nodes.remainder
+        high = (points.max(axis=0) + remainder).max(axis=0, initial=0.0)
+        low = (points.min(axis=0) - remainder).min(axis=0, initial=0.0)
         for joint, (lower, upper) in enumerate(limits.tolist()):
             for sign, most, limit in ((1, high[joint], upper), (-1, -low[joint], -lower)):
                 if not most <= limit * (1.0 + room):
@@ -108,11 +95,11 @@ class EffortSurvey:
         Args:
             stretch: How many times longer the motion is to last, at least 1.
         """
-        return [self.peak(joint, 1, stretch) for joint in range(self.rest.shape[1])]
+        return [self.peak(joint, 1, stretch) for joint in range(self.limits.size)]
 
     def lowest(self, stretch: float = 1.0) -> list[EffortPeak]:
         """Return the same downwards: of the efforts with the other sign."""
-        return [self.peak(joint, -1, stretch) for joint in range(self.rest.shape[1])]
+        return [self.peak(joint, -1, stretch) for joint in range(self.limits.size)]
 
     def peak(self, joint: int, sign: int, stretch: float = 1.0) -> EffortPeak:
         """Return the largest effort of one joint in one direction.
@@ -122,14 +109,15 @@ class EffortSurvey:
             sign: 1 for upwards, -1 for the largest of the effort with the other sign.
             stretch: How many times longer the motion is to last, at least 1; times are of that as it is.
         """
-        if not self.lengths.size:
+        if not self.nodes.lengths.size:
             return EffortPeak(0.0, self.span[0], 0.0, (0.0, 0.0, 0.0, 0.0))
         weights = sign * np.array([stretch**-2.0, 1.0 / stretch, 1.0, 1.0])
-        rows, rest = self.parts[:, :, joint] * weights, self.rest[:, joint]
-        if not (np.isfinite(rows).all() and np.isfinite(rest).all()):
-            return EffortPeak(np.inf, self.span[0], np.inf, (np.inf, 0.0, 0.0, 0.0))
-        found = _largest(rows, rest, (self.starts, self.lengths), float(self.room[joint]))
-        return replace(found, time=min(max(found.time, self.span[0]), self.span[1]))
+        slack = float(_slack(self.nodes.values, self.limits)[joint])
+        weighted = replace(self.nodes, values=self.nodes.values * weights)
+        found = weighted.largest(joint, _sum, lambda _: slack)
+        dynamic, viscous, coulomb, gravity = found.entries.tolist()
+        time = min(max(found.time, self.span[0]), self.span[1])
+        return EffortPeak(found.value, time, found.most, (dynamic, viscous, coulomb, gravity))
 
 
 @frozen
@@ -192,53 +180,40 @@ def effort_survey(
     """
     long = np.diff(breaks) > 0
     starts, lengths = breaks[:-1][long], np.diff(breaks)[long]
-    pieces = cut_where_joints_turn(dynamics, starts, lengths, coefficients[:, long])
     least = np.full(len(dynamics.links), np.inf) if limits is None else np.abs(limits).min(axis=1)
-    span = float(breaks[0]), float(breaks[-1])
-    known = replace(_known(dynamics, *pieces), span=span, limits=least)
-    if not lengths.size:
-        return known
-    coefficients = pieces[2]
-    for _ in range(_HALVINGS):
-        coarse = (known.rest > known.room).any(axis=1) & np.isfinite(known.rest).all(axis=1)
-        if not coarse.any():
-            break
-        half, early = known.lengths[coarse] / 2, coefficients[:, coarse]
-        late = taylor_shift(early, np.broadcast_to(half[:, None], early.shape[1:]))
-        both = np.concatenate([early, late], axis=1)
-        begins = known.starts[coarse]
-        more = _known(dynamics, np.concatenate([begins, begins + half]), np.tile(half, 2), both)
-        coefficients = np.concatenate([coefficients[:, ~coarse], both], axis=1)
-        known = replace(
-            known,
-            starts=np.concatenate([known.starts[~coarse], more.starts]),
-            lengths=np.concatenate([known.lengths[~coarse], more.lengths]),
-            parts=np.concatenate([known.parts[~coarse], more.parts]),
-            rest=np.concatenate([known.rest[~coarse], more.rest]),
-        )
-    return known
-
-
-def _known(dynamics: InverseDynamics, starts: Array, lengths: Array, coefficients: Array) -> EffortSurvey:
-    """Return the efforts at nine rows of each piece, and how far off they may be between them."""
-    inside = lengths[:, None] * np.linspace(0.0, 1.0, NODES_DEGREE + 1)
-    q, qd, qdd = (
-        horner(derivative_coefficients(coefficients, order)[:, :, None], inside[..., None])
-        for order in range(3)
+    nodes = node_survey(
+        lambda coefficients, lengths: _known(dynamics, coefficients, lengths),
+        cut_where_joints_turn(dynamics, starts, lengths, coefficients[:, long]),
+        lambda values: _slack(values, least),
+        _HALVINGS,
     )
-    joints, unknown = dynamics.robot.joints, np.full(len(dynamics.links), np.inf)
-    if not all(np.isfinite(values).all() for values in (q, qd, qdd)):
-        nothing = np.full((*q.shape, _PARTS), np.inf)  # nothing is known of what no float64 holds
-        return EffortSurvey((0.0, 0.0), starts, lengths, nothing, nothing[:, 0, :, 0], unknown)
+    return EffortSurvey((float(breaks[0]), float(breaks[-1])), nodes, least)
+
+
+def _sum(parts: Array) -> Array:
+    return np.asarray(parts.sum(axis=-1))
+
+
+def _slack(values: Array, limits: Array) -> Array:
+    """Return how near to the efforts of each joint their bounds are to come, shape (n,)."""
+    largest: Array = np.abs(_sum(values)).max(axis=(0, 1), initial=0.0)
+    return np.asarray(_CLOSE * np.maximum(np.minimum(largest, limits), _SMALL))
+
+
+def _known(dynamics: InverseDynamics, coefficients: Array, lengths: Array) -> tuple[Array, Array]:
+    """Return the parts of efforts at the nodes (P, 9, n, 4), and majorants of the ninth order (P, n)."""
+    q, qd, qdd = at_nodes(coefficients, lengths)
     parts = np.empty((*q.shape, _PARTS))
+    if not all(np.isfinite(values).all() for values in (q, qd, qdd)):
+        parts[...] = np.inf  # nothing is known of what no float64 holds
+        return parts, parts[:, 0, :, 0]
+    joints = dynamics.robot.joints
     parts[..., 0], parts[..., 3] = dynamics.apart_from_gravity(q, qd, qdd)
     parts[..., 1] = qd * [joint.friction.viscous for joint in joints]
     signs = direction(qd[:, NODES_DEGREE // 2])
     parts[..., 2] = (signs * [joint.friction.coulomb for joint in joints])[:, None]
     n = NODES_DEGREE + 1
-    highest = effort_majorants(dynamics, q[:, 0], growth(coefficients, lengths, n + 2))[n]
-    rest = highest * BETWEEN_NODES * lengths[:, None] ** n
-    return EffortSurvey((0.0, 0.0), starts, lengths, parts, rest, unknown)
+    return parts, effort_majorants(dynamics, q[:, 0], growth(coefficients, lengths, n + 2))[n]
 
 
 def cut_where_joints_turn(
@@ -287,100 +262,62 @@ def effort_majorants(dynamics: InverseDynamics, start: Array, rising: Array) -> 
         rising: From `growth` of power series, (K + 2, P, n).
     """
     orders = np.arange(len(rising) - 2)[:, None, None]
-    first = (orders + 1.0) * rising[1:-1]
-    second = (orders + 1.0) * (orders + 2.0) * rising[2:]
-    turns, levers, wrenches = _outward_majorants(dynamics, start, rising[:-2], first, second)
-    result = np.empty(first.shape)
-    force = moment = np.zeros(first.shape[:2])
-    for i in reversed(range(first.shape[2])):
+    qd = (orders + 1.0) * rising[1:-1]
+    qdd = (orders + 1.0) * (orders + 2.0) * rising[2:]
+    rotations, levers, wrenches = _outward_majorants(dynamics, start, rising[:-2], qd, qdd)
+    result = np.empty(qd.shape)
+    force = moment = np.zeros(qd.shape[:2])
+    for i in reversed(range(qd.shape[2])):
         force, moment = force + wrenches[i][0], moment + wrenches[i][1]
         joint = dynamics.robot.joints[i]
         result[:, :, i] = force if dynamics.links[i].prismatic else moment
-        result[:, :, i] += joint.rotor * second[:, :, i] + joint.friction.viscous * first[:, :, i]
-        moment = series_product(turns[i], moment + series_product(levers[i], force))
-        force = series_product(turns[i], force)
+        result[:, :, i] += joint.rotor * qdd[:, :, i] + joint.friction.viscous * qd[:, :, i]
+        moment = series_product(rotations[i], moment + series_product(levers[i], force))
+        force = series_product(rotations[i], force)
     return result
 
 
 def _outward_majorants(
-    dynamics: InverseDynamics, start: Array, rising: Array, first: Array, second: Array
+    dynamics: InverseDynamics, start: Array, rising: Array, qd: Array, qdd: Array
 ) -> tuple[list[Array], list[Array], list[tuple[Array, Array]]]:
-    """Return bounds of each joint's turn, of the lever to it, and of the force and moment on its solid."""
-    turns, levers, wrenches = [], [], []
-    zero = np.zeros(first.shape[:2])
-    spin, change, bend, rise = zero, zero, zero, zero.copy()
-    rise[0] = np.linalg.norm(dynamics.robot.gravity)
+    """Return majorants of each joint's rotation, of the lever to it, and of force and moment on its solid.
+
+    Majorants, each (K, P): `w` of the angular velocity, `alpha` of its derivative, `a` of the acceleration of
+    the origin, gravity included, `r` of the lever from the origin before, `rotation` of a rotation matrix.
+    """
+    rotations, levers, wrenches = [], [], []
+    zero = np.zeros(qd.shape[:2])
+    w, alpha, alpha_and_w2, a = zero, zero, zero, zero.copy()
+    a[0] = np.linalg.norm(dynamics.robot.gravity)
     for i, link in enumerate(dynamics.links):
-        lever, turn = zero.copy(), zero.copy()
-        slide = (
-            np.abs(link.sign * start[:, i] + link.d) if link.prismatic else np.full(len(start), abs(link.d))
-        )
+        r, angle = zero.copy(), zero.copy()
+        d = np.abs(link.sign * start[:, i] + link.d) if link.prismatic else np.full(len(start), abs(link.d))
         if link.prismatic:
-            slide += rising[0, :, i]
-            lever[1:] = rising[1:, :, i]
+            d += rising[0, :, i]
+            r[1:] = rising[1:, :, i]
         else:
-            turn[1:] = rising[1:, :, i]
-        turn = series_exponential(turn)
-        square = len(link.screw) == 3  # without a tilt the slide is square to the lever
-        lever[0] = np.hypot(link.screw[0], slide) if square else abs(link.screw[0]) + slide
-        rise = rise + series_product(lever, bend)
+            angle[1:] = rising[1:, :, i]
+        rotation = series_exponential(angle)
+        square = len(link.screw) == 3  # without a tilt d is square to the length along x
+        r[0] = np.hypot(link.screw[0], d) if square else abs(link.screw[0]) + d
+        a = a + series_product(r, alpha_and_w2)
         if link.prismatic:
-            rise = rise + 2.0 * series_product(spin, first[:, :, i]) + second[:, :, i]
-        rise, before = series_product(turn, rise), series_product(turn, spin)
-        spin, change = before, series_product(turn, change)
+            a = a + 2.0 * series_product(w, qd[:, :, i]) + qdd[:, :, i]
+        a, w, alpha = (series_product(rotation, majorant) for majorant in (a, w, alpha))
         if not link.prismatic:
-            spin = spin + first[:, :, i]
-            change = change + second[:, :, i] + series_product(before, first[:, :, i])
-        square_of_spin = series_product(spin, spin)
-        bend = change + square_of_spin
-        wrenches.append(_wrench_majorants(link.solid.sizes, rise, change, square_of_spin))
-        turns.append(turn)
-        levers.append(lever)
-    return turns, levers, wrenches
+            alpha = alpha + qdd[:, :, i] + series_product(w, qd[:, :, i])
+            w = w + qd[:, :, i]
+        w2 = series_product(w, w)
+        alpha_and_w2 = alpha + w2
+        wrenches.append(_wrench_majorants(link.solid.sizes, a, alpha, w2))
+        rotations.append(rotation)
+        levers.append(r)
+    return rotations, levers, wrenches
 
 
 def _wrench_majorants(
-    solid: tuple[float, float, float, float], rise: Array, change: Array, spin: Array
+    solid: tuple[float, float, float, float], a: Array, alpha: Array, w2: Array
 ) -> tuple[Array, Array]:
-    """Return bounds of the force on a solid and of its moment; `spin` is that of its square."""
+    """Return majorants of the force on a solid and of its moment, from those of a, alpha and w^2."""
     mass, first, largest, uneven = solid
-    return mass * rise + first * (change + spin), largest * change + uneven * spin + first * rise
-
-
-def _largest(parts: Array, rest: Array, pieces: tuple[Array, Array], room: float) -> EffortPeak:
-    """Return the peak of sums of parts at nine rows of pieces (P, 9, 4), off by `rest` (P,) between them.
-
-    Args:
-        parts: With their weights.
-        rest: How far off the sums may be.
-        pieces: Starts and lengths, each (P,).
-        room: How close to the peak the hull must come.
-    """
-    hull, halves = hull_matrices()
-    points, (starts, lengths) = hull @ parts, pieces
-    value, time, most, chosen = -np.inf, float(starts.min()), -np.inf, points[0, 0]
-    for _ in range(_DIVISIONS):
-        sums = points.sum(axis=2)
-        ends = sums[:, [0, -1]]
-        piece, end = np.unravel_index(int(ends.argmax()), ends.shape)
-        if ends[piece, end] > value:
-            value, time = float(ends[piece, end]), float(starts[piece] + end * lengths[piece])
-            chosen = points[piece, -1 if end else 0]
-        over = sums.max(axis=1)
-        wide = over > value + room
-        if not wide.any() or len(points) > _MOST:
-            return _peak(value, time, max(most, float((over + rest).max())), chosen)
-        most = max(most, float((over + rest)[~wide].max(initial=-np.inf)))
-        points = (halves[:, None] @ points[wide]).reshape(-1, *points.shape[1:])
-        rest, lengths, starts = (
-            np.tile(rest[wide], 2),
-            np.tile(lengths[wide] / 2, 2),
-            np.tile(starts[wide], 2),
-        )
-        starts[len(starts) // 2 :] += lengths[len(starts) // 2 :]
-    return _peak(value, time, max(most, float((points.sum(axis=2).max(axis=1) + rest).max())), chosen)
-
-
-def _peak(value: float, time: float, most: float, parts: Array) -> EffortPeak:
-    dynamic, viscous, coulomb, gravity = parts.tolist()
-    return EffortPeak(value, time, most, (dynamic, viscous, coulomb, gravity))
+    return mass * a + first * (alpha + w2), largest * alpha + uneven * w2 + first * a

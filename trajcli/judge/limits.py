@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.approach import ROOM, ApproachUse, allowed_speed, uses_of_pieces
-from trajcli.curves.bernstein import control_points
 from trajcli.curves.extrema import critical_points
-from trajcli.curves.piecewise import Array, derivative_coefficients, horner
+from trajcli.curves.piecewise import Array, control_points, derivative_coefficients, horner
 from trajcli.dynamics.effort_bound import EffortPeak, EffortSurvey, effort_survey
 from trajcli.dynamics.newton_euler import InverseDynamics
 from trajcli.findings import Certainty, Collector, Finding, FindingSeverity, NamedJoints

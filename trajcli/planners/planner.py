@@ -151,6 +151,7 @@ class Planned:
         origin: Where the zero of the planner's own time lies on the curve, s: above zero where the motion had
             to begin before it.
         begins: The state in which the curve begins where the method does not let its start be imposed.
+        ends_open: Whether the method says the velocity in which it ends, as nobody states one.
         tool: The reference motion of the tool, where the move follows a path of it.
         wanted_speed: Speed along the tool's path that is asked for, m/s, or rad/s where the tool turns in
             its place; None where none is.
@@ -179,6 +180,7 @@ class Planned:
     via_points: ViaPoints | None = None
     origin: float = 0.0
     begins: State | None = None
+    ends_open: bool = False
     tool: ToolMotion | None = None
     wanted_speed: float | None = None
     formulas: tuple[str, str, str] | None = None

@@ -242,7 +242,7 @@ def _double_s(problem: BoundaryProblem, duration: float | None) -> PhaseProfile 
     sizes = abs(displacement), highest if displacement > 0 else -lowest, high, min(-jerks[0], jerks[1])
     if low != -high or not all(1 / _COMMON < size < _COMMON for size in sizes):
         return None
-    from trajcli.curves.double_s import DoubleS, double_s_of, fastest_double_s
+    from trajcli.curves.rest_to_rest import DoubleS, double_s_of, fastest_double_s
 
     distance, velocity, acceleration, jerk = sizes
     if duration is None:

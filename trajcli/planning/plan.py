@@ -94,6 +94,7 @@ def plan_job(loaded: LoadedJob, carried: Carried | None = None, *, advise: bool 
     if hint is not None:
         events.append(Event("units", hint))
     trajectory = _joined(moves, loaded, _first_state(loaded, _first_moving(moves), events))
+    events += _ends_moving(loaded, moves)
     report_progress("checking the trajectory")
     verdict = verify(trajectory, [move.robot.limits for move in moves], [move.promise for move in moves])
     if advise and not verdict.passed:
@@ -285,6 +286,21 @@ def _handed_over(state: State, before: Planner | None, after: Planner) -> State:
         np.where(np.abs(rates) <= JUMP_ABSOLUTE, 0.0, rates) for rates in (state.velocity, state.acceleration)
     )
     return State(state.position, velocity, acceleration if smooth else np.zeros_like(acceleration))
+
+
+def _ends_moving(loaded: LoadedJob, moves: Sequence[PlannedMove]) -> Iterator[Event]:
+    """Yield the event of a trajectory that ends in motion although nobody says so."""
+    last = next(move for move in reversed(moves) if not move.planner.handles)
+    velocity = last.planned.end.velocity
+    if not (last.planned.ends_open and velocity.any()):
+        return
+    joint = int(np.abs(velocity).argmax())
+    message = "the trajectory ends in motion, {joint} with {velocity}"
+    amounts: Amounts = {
+        "joint": loaded.robot.joint_names[joint],
+        "velocity": Amount(float(velocity[joint]), 1, joint),
+    }
+    yield Event("ends_moving", message, last.index, amounts)
 
 
 def _first_moving(moves: Sequence[PlannedMove]) -> PlannedMove:

@@ -6,7 +6,7 @@ from jerk_paths import PANDA, both, judged, spline
 from test_jerk_limited_laws import random_problem, ruckig_duration
 
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.curves.third_order.turning_bound import turning_bound
+from trajcli.curves.turning_bound import turning_bound
 
 
 def line(distance):

@@ -115,15 +115,33 @@ def test_ends_that_the_rule_leaves_open(rule):
     start, points = timed(t, q)
     move = {"planner": "spline", "rule": rule, "through": points}
     made = plan(start, move)
-    (event,) = made.events
-    speed = CubicSpline(t, q, bc_type=rule.replace("_", "-"))(0, 1)
-    assert event.kind == "begins_moving"
-    assert f"{speed:.9g} rad/s" in event.message
+    begins, ends = made.events
+    spline = CubicSpline(t, q, bc_type=rule.replace("_", "-"))
+    assert (begins.kind, ends.kind) == ("begins_moving", "ends_moving")
+    assert f"{spline(0, 1):.9g} rad/s" in begins.message
+    assert f"{spline(4, 1):.9g} rad/s" in ends.message
     asked = plan({**start, "velocity": 0}, move, passes=rule == "never")  # 0 is said: the rule breaks it
     assert {finding.kind for finding in asked.verdict.findings} == {"velocity_jump"}
     given_speed = plan({**start, "velocity": [0.7]}, move)
     assert curve_of(given_speed).evaluate(0.0, 1)[0] == pytest.approx(0.7)
-    assert not given_speed.events
+    assert [event.kind for event in given_speed.events] == ["ends_moving"]
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.5, -1.5])
+def test_an_end_velocity_that_is_stated_is_imposed(speed):
+    t, q = [0, 1, 2, 4], [0, 1, 0, 2]
+    start, points = timed(t, q)
+    points[-1]["velocity"] = [speed]
+    made = plan({**start, "velocity": [0.5]}, {"planner": "spline", "rule": "natural", "through": points})
+    dense = np.linspace(0, 4, 101)
+    expected = CubicSpline(t, q, bc_type=((1, 0.5), (1, speed)))(dense)
+    np.testing.assert_allclose(curve_of(made).evaluate(dense)[:, 0], expected, atol=1e-12)
+    assert made.moves[0].planned.end.velocity == [speed]
+    assert not made.events
+    free = plan(start, {"planner": "spline", "rule": "natural", "through": points})
+    expected = CubicSpline(t, q, bc_type=((2, 0.0), (1, speed)))(dense)
+    np.testing.assert_allclose(curve_of(free).evaluate(dense)[:, 0], expected, atol=1e-12)
+    assert [event.kind for event in free.events] == ["begins_moving"]
 
 
 def test_after_another_move_an_open_end_is_a_jump():
@@ -198,10 +216,6 @@ WRONG = {
     "not somewhere": ({"through": [{"velocity": 1, "time": 1}]}, "a waypoint needs `joints` or a pose"),
     "no velocity": ({"rule": "imposed", "through": FIRST}, "needs the velocity of every waypoint"),
     "inner velocity": ({"through": [FIRST[0] | {"velocity": 1}, FIRST[1]]}, "computes the velocity between"),
-    "end velocity": (
-        {"rule": "natural", "through": [FIRST[0], FIRST[1] | {"velocity": 1}]},
-        "natural does not impose the velocity at its end",
-    ),
     "end acceleration": (
         {"rule": "clamped", "through": [FIRST[0], FIRST[1] | {"acceleration": 1}]},
         "clamped does not impose the acceleration at its end",

@@ -10,8 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from trajcli.curves.bernstein import control_points
-from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, derivative_coefficients
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, control_points, derivative_coefficients
 from trajcli.curves.time_optimal.time_law import LawPieces, blocks
 from trajcli.frozen import frozen
 

@@ -20,7 +20,6 @@ from trajcli.curves.third_order.first_law import EndStates, smoothed_law
 from trajcli.curves.third_order.jerk import JointJerkConstraint, ThirdOrderConstraint, curvature_jumps
 from trajcli.curves.third_order.limits import LawLimits, most_nodes, time_lost
 from trajcli.curves.third_order.quartic_law import QuarticLaw, ReversingLawError
-from trajcli.curves.third_order.turning_bound import turning_bound
 from trajcli.curves.time_optimal.constraints import JointConstraint, PathConstraint
 from trajcli.curves.time_optimal.parameterization import (
     TimeOptimalMotion,
@@ -29,6 +28,7 @@ from trajcli.curves.time_optimal.parameterization import (
 )
 from trajcli.curves.time_optimal.refinement import parts_for
 from trajcli.curves.time_optimal.time_law import law_and_trajectory
+from trajcli.curves.turning_bound import turning_bound
 from trajcli.frozen import frozen
 
 _FIRST_GAP = 1e-3  # of the duration: what the first step may miss

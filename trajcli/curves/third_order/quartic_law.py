@@ -18,8 +18,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.curves.bernstein import control_points
-from trajcli.curves.piecewise import Array, derivative_coefficients, horner
+from trajcli.curves.piecewise import Array, control_points, derivative_coefficients, horner
 from trajcli.curves.time_optimal.time_law import LawPieces
 from trajcli.frozen import frozen
 

@@ -18,8 +18,14 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from trajcli.curves.approach import ApproachLimits, uses_of_pieces
-from trajcli.curves.bernstein import control_points
-from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, derivative_coefficients, horner
+from trajcli.curves.piecewise import (
+    Array,
+    PiecewisePolynomial,
+    Side,
+    control_points,
+    derivative_coefficients,
+    horner,
+)
 from trajcli.curves.time_optimal.time_law import LawPieces, blocks
 from trajcli.frozen import frozen
 

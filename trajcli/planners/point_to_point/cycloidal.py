@@ -6,9 +6,9 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from trajcli.curves.cycloid import PEAKS, cycloid_law
 from trajcli.curves.operations import along_line
 from trajcli.curves.piecewise import Array
+from trajcli.curves.rest_to_rest import PEAKS, cycloid_law
 from trajcli.kinematics.robot import Robot
 from trajcli.language.targets import Duration
 from trajcli.planners.boundary_states import missing_limit, same_state, standstill, start_in_motion

@@ -267,7 +267,7 @@ class CycloidalLaw(PolynomialLaw):
     peaks: tuple[float, float, float] = (2.0, 2 * math.pi, 4 * math.pi**2)
 
     def _lasting(self, time: float, length: float) -> PiecewisePolynomial:
-        from trajcli.curves.cycloid import cycloid_law
+        from trajcli.curves.rest_to_rest import cycloid_law
 
         law = cycloid_law(time)
         return PiecewisePolynomial(law.breaks, law.coefficients * length)

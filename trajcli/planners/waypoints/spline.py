@@ -190,6 +190,7 @@ class Spline(ThroughPoints):
             self._end(points, curve),
             via_points=via_points(points, times),
             begins=_beginning(curve) if self.rule in FREE_ENDS else None,
+            ends_open=self.rule in FREE_ENDS and not points.given[0, -1],
             events=(*points.events, *events),
             one_piece_per_interval=True,
             virtual=(1, curve.pieces - 1) if self.rule == "continuous_acceleration" else (),
@@ -220,7 +221,8 @@ class Spline(ThroughPoints):
     def _end(self, points: PointTable, curve: PiecewisePolynomial) -> State:
         if self.rule not in FREE_ENDS:
             return points.target
-        return State(points.positions[-1], curve.piece_ends(1)[1][-1], np.zeros(curve.dimension))
+        velocity = points.rates[0, -1] if points.given[0, -1] else curve.piece_ends(1)[1][-1]
+        return State(points.positions[-1], velocity, np.zeros(curve.dimension))
 
 
 def _not_monotone(error: ShapeError, robot: Robot, *, given: bool) -> PlanningError:

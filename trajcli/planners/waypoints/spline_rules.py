@@ -46,13 +46,13 @@ IMPOSES: dict[Rule, int] = {
     "imposed": 1,
     "computed": 1,
     "continuous_acceleration": 2,
-    "natural": 0,
+    "natural": 1,
     "clamped": 1,
-    "not_a_knot": 0,
+    "not_a_knot": 1,
     "quintic": 2,
     "shape_preserving": 1,
 }
-"""Highest derivative that the ends impose."""
+"""Highest derivative that the ends can impose; those of `FREE_ENDS` do where a velocity is stated."""
 INNER: dict[Rule, int] = {"imposed": 1, "quintic": 2}
 """The same of the points between."""
 _NEARLY = 1.05  # times the fastest motion along a path: times within it need no remark
@@ -86,9 +86,9 @@ def curve_through(
         case "continuous_acceleration":
             return continuous_acceleration(times, q, (first, last), (start, end), virtual_times)
         case "natural":
-            return natural(times, q, *_imposed(first, last))
+            return natural(times, q, *_imposed(points))
         case "not_a_knot":
-            return not_a_knot(times, q, *_imposed(first, last))
+            return not_a_knot(times, q, *_imposed(points))
         case "clamped":
             return clamped(times, q, first, last)
         case "shape_preserving":
@@ -97,9 +97,13 @@ def curve_through(
             return _quintic(points, times)
 
 
-def _imposed(first: Array, last: Array) -> tuple[Array | None, Array | None]:
-    """Return the end velocities that are not zero: at a point at rest the rule decides."""
-    return first if first.any() else None, last if last.any() else None
+def _imposed(points: PointTable) -> tuple[Array | None, Array | None]:
+    """Return the velocities that the ends impose in the place of the rule's condition.
+
+    At the start it is that of the arm, unless it stands; at the end one that is stated, zero included.
+    """
+    first, last = points.rates[0, [0, -1]]
+    return first if first.any() else None, last if points.given[0, -1] else None
 
 
 def _quintic(points: PointTable, times: Array) -> PiecewisePolynomial:

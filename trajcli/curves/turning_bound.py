@@ -1,10 +1,10 @@
-"""Lower bound of the duration along a path: what each joint alone needs between its turning points.
+"""Lower bounds of durations: the time that each joint alone needs between its turning points.
 
 Where a joint turns back it stands still, at whatever acceleration. So between two turning points it needs at
 least the time of the fastest motion over their distance with speed zero at both and free acceleration there,
-and with the states of the path's ends where that begins or ends. The sum over its monotone stretches bounds
-the motion, and so does the largest sum of all joints. Turning back by next to nothing is left out, which only
-lowers the bound.
+and with the states of the motion's ends where that begins or ends. Where only points to pass are given, it
+turns at or beyond them. The sum over its monotone stretches bounds the motion, and so does the largest sum of
+all joints. Turning back by next to nothing is left out, which only lowers the bound.
 
 The fastest such motion goes up to a peak speed by one ramp and down by another, with a cruise between them
 where the peak is the limit. A ramp with free acceleration at its outer end begins with as much as it may: to
@@ -13,6 +13,8 @@ acceleration 2 sqrt(w / j), or w / a + a / j.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +30,8 @@ _ROUNDING = 1e-12  # relative: taken off, so that a bound stays one
 
 
 @frozen
-class _Stretches:
-    """Monotone stretches, k of them; rates are along each, all positive.
+class MonotoneStretches:
+    """Intervals of one joint between turning points, k of them; rates are along each, all positive.
 
     Attributes:
         distance: Shape (k,).
@@ -46,6 +48,33 @@ class _Stretches:
     jerk: Array
     speeds: Array
     free: NDArray[np.bool_]
+
+    @classmethod
+    def between(
+        cls, turns: Array, bounds: Sequence[Array], speeds: Array, free: NDArray[np.bool_]
+    ) -> MonotoneStretches:
+        """Return the stretches of one joint between its turning points; none where nothing bounds their time.
+
+        Args:
+            turns: Its first position, those at which it turns and the last one, shape (k + 1,).
+            bounds: Of its velocity, acceleration and jerk, each of shape (2,).
+            speeds: At its start and end, along its direction there, at least 0, shape (2,).
+            free: Whether the acceleration is free there, shape (2,).
+        """
+        steps = np.diff(turns if np.isfinite(bounds[1]).all() else turns[:1])
+        up, down = (steps > 0).astype(int), (steps <= 0).astype(int)
+        velocity, acceleration, jerk = (np.abs(each) for each in bounds)
+        at_ends, free_ends = np.zeros((2, steps.size)), np.ones((2, steps.size), dtype=bool)
+        for end, position in enumerate((slice(0, 1), slice(-1, None))):
+            at_ends[end, position], free_ends[end, position] = speeds[end], free[end]
+        return cls(
+            np.abs(steps),
+            np.minimum(velocity[up], _UNLIMITED),
+            np.stack([acceleration[up], acceleration[down]]),
+            np.full(steps.size, float(jerk.max())),
+            at_ends,
+            free_ends,
+        )
 
     def least_times(self) -> Array:
         """Return the least time of each, shape (k,)."""
@@ -90,21 +119,27 @@ def turning_bound(
         bounds: Of velocity, acceleration and jerk, each of shape (n, 2).
         speeds: sd at the start and at the end; zero is rest, without acceleration.
     """
-    values = _at_breaks_and_turns(path)
-    slopes = path.evaluate(np.array([path.start, path.end]), 1) * np.array(speeds)[:, None]
-    owner, columns = list[int](), list[_Stretches]()
-    for joint in range(path.dimension):
-        turns = _turns(values[:, joint])
-        if turns.size > 1 and np.isfinite(bounds[1][joint]).all():
-            of_joint = tuple(each[joint] for each in bounds)
-            columns.append(_stretches(turns, of_joint, np.abs(slopes[:, joint]), speeds))
-            owner += [joint] * (turns.size - 1)
-    if not columns:
-        return 0.0, 0
-    names = ("distance", "limit", "rates", "jerk", "speeds", "free")
-    joined = _Stretches(*(np.concatenate([getattr(c, name) for c in columns], axis=-1) for name in names))
-    times = np.bincount(owner, weights=joined.least_times(), minlength=path.dimension)
+    values, free = _at_breaks_and_turns(path), np.array(speeds) > 0.0
+    slopes = np.abs(path.evaluate(np.array([path.start, path.end]), 1)) * np.array(speeds)[:, None]
+    times = durations_by_joint(
+        [
+            MonotoneStretches.between(
+                turning_points(values[:, joint]), [each[joint] for each in bounds], slopes[:, joint], free
+            )
+            for joint in range(path.dimension)
+        ]
+    )
     return float(times.max()), int(times.argmax())
+
+
+def durations_by_joint(joints: Sequence[MonotoneStretches]) -> Array:
+    """Return the least time that each of n joints needs for all of its stretches; 0 where it has none."""
+    owner = np.repeat(np.arange(len(joints)), [each.distance.size for each in joints])
+    names = ("distance", "limit", "rates", "jerk", "speeds", "free")
+    joined = MonotoneStretches(
+        *(np.concatenate([getattr(each, name) for each in joints], axis=-1) for name in names)
+    )
+    return np.asarray(np.bincount(owner, joined.least_times(), len(joints)), dtype=np.float64)
 
 
 def _at_breaks_and_turns(path: PiecewisePolynomial) -> Array:
@@ -115,8 +150,8 @@ def _at_breaks_and_turns(path: PiecewisePolynomial) -> Array:
     return np.concatenate([values, path.evaluate(np.array([path.end]))])
 
 
-def _turns(values: Array) -> Array:
-    """Return the first value, those at which the direction changes, and the last one."""
+def turning_points(values: Array) -> Array:
+    """Return the first of values (m,), those at which their direction changes, and the last one."""
     nothing = _NOTHING * float(np.ptp(values))
     kept = [float(values[0])]
     for value in values[1:].tolist():
@@ -127,24 +162,3 @@ def _turns(values: Array) -> Array:
         else:
             kept.append(value)
     return np.array(kept)
-
-
-def _stretches(
-    turns: Array, bounds: tuple[Array, ...], ends: Array, speeds: tuple[float, float]
-) -> _Stretches:
-    """Return the stretches of one joint between its turning points (k + 1,)."""
-    steps = np.diff(turns)
-    forward = steps > 0
-    up, down = np.where(forward, 1, 0), np.where(forward, 0, 1)
-    velocity, acceleration, jerk = (np.abs(each) for each in bounds)
-    at_ends, free = np.zeros((2, steps.size)), np.ones((2, steps.size), dtype=bool)
-    at_ends[0, 0], at_ends[1, -1] = ends
-    free[0, 0], free[1, -1] = speeds[0] > 0.0, speeds[1] > 0.0
-    return _Stretches(
-        np.abs(steps),
-        np.minimum(velocity[up], _UNLIMITED),
-        np.stack([acceleration[up], acceleration[down]]),
-        np.full(steps.size, float(jerk.max())),
-        at_ends,
-        free,
-    )

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.curves.third_order.turning_bound import turning_bound
+from trajcli.curves.turning_bound import turning_bound
 
 CLOSE = 1e-6
 

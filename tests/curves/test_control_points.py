@@ -7,7 +7,7 @@ from math import comb
 import numpy as np
 import pytest
 
-from trajcli.curves.bernstein import control_points
+from trajcli.curves.piecewise import control_points
 
 
 @pytest.mark.parametrize("degree", range(10))
