@@ -100,6 +100,20 @@ def knots_of(trajectory: Trajectory) -> Knots:
         whole = np.sort(np.concatenate([whole, inserted]))
 
 
+def knots_at(trajectory: Trajectory, times: Array) -> Knots:
+    """Return the states of a trajectory at some times as knots, each in its nearest nanosecond.
+
+    Args:
+        trajectory: One without jumps of position and velocity.
+        times: From its start, s, shape (m,), rising by more than a nanosecond; the last is its end.
+    """
+    whole = np.rint(times * _PER_SECOND).astype(np.int64)
+    last = whole[-1] / _PER_SECOND
+    whole[-1] += last < trajectory.duration - max(_ROUNDING, 4 * float(np.spacing(trajectory.duration)))
+    states = _states(trajectory, whole)
+    return Knots(whole, states[0], states[1], states[2], _deviation(_missed(trajectory.curve, whole, states)))
+
+
 def knot_grid(
     trajectory: Trajectory, knots: Knots, rate: float | None = None, start_time: float = 0.0
 ) -> KnotGrid:

@@ -32,7 +32,7 @@ FLOORS = (
 FLOOR_OF = {room: level for level, floor in enumerate(FLOORS) for room in floor}
 HOMES = {
     "pydantic": ("language/", "planners/", "job/"),
-    "pydantic_core": ("language/", "planners/", "job/", "streams/jsonl.py", "streams/json_rows.py"),
+    "pydantic_core": ("language/", "planners/", "job/", "streams/"),
     "yaml": ("job/yaml/", "streams/ros_messages.py"),
     "typer": ("cli/",),
     "click": ("cli/",),

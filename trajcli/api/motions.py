@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import closing
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -240,6 +240,7 @@ def batch(
     output: str | Path | None = None,
     *,
     form: FormatName = "csv",
+    rows: Literal["rate", "knots", "both"] | None = None,
     processes: int | None = None,
     force: bool = False,
     timeout: float | None = 600.0,
@@ -250,6 +251,7 @@ def batch(
         jobs: Job files, and folders of them.
         output: The folder of the rows; beside their jobs where left out.
         form: Their format.
+        rows: Where they stand, instead of what each job says.
         processes: At most; one a core where left out.
         force: Whether unchanged jobs are planned again.
         timeout: What a job may take, s; None for ever.
@@ -268,7 +270,7 @@ def batch(
     ledgers = Ledgers(found.jobs)
     known = {} if force else ledgers.known()
     tasks = [Task(job, known.get(job.output)) for job in found.jobs]
-    setup = BatchSetup(form, found.owners())
+    setup = BatchSetup(form, found.owners(), rows)
     outcomes: list[JobOutcome] = []
     count = min(processes or usable_cores(), len(tasks))
     try:

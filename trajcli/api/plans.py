@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -148,7 +148,12 @@ class Arm(Robot):
         )
 
 
-def plan(job: str | Path | Mapping[str, Any] | LoadedJob, *, overrides: Sequence[str] = ()) -> PlannedJob:
+def plan(
+    job: str | Path | Mapping[str, Any] | LoadedJob,
+    *,
+    overrides: Sequence[str] = (),
+    rows: Literal["rate", "knots", "both"] | None = None,
+) -> PlannedJob:
     """Return the plan of a job with its verdict: one with findings is no error here, only `save` refuses it.
 
     Place and advice of an error stand in the notes that a traceback shows.
@@ -156,6 +161,7 @@ def plan(job: str | Path | Mapping[str, Any] | LoadedJob, *, overrides: Sequence
     Args:
         job: The path of a job file, its YAML text, a mapping as YAML would give it, or a job that was read.
         overrides: Such as "moves.0.duration=3", as `--set` takes them; for files only.
+        rows: Where rows stand, instead of what `output.rows` says; for files only.
 
     Raises:
         InputError: With every flaw of the job at once.
@@ -163,7 +169,7 @@ def plan(job: str | Path | Mapping[str, Any] | LoadedJob, *, overrides: Sequence
         FileError: When a file cannot be read.
     """
     try:
-        planned = plan_job(_loaded(job, overrides))
+        planned = plan_job(_loaded(job, [*overrides, *(() if rows is None else (f"output.rows={rows}",))]))
     except TrajcliError as error:
         for problem in error.problems:
             where = "" if problem.place is None else str(problem.place)

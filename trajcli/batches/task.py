@@ -32,10 +32,25 @@ class BatchSetup:
     Attributes:
         form: The format of the rows.
         outputs: The job behind each file that will be written, by the file's real path.
+        rows: Replaces `output.rows` of each job; None leaves it.
     """
 
     form: FormatName
     outputs: Mapping[str, str]
+    rows: str | None = None
+
+    @property
+    def said(self) -> str:
+        """What the batch says of the rows, for the hash of what they are made of."""
+        return self.form if self.rows is None else f"{self.form} {self.rows}"
+
+    def document(self, document: Document) -> Document:
+        """Return a job with what the batch says of the rows."""
+        if self.rows is None:
+            return document
+        from trajcli.job.override import Setting, overridden
+
+        return overridden(document, [Setting(f"--rows {self.rows}", ("output", "rows"), self.rows)])
 
 
 @frozen
@@ -120,7 +135,7 @@ def _unchanged(task: Task, setup: BatchSetup) -> LedgerEntry | None:
     known, job = task.known, task.job
     if known is None or hash_of_file(job.output) != known.output:
         return None
-    now = hash_of_inputs(Path(job.job).name, read_bytes(job.job), known.files, setup.form)
+    now = hash_of_inputs(Path(job.job).name, read_bytes(job.job), known.files, setup.said)
     return known if now == known.inputs else None
 
 
@@ -131,9 +146,9 @@ def _written(task: Task, setup: BatchSetup, hashed: _Hash) -> LedgerEntry:
     document = parse_document(content, job.job)
     _check_files_stay(document, setup)
     files = tuple(path for what, path in files_of(document) if what != "the job")
-    hashed.value = hash_of_inputs(Path(job.job).name, content, files, setup.form)
+    hashed.value = hash_of_inputs(Path(job.job).name, content, files, setup.said)
     with np.errstate(all="ignore"):  # what is not finite is for the checks to find
-        plan = plan_job(job_of_document(document))
+        plan = plan_job(job_of_document(setup.document(document)))
         grid = grid_of(plan)
         if not plan.verdict.passed:
             from trajcli.output.report import verification_error
@@ -141,7 +156,7 @@ def _written(task: Task, setup: BatchSetup, hashed: _Hash) -> LedgerEntry:
             raise verification_error(plan)
         _make_folder(Path(job.output).parent)
         write_rows(plan, grid, job.output, "fixed", form=format_of(job.output, setup.form))
-    after = hash_of_inputs(Path(job.job).name, content, files, setup.form)
+    after = hash_of_inputs(Path(job.job).name, content, files, setup.said)
     # where a file has changed meanwhile, nobody knows of which content the rows were made
     kept = hashed.value if after == hashed.value else None
     return LedgerEntry(kept or "", files, hash_of_file(job.output) or "", plan.trajectory.duration)

@@ -19,7 +19,7 @@ from trajcli.kinematics.jacobian import linearisation
 from trajcli.kinematics.robot import Robot
 from trajcli.limits.kinds import LimitedMove
 from trajcli.limits.tolerances import exceeds
-from trajcli.limits.tool import tool_peaks
+from trajcli.limits.tool import peaks_in
 from trajcli.limits.tool_bound import ToolPeak
 from trajcli.trajectory import Span, Trajectory
 
@@ -72,7 +72,7 @@ class SampledTool:
     def peaks(self) -> Mapping[str, ToolPeak]:
         """Largest speeds and accelerations, from the start of the move, by the keys of their limits."""
         robot = self.robot
-        return tool_peaks(LimitedMove(self.trajectory, self.span, robot.limits, robot, self.motion), robot)
+        return peaks_in(LimitedMove(self.trajectory, self.span, robot.limits, robot, self.motion), robot)
 
     @cached_property
     def _joints(self) -> Array:

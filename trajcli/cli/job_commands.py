@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 import typer
 
 from trajcli.cli.command import Command, CommandLine
-from trajcli.cli.options import JobErrors, JobFile, Json, Overrides, profile_words, robot_names
+from trajcli.cli.options import JobErrors, JobFile, Json, Overrides, RowTimes, profile_words, robot_names
 
 
 class PlanCommand(CommandLine):
@@ -46,6 +46,7 @@ class PlanCommand(CommandLine):
         ),
     ] = None
     rate: Annotated[str | None, typer.Option("--rate", metavar="HZ", help="Rows per second.")] = None
+    rows: RowTimes = None
     override: Overrides = []
     digits: Annotated[
         Literal["fixed", "full"] | None,

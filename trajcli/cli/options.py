@@ -30,6 +30,14 @@ Overrides = Annotated[
         "--set", metavar="PATH=VALUE", help="Override a value of the job, such as moves.0.duration=3."
     ),
 ]
+RowTimes = Annotated[
+    Literal["rate", "knots", "both"] | None,
+    typer.Option(
+        "--rows",
+        help="Rows at the times of the rate, at the knots of the curve, or at both.",
+        show_default="rate; of ROS messages knots",
+    ),
+]
 Errors = Annotated[
     Literal["text", "json"], typer.Option("--errors", help="How errors are written to stderr.")
 ]

@@ -41,7 +41,7 @@ def plan_and_write(job: str, options: PlanCommand) -> Plan:
     """
     form = _check_options(options)
     profile = _profile(options)
-    loaded = load_job(job, options.override, rate=options.rate, si=options.si)
+    loaded = load_job(job, options.override, rate=options.rate, rows=options.rows, si=options.si)
     _check_inputs_stay(loaded, options)
     log = _log_options(options)
     if log is not None:
@@ -170,8 +170,11 @@ def _check_options(options: PlanCommand) -> StreamFormat:
         raise InputError(f"{log[0]} is about MCAP, and the rows are written as {form.name}", hint=hint)
     if options.digits is not None and not form.decimals:
         raise InputError(f"--digits is about CSV, {form.name} has every bit", hint="leave --digits out")
-    if options.rate is not None and form.content == "knots":
-        raise InputError(f"--rate is about rows, {form.name} has knots", hint="leave --rate out")
+    if options.rate is not None and form.content == "knots" and options.rows in (None, "knots"):
+        hint = "leave --rate out, or say --rows rate"
+        raise InputError(f"--rate is about rows, {form.name} has knots", hint=hint)
+    if options.rate is not None and options.rows == "knots":
+        raise InputError("--rate is about rows between the knots", hint="leave it out, or say --rows both")
     to_stream = options.output in (None, "-") and not options.no_output
     if to_stream and not form.text and sys.stdout is not None and sys.stdout.isatty():
         raise InputError(f"{form.name} is not written to a terminal", hint="name a file with -o")

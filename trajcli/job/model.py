@@ -154,6 +154,13 @@ class Output(Model):
     times: Annotated[
         tuple[Seconds, ...] | None, Field(min_length=1, description="Times of the rows instead of a rate, s.")
     ] = None
+    rows: Annotated[
+        Literal["rate", "knots", "both"] | None,
+        Field(
+            description="Where rows stand: at the times of the rate, at the knots of the curve, or at both; "
+            "left out: the rate, and in messages of ROS the knots."
+        ),
+    ] = None
     start_time: Annotated[float, Number(Quantity("time"), "Time of the first row, s.")] = 0.0
     align: Annotated[
         bool, Field(strict=True, description="Stretch each move to a whole number of periods.")
@@ -170,6 +177,8 @@ class Output(Model):
     def _fits_together(self) -> Output:
         if self.times is not None and "rate" in self.model_fields_set:
             raise refuse([(("times",), "rate and times exclude each other", "leave one of them out")])
+        if self.times is not None and self.rows is not None:
+            raise refuse([(("rows",), "rows and times exclude each other", "leave one of them out")])
         if self.times is not None and self.align:
             raise refuse([(("align",), "align needs a rate, not times", "leave one of them out")])
         for index, (before, time) in enumerate(pairwise(self.times or ()), 1):

@@ -97,7 +97,12 @@ class LoadedJob:
 
 
 def load_job(
-    path: str | Path, overrides: Sequence[str] = (), *, rate: str | None = None, si: bool = False
+    path: str | Path,
+    overrides: Sequence[str] = (),
+    *,
+    rate: str | None = None,
+    rows: str | None = None,
+    si: bool = False,
 ) -> LoadedJob:
     """Return the job of a file; `-` is standard input.
 
@@ -105,19 +110,22 @@ def load_job(
         path: The file.
         overrides: Such as "moves.0.duration=3"; they replace what the file says, or add to it.
         rate: Replaces `output.rate`.
+        rows: Replaces `output.rows`.
         si: Whether rows are in rad and m, whatever `output.units` says.
 
     Raises:
         InputError: With every flaw of the file at once.
         FileError: When it cannot be read.
     """
-    if not overrides and rate is None and not si:
+    if not overrides and rate is None and rows is None and not si:
         return _load(read_document(str(path)))
     from trajcli.job.override import Setting, overridden, parse_setting
 
     settings = [parse_setting(text) for text in overrides]
     if rate is not None:
         settings.append(Setting(f"--rate {rate}", ("output", "rate"), rate))
+    if rows is not None:
+        settings.append(Setting(f"--rows {rows}", ("output", "rows"), rows))
     if si:
         settings.append(Setting("--si", ("output", "units"), "{angle: rad, length: m}"))
     return _load(overridden(read_document(str(path)), settings))

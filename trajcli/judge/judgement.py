@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from trajcli.findings import Finding
 from trajcli.frozen import frozen
+from trajcli.limits.tolerances import JOINED_RELATIVE
 
 VerdictText = Literal["satisfied", "within rounding", "exceeded"]
 
@@ -105,6 +106,7 @@ def as_planned(judgement: Judgement) -> Judgement:
         for finding in judgement.findings
         if finding.severity == "warning"
         or (finding.rule not in _RATES_OF_ROWS and finding.certainty == "exceeded")
+        if finding.excess > 1 + JOINED_RELATIVE
     ]
     over = [f for f in findings if f.rule != "state" and f.limit]
     events = judgement.events

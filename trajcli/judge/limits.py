@@ -8,26 +8,28 @@ because the motion changes its law between two rows is a warning, unless somebod
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.curves.approach import ROOM, ApproachUse, allowed_speed, uses_of_pieces
 from trajcli.curves.extrema import critical_points
 from trajcli.curves.piecewise import Array, control_points, derivative_coefficients, horner
-from trajcli.dynamics.effort_bound import EffortPeak, EffortSurvey, effort_survey
-from trajcli.dynamics.newton_euler import InverseDynamics
-from trajcli.findings import Certainty, Collector, Finding, FindingSeverity, NamedJoints
+from trajcli.findings import Certainty, Collector, Finding, FindingSeverity
 from trajcli.frozen import frozen
 from trajcli.judge.intervals import DENSE, Intervals, explained_by_law
 from trajcli.judge.rounding import PieceRows
-from trajcli.kinematics.robot import Limits, Robot
-from trajcli.limits.effort import effort_excess
+from trajcli.kinematics.robot import Robot
 from trajcli.limits.joints import joint_excess
-from trajcli.limits.kinds import JOINT_KINDS
+from trajcli.limits.kinds import JOINT_KINDS, families
 from trajcli.limits.tolerances import EFFORT_RELATIVE, exceeds
-from trajcli.limits.velocity_by_position import approach_excess
+
+if TYPE_CHECKING:
+    from trajcli.dynamics.effort_bound import EffortPeak, EffortSurvey
+    from trajcli.dynamics.newton_euler import InverseDynamics
 
 _MANY = 20000  # pieces and joints over a limit from which on only the worst of them are looked at closely
 
@@ -51,27 +53,73 @@ class _Offences:
     bound: Array
 
 
-def judge_limits(
-    window: Intervals,
-    pieces: slice,
-    limits: Limits,
-    move: int,
-    axes: NamedJoints,
-    worst: Collector,
-    *,
-    asked: bool,
-) -> None:
-    """Add where joints go beyond their limits in pieces of one move.
+@frozen
+class JudgedRun:
+    """Pieces of recorded rows that belong to one move, with the limits in force.
 
-    Args:
+    Attributes:
         window: The rows.
         pieces: Which ones.
-        limits: In force.
+        robot: With the limits in force, gravity, and what its tool carries.
         move: Its index, -1 for none.
-        axes: The joints.
-        worst: What is added to.
+        worst: To which findings are added.
         asked: Whether somebody asked for this curve.
+        carries_one: Whether the tool carries the same in all of them: else no row says when it changed.
     """
+
+    window: Intervals
+    pieces: slice
+    robot: Robot
+    move: int
+    worst: Collector
+    asked: bool
+    carries_one: bool = True
+
+    def add(
+        self,
+        kind: str,
+        joints: NDArray[np.intp],
+        excess: Array,
+        make: Callable[[int], Finding],
+        certain: NDArray[np.bool_],
+        warned: NDArray[np.bool_],
+    ) -> None:
+        """Add offences by what is certain about them: m of one kind, `warned` where they are warnings."""
+        groups: tuple[tuple[NDArray[np.bool_], FindingSeverity, Certainty], ...] = (
+            (certain & ~warned, "error", "exceeded"),
+            (~certain, "error", "within rounding"),
+            (certain & warned, "warning", "exceeded"),
+        )
+        for chosen, severity, certainty in groups:
+            self.worst.add(
+                kind,
+                self.move,
+                joints,
+                excess,
+                make,
+                severity=severity,
+                certainty=certainty,
+                chosen=chosen,
+            )
+
+
+def judge_limits(run: JudgedRun) -> None:
+    """Add where joints go beyond their limits in pieces of one move.
+
+    Raises:
+        InputError: When efforts are limited, and a link of the arm has no inertia, or the arm no geometry.
+    """
+    _judge_derivatives(run)
+    for name, _ in families(run.robot.limits, further=True):
+        if name == "velocity_by_position":
+            _judge_approaches(run)
+        elif name == "effort" and run.carries_one:
+            _judge_efforts(run)
+
+
+def _judge_derivatives(run: JudgedRun) -> None:
+    """Add where joints go beyond their limits of position, velocity, acceleration and jerk."""
+    window, pieces, limits = run.window, run.pieces, run.robot.limits
     coefficients, lengths = window.coefficients[:, pieces], window.lengths[pieces, None]
     highest = window.highest[pieces]
     for order in range(int(highest.max(initial=0)) + 1):
@@ -90,7 +138,7 @@ def judge_limits(
                 alike = over & (highest == level)[:, None]
                 offences = side.offences(sign * derivative, alike, most) if order <= level else None
                 if offences is not None:
-                    side.add(offences, move, axes, worst, asked=asked)
+                    side.add(offences, run)
 
 
 @frozen
@@ -134,7 +182,7 @@ class _Side:
             self.first + piece[beyond], joint[beyond], value[beyond], local[beyond], bound[beyond]
         )
 
-    def add(self, found: _Offences, move: int, axes: NamedJoints, worst: Collector, *, asked: bool) -> None:
+    def add(self, found: _Offences, run: JudgedRun) -> None:
         """Add pieces beyond the bound, by what is certain about them."""
         count = 1 if self.window.interpolation == "jtc-upsampling" else max(self.level, 1)
         rows = self.window.piece_rows(found.piece, found.joint, count)
@@ -144,29 +192,16 @@ class _Side:
         by_curve = found.value - found.bound > error
         value = np.where(by_rows & ~by_curve, np.minimum(stated, found.value), found.value)
         certain, warned = by_rows | by_curve, np.zeros(value.shape, dtype=bool)
-        if not asked and by_curve.any():
+        if not run.asked and by_curve.any():
             warned = by_curve & ~by_rows & self._unresolved(found, error)
         excess = value / found.bound if self.order else value - found.bound
 
         def make(k: int) -> Finding:
-            return self._finding(found, k, float(value[k]), float(error[k]), axes, warned=bool(warned[k]))
-
-        groups: tuple[tuple[NDArray[np.bool_], FindingSeverity, Certainty], ...] = (
-            (certain & ~warned, "error", "exceeded"),
-            (~certain, "error", "within rounding"),
-            (warned, "warning", "exceeded"),
-        )
-        for chosen, severity, certainty in groups:
-            worst.add(
-                JOINT_KINDS[self.order].name,
-                move,
-                found.joint,
-                excess,
-                make,
-                severity=severity,
-                certainty=certainty,
-                chosen=chosen,
+            return self._finding(
+                found, k, float(value[k]), float(error[k]), run.robot, warned=bool(warned[k])
             )
+
+        run.add(JOINT_KINDS[self.order].name, found.joint, excess, make, certain, warned)
 
     def _unresolved(self, found: _Offences, error: Array) -> NDArray[np.bool_]:
         """Return where a change of the law between two rows explains what the curve goes beyond the bound."""
@@ -174,11 +209,11 @@ class _Side:
         return np.asarray(found.value - found.bound <= explained + error)
 
     def _finding(
-        self, found: _Offences, k: int, value: float, error: float, axes: NamedJoints, *, warned: bool
+        self, found: _Offences, k: int, value: float, error: float, robot: Robot, *, warned: bool
     ) -> Finding:
         piece, joint, local = int(found.piece[k]), int(found.joint[k]), float(found.local[k])
         time, limit = float(self.window.t[piece]) + local, self.sign * float(found.bound[k])
-        found_one = joint_excess(axes, self.order, joint, self.sign * value, limit, time)
+        found_one = joint_excess(robot, self.order, joint, self.sign * value, limit, time)
         between = "; between the rows only, where the motion changes its law" if warned else ""
         row, message = self.window.row_at(piece, local), found_one.message + between
         return replace(found_one, row=row, rounding=error, message=message)
@@ -209,58 +244,27 @@ def _stated(rows: PieceRows, order: int, sign: float) -> tuple[Array, Array]:
     return stated, certain
 
 
-def judge_velocity_by_position(
-    window: Intervals,
-    pieces: slice,
-    limits: Limits,
-    move: int,
-    axes: NamedJoints,
-    worst: Collector,
-    *,
-    asked: bool,
-) -> None:
-    """Add where joints move faster towards the end of their range than their distance from there allows.
+def _judge_approaches(run: JudgedRun) -> None:
+    """Add where joints move faster towards the end of their range than their distance from there allows."""
+    from trajcli.curves.approach import uses_of_pieces
 
-    Args:
-        window: The rows.
-        pieces: Which ones; of a degree of one at least.
-        limits: In force.
-        move: Its index, -1 for none.
-        axes: The joints.
-        worst: What is added to.
-        asked: Whether somebody asked for this curve.
-    """
-    if not limits.has_velocity_by_position or int(window.highest[pieces].max(initial=0)) < 1:
+    window, pieces, limits = run.window, run.pieces, run.robot.limits
+    if int(window.highest[pieces].max(initial=0)) < 1:
         return
     used, times = uses_of_pieces(window.coefficients[:, pieces], window.lengths[pieces], limits.approach, 1.0)
     found = np.nonzero(exceeds(used, 1.0))
     if not found[0].size:
         return
-    fast = _fast_approaches(window, pieces, limits, found, (times[found], used[found]))
+    fast = _fast_approaches(run, found, (times[found], used[found]))
     certain, warned = fast.certain, np.zeros(fast.joint.size, dtype=bool)
-    if not asked:
+    if not run.asked:
         level = int(window.highest[fast.piece].max())
         explained = explained_by_law(window, fast.piece, fast.joint, 1, level)
         warned = certain & (np.abs(fast.speed) - np.abs(fast.bound) <= explained + fast.rounding)
         for end in (np.zeros_like(fast.local), window.lengths[fast.piece]):
-            on_row = _fast_approaches(window, pieces, limits, found, (end, fast.used))
-            warned &= ~on_row.certain
-    groups: tuple[tuple[NDArray[np.bool_], FindingSeverity, Certainty], ...] = (
-        (certain & ~warned, "error", "exceeded"),
-        (~certain, "error", "within rounding"),
-        (warned, "warning", "exceeded"),
-    )
-    for chosen, severity, certainty in groups:
-        worst.add(
-            "velocity_by_position",
-            move,
-            fast.joint,
-            fast.used,
-            lambda k: fast.finding(window, axes, k),
-            severity=severity,
-            certainty=certainty,
-            chosen=chosen,
-        )
+            warned &= ~_fast_approaches(run, found, (end, fast.used)).certain
+    make = partial(fast.finding, run)
+    run.add("velocity_by_position", fast.joint, fast.used, make, certain, warned)
 
 
 @frozen
@@ -293,23 +297,25 @@ class _FastApproaches:
         towards = np.where(np.signbit(self.bound), -self.speed, self.speed)
         return np.asarray(towards - np.abs(self.bound) > self.rounding)
 
-    def finding(self, window: Intervals, axes: NamedJoints, k: int) -> Finding:
+    def finding(self, run: JudgedRun, k: int) -> Finding:
         """Return one of them as a finding."""
+        from trajcli.curves.approach import ApproachUse
+        from trajcli.limits.velocity_by_position import approach_excess
+
         piece, joint, local = int(self.piece[k]), int(self.joint[k]), float(self.local[k])
         rates = float(self.used[k]), float(self.speed[k]), float(self.bound[k])
-        time = float(window.t[piece]) + local
-        found = approach_excess(axes, ApproachUse(joint, *rates, float(self.distance[k]), time))
-        return replace(found, row=window.row_at(piece, local), rounding=float(self.rounding[k]))
+        time = float(run.window.t[piece]) + local
+        found = approach_excess(run.robot, ApproachUse(joint, *rates, float(self.distance[k]), time))
+        return replace(found, row=run.window.row_at(piece, local), rounding=float(self.rounding[k]))
 
 
 def _fast_approaches(
-    window: Intervals,
-    pieces: slice,
-    limits: Limits,
-    found: tuple[NDArray[np.intp], ...],
-    at: tuple[Array, Array],
+    run: JudgedRun, found: tuple[NDArray[np.intp], ...], at: tuple[Array, Array]
 ) -> _FastApproaches:
     """Return the states in which limits are used most, from indices of uses, their times and sizes."""
+    from trajcli.curves.approach import ROOM, allowed_speed
+
+    window, pieces, limits = run.window, run.pieces, run.robot.limits
     limited, (piece, column), (local, used) = limits.approach.limited, found, at
     joint, piece = limited[column % limited.size], piece + pieces.start
     chosen = window.coefficients[:, piece, joint]
@@ -329,50 +335,29 @@ def _fast_approaches(
 _ACCELERATED = 3  # degree from which on pieces have an acceleration
 
 
-def judge_efforts(
-    window: Intervals,
-    pieces: slice,
-    robot: Robot,
-    move: int,
-    axes: NamedJoints,
-    worst: Collector,
-    *,
-    asked: bool,
-) -> None:
-    """Add where joints of an arm are over their limits of torque or force in pieces of one move.
+def _judge_efforts(run: JudgedRun) -> None:
+    """Add where joints of an arm are over their limits of torque or force.
 
     Rows state efforts where they have accelerations, and the mean of one between two velocities else. Where
     rows stand dense, an effort that only the curve between them has is a warning, as above.
-
-    Args:
-        window: The rows.
-        pieces: Which ones; those that are joined without an acceleration are left out.
-        robot: With the limits in force, gravity, and what its tool carries.
-        move: Its index, -1 for none.
-        axes: The joints.
-        worst: What is added to.
-        asked: Whether somebody asked for this curve.
-
-    Raises:
-        InputError: When a link of the arm has no inertia, or the arm no geometry.
     """
-    limits = robot.limits.effort
-    curved = np.flatnonzero(window.highest[pieces] >= _ACCELERATED - 1) + pieces.start
-    if not robot.limits.has_effort or not curved.size:
+    from trajcli.dynamics.effort_bound import effort_survey
+    from trajcli.dynamics.newton_euler import InverseDynamics
+
+    window, limits = run.window, run.robot.limits.effort
+    curved = np.flatnonzero(window.highest[run.pieces] >= _ACCELERATED - 1) + run.pieces.start
+    if not curved.size:
         return
-    dynamics, coefficients = InverseDynamics(robot), window.coefficients[:, curved]
-    lengths = window.lengths[curved]
-    breaks = np.concatenate([[0.0], np.cumsum(lengths)])
+    dynamics, coefficients = InverseDynamics(run.robot), window.coefficients[:, curved]
+    breaks = np.concatenate([[0.0], np.cumsum(window.lengths[curved])])
     survey = effort_survey(dynamics, breaks, coefficients, limits)
     stated = _stated_efforts(dynamics, window, curved)
     for joint, bounds in enumerate(limits.tolist()):
         for sign, limit in ((1, bounds[1]), (-1, -bounds[0])):
             peak = survey.peak(joint, sign)
-            if peak.most <= limit * (1 + EFFORT_RELATIVE):
-                continue
-            over = _OverEffort(window, dynamics, survey, curved, breaks, joint, sign, limit, peak)
-            rows = float((sign * stated[:, joint]).max())
-            over.add(move, axes, worst, stated=rows, asked=asked)
+            if not peak.most <= limit * (1 + EFFORT_RELATIVE):
+                over = _OverEffort(run, dynamics, survey, curved, breaks, joint, sign, limit, peak)
+                over.add(float((sign * stated[:, joint]).max()))
 
 
 def _stated_efforts(dynamics: InverseDynamics, window: Intervals, curved: NDArray[np.intp]) -> Array:
@@ -393,7 +378,7 @@ def _stated_efforts(dynamics: InverseDynamics, window: Intervals, curved: NDArra
 class _OverEffort:
     """A joint over its limit in one direction, on the pieces `curved` of a window."""
 
-    window: Intervals
+    run: JudgedRun
     dynamics: InverseDynamics
     survey: EffortSurvey
     curved: NDArray[np.intp]
@@ -403,38 +388,38 @@ class _OverEffort:
     limit: float
     peak: EffortPeak
 
-    def add(self, move: int, axes: NamedJoints, worst: Collector, *, stated: float, asked: bool) -> None:
-        """Add it by what is certain about it."""
-        at = int(np.clip(np.searchsorted(self.breaks, self.peak.time, "right") - 1, 0, self.curved.size - 1))
-        piece, local = int(self.curved[at]), float(self.peak.time - self.breaks[at])
+    def add(self, stated: float) -> None:
+        """Add it by what is certain about it; rows state `stated` at most."""
+        run, peak = self.run, self.peak
+        at = int(np.clip(np.searchsorted(self.breaks, peak.time, "right") - 1, 0, self.curved.size - 1))
+        piece, local = int(self.curved[at]), float(peak.time - self.breaks[at])
         rounding = self._rounding(piece, local)
-        beyond = self.peak.most - self.limit
-        dense = float(self.window.lengths[piece]) <= DENSE
-        severity: FindingSeverity = "error"
-        if not asked and dense and stated <= self.limit * (1 + EFFORT_RELATIVE) + rounding:
-            severity = "warning"
-        certainty: Certainty = "exceeded" if beyond > rounding else "within rounding"
-        found = self._finding(piece, local, axes, rounding)
-        worst.add(
+        dense = float(run.window.lengths[piece]) <= DENSE
+        warned = not run.asked and dense and stated <= self.limit * (1 + EFFORT_RELATIVE) + rounding
+        found = self._finding(piece, local, rounding)
+        run.worst.add(
             "effort",
-            move,
+            run.move,
             np.array([self.joint]),
-            np.array([self.peak.most / self.limit]),
+            np.array([peak.most / self.limit]),
             lambda _: found,
-            severity=severity,
-            certainty=certainty,
+            severity="warning" if warned else "error",
+            certainty="exceeded" if peak.most - self.limit > rounding else "within rounding",
         )
 
     def _rounding(self, piece: int, local: float) -> float:
         """Return by how much the effort may be off by the rounding of the accelerations."""
         count = len(self.dynamics.robot.joints)
-        level = max(int(self.window.highest[piece]), 1)
-        rows = self.window.piece_rows(np.full(count, piece), np.arange(count), level)
-        position = horner(self.window.coefficients[:, piece], np.full(count, local))
+        window = self.run.window
+        level = max(int(window.highest[piece]), 1)
+        rows = window.piece_rows(np.full(count, piece), np.arange(count), level)
+        position = horner(window.coefficients[:, piece], np.full(count, local))
         inertia = np.abs(self.dynamics.mass_matrix(position)[self.joint])
         return float(inertia @ rows.error(2))
 
-    def _finding(self, piece: int, local: float, axes: NamedJoints, rounding: float) -> Finding:
-        peak = replace(self.peak, time=float(self.window.t[piece]) + local)
-        found = effort_excess(axes, self.survey, self.joint, self.sign, self.limit, peak)
-        return replace(found, row=self.window.row_at(piece, local), rounding=rounding)
+    def _finding(self, piece: int, local: float, rounding: float) -> Finding:
+        from trajcli.limits.effort import effort_excess
+
+        window, peak = self.run.window, replace(self.peak, time=float(self.run.window.t[piece]) + local)
+        found = effort_excess(self.run.robot, self.survey, self.joint, self.sign, self.limit, peak)
+        return replace(found, row=window.row_at(piece, local), rounding=rounding)

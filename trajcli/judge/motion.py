@@ -17,7 +17,7 @@ from trajcli.judge.consistency import changes_of, judge_consistency
 from trajcli.judge.ends import judge_end, judge_order_of_stamps, judge_start
 from trajcli.judge.intervals import BESIDE, Intervals
 from trajcli.judge.judgement import Judgement, worst_first
-from trajcli.judge.limits import judge_efforts, judge_limits, judge_velocity_by_position
+from trajcli.judge.limits import JudgedRun, judge_limits
 from trajcli.judge.reconstruction import Interpolation, chosen_interpolation
 from trajcli.judge.stamps import Stamps, UnfitError
 from trajcli.kinematics.robot import QUANTITIES, Limits, Robot
@@ -240,10 +240,8 @@ class MotionJudge:
         for (before, after), low, high in window.runs():
             robot, pieces = self._robot_of(before, after), slice(low, high)
             arguments = (window, pieces, robot.limits, before, self._axes, self._worst)
-            judge_limits(*arguments, asked=asked)
-            judge_velocity_by_position(*arguments, asked=asked)
-            if robot.limits.has_effort and self._carries_one(before, after):
-                judge_efforts(window, pieces, robot, before, self._axes, self._worst, asked=asked)
+            carries_one = self._carries_one(before, after)
+            judge_limits(JudgedRun(window, pieces, robot, before, self._worst, asked, carries_one))
             judge_consistency(*arguments, changes, flips)
             if self._tool is not None:
                 self._tool.see(window, pieces, robot, before, asked=asked)

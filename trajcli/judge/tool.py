@@ -15,12 +15,12 @@ from trajcli.judge.tool_path import RecordedPath
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.kinematics.forward import forward
-from trajcli.kinematics.jacobian import jacobian
+from trajcli.kinematics.jacobian import jacobian, jacobian_dot_qd
 from trajcli.kinematics.robot import Robot
 from trajcli.limits.kinds import LimitKind
 from trajcli.limits.tolerances import TOOL_RELATIVE
-from trajcli.limits.tool import BOUNDED, limits_tool, tool_excess
-from trajcli.limits.tool_bound import ToolPeak, tool_bounds
+from trajcli.limits.tool import BOUNDED, limits_tool, tool_excess, tool_peaks
+from trajcli.limits.tool_bound import ToolPeak
 
 _PIECES = 2048  # at a time: nine configurations of each are looked at
 _TURN = 0.05  # rad or m that a joint moves between the rows at which nearness to a singularity is looked at
@@ -101,9 +101,9 @@ class ToolJudge:
     ) -> None:
         coefficients = window.coefficients[:, pieces]
         breaks = window.t[pieces.start] + np.append(0.0, np.cumsum(window.lengths[pieces]))
-        with np.errstate(over="ignore", invalid="ignore"):
-            bounds = tool_bounds(robot, breaks, coefficients)
-        for kind, peak in zip(BOUNDED, bounds, strict=True):
+        peaks = tool_peaks(robot, breaks, coefficients)
+        for kind in (kind for kind in BOUNDED if kind.key in peaks):
+            peak = peaks[kind.key]
             limit, order = float(getattr(robot.limits.tcp, kind.key)), kind.order or 1
             if order > int(window.highest[pieces].max()) or peak.most <= limit * (1 + TOOL_RELATIVE):
                 continue
@@ -151,17 +151,21 @@ class ToolJudge:
             return False
         room = limit * (1 + _CLOSE) + self._rounding(window, self._piece_at(window, pieces, peak.time), order)
         rows = slice(pieces.start, pieces.stop + 1)
-        q, qd = np.asarray(window.states[0])[rows], window.states[1]
+        states = tuple(None if values is None else values[rows] for values in window.states)
+        q = np.asarray(states[0])
         if order == 1:
             poses = forward(self._robot, q)
             turns = np.swapaxes(poses[:-1, :3, :3], 1, 2) @ poses[1:, :3, :3]
             traces = np.clip((np.trace(turns, axis1=1, axis2=2) - 1.0) / 2.0, -1.0, 1.0)
             moved = np.arccos(traces)[:, None] if angular else np.diff(poses[:, :3, 3], axis=0)
             return bool((np.linalg.norm(moved / lengths, axis=1) <= room).all())
-        if qd is None:
+        if any(values is None for values in states[:order]):
             return True
-        twists = (jacobian(self._robot, q) @ qd[rows, :, None])[..., 0]
-        part = twists[:, 3:] if angular else twists[:, :3]
+        rates = [np.asarray(values) for values in states[1:order]]
+        below = (jacobian(self._robot, q) @ rates[-1][..., None])[..., 0]
+        if order == 3:
+            below = below + jacobian_dot_qd(self._robot, q, rates[0])
+        part = below[:, 3:] if angular else below[:, :3]
         changes = np.linalg.norm(np.diff(part, axis=0) / lengths, axis=1)
         return bool((changes <= room).all())
 
@@ -176,7 +180,7 @@ class ToolJudge:
         return int((np.linalg.norm(part, axis=1) > limit).sum())
 
     def _rounding(self, window: Intervals, piece: int, order: int) -> float:
-        """Return by how much a speed or acceleration of the tool may be off by the rounding of the rows."""
+        """Return by how much a derivative of the tool's motion may be off by the rounding of the rows."""
         count = max(int(window.highest[piece]), 1)
         joints = np.arange(window.coefficients.shape[2])
         rows = window.piece_rows(np.full(joints.size, piece), joints, min(count, 3))
@@ -184,11 +188,15 @@ class ToolJudge:
         arm = self._length
         rates = [
             np.abs(horner(derivative_coefficients(window.coefficients[:, piece], k), rows.length)).sum()
-            for k in range(3)
+            for k in range(order + 1)
         ]
         total = arm * (errors[-1].sum() + errors[0].sum() * rates[order])
         if order == 2:
             total += 2.0 * arm * rates[1] * (errors[1].sum() + errors[0].sum() * rates[1])
+        if order == 3:
+            q, first, second = (error.sum() for error in errors[:3])
+            total += 3.0 * arm * (rates[1] * second + (rates[2] + rates[1] ** 2) * first)
+            total += arm * q * rates[1] * (3.0 * rates[2] + rates[1] ** 2)
         return float(total)
 
     def _judge_singularity(self, window: Intervals, pieces: slice, move: int) -> None:

@@ -57,6 +57,9 @@ EFFORT_RELATIVE = 1e-6
 # When a braking joint comes inside its limits is the root of a quadratic, of the rounding of its phases.
 BRAKING_RELATIVE = 1e-9
 
+# Knots stand in whole nanoseconds: half of one in a piece of 50 microseconds.
+JOINED_RELATIVE = 1e-5
+
 
 def exceeds(value: ArrayLike, bound: ArrayLike) -> NDArray[np.bool_]:
     """Return whether values are above an upper bound by more than rounding; for a lower bound negate both.

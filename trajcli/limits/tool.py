@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from trajcli.curves.extrema import peaks
+from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount, Amounts
 from trajcli.findings import Finding, NamedJoints, at_time
 from trajcli.frozen import frozen
@@ -53,7 +54,7 @@ class ToolSurvey(LimitSurvey):
     def over(self, joints: NamedJoints, origin: float = 0.0) -> Iterator[Finding]:
         """Yield the limits of the tool that the move does not keep."""
         del joints, origin  # times are from the start of the trajectory
-        for kind in BOUNDED if self.peaks else ():
+        for kind in (kind for kind in BOUNDED if kind.key in self.peaks):
             limit, peak = float(getattr(self.limits.tcp, kind.key)), self.peaks[kind.key]
             if not np.isinf(limit) and not peak.most <= limit * (
                 1 + TOOL_RELATIVE + 2 * self._promised(kind)
@@ -64,8 +65,8 @@ class ToolSurvey(LimitSurvey):
 
     def excess(self) -> float:
         """Return by how much of a limit the tool is above it."""
-        shares = [self.peaks[kind.key].most / float(getattr(self.limits.tcp, kind.key)) for kind in BOUNDED]
-        return max(shares) - 1
+        shares = (peak.most / float(getattr(self.limits.tcp, key)) for key, peak in self.peaks.items())
+        return max(shares, default=0.0) - 1
 
     def _promised(self, kind: LimitKind) -> float:
         """Return by what part of its peak a quantity may differ from that of the law."""
@@ -162,7 +163,7 @@ class ToolFamily(LimitFamily):
         robot, motion, span = move.robot, move.motion, move.span
         if robot is None or (motion is None and not limits_tool(robot)):
             return None
-        known = tool_peaks(move, robot) if limits_tool(robot) else {}
+        known = peaks_in(move, robot) if limits_tool(robot) else {}
         return ToolSurvey(robot.limits, known, span.start, span.duration > 0, motion)
 
     def over_at_ends(self, robot: Robot | None, ends: Sequence[State], use: tuple[str, int, float]) -> bool:
@@ -182,12 +183,20 @@ class ToolFamily(LimitFamily):
 FAMILY = ToolFamily()
 
 
-def tool_peaks(move: LimitedMove, robot: Robot) -> Mapping[str, ToolPeak]:
-    """Return the largest magnitude of each of `BOUNDED` over a move, by the key of its limit.
-
-    Times count from the start of the move.
-    """
+def peaks_in(move: LimitedMove, robot: Robot) -> Mapping[str, ToolPeak]:
+    """Return `tool_peaks` of a move; times count from its start."""
     breaks, coefficients = move.pieces
+    return tool_peaks(robot, breaks - move.span.start, coefficients)
+
+
+def tool_peaks(robot: Robot, breaks: Array, coefficients: Array) -> Mapping[str, ToolPeak]:
+    """Return the largest magnitudes of what limits of the tool bound, by the keys of these limits.
+
+    Args:
+        robot: The arm, with the limits in force.
+        breaks: Of the joints' curve, (P + 1,), s.
+        coefficients: Of its pieces, (degree + 1, P, n), highest power first, from the break on.
+    """
     with np.errstate(over="ignore", invalid="ignore"):
-        bounds = tool_bounds(robot, breaks - move.span.start, coefficients)
+        bounds = tool_bounds(robot, breaks, coefficients)
     return {kind.key: bound for kind, bound in zip(BOUNDED, bounds, strict=True)}

@@ -21,6 +21,7 @@ from trajcli.streams.whole_file import standard_output, whole_file
 from trajcli.units import Units
 
 if TYPE_CHECKING:
+    from trajcli.knots import Knots
     from trajcli.output.recording import LogOptions
 
 
@@ -34,7 +35,12 @@ def grid_of(plan: Plan) -> Grid:
     try:
         if output.times is not None:
             return ListedGrid(duration, np.array(output.times), output.start_time)
-        return UniformGrid(duration, output.rate, output.start_time)
+        if output.rows in (None, "rate"):
+            return UniformGrid(duration, output.rate, output.start_time)
+        from trajcli.knots import knot_grid, knots_of
+
+        rate = None if output.rows == "knots" else output.rate
+        return knot_grid(plan.trajectory, knots_of(plan.trajectory), rate, output.start_time)
     except InputError as error:
         key = "rate" if output.times is None else "times"
         raise error.located(place=plan.loaded.document.place(("output", key))) from None
@@ -65,7 +71,7 @@ def write_rows(
         BrokenPipeError: When the reader has closed the pipe.
     """
     form, loaded = form or format_of(path), plan.loaded
-    options = _write_options(plan, form, digits, log)
+    options = _write_options(plan, grid, form, digits, log)
     rows: Iterator[Array] = iter(())
     columns: tuple[Column, ...] = ()
     if form.content != "knots":
@@ -81,13 +87,12 @@ def write_rows(
         form.write(rows, columns, out, options)
 
 
-def _write_options(plan: Plan, form: StreamFormat, digits: Digits, log: LogOptions | None) -> WriteOptions:
+def _write_options(
+    plan: Plan, grid: Grid, form: StreamFormat, digits: Digits, log: LogOptions | None
+) -> WriteOptions:
     """Return what the rows of a plan do not say in a format."""
     if form.content == "knots":
-        from trajcli.knots import knots_of
-
-        names = plan.trajectory.joint_names
-        return WriteOptions(goal=cache(lambda: Goal(names, knots_of(plan.trajectory))))
+        return WriteOptions(goal=cache(lambda: Goal(plan.trajectory.joint_names, points_of(plan, grid))))
     if form.content == "log":
         from trajcli.output.recording import LogOptions, check_log_options, recording_of
 
@@ -95,6 +100,15 @@ def _write_options(plan: Plan, form: StreamFormat, digits: Digits, log: LogOptio
         check_log_options(options, plan.loaded.robot, plan.loaded.job.output.start_time)
         return WriteOptions(recording=cache(lambda: recording_of(plan, options)))
     return WriteOptions(digits)
+
+
+def points_of(plan: Plan, grid: Grid) -> Knots:
+    """Return the points of a message of ROS: the knots, or the rows where the job asks for these."""
+    from trajcli.knots import knots_at, knots_of
+
+    if plan.loaded.job.output.rows in (None, "knots"):
+        return knots_of(plan.trajectory)
+    return knots_at(plan.trajectory, np.concatenate([local for _, local in grid.blocks()]))
 
 
 def _groups_of_log(log: LogOptions | None, asked: Sequence[Group]) -> tuple[Group, ...]:

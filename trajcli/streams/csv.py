@@ -79,8 +79,7 @@ def encoder_of(digits: Digits) -> Callable[[Array, Sequence[int]], bytes]:
     """Return the function that makes lines of rows (N, m), given which columns are whole numbers."""
     if digits == "fixed":
         return encode_fixed
-    # nobody else pays for the import
-    from trajcli.streams.shortest_digits import encode_full
+    from trajcli.streams.number_cells import encode_full
 
     return encode_full
 
@@ -133,21 +132,13 @@ class _RowsReadBack:
         text += b"" if text.endswith(b"\n") else self._stream.readline()
         with suppress(NotFixedError):
             return scan_fixed(text, self._width, self._whole_numbers)
-        if text.endswith(b"\n"):
-            from trajcli.streams.number_cells import scan_decimals
+        from trajcli.streams.number_cells import scan_decimals
 
-            with suppress(NotFixedError):
-                return scan_decimals(text, self._width)[0]
-        return self._scan_any(text)
-
-    def _scan_any(self, text: bytes) -> Array:
-        lines = [line.split(b",") for line in text.splitlines()]
-        if any(len(line) != self._width for line in lines) or not text.endswith(b"\n"):
-            raise TrajcliError("the file read back has lines of another length than were written")
         try:
-            return np.array([list(map(float, line)) for line in lines])
-        except ValueError as error:
-            raise TrajcliError(f"the file read back holds what is not a number: {error}") from error
+            return scan_decimals(text, self._width)[0]
+        except NotFixedError as error:
+            message = "the file read back has lines that are no rows of as many numbers as were written"
+            raise TrajcliError(message) from error
 
     def take(self, count: int, before: int) -> Array:
         """Return the next `count` rows; `before` is how many were taken before."""
