@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from trajcli.errors import InputError
 from trajcli.frozen import frozen
 from trajcli.geometry.euler import check_sequence, euler_from_matrix, matrix_from_euler
-from trajcli.geometry.paths.orientation import SegmentProgress, check_targets, rate_jumps
+from trajcli.geometry.paths.orientation import OverSegments, SegmentProgress
 from trajcli.geometry.paths.position import Side, Triple
 from trajcli.geometry.rotation import AXES, Array, Frame, rotation_about
 
@@ -27,7 +27,7 @@ _MET = 1e-10  # of an entry of a matrix, by which a rotation is still met
 
 
 @frozen
-class EulerInterpolation:
+class EulerInterpolation(OverSegments):
     """Three angles about the axes of a sequence, each going evenly along each segment.
 
     Through a rounded corner of a chain the rates fade from those of one segment into those of the next one.
@@ -50,7 +50,7 @@ class EulerInterpolation:
 
     def __post_init__(self) -> None:
         check_sequence(self.sequence)
-        check_targets(self.angles, self.progress)
+        self.require_targets(len(self.angles))
         if self.angles.shape[1:] != (3,) or not np.isfinite(self.angles).all():
             raise InputError(f"angles must be finite triples, they have shape {self.angles.shape}")
 
@@ -76,35 +76,9 @@ class EulerInterpolation:
         distance = float(np.linalg.norm(angles[1] - angles[0]))
         return cls(angles, SegmentProgress.even(distance if length is None else length), sequence, frame)
 
-    @property
-    def length(self) -> float:
-        """How far s goes."""
-        return self.progress.length
-
-    @property
-    def breaks(self) -> Array:
-        """Where the rates begin to change, the border, and where they have changed."""
-        return self.progress.breaks
-
-    @property
-    def stops(self) -> Array:
-        """Borders without a blend at which the rate jumps."""
-        return rate_jumps(self, self.progress)
-
-    @property
-    def jumps(self) -> Array:
-        """None."""
-        return np.empty(0)
-
     def angles_at(self, s: Array, side: Side = "right") -> Triple:
         """Return the angles (N, 3), rad, and their first and second derivative by s."""
-        done = self.progress.at(s, side)
-        steps = np.concatenate([np.diff(self.angles, axis=0), np.zeros((1, 3))])
-        one, other = steps[done.segment], steps[done.segment + 1]
-        values, slopes, bends = (
-            one * row[0][:, None] + other * row[1][:, None] for row in (done.value, done.slope, done.bend)
-        )
-        return self.angles[done.segment] + values, slopes, bends
+        return self.progress.between(self.angles, s, side)
 
     def evaluate(self, s: Array, side: Side = "right") -> Triple:
         """Return R, w', w'' as `OrientationCurve` says.

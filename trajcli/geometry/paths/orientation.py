@@ -8,6 +8,7 @@ as S, with S = 3x^2 - 2x^3: the fractions are twice continuously differentiable 
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from functools import cached_property
 from typing import NamedTuple, Protocol
 
@@ -89,8 +90,55 @@ class FixedOrientation(Smooth):
         return np.tile(self.rotation, (count, 1, 1)), np.zeros((count, 3)), np.zeros((count, 3))
 
 
+class OverSegments(ABC):
+    """What orientations that go from border to border of segments share.
+
+    Attributes:
+        progress: How far each segment is done.
+    """
+
+    progress: SegmentProgress
+
+    @property
+    def length(self) -> float:
+        """How far s goes."""
+        return self.progress.length
+
+    @property
+    def breaks(self) -> Array:
+        """Where one rotation begins to fade into the next one, the border, and where it has done so."""
+        return self.progress.breaks
+
+    @property
+    def stops(self) -> Array:
+        """Borders without a blend at which the rate jumps."""
+        sharp: Array = self.progress.borders[1:-1][self.progress.half_widths == 0.0]
+        if not sharp.size:
+            return sharp
+        return np.asarray(sharp[_differ(self.evaluate(sharp, "left")[1], self.evaluate(sharp, "right")[1])])
+
+    @property
+    def jumps(self) -> Array:
+        """None."""
+        return np.empty(0)
+
+    @abstractmethod
+    def evaluate(self, s: Array, side: Side = "right") -> Triple:
+        """Return R, w', w'' as `OrientationCurve` says."""
+
+    def require_targets(self, count: int) -> None:
+        """Check that there is one target for each border of the segments.
+
+        Raises:
+            InputError: When there is not.
+        """
+        wanted = self.progress.segments + 1
+        if count != wanted:
+            raise InputError(f"{wanted - 1} segments need {wanted} orientations, not {count}")
+
+
 @frozen
-class AxisAngleOrientation:
+class AxisAngleOrientation(OverSegments):
     """From each orientation to the next one about the fixed axis of the shortest rotation.
 
     Over a chain the rotation goes evenly along each segment; through a rounded corner one rotation fades into
@@ -110,7 +158,7 @@ class AxisAngleOrientation:
     progress: SegmentProgress
 
     def __post_init__(self) -> None:
-        check_targets(self.rotations, self.progress)
+        self.require_targets(len(self.rotations))
         for rotation in self.rotations:
             check_rotation(rotation)
 
@@ -126,26 +174,6 @@ class AxisAngleOrientation:
         rotations = np.array([start, end], dtype=np.float64)
         angle = float(np.linalg.norm(turn_vectors(rotations[:1], rotations[1:])))
         return cls(rotations, SegmentProgress.even(angle if length is None else length))
-
-    @property
-    def length(self) -> float:
-        """How far s goes."""
-        return self.progress.length
-
-    @property
-    def breaks(self) -> Array:
-        """Where one rotation begins to fade into the next one, the border, and where it has done so."""
-        return self.progress.breaks
-
-    @property
-    def stops(self) -> Array:
-        """Borders without a blend at which the rate jumps."""
-        return rate_jumps(self, self.progress)
-
-    @property
-    def jumps(self) -> Array:
-        """None."""
-        return np.empty(0)
 
     @cached_property
     def vectors(self) -> Array:
@@ -306,6 +334,25 @@ class SegmentProgress:
             np.array([-bend / first, bend / second]),
         )
 
+    def between(self, targets: Array, s: Array, side: Side = "right") -> Triple:
+        """Return values (N, d) that go evenly along each segment, and their first and second derivative by s.
+
+        Args:
+            targets: At the borders, shape (k + 1, d).
+            s: Shape (N,).
+            side: Which of two neighbouring pieces speaks at a break.
+
+        Raises:
+            ValueError: When s lies outside the path.
+        """
+        done = self.at(s, side)
+        steps = np.concatenate([np.diff(targets, axis=0), np.zeros((1, targets.shape[1]))])
+        one, other = steps[done.segment], steps[done.segment + 1]
+        values, slopes, bends = (
+            one * row[0][:, None] + other * row[1][:, None] for row in (done.value, done.slope, done.bend)
+        )
+        return targets[done.segment] + values, slopes, bends
+
 
 def _ramp(s: Array, border: Array, width: Array, side: Side) -> tuple[Array, Array, Array]:
     """Return a function of slope 0 before border - width and 1 after border + width, and two derivatives."""
@@ -329,26 +376,6 @@ def turn_vectors(start: Array, end: Array) -> Array:
     opposite = read.sign_free & (np.take_along_axis(read.axis, first, axis=-1)[..., 0] < 0.0)
     angle = np.where(opposite, read.angle - 2.0 * np.pi, read.angle)
     return np.asarray(read.axis * angle[..., None])
-
-
-def check_targets(targets: Array, progress: SegmentProgress) -> None:
-    """Check that there is one target for each border of the segments.
-
-    Raises:
-        InputError: When there is not.
-    """
-    if len(targets) != progress.segments + 1:
-        raise InputError(
-            f"{progress.segments} segments need {progress.segments + 1} orientations, not {len(targets)}"
-        )
-
-
-def rate_jumps(curve: OrientationCurve, progress: SegmentProgress) -> Array:
-    """Return the borders (k,) without a blend at which the rate of an orientation jumps."""
-    sharp: Array = progress.borders[1:-1][progress.half_widths == 0.0]
-    if not sharp.size:
-        return sharp
-    return np.asarray(sharp[_differ(curve.evaluate(sharp, "left")[1], curve.evaluate(sharp, "right")[1])])
 
 
 def _differ(left: Array, right: Array) -> Flags:

@@ -207,13 +207,10 @@ class ToolPath:
         initial_angle = self.angle_of(
             self.poses.evaluate(np.zeros(1))[0][0], self.orientation, self.tool_axis
         )
-        done = (self.progress or SegmentProgress.even(self.length)).at(s, side)
-        angle_changes = np.append(self.angle_changes, 0.0)
-        before = np.concatenate([[0.0], np.cumsum(self.angle_changes)])[done.segment]
-        both = angle_changes[np.stack([done.segment, done.segment + 1])]
-        value, slope, bend = ((rows * both).sum(axis=0) for rows in (done.value, done.slope, done.bend))
-        second = bend * speed**2 + slope * acceleration
-        return np.stack([initial_angle + before + value, slope * speed, second], axis=1)
+        angles = initial_angle + np.concatenate([[0.0], np.cumsum(self.angle_changes)])
+        progress = self.progress or SegmentProgress.even(self.length)
+        values, slopes, bends = (rows[:, 0] for rows in progress.between(angles[:, None], s, side))
+        return np.stack([values, slopes * speed, bends * speed**2 + slopes * acceleration], axis=1)
 
     @staticmethod
     def angle_of(pose: Array, orientation: OrientationConstraint, tool_axis: AxisName) -> float:
