@@ -57,6 +57,29 @@ def test_value_slope_and_curvature_are_met_everywhere(tolerance):
     assert (curve.start, curve.end) == tuple(ENDS)
 
 
+@pytest.mark.parametrize("order", [0, 1, 2])
+@pytest.mark.parametrize("center", [0.4, 0.62, 0.86, 1.1, 2.3])
+def test_a_mirrored_function_has_the_mirrored_pieces(center, order):
+    """A narrow hump anywhere: no part of a piece is looked at less closely than its mirror image."""
+
+    def hump(t):
+        x = 8 * (t - center)
+        value = np.exp(-(x**2))
+        rows = value, -16 * x * value, (256 * x**2 - 128) * value
+        return np.stack([np.stack([row, 0 * row], axis=-1) for row in rows])
+
+    def mirrored(t):
+        return hump(3.0 - t) * np.array([1.0, -1.0, 1.0])[:, None, None]
+
+    def misfit(known, rows, fitted):
+        return np.abs(fitted - known.values[:, rows])[order].max(axis=1) / 1e-4
+
+    one, other = (fit(known(function), misfit, ENDS, nothing) for function in (hump, mirrored))
+    np.testing.assert_allclose(other.breaks, 3.0 - one.breaks[::-1], atol=1e-12)
+    t = np.linspace(*ENDS, 7001)
+    assert np.abs(one.evaluate(t, order) - hump(t)[order]).max() <= 1.25e-4
+
+
 @pytest.mark.parametrize(("order", "rate"), [(0, 6), (1, 5), (2, 4)])
 def test_the_error_falls_with_the_order_of_quintic_pieces(order, rate):
     def misfit(known, rows, fitted):

@@ -209,8 +209,20 @@ def test_coulomb_friction_jumps_where_a_joint_turns_back():
 
 def test_a_motion_of_no_length_asks_for_nothing():
     survey = effort_survey(lift(), np.array([2.0, 2.0]), np.zeros((2, 1, 1)))
-    assert survey.highest()[0].most == 0.0
+    for peak in (survey.highest()[0], survey.lowest()[0]):
+        assert (peak.value, peak.most, peak.parts, peak.time) == (0.0, 0.0, (0.0,) * 4, 2.0)
     assert needed_stretch(survey, 0, 1, 1.0, 1e-6).factor == 1.0
+
+
+def test_peaks_are_of_the_motion_as_it_is_unless_asked_otherwise():
+    """m (a / k^2 + g) and v / k, by hand: a lift that is stretched to k times as long."""
+    coefficients = np.array([2.0, 0.0, 0.0])[:, None, None]  # qdd = 4 up to qd = 4
+    survey = effort_survey(lift(5.0, Friction(1.0, 2.0)), np.array([0.0, 1.0]), coefficients)
+    assert survey.peak(0, 1).most == pytest.approx(20.0 + 49.05 + 1.0 + 8.0)
+    assert survey.peak(0, 1, 2.0).most == pytest.approx(5.0 + 49.05 + 1.0 + 4.0)
+    assert survey.highest(2.0)[0].most == pytest.approx(5.0 + 49.05 + 1.0 + 4.0)
+    assert survey.lowest(2.0)[0].most == pytest.approx(-5.0 - 49.05 - 1.0)
+    assert survey.peak(0, 1, np.inf).most == pytest.approx(50.05)
 
 
 @pytest.mark.filterwarnings("error")
@@ -265,6 +277,16 @@ def test_stretch_of_a_lift_in_closed_form():
     wanted = (8.0 + (64.0 + 80.0 * free) ** 0.5) / (2 * free)
     assert needed_stretch(survey, 0, 1, 60.0, 0.0).factor == pytest.approx(wanted, rel=1e-8)
     assert needed_stretch(survey, 0, 1, 200.0, 0.0).factor == 1.0
+
+
+@pytest.mark.parametrize("scale", [1e-4, 1.0, 1e4])
+def test_stretch_of_a_light_and_of_a_heavy_lift(scale):
+    dynamics = lift(5.0 * scale, Friction(0.0, 2.0 * scale))
+    survey = effort_survey(dynamics, np.array([0.0, 1.0]), np.array([2.0, 0.0, 0.0])[:, None, None])
+    free = 60.0 - 49.05
+    wanted = (8.0 + (64.0 + 80.0 * free) ** 0.5) / (2 * free)
+    found = needed_stretch(survey, 0, 1, 60.0 * scale, 1e-6)
+    assert found.factor == pytest.approx(wanted, rel=1e-2 if scale < 1 else 2e-6)
 
 
 def test_no_stretch_helps_where_gravity_alone_is_over_the_limit():

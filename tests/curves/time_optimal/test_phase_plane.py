@@ -7,7 +7,9 @@ import pytest
 from scipy.optimize import linprog
 
 from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.curves.time_optimal.collocation import CollocationRows
 from trajcli.curves.time_optimal.constraints import JointConstraint
+from trajcli.curves.time_optimal.maximum_velocity import largest_in_intervals, maximum_velocity_curve
 from trajcli.curves.time_optimal.phase_plane import PhasePlane
 from trajcli.job.read import job_from_text, load_job
 from trajcli.planning.plan import plan_job
@@ -104,3 +106,42 @@ def test_sharp_corners_are_stops_and_units_are_those_of_the_joints() -> None:
     assert plane.stops.size == 2
     assert plane.dimension == "angle"
     assert plane_of(JOB.format(more=", parameter: uniform")).dimension == "ratio"
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_room_in_intervals_is_that_of_a_linear_program(seed: int) -> None:
+    """Largest x <= cap with P x + R y <= C for some y >= 0, rows without y among them."""
+    rng = np.random.default_rng(seed)
+    P, R, C = (rng.normal(size=(6, 40)) for _ in range(3))
+    R[:, ::3] *= rng.random((6, 14)) > 0.4  # some without y
+    R[:, ::5] = np.abs(R[:, ::5])  # y = 0 decides
+    C, cap = np.abs(C) + 0.05, rng.uniform(0.1, 9.0, 40)
+    cap[::7] = np.inf
+    found = largest_in_intervals(P, R, C, cap)
+    for k in range(40):
+        rows = np.column_stack([P[:, k], R[:, k]])
+        answer = linprog([-1, 0], rows, C[:, k], bounds=[(0, cap[k]), (0, None)])
+        if answer.status == 3:
+            assert found[k] == np.inf
+        else:
+            assert found[k] == pytest.approx(answer.x[0], rel=1e-7)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_was_known_of_unchanged_intervals_is_what_they_would_have(seed: int) -> None:
+    """Also where a cap is lowered at an end that an unchanged interval shares."""
+    rng = np.random.default_rng(seed)
+    P, R = rng.normal(size=(2, 6, 30))
+    C, cap = rng.uniform(0.05, 1.0, (6, 30)), rng.uniform(0.1, 9.0, 31)
+    rest = np.zeros(30), np.ones(30), np.zeros(6, dtype=np.intp)
+    before = CollocationRows(np.arange(31.0), P, R, C, cap, *rest)
+    known = maximum_velocity_curve(before)
+    changed = rng.random(30) < 0.3
+    lower = C / np.where(changed, 3.0, 1.0)
+    caps = cap / np.append(np.where(changed, 2.0, 1.0), 1.0)
+    caps[1:] = np.where(changed, np.minimum(caps[1:], cap[1:] / 2.0), caps[1:])
+    after = CollocationRows(np.arange(31.0), P, R, lower, caps, *rest)
+    np.testing.assert_allclose(maximum_velocity_curve(after, known, changed), maximum_velocity_curve(after))
+    np.testing.assert_allclose(
+        maximum_velocity_curve(after)[:-1], largest_in_intervals(P, R, lower, caps[:-1])
+    )
