@@ -34,8 +34,9 @@ types: $(STAMP)
 test: $(STAMP)
 	$(BIN)/python -m pytest -n auto
 
-soak: $(STAMP)  ## long random campaigns, and the random tests of `make test` with new examples
-	HYPOTHESIS_PROFILE=random $(BIN)/python -m pytest -n auto -m "soak or not soak"
+PART ?= tests
+soak: $(STAMP)  ## long random campaigns, and the random tests of `make test` with new examples; PART=tests/judge: those alone
+	HYPOTHESIS_PROFILE=random $(BIN)/python -m pytest -n auto -m "soak or not soak" $(PART)
 
 bench: $(STAMP) $(PEERS)/.installed  ## ratios against named peers, in one run
 	$(BIN)/python -m benchmarks --peers $(PEERS)/bin/python

@@ -8,6 +8,7 @@ import os
 import signal
 
 from hypothesis import settings
+from tally import pytest_terminal_summary, tally  # noqa: F401
 
 # a loaded machine is no defect: no example has a deadline
 settings.register_profile("fixed", derandomize=True, deadline=None)

@@ -213,7 +213,7 @@ _FIELDS = {
     "hold": _hold,
 }
 TAGS = sorted(_FIELDS)
-# moves along a path need arms with geometry: tests/planners/tool_path/tool_campaign.py draws them
+# moves along a path need arms with geometry: tests/tool_campaign.py draws them
 ALONG_PATHS = {"line", "arc", "path", "screw"}
 assert set(TAGS) == set(PLANNERS) - ALONG_PATHS, "say here how a move of the new planner is drawn"
 

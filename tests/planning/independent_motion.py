@@ -107,7 +107,11 @@ def efforts(robot: Robot, q: Series) -> np.ndarray:
         solids.append((len(frames) - 1, carried.mass, carried.com, carried.inertia, tool))
     result = np.zeros(q.shape[1:])
     for owner, mass, com, tensor, frame in solids:
-        center, rotation, w = frame[..., :3, :] @ np.append(com, 1.0), frame[..., :3, :3], angular_velocity(frame)
+        center, rotation, w = (
+            frame[..., :3, :] @ np.append(com, 1.0),
+            frame[..., :3, :3],
+            angular_velocity(frame),
+        )
         force = mass * (2 * center[2] - robot.gravity)
         inertia = np.zeros_like(rotation)
         inertia[0] = tensor
@@ -162,7 +166,9 @@ def shares(curve: PiecewisePolynomial, robot: Robot) -> dict[str, float]:
         low, high = extremes(curve, order)
         lower, upper = robot.limits.of_order(order).T
         result[kind] = float(
-            1 + np.fmax(high - upper, lower - low).max() if order == 0 else np.fmax(high / upper, low / lower).max()
+            1 + np.fmax(high - upper, lower - low).max()
+            if order == 0
+            else np.fmax(high / upper, low / lower).max()
         )
     bounds = np.array([getattr(robot.limits.tcp, key, np.inf) for key in TOOL])
     if np.isfinite(bounds).any():

@@ -130,9 +130,10 @@ def test_random_problems_keep_all_limits(seed):
 
 @pytest.mark.soak
 @pytest.mark.parametrize("block", range(100))
-def test_a_thousand_random_problems_keep_all_limits(block):
+def test_a_thousand_random_problems_keep_all_limits(block, tally):
     for seed in range(1000 + 10 * block, 1010 + 10 * block):
         judged(*random_problem(seed))
+    tally({"laws": 10})
 
 
 def random_problem(seed):
