@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from trajcli.curves.piecewise import PiecewisePolynomial, constant
+from trajcli.errors import InputError
 from trajcli.job.read import job_from_text, load_job
 from trajcli.knots import LARGEST_DEVIATION, Knots, knots_of
 from trajcli.output.report import report_of
@@ -167,3 +168,13 @@ def test_the_report_says_how_many_and_how_good() -> None:
     broken = plan_job(load_job(str(EXAMPLES / "septic.yaml"), ["limits.velocity=0.001"]))
     assert not broken.verdict.passed
     assert report_of(broken).knots is None
+
+
+def test_a_motion_of_thousands_of_years_is_explained_without_knots() -> None:
+    """5e11 s: float64 tells nanoseconds apart up to 2^53 of them."""
+    text = (EXAMPLES / "sync.yaml").read_text().replace("velocity: 10}", "velocity: 1.0e-10}")
+    plan = plan_job(job_from_text(text))
+    assert plan.trajectory.duration == pytest.approx(5e11, rel=1e-9)
+    assert report_of(plan).knots is None
+    with pytest.raises(InputError, match="whole nanoseconds"):
+        knots_of(plan.trajectory)

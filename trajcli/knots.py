@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from trajcli.curves.extrema import piece_extremes
 from trajcli.curves.hermite import hermite_coefficients
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, distinct, read_only, taylor_shift
+from trajcli.errors import InputError
 from trajcli.frozen import comparable, frozen
 from trajcli.grids import KnotGrid, UniformGrid
 from trajcli.trajectory import Trajectory
@@ -25,6 +26,7 @@ Nanoseconds = NDArray[np.int64]
 LARGEST_DEVIATION = 1e-6  # rad or m: what quintics between knots may miss, where knots can be inserted
 _NEAREST = 1000  # ns: knots closer than this are one, and no closer ones are inserted
 _PER_SECOND = 1e9
+_LONGEST = 2.0**53 / _PER_SECOND  # s: in longer motions float64 tells no nanoseconds apart
 _ROUNDING = 1e-12  # s: a time this close to a break is the break
 _CONTINUOUS = 1e-9  # of the largest acceleration of its joint: a step below that is rounding
 _STEP_DEVIATION = 1e-9  # rad or m: what the knots around a step of the acceleration may miss
@@ -80,6 +82,11 @@ class Knots:
         return self.nanoseconds / _PER_SECOND
 
 
+def has_knots(trajectory: Trajectory) -> bool:
+    """Return whether a trajectory is so short that float64 tells all its nanoseconds apart."""
+    return trajectory.duration <= _LONGEST
+
+
 def knots_of(trajectory: Trajectory) -> Knots:
     """Return the knots of a trajectory, so many that quintics between them are within `LARGEST_DEVIATION`.
 
@@ -88,8 +95,16 @@ def knots_of(trajectory: Trajectory) -> Knots:
 
     Args:
         trajectory: One without jumps of position and velocity.
+
+    Raises:
+        InputError: When it is so long that float64 tells no nanoseconds apart.
     """
     curve = trajectory.curve
+    if not has_knots(trajectory):
+        raise InputError(
+            f"the trajectory lasts {trajectory.duration:.6g} s, and knots stand at whole nanoseconds",
+            hint=f"up to {_LONGEST:.6g} s they can be told apart; rows at a rate have no such bound",
+        )
     whole = _first_knots(curve)
     while True:
         states = _states(trajectory, whole)

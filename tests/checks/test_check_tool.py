@@ -229,18 +229,19 @@ def test_a_step_of_acceleration_although_jerk_is_limited():
 
 def planar(elbow) -> SampledTool:
     """Return a planar arm that goes along the tool's way for which its elbow has the given angles over time."""
-    robot = load_robot("planar3r")
     t = np.linspace(0, DURATION, 65)
     rows = np.stack([0.4 + 0.1 * t, elbow(t), -0.3 + 0.05 * t], axis=1)
     from scipy.interpolate import make_interp_spline
 
     spline = make_interp_spline(t, rows, k=5)
     derivatives = np.stack([spline(t, order) for order in range(3)])
-    curve = hermite_pieces(t, derivatives)
-    whole = trajectory_of(robot, curve)
+    return told(hermite_pieces(t, derivatives))
 
-    class Told:
-        """The tool is told exactly where the joints bring it."""
+
+def told(curve: PiecewisePolynomial) -> SampledTool:
+    """Return a planar arm whose tool is told exactly where the joints bring it."""
+    robot = load_robot("planar3r")
+    whole = trajectory_of(robot, curve)
 
     def timed(times, side):
         from trajcli.kinematics.following.tool_path import ToolReference
@@ -269,6 +270,20 @@ def test_an_elbow_that_straightens_through_changes_the_branch():
     assert found.kind == "branch"
     assert found.time == pytest.approx(1.1, abs=0.02)
     assert found.factor is None
+
+
+def test_a_determinant_of_zero_on_a_row_hides_no_change_of_branch():
+    """The arm lies along x at t = 1 s, where each row of its Jacobian across x is exactly zero."""
+
+    def elbow(turn: float) -> SampledTool:
+        """Half a radian, straight at the break, and on or back by as much."""
+        pieces = np.zeros((2, 2, 3))
+        pieces[:, :, 1] = [[-0.5, turn], [0.5, 0.0]]
+        return told(PiecewisePolynomial(np.array([0.0, 1.0, 2.0]), pieces))
+
+    (found,) = judged(elbow(-0.5))
+    assert (found.kind, found.time) == ("branch", pytest.approx(1.0, abs=1e-12))
+    assert judged(elbow(0.5)) == []
 
 
 def test_a_wrist_that_passes_its_middle_changes_the_branch():

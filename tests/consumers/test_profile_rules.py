@@ -172,7 +172,7 @@ def test_a_partial_goal_misses_a_joint() -> None:
     )
     found = judged(part, "ros-jtc", surroundings(7))
     missing = [(each.kind, each.message) for each in found.findings]
-    assert missing == [("joints", "the joint 'joint_7' is missing")]
+    assert missing == [("position", "the joint 'joint_7' is missing")]
 
 
 @pytest.mark.parametrize(
@@ -185,7 +185,7 @@ def test_the_number_of_joints(profile: str, joints: int) -> None:
         (each.rule.split("-", 1)[1], each.severity, each.kind, each.value)
         for each in found
         if "joints" in each.rule
-    ] == [("joints", "error", "joints", joints)]
+    ] == [("joints", "error", "position", joints)]
 
 
 @pytest.mark.parametrize("name", ["q", "qd", "qdd"])

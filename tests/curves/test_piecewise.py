@@ -61,6 +61,16 @@ def test_a_time_outside_is_refused_wherever_it_stands(wrong):
             curve.evaluate(np.insert(np.linspace(0, 3, 5), place, wrong))
 
 
+@pytest.mark.parametrize("scale", [1e-12, 1.0, 5e11])
+def test_a_time_that_only_rounding_has_outside_is_the_border(scale):
+    """As the sum of its parts may be: at each magnitude the next numbers beyond both ends."""
+    curve = PiecewisePolynomial([-scale, 0.0, 3.0 * scale], np.array([[[2.0], [1.0]], [[0.0], [5.0]]]))
+    beyond = np.nextafter([-scale, 3.0 * scale], [-np.inf, np.inf])
+    np.testing.assert_array_equal(curve.evaluate(beyond), curve.evaluate([-scale, 3.0 * scale]))
+    with pytest.raises(ValueError, match="outside the curve's domain"):
+        curve.evaluate(3.0 * scale * (1 + 1e-14))
+
+
 def test_joined_curves_are_each_other_after_another():
     _, first = drawn(1, 3)
     _, second = drawn(2, 4)

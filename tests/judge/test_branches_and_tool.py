@@ -164,3 +164,25 @@ def test_a_tool_at_its_limits_is_no_false_alarm(orders: int) -> None:
     assert judgement.passed, [found.text() for found in judgement.findings]
     tight = replace(robot, limits=replace(robot.limits, tcp=ToolLimits(speed=0.1199)))
     assert not judge_motion(lambda: (motion,), Requirements(tight, tool=lambda: ToolJudge(tight, {}))).passed
+
+
+@pytest.mark.parametrize("half", [1, -1])
+def test_a_determinant_of_zero_on_a_row_hides_no_change_of_branch(half: int) -> None:
+    """A planar arm straightens along x on a row, where the rows of its Jacobian across x are exactly zero."""
+    path = {"xyz": [0.35, 0.25, 0.0], "yaw": 1.5, "tool_axis": "x"}
+    line = {"planner": "line", "to": path, "law": {"shape": "quintic", "duration": 1}}
+    job = trajcli.plan(
+        {"version": 1, "robot": "planar3r", "start": {"joints": [-0.2, 1.0, 0.3]}, "moves": [line]}
+    )
+    paths = {0: job.moves[0].planned.tool}
+    elbow = np.arange(20, -21, -1) / 100.0
+    q = np.stack([np.zeros(41), np.where(elbow < 0, half * elbow, elbow), np.zeros(41)], axis=1)
+    off = np.full(3, 0.5e-9)
+    resolution = Resolution(0.5e-9, off, off, off)
+    rows = RecordedMotion(
+        np.arange(41) / 50.0, q, None, None, None, None, np.zeros(41, int), None, resolution, "rows"
+    )
+    robot = job.moves[0].robot
+    required = Requirements(robot, tool=lambda: ToolJudge(robot, paths))
+    found = [each for each in judge_motion(lambda: [rows], required).findings if each.kind == "branch"]
+    assert [each.row for each in found] == ([22] if half == 1 else [])

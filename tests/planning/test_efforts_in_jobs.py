@@ -173,3 +173,15 @@ def test_a_move_between_moving_states_is_slowed_within_efforts():
     planned = plan(given)
     assert planned.verdict.passed
     assert 1 - 1e-3 <= shares(planned, np.array([65.0])).max() <= 1 + 1e-6
+
+
+@pytest.mark.parametrize(("limits", "unjudged"), [({}, True), ({"effort": 1e6}, False)])
+def test_what_is_carried_and_not_judged_is_said(limits, unjudged) -> None:
+    """200 kg at the flange of an arm that lifts 5: without limits of effort nobody judges them."""
+    move = {"planner": "quintic", "to": {"joints": RESTS[1]}, "duration": 9}
+    made = plan(job(move, mass=200, limits={"velocity": 20, "acceleration": 40, **limits}))
+    assert made.verdict.passed
+    said = {quantity for _, quantity in made.verdict.unchecked}
+    assert ("effort" in said, "effort with 200 kg carried" in made.unchecked) == (unjudged, unjudged)
+    empty = plan(job(move, limits={"velocity": 20, "acceleration": 40}))
+    assert "effort" not in empty.unchecked

@@ -6,6 +6,7 @@ import re
 
 import pytest
 
+import trajcli
 from trajcli.errors import InputError
 from trajcli.urdf.read import MAX_BYTES, MAX_DEPTH
 from trajcli.urdf.robot import UrdfRobot, robot_of_urdf
@@ -180,3 +181,44 @@ def test_more_joints_than_a_robot_has() -> None:
     with pytest.raises(InputError, match="13 joints that move"):
         read(text)
     assert len(read(text, root="l1").robot.joints) == 12
+
+
+def _joint(name: str, parent: str, child: str, more: str = "") -> str:
+    ends = f'<parent link="{parent}"/><child link="{child}"/><axis xyz="0 0 1"/>{more}'
+    return f'<link name="{child}"/><joint name="{name}" type="continuous">{ends}</joint>'
+
+
+@pytest.mark.parametrize("joints", [2, 6])
+def test_a_mimic_between_root_and_tip_is_refused_by_its_name(joints: int) -> None:
+    """Not taken as a gripper, which would end the arm before it or leave it without joints."""
+    inner = [
+        _joint(f"j{k}", f"l{k - 1}", f"l{k}", '<mimic joint="j1"/>' if k == 2 else "")
+        for k in range(1, joints + 1)
+    ]
+    with pytest.raises(InputError, match="joint 'j2' mimics j1") as refused:
+        read(f'<robot name="r"><link name="l0"/>{"".join(inner)}</robot>')
+    assert "`tip: l1`" in str(refused.value.problems[0].hint)
+
+
+def test_a_linkage_beside_the_arm_is_no_gripper() -> None:
+    """A rod that mimics the second of six joints from another branch: the arm is whole."""
+    arm = [_joint(f"j{k}", f"l{k - 1}", f"l{k}") for k in range(1, 7)]
+    rod = _joint("rod", "l1", "rod_link", '<mimic joint="j2"/>')
+    found = read(f'<robot name="r"><link name="l0"/>{"".join(arm)}{rod}</robot>')
+    assert (found.tip, len(found.robot.joints)) == ("l6", 6)
+
+
+def test_trees_that_were_passed_over_are_named(tmp_path) -> None:
+    """Two arms in one file and a lone link: the file has two trees with joints, and one is planned."""
+    two = _joint("ja1", "a0", "a1") + _joint("ja2", "a1", "a2") + _joint("jb1", "b0", "b1")
+    text = f'<robot name="two"><link name="a0"/><link name="b0"/><link name="table"/>{two}</robot>'
+    assert read(text).other_roots == ("b0",)
+    assert "2 trees" in " ".join(read(text).remarks)
+    for chosen in ({"root": "a0"}, {"tip": "b1"}):
+        assert read(text, **chosen).other_roots == ()
+    (tmp_path / "two.urdf").write_text(text)
+    start = {"joints": [0.0, 0.0]}
+    job = {"version": 1, "robot": {"urdf": str(tmp_path / "two.urdf")}, "start": start}
+    job["moves"] = [{"planner": "quintic", "to": start, "duration": 1}]
+    (event,) = (each for each in trajcli.plan(job).events if each.kind == "root_chosen")
+    assert "root 'a0'" in event.message and "b0" in event.message  # noqa: PT018

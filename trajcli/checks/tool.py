@@ -12,9 +12,9 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount
 from trajcli.findings import Finding, at_time
 from trajcli.frozen import frozen
-from trajcli.kinematics.dexterity import characteristic_length
+from trajcli.kinematics.dexterity import changes_of_sign, characteristic_length
 from trajcli.kinematics.following.motion import ToolMotion
-from trajcli.kinematics.inverse.target import IkTarget, residual_jacobian, residuals
+from trajcli.kinematics.inverse.target import IkTarget, determinants, residuals
 from trajcli.kinematics.jacobian import linearisation
 from trajcli.kinematics.robot import Robot
 from trajcli.limits.kinds import LimitedMove
@@ -117,16 +117,11 @@ def _check_path(tool: SampledTool) -> list[Finding]:
 
 def _check_branch(tool: SampledTool) -> list[Finding]:
     """Return where the arm passes from one branch to another: the determinant of its rows changes sign."""
-    target = tool.target
-    slopes = residual_jacobian(target, *tool.linearised)
-    if slopes.shape[1] != slopes.shape[2] or target.orientation == "direction":
-        return []  # without as many independent rows as joints there is no determinant
-    slopes[:, : sum(target.position)] /= characteristic_length(tool.robot)
-    signs = np.sign(np.linalg.det(slopes))
-    changes = np.flatnonzero(signs[1:] * signs[:-1] < 0)
+    known = determinants(tool.target, *tool.linearised, characteristic_length(tool.robot))
+    changes = changes_of_sign(known) if known is not None else np.empty(0)
     if not changes.size:
         return []
-    when = tool.span.start + float(tool.times[changes[0]])
+    when = tool.span.start + float(tool.times[changes[0] - 1])
     finding = Finding(
         move=tool.span.index,
         joint=None,

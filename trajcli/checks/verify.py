@@ -39,7 +39,8 @@ class Verdict:
         findings: What is wrong, by move and time.
         steps: Legal steps in acceleration, in order of time.
         peaks: For each span the extremes of position, velocity, acceleration and jerk, times on the curve.
-        unchecked: (joint, quantity) that some move leaves unlimited in at least one direction.
+        unchecked: (joint, quantity) that some move leaves unlimited in at least one direction; an effort only
+            where the tool carries something.
         unchecked_of_tool: Limits of the tool that are stated and cannot be judged in some move: of an arm
             without geometry, and of the jerk in joint space.
         sampled: Moves along a path: the distance from it and the branch are judged on rows alone, which is no
@@ -274,12 +275,20 @@ def _unchecked(trajectory: Trajectory, limits_by_move: Sequence[Limits]) -> tupl
         [np.isinf(limits.of_order(order)).any(axis=1) for limits in limits_by_move]
         for order in range(len(QUANTITIES))
     ]
-    unlimited = np.any(open_ended, axis=1)
+    loaded = [
+        np.isinf(limits.effort).any(axis=1)
+        for limits, span in zip(limits_by_move, trajectory.spans, strict=True)
+        if span.payload is not None and span.duration > 0
+    ]
+    unlimited = [
+        *np.any(open_ended, axis=1),
+        np.any(loaded or np.zeros((1, len(trajectory.joint_names))), axis=0),
+    ]
     return tuple(
         (name, quantity)
         for joint, name in enumerate(trajectory.joint_names)
-        for order, quantity in enumerate(QUANTITIES)
-        if unlimited[order, joint]
+        for quantity, of_joints in zip((*QUANTITIES, "effort"), unlimited, strict=True)
+        if of_joints[joint]
     )
 
 

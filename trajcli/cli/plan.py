@@ -295,9 +295,8 @@ def summary(plan: Plan, rows: int) -> str:
     tightest = _tightest(plan)
     if tightest:
         lines.append(f"  tightest limit: {tightest}")
-    unchecked = _unchecked(plan)
-    if unchecked:
-        lines.append(f"  without a limit, not checked: {unchecked}")
+    if plan.unchecked:
+        lines.append(f"  without a limit, not checked: {plan.unchecked}")
     if plan.verdict.unchecked_of_tool:
         names = ", ".join(name.replace("_", " ") for name in plan.verdict.unchecked_of_tool)
         lines.append(f"  limited, but not checked in every move: {names} of the tool")
@@ -382,15 +381,3 @@ def _tool_in_joint_space(move: PlannedMove, peaks: Mapping[str, ToolPeak]) -> tu
     limits = move.robot.limits.tcp
     used, name = max((peak.value / getattr(limits, name), name) for name, peak in peaks.items())
     return used, name.replace("_", " ")
-
-
-def _unchecked(plan: Plan) -> str:
-    every = set(plan.trajectory.joint_names)
-    parts = []
-    for quantity in QUANTITIES:
-        joints = [joint for joint, what in plan.verdict.unchecked if what == quantity]
-        if set(joints) == every:
-            parts.append(quantity)
-        elif joints:
-            parts.append(f"{quantity} of {', '.join(joints)}")
-    return ", ".join(parts)

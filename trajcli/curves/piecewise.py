@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 Side = Literal["left", "right"]
 
 _BLOCK = 4096  # rows evaluated at a time: their monomials and results stay in the processor's cache
+_BORDER_UNITS = 4.0  # in the last place: a time so near to the border is on it, at any magnitude
 _FEW = 8  # rows a piece below which gathering coefficients beats a product for each piece
 
 
@@ -118,7 +119,7 @@ class PiecewisePolynomial:
         """Return the derivative of the given order at `t`, shape (*t.shape, n).
 
         Args:
-            t: Any shape, inside [start, end].
+            t: Any shape, inside [start, end] but for rounding.
             order: 0 for the value.
             side: Which of two neighbouring pieces speaks at a break.
 
@@ -141,7 +142,7 @@ class PiecewisePolynomial:
             ValueError: When a time lies outside the curve.
         """
         if t.size and not (t.min() >= self.start and t.max() <= self.end):  # so written, NaN is outside too
-            raise ValueError(f"time outside the curve's domain [{self.start!r}, {self.end!r}]")
+            t = self._at_border(t)
         piece = _piece_of(self.breaks, t, side)
         first, last = (int(piece.min()), int(piece.max())) if t.size else (0, 0)
         spoken = self.coefficients[:, first : last + 1]  # a time on a long curve costs no look at all pieces
@@ -153,6 +154,13 @@ class PiecewisePolynomial:
             block = slice(low, min(low + _BLOCK, t.size))
             _evaluate_block(breaks, table, t[block], piece[block], rows[block])
         return rows.reshape(t.size, len(orders), self.dimension)
+
+    def _at_border(self, t: Array) -> Array:
+        """Return times with those on the border that only rounding has beside it."""
+        inside = np.clip(t, self.start, self.end)
+        if not (np.abs(t - inside) <= _BORDER_UNITS * np.spacing(max(-self.start, self.end))).all():
+            raise ValueError(f"time outside the curve's domain [{self.start!r}, {self.end!r}]")
+        return inside
 
     def shifted(self, offset: float) -> PiecewisePolynomial:
         """Return the same curve starting `offset` later."""

@@ -201,8 +201,8 @@ def _load(document: Document) -> LoadedJob:
     except InputError as error:
         raise error.said_by(str).located(place=document.place(("limits", "position"))) from None
     name = job.name or ("stdin" if document.file in ("-", "<stdin>") else utf8(Path(document.file).stem))
-    if sheet is not None and sheet.concession is not None:
-        events = [Event("angles_snapped", sheet.concession), *events]
+    if sheet is not None:
+        events = [*(Event(kind, message) for kind, message in sheet.concessions), *events]
     source = "the job" if sheet is None else sheet.source or _named_source(plain["robot"])
     loaded = LoadedJob(job, name, effective, document, (*noted, *events), source, context.has_far_angle)
     flaws = [

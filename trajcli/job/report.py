@@ -298,10 +298,10 @@ class StepReport(ReportPart):
 
 
 class UncheckedReport(ReportPart):
-    """A quantity that is not checked because it has no limit."""
+    """A quantity that is not checked because it has no limit; efforts are named where a load is carried."""
 
     joint: str
-    quantity: JointQuantity
+    quantity: JointQuantity | Literal["effort"]
 
 
 class UncheckedToolReport(ReportPart):
@@ -360,5 +360,5 @@ class Report(ReportPart):
     ] = None
     knots: Annotated[
         KnotsReport | None,
-        Field(description="Of /joint_trajectory and of ROS goals; null where a limit is broken."),
+        Field(description="Of /joint_trajectory; null where a limit is broken, or the motion lasts months."),
     ] = None

@@ -235,7 +235,7 @@ class RobotSheet:
         maker: Who builds the robot.
         origin: Whether it is built (real) or stands in a text (textbook).
         date: When the source was read.
-        concession: What was given up in reading it, for an event; None where nothing was.
+        concessions: What was taken for granted in reading it, as events: kind and message.
     """
 
     robot: Robot
@@ -247,7 +247,7 @@ class RobotSheet:
     maker: str | None = None
     origin: str | None = None
     date: str | None = None
-    concession: str | None = None
+    concessions: tuple[tuple[str, str], ...] = ()
 
 
 def catalogue_names() -> list[str]:
@@ -375,7 +375,9 @@ def _robot_of_urdf(
 def urdf_sheet(path: str, read: UrdfRobot) -> RobotSheet:
     """Return the sheet of a robot that was read from a URDF."""
     note = "; ".join(read.remarks)
-    return RobotSheet(read.robot, Units(), utf8(Path(path).name), None, note, None, concession=read.snapping)
+    events = {"root_chosen": read.choice, "angles_snapped": read.snapping}
+    conceded = tuple((kind, message) for kind, message in events.items() if message is not None)
+    return RobotSheet(read.robot, Units(), utf8(Path(path).name), None, note, None, concessions=conceded)
 
 
 def read_sheet(path: str) -> RobotSheet:

@@ -12,10 +12,10 @@ from trajcli.errors import Amount
 from trajcli.findings import Certainty, Collector, Finding, at_time
 from trajcli.judge.intervals import Intervals
 from trajcli.judge.rounding import stated_errors
-from trajcli.kinematics.dexterity import characteristic_length
+from trajcli.kinematics.dexterity import changes_of_sign, characteristic_length
 from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.kinematics.following.tool_path import ToolPath
-from trajcli.kinematics.inverse.target import residual_jacobian, residuals
+from trajcli.kinematics.inverse.target import determinants, residuals
 from trajcli.kinematics.jacobian import linearisation
 from trajcli.kinematics.robot import Robot
 from trajcli.limits.tolerances import exceeds
@@ -76,10 +76,9 @@ class RecordedPath:
             ("position", "orientation"), sizes, (tolerance.position, tolerance.angle), strict=True
         ):
             self._add(quantity, size, limit, t, numbers, room)
-        slopes = residual_jacobian(target, poses, jacobians)
-        if slopes.shape[1] == slopes.shape[2] and target.orientation != "direction":
-            slopes[:, :split] /= self._arm
-            self._watch_branch(np.sign(np.linalg.det(slopes)), t, numbers)
+        known = determinants(target, poses, jacobians, self._arm)
+        if known is not None:
+            self._watch_branch(np.sign(known), t, numbers)
 
     def _nearest(self, poses: Array) -> Array:
         """Return the values of s (N,) at which the path is nearest to the tool."""
@@ -161,8 +160,8 @@ class RecordedPath:
     def _watch_branch(self, signs: Array, t: Array, numbers: NDArray[np.int64]) -> None:
         """Note where the determinant of the rows that the path fixes changes its sign."""
         signs = np.append(self._sign, signs)
-        changes = np.flatnonzero(signs[1:] * signs[:-1] < 0)
-        self._sign = float(signs[-1])
+        changes = changes_of_sign(signs) - 1
+        self._sign = float(signs[signs != 0.0][-1]) if signs.any() else 0.0
         if not changes.size:
             return
 

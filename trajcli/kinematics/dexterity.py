@@ -97,6 +97,16 @@ def characteristic_length(robot: Robot) -> float:
     return total if total > 0.0 else 1.0
 
 
+def changes_of_sign(determinants: Array) -> NDArray[np.intp]:
+    """Return the indices from which on determinants (N,) have the other sign than before, shape (k,).
+
+    Zeros have none: the sign before them counts.
+    """
+    known = np.flatnonzero(determinants)
+    signs = np.sign(determinants[known])
+    return np.asarray(known[1:][signs[1:] != signs[:-1]])
+
+
 def _scaled(plain: Array, length: float) -> Array:
     scaled: Array = plain / np.array([length, length, length, 1.0, 1.0, 1.0])[:, None]
     return scaled

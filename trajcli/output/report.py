@@ -37,7 +37,7 @@ from trajcli.job.report import (
     WaypointReport,
 )
 from trajcli.kinematics.robot import QUANTITIES, Robot
-from trajcli.knots import Knots, knots_of
+from trajcli.knots import Knots, has_knots, knots_of
 from trajcli.output.efforts import effort_reports, efforts_report, most_used, payload_report
 from trajcli.output.sensitivity import at_limit_of
 from trajcli.planners.planner import PlannedMove
@@ -69,6 +69,8 @@ def report_of(
         knots: Those of its trajectory, where they are known.
     """
     verdict = plan.verdict
+    if knots is None and verdict.passed and has_knots(plan.trajectory):
+        knots = knots_of(plan.trajectory)
     moves = tuple(
         _move(plan, index, reference=reference or peers, peers=peers) for index in range(len(plan.moves))
     )
@@ -91,7 +93,7 @@ def report_of(
         unchecked=[UncheckedReport(joint=joint, quantity=quantity) for joint, quantity in verdict.unchecked],
         efforts=efforts_report(plan),
         unchecked_of_tool=[UncheckedToolReport(quantity=name) for name in verdict.unchecked_of_tool],
-        knots=_knots(plan.trajectory, knots or knots_of(plan.trajectory)) if verdict.passed else None,
+        knots=None if knots is None else _knots(plan.trajectory, knots),
     )
 
 

@@ -67,6 +67,24 @@ class Plan:
         of_what = f"{self.loaded.name!r}, {self.loaded.robot.name}, {of_moves}"
         return f"{type(self).__name__}({of_what}, {duration:g} s, {self.verdict.text})"
 
+    @property
+    def unchecked(self) -> str:
+        """What has no limit and is not checked, in words; beside efforts what is carried."""
+        joints: dict[str, list[str]] = {}
+        for joint, quantity in self.verdict.unchecked:
+            joints.setdefault(quantity, []).append(joint)
+        count = len(self.trajectory.joint_names)
+        parts = {
+            quantity: quantity if len(some) == count else f"{quantity} of {', '.join(some)}"
+            for quantity, some in sorted(
+                joints.items(), key=lambda item: (*QUANTITIES, "effort").index(item[0])
+            )
+        }
+        if "effort" in parts:
+            heaviest = max(span.payload.mass for span in self.trajectory.spans if span.payload is not None)
+            parts["effort"] += f" with {heaviest:g} kg carried"
+        return ", ".join(parts.values())
+
 
 def plan_job(loaded: LoadedJob, carried: Carried | None = None, *, advise: bool = True) -> Plan:
     """Return the plan of a job, with its verdict: a verdict with findings is no error here.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -224,17 +224,9 @@ def _step(plan: Plan, index: int) -> dict[str, Any]:
 
 def _notes(plan: Plan) -> Iterator[str]:
     """Yield what was not judged."""
-    verdict, every = plan.verdict, set(plan.trajectory.joint_names)
-    unlimited: Mapping[str, set[str]] = {
-        quantity: {joint for joint, what in verdict.unchecked if what == quantity} for quantity in QUANTITIES
-    }
-    parts = [
-        quantity if joints == every else f"{quantity} of {', '.join(sorted(joints))}"
-        for quantity, joints in unlimited.items()
-        if joints
-    ]
-    if parts:
-        yield f"Without a limit, not checked: {', '.join(parts)}."
+    verdict = plan.verdict
+    if plan.unchecked:
+        yield f"Without a limit, not checked: {plan.unchecked}."
     if verdict.unchecked_of_tool:
         names = ", ".join(name.replace("_", " ") for name in verdict.unchecked_of_tool)
         yield f"Limited, but not checked in every move: {names} of the tool."

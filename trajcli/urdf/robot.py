@@ -64,6 +64,7 @@ class UrdfRobot:
         root: Name of the link where the chain begins.
         tip: Name of the link where it ends: the tcp.
         other_tips: Links in which the tree ends too.
+        other_roots: Where further trees of the file begin, of which nobody said which one is meant.
         snapped: Angles that were taken as whole numbers of right angles.
         notes: What was taken as unknown, left out, or is not taken over.
     """
@@ -72,6 +73,7 @@ class UrdfRobot:
     root: str
     tip: str
     other_tips: tuple[str, ...]
+    other_roots: tuple[str, ...]
     snapped: tuple[SnappedAngle, ...]
     notes: tuple[str, ...]
 
@@ -89,13 +91,21 @@ class UrdfRobot:
     def remarks(self) -> tuple[str, ...]:
         """What a user should know about the numbers, one sentence each."""
         ends = f"; the tree also ends in {', '.join(self.other_tips)}" if self.other_tips else ""
-        snapping = filter(None, [self.snapping])
         return (
             f"from link {self.root} to link {self.tip}{ends}",
-            *snapping,
+            *filter(None, [self.choice, self.snapping]),
             *map(str, self.snapped),
             *self.notes,
         )
+
+    @property
+    def choice(self) -> str | None:
+        """One sentence on the trees that were passed over; None where there are none."""
+        if not self.other_roots:
+            return None
+        count, others = 1 + len(self.other_roots), ", ".join(self.other_roots)
+        chosen = f"the file has {count} trees of links, and the arm is that of root '{self.root}'"
+        return f"{chosen}; the others begin at {others}: `root` or `tip` names one"
 
     @property
     def snapping(self) -> str | None:
@@ -147,7 +157,7 @@ def robot_of_urdf(
     inertias = _inertias(document, path, origins, table, notes)
     robot = _robot(document, moving, table, properties, inertias)
     snapped = () if exact else tuple(_snapped(document, path, origins, properties))
-    return UrdfRobot(robot, path.root, path.tip, path.other_tips, snapped, tuple(notes))
+    return UrdfRobot(robot, path.root, path.tip, path.other_tips, path.other_roots, snapped, tuple(notes))
 
 
 def _angles(document: UrdfDocument, joint: JointElement) -> tuple[Array, Array]:

@@ -1,9 +1,9 @@
 """Kinematic tree of a URDF: the serial chain from a root to a tip, and its choice where no names are given.
 
 Without a tip the chain with the most joints is taken that ends before the gripper. A joint belongs to a
-gripper when it mimics another or is mimicked, or when its name says so and at most three more joints follow.
-Behind the last joint that is left the tip is the link whose name speaks of a tool, else the one behind most
-fixed joints.
+gripper when at most three more joints follow, and its name says so, or it mimics a joint of another branch or
+is mimicked there. A file of nothing but a gripper is taken as an arm. Behind the last joint that is left the
+tip is the link whose name speaks of a tool, else the one behind most fixed joints.
 """
 
 from __future__ import annotations
@@ -39,12 +39,14 @@ class SerialPath:
         tip: Name of the last link.
         joints: From the root on.
         other_tips: Links without children, behind a moving joint; without the tip, in the file's order.
+        other_roots: Where further trees with joints that move begin; empty where root or tip was named.
     """
 
     root: str
     tip: str
     joints: tuple[JointElement, ...]
     other_tips: tuple[str, ...]
+    other_roots: tuple[str, ...] = ()
 
 
 def serial_path(document: UrdfDocument, root: str | None = None, tip: str | None = None) -> SerialPath:
@@ -81,7 +83,10 @@ def serial_path(document: UrdfDocument, root: str | None = None, tip: str | None
         raise InputError(
             Problem(f"the chain {ends} has {some}", f"{hint}; {listed}" if listed else hint, _top(document))
         )
-    return SerialPath(first, last, joints, tuple(tree.tips(first, last)))
+    others = (
+        () if root or tip else (start for start in tree.roots() if start != first and tree.tips(start, ""))
+    )
+    return SerialPath(first, last, joints, tuple(tree.tips(first, last)), tuple(others))
 
 
 def _top(document: UrdfDocument) -> Place:
@@ -120,7 +125,12 @@ class _Tree:
         for joint in document.joints.values():
             self._below[joint.parent].append(joint)
         self._order = {link: number for number, link in enumerate(document.links)}
-        self._mimicked = {joint.mimics for joint in document.joints.values()}
+        self._coupled = set[str | None]()  # joints that move with one of another branch
+        for joint in document.joints.values():
+            if joint.mimics is not None and joint.mimics not in [
+                j.name for j in self.up_to(joint.parent, None)
+            ]:
+                self._coupled |= {joint.name, joint.mimics}
 
     def up_to(self, tip: str, root: str | None) -> list[JointElement]:
         """Return the joints from the root to the tip; without a root from the outermost link on."""
@@ -139,7 +149,7 @@ class _Tree:
 
     def tips(self, root: str | None, tip: str) -> list[str]:
         """Return the links without children, but for the tip, that are behind a moving joint."""
-        starts = self._roots() if root is None else [root]
+        starts = self.roots() if root is None else [root]
         ends = [
             link
             for start in starts
@@ -150,10 +160,13 @@ class _Tree:
 
     def chosen_tip(self, root: str | None) -> str:
         """Return the end of the longest chain without a gripper."""
-        starts = self._roots() if root is None else [root]
-        ends = [end for start in starts for end in self._behind(start, whole=False)]
-        most = max((moving for _, moving, _ in ends), default=0)
-        if most == 0:
+        starts = self.roots() if root is None else [root]
+        for whole in (False, True):
+            ends = [end for start in starts for end in self._behind(start, whole=whole)]
+            most = max((moving for _, moving, _ in ends), default=0)
+            if most:
+                break
+        else:
             message = "the robot has no joint that moves" + (f" behind link '{root}'" if root else "")
             raise InputError(
                 Problem(message, "trajcli needs 1 to 12 revolute or prismatic joints", _top(self._document))
@@ -161,10 +174,11 @@ class _Tree:
         # of several arms the one that the file has first; then the best link behind its last joint
         longest = [(link, fixed) for link, moving, fixed in ends if moving == most]
         first = min((link for link, fixed in longest if fixed == 0), key=self._order.__getitem__)
-        rigid = {link: fixed for link, moving, fixed in self._behind(first, whole=False) if moving == 0}
+        rigid = {link: fixed for link, moving, fixed in self._behind(first, whole=whole) if moving == 0}
         return min(rigid, key=lambda link: (_tool_rank(link), -rigid[link], self._order[link]))
 
-    def _roots(self) -> list[str]:
+    def roots(self) -> list[str]:
+        """Return the links that are no joint's child, in the file's order."""
         starts = [link for link in self._document.links if link not in self._above]
         if not starts:
             message = "every link is the child of a joint: they go in a circle"
@@ -188,10 +202,8 @@ class _Tree:
                     links.append((joint.child, moving + joint.moves, fixed + 1 if stays else 0))
 
     def _is_finger(self, joint: JointElement) -> bool:
-        if joint.mimics is not None or joint.name in self._mimicked:
-            return True
         named = _FINGER.search(joint.name) and not _WRIST.search(joint.name) and joint.type != "fixed"
-        return bool(named) and self._depth(joint) <= _FINGER_JOINTS
+        return bool(named or joint.name in self._coupled) and self._depth(joint) <= _FINGER_JOINTS
 
     def _depth(self, joint: JointElement) -> int:
         """Return the most joints that move from a joint, which counts, to any link behind it."""

@@ -19,7 +19,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import comparable, frozen
 from trajcli.grids import Grid, ListedGrid, UniformGrid
-from trajcli.knots import knot_grid, knots_of
+from trajcli.knots import has_knots, knot_grid, knots_of
 from trajcli.planning.plan import Plan
 from trajcli.samples import sample
 from trajcli.streams.byte_source import ByteSource
@@ -207,10 +207,11 @@ def _grids(plan: Plan, stamps: _Stamps) -> Iterator[Grid]:
         asked = ListedGrid(duration, np.array(output.times), output.start_time)
     found: list[Grid] = [] if asked is None else [asked]
     found += [UniformGrid(duration, rate, stamps.first) for rate in _rates(plan, stamps)]
-    knots = knots_of(plan.trajectory)
-    found.append(knot_grid(plan.trajectory, knots, None, stamps.first))
-    if stamps.count > knots.times.size:
-        found.append(knot_grid(plan.trajectory, knots, output.rate, stamps.first))
+    if has_knots(plan.trajectory):
+        knots = knots_of(plan.trajectory)
+        found.append(knot_grid(plan.trajectory, knots, None, stamps.first))
+        if stamps.count > knots.times.size:
+            found.append(knot_grid(plan.trajectory, knots, output.rate, stamps.first))
     for grid in found:
         if grid.count == stamps.count:
             yield grid

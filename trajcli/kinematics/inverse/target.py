@@ -19,6 +19,7 @@ from trajcli.geometry.rotation import AXES, AxisName, exp, log
 
 OrientationConstraint = Literal["all", "direction", "yaw", "pitch", "none"]
 _WHOLE = (True, True, True)
+_UNCHANGED = 1e-12  # by a turn of any joint, relative to the arm: rounding
 _ALMOST_UPRIGHT = 1e-12  # of a unit vector: the heading of a vertical direction is not defined
 
 
@@ -165,6 +166,26 @@ def residual_jacobian(target: IkTarget, poses: Array, jacobians: Array) -> Array
         case _:
             return np.asarray(linear)
     return np.concatenate([linear, turning], axis=1)
+
+
+def determinants(target: IkTarget, poses: Array, jacobians: Array, length: float) -> Array | None:
+    """Return the determinants of what the joints do to the coordinates that a target fixes, shape (K,).
+
+    Their sign tells branches apart. None where these are not as many as the joints; those that no joint ever
+    changes, as the height of a planar arm, are not counted.
+
+    Args:
+        target: Which coordinates.
+        poses: Of the tcp, (K, 4, 4).
+        jacobians: In world, (K, 6, n).
+        length: By which positions are divided, m.
+    """
+    if target.orientation == "direction":
+        return None
+    slopes = residual_jacobian(target, poses, jacobians)
+    slopes[:, : sum(target.position)] /= length
+    slopes = slopes[:, np.abs(slopes).max(axis=(0, 2), initial=0.0) > _UNCHANGED]
+    return np.asarray(np.linalg.det(slopes)) if slopes.shape[1] == slopes.shape[2] else None
 
 
 def closure_of(target: IkTarget, poses: Array) -> Array:
