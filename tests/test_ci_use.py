@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
+from yaml_files import read_yaml
 
 ROOT = Path(__file__).parents[1]
 PATH = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
@@ -46,7 +46,7 @@ def run(command: list[str], **environment: str) -> subprocess.CompletedProcess[s
 
 
 def hook() -> dict[str, Any]:
-    (entry,) = yaml.safe_load((ROOT / ".pre-commit-hooks.yaml").read_text())
+    (entry,) = read_yaml(ROOT / ".pre-commit-hooks.yaml")
     return dict(entry)
 
 
@@ -78,7 +78,7 @@ def test_the_hook_takes_no_other_yaml(name: str, taken: bool) -> None:
 
 
 def action() -> dict[str, Any]:
-    return dict(yaml.safe_load((ROOT / "action.yml").read_text()))
+    return dict(read_yaml(ROOT / "action.yml"))
 
 
 def step(name: str, **inputs: str) -> subprocess.CompletedProcess[str]:

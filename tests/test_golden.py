@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from golden.regenerate import EXAMPLES, GOLDEN, golden_file, rows_of
+from planned_examples import planned_example
 
 from trajcli.comparison.difference import compare
 from trajcli.curves import piecewise
@@ -25,7 +26,7 @@ def test_there_is_one_golden_file_for_each_example() -> None:
 @pytest.mark.parametrize("example", PATHS, ids=IDS)
 def test_rows_are_the_golden_ones(example: Path, tmp_path: Path) -> None:
     now = tmp_path / "now.csv"
-    now.write_bytes(rows_of(example))
+    now.write_bytes(rows_of(planned_example(example.stem)))
     difference = compare(read_csv(str(now)), read_csv(str(golden_file(example))), {}, {})
     assert difference.equal, difference.first
     assert now.read_bytes() == golden_file(example).read_bytes()
@@ -67,5 +68,5 @@ def test_the_order_of_evaluation_does_not_show(
         order(*arguments)
 
     monkeypatch.setattr(piecewise, "_evaluate_block", evaluate)
-    assert rows_of(example) == golden_file(example).read_bytes()
+    assert rows_of(planned_example(example.stem)) == golden_file(example).read_bytes()
     assert sum(calls) >= golden_file(example).read_bytes().count(b"\n") - 1

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 import typer
-import yaml
 from running import Outcome
+from yaml_files import read_yaml
 
 from trajcli.cli.arm_commands import ARM_COMMANDS
 from trajcli.cli.command import register
@@ -48,7 +48,7 @@ class Arms:
 
 @cache
 def cases(file: str) -> dict[str, dict[str, Any]]:
-    rows = yaml.safe_load((ORACLES / file).read_text(encoding="utf-8"))["cases"]
+    rows = read_yaml(ORACLES / file)["cases"]
     return {row["id"]: row for row in rows}
 
 

@@ -11,14 +11,13 @@ import pytest
 import yaml
 from arm_calls import ORACLES, Arms
 from scipy.spatial.transform import Rotation
+from yaml_files import read_yaml
 
 from trajcli.job.robot import load_robot, load_sheet
 from trajcli.kinematics.forward import forward
 from trajcli.streams.table import read_csv
 
-CASES = {
-    case["id"]: case for case in yaml.safe_load((ORACLES / "calibration.yaml").read_text("utf-8"))["cases"]
-}
+CASES = {case["id"]: case for case in read_yaml(ORACLES / "calibration.yaml")["cases"]}
 PLANAR = CASES["A-2.4-cal2R"]
 SPATIAL = CASES["A-2.4-cal3R"]
 DH = ",".join(f"j{i}.{name}" for i in (1, 2, 3) for name in ("theta", "d", "a", "alpha"))

@@ -8,16 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 from jsonschema import Draft202012Validator
 from numpy.polynomial import Polynomial
 from running import EXAMPLES, ROOT, call
+from yaml_files import read_yaml
 
 Capture = pytest.CaptureFixture[str]
 CASES = [
-    case
-    for name in ("splines", "blends")
-    for case in yaml.safe_load((ROOT / f"tests/oracles/{name}.yaml").read_text(encoding="utf-8"))["cases"]
+    case for name in ("splines", "blends") for case in read_yaml(ROOT / f"tests/oracles/{name}.yaml")["cases"]
 ]
 
 

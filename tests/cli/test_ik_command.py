@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 from arm_calls import ORACLES, Arms, robot_file
+from yaml_files import read_yaml
 
-INVERSE = yaml.safe_load((ORACLES / "inverse.yaml").read_text("utf-8"))
-ARMS = {row["id"]: row for row in yaml.safe_load((ORACLES / "robots.yaml").read_text("utf-8"))["robots"]}
+INVERSE = read_yaml(ORACLES / "inverse.yaml")
+ARMS = {row["id"]: row for row in read_yaml(ORACLES / "robots.yaml")["robots"]}
 EXAMPLES = {case["id"]: case for case in INVERSE["cases"] if case["kind"] == "ik_set"}
 BRANCHES = {case["id"]: case for case in INVERSE["branches"]}
 HOME = ("0", "-90", "90", "0", "90", "0")

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
-import yaml
 from arm_calls import ORACLES, Arms
+from yaml_files import read_yaml
 
-CASES = yaml.safe_load((ORACLES / "mobility.yaml").read_text("utf-8"))["cases"]
+CASES = read_yaml(ORACLES / "mobility.yaml")["cases"]
 
 
 @pytest.fixture

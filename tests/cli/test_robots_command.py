@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 from arm_calls import Arms
+from yaml_files import read_yaml
 
 from trajcli.job.robot import CATALOGUE, catalogue_names, load_robot
 from trajcli.kinematics.forward import forward
@@ -39,7 +39,7 @@ def test_the_list_says_the_units_of_each_file(arms):
     head, *lines = out.splitlines()
     start, end = head.index("units"), head.index("origin")
     for row, line in zip(arms.json("robots"), lines, strict=True):
-        units = yaml.safe_load((CATALOGUE / f"{row['name']}.yaml").read_text("utf-8"))["units"]
+        units = read_yaml(CATALOGUE / f"{row['name']}.yaml")["units"]
         assert line[start:end].strip() == f"{units['angle']}, {units['length']}"
         assert line[start - 2 : start] == line[end - 2 : end] == "  "
         assert row["units"] == units

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
+from yaml_files import read_yaml
 
 from trajcli.errors import InputError
 from trajcli.geometry.euler import euler_from_matrix, matrix_from_euler, rpy_from_matrix
@@ -22,7 +22,7 @@ from trajcli.geometry.rotation import (
 )
 
 FILE = Path(__file__).parents[1] / "oracles" / "rotations.yaml"
-CASES = yaml.safe_load(FILE.read_text(encoding="utf-8"))["cases"]
+CASES = read_yaml(FILE)["cases"]
 
 
 def of(*kinds):

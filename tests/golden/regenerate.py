@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import io
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from trajcli.planning.plan import Plan
 
 GOLDEN = Path(__file__).parent
 EXAMPLES = GOLDEN.parent.parent / "examples"
@@ -14,19 +18,16 @@ def golden_file(example: Path) -> Path:
     return GOLDEN / f"{example.stem}.csv"
 
 
-def rows_of(example: Path) -> bytes:
-    """Return what `trajcli plan EXAMPLE` writes to standard output."""
+def rows_of(plan: Plan) -> bytes:
+    """Return what `trajcli plan` writes to standard output of a job so planned."""
     from trajcli.columns import columns_of
-    from trajcli.job.read import load_job
     from trajcli.output.write import grid_of
-    from trajcli.planning.plan import plan_job
     from trajcli.samples import sample
     from trajcli.streams.csv import write_csv
 
-    loaded = load_job(example)
-    plan = plan_job(loaded)
+    loaded = plan.loaded
     if not plan.verdict.passed:
-        raise SystemExit(f"{example} does not verify: {plan.verdict.findings}")
+        raise SystemExit(f"{loaded.name} does not verify: {plan.verdict.findings}")
     groups = loaded.job.output.columns
     out = io.BytesIO()
     columns = columns_of(groups, loaded.robot.joint_types, loaded.units)
@@ -37,10 +38,13 @@ def rows_of(example: Path) -> bytes:
 
 def main() -> None:
     """Write one golden file for each example, and remove those of examples that are gone."""
+    from trajcli.job.read import load_job
+    from trajcli.planning.plan import plan_job
+
     written = set()
     for example in sorted(EXAMPLES.glob("*.yaml")):
         target = golden_file(example)
-        text = rows_of(example)
+        text = rows_of(plan_job(load_job(example)))
         written.add(target)
         if not target.exists() or target.read_bytes() != text:
             target.write_bytes(text)

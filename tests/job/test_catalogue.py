@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
+from yaml_files import read_yaml
 
 from trajcli.errors import FileError, InputError
 from trajcli.job.robot import CATALOGUE, catalogue_names, load_robot
@@ -58,16 +58,14 @@ BOOK = {*EXAMPLES, *SOLVED}
 
 @cache
 def oracle(file: str, key: str, name: str) -> dict[str, Any]:
-    rows = yaml.safe_load((ORACLES / file).read_text(encoding="utf-8"))[key]
+    rows = read_yaml(ORACLES / file)[key]
     found: dict[str, Any] = next(row for row in rows if row["id"] == ARMS[name])
     return found
 
 
 @cache
 def checks() -> list[dict[str, Any]]:
-    rows: list[dict[str, Any]] = yaml.safe_load((ORACLES / "catalogue_poses.yaml").read_text("utf-8"))[
-        "checks"
-    ]
+    rows: list[dict[str, Any]] = read_yaml(ORACLES / "catalogue_poses.yaml")["checks"]
     return rows
 
 
@@ -131,7 +129,7 @@ def test_poses(name: str) -> None:
 
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_poses_of_the_lecture_notes(name: str) -> None:
-    cases = yaml.safe_load((ORACLES / "forward.yaml").read_text(encoding="utf-8"))["cases"]
+    cases = read_yaml(ORACLES / "forward.yaml")["cases"]
     found = [case for case in cases if case["id"] in EXAMPLES[name]]
     assert len(found) == len(EXAMPLES[name])
     robot = load_robot(name)
@@ -153,7 +151,7 @@ def test_limits_of_the_lecture_notes(name: str) -> None:
 
 @pytest.mark.parametrize("name", SOLVED)
 def test_dimensions_of_the_exercises(name: str) -> None:
-    cases = yaml.safe_load((ORACLES / "inverse.yaml").read_text(encoding="utf-8"))["cases"]
+    cases = read_yaml(ORACLES / "inverse.yaml")["cases"]
     case = next(case for case in cases if case["id"] == SOLVED[name])
     for joint, row in zip(load_robot(name).joints, case["inputs"]["dh"], strict=True):
         values = [joint.theta, joint.d, joint.a, joint.alpha]
@@ -182,7 +180,7 @@ def test_joint_names_of_the_ur5e_are_those_of_its_description() -> None:
 
 @pytest.mark.parametrize("name", [*REAL, *sorted(BOOK)])
 def test_sources_are_named(name: str) -> None:
-    plain = yaml.safe_load((CATALOGUE / f"{name}.yaml").read_text(encoding="utf-8"))
+    plain = read_yaml(CATALOGUE / f"{name}.yaml")
     assert plain["source"]
     assert plain["licence"]
     assert plain["note"]

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
+from yaml_files import read_yaml
 
 from trajcli.dynamics.newton_euler import InverseDynamics
 from trajcli.job.robot import catalogue_names, load_robot, load_sheet
@@ -25,7 +25,7 @@ HEAVY = [name for name in catalogue_names() if not load_robot(name).without_iner
 @cache
 def cases() -> list[dict[str, Any]]:
     file = Path(__file__).parents[1] / "oracles" / "catalogue_efforts.yaml"
-    found: list[dict[str, Any]] = yaml.safe_load(file.read_text(encoding="utf-8"))["cases"]
+    found: list[dict[str, Any]] = read_yaml(file)["cases"]
     return found
 
 

@@ -6,9 +6,9 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-import yaml
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
+from yaml_files import read_yaml
 
 from trajcli.kinematics.robot import Joint, Robot, unlimited
 
@@ -18,7 +18,7 @@ TYPES = {"R": "revolute", "P": "prismatic"}
 
 @cache
 def load(name, key):
-    return yaml.safe_load((ORACLES / name).read_text(encoding="utf-8"))[key]
+    return read_yaml(ORACLES / name)[key]
 
 
 def robots():

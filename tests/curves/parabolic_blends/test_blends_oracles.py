@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 from blend_cases import chords
+from yaml_files import read_yaml
 
 from trajcli.curves.parabolic_blends.blends import blended, blended_by_acceleration
 
 ORACLES = Path(__file__).parents[2] / "oracles" / "blends.yaml"
-CASES = yaml.safe_load(ORACLES.read_text(encoding="utf-8"))["cases"]
+CASES = read_yaml(ORACLES)["cases"]
 
 
 def of_kind(kind):

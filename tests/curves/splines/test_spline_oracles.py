@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 from numpy.polynomial import Polynomial
+from yaml_files import read_yaml
 
 from trajcli.curves.splines.cubic import clamped
 from trajcli.curves.splines.hermite import (
@@ -20,8 +20,8 @@ from trajcli.curves.splines.hermite import (
 from trajcli.curves.splines.virtual_points import continuous_acceleration, virtual_points
 
 FOLDER = Path(__file__).parents[2] / "oracles"
-CASES = yaml.safe_load((FOLDER / "splines.yaml").read_text(encoding="utf-8"))["cases"]
-MOVES = yaml.safe_load((FOLDER / "point_to_point.yaml").read_text(encoding="utf-8"))["cases"]
+CASES = read_yaml(FOLDER / "splines.yaml")["cases"]
+MOVES = read_yaml(FOLDER / "point_to_point.yaml")["cases"]
 
 
 def of(kind, cases=CASES):

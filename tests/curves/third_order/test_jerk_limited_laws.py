@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 from jerk_paths import PANDA, both, copp_problem, judged, polyline, spline
+from yaml_files import read_yaml
 
 from trajcli.curves.operations import reverse
 from trajcli.curves.piecewise import PiecewisePolynomial
@@ -60,7 +60,7 @@ def test_a_line_of_seven_joints_between_motions(factor, start, end):
 
 @pytest.mark.parametrize("number", range(3))
 def test_splines_whose_best_durations_are_known(number):
-    known = yaml.safe_load(ORACLES.read_text())[number]
+    known = read_yaml(ORACLES)[number]
     path = spline(known["parameter"], np.array(known["points"]))
     duration = judged(path, both(PANDA[0]), both(PANDA[1]), both(0.02 * PANDA[2])).law.duration
     assert duration <= 1.001 * known["best"]

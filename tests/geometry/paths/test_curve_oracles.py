@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
+from yaml_files import read_yaml
 
 from trajcli.geometry.paths.arc import Arc
 from trajcli.geometry.paths.chain import join
@@ -20,7 +20,7 @@ from trajcli.geometry.paths.pose import PoseCurve
 from trajcli.geometry.paths.position import SAME_POINT, Line, Pivot
 
 FILE = Path(__file__).parents[2] / "oracles" / "operational.yaml"
-CASES = yaml.safe_load(FILE.read_text(encoding="utf-8"))["cases"]
+CASES = read_yaml(FILE)["cases"]
 
 
 def of(*kinds):

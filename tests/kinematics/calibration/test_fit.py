@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 from arms import arm, configurations, measured, true_changes, without_rows
 from oracle_robots import ORACLES
 from product_of_rows import pose_of
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
+from yaml_files import read_yaml
 
 from trajcli.kinematics.calibration.fit import Options, calibrate
 from trajcli.kinematics.calibration.measurements import MeasuredKind, Measurements
@@ -22,7 +22,7 @@ from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.target import partial_target, pose_target
 from trajcli.kinematics.robot import Joint, Robot, unlimited
 
-CASES = {case["id"]: case for case in yaml.safe_load(Path(ORACLES, "calibration.yaml").read_text())["cases"]}
+CASES = {case["id"]: case for case in read_yaml(Path(ORACLES, "calibration.yaml"))["cases"]}
 LINEAR = Options(1.0)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import yaml
 from numpy.polynomial import Polynomial
+from yaml_files import read_yaml
 
 from trajcli.errors import PlanningError
 from trajcli.job.read import job_from_text
@@ -21,7 +22,7 @@ from trajcli.planning.plan import Plan, plan_job
 from trajcli.samples import sample
 
 ORACLES = Path(__file__).parents[2] / "oracles" / "point_to_point.yaml"
-CASES = yaml.safe_load(ORACLES.read_text(encoding="utf-8"))["cases"]
+CASES = read_yaml(ORACLES)["cases"]
 DEGREES = {3: "cubic", 5: "quintic", 7: "septic"}
 Case = dict[str, Any]
 

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 from scipy.spatial.transform import Rotation
 from tool_jobs import plan, poses_of
+from yaml_files import read_yaml
 
 from trajcli.kinematics.jacobian import tcp_acceleration, tcp_twist
 
 FILE = Path(__file__).parents[2] / "oracles" / "operational.yaml"
-CASES = yaml.safe_load(FILE.read_text(encoding="utf-8"))["cases"]
+CASES = read_yaml(FILE)["cases"]
 PPP = {
     "convention": "standard",
     "joints": [

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 from numpy.polynomial import Polynomial
+from yaml_files import read_yaml
 
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.errors import TrajcliError
@@ -23,7 +23,7 @@ Fields = dict[str, Any]
 
 def cases(file: str, kind: str) -> Any:
     """Return the parametrisation over the cases of a kind."""
-    every = yaml.safe_load((ORACLES / f"{file}.yaml").read_text(encoding="utf-8"))["cases"]
+    every = read_yaml(ORACLES / f"{file}.yaml")["cases"]
     found = [case for case in every if case["kind"] == kind]
     assert found
     return pytest.mark.parametrize("case", found, ids=[case["id"] for case in found])

@@ -6,12 +6,12 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-import yaml
+from yaml_files import read_yaml
 
 import trajcli
 
 ORACLES = Path(__file__).parents[2] / "oracles" / "waypoint_lists.yaml"
-LISTS = yaml.safe_load(ORACLES.read_text("utf-8"))
+LISTS = read_yaml(ORACLES)
 
 
 def job_of(case, **fields):
