@@ -42,7 +42,7 @@ goes point by point.
 Limits of joints are not looked at when a law is made, only when the move is verified, except by
 `time_optimal`, which needs and keeps those of velocity and acceleration. A turn that the target leaves free
 counts as the arm makes it, except where segments overlap. A move that is too fast is refused with the
-factor, or stretched by it: `when_over_limit: slow`. A rotation about the tcp has no limit of jerk.
+factor, or stretched by it: `when_over_limit: slow`.
 
 Along a bent path the tool also accelerates across. Of an acceleration in `limits.tcp`, 0.6 goes along the
 path and 0.8 across where a path is bent anywhere (`time_optimal` divides it point by point). The

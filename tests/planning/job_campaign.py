@@ -28,6 +28,7 @@ HEAVY = ("ur5e", "ur3e", "panda", "z1")  # with masses and efforts
 TOOL = {
     "speed": (0.1, 2.0),
     "acceleration": (1.0, 20.0),
+    "jerk": (20.0, 500.0),
     "angular_speed": (0.5, 5.0),
     "angular_acceleration": (5.0, 50.0),
 }
@@ -54,6 +55,7 @@ def job_of(number: int) -> dict[str, Any]:
         job["robot"], stated = arm, _limits(rng, arm)
     if planner in STEPPING and rng.random() < 0.9:
         stated["jerk"] = None
+        stated.get("tcp", {}).pop("jerk", None)
     job |= {"limits": stated, "moves": [move]}
     if arm in HEAVY and rng.random() < 0.6:
         stated["effort"] = "robot"

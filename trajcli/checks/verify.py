@@ -42,7 +42,7 @@ class Verdict:
         unchecked: (joint, quantity) that some move leaves unlimited in at least one direction; an effort only
             where the tool carries something.
         unchecked_of_tool: Limits of the tool that are stated and cannot be judged in some move: of an arm
-            without geometry, and of the jerk in joint space.
+            without geometry.
         sampled: Moves along a path: the distance from it and the branch are judged on rows alone, which is no
             proof of what lies between them.
         surveys: For each span what it uses of further limits, by their family.
@@ -266,7 +266,7 @@ def _unchecked_of_tool(moves: Sequence[LimitedMove], peaks: Sequence[tuple[Peaks
         if move.limits.tcp != _NO_TOOL_LIMITS and of_span[1].magnitude.any():
             from trajcli.limits.tool import unjudged
 
-            names |= unjudged(move.limits, move.robot, move.motion)
+            names |= unjudged(move.limits, move.robot)
     return tuple(name for name in vars(_NO_TOOL_LIMITS) if name in names)
 
 

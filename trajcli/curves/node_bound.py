@@ -154,16 +154,17 @@ def _surveyed(known: KnownAtNodes, starts: Array, lengths: Array, coefficients: 
     return NodeSurvey(starts, lengths, values, remainder)
 
 
-def at_nodes(coefficients: Array, lengths: Array) -> tuple[Array, Array, Array]:
-    """Return a curve and its first two derivatives at the nodes of its pieces, each (P, 9, n).
+def at_nodes(coefficients: Array, lengths: Array, order: int = 2) -> tuple[Array, ...]:
+    """Return a curve and its derivatives at the nodes of its pieces, each (P, 9, n).
 
     Args:
         coefficients: Of the pieces, (degree + 1, P, n), highest power first.
         lengths: Of the pieces, (P,).
+        order: Of the last derivative.
     """
     inside = (lengths[:, None] * np.linspace(0.0, 1.0, NODES_DEGREE + 1))[..., None]
-    first, second = (derivative_coefficients(coefficients, order)[:, :, None] for order in (1, 2))
-    return horner(coefficients[:, :, None], inside), horner(first, inside), horner(second, inside)
+    derivatives = (derivative_coefficients(coefficients, k) for k in range(order + 1))
+    return tuple(horner(each[:, :, None], inside) for each in derivatives)
 
 
 @cache

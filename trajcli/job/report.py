@@ -19,7 +19,7 @@ from trajcli.job.reports.comparisons import (
 )
 from trajcli.job.reports.efforts import EffortReport, EffortsReport, PayloadReport
 from trajcli.job.reports.part import JointQuantity, MeasuredIn, ReportPart, ReportSeconds, UnitName, in_units
-from trajcli.limits.kinds import BoundedToolLimit, ToolLimit
+from trajcli.limits.kinds import ToolLimit
 
 __all__ = ["MeasuredIn", "Report", "ReportPart", "UnitName", "in_units"]
 
@@ -135,7 +135,7 @@ class FastestReport(ReportPart):
 class ToolPeakReport(ReportPart):
     """The largest magnitude of one quantity of the tool in one move."""
 
-    quantity: BoundedToolLimit
+    quantity: ToolLimit
     value: Annotated[float, MeasuredIn(), Field(description="SI, of the tool as forward kinematics has it.")]
     bound: Annotated[
         float, MeasuredIn(), Field(description="It is proven to be at most this at every time, SI.")

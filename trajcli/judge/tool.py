@@ -17,9 +17,9 @@ from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.jacobian import jacobian, jacobian_dot_qd
 from trajcli.kinematics.robot import Robot
-from trajcli.limits.kinds import LimitKind
+from trajcli.limits.kinds import TOOL_KINDS, LimitKind
 from trajcli.limits.tolerances import TOOL_RELATIVE
-from trajcli.limits.tool import BOUNDED, limits_tool, tool_excess, tool_peaks
+from trajcli.limits.tool import limits_tool, tool_excess, tool_peaks
 from trajcli.limits.tool_bound import ToolPeak
 
 _PIECES = 2048  # at a time: nine configurations of each are looked at
@@ -102,7 +102,7 @@ class ToolJudge:
         coefficients = window.coefficients[:, pieces]
         breaks = window.t[pieces.start] + np.append(0.0, np.cumsum(window.lengths[pieces]))
         peaks = tool_peaks(robot, breaks, coefficients)
-        for kind in (kind for kind in BOUNDED if kind.key in peaks):
+        for kind in (kind for kind in TOOL_KINDS if kind.key in peaks):
             peak = peaks[kind.key]
             limit, order = float(getattr(robot.limits.tcp, kind.key)), kind.order or 1
             if order > int(window.highest[pieces].max()) or peak.most <= limit * (1 + TOOL_RELATIVE):

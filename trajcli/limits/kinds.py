@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
 ToolLimit = Literal["speed", "acceleration", "jerk", "angular_speed", "angular_acceleration"]
 """Keys of the limits of the tool."""
-BoundedToolLimit = Literal["speed", "acceleration", "angular_speed", "angular_acceleration"]
-"""Those of which reports state the largest value in every move, proven for all t."""
 _RATES = ("", "/s", "/s^2", "/s^3")
 ScaleFactor = Literal["velocity", "acceleration", "jerk"]
 
@@ -45,7 +43,6 @@ class LimitKind:
             none.
         planned: Which planners keep it themselves: all, those of paths of the tool, or none; by others a move
             that finds its duration is stretched to it.
-        on_paths_only: Whether it bounds the law along a path, and nothing in joint space.
     """
 
     name: str
@@ -54,7 +51,6 @@ class LimitKind:
     factor: ScaleFactor | None = None
     picture: str | None = None
     planned: Literal["always", "on paths", "never"] = "always"
-    on_paths_only: bool = False
 
     @property
     def of_tool(self) -> bool:
@@ -105,7 +101,7 @@ KINDS = (
     LimitKind("tool_angular_speed", "tool", 1, "velocity", "angular speed", "on paths"),
     LimitKind("tool_acceleration", "tool", 2, "acceleration", None, "on paths"),
     LimitKind("tool_angular_acceleration", "tool", 2, "acceleration", None, "on paths"),
-    LimitKind("tool_jerk", "tool", 3, "jerk", None, "on paths", on_paths_only=True),
+    LimitKind("tool_jerk", "tool", 3, "jerk", None, "never"),
 )
 """All of them, in the order in which they are judged."""
 
@@ -155,12 +151,17 @@ class LimitedMove:
     motion: ToolMotion | None = None
 
     @cached_property
-    def pieces(self) -> tuple[Array, Array]:
-        """Breaks (w + 1,) and coefficients (degree + 1, w, n) of its curve; w is 0 where it has no length."""
+    def numbers(self) -> tuple[int, int]:
+        """Of the first piece of its curve, and of the one behind its last; equal where it has no length."""
         curve = self.trajectory.curve
         middles = curve.breaks[:-1] + curve.lengths / 2 - curve.start
         first, last = np.searchsorted(middles, [self.span.start, self.span.end]).tolist()
-        last = first if self.span.duration == 0 else last
+        return first, first if self.span.duration == 0 else last
+
+    @property
+    def pieces(self) -> tuple[Array, Array]:
+        """Breaks (w + 1,) and coefficients (degree + 1, w, n) of its curve."""
+        (first, last), curve = self.numbers, self.trajectory.curve
         return curve.breaks[first : last + 1], curve.coefficients[:, first:last]
 
 

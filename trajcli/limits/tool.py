@@ -3,102 +3,112 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
-from trajcli.curves.extrema import peaks
-from trajcli.curves.piecewise import Array
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount, Amounts
 from trajcli.findings import Finding, NamedJoints, at_time
 from trajcli.frozen import frozen
 from trajcli.kinematics.following.motion import ToolMotion
+from trajcli.kinematics.jacobian import jacobian, tcp_twist
 from trajcli.kinematics.robot import Limits, Robot
-from trajcli.limits.kinds import (
-    KIND_OF,
-    TOOL_KINDS,
-    LimitedMove,
-    LimitFamily,
-    LimitKind,
-    LimitSurvey,
-)
-from trajcli.limits.tolerances import JUMP_RELATIVE, TOOL_RELATIVE
+from trajcli.limits.kinds import TOOL_KINDS, LimitedMove, LimitFamily, LimitKind, LimitSurvey
+from trajcli.limits.tolerances import TOOL_RELATIVE, allowed_jump
 from trajcli.limits.tool_bound import ToolPeak, tool_bounds
-from trajcli.trajectory import State
+from trajcli.trajectory import State, Trajectory
 
-BOUNDED = tuple(kind for kind in TOOL_KINDS if not kind.on_paths_only)
-"""What `tool_bounds` bounds, in its order."""
-_JERK_HINT = "use shape jerk_limited or quintic, or leave the limit of the tool's jerk out"
+_SMOOTH_HINT = (
+    "use a planner or a law whose acceleration does not step, or leave the limit of the tool's {words} out"
+)
+_SEXTIC = 16.0
+"""Largest third over largest second derivative of x^3 (1 - x)^3, by which quintic pieces are off a curve."""
+
+
+@frozen
+class ToolStep:
+    """A step in the acceleration of the tool, or in its angular acceleration.
+
+    Attributes:
+        kind: The limit of the acceleration that steps.
+        size: SI.
+        time: s, from the start of the move.
+    """
+
+    kind: LimitKind
+    size: float
+    time: float
 
 
 @frozen
 class ToolSurvey(LimitSurvey):
-    """The largest speeds and accelerations of the tool in a move.
+    """The largest speeds, accelerations and jerks of the tool in a move.
 
     Attributes:
         limits: In force.
         peaks: By the key of their limits, times from the start of the move; none where none is asked for.
+        steps: The largest steps of accelerations, where their derivatives are limited.
         begins: When the move begins, s from the start of the trajectory.
         moves: Whether it has a duration.
         motion: The reference motion along a path; None in joint space. Speeds and accelerations may differ
             from those of its law, which was planned within the limits, by as much as its tolerance says.
+        spacing: Mean length of the pieces of the joints' curve, s.
     """
 
     limits: Limits
     peaks: Mapping[str, ToolPeak]
+    steps: tuple[ToolStep, ...] = ()
     begins: float = 0.0
     moves: bool = True
     motion: ToolMotion | None = None
+    spacing: float = np.inf
 
     def over(self, joints: NamedJoints, origin: float = 0.0) -> Iterator[Finding]:
         """Yield the limits of the tool that the move does not keep."""
         del joints, origin  # times are from the start of the trajectory
-        for kind in (kind for kind in BOUNDED if kind.key in self.peaks):
+        for kind in (kind for kind in TOOL_KINDS if kind.key in self.peaks):
             limit, peak = float(getattr(self.limits.tcp, kind.key)), self.peaks[kind.key]
-            if not np.isinf(limit) and not peak.most <= limit * (
-                1 + TOOL_RELATIVE + 2 * self._promised(kind)
-            ):
+            steps = [step for step in self.steps if (step.kind.order or 0) + 1 == kind.order]
+            stepping = [step for step in steps if step.kind.dimension == kind.dimension]
+            if np.isinf(limit):
+                continue
+            if stepping:
+                yield from (_stepping(step, kind, self.begins) for step in stepping)
+            elif not peak.most <= limit * (1 + TOOL_RELATIVE + 2 * self._promised(kind, limit)):
                 yield tool_excess(kind, peak.most, limit, self.begins + peak.time, still=not self.moves)
-        if self.motion is not None and not self.motion.pure_rotation and np.isfinite(self.limits.tcp.jerk):
-            yield from self._law_over()
 
     def excess(self) -> float:
         """Return by how much of a limit the tool is above it."""
+        if self.steps:
+            return np.inf
         shares = (peak.most / float(getattr(self.limits.tcp, key)) for key, peak in self.peaks.items())
         return max(shares, default=0.0) - 1
 
-    def _promised(self, kind: LimitKind) -> float:
-        """Return by what part of its peak a quantity may differ from that of the law."""
+    def _promised(self, kind: LimitKind, limit: float) -> float:
+        """Return by what part of its peak, or of its limit, a quantity may differ from that of the law."""
         if self.motion is None:
             return 0.0
-        tolerance = self.motion.tolerance
-        return tolerance.angle if kind.dimension == "angle" else tolerance.position
+        tolerance = getattr(self.motion.tolerance, "angle" if kind.dimension == "angle" else "position")
+        if kind.order != 3:
+            return float(tolerance)
+        (below,) = (each for each in TOOL_KINDS if (each.order, each.dimension) == (2, kind.dimension))
+        return float(_SEXTIC * tolerance * self.peaks[below.key].value / (self.spacing * limit))
 
-    def _law_over(self) -> Iterator[Finding]:
-        """Yield where the law's jerk breaks its limit, or its acceleration steps although jerk is limited."""
-        assert self.motion is not None  # noqa: S101
-        limit, law = self.limits.tcp.jerk, self.motion.law
-        before, after = law.piece_ends(2)[1][:, 0], law.piece_ends(2)[0][:, 0]
-        steps = np.abs(np.append(after, 0.0) - np.append(0.0, before))
-        accelerations, jerks = peaks(law, (2, 3))
-        if steps.max() > JUMP_RELATIVE * float(accelerations.magnitude[0]):
-            time, size = self.begins + float(law.breaks[int(steps.argmax())]), float(steps.max())
-            yield Finding(
-                kind="tool_acceleration_jump",
-                joint=None,
-                value=size,
-                limit=0.0,
-                time=time,
-                message=f"the acceleration of the tool along its path steps by {{value}} {at_time(time)}",
-                amounts=_amounts(size, 0.0, 2, "length"),
-                hint=_JERK_HINT,
-            )
-            return
-        value = float(jerks.magnitude[0])
-        if value > limit * (1 + TOOL_RELATIVE):
-            time = float(jerks.high_time[0] if jerks.high[0] >= value else jerks.low_time[0])
-            yield replace(tool_excess(KIND_OF["tool_jerk"], value, limit, self.begins + time), method="exact")
+
+def _stepping(step: ToolStep, kind: LimitKind, begins: float) -> Finding:
+    """Return that an acceleration steps although its derivative is limited."""
+    time = begins + step.time
+    return Finding(
+        kind=f"{step.kind.name}_jump",
+        joint=None,
+        value=step.size,
+        limit=0.0,
+        time=time,
+        message=f"the {step.kind.words} of the tool steps by {{value}} {at_time(time)}",
+        amounts=_amounts(step.size, 0.0, 2, step.kind.dimension),
+        hint=_SMOOTH_HINT.format(words=kind.words),
+    )
 
 
 def tool_excess(kind: LimitKind, value: float, limit: float, time: float, *, still: bool = False) -> Finding:
@@ -135,24 +145,18 @@ def _amounts(value: float, limit: float, order: int, dimension: Literal["length"
 
 def limits_tool(robot: Robot) -> bool:
     """Return whether an arm has limits of its tool, and the geometry that it takes to judge them."""
-    return robot.convention is not None and any(kind.stated(robot.limits) for kind in BOUNDED)
+    return robot.convention is not None and any(kind.stated(robot.limits) for kind in TOOL_KINDS)
 
 
-def unjudged(limits: Limits, robot: Robot | None, motion: ToolMotion | None) -> set[str]:
-    """Return the keys of limits of the tool that are stated, and cannot be judged in a move.
+def unjudged(limits: Limits, robot: Robot | None) -> set[str]:
+    """Return the keys of limits of the tool that are stated, and cannot be judged of an arm.
 
     Args:
         limits: In force.
         robot: The arm; None where nobody says.
-        motion: The reference motion of the tool along a path; None in joint space.
     """
     blind = robot is None or robot.convention is None
-    on_path = motion is not None and not motion.pure_rotation
-    return {
-        kind.key
-        for kind in TOOL_KINDS
-        if kind.stated(limits) and (blind or (kind.on_paths_only and not on_path))
-    }
+    return {kind.key for kind in TOOL_KINDS if blind and kind.stated(limits)}
 
 
 class ToolFamily(LimitFamily):
@@ -163,16 +167,20 @@ class ToolFamily(LimitFamily):
         robot, motion, span = move.robot, move.motion, move.span
         if robot is None or (motion is None and not limits_tool(robot)):
             return None
-        known = peaks_in(move, robot) if limits_tool(robot) else {}
-        return ToolSurvey(robot.limits, known, span.start, span.duration > 0, motion)
+        if not limits_tool(robot):
+            return ToolSurvey(robot.limits, {}, (), span.start, span.duration > 0, motion)
+        breaks, _ = move.pieces
+        spacing = span.duration / max(len(breaks) - 1, 1)
+        steps = tuple(_steps(move, robot)) if _order(robot.limits) > 2 else ()
+        return ToolSurvey(
+            robot.limits, peaks_in(move, robot), steps, span.start, span.duration > 0, motion, spacing
+        )
 
     def over_at_ends(self, robot: Robot | None, ends: Sequence[State], use: tuple[str, int, float]) -> bool:
         """Return whether the tool is too fast where a move begins or ends."""
         del use
         if robot is None or not limits_tool(robot):
             return False
-        from trajcli.kinematics.jacobian import tcp_twist
-
         limits = robot.limits.tcp
         twists = [tcp_twist(robot, state.position, state.velocity) for state in ends]
         speed, angular_speed = (max(float(np.linalg.norm(t[k : k + 3])) for t in twists) for k in (0, 3))
@@ -197,6 +205,52 @@ def tool_peaks(robot: Robot, breaks: Array, coefficients: Array) -> Mapping[str,
         breaks: Of the joints' curve, (P + 1,), s.
         coefficients: Of its pieces, (degree + 1, P, n), highest power first, from the break on.
     """
+    order = _order(robot.limits)
     with np.errstate(over="ignore", invalid="ignore"):
-        bounds = tool_bounds(robot, breaks, coefficients)
-    return {kind.key: bound for kind, bound in zip(BOUNDED, bounds, strict=True)}
+        bounds = tool_bounds(robot, breaks, coefficients, order)
+    known = (kind for kind in TOOL_KINDS if kind.order is not None and kind.order <= order)
+    return {kind.key: bounds[2 * (kind.order or 1) - 2 + (kind.dimension == "angle")] for kind in known}
+
+
+def _order(limits: Limits) -> int:
+    """Return the order of the last derivative of the tool that is limited, at least that of accelerations."""
+    return max([2, *(kind.order or 0 for kind in TOOL_KINDS if kind.stated(limits))])
+
+
+def _steps(move: LimitedMove, robot: Robot) -> Iterator[ToolStep]:
+    """Yield the largest steps of the accelerations of the tool whose derivatives are limited.
+
+    A step where a move begins or ends is its own if the acceleration on its side is not zero.
+    """
+    (first, last), trajectory, (breaks, coefficients) = move.numbers, move.trajectory, move.pieces
+    if first == last:
+        return
+    before, after = _both_sides(trajectory, first, last)
+    peak, slopes = (
+        np.abs([before, after]).max(axis=(0, 1)),
+        PiecewisePolynomial(breaks, coefficients).piece_ends(3),
+    )
+    allowed = allowed_jump(peak, breaks, np.broadcast_to(np.abs(slopes).max(axis=(0, 1)), before.shape))
+    change = np.where(np.abs(after - before) <= allowed, 0.0, after - before)
+    change[0][np.abs(after[0]) <= allowed[0] / 2] = 0.0
+    change[-1][np.abs(before[-1]) <= allowed[-1] / 2] = 0.0
+    q = np.concatenate([coefficients[-1], trajectory.before(np.array([move.span.end]))])
+    sizes = np.linalg.norm((jacobian(robot, q) @ change[..., None]).reshape(-1, 2, 3), axis=-1)
+    limited = {kind.dimension for kind in TOOL_KINDS if kind.order == 3 and kind.stated(robot.limits)}
+    for kind in (kind for kind in TOOL_KINDS if kind.order == 2 and kind.dimension in limited):
+        size = sizes[:, int(kind.dimension == "angle")]
+        if size.max() > 0.0:
+            worst = int(size.argmax())
+            yield ToolStep(kind, float(size[worst]), float(breaks[worst]) - move.span.start)
+
+
+def _both_sides(trajectory: Trajectory, first: int, last: int) -> tuple[Array, Array]:
+    """Return the accelerations before and after each break of pieces from `first` to `last`, (w + 1, n)."""
+    curve = trajectory.curve
+    near = slice(max(first - 1, 0), last + 1)
+    starts, ends = PiecewisePolynomial(
+        curve.breaks[near.start : near.stop + 1], curve.coefficients[:, near]
+    ).piece_ends(2)
+    before = ends if first else np.concatenate([trajectory.start.acceleration[None], ends])
+    after = np.concatenate([starts[min(first, 1) :], trajectory.end.acceleration[None]])
+    return before[: last - first + 1], after[: last - first + 1]

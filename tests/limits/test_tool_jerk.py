@@ -1,0 +1,185 @@
+"""Limits of the tool's jerk for all t, in joint space and on paths.
+
+A link of length L that turns by q has |p'''|^2 = L^2 ((q''' - q'^3)^2 + (3 q' q'')^2).
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from independent_motion import TOOL, largest, tool_rates
+from random_jobs import loaded
+
+from trajcli.job.report import Report
+from trajcli.judge.file import CheckOptions, check_file
+from trajcli.output.report import report_of
+from trajcli.output.write import write_plan
+from trajcli.planning.plan import Plan, plan_job
+
+LEVER, DURATION, TURN = 0.5, 1.6, 1.2
+THIRD = ["jerk"]
+
+
+def link(tcp: dict[str, float], move: dict[str, Any], **more: Any) -> dict[str, Any]:
+    """Return a job of an arm of one link."""
+    return {
+        "version": 1,
+        "robot": {"convention": "standard", "joints": [{"a": LEVER}]},
+        "limits": {"velocity": 9, "acceleration": 99, "tcp": tcp},
+        "start": {"joints": [0.1]},
+        "moves": [{"planner": "quintic", "to": {"joints": [0.1 + TURN]}, **move}],
+        **more,
+    }
+
+
+def peak_of_quintic(duration: float, order: str) -> float:
+    s = np.linspace(0, 1, 400_001)
+    rates = [np.polyval(np.polyder([6.0, -15, 10, 0, 0, 0], k), s) * TURN / duration**k for k in (1, 2, 3)]
+    if order == "angular_jerk":
+        return float(np.abs(rates[2]).max())
+    return float(LEVER * np.hypot(rates[2] - rates[0] ** 3, 3 * rates[0] * rates[1]).max())
+
+
+@pytest.mark.parametrize("key", THIRD)
+@pytest.mark.parametrize(("part", "passes"), [(1 - 3e-6, False), (1 + 3e-6, True)])
+def test_a_move_in_joint_space_is_judged_on_both_sides_of_the_limit(
+    key: str, part: float, passes: bool
+) -> None:
+    peak = peak_of_quintic(DURATION, key)
+    plan = plan_job(loaded(link({key: peak * part}, {"duration": DURATION})))
+    assert plan.verdict.passed == passes
+    for finding in plan.verdict.findings:
+        assert finding.kind == f"tool_{key}"
+        assert (finding.value, finding.method) == (pytest.approx(peak, rel=1e-6), "bounded")
+        assert finding.factor == pytest.approx(part ** (-1 / 3), rel=1e-6)
+
+
+@pytest.mark.parametrize("key", THIRD)
+@pytest.mark.parametrize("move", [{}, {"duration": DURATION, "when_over_limit": "slow"}])
+def test_a_move_is_stretched_to_the_limit(key: str, move: dict[str, Any]) -> None:
+    limit = peak_of_quintic(2 * DURATION, key)
+    plan = plan_job(loaded(link({key: limit}, move)))
+    assert plan.verdict.passed
+    assert plan.trajectory.duration == pytest.approx(2 * DURATION, rel=1e-6)
+    assert f"to keep the {key.replace('_', ' ')} limit of the tool" in plan.events[0].message
+    (peak,) = [each for each in report_of(plan).moves[0].tool_peaks or [] if each.quantity == key]
+    assert (peak.value, peak.limit) == (pytest.approx(limit, rel=1e-6), limit)
+    Report.model_validate_json(report_of(plan).model_dump_json())
+
+
+@pytest.mark.parametrize("key", THIRD)
+def test_between_moving_states_the_search_sees_it(key: str) -> None:
+    move = {"to": {"joints": [0.1 + TURN], "velocity": [0.3]}, "when_over_limit": "slow"}
+    plan = plan_job(loaded(link({key: 4.0}, move)))
+    assert plan.verdict.passed
+    assert used(plan, key) == pytest.approx(1, abs=1e-4)
+
+
+@pytest.mark.parametrize("key", THIRD)
+def test_acceleration_that_steps_breaks_it(key: str) -> None:
+    plan = plan_job(loaded(link({key: 500.0}, {"planner": "trapezoid"})))
+    findings = [finding for finding in plan.verdict.findings if finding.kind.endswith("_jump")]
+    assert [f.kind for f in findings] == [f"tool_{key.replace('jerk', 'acceleration')}_jump"]
+    assert findings[0].value == pytest.approx(99 * (LEVER if key == "jerk" else 1) * 1, rel=1e-9)
+
+
+def test_a_step_belongs_to_the_move_with_the_acceleration() -> None:
+    still = {"planner": "hold", "duration": 0.5}
+    job = link({"jerk": 500.0}, {"planner": "trapezoid"})
+    job["moves"] = [still, *job["moves"], still]
+    plan = plan_job(loaded(job))
+    assert {finding.move for finding in plan.verdict.findings} == {1}
+
+
+def test_speeds_are_reported_where_no_limit_is_stated() -> None:
+    plan = plan_job(
+        loaded({**JOB_ON_PATH, "moves": [PATHS["line"] | {"law": {"shape": "quintic", "duration": 3}}]})
+    )
+    tool = report_of(plan).moves[0].tool
+    assert tool is not None
+    assert [each.quantity for each in tool.peaks] == [
+        "speed",
+        "angular_speed",
+        "acceleration",
+        "angular_acceleration",
+    ]
+
+
+def used(plan: Plan, key: str) -> float:
+    """Return the largest share of a limit, by an evaluation of its own."""
+    (index,) = [k for k, name in enumerate(TOOL) if name == key]
+    shares = []
+    for move in plan.moves:
+        robot = move.robot
+        rates = largest(move.planned.curve, lambda q, robot=robot: tool_rates(robot, q))  # type: ignore[misc]
+        shares.append(rates[index] / getattr(robot.limits.tcp, key))
+    return float(max(shares))
+
+
+DOWN = {"xyz": [0.45, 0.2, 0.3], "rpy": [np.pi, 0, 0], "configuration": {"elbow": "up"}}
+PATHS = {
+    "line": {"planner": "line", "to": {"xyz": [0.45, -0.2, 0.3], "rpy": [np.pi, 0, 0.8]}},
+    "arc": {"planner": "arc", "via": {"xyz": [0.5, 0, 0.3]}, "to": {"xyz": [0.45, -0.2, 0.3]}},
+    "path": {
+        "planner": "path",
+        "corner": "round",
+        "radius": 0.05,
+        "segments": [
+            {"line": {"xyz": [0.45, 0, 0.3]}},
+            {"line": {"xyz": [0.45, -0.2, 0.4], "rpy": [np.pi, 0, 0.8]}},
+        ],
+    },
+}
+
+
+JOB_ON_PATH = {"version": 1, "robot": "ur5e", "limits": {"acceleration": 20}, "start": DOWN}
+
+
+@pytest.mark.parametrize("key", THIRD)
+@pytest.mark.parametrize("shape", ["jerk_limited", "quintic", "time_optimal"])
+@pytest.mark.parametrize("planner", PATHS)
+def test_on_a_path_the_whole_vector_counts(planner: str, shape: str, key: str) -> None:
+    """On a rounded corner the tool turns at speed: its jerk was 2.5 times that along the path."""
+    tcp = {
+        "speed": 0.5,
+        "acceleration": 3,
+        "angular_speed": 3,
+        "angular_acceleration": 30,
+        "jerk": 30.0,
+        key: 20.0,
+    }
+    job = {
+        "version": 1,
+        "robot": "ur5e",
+        "limits": {
+            "velocity": 3,
+            "acceleration": 20,
+            "jerk": 1000 if shape == "time_optimal" else None,
+            "tcp": tcp,
+        },
+        "start": DOWN,
+        "moves": [{**PATHS[planner], "law": {"shape": shape}}],
+    }
+    plan = plan_job(loaded(job))
+    assert plan.verdict.passed
+    share = used(plan, key)
+    assert share <= 1 + 2e-4
+    if planner == "path" and key == "jerk":
+        assert share > 1 - 1e-6
+        assert [event.kind for event in plan.events] == ["stretched"]
+
+
+@pytest.mark.parametrize("key", THIRD)
+def test_recorded_rows_are_judged_by_it(key: str, tmp_path: Path) -> None:
+    peak = peak_of_quintic(DURATION, key)
+    file = tmp_path / "rows.csv"
+    write_plan(plan_job(loaded(link({}, {"duration": DURATION}))), str(file))
+    for part, kinds in ((0.98, {f"tool_{key}"}), (1.02, set())):
+        job = tmp_path / "job.json"
+        job.write_text(json.dumps(link({key: part * peak}, {"duration": DURATION})))
+        judged = check_file(str(file), CheckOptions(job=str(job))).judgement
+        assert {finding.kind for finding in judged.findings if finding.severity == "error"} == kinds
