@@ -21,7 +21,7 @@ from trajcli.output.write import write_plan
 from trajcli.planning.plan import Plan, plan_job
 
 LEVER, DURATION, TURN = 0.5, 1.6, 1.2
-THIRD = ["jerk"]
+THIRD = ["jerk", "angular_jerk"]
 
 
 def link(tcp: dict[str, float], move: dict[str, Any], **more: Any) -> dict[str, Any]:

@@ -31,6 +31,7 @@ TOOL = {
     "jerk": (20.0, 500.0),
     "angular_speed": (0.5, 5.0),
     "angular_acceleration": (5.0, 50.0),
+    "angular_jerk": (50.0, 2000.0),
 }
 
 
@@ -55,7 +56,7 @@ def job_of(number: int) -> dict[str, Any]:
         job["robot"], stated = arm, _limits(rng, arm)
     if planner in STEPPING and rng.random() < 0.9:
         stated["jerk"] = None
-        stated.get("tcp", {}).pop("jerk", None)
+        stated["tcp"] = {key: bound for key, bound in stated.get("tcp", {}).items() if "jerk" not in key}
     job |= {"limits": stated, "moves": [move]}
     if arm in HEAVY and rng.random() < 0.6:
         stated["effort"] = "robot"
@@ -90,6 +91,7 @@ def _along_path(rng: np.random.Generator, number: int, planner: str) -> dict[str
     stated = _limits(rng, made.robot) | {"tcp": {key: _between(rng, *bounds) for key, bounds in TOOL.items()}}
     if move["law"]["shape"] not in ("jerk_limited", "time_optimal", "quintic"):
         stated["jerk"] = None
+        del stated["tcp"]["jerk"], stated["tcp"]["angular_jerk"]
     return {
         "version": 1,
         "robot": made.robot,

@@ -202,6 +202,7 @@ class ToolLimits:
         jerk: m/s^3.
         angular_speed: rad/s.
         angular_acceleration: rad/s^2.
+        angular_jerk: rad/s^3.
     """
 
     speed: float = inf
@@ -209,6 +210,7 @@ class ToolLimits:
     jerk: float = inf
     angular_speed: float = inf
     angular_acceleration: float = inf
+    angular_jerk: float = inf
 
 
 def _no_rows() -> Array:

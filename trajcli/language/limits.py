@@ -203,6 +203,11 @@ AngularAcceleration = Annotated[
     ),
 ]
 
+AngularJerk = Annotated[
+    float,
+    Number(Quantity("angle", 3), "Magnitude of the tool's angular jerk (angle unit per s^3).", above=0.0),
+]
+
 
 class ToolLimitsSpec(Model):
     """Limits of the tool, in all moves; what is left out is unlimited."""
@@ -212,6 +217,7 @@ class ToolLimitsSpec(Model):
     jerk: ToolJerk | None = None
     angular_speed: AngularSpeed | None = None
     angular_acceleration: AngularAcceleration | None = None
+    angular_jerk: AngularJerk | None = None
 
 
 class LimitsSpec(Model, defer_build=False):  # made once, not for each planner that has it

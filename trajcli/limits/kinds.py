@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from trajcli.curves.time_optimal.constraints import PathConstraint
     from trajcli.kinematics.following.motion import ToolMotion
 
-ToolLimit = Literal["speed", "acceleration", "jerk", "angular_speed", "angular_acceleration"]
+ToolLimit = Literal["speed", "acceleration", "jerk", "angular_speed", "angular_acceleration", "angular_jerk"]
 """Keys of the limits of the tool."""
 _RATES = ("", "/s", "/s^2", "/s^3")
 ScaleFactor = Literal["velocity", "acceleration", "jerk"]
@@ -102,6 +102,7 @@ KINDS = (
     LimitKind("tool_acceleration", "tool", 2, "acceleration", None, "on paths"),
     LimitKind("tool_angular_acceleration", "tool", 2, "acceleration", None, "on paths"),
     LimitKind("tool_jerk", "tool", 3, "jerk", None, "never"),
+    LimitKind("tool_angular_jerk", "tool", 3, "jerk", None, "never"),
 )
 """All of them, in the order in which they are judged."""
 
