@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 PEERS := .venv-peers
 EXTRAS ?= dev  # dev,dask,docs,viewers: also what the tests of viewers, of the site and of clusters need
 
-.PHONY: setup demo check format lint types test soak bench golden schema docs player picture site clean
+.PHONY: setup demo check format lint types test soak mutants bench golden schema docs player picture site clean
 
 setup: $(STAMP)
 
@@ -37,6 +37,13 @@ test: $(STAMP)
 PART ?= tests
 soak: $(STAMP)  ## long random campaigns, and the random tests of `make test` with new examples; PART=tests/judge: those alone
 	HYPOTHESIS_PROFILE=random $(BIN)/python -m pytest -n auto -m "soak or not soak" $(PART)
+
+FILES ?=
+SAMPLE ?= 0
+SEED ?= 1
+mutants: $(STAMP)  ## mutants of code that proves or judges; FILES='trajcli/judge/*': those alone; SAMPLE=50: that many a file
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[$(strip $(EXTRAS)),mutants]'
+	$(BIN)/python -m tests.mutants $(foreach pattern,$(FILES),'$(pattern)') --sample $(SAMPLE) --seed $(SEED)
 
 bench: $(STAMP) $(PEERS)/.installed  ## ratios against named peers, in one run
 	$(BIN)/python -m benchmarks --peers $(PEERS)/bin/python
@@ -70,4 +77,4 @@ site: $(STAMP)  ## the documents as a site in site/, dead links refused
 	@echo "open site/index.html"
 
 clean:
-	rm -rf $(VENV) $(PEERS) site .mypy_cache .ruff_cache .pytest_cache .hypothesis ur5e_pick.csv ur5e_pick.report.json
+	rm -rf $(VENV) $(PEERS) .mutants site .mypy_cache .ruff_cache .pytest_cache .hypothesis ur5e_pick.csv ur5e_pick.report.json

@@ -35,7 +35,7 @@ ONE_SHAPE = {
 """Folders that may hold more than MOST_FILES files, since these are of one shape."""
 
 FORBIDDEN_NAMES = {"utils", "util", "helpers", "helper", "common", "misc", "base", "core", "manager"}
-OTHER_TESTS = ("architecture", "golden", "oracles", "urdf/models")
+OTHER_TESTS = ("architecture", "golden", "mutants", "oracles", "urdf/models")
 
 
 def files_are_not_too_long(sources: Sources) -> Iterator[Offence]:
