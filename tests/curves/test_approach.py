@@ -131,3 +131,31 @@ def test_behind_a_bound_nothing_may_move_on(offset: float) -> None:
     inside[-1] = 0.4
     (use,) = approach_uses(np.array([0.0, 2.0]), inside, limits)
     assert use.used < 1
+
+
+@pytest.mark.parametrize("upper", [True, False])
+@pytest.mark.parametrize("piece", [0, 1, 2])
+@pytest.mark.parametrize("middle", [0.1, 0.3, 0.5, 0.7, 0.9])
+def test_a_short_approach_is_seen_wherever_in_a_piece_it_is(middle: float, piece: int, upper: bool) -> None:
+    """One piece approaches for a tenth of its length and moves away at both ends of it; the others rest."""
+    sign, length = 1.0 if upper else -1.0, 2.0
+    bump = -np.polymul(
+        [1.0, -(middle - 0.05)], [1.0, -(middle + 0.05)]
+    )  # of the velocity, over 0 <= t / T <= 1
+    rows = np.zeros((4, 3, 1))
+    rows[:, piece, 0] = sign * np.polyint(bump) * length / length ** np.arange(3, -1, -1)
+    gone = sign * length * np.polyval(np.polyint(bump), 1.0)
+    rows[-1, piece + 1 :, 0] = gone
+    limits = ApproachLimits(np.array([[-1.0, 1.0]]), np.array([0.01]), np.zeros(1))
+    curve = PiecewisePolynomial(length * np.arange(4.0), rows)
+    (use,) = approach_uses(curve.breaks, curve.coefficients, limits)
+    t = np.linspace(0.0, length, 20_001)
+    speed = sign * np.polyval(np.polyder(rows[:, piece, 0]), t)
+    ahead = 1.0 - sign * np.polyval(rows[:, piece, 0], t)
+    share = speed / np.sqrt(2 * 0.01 * ahead)
+    away = np.maximum(-speed, 0.0) / np.sqrt(2 * 0.01 * (2.0 - ahead))
+    assert share.max() > 1e-2
+    assert use.used == pytest.approx(max(share.max(), away.max()), rel=1e-6)
+    both, _ = uses_of_pieces(curve.coefficients, curve.lengths, limits, 0.0)
+    assert both[piece, 0 if upper else 1] == pytest.approx(share.max(), rel=1e-6)
+    assert both[piece, 1 if upper else 0] == pytest.approx(away.max(), rel=1e-6)

@@ -245,6 +245,38 @@ def test_the_cost_is_that_of_scipys_least_squares():
     assert np.square(residual(step)).sum() <= 2 * peer.cost * (1 + 1e-9)
 
 
+@pytest.mark.parametrize("loss", ["huber", "cauchy"])
+@pytest.mark.parametrize("seed", range(2))
+def test_a_robust_fit_is_where_the_sum_of_its_loss_is_least(loss, seed):
+    """The weights are those of the loss: with others the steps come to rest elsewhere."""
+    robot, rng = arm("scara"), np.random.default_rng(30 + seed)
+    parameters = parse_parameters(robot, "j1.a,j2.a,tool.x")
+    measurements = measured(
+        robot, configurations(robot, 25, rng), true_changes(robot, rng), rng, position=2e-2, angle=2e-2
+    )
+    fit = calibrate(robot, measurements, parameters, Options(0.3, loss=loss))
+    poses, scale = measurements.kinds[0].target.poses, fit.loss_scale
+
+    def lost(change):
+        total = 0.0
+        for q, pose in zip(measurements.joints, poses, strict=True):
+            mine = pose_of(robot, q, dict(zip(parameters, change, strict=True)))
+            turn = Rotation.from_matrix(pose[:3, :3] @ mine[:3, :3].T).as_rotvec()
+            square = (np.square(pose[:3, 3] - mine[:3, 3]).sum() + np.square(0.3 * turn).sum()) / scale**2
+            if loss == "cauchy":
+                total += np.log1p(square)
+            else:
+                total += square if square <= 1 else 2 * np.sqrt(square) - 1
+        return total
+
+    step = values_of(fit.robot, robot, parameters) - values_of(robot, robot, parameters)
+    for along in 1e-4 * np.eye(len(parameters)):
+        below, here, above = lost(step - along), lost(step), lost(step + along)
+        assert here < min(below, above)
+        offset = 0.5 * (above - below) / (above - 2 * here + below)  # of the least one, by a parabola
+        assert abs(offset) * 1e-4 < 2e-6
+
+
 def test_far_from_nominal():
     robot, rng = arm("puma"), np.random.default_rng(21)
     parameters = all_parameters(robot)
