@@ -3,6 +3,8 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+# compiled tests are kept whatever the environment says: to compile them takes longer than to import them
+PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n auto
 PEERS := .venv-peers
 EXTRAS ?= dev  # dev,dask,docs,viewers: also what the tests of viewers, of the site and of clusters need
 
@@ -20,7 +22,8 @@ demo: $(STAMP)  ## plan the main example and show the first rows
 	$(BIN)/trajcli plan examples/ur5e_pick.yaml --report ur5e_pick.report.json -o ur5e_pick.csv
 	@head -n 4 ur5e_pick.csv
 
-check: format lint types test  ## what .ci/run does
+check: format lint types  ## what .ci/run does: the tests with all seeds of their campaigns
+	TRAJCLI_TEST_TIER=full $(PYTEST)
 
 format: $(STAMP)
 	$(BIN)/ruff format --check .
@@ -31,12 +34,12 @@ lint: $(STAMP)
 types: $(STAMP)
 	$(BIN)/mypy
 
-test: $(STAMP)
-	$(BIN)/python -m pytest -n auto
+test: $(STAMP)  ## every test, with a few seeds of each campaign
+	$(PYTEST)
 
 PART ?= tests
-soak: $(STAMP)  ## long random campaigns, and the random tests of `make test` with new examples; PART=tests/judge: those alone
-	HYPOTHESIS_PROFILE=random $(BIN)/python -m pytest -n auto -m "soak or not soak" $(PART)
+soak: $(STAMP)  ## long random campaigns, and the random tests of `make check` with new examples; PART=tests/judge: those alone
+	TRAJCLI_TEST_TIER=soak $(PYTEST) -m "soak or not soak" $(PART)
 
 FILES ?=
 SAMPLE ?= 0

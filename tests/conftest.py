@@ -1,21 +1,59 @@
 """Puts this folder on the import path, so that every test finds what several of them share.
 
-Random tests draw the same examples in every run, so that a change is what makes a test fail. `make soak` draws new
-ones each time: it sets HYPOTHESIS_PROFILE=random.
+Random tests draw the same examples in every run, so that a change is what makes a test fail; `make soak` draws new ones
+each time. How many there are is said by `tiers`.
 """
 
+import gc
 import os
 import signal
+from typing import Any
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: threads of small matrices only wait
+
+import pytest
+from extras import pytest_terminal_summary as say_what_lacks
 from hypothesis import settings
-from tally import pytest_terminal_summary, tally  # noqa: F401
+from tally import pytest_terminal_summary as say_what_campaigns_did
+from tally import tally  # noqa: F401
+from tiers import TIER, few_examples
 
 # a loaded machine is no defect: no example has a deadline
 settings.register_profile("fixed", derandomize=True, deadline=None)
-settings.register_profile("random", deadline=None)
-settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "fixed"))
+settings.register_profile("new", deadline=None)
+settings.load_profile("new" if TIER == "soak" else "fixed")
+ASKED = "_hypothesis_internal_use_settings"
 
 if (
     signal.getsignal(signal.SIGINT) is signal.SIG_IGN
 ):  # as in the background of a shell; the programs that tests start inherit it
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Go on after a hangup under `nohup`, but let the programs that tests start end by it.
+
+    They inherit that a signal is ignored, not that it is handled. Workers of pytest-xdist inherit it in their turn.
+    """
+    starts_workers = bool(getattr(config.option, "numprocesses", None)) and not hasattr(config, "workerinput")
+    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN and not starts_workers:
+        signal.signal(signal.SIGHUP, lambda *_: None)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Draw fewer examples in the quick tier."""
+    for test in {item.function for item in items if hasattr(getattr(item, "function", None), ASKED)}:
+        asked = getattr(test, ASKED)
+        setattr(test, ASKED, settings(asked, max_examples=few_examples(asked.max_examples)))
+
+
+def pytest_collection_finish() -> None:
+    """Keep what stays until the end from being looked at by each collection of garbage."""
+    gc.collect()
+    gc.freeze()
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    """Say what the campaigns did, and what would be needed for the tests that were skipped."""
+    say_what_campaigns_did(terminalreporter)
+    say_what_lacks(terminalreporter)

@@ -3,16 +3,18 @@
 import importlib.util
 import os
 import shutil
+from typing import Any
 
 import pytest
 
+_NEEDS = "needs "
 _ALL = os.environ.get("TRAJCLI_TEST_EXTRAS") == "all"
 
 
-def require_module(name: str, extra: str = "viewers") -> None:
+def require_module(name: str) -> None:
     """Skip the test where a Python module of an extra is not installed."""
     if importlib.util.find_spec(name) is None:
-        _absent(f"the module {name}: pip install 'trajcli[{extra}]'")
+        _absent(name)
 
 
 def require_program(*names: str) -> str:
@@ -25,5 +27,16 @@ def require_program(*names: str) -> str:
 
 def _absent(what: str) -> None:
     if _ALL:
-        pytest.fail(f"needs {what}")
-    pytest.skip(f"needs {what}")
+        pytest.fail(f"{_NEEDS}{what}")
+    pytest.skip(f"{_NEEDS}{what}")
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    """Say once how many tests were skipped for want of what, and how to get it."""
+    reasons = [report.longrepr[2] for report in terminalreporter.getreports("skipped")]
+    lacking = sorted(reason.partition(_NEEDS)[2] for reason in reasons if _NEEDS in reason)
+    if lacking:
+        terminalreporter.write_line(
+            f"{len(lacking)} tests were skipped, which need {', '.join(dict.fromkeys(lacking))}: "
+            "`make -B setup EXTRAS=dev,dask,docs,viewers` installs the modules"
+        )

@@ -11,6 +11,7 @@ from functools import cache
 from typing import Any
 
 import pytest
+from tiers import few
 
 from trajcli.cli.frames import problem_as_json, render_problem
 from trajcli.errors import Amount, Problem, TrajcliError, said
@@ -103,6 +104,7 @@ JOBS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 }
 
 
+SLOW = ("out of reach", "singularity")  # searches that end after a second
 PLAIN = {
     "Jo0Nt": "{}",
     "RoBot": "{}",
@@ -155,8 +157,10 @@ def words_of(job: str) -> list[str]:
     return [*events, *(render_problem(problem, color=False) for problem in problems), *texts]
 
 
-@pytest.mark.parametrize("case", JOBS)
-@pytest.mark.parametrize("name", AWKWARD)
+@pytest.mark.parametrize(
+    ("case", "name"),
+    [(case, name) for case in JOBS for name in (few(AWKWARD, 3) if case in SLOW else AWKWARD)],
+)
 def test_names_of_joints_and_robots_are_text(case: str, name: str) -> None:
     expected = [renamed(text, name) for text in plain_words(case)]
     assert any(name in text for text in expected), expected

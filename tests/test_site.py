@@ -62,8 +62,8 @@ def test_documents_of_the_repository_fit_the_site(
 
 
 def build(config: Path, site: Path) -> subprocess.CompletedProcess[str]:
-    require_module("mkdocs", "docs")
-    require_module("material", "docs")
+    require_module("mkdocs")
+    require_module("material")
     return subprocess.run(
         [sys.executable, "-m", "mkdocs", "build", "--config-file", config, "--site-dir", site],
         env={**os.environ, "NO_MKDOCS_2_WARNING": "1"},

@@ -31,7 +31,7 @@ pytestmark = pytest.mark.filterwarnings("ignore")  # what Dask warns of is not o
 
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[Any]:
-    require_module("distributed", "dask")
+    require_module("distributed")
     import dask
     from distributed import LocalCluster
 
@@ -113,7 +113,7 @@ def kill_when_under_way(cluster: Any) -> None:
 
 @pytest.mark.usefixtures("folder")
 def test_a_scheduler_that_is_not_there() -> None:
-    require_module("distributed", "dask")
+    require_module("distributed")
     code, found, err = run("jobs", "--engine", "dask")
     assert (code, found) == (2, {})
     assert "the engine dask needs the address of a scheduler" in err

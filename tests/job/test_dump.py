@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
+from planned_examples import planned_example
 from random_mappings import jobs
 
 from trajcli.job.dump import dump_job
@@ -46,7 +47,8 @@ def test_the_resolved_example_gives_the_same_curve(example: Path) -> None:
     first = load_job(example)
     second = job_from_text(dump_job(first))
     assert_same(first, second)
-    curves = [plan_job(loaded).trajectory.curve for loaded in (first, second)]
+    plans = planned_example(example.stem), plan_job(second)
+    curves = [plan.trajectory.curve for plan in plans]
     assert np.array_equal(curves[0].breaks, curves[1].breaks)
     assert np.array_equal(curves[0].coefficients, curves[1].coefficients)
 

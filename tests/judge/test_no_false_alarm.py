@@ -10,6 +10,7 @@ import pytest
 import random_jobs
 from recorded_rows import part
 from tally import Tally
+from tiers import few
 
 from trajcli.errors import TrajcliError
 from trajcli.judge.file import CheckOptions, check_file
@@ -81,7 +82,8 @@ def check_plan(plan: Plan, seed: int) -> bool:
 
 
 def test_rows_give_no_false_alarm() -> None:
-    assert sum(check_rows(seed) for seed in range(80)) > 10
+    seeds = few(range(80), 12)
+    assert sum(check_rows(seed) for seed in seeds) >= len(seeds) / 16
 
 
 @pytest.mark.parametrize("seed", [21674, 23368])
@@ -102,8 +104,8 @@ def test_rows_give_no_false_alarm_at_length(block: int, tally: Tally) -> None:
 
 @pytest.mark.parametrize("ending", ["csv", "mcap", "jsonl", "yaml"])
 def test_our_own_files_give_no_false_alarm(ending: str, tmp_path: Path) -> None:
-    checked = 0
-    for seed in range(500, 560):
+    seeds, checked = few(range(500, 560), 12), 0
+    for seed in seeds:
         plan = verified_plan(seed)
         if plan is None or plan.trajectory.duration > 2.0:
             continue
@@ -117,4 +119,4 @@ def test_our_own_files_give_no_false_alarm(ending: str, tmp_path: Path) -> None:
         alarms = [f for f in judgement.findings if (f.severity, f.certainty) == ("error", "exceeded")]
         assert alarms == [], (seed, [alarm.text() for alarm in alarms])
         checked += 1
-    assert checked >= 4
+    assert checked >= len(seeds) / 15

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from random_jobs import MOST_JOINTS, TAGS, only_move, random_job
+from tiers import few
 
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.errors import InputError, MissingLimitError, PlanningError
@@ -95,8 +96,8 @@ def assert_explains_itself(planned: Planned, start: State) -> None:
 
 @pytest.mark.parametrize("tag", TAGS)
 def test_contract(tag: str) -> None:
-    kept = 0
-    for seed in range(ROUNDS):
+    seeds, kept = few(range(ROUNDS), 8), 0
+    for seed in seeds:
         rng = np.random.default_rng([seed, *tag.encode()])
         job = random_job(
             rng, tag, 1 + seed % MOST_JOINTS, rest=seed % 3 == 0, unlimited=(0.0, 0.2, 1.0)[seed % 8 % 3]
@@ -112,7 +113,7 @@ def test_contract(tag: str) -> None:
             if planned.begins is None:  # else the method decides with what velocity it ends
                 assert_ends_at_target(planner, start, planned.end)
             assert_explains_itself(planned, start)
-    assert kept >= ROUNDS / 4, "too few of the moves were possible for this to say something"
+    assert kept >= len(seeds) / 4, "too few of the moves were possible for this to say something"
 
 
 @pytest.mark.parametrize("tag", TAGS)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-from picture_jobs import EXAMPLES, TWO
+from picture_jobs import TWO
+from planned_examples import planned_example
 
-from trajcli.job.read import job_from_text, load_job
+from trajcli.job.read import job_from_text
 from trajcli.planning.plan import Plan, plan_job
 
 
@@ -18,11 +19,4 @@ def two() -> Plan:
 
 @pytest.fixture(scope="session")
 def example() -> Callable[[str], Plan]:
-    plans: dict[str, Plan] = {}
-
-    def planned(name: str) -> Plan:
-        if name not in plans:
-            plans[name] = plan_job(load_job(EXAMPLES / f"{name}.yaml"))
-        return plans[name]
-
-    return planned
+    return planned_example

@@ -15,7 +15,7 @@ BETWEEN = np.linspace(0.0, 1.0, 11)
 
 def copp_durations(path, velocity, acceleration, jerk):
     """Return the duration of COPP's law, and that of the same law once it keeps the limits between stations."""
-    require_module("copp_py", "dev")
+    require_module("copp_py")
     import copp_py as copp
 
     s = np.linspace(path.start, path.end, STATIONS)

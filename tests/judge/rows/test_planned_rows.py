@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 import random_jobs
 from numpy.typing import NDArray
+from tiers import few
 
 from trajcli.errors import TrajcliError
 from trajcli.job.read import load_job
@@ -152,7 +153,7 @@ FAULTS: tuple[Callable[[Rows, np.random.Generator], Rows], ...] = (
 )
 
 
-def faults_are_found(seeds: range, folder: Path) -> int:
+def faults_are_found(seeds: Sequence[int], folder: Path) -> int:
     """Plant every fault into the rows of random jobs; return how many jobs there were."""
     jobs, file = 0, folder / "rows.csv"
     before: tuple[Plan, Rows] | None = None
@@ -185,7 +186,7 @@ def planted(rows: Rows, seed: int) -> Iterator[tuple[str, Rows]]:
 
 
 def test_rows_with_a_fault_are_never_those_of_the_motion(tmp_path: Path) -> None:
-    assert faults_are_found(range(14), tmp_path) >= 6
+    assert faults_are_found(few(range(14), 6), tmp_path) >= 2
 
 
 @pytest.mark.soak
