@@ -3,8 +3,10 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+# pytest needs streams to write to: where one is closed, nobody reads it
+STREAMS := (: 9>&1) 2>/dev/null || exec >/dev/null; (: 9>&2) || exec 2>/dev/null;
 # compiled tests are kept whatever the environment says: to compile them takes longer than to import them
-PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n auto
+PYTEST := $(STREAMS) PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n auto
 PEERS := .venv-peers
 EXTRAS ?= dev  # dev,dask,docs,viewers: also what the tests of viewers, of the site and of clusters need
 
@@ -22,8 +24,9 @@ demo: $(STAMP)  ## plan the main example and show the first rows
 	$(BIN)/trajcli plan examples/ur5e_pick.yaml --report ur5e_pick.report.json -o ur5e_pick.csv
 	@head -n 4 ur5e_pick.csv
 
+check: export TRAJCLI_TEST_TIER := full
 check: format lint types  ## what .ci/run does: the tests with all seeds of their campaigns
-	TRAJCLI_TEST_TIER=full $(PYTEST)
+	$(PYTEST)
 
 format: $(STAMP)
 	$(BIN)/ruff format --check .
@@ -38,8 +41,9 @@ test: $(STAMP)  ## every test, with a few seeds of each campaign
 	$(PYTEST)
 
 PART ?= tests
+soak: export TRAJCLI_TEST_TIER := soak
 soak: $(STAMP)  ## long random campaigns, and the random tests of `make check` with new examples; PART=tests/judge: those alone
-	TRAJCLI_TEST_TIER=soak $(PYTEST) -m "soak or not soak" $(PART)
+	$(PYTEST) -m "soak or not soak" $(PART)
 
 FILES ?=
 SAMPLE ?= 0

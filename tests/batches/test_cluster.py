@@ -16,6 +16,8 @@ from typing import Any
 import pytest
 from extras import require_module
 
+from trajcli.cli.app import app
+
 COMMAND = [sys.executable, "-m", "trajcli", "batch"]
 JOB = """\
 version: 1
@@ -112,13 +114,20 @@ def kill_when_under_way(cluster: Any) -> None:
 
 
 @pytest.mark.usefixtures("folder")
-def test_a_scheduler_that_is_not_there() -> None:
+def test_a_scheduler_that_is_not_there(
+    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     require_module("distributed")
-    code, found, err = run("jobs", "--engine", "dask")
-    assert (code, found) == (2, {})
+    monkeypatch.setattr("trajcli.batches.cluster._CONNECTING", 0.5)
+    with pytest.raises(SystemExit, match=r"^2$"):
+        app(["batch", "jobs", "--engine", "dask"])
+    out, err = capfd.readouterr()
+    assert out == ""
     assert "the engine dask needs the address of a scheduler" in err
-    code, found, err = run("jobs", "--engine", "dask", "--scheduler", "tcp://127.0.0.1:9")
-    assert (code, found) == (4, {})
+    with pytest.raises(SystemExit, match=r"^4$"):
+        app(["batch", "jobs", "--engine", "dask", "--scheduler", "tcp://127.0.0.1:9"])
+    out, err = capfd.readouterr()
+    assert out == ""
     assert "the scheduler tcp://127.0.0.1:9 cannot be reached" in err
     assert "Traceback" not in err
 

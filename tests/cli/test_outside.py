@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 
 import pytest
-from running import COMMAND, ENDLESS, FAST, JOB, run
+from running import COMMAND, ENDLESS, FAST, JOB, Outcome, call
 
 SIGNALS = [(signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, 130)]
 TRAJCLI = " ".join([sys.executable, "-m", "trajcli"])
@@ -143,9 +143,10 @@ def test_rows_that_cannot_be_written_leave_no_report(folder: Path) -> None:
     assert not (folder / "r.json").exists()
 
 
-def test_a_refused_plan_has_a_report(tmp_path: Path) -> None:
-    report = tmp_path / "r.json"
-    assert run("plan", "-", "--report", report, stdin=FAST).code == 1
+def test_a_refused_plan_has_a_report(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    job, report = tmp_path / "fast.yaml", tmp_path / "r.json"
+    job.write_text(FAST)
+    assert call(capfd, "plan", job, "--report", report).code == 1
     assert '"verdict": "violated"' in report.read_text()
 
 
@@ -168,20 +169,30 @@ OVERWRITES = [
 
 @pytest.mark.parametrize(("line", "output", "overwritten"), OVERWRITES)
 def test_an_output_never_overwrites_what_was_read(
-    folder: Path, line: str, output: str, overwritten: str
+    folder: Path,
+    line: str,
+    output: str,
+    overwritten: str,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.chdir(folder)
     (folder / "own.yaml").write_text(OWN_FILES)
     (folder / "arm.yaml").write_text(ROBOT)
     (folder / "points.csv").write_text("q1\n0\n0.2\n")
     (folder / "soft.yaml").symlink_to("own.yaml")
     (folder / "soft.csv").symlink_to("own.yaml")
     (folder / "hard.yaml").hardlink_to(folder / "own.yaml")
-    assert shell("trajcli plan own.yaml --no-output", folder).returncode == 0
+    assert call(capfd, "plan", "own.yaml", "--no-output").code == 0
     before = {path: path.read_bytes() for path in folder.iterdir()}
-    done = shell(line, folder)
-    assert done.returncode == 2
-    assert done.stderr.startswith(f"error: {output} to ")
-    assert f" would overwrite {overwritten} " in done.stderr
+    if ">" in line or "<" in line:  # what the shell has opened is known by its number
+        done = shell(line, folder)
+        outcome = Outcome(done.returncode, done.stdout, done.stderr)
+    else:
+        outcome = call(capfd, *line.split()[1:])
+    assert outcome.code == 2
+    assert outcome.err.startswith(f"error: {output} to ")
+    assert f" would overwrite {overwritten} " in outcome.err
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
 
 
