@@ -179,7 +179,7 @@ def _states():
 
 def _dynamics():
     from trajcli.dynamics.newton_euler import InverseDynamics
-    from trajcli.urdf.robot import robot_of_urdf
+    from trajcli.urdf.serial_robot import robot_of_urdf
 
     return InverseDynamics(robot_of_urdf(_URDF.read_bytes(), "ur5.urdf").robot)
 

@@ -34,6 +34,16 @@ ONE_SHAPE = {
 }
 """Folders that may hold more than MOST_FILES files, since these are of one shape."""
 
+SAME_NAME = 2
+SAME_NAMES = {
+    "read": "reading a job, a URDF and a log: an interface of each format",
+    "write": "writing a plan, a plot, a URDF and a log: an interface of each format",
+    "pose": "the value, the path between two, and the command with its query",
+    "jacobian": "the formula, and the command with its query",
+    "dynamics": "the fields of files, and the command with its query",
+}
+"""Why files in more than SAME_NAME folders have one name."""
+
 FORBIDDEN_NAMES = {"utils", "util", "helpers", "helper", "common", "misc", "base", "core", "manager"}
 OTHER_TESTS = ("architecture", "golden", "mutants", "oracles", "urdf/models")
 
@@ -87,6 +97,16 @@ def names_of_files_say_something(sources: Sources) -> Iterator[Offence]:
         parts = PurePosixPath(path).with_suffix("").parts
         empty = {word for part in parts for word in part.split("_")} & FORBIDDEN_NAMES
         yield from (Offence(path, f"`{word}` says nothing") for word in sorted(empty))
+
+
+def names_of_files_tell_them_apart(sources: Sources) -> Iterator[Offence]:
+    folders: dict[str, list[str]] = defaultdict(list)
+    for path in sources.texts:
+        if not is_init(path):
+            folders[PurePosixPath(path).stem].append(folder_of(path) or "trajcli")
+    for name, those in folders.items():
+        if len(those) > SAME_NAME:
+            yield Offence(name, f"stands in {len(those)} folders: {', '.join(those)}")
 
 
 def tests_stand_where_the_sources_stand(sources: Sources) -> Iterator[Offence]:
@@ -170,6 +190,24 @@ RULES = [
                 ],
             )
         ],
+    ),
+    Rule(
+        names_of_files_tell_them_apart,
+        [
+            Planted(
+                {
+                    "a/__init__.py": "",
+                    "a/law.py": "",
+                    "b/law.py": "",
+                    "c/__init__.py": "",
+                    "d/__init__.py": "",
+                },
+                {"law.py": ""},
+                [Offence("law", "stands in 3 folders: a, b, trajcli")],
+            )
+        ],
+        SAME_NAMES,
+        most=5,
     ),
     Rule(
         tests_stand_where_the_sources_stand,

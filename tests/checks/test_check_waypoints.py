@@ -7,7 +7,7 @@ import pytest
 from motions import between, trajectory
 
 from trajcli.checks.verify import verify
-from trajcli.checks.waypoints import check_waypoints
+from trajcli.checks.via_points import check_waypoints
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.kinematics.robot import Limits
 from trajcli.trajectory import Promise, ViaPoints

@@ -11,7 +11,7 @@ import pytest
 
 from trajcli.dynamics.newton_euler import InverseDynamics
 from trajcli.kinematics.robot import Friction, Payload
-from trajcli.urdf.robot import robot_of_urdf
+from trajcli.urdf.serial_robot import robot_of_urdf
 
 ARMS = json.loads(
     (Path(__file__).parents[1] / "oracles" / "inverse_dynamics.json").read_text(encoding="utf-8")

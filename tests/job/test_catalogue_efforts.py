@@ -15,8 +15,8 @@ from yaml_files import read_yaml
 
 from trajcli.dynamics.newton_euler import InverseDynamics
 from trajcli.job.robot import catalogue_names, load_robot, load_sheet
-from trajcli.urdf.limits import LEAST_PLACEHOLDER_EFFORT
-from trajcli.urdf.robot import robot_of_urdf
+from trajcli.urdf.joint_properties import LEAST_PLACEHOLDER_EFFORT
+from trajcli.urdf.serial_robot import robot_of_urdf
 from trajcli.urdf.write import urdf_of
 
 HEAVY = [name for name in catalogue_names() if not load_robot(name).without_inertia]

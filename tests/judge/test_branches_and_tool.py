@@ -13,7 +13,7 @@ import trajcli
 from trajcli.api.plans import PlannedJob
 from trajcli.judge.judgement import Judgement
 from trajcli.judge.motion import Requirements, judge_motion
-from trajcli.judge.tool import ToolJudge
+from trajcli.judge.recorded_tool import ToolJudge
 from trajcli.kinematics.robot import ToolLimits
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 

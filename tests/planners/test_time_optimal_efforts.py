@@ -21,7 +21,7 @@ from trajcli.dynamics.newton_euler import InverseDynamics
 from trajcli.errors import MissingLimitError, PlanningError
 from trajcli.kinematics.robot import Friction, Robot, point_mass
 from trajcli.planners.effort_limits import solved_within_efforts
-from trajcli.urdf.robot import robot_of_urdf
+from trajcli.urdf.serial_robot import robot_of_urdf
 
 MODELS = Path(__file__).parents[1] / "urdf" / "models"
 EFFORTS = {

@@ -9,7 +9,7 @@ import pytest
 import trajcli
 from trajcli.errors import InputError
 from trajcli.urdf.read import MAX_BYTES, MAX_DEPTH
-from trajcli.urdf.robot import UrdfRobot, robot_of_urdf
+from trajcli.urdf.serial_robot import UrdfRobot, robot_of_urdf
 
 ARM = """\
 <?xml version="1.0"?>

@@ -17,7 +17,7 @@ from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.families.choose import method_for
 from trajcli.kinematics.jacobian import jacobian
 from trajcli.kinematics.robot import Joint, Robot, unlimited
-from trajcli.urdf.robot import UrdfRobot, robot_of_urdf
+from trajcli.urdf.serial_robot import UrdfRobot, robot_of_urdf
 from trajcli.urdf.write import urdf_of
 
 MODELS = Path(__file__).parent / "models"

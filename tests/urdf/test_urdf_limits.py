@@ -9,7 +9,7 @@ import pytest
 
 from trajcli.errors import InputError
 from trajcli.kinematics.robot import Friction, LinkInertia
-from trajcli.urdf.robot import UrdfRobot, robot_of_urdf
+from trajcli.urdf.serial_robot import UrdfRobot, robot_of_urdf
 
 
 def arm(inside: str, kind: str = "revolute", link: str = "", **options: object) -> UrdfRobot:

@@ -112,7 +112,7 @@ def retime(
         VerificationError: When no time keeps the limits.
         FileError: When a file cannot be read or written.
     """
-    from trajcli.editing.limits import kept_limits
+    from trajcli.editing.kept_limits import kept_limits
     from trajcli.editing.retiming import retime as retimed
     from trajcli.editing.writing import as_read
 

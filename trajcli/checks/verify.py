@@ -245,7 +245,7 @@ def longest_factor(findings: Sequence[Finding]) -> float | None:
 def _check_via_points(trajectory: Trajectory, promises: Sequence[Promise]) -> Sequence[Finding]:
     if all(promise.via_points is None for promise in promises):
         return ()
-    from trajcli.checks.waypoints import check_waypoints
+    from trajcli.checks.via_points import check_waypoints
 
     return check_waypoints(trajectory, [promise.via_points for promise in promises])
 

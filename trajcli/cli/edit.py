@@ -115,7 +115,7 @@ def run_retime(options: RetimeCommand) -> int:
     Raises:
         TrajcliError: When anything is wrong; then nothing was written.
     """
-    from trajcli.editing.limits import kept_limits
+    from trajcli.editing.kept_limits import kept_limits
     from trajcli.editing.retiming import retime
     from trajcli.queries.arm import stated_units
 

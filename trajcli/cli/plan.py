@@ -361,7 +361,7 @@ def _effort(plan: Plan, index: int) -> tuple[float, str]:
     """Return the largest part of a limit of effort that a move uses, and the joint."""
     if plan.verdict.efforts[index] is None:
         return 0.0, ""
-    from trajcli.output.efforts import most_used
+    from trajcli.output.effort_report import most_used
 
     report = most_used(plan, index)
     return (0.0, "") if report is None else (report.used or 0.0, report.joint)

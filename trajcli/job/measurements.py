@@ -13,7 +13,7 @@ from trajcli.columns import GROUPS, Column, group_of, parse_column
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Problem, TrajcliError
 from trajcli.geometry.rotation import QUATERNION_DEFECT, matrix_from_quaternion
-from trajcli.job.files.recording import joint_columns
+from trajcli.job.files.recorded_values import joint_columns
 from trajcli.job.messages import problems_of
 from trajcli.job.yaml.document import Document
 from trajcli.job.yaml.load import read_document

@@ -244,7 +244,7 @@ def _texts(node: Node | None) -> Iterator[str]:
 
 def _recorded(document: Document, robot: Robot, path: str) -> Recorded:
     """Return the recording of a path; jobs without one do not pay for the import."""
-    from trajcli.job.files.recording import read_recording
+    from trajcli.job.files.recorded_values import read_recording
 
     return read_recording(path, document, robot)
 

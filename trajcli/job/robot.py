@@ -44,7 +44,7 @@ from trajcli.suggest import did_you_mean, nearest, nearest_names
 from trajcli.units import Quantity, Units
 
 if TYPE_CHECKING:
-    from trajcli.urdf.robot import UrdfRobot
+    from trajcli.urdf.serial_robot import UrdfRobot
 
 CATALOGUE = Path(__file__).parent.parent / "catalogue"
 
@@ -367,7 +367,7 @@ def _robot_of_urdf(
     content: bytes, name: str, root: str | None, tip: str | None, exact: bool, soft: bool
 ) -> UrdfRobot:
     """Return the robot of a URDF's content: many jobs of one process convert it once."""
-    from trajcli.urdf.robot import robot_of_urdf
+    from trajcli.urdf.serial_robot import robot_of_urdf
 
     return robot_of_urdf(content, name, root=root, tip=tip, exact=exact, soft=soft)
 

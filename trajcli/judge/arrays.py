@@ -171,6 +171,6 @@ def _tool_of(robot: _Held) -> Any:  # noqa: ANN401
     """Return what makes the judge of the tool; None for an arm without geometry."""
     if robot.value.convention is None:
         return None
-    from trajcli.judge.tool import ToolJudge
+    from trajcli.judge.recorded_tool import ToolJudge
 
     return lambda: ToolJudge(robot.value)

@@ -21,7 +21,7 @@ from trajcli.units import Units, joint_quantity
 if TYPE_CHECKING:
     from trajcli.job.read import LoadedJob
     from trajcli.judge.consumer import ConsumerJudge
-    from trajcli.judge.tool import ToolJudge
+    from trajcli.judge.recorded_tool import ToolJudge
     from trajcli.kinematics.following.motion import ToolMotion
     from trajcli.planning.plan import Plan
 
@@ -309,7 +309,7 @@ def _tolerances(word: str | None, robot: Robot, units: Units) -> list[float]:
 def _tool_of(given: _Given) -> Callable[[], ToolJudge] | None:
     if given.robot.convention is None:
         return None
-    from trajcli.judge.tool import ToolJudge
+    from trajcli.judge.recorded_tool import ToolJudge
 
     paths: Mapping[int, ToolMotion | None] | None = None
     if given.loaded is not None:

@@ -16,8 +16,8 @@ from trajcli.frozen import frozen
 from trajcli.judge.consistency import changes_of, judge_consistency
 from trajcli.judge.ends import judge_end, judge_order_of_stamps, judge_start
 from trajcli.judge.intervals import BESIDE, Intervals
+from trajcli.judge.joint_limits import JudgedRun, judge_limits
 from trajcli.judge.judgement import Judgement, worst_first
-from trajcli.judge.limits import JudgedRun, judge_limits
 from trajcli.judge.reconstruction import Interpolation, chosen_interpolation
 from trajcli.judge.stamps import Stamps, UnfitError
 from trajcli.kinematics.robot import QUANTITIES, Limits, Robot
@@ -26,7 +26,7 @@ from trajcli.trajectory import State
 
 if TYPE_CHECKING:
     from trajcli.judge.consumer import ConsumerJudge
-    from trajcli.judge.tool import ToolJudge
+    from trajcli.judge.recorded_tool import ToolJudge
 
 JUDGED_ROWS = 16384
 """Rows of a block: what is computed of them takes some 100 MB at most."""

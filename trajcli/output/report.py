@@ -38,7 +38,7 @@ from trajcli.job.report import (
 )
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.knots import Knots, has_knots, knots_of
-from trajcli.output.efforts import effort_reports, efforts_report, most_used, payload_report
+from trajcli.output.effort_report import effort_reports, efforts_report, most_used, payload_report
 from trajcli.output.sensitivity import at_limit_of
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan

@@ -9,8 +9,8 @@ from product_of_rows import difference_jacobian, pose_of
 
 from trajcli.errors import InputError
 from trajcli.kinematics.calibration.identifiability import identifiability
+from trajcli.kinematics.calibration.identification_jacobian import identification_jacobian
 from trajcli.kinematics.calibration.parameters import all_parameters, parallel_rows, parse_parameters
-from trajcli.kinematics.calibration.sensitivity import identification_jacobian
 
 FREE = {
     "all": "all",

@@ -10,6 +10,7 @@ from oracle_robots import random_arm
 from product_of_rows import difference_jacobian, pose_of
 
 from trajcli.geometry.rotation import log
+from trajcli.kinematics.calibration.identification_jacobian import identification_jacobian
 from trajcli.kinematics.calibration.parameters import (
     ROW,
     ArmParameter,
@@ -17,7 +18,6 @@ from trajcli.kinematics.calibration.parameters import (
     shifted,
     values_of,
 )
-from trajcli.kinematics.calibration.sensitivity import identification_jacobian
 from trajcli.kinematics.forward import forward
 
 

@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike
 
 from trajcli.curves.linear_systems import solve_tridiagonal
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.curves.splines.waypoints import Waypoints
+from trajcli.curves.splines.slopes import Waypoints
 from trajcli.frozen import frozen
 
 

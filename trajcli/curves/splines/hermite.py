@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from trajcli.curves.hermite import hermite_coefficients
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.curves.splines.waypoints import Waypoints
+from trajcli.curves.splines.slopes import Waypoints
 
 _FLAT = 4 * np.finfo(np.float64).eps  # of two neighbours: a difference that rounding explains has no sign
 _MOST = 3.0  # times the smaller slope beside a point: what keeps a cubic monotone whatever its other end does

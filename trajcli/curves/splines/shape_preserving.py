@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.curves.splines.hermite import cubic_through
-from trajcli.curves.splines.waypoints import Waypoints
+from trajcli.curves.splines.slopes import Waypoints
 
 _ALWAYS = 3.0  # times the slope: keeps a cubic monotone whatever the other end does within the same bound
 

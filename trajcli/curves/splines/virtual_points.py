@@ -25,7 +25,7 @@ from trajcli.curves.splines.cubic import (
     starting_velocities,
     without_acceleration,
 )
-from trajcli.curves.splines.waypoints import Waypoints
+from trajcli.curves.splines.slopes import Waypoints
 from trajcli.frozen import frozen
 
 

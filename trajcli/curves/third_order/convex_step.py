@@ -28,7 +28,7 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 from trajcli.curves.third_order.interior_point import ChainProgram
 from trajcli.curves.third_order.jerk import ThirdOrderConstraint
-from trajcli.curves.third_order.limits import SHARES, LawLimits, Sample, sampled
+from trajcli.curves.third_order.path_limits import SHARES, LawLimits, Sample, sampled
 from trajcli.curves.third_order.quartic_law import QuarticLaw
 from trajcli.curves.time_optimal.constraints import PathConstraint
 

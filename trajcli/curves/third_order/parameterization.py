@@ -18,7 +18,7 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.curves.third_order.convex_step import faster
 from trajcli.curves.third_order.first_law import EndStates, smoothed_law
 from trajcli.curves.third_order.jerk import JointJerkConstraint, ThirdOrderConstraint, curvature_jumps
-from trajcli.curves.third_order.limits import LawLimits, most_nodes, time_lost
+from trajcli.curves.third_order.path_limits import LawLimits, most_nodes, time_lost
 from trajcli.curves.third_order.quartic_law import QuarticLaw, ReversingLawError
 from trajcli.curves.time_optimal.constraints import JointConstraint, PathConstraint
 from trajcli.curves.time_optimal.parameterization import (

@@ -23,9 +23,9 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import frozen
 from trajcli.kinematics.calibration.identifiability import Identifiability, identifiability
+from trajcli.kinematics.calibration.identification_jacobian import identification_jacobian
 from trajcli.kinematics.calibration.measurements import MeasuredKind, Measurements
 from trajcli.kinematics.calibration.parameters import ArmParameter
-from trajcli.kinematics.calibration.sensitivity import identification_jacobian
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import Robot
 

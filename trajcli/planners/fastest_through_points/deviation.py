@@ -8,7 +8,7 @@ import numpy as np
 
 from trajcli.curves.extrema import peaks
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.planners.fastest_through_points.motion import PointMotion
+from trajcli.planners.fastest_through_points.segment_motion import PointMotion
 
 
 def off_chords(motion: PointMotion, points: Array, velocity: Array) -> tuple[Array, Array]:

@@ -17,7 +17,7 @@ from trajcli.errors import InputError, Place, Problem
 from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Joint, Limits, LinkInertia, Robot
 from trajcli.urdf.dh import AxisInChain, DhTable, dh_table
-from trajcli.urdf.limits import (
+from trajcli.urdf.joint_properties import (
     JointProperties,
     joint_properties,
     link_inertia,

@@ -66,7 +66,7 @@ def _kept(requirements: Requirements, units: Units) -> KeptLimits:
     robot = requirements.robot
     arms = [robot, *requirements.by_move.values()]
     if robot.convention is not None and any(arm.limits.tcp != ToolLimits() for arm in arms):
-        from trajcli.judge.tool import ToolJudge
+        from trajcli.judge.recorded_tool import ToolJudge
 
         requirements = replace(requirements, tool=lambda: ToolJudge(robot))
     say = partial(amount_text, joint_types=robot.joint_types, units=units)
