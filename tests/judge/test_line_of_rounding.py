@@ -97,10 +97,19 @@ def test_time_stamps_that_are_off(piece, planted, certainty, side):
 @pytest.mark.parametrize("side", SIDES)
 @pytest.mark.parametrize(("planted", "certainty"), PLANTED)
 @pytest.mark.parametrize("order", [1, 2])
-def test_rates_that_a_row_states(order, planted, certainty, side):
-    """A joint of constant rate: its column says more of it than differences and curves of rougher columns."""
-    kind, rate = ("velocity", "acceleration")[order - 1], side * np.ones(T.size)
-    columns = (rate * T, rate) if order == 1 else (rate * T**2 / 2, rate * T, rate)
+@pytest.mark.parametrize("row", [0, 2, 4])
+def test_rates_that_a_row_states(row, order, planted, certainty, side):
+    """Linear rates, largest at one row: its column says more of it than rougher columns and their curve."""
+    kind, lengths, rate = ("velocity", "acceleration")[order - 1], np.diff(T), np.full(T.size, 0.5 * side)
+    rate[row] = side
+
+    def summed(changes: np.ndarray) -> np.ndarray:
+        return np.append(0.0, np.cumsum(changes))
+
+    columns = [summed(lengths * (rate[1:] + rate[:-1]) / 2), rate]
+    if order == 2:
+        bend = lengths**2 * np.diff(rate) / 12
+        columns.insert(0, summed(lengths * (columns[0][1:] + columns[0][:-1]) / 2 - bend))
     off = {"q": 1e-3, "qd": OFF} if order == 1 else {"q": 1e-3, "qd": 1e-3, "qdd": OFF}
     limits = one_limit(kind, side, 1.0 - planted * OFF)
     found = found_in(rows(*columns, **off), bare_robot(limits), kind, ("cubic", "quintic")[order - 1])

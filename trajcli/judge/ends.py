@@ -68,7 +68,7 @@ def _position(
         return []
     room = stated_errors(q, resolution.q, resolution.relative)[0]
     over = np.abs(q[0] - wanted) - tolerance
-    joint = int(over.argmax())
+    joint = int(np.where(over > 0, over - room, -np.inf).argmax())  # roundings differ by joint
     if over[joint] <= 0:
         return []
     value, limit = float(q[0, joint]), float(wanted[joint])
@@ -114,7 +114,7 @@ def _velocity(
         return []
     room = stated_errors(qd, resolution.qd, resolution.relative)[0] + _REST
     over = np.abs(qd[0] - wanted)
-    joint = int(over.argmax())
+    joint = int((over - room).argmax())
     if over[joint] <= room[joint]:
         return []
     value, limit = float(qd[0, joint]), float(wanted[joint])

@@ -1,0 +1,116 @@
+"""Where rows begin and end: planted offsets of any joint, in either direction, on both sides of each line."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from recorded_rows import bare_robot, part
+
+from trajcli.findings import Finding
+from trajcli.judge.judgement import Judgement
+from trajcli.judge.motion import Requirements, judge_motion
+from trajcli.kinematics.robot import unlimited
+from trajcli.streams.recorded_motion import RecordedMotion, Resolution
+from trajcli.trajectory import State
+
+TOLERANCE, OFF = np.array([1e-3, 2e-3, 3e-3]), np.array([1e-6, 2e-6, 3e-6])
+START, END = np.array([0.1, -0.2, 0.3]), np.array([0.4, 0.5, -0.6])
+T = np.array([0.0, 0.7, 1.9, 2.4])
+
+
+def motion(off: np.ndarray = OFF) -> RecordedMotion:
+    """Return rows that rest at the start and then at the end, with roundings of their columns by joint."""
+    q, qd = np.stack([START, START, END, END]), np.zeros((4, 3))
+    return RecordedMotion(T, q, qd, None, None, None, None, None, Resolution(0.0, off, off, off), "rows")
+
+
+def judged(rows: RecordedMotion, *, end: bool = True, blocks: int = 10) -> Judgement:
+    """Return the judgement of rows that shall begin in START, and end in END where that is said."""
+    states = [State(each, np.zeros(3), np.zeros(3)) for each in (START, END)]
+    required = Requirements(
+        bare_robot(unlimited(3)),
+        start=states[0] if end else None,
+        start_tolerance=TOLERANCE if end else None,
+        end=states[1] if end else None,
+    )
+    parts = [part(rows, slice(low, low + blocks)) for low in range(0, len(rows.t), blocks)]
+    return judge_motion(lambda: parts, required)
+
+
+def states_of(rows: RecordedMotion, *, end: bool = True) -> list[Finding]:
+    return [found for found in judged(rows, end=end).findings if found.rule == "state"]
+
+
+def moved(rows: RecordedMotion, name: str, row: int, joint: int, by: float) -> RecordedMotion:
+    values = getattr(rows, name).copy()
+    values[row, joint] += by
+    return replace(rows, **{name: values})
+
+
+def test_a_motion_from_start_to_end_is_as_it_shall_be() -> None:
+    assert states_of(motion()) == []
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("joint", range(3))
+@pytest.mark.parametrize(("row", "kind"), [(0, "start"), (-1, "end")])
+@pytest.mark.parametrize(
+    ("roundings", "certainty"), [(-0.5, None), (0.5, "within rounding"), (1.5, "exceeded"), (2.9, "exceeded")]
+)
+def test_a_position_beyond_its_tolerance(roundings, certainty, row, kind, joint, sign) -> None:
+    by = sign * (TOLERANCE[joint] + roundings * OFF[joint])
+    found = states_of(moved(motion(), "q", row, joint, by))
+    if certainty is None:
+        assert found == []
+        return
+    (one,) = found
+    assert (one.kind, one.joint, one.quantity) == (kind, f"j{joint + 1}", "position")
+    assert (one.severity, one.certainty, one.row) == ("error", certainty, range(1, 5)[row])
+    assert one.value - one.limit == pytest.approx(by, rel=1e-9)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("joint", range(3))
+@pytest.mark.parametrize(("row", "kind"), [(0, "start"), (-1, "end")])
+@pytest.mark.parametrize("end", [True, False])
+@pytest.mark.parametrize("share", [0.9, 1.1, 100.0])
+def test_a_velocity_that_rounding_does_not_explain(share, end, row, kind, joint, sign) -> None:
+    """Beside its rounding six decimals of rest are allowed. Nobody asked for rest at the end: a warning."""
+    by = sign * share * (OFF[joint] + 1e-6)
+    found = states_of(moved(motion(), "qd", row, joint, by), end=end)
+    if share < 1 or (kind == "start" and not end):
+        assert found == []
+        return
+    (one,) = found
+    assert (one.kind, one.joint, one.quantity, one.value) == (kind, f"j{joint + 1}", "velocity", by)
+    assert (one.severity, one.certainty) == ("error" if end else "warning", "exceeded")
+
+
+@pytest.mark.parametrize("name", ["q", "qd"])
+@pytest.mark.parametrize("row", [0, -1])
+def test_a_joint_with_rough_numbers_hides_no_other_one(name: str, row: int) -> None:
+    """The first joint is off by more, which its rounding explains; the third one by what nothing explains."""
+    rows = motion(np.array([1e-1, 1e-6, 1e-6]))
+    rows = moved(moved(rows, name, row, 0, 5e-2), name, row, 2, 1e-2)
+    (found,) = states_of(rows)
+    assert (found.joint, found.severity, found.certainty) == ("j3", "error", "exceeded")
+
+
+@pytest.mark.parametrize("blocks", [1, 2, 3, 10])
+@pytest.mark.parametrize(
+    ("stamps", "wrong"),
+    [
+        ((0.0, 0.7, 0.7, 2.4), [3]),
+        ((0.0, 0.7, 0.6, 2.4), [3]),
+        ((0.0, 1.9, 0.7, 0.8), [3, 4]),  # later than the row before, earlier than the latest one
+        ((0.0, 0.7, 1.9, 1.9), [4]),
+    ],
+)
+def test_stamps_are_later_than_all_before_them(stamps, wrong, blocks) -> None:
+    judgement = judged(replace(motion(), t=np.array(stamps)), blocks=blocks)
+    found = [each for each in judgement.findings if each.rule == "time"]
+    assert sum(each.count for each in found) == len(wrong)
+    assert {each.row for each in found} <= set(wrong)
+    assert all((each.severity, each.certainty) == ("error", "exceeded") for each in found)
