@@ -11,12 +11,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from planned_examples import planned_example
 from random_mappings import jobs
+from tiers import few
 
 from trajcli.job.dump import dump_job
 from trajcli.job.read import LoadedJob, job_from_text, load_job
 from trajcli.planning.plan import plan_job
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.yaml"))
+PLANNED = few(EXAMPLES, 12)
 
 
 def assert_same(a: LoadedJob, b: LoadedJob) -> None:
@@ -47,6 +49,8 @@ def test_the_resolved_example_gives_the_same_curve(example: Path) -> None:
     first = load_job(example)
     second = job_from_text(dump_job(first))
     assert_same(first, second)
+    if example not in PLANNED:
+        return
     plans = planned_example(example.stem), plan_job(second)
     curves = [plan.trajectory.curve for plan in plans]
     assert np.array_equal(curves[0].breaks, curves[1].breaks)

@@ -117,13 +117,16 @@ def test_bounds_in_messages_are_given_back(move: Job) -> None:
 
 @pytest.mark.parametrize(
     "law",
-    [
-        {"shape": "quintic", "speed": 0.1, "duration": 0.2},
-        {"shape": "trapezoid", "speed": 1, "acceleration": 100},
-        {"shape": "trapezoid", "duration": 0.2, "acceleration": 100},
-        {"shape": "trapezoid", "duration": 0.2, "speed": 2},
-        {"shape": "jerk_limited", "speed": 3, "acceleration": 50, "jerk": 900},
-    ],
+    few(
+        [
+            {"shape": "quintic", "speed": 0.1, "duration": 0.2},
+            {"shape": "trapezoid", "speed": 1, "acceleration": 100},
+            {"shape": "trapezoid", "duration": 0.2, "acceleration": 100},
+            {"shape": "trapezoid", "duration": 0.2, "speed": 2},
+            {"shape": "jerk_limited", "speed": 3, "acceleration": 50, "jerk": 900},
+        ],
+        3,
+    ),
 )
 @pytest.mark.parametrize("jerk", [None, 300])
 def test_laws_of_the_tool(law: Job, jerk: float | None) -> None:

@@ -20,6 +20,7 @@ from matplotlib.image import imread
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from picture_jobs import EXAMPLES, TWO, many_joints
+from tiers import few
 
 from trajcli.errors import InputError
 from trajcli.job.read import job_from_text
@@ -67,7 +68,7 @@ def overlaps(picture: Picture) -> list[tuple[str, str]]:
     return outside + pairs
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", few(NAMES, 16))
 def test_texts_of_examples_do_not_overlap(name: str, example: Example) -> None:
     assert overlaps(picture_of(example(name))) == []
 
