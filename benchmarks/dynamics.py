@@ -206,7 +206,7 @@ def _on_grid(path, constraint):
     """Prepare rows, passes and time law on a fixed grid, within velocities and another constraint."""
     import numpy as np
 
-    from trajcli.curves.time_optimal.collocation import collocation_rows
+    from trajcli.curves.time_optimal.collocation import interval_rows
     from trajcli.curves.time_optimal.constraints import JointConstraint
     from trajcli.curves.time_optimal.passes import solve
     from trajcli.curves.time_optimal.time_law import law_of
@@ -216,7 +216,7 @@ def _on_grid(path, constraint):
     grid, nowhere = np.linspace(0.0, 1.0, INTERVALS + 1), np.empty(0)
 
     def run():
-        rows = collocation_rows(grid, [velocities, constraint()], nowhere)
+        rows = interval_rows(grid, [velocities, constraint()], nowhere)
         return law_of(grid, solve(rows, 0.0, 0.0).x).duration
 
     return run, _shown

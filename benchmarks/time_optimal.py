@@ -17,7 +17,7 @@ def ours():
     from scipy.interpolate import CubicSpline
 
     from trajcli.curves.piecewise import PiecewisePolynomial
-    from trajcli.curves.time_optimal.collocation import collocation_rows
+    from trajcli.curves.time_optimal.collocation import interval_rows
     from trajcli.curves.time_optimal.constraints import JointConstraint
     from trajcli.curves.time_optimal.passes import solve
     from trajcli.curves.time_optimal.time_law import law_of
@@ -28,7 +28,7 @@ def ours():
     grid, nowhere = np.linspace(0.0, 1.0, INTERVALS + 1), np.empty(0)
 
     def run():
-        rows = collocation_rows(grid, [JointConstraint(path, velocity, acceleration)], nowhere)
+        rows = interval_rows(grid, [JointConstraint(path, velocity, acceleration)], nowhere)
         return law_of(grid, solve(rows, 0.0, 0.0).x).duration
 
     return run, _shown

@@ -24,7 +24,7 @@ from trajcli.dynamics.newton_euler import InverseDynamics, direction
 from trajcli.frozen import frozen
 
 _MOST = 1e3  # excess that is told: limits lowered by more would be rounding
-_SAMPLES = (0.2, 0.5, 0.8)  # of an interval: at its ends the rows hold
+_SAMPLES = (0.0, 0.5, 1.0)  # of an interval: sdd is largest at an end, or nearly so
 _SHARE = 0.5  # of what gravity leaves: what the tangent may take of it at rest
 _SAME = 1e-12  # of the largest: states on both sides of a break that differ by less are one
 _SLOWEST = 1e-3  # of the largest speed at which a tangent is taken
@@ -59,7 +59,7 @@ class _PathDynamics:
         index = np.clip(np.searchsorted(self._s, s), 0, max(self._s.size - 1, 0))
         new = np.ones(s.size, dtype=bool)
         if self._s.size:
-            apart = np.abs(self._states[index] - states) <= _SAME * np.abs(states).max(axis=0)
+            apart = np.abs(self._states[index] - states) <= _SAME * np.abs(states).max(axis=0, initial=0.0)
             new = ~((self._s[index] == s) & apart.all(axis=1))
         values = np.empty_like(states)
         values[~new] = self._values[index[~new]]
@@ -87,7 +87,7 @@ class EffortConstraint:
             known. It says where viscous friction is not overestimated.
     """
 
-    estimate: ClassVar[float] = 0.3  # rows of efforts turn with the whole arm
+    estimate: ClassVar[float] = 0.3
 
     dynamics: InverseDynamics
     path: PiecewisePolynomial
@@ -131,6 +131,11 @@ class EffortConstraint:
         slopes, offsets = self._viscous_rows(s, first, rub, rooms)
         return ConstraintRows(a, b + slopes, rooms - offsets, np.full(s.size, np.inf))
 
+    def largest(self, s: Array, side: Side) -> Array:
+        """Return no bound at points (p,): sdd may be anything."""
+        del side
+        return np.full(s.size, np.inf)
+
     def excess(self, law: LawPieces) -> Array:
         """Return zeros for velocity, and the shares used of what gravity leaves, at samples, (2, N)."""
         q = law.along(self.path).transpose(0, 2, 1)[:, None]
@@ -141,7 +146,9 @@ class EffortConstraint:
         # where the limit is met the share is 1 whatever gravity is taken to be: that of the near end is known
         gravity = self._known.at(begins, *states)[2]
         moving = self.dynamics.rigid_effort(position, rate, change) - gravity + self._viscous * rate
-        rooms = self._rooms(gravity + self._coulomb * direction(rate))
+        rooms = self._rooms(
+            gravity + self._coulomb * direction(rate[1])
+        )  # at rest at an end it is that of the motion
         used = self._both_bounds(moving)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             shares = np.where(rooms > 0, used / rooms, np.where(used > rooms, _MOST, 0.0))

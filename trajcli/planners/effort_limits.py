@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 _ROOM = 5e-7  # relative: half of what checks allow
 _ROUNDS = 3  # of tangents at the speeds of the motion before: the last one changes next to nothing
+_RESTS = 1e-9  # of the largest speed: less at an end is rounding
 _TRIES = 4  # of lower limits between moving states
 _LOWERED = 1.5  # times what is proven to be over them
 
@@ -85,7 +86,8 @@ def solved_within_efforts(path: PiecewisePolynomial, robot: Robot, solve: _Solve
         factor, over = _proven(motion.trajectory, robot)
         if factor == 1.0:
             return motion
-        if not motion.law.piece_ends(1)[0][0].any() and not motion.law.piece_ends(1)[1][-1].any():
+        begins, ends = motion.law.piece_ends(1)
+        if max(abs(float(begins[0, 0])), abs(float(ends[-1, 0]))) <= _RESTS * float(begins.max()):
             return _slower(motion, factor)
         lowered /= 1.0 + _LOWERED * over
     return motion

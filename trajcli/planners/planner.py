@@ -83,8 +83,7 @@ class Event:
 
 def stretched(factor: float) -> Event:
     """Return the event of a time-optimal law that lasts `factor` times longer than it was computed."""
-    text = f"stretched {factor:.9g} times to keep all limits between grid points"
-    return Event("stretched" if factor > 1 + LITTLE else "refined", text)
+    return Event("stretched", f"stretched {factor:.9g} times to keep all limits between grid points")
 
 
 @frozen

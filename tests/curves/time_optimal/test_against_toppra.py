@@ -58,9 +58,10 @@ def contest(seed, points):
 @pytest.mark.parametrize(("seed", "points"), [(0, 5), (1, 5), (2, 20)])
 def test_as_fast_as_toppra(seed, points):
     found, path, velocity, acceleration, theirs = contest(seed, points)
-    assert found.stretch == 1.0
-    assert found.trajectory.duration <= 1.01 * theirs
-    assert found.trajectory.duration >= 0.99 * theirs  # on so fine a grid toppra is near the optimum too
+    assert found.stretch <= 1.0005
+    assert found.trajectory.duration <= 1.001 * theirs
+    assert found.trajectory.duration >= 0.999 * theirs  # on so fine a grid toppra is near the optimum too
+    assert found.lower_bound <= theirs
     assert_motion(found, path, velocity, acceleration)
 
 
@@ -71,6 +72,6 @@ def test_as_fast_as_toppra_on_fifty_splines(points):
         found, path, velocity, acceleration, theirs = contest(seed, points)
         assert_motion(found, path, velocity, acceleration)
         if theirs is not None:
-            assert found.trajectory.duration <= 1.01 * theirs, f"seed {seed}"
+            assert found.trajectory.duration <= 1.002 * theirs, f"seed {seed}"
             if points <= 20:
-                assert found.trajectory.duration >= 0.99 * theirs, f"seed {seed}"
+                assert found.trajectory.duration >= 0.998 * theirs, f"seed {seed}"

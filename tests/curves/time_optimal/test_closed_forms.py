@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from topp_paths import assert_motion, over, polyline, spline, symmetric
+from topp_paths import assert_motion, polyline, spline, symmetric
 
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.time_optimal.constraints import SpeedConstraint
@@ -104,12 +104,12 @@ def test_where_the_derivative_of_the_path_vanishes_any_speed_is_rest(path, durat
     assert_motion(found, path, velocity, acceleration)
 
 
-def test_what_no_grid_settles_is_stretched():
-    """With s^3 the path has no derivative at all in the middle: sdd is too large next to it, whatever the grid."""
+def test_where_the_path_stands_still_in_its_middle_next_to_nothing_is_lost():
+    """With s^3 the path has no derivative at all there: sd would be infinite. From -1 to 1, accelerate and brake."""
     path, velocity, acceleration = powers(-1, 1, [1, -3, 3, -1]), symmetric(10.0), symmetric(2.0)
     found = time_optimal(path, velocity, acceleration)
-    assert found.stretch > 1.01
-    assert max(over(found.trajectory, velocity, acceleration)) == pytest.approx(1.0, rel=1e-9)
+    assert found.lower_bound == 0.0
+    assert 2.0 * sqrt(2.0) <= found.trajectory.duration <= 1.003 * 2.0 * sqrt(2.0)
     assert_motion(found, path, velocity, acceleration)
 
 

@@ -79,7 +79,7 @@ def a_law(seed, size=2.0):
     grid = np.linspace(0.0, 1.0, 61)
     x = rng.uniform(0.3, 3.0, 61) * size
     x[[0, -1]] = 0.0
-    return law_pieces(grid, x, np.zeros(60))
+    return law_pieces(grid, x)
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -13,7 +13,7 @@ from topp_paths import random_bounds, spline, symmetric
 
 from trajcli.curves.hermite import hermite_pieces
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.curves.time_optimal.collocation import collocation_rows
+from trajcli.curves.time_optimal.collocation import interval_rows
 from trajcli.curves.time_optimal.constraints import ConstraintRows, JointConstraint
 from trajcli.curves.time_optimal.passes import UnreachableSpeedError, controllable, solve
 
@@ -28,19 +28,32 @@ def raw_rows(path, s, side, velocity, acceleration):
         speeds = np.where(
             first > 0, velocity[:, 1] / first, velocity[:, 0] / np.where(first == 0, -0.0, first)
         )
-    return first, second, float(np.min(np.where(first == 0, np.inf, speeds) ** 2))
+    turns = np.where(second > 0, acceleration[:, 1], -acceleration[:, 0]) / np.abs(second)
+    squares = np.where(np.abs(first) < 1e-9, turns, speeds**2)
+    return first, second, float(np.min(squares))
 
 
 def programme(path, near, far, velocity, acceleration):
-    """Return A, b of A (x, u) <= b for one interval: accelerations at both ends."""
+    """Return A, b of A (x, u) <= b for one interval: v1^2 - v0^2 is twice the distance times the acceleration."""
     double, rows, bounds = 2.0 * (far - near), [], []
-    for s, side, share in ((near, "right", 0.0), (far, "left", 1.0)):
-        first, second, _ = raw_rows(path, s, side, velocity, acceleration)
-        for j in range(path.dimension):
-            row = np.array([second[j], first[j] + share * double * second[j]])
-            rows += [row, -row]
-            bounds += [acceleration[j, 1], -acceleration[j, 0]]
+    first, last = (path.evaluate(s, 1, side=side) for s, side in ((near, "right"), (far, "left")))
+    gone = path.evaluate(far) - path.evaluate(near)
+    for j in range(path.dimension):
+        row = np.array([last[j] ** 2 - first[j] ** 2, last[j] ** 2 * double])
+        rows += [row, -row]
+        bounds += sorted(2.0 * acceleration[j] * gone[j], reverse=True)
+        bounds[-1] *= -1.0
     return np.array(rows), np.array(bounds), double
+
+
+def turning(path, grid):
+    """Return the grid with the places where a joint turns, from numpy's roots."""
+    places = []
+    for k, (begin, length) in enumerate(zip(path.breaks, path.lengths, strict=False)):
+        for joint in range(path.dimension):
+            roots = np.roots(np.polyder(path.coefficients[:, k, joint]))
+            places += [begin + z.real for z in roots if abs(z.imag) < 1e-12 and 0 < z.real < length]
+    return np.union1d(grid, places)
 
 
 def best(direction, A, b, double, x_range, y_range):
@@ -83,8 +96,8 @@ def test_the_passes_solve_the_linear_programmes(seed, moving):
     if seed % 2:  # q'' jumps at the breaks
         path = hermite_pieces(path.breaks, rng.uniform(-2, 2, (2, 5, joints)))
     velocity, acceleration = random_bounds(rng, joints)
-    grid = np.union1d(np.linspace(0, 1, count), path.breaks)
-    intervals = collocation_rows(grid, [JointConstraint(path, velocity, acceleration)], NOWHERE)
+    grid = turning(path, np.union1d(np.linspace(0, 1, count), path.breaks))
+    intervals = interval_rows(grid, [JointConstraint(path, velocity, acceleration)], NOWHERE)
     top = controllable(intervals, np.inf).upper[-1]
     end = 0.3 * top if moving else 0.0
     lower, upper = sets_by_programmes(path, grid, velocity, acceleration, end)
@@ -101,8 +114,8 @@ def test_the_passes_solve_the_linear_programmes(seed, moving):
 def test_an_end_that_is_too_fast_has_no_programme_either():
     path = spline(np.array([[0.0], [0.3], [0.1], [0.5]]))
     velocity, acceleration = symmetric(1.0), symmetric(1.0)
-    grid = np.union1d(np.linspace(0, 1, 31), path.breaks)
-    intervals = collocation_rows(grid, [JointConstraint(path, velocity, acceleration)], NOWHERE)
+    grid = turning(path, np.union1d(np.linspace(0, 1, 31), path.breaks))
+    intervals = interval_rows(grid, [JointConstraint(path, velocity, acceleration)], NOWHERE)
     allowed = np.sqrt(solve(intervals, 0.0, np.inf).x[-1])
     assert solve(intervals, 0.0, allowed * (1 - 1e-9)).x[-1] == pytest.approx(allowed**2)
     with pytest.raises(UnreachableSpeedError, match="at the end") as caught:
@@ -122,10 +135,10 @@ def test_controllable_sets_of_another_library():
     path = PiecewisePolynomial(given["breaks"], coefficients)
     demand = JointConstraint(path, symmetric(*given["vmax"]), symmetric(*given["amax"]))
     grid = np.linspace(path.start, path.end, given["N"] + 1)
-    both = collocation_rows(grid, [demand], NOWHERE)
-    half = len(both.P) // 2  # the table is of the collocation scheme: rows at the near ends only
-    near = replace(both, P=both.P[:half], R=both.R[:half], C=both.C[:half])
-    found = controllable(near).upper
+    rows = interval_rows(grid, [demand], NOWHERE)
+    a, b, c = rows.near  # the table is of the collocation scheme: rows at the near ends only
+    D = 2.0 * np.diff(grid)
+    found = controllable(replace(rows, P=D * b - a, R=a, C=D * c)).upper
     np.testing.assert_allclose(found, case["expected"]["K_max"], rtol=0, atol=case["tolerance"])
 
 
@@ -139,7 +152,7 @@ def test_rows_of_any_kind_join_in():
             return ConstraintRows(-ones, 0 * ones, ones, np.full(s.size, np.inf))
 
     joints = JointConstraint(path, symmetric(10.0), symmetric(2.0))
-    found = controllable(collocation_rows(grid, [joints, Braking()], NOWHERE)).upper
+    found = controllable(interval_rows(grid, [joints, Braking()], NOWHERE)).upper
     np.testing.assert_allclose(found, 2.0 * (1.0 - grid), atol=1e-14)
 
 
@@ -150,7 +163,7 @@ def test_of_two_caps_at_a_place_the_lower_one_counts():
             return ConstraintRows(nothing, nothing, nothing, np.where(s == 0.5, beside[side], 9.0))
 
     joints = JointConstraint(spline(np.array([[0.0], [1.0]])), symmetric(9.0), symmetric(9.0))
-    assert collocation_rows(np.array([0.0, 0.5, 1.0]), [joints, Capped()], NOWHERE).cap[1] == 0.2
+    assert interval_rows(np.array([0.0, 0.5, 1.0]), [joints, Capped()], NOWHERE).cap[1] == 0.2
 
 
 @pytest.mark.parametrize("seed", [1, 139])
@@ -164,6 +177,6 @@ def test_a_joint_that_turns_next_to_a_place_does_no_harm(seed):
     for turn in (0.0, 1.4e-16, -1.4e-16, 1e-13):
         grid = np.linspace(-1, 1, 41)
         grid[20] = turn
-        found.append(solve(collocation_rows(grid, [demand], NOWHERE), 0.0, 0.0).x)
+        found.append(solve(interval_rows(grid, [demand], NOWHERE), 0.0, 0.0).x)
     for other in found[1:]:
         np.testing.assert_allclose(other, found[0], rtol=1e-9, atol=1e-12)

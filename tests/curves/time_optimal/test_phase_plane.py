@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import linprog
 
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.curves.time_optimal.collocation import CollocationRows
+from trajcli.curves.time_optimal.collocation import IntervalRows
 from trajcli.curves.time_optimal.constraints import JointConstraint
 from trajcli.curves.time_optimal.maximum_velocity import largest_in_intervals, maximum_velocity_curve
 from trajcli.curves.time_optimal.phase_plane import PhasePlane
@@ -133,14 +133,15 @@ def test_what_was_known_of_unchanged_intervals_is_what_they_would_have(seed: int
     rng = np.random.default_rng(seed)
     P, R = rng.normal(size=(2, 6, 30))
     C, cap = rng.uniform(0.05, 1.0, (6, 30)), rng.uniform(0.1, 9.0, 31)
-    rest = np.zeros(30), np.ones(30), np.zeros(6, dtype=np.intp)
-    before = CollocationRows(np.arange(31.0), P, R, C, cap, *rest)
+    none, nothing = np.zeros(6, dtype=np.intp), (np.empty((0, 30)),) * 3
+    eased, rest = np.ones((1, 31)), (np.zeros(31, dtype=bool), none, none, nothing, nothing)
+    before = IntervalRows(np.arange(31.0), P, R, C, C, eased, cap, *rest)
     known = maximum_velocity_curve(before)
     changed = rng.random(30) < 0.3
     lower = C / np.where(changed, 3.0, 1.0)
     caps = cap / np.append(np.where(changed, 2.0, 1.0), 1.0)
     caps[1:] = np.where(changed, np.minimum(caps[1:], cap[1:] / 2.0), caps[1:])
-    after = CollocationRows(np.arange(31.0), P, R, lower, caps, *rest)
+    after = IntervalRows(np.arange(31.0), P, R, lower, C, eased, caps, *rest)
     np.testing.assert_allclose(maximum_velocity_curve(after, known, changed), maximum_velocity_curve(after))
     np.testing.assert_allclose(
         maximum_velocity_curve(after)[:-1], largest_in_intervals(P, R, lower, caps[:-1])

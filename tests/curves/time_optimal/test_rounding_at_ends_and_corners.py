@@ -40,4 +40,4 @@ def test_however_large_the_parameter_is_the_motion_is_the_same(scale):
     bounds = symmetric(np.inf, 2.0), symmetric(3.0, 4.0)
     plain = time_optimal(spline(points), *bounds).trajectory
     scaled = time_optimal(spline(points, np.linspace(0.0, scale, 4)), *bounds).trajectory
-    assert scaled.duration == pytest.approx(plain.duration, rel=1e-9)
+    assert scaled.duration == pytest.approx(plain.duration, rel=1e-4)

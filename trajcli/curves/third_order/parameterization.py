@@ -56,14 +56,12 @@ class JerkLimitedMotion(TimeOptimalMotion):
     Attributes:
         second_order: The optimum without limits of jerk: no motion is faster.
         steps: Number of convex steps.
-        lower_bound: Duration that no motion along the path is shorter than, s.
-        bounding_joint: The joint that alone needs so long between its turning points, which is proven; None
-            where it is the optimum without limits of jerk, up to the estimate of what its grid loses.
+        bounding_joint: The joint that alone needs the lower bound between its turning points; None where it
+            is that without limits of jerk.
     """
 
     second_order: TimeOptimalMotion
     steps: int
-    lower_bound: float
     bounding_joint: int | None
 
 
@@ -77,6 +75,7 @@ def jerk_limited_time_optimal(
     end: tuple[float, float] = (0.0, 0.0),
     further: Sequence[PathConstraint] = (),
     further_jerk: Sequence[ThirdOrderConstraint] = (),
+    along: tuple[float, float] = (np.inf, np.inf),
 ) -> JerkLimitedMotion:
     """Return the fastest motion that is found along a path within bounds that hold for all t.
 
@@ -91,6 +90,7 @@ def jerk_limited_time_optimal(
         end: The same at the end.
         further: Other constraints of velocity and acceleration; kept as far as their excess tells.
         further_jerk: Other constraints of jerk.
+        along: As for `time_optimal`.
 
     Raises:
         UnlimitedSpeedError: When nothing limits the motion somewhere.
@@ -102,7 +102,7 @@ def jerk_limited_time_optimal(
     ends = EndStates(start, end)
     speeds = {"start_velocity": start[0], "end_velocity": end[0]}
     stops = curvature_jumps(path, bounds[2])
-    second = time_optimal(path, bounds[0], bounds[1], **speeds, further=further, stops=stops)
+    second = time_optimal(path, bounds[0], bounds[1], **speeds, further=further, stops=stops, along=along)
     limits = LawLimits(
         (JointConstraint(path, bounds[0], bounds[1]), *further),
         (JointJerkConstraint(path, bounds[2]), *further_jerk),
@@ -118,6 +118,7 @@ def jerk_limited_time_optimal(
         curve, trajectory = scale_time(curve, stretch), scale_time(trajectory, stretch)
     times = curve.breaks[np.searchsorted(law.s, second.stops)]
     lowered = int((search.lowered > 1.0).any(axis=0).sum())
+    alone, joint = turning_bound(path, (bounds[0], bounds[1], bounds[2]), (start[0], end[0]))
     return JerkLimitedMotion(
         trajectory,
         curve,
@@ -128,22 +129,11 @@ def jerk_limited_time_optimal(
         lost / law.duration,
         second.stops,
         times,
+        max(second.lower_bound, alone),
         second,
         search.steps,
-        *_lower_bound(path, second, (bounds[0], bounds[1], bounds[2]), ends),
+        joint if alone > second.lower_bound else None,
     )
-
-
-def _lower_bound(
-    path: PiecewisePolynomial,
-    second: TimeOptimalMotion,
-    bounds: tuple[Array, Array, Array],
-    ends: EndStates,
-) -> tuple[float, int | None]:
-    """Return the higher of two bounds of the duration, and the joint that sets it, if one alone does."""
-    without_jerk = second.law.duration / second.stretch * (1.0 - second.lost)
-    of_joint, joint = turning_bound(path, bounds, (ends.start[0], ends.end[0]))
-    return (of_joint, joint) if of_joint > without_jerk else (without_jerk, None)
 
 
 class _Search:

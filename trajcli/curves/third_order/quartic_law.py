@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array, control_points, derivative_coefficients, horner
-from trajcli.curves.time_optimal.time_law import LawPieces
+from trajcli.curves.time_optimal.time_law import LawPieces, quartic_coefficients
 from trajcli.frozen import frozen
 
 _BACKWARD = 1e-9  # of the largest speed in a piece: less is rounding
@@ -60,11 +60,8 @@ class QuarticLaw:
     @cached_property
     def coefficients(self) -> Array:
         """Coefficients of the pieces, each on its own time from 0 on, highest power first, shape (5, N)."""
-        h, v, a = self.lengths, self.speed, self.acceleration
-        rise = 6.0 * np.diff(v) / h**2
-        near = rise - (4.0 * a[:-1] + 2.0 * a[1:]) / h
-        far = (2.0 * a[:-1] + 4.0 * a[1:]) / h - rise
-        return np.stack([(far - near) / (24.0 * h), near / 6.0, 0.5 * a[:-1], v[:-1], self.s[:-1]])
+        a = self.acceleration
+        return quartic_coefficients(self.lengths, self.s, self.speed, a[:-1], a[1:])
 
     @property
     def _discriminant(self) -> Array:

@@ -1,12 +1,16 @@
-"""Collocation of constraints: rows P x + R y <= C for the intervals of a grid, from both of their ends.
+"""Rows P x + R y <= C of the constraints over the intervals of a grid, where x and y are sd^2 at their ends.
 
-There x is sd^2 at the near end of an interval, and y at its far end. Between them sdd grows from u - d to
-u + d, where d is the sdd ramp of the interval and u = (y - x) / 2E its mean. E is the distance that the mean
-of both speeds covers in the time of the interval: without a ramp its length, and else nearly so. The near row
-a (u - d) + b x <= c has P = 2Eb - a, R = a and C = 2E(c + ad), the far row a (u + d) + b y <= c has P = -a,
-R = 2Eb + a and C = 2E(c - ad).
+A row a u + b x <= c times |a| is, integrated over an interval in which a keeps its sign, one about the change
+of (a sd)^2: its rate is 2 a (a u + a' x). For the acceleration of a joint a = q' and b = q'', so that
 
-Source: Pham and Pham (2018), section IV, for the rows without ramps; the ramps are our own.
+    |q1'^2 y - q0'^2 x| <= 2 c |q1 - q0|,
+
+the equation of work and energy, without any error: no motion passes the ends of the interval otherwise. Of
+other constraints the integrals are trapezoids. Where a changes its sign the row holds at both ends with the
+mean of sdd; where all a vanish at an end and nothing bounds x there, the interval is passed without sdd.
+
+Source: Verscheure et al., Time-optimal path tracking for robots: a convex optimization approach, IEEE Trans.
+Automatic Control 54 (2009), for sd^2 as the variable; the rows by work and energy are our own.
 """
 
 from __future__ import annotations
@@ -19,129 +23,78 @@ from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.curves.time_optimal.constraints import ConstraintRows, PathConstraint
-from trajcli.curves.time_optimal.time_law import blocks
 from trajcli.frozen import frozen
 
 _FLAT = 1e-9  # a coefficient this much smaller than its neighbour is zero: it shifts the bound by as little
+_SMALL = 0.03  # of an integral up to a point: a difference as small is rounded
+_FADING = 8  # grid points around an interval with lower limits: so far they grow back, by half at each
 
 
 @frozen
-class CollocationRows:
-    """Rows of the N intervals of a grid; the first half of the m holds at the near end, the other at the far.
+class IntervalRows:
+    """Rows of the N intervals of a grid, made of the k rows at their ends.
 
     Attributes:
         grid: Grid points, shape (N + 1,), strictly increasing.
         P: Shape (m, N).
         R: Shape (m, N).
         C: Shape (m, N).
+        whole: C before any limit was lowered, shape (m, N).
+        eased: By what each constraint's c are multiplied at the grid points, shape (constraints, N + 1).
         cap: Largest x at each grid point, shape (N + 1,).
-        ramps: d, shape (N,).
-        distances: E, shape (N,).
+        turning: At which it is that of a row whose a vanishes, shape (N + 1,).
         owners: Which constraint each row is of, shape (m,).
+        sources: Of which of the k rows each is made, shape (m,).
+        near: a, b and c at the near ends, each of shape (k, N).
+        far: The same at the far ends.
     """
 
     grid: Array
     P: Array
     R: Array
     C: Array
+    whole: Array
+    eased: Array
     cap: Array
-    ramps: Array
-    distances: Array
+    turning: NDArray[np.bool_]
     owners: NDArray[np.intp]
+    sources: NDArray[np.intp]
+    near: tuple[Array, Array, Array]
+    far: tuple[Array, Array, Array]
 
     @property
     def straight(self) -> NDArray[np.bool_]:
-        """Which intervals have b = 0 in all rows up to rounding, as on a straight line, shape (N,)."""
+        """Which intervals have constant rows up to rounding, as on a straight line, shape (N,)."""
         return np.asarray((np.abs(self.P + self.R) <= _FLAT * np.abs(self.R)).all(axis=0))
 
-    def tightened(self, velocity: Array, acceleration: Array) -> CollocationRows:
+    def tightened(self, velocity: Array, acceleration: Array) -> IntervalRows:
         """Return the intervals with caps and every c divided by factors of their own.
 
         Args:
             velocity: What speeds are divided by, shape (N,).
-            acceleration: What the c of each of the k constraints are divided by, shape (k, N); or (N,), all.
+            acceleration: What the c of each of the constraints are divided by, shape (constraints, N).
         """
-        cap = self.cap.copy()
-        cap[:-1] /= velocity**2
-        cap[1:] = np.minimum(cap[1:], self.cap[1:] / velocity**2)
-        C, less = self.C.copy(), np.atleast_2d(1.0 - 1.0 / acceleration)
-        for block in blocks(self.distances.size):
-            at_rest = self._at_rest(block)
-            at_rest[np.isinf(at_rest)] = 0.0  # no bound stays none
-            of_rows = less[:, block] if len(less) == 1 else less[self.owners, block]
-            C[:, block] = np.maximum(C[:, block] - at_rest * of_rows, 0.0)
-        return replace(self, C=C, cap=cap)
-
-    def sdd_ranges(self, x: Array, relaxed: float = 0.0) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-        """Return the least and the largest sdd that the rows allow at the near and at the far end, each (N,).
-
-        Args:
-            x: sd^2 at the grid points, shape (N + 1,).
-            relaxed: By what share every c is larger.
-        """
-        half = len(self.P) // 2
-        ranges = np.empty((4, self.distances.size))
-        for block in blocks(self.distances.size):
-            double, P, R = 2.0 * self.distances[block], self.P[:, block], self.R[:, block]
-            C, b = self._at_rest(block) * (1.0 + relaxed), P + R
-            ranges[:2, block] = _range(double * R[:half], C[:half] - b[:half] * x[:-1][block])
-            ranges[2:, block] = _range(double * -P[half:], C[half:] - b[half:] * x[1:][block])
-        return (ranges[0], ranges[1]), (ranges[2], ranges[3])
-
-    def largest_ramps(self) -> Array:
-        """Return the largest sdd ramps from rest, shape (N,); infinite where nothing limits them."""
-        largest = np.empty(self.distances.size)
-        for block in blocks(self.distances.size):
-            largest[block] = _range(np.abs(self._a(block)), self._at_rest(block))[1]
-        return largest / (2.0 * self.distances)
-
-    def _a(self, block: slice) -> Array:
-        """Return a of the near rows and -a of the far ones, (m, w), of some intervals."""
-        half = len(self.P) // 2
-        return np.concatenate([self.R[:half, block], self.P[half:, block]])
-
-    def _at_rest(self, block: slice) -> Array:
-        """Return 2Ec of all rows, (m, w), of some intervals."""
-        shift = 2.0 * self.distances[block] * self.ramps[block] * self._a(block)
-        return np.asarray(self.C[:, block] - shift)
+        less = _spread(acceleration, self.grid)
+        cap, eased = self.cap / _spread(velocity[None], self.grid)[0] ** 2, self.eased / less
+        cap[self.turning] /= less.max(axis=0)[self.turning]
+        mean = 0.5 * (eased[:, 1:] + eased[:, :-1])
+        return replace(self, C=self.whole * mean[self.owners], eased=eased, cap=cap)
 
 
-@frozen
-class CollocatedConstraints:
-    """All constraints at both ends of the intervals of a grid.
-
-    Attributes:
-        grid: Grid points, shape (N + 1,), strictly increasing.
-        near: a, b and c at the near ends, each of shape (k, N).
-        far: The same at the far ends.
-        cap: Largest x at each grid point, shape (N + 1,).
-        owners: Which constraint each row is of, shape (k,).
-    """
-
-    grid: Array
-    near: tuple[Array, Array, Array]
-    far: tuple[Array, Array, Array]
-    cap: Array
-    owners: NDArray[np.intp]
-
-    def intervals(self, ramps: Array, distances: Array) -> CollocationRows:
-        """Return the rows of the intervals for given sdd ramps d and distances E, each of shape (N,)."""
-        half, count = self.near[0].shape
-        P, R, C = (np.empty((2 * half, count)) for _ in range(3))
-        for block in blocks(count):
-            double, d = 2.0 * distances[block], ramps[block]
-            a, b, c = (values[:, block] for values in self.near)
-            P[:half, block], R[:half, block], C[:half, block] = double * b - a, a, double * (c + a * d)
-            a, b, c = (values[:, block] for values in self.far)
-            P[half:, block], R[half:, block], C[half:, block] = -a, double * b + a, double * (c - a * d)
-            size_P, size_R = np.abs(P[:, block]), np.abs(R[:, block])
-            P[:, block][size_P <= _FLAT * size_R] = 0.0
-            R[:, block][size_R <= _FLAT * size_P] = 0.0
-        return CollocationRows(self.grid, P, R, C, self.cap, ramps, distances, np.tile(self.owners, 2))
+def _spread(factors: Array, grid: Array) -> Array:
+    """Return factors of intervals (k, N) at the grid points (k, N + 1), fading around those above one."""
+    lengths, edge = np.diff(grid), np.ones((len(factors), 1))
+    around = np.maximum(np.append(lengths[1:], 0.0), np.append(0.0, lengths[:-1]))
+    fade = 0.5 ** (lengths / np.maximum(lengths, around))
+    at = np.maximum(np.concatenate([edge, factors], axis=1), np.concatenate([factors, edge], axis=1)) - 1.0
+    for _ in range(_FADING):
+        at[:, 1:] = np.maximum(at[:, 1:], fade * at[:, :-1])
+        at[:, :-1] = np.maximum(at[:, :-1], fade * at[:, 1:])
+    return np.asarray(1.0 + at)
 
 
-def collocated(grid: Array, constraints: Sequence[PathConstraint], stops: Array) -> CollocatedConstraints:
-    """Return all constraints at both ends of every interval.
+def interval_rows(grid: Array, constraints: Sequence[PathConstraint], stops: Array) -> IntervalRows:
+    """Return the rows of all constraints over every interval.
 
     Args:
         grid: Grid points, shape (N + 1,), strictly increasing.
@@ -149,33 +102,135 @@ def collocated(grid: Array, constraints: Sequence[PathConstraint], stops: Array)
         stops: Grid points where x must be zero.
     """
     near_rows = [constraint.rows(grid[:-1], "right") for constraint in constraints]
-    near, near_cap = _joined(near_rows)
-    far, far_cap = _joined([constraint.rows(grid[1:], "left") for constraint in constraints])
-    owners = np.repeat(np.arange(len(near_rows)), [rows.a.shape[1] for rows in near_rows])
-    cap = np.append(near_cap, np.inf)
-    cap[1:] = np.minimum(cap[1:], far_cap)
+    far_rows = [constraint.rows(grid[1:], "left") for constraint in constraints]
+    near, far, D = _joined(near_rows), _joined(far_rows), np.diff(grid)
+    cap, turns = (np.append(each, np.inf) for each in (_cap(near_rows), _turning_cap(near, D)))
+    cap[1:] = np.minimum(cap[1:], _cap(far_rows))
+    turns[1:] = np.minimum(turns[1:], _turning_cap(far, D))
     cap[np.isin(grid, stops)] = 0.0
-    return CollocatedConstraints(grid, near, far, cap, owners)
+    turning, cap = turns < cap, np.minimum(cap, turns)
+    owners = np.repeat(np.arange(len(near_rows)), [rows.a.shape[1] for rows in near_rows])
+    P, R, C = _integrated(near, far, D, _works(near_rows, far_rows, owners, D))
+    sources = np.arange(owners.size)
+    turned = np.isnan(C)
+    if turned.any():
+        P, R, C, sources = _at_both_ends((P, R, C), near, far, D)
+    for end, free in enumerate(_unbounded(near[0], far[0], cap)):
+        if free.any():
+            P, R, C, sources = _at_constant_speed((P, R, C, sources), (near, far)[1 - end], D, free, end)
+    size_P, size_R = np.abs(P), np.abs(R)
+    P[size_P <= _FLAT * size_R] = 0.0
+    R[size_R <= _FLAT * size_P] = 0.0
+    eased = np.ones((len(near_rows), grid.size))
+    return IntervalRows(grid, P, R, C, C, eased, cap, turning, owners[sources], sources, near, far)
 
 
-def collocation_rows(grid: Array, constraints: Sequence[PathConstraint], stops: Array) -> CollocationRows:
-    """Return the rows of all constraints with constant sdd in every interval, arguments as `collocated`."""
-    return collocated(grid, constraints, stops).intervals(np.zeros(grid.size - 1), np.diff(grid))
+def _works(
+    near_rows: Sequence[ConstraintRows],
+    far_rows: Sequence[ConstraintRows],
+    owners: NDArray[np.intp],
+    D: Array,
+) -> Array:
+    """Return the integrals of c a over the intervals where they are known, else NaN, shape (k, N).
+
+    Where they are small against what they are the difference of, the trapezoidal rule with end correction,
+    which is exact up to the third degree of a, is free of its rounding.
+    """
+    works = np.full((owners.size, D.size), np.nan)
+    for k, (start, end) in enumerate(zip(near_rows, far_rows, strict=True)):
+        if start.work is not None and end.work is not None:
+            found = (end.work - start.work).T
+            rule = 0.5 * D * (start.a + end.a).T - D**2 / 12.0 * (end.b - start.b).T
+            sizes = _SMALL * np.maximum(np.abs(end.work), np.abs(start.work)).T
+            works[owners == k] = np.where(np.abs(found) > sizes, found, start.c.T * rule)
+    return works
 
 
-def _joined(all_rows: Sequence[ConstraintRows]) -> tuple[tuple[Array, Array, Array], Array]:
-    """Return a, b and c of all rows, each of shape (k, N), and the lowest caps, shape (N,)."""
-    if len(all_rows) == 1:  # its c may be one row for all points
-        rows = all_rows[0]
-        return (np.ascontiguousarray(rows.a.T), np.ascontiguousarray(rows.b.T), rows.c.T), rows.cap
+def _integrated(
+    near: tuple[Array, Array, Array], far: tuple[Array, Array, Array], D: Array, works: Array
+) -> tuple[Array, Array, Array]:
+    """Return P, R and C of the rows times |a|, integrated; by trapezoids where their works are NaN."""
+    (a0, b0, c0), (a1, b1, c1) = near, far
+    exact, sign = ~np.isnan(works), np.sign(a0 + a1)
+    P = sign * a0 * np.where(exact, -a0, b0 * D - a1)
+    R = sign * a1 * np.where(exact, a1, b1 * D + a0)
+    with np.errstate(invalid="ignore"):
+        C = sign * np.where(exact, 2.0 * works, D * (a0 * c0 + a1 * c1))
+    same = exact | (a0 * a1 >= -_FLAT * np.maximum(a0**2, a1**2))
+    return P, R, np.where(same, np.where(np.isnan(C), np.inf, np.maximum(C, 0.0)), np.nan)
+
+
+def _at_both_ends(
+    rows: tuple[Array, Array, Array],
+    near: tuple[Array, Array, Array],
+    far: tuple[Array, Array, Array],
+    D: Array,
+) -> tuple[Array, Array, Array, NDArray[np.intp]]:
+    """Return P, R and C with rows at both ends, of the mean sdd, where C is NaN; and what each is made of."""
+    P, R, C = rows
+    (a0, b0, c0), (a1, b1, c1), turned = near, far, np.isnan(C)
+    P, R = np.where(turned, 2.0 * D * b0 - a0, P), np.where(turned, a0, R)
+    more = np.flatnonzero(turned.any(axis=1))
+    a, b, c, also = a1[more], b1[more], c1[more], turned[more]
+    return (
+        np.concatenate([P, np.where(also, -a, 0.0)]),
+        np.concatenate([R, np.where(also, 2.0 * D * b + a, 0.0)]),
+        np.concatenate([np.where(turned, 2.0 * D * c0, C), np.where(also, 2.0 * D * c, 1.0)]),
+        np.concatenate([np.arange(len(P)), more]),
+    )
+
+
+def _unbounded(a0: Array, a1: Array, cap: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return at whose near, and at whose far end all a vanish and nothing bounds x, each (N,)."""
+    size_0, size_1 = np.abs(a0).max(axis=0, initial=0.0), np.abs(a1).max(axis=0, initial=0.0)
+    free = np.isinf(cap)
+    moves = np.maximum(size_0, size_1) > 0.0
+    return moves & (size_0 <= _FLAT * size_1) & free[:-1], moves & (size_1 <= _FLAT * size_0) & free[1:]
+
+
+def _at_constant_speed(
+    rows: tuple[Array, Array, Array, NDArray[np.intp]],
+    other: tuple[Array, Array, Array],
+    D: Array,
+    free: NDArray[np.bool_],
+    end: int,
+) -> tuple[Array, Array, Array, NDArray[np.intp]]:
+    """Return rows by which intervals with an unbounded end are passed without sdd.
+
+    Args:
+        rows: P, R, C and of which row each is made.
+        other: a, b and c at the other ends, each of shape (k, N).
+        D: Lengths, shape (N,).
+        free: Which intervals these are, shape (N,).
+        end: At which of their ends.
+    """
+    P, R, C, sources = rows
+    held, none = 2.0 * D * other[1][sources], np.zeros_like(P)
+    P, R = (np.where(free, each, was) for each, was in zip((none, held)[:: 1 - 2 * end], (P, R), strict=True))
+    C = np.where(free, 2.0 * D * other[2][sources], C)
+    faster = np.where(free, 1.0 - 2.0 * end, 0.0)
+    return (
+        np.concatenate([P, faster[None]]),
+        np.concatenate([R, -faster[None]]),
+        np.concatenate([C, np.where(free, 0.0, 1.0)[None]]),
+        np.append(sources, 0),
+    )
+
+
+def _cap(all_rows: Sequence[ConstraintRows]) -> Array:
+    """Return the lowest caps, shape (N,)."""
+    return np.asarray(np.fmin.reduce([rows.cap for rows in all_rows]))
+
+
+def _turning_cap(rows: tuple[Array, Array, Array], D: Array) -> Array:
+    """Return the lowest x of rows whose a vanishes, shape (N,)."""
+    a, b, c = rows
+    with np.errstate(divide="ignore", invalid="ignore"):
+        bounds = np.where((b > 0) & (np.abs(a) <= _FLAT * 2.0 * D * b), c / b, np.inf)
+    return np.asarray(bounds.min(axis=0, initial=np.inf))
+
+
+def _joined(all_rows: Sequence[ConstraintRows]) -> tuple[Array, Array, Array]:
+    """Return a, b and c of all rows, each of shape (k, N)."""
     a, b, c = (np.concatenate([getattr(rows, name).T for rows in all_rows]) for name in "abc")
-    return (a, b, c), np.minimum.reduce([rows.cap for rows in all_rows])
-
-
-def _range(factors: Array, rest: Array) -> tuple[Array, Array]:
-    """Return the least and the largest u, each (w,), with factors u <= rest in every row (k, w)."""
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        bounds = rest / factors
-    high = np.where(factors > 0, bounds, np.inf).min(axis=0, initial=np.inf)
-    low = np.where(factors < 0, bounds, -np.inf).max(axis=0, initial=-np.inf)
-    return low, high
+    return a, b, c

@@ -45,12 +45,14 @@ class ConstraintRows:
         b: Shape (p, k).
         c: Shape (p, k), positive; infinite for no bound.
         cap: Largest x, shape (p,); infinite for no bound, zero where the motion must stop.
+        work: Where b = a' and c is constant in each row: c times the antiderivative of a, shape (p, k).
     """
 
     a: Array
     b: Array
     c: Array
     cap: Array
+    work: Array | None = None
 
 
 class PathConstraint(Protocol):
@@ -73,6 +75,10 @@ class PathConstraint(Protocol):
 
     def rows(self, s: Array, side: Side) -> ConstraintRows:
         """Return the rows at the points (p,) of the path, seen from one side; k is always the same."""
+        ...
+
+    def largest(self, s: Array, side: Side) -> Array:
+        """Return what sd^2 cannot pass at points (p,) of the path, whatever the motion; or infinity."""
         ...
 
     def excess(self, law: LawPieces) -> Array:
@@ -123,12 +129,17 @@ class JointConstraint:
         """Return the rows at points (p,), one for each finite bound of acceleration."""
         upper, lower = np.isfinite(self.acceleration[:, 1]), np.isfinite(self.acceleration[:, 0])
         limits = np.concatenate([self.acceleration[upper, 1], -self.acceleration[lower, 0]])
-        first, second = self.path.evaluate_orders(s, (1, 2), side=side).transpose(1, 0, 2)
-        a = np.concatenate([first[:, upper], -first[:, lower]], axis=1)
-        b = np.concatenate([second[:, upper], -second[:, lower]], axis=1)
+        q, first, second = self.path.evaluate_orders(s, (0, 1, 2), side=side).transpose(1, 0, 2)
+        work, a, b = (
+            np.concatenate([each[:, upper], -each[:, lower]], axis=1) for each in (q, first, second)
+        )
         rate = np.maximum(first / self.velocity[:, 1], first / self.velocity[:, 0]).max(axis=1)
         with np.errstate(divide="ignore", over="ignore"):
-            return ConstraintRows(a, b, np.broadcast_to(limits, a.shape), rate**-2.0)
+            return ConstraintRows(a, b, np.broadcast_to(limits, a.shape), rate**-2.0, work * limits)
+
+    def largest(self, s: Array, side: Side) -> Array:
+        """Return the caps at points (p,)."""
+        return self.rows(s, side).cap
 
     def excess(self, law: LawPieces) -> Array:
         """Return bounds of what is used of velocity and acceleration in each piece, shape (2, N)."""
@@ -173,14 +184,19 @@ class SpeedConstraint:
         nothing = np.empty((s.size, 0))
         return ConstraintRows(nothing, nothing, nothing, self.limit(s) ** 2)
 
+    def largest(self, s: Array, side: Side) -> Array:
+        """Return the caps at points (p,)."""
+        return self.rows(s, side).cap
+
     def excess(self, law: LawPieces) -> Array:
         """Return what is used of the limit at samples of each piece, and zeros for acceleration, (2, N)."""
         samples = np.linspace(0.0, 1.0, _SAMPLES)[:, None] * law.durations
         sdd = derivative_coefficients(law.coefficients, 2)
-        if len(sdd) == 2:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                turning = np.nan_to_num(-sdd[1] / sdd[0])  # where sdd is zero, sd is largest or smallest
-            samples = np.concatenate([samples, [np.clip(turning, 0.0, law.durations)]])
+        if len(sdd) == 3:
+            turning = np.clip(
+                _roots(*sdd), 0.0, law.durations
+            )  # where sdd is zero, sd is largest or smallest
+            samples = np.concatenate([samples, turning])
         sd = horner(derivative_coefficients(law.coefficients, 1), samples)
         limits = self.limit(horner(law.coefficients, samples).reshape(-1)).reshape(sd.shape)
         used = (sd / limits).max(axis=0)
@@ -211,6 +227,10 @@ class ApproachConstraint:
             rate = np.maximum(first / high, first / low).max(axis=1)
             return ConstraintRows(nothing, nothing, nothing, rate**-2.0)
 
+    def largest(self, s: Array, side: Side) -> Array:
+        """Return the caps at points (p,)."""
+        return self.rows(s, side).cap
+
     def excess(self, law: LawPieces) -> Array:
         """Return what is used of the limits in each piece, and zeros for acceleration, (2, N)."""
         excess = np.zeros((2, law.durations.size))
@@ -220,6 +240,13 @@ class ApproachConstraint:
             uses, _ = uses_of_pieces(q, pieces.durations, self.limits, _NEARLY)
             excess[0, block] = np.minimum(uses.max(axis=1, initial=0.0), _MOST)
         return excess
+
+
+def _roots(a: Array, b: Array, c: Array) -> Array:
+    """Return the roots of a t^2 + b t + c, shape (2, N); zeros where there are none."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        q = -0.5 * (b + np.copysign(np.sqrt(np.maximum(b**2 - 4.0 * a * c, 0.0)), b))
+        return np.nan_to_num(np.stack([q / a, c / q]), posinf=0.0, neginf=0.0)
 
 
 def is_at_rest(path: PiecewisePolynomial) -> tuple[bool, bool]:

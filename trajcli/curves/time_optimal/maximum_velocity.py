@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
-from trajcli.curves.time_optimal.collocation import CollocationRows
+from trajcli.curves.time_optimal.collocation import IntervalRows
 from trajcli.curves.time_optimal.recurrence import HUGE
 from trajcli.curves.time_optimal.time_law import blocks
 
@@ -15,7 +15,7 @@ _SAME = 1e-12
 
 
 def maximum_velocity_curve(
-    intervals: CollocationRows, known: Array | None = None, changed: NDArray[np.bool_] | None = None
+    intervals: IntervalRows, known: Array | None = None, changed: NDArray[np.bool_] | None = None
 ) -> Array:
     """Return the largest x at each grid point that its two intervals have room for, shape (N + 1,).
 

@@ -7,16 +7,16 @@ the problem is solved again. What is left after that is taken away by slowing do
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from trajcli.curves.extrema import peaks
 from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, distinct
-from trajcli.curves.time_optimal.collocation import CollocatedConstraints, CollocationRows, collocated
+from trajcli.curves.time_optimal.accelerations import end_accelerations
+from trajcli.curves.time_optimal.collocation import IntervalRows, interval_rows
 from trajcli.curves.time_optimal.constraints import JointConstraint, PathConstraint, corners, is_at_rest
 from trajcli.curves.time_optimal.maximum_velocity import maximum_velocity_curve
 from trajcli.curves.time_optimal.passes import (
@@ -29,34 +29,48 @@ from trajcli.curves.time_optimal.passes import (
 from trajcli.curves.time_optimal.refinement import (
     first_grid,
     halved,
-    interpolated_ramps,
     most_intervals,
     parts_for,
     refined,
+    shortest_intervals,
     time_lost,
-    wanted_ramps,
 )
 from trajcli.curves.time_optimal.time_law import (
     LawPieces,
-    distances_at_mean_speed,
-    feasible_ramps,
     law_and_trajectory,
     law_pieces,
 )
 from trajcli.frozen import frozen
 
 _FEW_CHANGED = 0.01  # of the intervals: if no more of them change, most of the solution stays
-_WILD = 1.02  # of a limit: where more is used, there shall be no sdd ramp
-_LARGEST_DEGREE = 3  # of a path: with sdd ramps the degree of the trajectory is three times as high
-_LOST = 2.5e-3  # of the duration, by estimate: a finer grid would not gain more
-_AIM = 1.2e-3  # of the duration: the estimate that a finer grid is made for
+_WILD = 1.01  # of a limit: where more is used, sdd shall not change
+_AROUND = 5e-3  # of the duration: what is slowed down at least around an interval with wild excess
+_LOST = 4e-4  # of the duration, by estimate: a finer grid would not gain more
+_AIM = 2e-4  # of the duration: the estimate that a finer grid is made for
 _SWITCHING = 1e-8  # of an interval of a straight line: more is lost only where a switching point is missing
 _SETTLED = 0.01  # of what is lost elsewhere: then switching points still move by more than they are off
 _FEW_NEW = 0.1  # of the intervals: for fewer new ones the whole solution is not worth finding again
 _ROUNDS = 8  # of refinement
 _TRIES = 4  # of halving the grid before a speed at an end is called too high
 _TIGHTENINGS, _MOST_TIGHTENINGS = 8, 40  # where the rest is stretched away, and where it must not be
-_LOWERED = (1.1, 1.3, 2.0, 4.0, 16.0, 64.0)  # times the excess that limits are lowered by, round by round
+_LOWERED = (
+    1.1,
+    1.2,
+    1.5,
+    2.0,
+    2.0,
+    2.0,
+    2.0,
+    2.0,
+    4.0,
+    8.0,
+    16.0,
+)  # times the excess that limits are lowered by, round by round
+_EXTRA = 1e-9  # of a limit: taken off beyond that
+_MOST_LOWERED = 0.2  # of a limit: no more of its excess is taken off it at a time
+_STUBBORN = 1e-5  # of a limit: where it is passed by more in the end, sdd shall not change
+_PATIENCE = 3  # rounds after which that is decided
+_LITTLE = 2e-5  # of the duration: so much is left to a stretch
 _EXACT = 1e-10  # a limit exceeded by less is kept
 
 
@@ -89,6 +103,7 @@ class TimeOptimalMotion:
         lost: Estimate of the share of the duration that a finer grid would save.
         stops: s at the corners of the path, where the motion stops, shape (k,).
         stop_times: When it does, in seconds, shape (k,).
+        lower_bound: Duration that no motion along the path falls below, s, by velocity and acceleration.
     """
 
     trajectory: PiecewisePolynomial
@@ -100,6 +115,7 @@ class TimeOptimalMotion:
     lost: float
     stops: Array
     stop_times: Array
+    lower_bound: float
 
 
 def time_optimal(
@@ -111,6 +127,7 @@ def time_optimal(
     end_velocity: float = 0.0,
     further: Sequence[PathConstraint] = (),
     stops: ArrayLike = (),
+    along: tuple[float, float] = (np.inf, np.inf),
 ) -> TimeOptimalMotion:
     """Return the fastest motion along a path within bounds of velocity and acceleration that hold for all t.
 
@@ -125,6 +142,7 @@ def time_optimal(
         end_velocity: sd at the end, not negative.
         further: Other constraints; kept as far as their excess tells.
         stops: Breaks of the path at which it stops, too, shape (k,).
+        along: Limits of sd and of the size of sdd that further constraints imply, for the lower bound.
 
     Raises:
         UnlimitedSpeedError: When nothing limits the motion somewhere.
@@ -148,12 +166,22 @@ def time_optimal(
         raise UnlimitedSpeedError(path.start)
     solution, rounds, lost = _refined_solution(problem)
     solution, tightened = _tightened_solution(solution)
-    grid, pieces, excess = solution.grid, solution.pieces, float(solution.excess.max())
+    grid, pieces, stretch = solution.grid, solution.pieces, solution.needed
+    if stretch > 1.0 and not problem.rests:
+        worst = int(solution.excess.max(axis=(0, 1)).argmax())
+        raise UnsettledSpeedError(float(grid[worst : worst + 2].mean()), float(solution.excess.max()))
     del solution  # the rows of a long path are large
-    law, trajectory, stretch = _stretched(problem, pieces, excess)
+    law, trajectory = law_and_trajectory(path, pieces)
+    if stretch > 1.0:
+        law, trajectory = scale_time(law, stretch), scale_time(trajectory, stretch)
+    from trajcli.curves.time_optimal.lower_bound import lower_bound
+
     stops = problem.stops
     stop_times = law.breaks[np.searchsorted(grid, stops)]
-    return TimeOptimalMotion(trajectory, law, stretch, tightened, rounds, grid, lost, stops, stop_times)
+    least = lower_bound(joints, problem.further, along, (grid, stops), problem.ends)
+    return TimeOptimalMotion(
+        trajectory, law, stretch, tightened, rounds, grid, lost, stops, stop_times, least
+    )
 
 
 @frozen
@@ -183,11 +211,6 @@ class PathProblem:
         return all(end in (0.0, np.inf) for end in self.ends)
 
     @property
-    def with_ramps(self) -> bool:
-        """Whether sdd may change within an interval."""
-        return self.joints.path.degree <= _LARGEST_DEGREE
-
-    @property
     def estimate(self) -> float:
         """What share of the time that a grid may lose by estimate it may lose here."""
         return min(constraint.estimate for constraint in self.constraints)
@@ -203,19 +226,19 @@ class GridSolution:
 
     Attributes:
         problem: What it solves.
-        collocated: The constraints at its grid points.
         intervals: The rows that it obeys.
         speeds: sd^2 at its grid points.
         pieces: Of its law s(t).
         excess: Of each of the k constraints in each interval, shape (k, 2, N).
+        even: In which intervals sdd is constant, as a change of it led to wild excess, shape (N,).
     """
 
     problem: PathProblem
-    collocated: CollocatedConstraints
-    intervals: CollocationRows
+    intervals: IntervalRows
     speeds: Speeds
     pieces: LawPieces
     excess: Array
+    even: NDArray[np.bool_]
 
     @property
     def grid(self) -> Array:
@@ -228,111 +251,101 @@ class GridSolution:
         return self.speeds.x
 
     @property
+    def duration(self) -> float:
+        """Of its law, s."""
+        return float(self.pieces.durations.sum())
+
+    @property
     def lost(self) -> Array:
         """Estimate of the time lost in each interval, the time to keep exceeded limits included, (N,)."""
         durations, over = self.pieces.durations, np.clip(self.excess.max(axis=0) - 1.0, 0.0, 1.0)
         lost = time_lost(self.intervals, self.x, self.speeds.mvc, durations)
-        return np.asarray(lost + durations * np.maximum(over[0], 0.5 * over[1]))
+        slowed = np.maximum(over[0], 0.5 * over[1])  # lower limits slow the motion down around, too
+        long = np.diff(self.grid) > shortest_intervals(self.problem.joints.path, self.grid)
+        least = np.where((slowed > _WILD - 1.0) & long, _AROUND * durations.sum(), 0.0)
+        return np.asarray(lost + np.maximum(durations, least) * slowed)
 
-    def tightened(self, factors: Array, *, new_ramps: bool) -> GridSolution:
+    @property
+    def needed(self) -> float:
+        """By what factor its law must be stretched to keep its limits."""
+        velocity, acceleration = self.excess.max(axis=(0, 2)).tolist()
+        factor = float(max(velocity, acceleration**0.5))
+        return factor if factor > 1.0 + _EXACT else 1.0
+
+    def tightened(self, factors: Array, even: NDArray[np.bool_]) -> GridSolution:
         """Return the solution with limits divided by factors.
 
         Args:
             factors: Of velocity and acceleration of each constraint in each interval, shape (k, 2, N).
-            new_ramps: Whether to find the sdd ramps anew.
+            even: In which intervals sdd shall be constant from now on, shape (N,).
 
         Raises:
             UnreachableSpeedError: When the speeds at the ends are too high for these limits.
         """
-        problem, constraints, grid = self.problem, self.collocated, self.grid
-        velocity, acceleration = factors[:, 0].max(axis=0), factors[:, 1]
-        if new_ramps and problem.with_ramps:
-            calm = (
-                self.excess.max(axis=(0, 1)) <= _WILD
-            )  # elsewhere sdd changes by more than the limits follow
-            wanted = np.where(calm, wanted_ramps(self.intervals, self.x), 0.0)
-            rows = constraints.intervals(wanted, distances_at_mean_speed(grid, self.x, wanted))
-            rows = rows.tightened(np.where(calm, velocity, 1.0), np.where(calm, acceleration, 1.0))
-            with suppress(UnreachableSpeedError):  # then there may be one with the ramps as they are
-                return _judged(problem, constraints, rows, solve(rows, *problem.ends))
-        rows, changed = self.intervals.tightened(velocity, acceleration), (factors != 1.0).any(axis=(0, 1))
+        old, problem = self.intervals, self.problem
+        rows = old.tightened(factors[:, 0].max(axis=0), factors[:, 1])
+        lower = rows.cap != old.cap
+        changed = (rows.C != old.C).any(axis=0) | lower[1:] | lower[:-1]
         mvc = maximum_velocity_curve(rows, self.speeds.mvc, changed)
-        few = changed.mean() < _FEW_CHANGED
-        speeds = solve_locally(rows, self.speeds, changed, mvc) if few else None
-        return _judged(problem, constraints, rows, speeds or solve(rows, *problem.ends, mvc), self)
+        speeds = solve_locally(rows, self.speeds, changed, mvc) if changed.mean() < _FEW_CHANGED else None
+        before = replace(self, even=self.even | even)
+        return _judged(problem, rows, speeds or solve(rows, *problem.ends, mvc), before)
 
 
 def _judged(
-    problem: PathProblem,
-    constraints: CollocatedConstraints,
-    rows: CollocationRows,
-    speeds: Speeds,
-    before: GridSolution | None = None,
+    problem: PathProblem, rows: IntervalRows, speeds: Speeds, before: GridSolution | None = None
 ) -> GridSolution:
-    """Return the solution with its law and the excess of that.
+    """Return the solution with its law and the excess of that; where it is wild, sdd is constant.
 
     Args:
         problem: What it solves.
-        constraints: At its grid points.
         rows: That it obeys.
         speeds: sd^2 at its grid points.
-        before: A solution with the same sdd ramps.
+        before: A solution on the same grid.
     """
-    pieces = law_pieces(rows.grid, speeds.x, feasible_ramps(rows.grid, speeds.x, rows.ramps))
-    if before is None:
-        excess = problem.excess(pieces)
-    else:
-        excess, differs = before.excess.copy(), before.x != speeds.x
-        chosen = np.flatnonzero(differs[:-1] | differs[1:])
-        excess[:, :, chosen] = problem.excess(pieces.chosen(chosen))
-    return GridSolution(problem, constraints, rows, speeds, pieces, excess)
+    even = np.zeros(rows.grid.size - 1, dtype=bool) if before is None else before.even
+    while True:
+        pieces = law_pieces(rows.grid, speeds.x, *end_accelerations(rows, speeds.x, speeds.mvc, even))
+        if before is None:
+            excess = problem.excess(pieces)
+        else:
+            excess, chosen = before.excess.copy(), np.flatnonzero(pieces.differ(before.pieces))
+            if chosen.size:
+                excess[:, :, chosen] = problem.excess(pieces.chosen(chosen))
+        before = GridSolution(problem, rows, speeds, pieces, excess, even)
+        wild = (excess.max(axis=(0, 1)) > _WILD) & ~even
+        if not wild.any():
+            return before
+        even = even | wild
 
 
-def _solution_on_grid(problem: PathProblem, grid: Array, ramps: Array, distances: Array) -> GridSolution:
-    """Return the solution on a grid.
-
-    Args:
-        problem: What to solve.
-        grid: Grid points, shape (N + 1,).
-        ramps: sdd ramps to begin with, shape (N,).
-        distances: How far the mean of both speeds leads in each interval, shape (N,).
+def _solution_on_grid(problem: PathProblem, grid: Array) -> GridSolution:
+    """Return the solution on a grid (N + 1,).
 
     Raises:
         UnreachableSpeedError: When there is no motion with the speeds at the ends.
         UnlimitedSpeedError: When nothing limits the motion somewhere.
     """
-    constraints = collocated(grid, problem.constraints, problem.stops)
-    rows = constraints.intervals(ramps, distances)
-    speeds = solve(rows, *problem.ends)
-    if problem.with_ramps:
-        wanted = wanted_ramps(rows, speeds.x)
-        rows = constraints.intervals(wanted, distances_at_mean_speed(grid, speeds.x, wanted))
-        try:
-            speeds = solve(rows, *problem.ends)
-        except UnreachableSpeedError:  # with such ramps there is none
-            rows = constraints.intervals(ramps, distances)
-    return _judged(problem, constraints, rows, speeds)
+    rows = interval_rows(grid, problem.constraints, problem.stops)
+    return _judged(problem, rows, solve(rows, *problem.ends))
 
 
 def _refined_solution(problem: PathProblem) -> tuple[GridSolution, int, float]:
     """Return the solution on a fine enough grid, how often it was refined, and what is lost."""
     path = problem.joints.path
     grid, most = first_grid(path), most_intervals(path)
-    ramps, distances = np.zeros(grid.size - 1), np.diff(grid)
     for rounds in range(_ROUNDS + 1):
         try:
-            solution = _solution_on_grid(problem, grid, ramps, distances)
+            solution = _solution_on_grid(problem, grid)
         except UnreachableSpeedError:  # a finer grid has room for a little more
             if rounds >= _TRIES or 2 * grid.size > most:
                 raise
             grid = halved(grid)
-            ramps, distances = np.zeros(grid.size - 1), np.diff(grid)
             continue
         parts, share = _parts(solution, most - grid.size + 1)
         if rounds == _ROUNDS or (parts == 1).all():
             break
         grid = refined(grid, solution.x, parts)
-        ramps, distances = interpolated_ramps(solution.intervals, grid)
     return solution, rounds, share
 
 
@@ -355,59 +368,23 @@ def _tightened_solution(solution: GridSolution) -> tuple[GridSolution, int]:
     """Return the solution with limits lowered in intervals that exceed them, and in how many.
 
     A little more than the excess is taken off the limits in such an interval. The solution around it then
-    moves, so that it takes a few rounds, in which more and more is taken off the last ones; where the motion
-    may be stretched, what is left after these is left to that.
+    moves, so that it takes a few rounds. Where the motion may be stretched, that is left over to the best.
     """
-    tightened = np.zeros(solution.x.size - 1, dtype=bool)
-    for turn in range(_TIGHTENINGS if solution.problem.rests else _MOST_TIGHTENINGS):
+    rests = solution.problem.rests
+    tightened, best = np.zeros(solution.x.size - 1, dtype=bool), solution
+    for turn in range(_TIGHTENINGS if rests else _MOST_TIGHTENINGS):
         exceeded = solution.excess > 1.0 + _EXACT
-        if not exceeded.any():
+        if not exceeded.any() or (rests and solution.needed <= 1.0 + _LITTLE):
             break
         tightened |= exceeded.any(axis=(0, 1))
-        lowered = _LOWERED[min(turn, len(_LOWERED) - 1)]
-        factors = 1.0 + lowered * np.where(exceeded, solution.excess - 1.0, 0.0)
-        solution = solution.tightened(factors, new_ramps=turn == 0)
-    return solution, int(tightened.sum())
-
-
-def _stretched(
-    problem: PathProblem, pieces: LawPieces, excess: float
-) -> tuple[PiecewisePolynomial, PiecewisePolynomial, float]:
-    """Return law and trajectory, as much slower as the peaks ask for, and by what factor.
-
-    Args:
-        problem: What was solved.
-        pieces: Of the law.
-        excess: A bound of what they use of the limits.
-    """
-    law, trajectory = law_and_trajectory(problem.joints.path, pieces)
-    if excess <= 1.0 + _EXACT:
-        return law, trajectory, 1.0
-    worst = [*_exact_peaks(problem.joints, trajectory), *_sampled_peaks(problem.further, pieces, law)]
-    stretch, used, time = max(worst)
-    if stretch <= 1.0 + _EXACT:
-        return law, trajectory, 1.0
-    if not problem.rests:
-        raise UnsettledSpeedError(float(law.evaluate(time)[0]), used)
-    return scale_time(law, stretch), scale_time(trajectory, stretch), stretch
-
-
-def _exact_peaks(
-    joints: JointConstraint, trajectory: PiecewisePolynomial
-) -> Iterator[tuple[float, float, float]]:
-    """Yield for velocity and acceleration (factor of time to keep them, share of the limit, when)."""
-    bounds = joints.velocity, joints.acceleration
-    for peak, limits, root in zip(peaks(trajectory, (1, 2)), bounds, (1.0, 0.5), strict=True):
-        high, low = peak.high / limits[:, 1], peak.low / limits[:, 0]
-        used, times = np.maximum(high, low), np.where(high > low, peak.high_time, peak.low_time)
-        yield float(used.max()) ** root, float(used.max()), float(times[used.argmax()])
-
-
-def _sampled_peaks(
-    constraints: Sequence[PathConstraint], pieces: LawPieces, law: PiecewisePolynomial
-) -> Iterator[tuple[float, float, float]]:
-    """Yield the same from the excess of constraints, each at the middle of an interval."""
-    for constraint in constraints:
-        for used, root in zip(constraint.excess(pieces), (1.0, 0.5), strict=True):
-            k = int(used.argmax())
-            yield float(used[k]) ** root, float(used[k]), float(law.breaks[k : k + 2].mean())
+        over = np.clip(solution.excess - 1.0, 0.0, _MOST_LOWERED)
+        factors = 1.0 + _LOWERED[min(turn, len(_LOWERED) - 1)] * np.where(exceeded, over + _EXTRA, 0.0)
+        kept = _STUBBORN if rests else _EXACT
+        stubborn = (solution.excess > (1.0 + kept if turn >= _PATIENCE else np.inf)).any(axis=(0, 1))
+        solution = solution.tightened(factors, np.asarray(stubborn))
+        before, now = best.duration * best.needed, solution.duration * solution.needed
+        if not rests or now < before:
+            best = solution
+        if rests and turn > _PATIENCE + 1 and now > before * (1.0 - _LITTLE):
+            break
+    return best, int(tightened.sum())

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
-from trajcli.curves.time_optimal.collocation import CollocationRows
+from trajcli.curves.time_optimal.collocation import IntervalRows
 from trajcli.curves.time_optimal.maximum_velocity import largest_in_intervals, maximum_velocity_curve
 from trajcli.curves.time_optimal.recurrence import solve_recurrence
 from trajcli.frozen import frozen
@@ -77,7 +77,7 @@ class Speeds:
 
 
 def solve(
-    intervals: CollocationRows, start_velocity: float, end_velocity: float, mvc: Array | None = None
+    intervals: IntervalRows, start_velocity: float, end_velocity: float, mvc: Array | None = None
 ) -> Speeds:
     """Return the fastest motion.
 
@@ -107,7 +107,7 @@ def solve(
 
 
 def solve_locally(
-    intervals: CollocationRows, before: Speeds, changed: NDArray[np.bool_], mvc: Array
+    intervals: IntervalRows, before: Speeds, changed: NDArray[np.bool_], mvc: Array
 ) -> Speeds | None:
     """Return the fastest motion where few rows changed, or None where it changes far away, too.
 
@@ -144,7 +144,7 @@ class Controllable:
 
 
 def controllable(
-    intervals: CollocationRows, end_velocity: float = 0.0, mvc: Array | None = None
+    intervals: IntervalRows, end_velocity: float = 0.0, mvc: Array | None = None
 ) -> Controllable:
     """Return the controllable sets.
 
@@ -164,13 +164,13 @@ def controllable(
     return Controllable(_lower(intervals, lower, upper) if lower[-1] > 0 else lower, upper, mvc)
 
 
-def _forward(intervals: CollocationRows, first: float, upper: Array) -> Array:
+def _forward(intervals: IntervalRows, first: float, upper: Array) -> Array:
     limits = upper.copy()
     limits[0] = first
     return solve_recurrence(intervals.P, intervals.R, intervals.C, intervals.R > 0, limits)
 
 
-def _lower(intervals: CollocationRows, lower: Array, upper: Array) -> Array:
+def _lower(intervals: IntervalRows, lower: Array, upper: Array) -> Array:
     """Return the lower ends of the controllable sets; infinite before the grid point where none is left."""
     P, R, C = intervals.P.T, intervals.R.T, intervals.C.T
     fastest = np.minimum(
@@ -192,7 +192,7 @@ def _lower(intervals: CollocationRows, lower: Array, upper: Array) -> Array:
 class _Neighbourhoods:
     """The surroundings of changed intervals, one after the other, with a gap between them."""
 
-    def __init__(self, intervals: CollocationRows, changed: NDArray[np.bool_], radius: int) -> None:
+    def __init__(self, intervals: IntervalRows, changed: NDArray[np.bool_], radius: int) -> None:
         rows = np.flatnonzero(changed)
         steps = np.zeros(changed.size + 1, dtype=np.intp)
         np.add.at(steps, np.maximum(rows - radius, 0), 1)

@@ -10,15 +10,27 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.curves.piecewise import Array, PiecewisePolynomial, distinct
-from trajcli.curves.time_optimal.collocation import CollocationRows
-from trajcli.curves.time_optimal.time_law import feasible_ramps
+from trajcli.curves.extrema import critical_points
+from trajcli.curves.piecewise import (
+    Array,
+    PiecewisePolynomial,
+    derivative_coefficients,
+    distinct,
+    horner,
+)
+from trajcli.curves.time_optimal.collocation import IntervalRows
+from trajcli.curves.time_optimal.time_law import blocks
 
-_FEWEST, _FIRST = 8, 96  # intervals: of a piece, and of the whole path, to begin with
+_FEWEST, _FIRST = 4, 96  # intervals: of a piece, and of the whole path, to begin with
 _MOST, _MORE = 16, 4000  # intervals: of a piece on average, and of the whole path on top, in the end
 _PARTS = 4  # that an interval is cut into at a time: an estimate of its loss is worth no more
+_BESIDE = 1e-4  # of the first intervals: a joint that turns so near to a grid point turns there
+_STILL = 1e-6  # of the largest derivative: a joint whose own changes by less in a piece stands still
 _BENT = 1e-6  # of the slopes of sd^2: a smaller difference does not say where they meet
 _EDGE = 1e-7  # of an interval: a point nearer to its ends is not worth a new one
+_AT = 1e-6  # of the largest sd^2: as near to it is at it
+_ROUND = 0.25  # of the triangle above an interval: what a smooth peak holds
+_SHORT = 64  # times shorter than the first intervals of a piece: there rounding is not far
 _SPARING = 1.1  # by which the loss to be reached grows until there is room
 _SOFT = 1e-9  # by which rows are relaxed, so that those with next to no say in sdd have none by rounding
 _BINDS = 1e-6  # of sdd: as near to its bound is at it
@@ -26,10 +38,29 @@ _SHARE = 0.5  # of what rows have room for at rest, and of what the speed stays 
 
 
 def first_grid(path: PiecewisePolynomial) -> Array:
-    """Return the breaks of the path and equally many equal parts between each two, shape (N + 1,)."""
-    parts = max(_FEWEST, -(-_FIRST // path.pieces))
+    """Return where the path breaks and joints turn, and equal parts between breaks, shape (N + 1,)."""
+    parts = _first_parts(path)
     inner = path.breaks[:-1, None] + path.lengths[:, None] * (np.arange(parts) / parts)
-    return distinct(np.append(inner, path.end))
+    (turns,) = critical_points(path.coefficients, path.lengths, (0,))
+    cells = turns / path.lengths[:, None] * parts
+    bends = horner(derivative_coefficients(path.coefficients, 2), turns) * path.lengths[:, None]
+    turning = np.abs(bends) > _STILL * np.abs(path.piece_ends(1)).max()  # of others the turns are rounding
+    apart = (np.abs(cells - np.rint(cells)) > _BESIDE) & turning
+    turns = (path.breaks[:-1, None] + turns)[apart]
+    grid = distinct(np.concatenate([inner.reshape(-1), turns, [path.end]]))
+    close = np.diff(grid) <= _BESIDE / parts * path.lengths.min()
+    return np.asarray(grid[~np.append(False, close)])
+
+
+def _first_parts(path: PiecewisePolynomial) -> int:
+    """Return into how many equal parts each piece of a path is cut to begin with."""
+    return max(_FEWEST, -(-_FIRST // path.pieces))
+
+
+def shortest_intervals(path: PiecewisePolynomial, grid: Array) -> Array:
+    """Return how long intervals are at least that are worth being cut for little time, shape (N,)."""
+    piece = np.clip(np.searchsorted(path.breaks, grid[:-1], "right") - 1, 0, path.pieces - 1)
+    return np.asarray(path.lengths[piece] / (_SHORT * _first_parts(path)))
 
 
 def most_intervals(path: PiecewisePolynomial) -> int:
@@ -42,7 +73,7 @@ def halved(grid: Array) -> Array:
     return distinct(np.append(grid, 0.5 * (grid[:-1] + grid[1:])))
 
 
-def time_lost(intervals: CollocationRows, x: Array, mvc: Array, durations: Array) -> Array:
+def time_lost(intervals: IntervalRows, x: Array, mvc: Array, durations: Array) -> Array:
     """Return an estimate of the time lost in each interval, shape (N,).
 
     The acceleration that is not used, as a share of its range, costs half that share of the time; so does the
@@ -58,19 +89,32 @@ def time_lost(intervals: CollocationRows, x: Array, mvc: Array, durations: Array
         below = np.where(mvc > 0, 1.0 - x / mvc, 0.0)
     more, less = _unused(intervals, x)
     unused = np.minimum.reduce([0.5 * (below[:-1] + below[1:]), more, less])
-    return np.asarray(0.5 * np.clip(unused, 0.0, 1.0) * durations)
+    above = np.where((below[1:] < _AT) & (below[:-1] < _AT), _peaks(intervals.grid, x), 0.0)
+    return np.asarray(0.5 * (np.clip(unused, 0.0, 1.0) + _ROUND * np.minimum(above, 1.0)) * durations)
 
 
-def _unused(intervals: CollocationRows, x: Array) -> tuple[Array, Array]:
-    """Return how much larger and smaller sdd could be, the mean of both ends, as shares of its range."""
-    mean = np.diff(x) / (2.0 * intervals.distances)
-    more, less = np.zeros_like(mean), np.zeros_like(mean)
-    ends = mean - intervals.ramps, mean + intervals.ramps
-    for (low, high), u in zip(intervals.sdd_ranges(x, _SOFT), ends, strict=True):
+def _peaks(grid: Array, x: Array) -> Array:
+    """Return how far its neighbours' lines meet above each interval's own, as a share of sd^2, (N,)."""
+    meeting, slopes = _meetings(grid, x), np.diff(x) / np.diff(grid)
+    before = np.concatenate([slopes[:1], slopes[:-1]])
+    rise = (before - slopes) * np.diff(grid) * meeting
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.nan_to_num(rise / np.minimum(x[1:], x[:-1]), posinf=0.0))
+
+
+def _unused(intervals: IntervalRows, x: Array) -> tuple[Array, Array]:
+    """Return how much larger and smaller sd^2 could be at the far ends, as shares of its range."""
+    more, less = np.empty(x.size - 1), np.empty(x.size - 1)
+    for block in blocks(x.size - 1):
+        P, R, C, y = intervals.P[:, block], intervals.R[:, block], intervals.C[:, block], x[1:][block]
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            bounds = (C * (1.0 + _SOFT) - P * x[:-1][block]) / R
+        high = np.where(R > 0, bounds, np.inf).min(axis=0, initial=np.inf)
+        low = np.where(R < 0, bounds, -np.inf).max(axis=0, initial=-np.inf)
         span = high - low
         known = np.isfinite(span) & (span > 0)
-        more += 0.5 * np.where(known, (high - u) / np.where(known, span, 1.0), 1.0)
-        less += 0.5 * np.where(known, (u - low) / np.where(known, span, 1.0), 1.0)
+        more[block] = np.where(known, (high - y) / np.where(known, span, 1.0), 1.0)
+        less[block] = np.where(known, (y - low) / np.where(known, span, 1.0), 1.0)
     return more, less
 
 
@@ -125,35 +169,3 @@ def _meetings(grid: Array, x: Array) -> Array:
         share = (slopes - after) / (before - after)
     bent = before - after > _BENT * np.maximum(np.abs(before), np.abs(after))
     return np.where(bent & (share > _EDGE) & (share < 1.0 - _EDGE), share, np.nan)
-
-
-def wanted_ramps(intervals: CollocationRows, x: Array) -> Array:
-    """Return the sdd ramps (N,) with which the bound that decides in each interval is met at both its ends.
-
-    Where neither the upper nor the lower bound of sdd decides, there is none.
-
-    Args:
-        intervals: N of them.
-        x: sd^2 at the grid points, the solution for them, shape (N + 1,).
-    """
-    mean, ramps = np.diff(x) / (2.0 * intervals.distances), intervals.ramps
-    (low, high), (far_low, far_high) = intervals.sdd_ranges(x)
-    near, far = mean - ramps, mean + ramps
-    margin = _BINDS * np.maximum(np.abs(near), np.abs(far))
-    with np.errstate(invalid="ignore"):
-        rising = np.minimum(high - near, far_high - far) <= margin
-        falling = np.minimum(near - low, far - far_low) <= margin
-        wanted = np.where(rising, far_high - high, np.where(falling, far_low - low, 0.0)) / 2
-    most = _SHARE * intervals.largest_ramps()
-    wanted = np.clip(np.where(np.isfinite(wanted), wanted, 0.0), -most, most)
-    return feasible_ramps(intervals.grid, x, wanted, _SHARE)
-
-
-def interpolated_ramps(intervals: CollocationRows, finer: Array) -> tuple[Array, Array]:
-    """Return sdd ramps and distances, both (M,), of the intervals of a finer grid (M + 1,)."""
-    grid = intervals.grid
-    owner = np.searchsorted(grid, finer[:-1], "right") - 1
-    lengths, parts = np.diff(grid), np.diff(finer)
-    share = parts / lengths[owner]
-    surplus = (intervals.distances / lengths - 1.0)[owner] * share**2
-    return intervals.ramps[owner] * share, parts * (1.0 + surplus)

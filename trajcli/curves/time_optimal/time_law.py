@@ -1,8 +1,9 @@
-"""Time law s(t) of given sd^2 on a grid: cubic pieces, in which sdd is linear in time.
+"""Time law s(t) of given sd^2 and sdd on a grid: quartic pieces, in which sddd is linear in time.
 
-A piece over the length D, from the speed v to the speed w, in which sdd grows by 2 d, lasts T with
-D = T (v + w) / 2 - T^2 d / 6; d is the sdd ramp of the interval. Without it sdd is constant, and sd^2 linear
-in s.
+A piece over the length D, from the speed v and the acceleration a to w and b, lasts T with
+D = T (v + w) / 2 - T^2 (b - a) / 12. Where sdd is constant, sd^2 is linear in s, and the piece quadratic.
+
+Source: Davis and Rabinowitz, Methods of Numerical Integration (1984), on corrections at the ends.
 """
 
 from __future__ import annotations
@@ -33,6 +34,13 @@ class LawPieces:
         """Return some of the pieces."""
         return LawPieces(self.durations[which], self.coefficients[:, which])
 
+    def differ(self, others: LawPieces) -> NDArray[np.bool_]:
+        """Return which pieces are not the same as those of a law over the same intervals, shape (N,)."""
+        if self.coefficients.shape != others.coefficients.shape:
+            return np.ones(self.durations.size, dtype=bool)
+        apart = (self.coefficients != others.coefficients).any(axis=0)
+        return np.asarray(apart | (self.durations != others.durations))
+
     def along(self, path: PiecewisePolynomial) -> Array:
         """Return the coefficients (degree + 1, n, N) of q(s(t)).
 
@@ -45,28 +53,58 @@ class LawPieces:
         return substituted(taylor_shift(local, begins - path.breaks[piece]), self.coefficients[:-1])
 
 
-def law_pieces(grid: Array, x: Array, ramps: Array) -> LawPieces:
-    """Return the pieces of the law, one for each interval, of degree 3, or 2 where no interval has a ramp.
+def law_pieces(grid: Array, x: Array, near: Array | None = None, far: Array | None = None) -> LawPieces:
+    """Return the pieces of the law, one for each interval, of degree 4, or 2 where sdd is constant in each.
 
     Args:
         grid: Grid points, shape (N + 1,).
         x: sd^2 there; two neighbours must not both be zero.
-        ramps: As from `feasible_ramps`, shape (N,).
+        near: sdd at the near ends of the intervals, shape (N,); constant in each unless given.
+        far: sdd at the far ends; where no law leads forward with both, sdd is constant instead.
     """
-    durations, sd = interval_durations(grid, x, ramps), np.sqrt(x)
-    rows = [0.5 * (np.diff(sd) / durations - ramps), sd[:-1], grid[:-1]]
-    return LawPieces(durations, np.stack([ramps / (3.0 * durations), *rows] if ramps.any() else rows))
+    v, D = np.sqrt(x), np.diff(grid)
+    mean, u = 0.5 * (v[1:] + v[:-1]), np.diff(x) / (2.0 * D)
+    near, far = u if near is None else near, u if far is None else far
+    even = (near == u) & (far == u) | ~_leads_forward(mean, v, D, near, far)
+    near, far = np.where(even, u, near), np.where(even, u, far)
+    h = 2.0 * D / (mean + np.sqrt(np.where(even, mean**2, mean**2 - (far - near) * D / 3.0)))
+    if even.all():
+        return LawPieces(h, np.stack([0.5 * u, v[:-1], grid[:-1]]))
+    rows = quartic_coefficients(h, grid, v, near, far)
+    rows[:2, even] = 0.0
+    return LawPieces(h, rows)
 
 
-def law_of(grid: Array, x: Array, ramps: Array | None = None) -> PiecewisePolynomial:
-    """Return s(t), one piece for each interval, from t = 0 on.
+def quartic_coefficients(h: Array, s: Array, v: Array, near: Array, far: Array) -> Array:
+    """Return the coefficients of pieces that last h (N,), highest power first, shape (5, N).
+
+    Args:
+        h: As states and accelerations ask for.
+        s: At the nodes, shape (N + 1,).
+        v: Speeds there.
+        near: Accelerations at the near ends, shape (N,).
+        far: At the far ends.
+    """
+    rise = 6.0 * np.diff(v) / h**2
+    first, last = rise - (4.0 * near + 2.0 * far) / h, (2.0 * near + 4.0 * far) / h - rise
+    return np.stack([(last - first) / (24.0 * h), first / 6.0, 0.5 * near, v[:-1], s[:-1]])
+
+
+def _leads_forward(mean: Array, v: Array, D: Array, near: Array, far: Array) -> NDArray[np.bool_]:
+    """Return where a quartic exists, and its speed has no control point below zero, shape (N,)."""
+    under = mean**2 - (far - near) * D / 3.0
+    h = 2.0 * D / (mean + np.sqrt(np.maximum(under, 0.0)))
+    return np.asarray((under > 0.0) & (v[:-1] + near * h / 3.0 >= 0.0) & (v[1:] - far * h / 3.0 >= 0.0))
+
+
+def law_of(grid: Array, x: Array) -> PiecewisePolynomial:
+    """Return s(t), one piece of constant sdd for each interval, from t = 0 on.
 
     Args:
         grid: Grid points, shape (N + 1,).
         x: sd^2 there; two neighbours must not both be zero.
-        ramps: As from `feasible_ramps`, shape (N,); zero unless given.
     """
-    return _law(law_pieces(grid, x, np.zeros(grid.size - 1) if ramps is None else ramps))
+    return _law(law_pieces(grid, x))
 
 
 def law_and_trajectory(
@@ -86,44 +124,6 @@ def law_and_trajectory(
     return law, PiecewisePolynomial(law.breaks, coefficients)
 
 
-def interval_durations(grid: Array, x: Array, ramps: Array) -> Array:
-    """Return the time each interval takes, shape (N,).
-
-    Args:
-        grid: Grid points, shape (N + 1,).
-        x: sd^2 there; two neighbours must not both be zero.
-        ramps: As from `feasible_ramps`, shape (N,).
-    """
-    lengths, mean = np.diff(grid), _mean_speeds(x)
-    return np.asarray(2.0 * lengths / (mean + np.sqrt(mean**2 - 2.0 / 3.0 * ramps * lengths)))
-
-
-def distances_at_mean_speed(grid: Array, x: Array, ramps: Array) -> Array:
-    """Return how far the mean of both speeds would lead in the time of each interval, shape (N,).
-
-    Args:
-        grid: Grid points, shape (N + 1,).
-        x: sd^2 there; two neighbours must not both be zero.
-        ramps: As from `feasible_ramps`, shape (N,).
-    """
-    return interval_durations(grid, x, ramps) * _mean_speeds(x)
-
-
-def feasible_ramps(grid: Array, x: Array, wanted: Array, share: float = 1.0) -> Array:
-    """Return the sdd ramps (N,) that are wanted, or as much of them as leaves every speed positive.
-
-    The speed between v and w is least where it bends down most, by at most d T / 4: with d D no more than the
-    square of the mean of v and w it stays positive.
-
-    Args:
-        grid: Grid points, shape (N + 1,).
-        x: sd^2 there, shape (N + 1,).
-        wanted: Shape (N,).
-        share: How much of the largest ramp may be used.
-    """
-    return np.asarray(np.minimum(wanted, share * _mean_speeds(x) ** 2 / np.diff(grid)))
-
-
 def blocks(count: int) -> list[slice]:
     """Return slices that cover so many intervals; the numbers of each stay in the processor's cache."""
     return [slice(first, first + _BLOCK) for first in range(0, count, _BLOCK)]
@@ -133,9 +133,3 @@ def _law(pieces: LawPieces) -> PiecewisePolynomial:
     """Return the pieces one after the other, from t = 0 on."""
     times = increasing(np.concatenate([[0.0], np.cumsum(pieces.durations)]))
     return PiecewisePolynomial(times, pieces.coefficients[:, :, None])
-
-
-def _mean_speeds(x: Array) -> Array:
-    """Return the mean of the speeds at both ends of each interval, shape (N,)."""
-    sd = np.sqrt(x)
-    return np.asarray(0.5 * (sd[:-1] + sd[1:]))

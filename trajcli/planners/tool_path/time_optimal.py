@@ -42,7 +42,7 @@ from trajcli.planners.effort_limits import (
     solved_within_efforts,
 )
 from trajcli.planners.law_events import distance_from_bound, solved_by_convex_steps
-from trajcli.planners.planner import Event, Phase, stretched
+from trajcli.planners.planner import LITTLE, Event, Phase, stretched
 from trajcli.planners.tool_path.follow import FollowedPath, JointMotion
 from trajcli.planners.tool_path.law import LawSpec
 
@@ -52,7 +52,6 @@ _BETWEEN = 6  # times in a piece at which the limits of the tool are looked at, 
 _STRETCHED = 1e-9
 _BESIDE = 1e-13  # of the length: so far before its end the last sample of an interval is
 _EVEN = 1e-6  # of the square of the turning: an axis that changes by less stays
-_NOTED = 1e-6  # relative: a smaller stretch is not worth an event
 
 
 def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, planner: str) -> JointMotion:
@@ -76,14 +75,18 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
     with joints.diagnosed():
         further = (ToolConstraint(joints.executed, tcp), *path_constraints(curve, robot))
 
+        turns = path.poses.pure_rotation
+        along = (tcp.angular_speed, tcp.angular_acceleration) if turns else (tcp.speed, tcp.acceleration)
         of_law = _jerk_of_law(tcp, angular=path.poses.pure_rotation)
         keeps_jerk = bool(of_law) or _moving(curve)[np.isfinite(limits.jerk).any(axis=1)].any()
 
         def solve(efforts: tuple[PathConstraint, ...]) -> TimeOptimalMotion:
             every, bounds = (*further, *efforts), (limits.velocity, limits.acceleration)
             if not keeps_jerk:
-                return time_optimal(curve, *bounds, further=every)
-            return jerk_limited_time_optimal(curve, *bounds, limits.jerk, further=every, further_jerk=of_law)
+                return time_optimal(curve, *bounds, further=every, along=along)
+            return jerk_limited_time_optimal(
+                curve, *bounds, limits.jerk, further=every, further_jerk=of_law, along=along
+            )
 
         solved = solved_within_efforts(curve, robot, solve)
         remaining = _remaining_stretch(joints.executed, solved.law, tcp)
@@ -123,7 +126,7 @@ def _events(solved: TimeOptimalMotion, robot: Robot, remaining: float, *, fastes
     """Return how a law was found, how good it is, and where it stops."""
     events = []
     if isinstance(solved, JerkLimitedMotion):
-        events += [solved_by_convex_steps(solved)] + [distance_from_bound(solved, robot, remaining)] * fastest
+        events.append(solved_by_convex_steps(solved))
         if solved.stops.size:
             count = solved.stops.size
             text = f"stops {count} time{'s' * (count != 1)} where the path bends: limits of jerk ask for it"
@@ -131,8 +134,10 @@ def _events(solved: TimeOptimalMotion, robot: Robot, remaining: float, *, fastes
     elif solved.refinements:
         text = f"the grid was refined {solved.refinements} times, to {solved.grid.size} grid points"
         events.append(Event("refined", text))
+    if fastest:
+        events.append(distance_from_bound(solved, robot, remaining))
     stretch = solved.stretch * remaining
-    if stretch > 1 + _NOTED:
+    if stretch > 1 + LITTLE:
         events.append(stretched(stretch))
     return tuple(events)
 
@@ -199,6 +204,16 @@ class ToolConstraint:
         cap = np.minimum(speed**2, angular[3])
         joined = [np.concatenate(pair, axis=1) for pair in zip(linear, angular[:3], strict=True)]
         return ConstraintRows(joined[0], joined[1], joined[2], cap)
+
+    def largest(self, s: Array, side: Side) -> Array:
+        """Return the largest sd^2 at points (p,), by speeds and by the accelerations across the path."""
+        limits = self.limits
+        _, first, second = self.path.poses.evaluate(np.clip(s, 0.0, self.path.length), side)
+        tangent, turning = (np.linalg.norm(first[:, part], axis=1) for part in (slice(0, 3), slice(3, 6)))
+        with np.errstate(divide="ignore"):
+            speed = np.minimum(limits.speed / tangent, limits.angular_speed / turning)
+            bend = limits.acceleration / np.linalg.norm(second[:, :3], axis=1)
+        return np.asarray(np.minimum(speed**2, bend))
 
     def excess(self, law: LawPieces) -> Array:
         """Return the shares of speed and acceleration used at samples of each piece, shape (2, N)."""

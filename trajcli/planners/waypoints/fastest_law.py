@@ -20,12 +20,11 @@ from trajcli.kinematics.robot import Robot
 from trajcli.limits.kinds import path_constraints
 from trajcli.planners.effort_limits import solved_within_efforts
 from trajcli.planners.law_events import distance_from_bound, solved_by_convex_steps
-from trajcli.planners.planner import Event, stretched
+from trajcli.planners.planner import LITTLE, Event, stretched
 from trajcli.planners.waypoints.joint_path import JointPath
 from trajcli.planners.waypoints.spline_rules import Rule
 
 _MOST_STOPS = 10  # that an event lists
-_STRETCHED = 1e-9  # relative: a smaller stretch is rounding
 _OFF = 1e-9  # relative: an acceleration this little off the path is along it
 _BENT: tuple[Rule, ...] = ("computed", "shape_preserving")  # rules whose curvature jumps
 
@@ -151,15 +150,15 @@ def events_of_law(motion: TimeOptimalMotion, robot: Robot, *, fastest: bool) -> 
     """
     if isinstance(motion, JerkLimitedMotion):
         yield solved_by_convex_steps(motion)
-        if fastest:
-            yield distance_from_bound(motion, robot)
     elif motion.refinements:
         yield Event(
             "refined",
             f"the grid was refined {'once' if motion.refinements == 1 else f'{motion.refinements} times'}, "
             f"to {motion.grid.size} grid points of the path",
         )
-    if motion.stretch > 1 + _STRETCHED:
+    if fastest:
+        yield distance_from_bound(motion, robot)
+    if motion.stretch > 1 + LITTLE:
         yield stretched(motion.stretch)
     if motion.stops.size:
         times = ", ".join(f"{time:.6g}" for time in motion.stop_times[:_MOST_STOPS].tolist())
