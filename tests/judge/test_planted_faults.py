@@ -267,3 +267,37 @@ def test_a_joint_too_fast_towards_its_end_is_found() -> None:
         assert abs(found.time - at) < 0.01
         assert found.value / found.limit == pytest.approx(1 + 1e-4, rel=1e-6)
         assert found.factor == pytest.approx(1 + 1e-4, rel=1e-6)
+
+
+def dipping(dips: tuple[int, ...]) -> PiecewisePolynomial:
+    """Return an acceleration of 1 rad/s^2, then -1, that leaves for 2 ms within some intervals of 8 ms."""
+    edges = sorted({0.0, 0.4, 0.8, *(0.008 * k + at for k in dips for at in (0.003, 0.005))})
+    lengths, middle = np.diff(edges), np.array(edges[:-1]) + np.diff(edges) / 2
+    away = (middle % 0.008 > 0.003) & (middle % 0.008 < 0.005) & np.isin(middle // 0.008, dips)
+    pieces = np.zeros((3, lengths.size, 1))
+    pieces[0, :, 0] = 0.5 * np.where(middle < 0.4, 1.0, -1.0) * np.where(away, -1.0, 1.0)
+    speed = np.concatenate([[0.0], np.cumsum(2 * pieces[0, :, 0] * lengths)])
+    pieces[1, :, 0] = speed[:-1]
+    pieces[2, 1:, 0] = np.cumsum(lengths * (speed[:-1] + speed[1:]) / 2)[:-1]
+    return PiecewisePolynomial(np.array(edges), pieces)
+
+
+def test_steps_of_acceleration_between_rows_are_no_wrong_column() -> None:
+    """The rows show 1 rad/s^2 throughout, and in three intervals of four the velocity gains half as much."""
+    dips = (20, 21, 23, 70, 71, 73)
+    motion = rows_of(dipping(dips), 0.008, decimals=9)
+    wide = limits(joints=1, velocity=9.0, acceleration=99.0, jerk=1e9)
+    assert np.ptp(np.asarray(motion.qdd)[:50]) == 0.0
+    assert judged(motion, wide).verdict == "satisfied"
+    found = worst(judged(replace(motion, qdd=1.02 * np.asarray(motion.qdd)), wide), "derivative")
+    assert found.quantity == "acceleration"
+
+
+@pytest.mark.parametrize("limit", [2.0, np.inf])
+def test_a_short_ramp_within_the_limit_is_no_jump(limit: float) -> None:
+    """Two velocities, and 2 rad/s^2 for 3 ms between two rows: only where nothing bounds it, it may be a jump."""
+    pieces = np.zeros((3, 3, 1))
+    pieces[:, :, 0] = [[0.0, 1.0, 0.0], [0.5, 0.5, 0.506], [0.0, 0.0505, 0.0505 + 0.003 * 0.503]]
+    motion = rows_of(PiecewisePolynomial(np.array([0.0, 0.101, 0.104, 0.3]), pieces), 0.01, decimals=9)
+    judgement = judged(motion, limits(0.0, joints=1, velocity=9.0, acceleration=limit, jerk=np.inf))
+    assert {each.kind for each in judgement.errors} == (set() if np.isfinite(limit) else {"jump"})

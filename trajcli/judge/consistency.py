@@ -26,6 +26,8 @@ from trajcli.limits.tolerances import JUMP_ABSOLUTE, JUMP_RELATIVE, exceeds
 _ISOLATED = 4.0  # times the changes beside it: a motion that merely is fast changes from row to row alike
 _STEPS = 2.0  # times what one step in acceleration within an interval explains: there may be several
 _MEANT, _MEANT_OF_ALL = 1e-3, 1e-4  # of the joint's peak, and of all: a column that differs by less is meant
+_AROUND = 32  # intervals on each side among which most disagree where a column of accelerations is wrong
+_FEWEST = 8  # of them that are counted, also where there are fewer
 _NEAR = 2  # intervals on each side that a jump is compared with
 _QUANTITIES = ("position", "velocity", "acceleration")
 
@@ -73,6 +75,17 @@ class Changes:
             room[sparse] += further
         return np.asarray(np.abs(self.change - self.stated) > room)
 
+    def persistent(self, disagree: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return where columns exclude each other in most of the intervals around that are not still, (P, n).
+
+        An acceleration may step between two rows, leave and return: a wrong column is wrong in many of them.
+        """
+        if self.order == 0 or self.stated is None or not disagree.any():
+            return disagree
+        moving = np.abs(self.change) + np.abs(self.stated) > self.error + JUMP_ABSOLUTE
+        wrong, known = (_around(flags) for flags in (disagree, moving))
+        return np.asarray(disagree & (2 * wrong > np.maximum(known, _FEWEST)))
+
     def isolated(self, piece: NDArray[np.intp], joint: NDArray[np.intp], values: Array) -> NDArray[np.bool_]:
         """Return which of some values (P, n) are much larger than those near to them, but for one beside."""
         near = piece + np.arange(-_NEAR, _NEAR + 1)[:, None]
@@ -111,6 +124,15 @@ def changes_of(window: Intervals) -> list[Changes]:
     return found
 
 
+def _around(flags: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return how many of some flags (P, n) are set among those near to each."""
+    summed = np.cumsum(np.concatenate([np.zeros_like(flags[:1]), flags]), axis=0)
+    middle = np.arange(len(flags))
+    return np.asarray(
+        summed[np.minimum(middle + _AROUND + 1, len(flags))] - summed[np.maximum(middle - _AROUND, 0)]
+    )
+
+
 def judge_consistency(
     window: Intervals,
     pieces: slice,
@@ -135,10 +157,13 @@ def judge_consistency(
     """
     for of_order in changes:
         judge = _Judge(window, of_order, axes, move, worst)
-        disagree = of_order.disagree(window.lengths, limits)[pieces]
-        over = judge.over_limit(limits)[pieces]
-        if disagree.any() or over.any():
-            judge.add(pieces.start, disagree, over, changes_branch)
+        disagree = of_order.disagree(window.lengths, limits)
+        persistent = of_order.persistent(disagree)[pieces]
+        if of_order.order == 1:  # a limited acceleration may be anything below its limit between two rows
+            disagree = disagree & np.isinf(limits.acceleration).any(axis=1)
+        jumping = (disagree | judge.over_limit(limits))[pieces]
+        if persistent.any() or jumping.any():
+            judge.add(pieces.start, persistent, jumping, changes_branch)
 
 
 @frozen
@@ -165,24 +190,21 @@ class _Judge:
     def add(
         self,
         first: int,
-        disagree: NDArray[np.bool_],
-        over: NDArray[np.bool_],
+        persistent: NDArray[np.bool_],
+        jumping: NDArray[np.bool_],
         changes_branch: ChangesBranch | None,
     ) -> None:
-        """Add jumps and wrong derivatives among intervals from the first on."""
+        """Add jumps, and derivatives that are wrong persistently, among intervals from the first on."""
         changes = self.changes
-        piece, joint = np.nonzero(disagree | over)
+        piece, joint = np.nonzero(persistent | jumping)
         row = piece + first
-        jumps = changes.isolated(row, joint, changes.change)
+        jumps = changes.isolated(row, joint, changes.change) & jumping[piece, joint]
         if changes.stated is not None:
             moved, said = (
                 np.abs(self._beside(values, row, joint)) for values in (changes.change, changes.stated)
             )
             jumps &= moved >= said  # else it is the column of the derivative that jumps
-        other = disagree[piece, joint] & ~jumps
-        if changes.order == 1 and changes.stated is not None:
-            # an acceleration may leave and return between two rows: a wrong column is wrong in many of them
-            other &= ~changes.isolated(row, joint, changes.change - changes.stated)
+        other = persistent[piece, joint] & ~jumps
         sizes = np.abs(changes.change[row, joint])
         branch = np.zeros(row.size, dtype=bool)
         if changes.order == 0 and changes_branch is not None:
