@@ -186,3 +186,43 @@ def test_a_determinant_of_zero_on_a_row_hides_no_change_of_branch(half: int) -> 
     required = Requirements(robot, tool=lambda: ToolJudge(robot, paths))
     found = [each for each in judge_motion(lambda: [rows], required).findings if each.kind == "branch"]
     assert [each.row for each in found] == ([22] if half == 1 else [])
+
+
+SQUARE = {
+    "version": 1,
+    "robot": "ur5e",
+    "limits": {"acceleration": 20.0, "tcp": {"speed": 0.25, "acceleration": 2.0}},
+    "start": {"xyz": [0.4, 0.1, 0.25], "rpy": [np.pi, 0, 0]},
+    "moves": [
+        {
+            "planner": "path",
+            "corner": "stop",
+            "segments": [
+                {"line": {"xyz": [*corner, 0.25]}}
+                for corner in ([0.5, 0.1], [0.5, 0.2], [0.4, 0.2], [0.4, 0.1])
+            ],
+        }
+    ],
+}
+
+
+def test_a_path_that_ends_where_it_starts_is_followed_from_place_to_place() -> None:
+    """Each row is on the side of the square on which it is driven; a step to the side is found by how much."""
+    made, arm, rate = trajcli.plan(SQUARE), trajcli.load_robot("ur5e"), 125
+    rows = made.trajectory.sample(rate)
+    paths = {0: made.moves[0].planned.tool}
+    off = np.full(6, 0.5e-9)
+    resolution, moves = Resolution(0.5e-9, off, off, off), np.zeros(len(rows), int)
+    required = Requirements(made.moves[0].robot, tool=lambda: ToolJudge(made.moves[0].robot, paths))
+
+    def deviations(q: np.ndarray) -> list[tuple[int | None, float | None]]:
+        motion = RecordedMotion(
+            rows.t + 3.0, np.round(q, 9), None, None, None, None, moves, None, resolution, "rows"
+        )
+        found = judge_motion(lambda: [motion], required).findings
+        return [(each.row, each.value) for each in found if each.kind == "deviation"]
+
+    assert deviations(rows.q) == []
+    q, row = rows.q.copy(), len(rows) - 3
+    q[row] += np.linalg.solve(arm.jacobian(q[row]), [2e-4, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert deviations(q) == [(row + 1, pytest.approx(2e-4, rel=1e-2))]

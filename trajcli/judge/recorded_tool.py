@@ -54,7 +54,7 @@ class ToolJudge:
         self._moved, self._seen = 0.0, -1
         self.notes: list[str] = []
         for move, motion in (paths or {}).items():
-            if motion is not None and motion.path is None:
+            if motion is not None and (motion.path is None or motion.overlaps):
                 self.notes.append(f"move {move}: its segments overlap, the distance from them is not judged")
             elif motion is not None:
                 self._recorded[move] = RecordedPath(robot, motion, move, self._worst)

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from trajcli.curves.extrema import peaks
 from trajcli.curves.piecewise import Array, horner
 from trajcli.errors import Amount
 from trajcli.findings import Certainty, Collector, Finding, at_time
@@ -23,6 +24,8 @@ from trajcli.limits.tolerances import exceeds
 _SAMPLES = 1000  # of a path, where the nearest point is looked for first
 _STEPS = 8  # of Gauss and Newton from there
 _ROWS = 1024  # at a time
+_ASIDE = 1e-3  # of the distance of samples: what tells the sides of a corner apart
+_FURTHER = 2.0  # times the way of the tool from row to row: how far along the path it may get
 
 
 class RecordedPath:
@@ -45,6 +48,10 @@ class RecordedPath:
         self._s = np.unique(np.concatenate([inner, self._path.breaks]))
         self._poses = self._path.poses.evaluate(self._s, "right")[0]
         self._sign = 0.0
+        step = self._path.length / _SAMPLES
+        self._slack, self._near = 2.0 * step, step**2  # samples beside a place, and squared distances alike
+        self._fast = float(peaks(motion.law, (1,))[0].magnitude[0])
+        self._before: tuple[float, Array, float] | None = None  # place, coordinates and time of a row
 
     def see(self, window: Intervals, pieces: slice) -> None:
         """Judge the rows of some pieces, and the middle between them where the curve is no straight line."""
@@ -53,21 +60,30 @@ class RecordedPath:
         for low in range(pieces.start, last, _ROWS):
             rows = np.arange(low, min(low + _ROWS, last))
             room = self._room(q[rows], window)
-            self._judge(q[rows], window.t[rows], window.rows[rows], room)
-            inner = rows[rows < pieces.stop]
+            along = self._judge(q[rows], window.t[rows], window.rows[rows], room)
+            kept = (rows < pieces.stop) & (window.moves[np.minimum(rows + 1, window.last)] == self._move)
+            inner, along = rows[kept], along[kept]
             if int(window.highest[pieces].max(initial=0)) > 1 and inner.size:
                 half = 0.5 * window.lengths[inner]
                 middle = horner(window.coefficients[:, inner], half[:, None])
-                self._judge(middle, window.t[inner] + half, window.rows[inner], room[: inner.size])
+                self._judge(middle, window.t[inner] + half, window.rows[inner], room[kept], (along, half))
 
     def _room(self, q: Array, window: Intervals) -> Array:
         """Return by how much the tool may be off by the rounding of the rows, m and rad alike, (N,)."""
         off = stated_errors(q, np.asarray(window.resolution.q), window.resolution.relative)
         return np.asarray(2.0 * max(self._arm, 1.0) * off.sum(axis=1))
 
-    def _judge(self, q: Array, t: Array, numbers: NDArray[np.int64], room: Array) -> None:
+    def _judge(
+        self,
+        q: Array,
+        t: Array,
+        numbers: NDArray[np.int64],
+        room: Array,
+        before: tuple[Array, Array] | None = None,
+    ) -> Array:
+        """Judge rows, or what lies behind rows of known s by some seconds; return their s (N,)."""
         poses, jacobians = linearisation(self._robot, q)
-        s = self._nearest(poses)
+        s = self._nearest(poses, t, before)
         target = self._path.at_s(s, "right").target()
         off, split = residuals(target, poses), sum(target.position)
         sizes = np.linalg.norm(off[:, :split], axis=1), np.linalg.norm(off[:, split:], axis=1)
@@ -79,9 +95,10 @@ class RecordedPath:
         known = determinants(target, poses, jacobians, self._arm)
         if known is not None:
             self._watch_branch(np.sign(known), t, numbers)
+        return s
 
-    def _nearest(self, poses: Array) -> Array:
-        """Return the values of s (N,) at which the path is nearest to the tool."""
+    def _nearest(self, poses: Array, t: Array, before: tuple[Array, Array] | None) -> Array:
+        """Return the values of s (N,) at which the path is nearest to the tool, each near the one before."""
         turning = self._path.poses.pure_rotation
         rows = slice(0, 3)
         known, own = (
@@ -89,8 +106,18 @@ class RecordedPath:
             for each in (self._poses, poses)
         )
         square = (own**2).sum(axis=1)[:, None] - 2.0 * own @ known.T + (known**2).sum(axis=1)
-        s = self._s[square.argmin(axis=1)]
+        if before is None:
+            s = self._s[self._followed(square, own, t)]
+        else:
+            far = np.abs(self._s - before[0][:, None]) > (self._slack + self._fast * before[1])[:, None]
+            s = self._s[np.where(far, np.inf, square).argmin(axis=1)]
         step = self._path.length / _SAMPLES
+        both = np.clip(s + _ASIDE * np.array([[-step], [step]]), 0.0, self._path.length)
+        left, right = (
+            np.linalg.norm(self._apart(self._path.at_s(side, "right").poses, poses, turning=turning), axis=1)
+            for side in both
+        )
+        s = np.where(left < right, both[0], both[1])  # a corner has no slope: its sides are no step from it
         for _ in range(_STEPS):
             reference = self._path.at_s(s, "right")
             slope = reference.first[:, 3:] if turning else reference.first[:, :3]
@@ -99,6 +126,32 @@ class RecordedPath:
             change = np.clip((slope * apart).sum(axis=1) / size, -step, step)
             s = np.clip(s + change, 0.0, self._path.length)
         return np.asarray(s)
+
+    def _followed(self, square: Array, own: Array, t: Array) -> NDArray[np.intp]:
+        """Return the indices of the nearest samples, each no further from the one before than the tool moves.
+
+        A path may pass a place twice, or end where it starts: of the first row the earliest place counts.
+
+        Args:
+            square: Squared distances of rows from samples, shape (N, samples).
+            own: Coordinates of the rows, shape (N, d).
+            t: Their times, s, shape (N,).
+        """
+        found = np.empty(len(own), dtype=np.intp)
+        for k, coordinates in enumerate(own):
+            if self._before is None:
+                near = square[k] <= square[k].min() + self._near
+                start = int(near.argmax())
+                end = start + int(np.append(near[start:], False).argmin())
+                found[k] = start + square[k, start:end].argmin()
+            else:
+                at, last, time = self._before
+                moved = float(np.linalg.norm(coordinates - last))
+                reach = _FURTHER * moved + self._fast * (float(t[k]) - time) + self._slack
+                low, high = np.searchsorted(self._s, [at - reach, at + reach])
+                found[k] = low + square[k, low : max(high, low + 1)].argmin()
+            self._before = float(self._s[found[k]]), coordinates, float(t[k])
+        return found
 
     @staticmethod
     def _apart(reference: Array, poses: Array, *, turning: bool) -> Array:
