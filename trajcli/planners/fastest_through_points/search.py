@@ -34,7 +34,6 @@ from trajcli.planners.fastest_through_points.states import (
 )
 from trajcli.progress import report_progress
 
-MOST_STARTS = 8
 _SPEEDS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0)  # of central differences
 _PROVEN = 1e-7  # relative: a motion this near to the bound is the fastest
 _GRID, _COST = 2.0**-21, 1e-6  # relative: to what states are rounded, and how much longer that may last

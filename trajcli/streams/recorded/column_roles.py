@@ -146,7 +146,6 @@ class _Assignment:
         self._names = [self._read(name) for name in file.names]
         self._echo = any(name.startswith(_ECHO) for name in file.names)
         self._chosen: dict[str, ColumnGroup] = {}
-        self._left_out: list[str] = []
         self._notes: list[str] = []
 
     def _read(self, text: str) -> ColumnName:
