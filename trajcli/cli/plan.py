@@ -26,7 +26,9 @@ if TYPE_CHECKING:
     from trajcli.consumers.profile import Profile
     from trajcli.job.report import MoveReport
     from trajcli.job.reports.comparisons import PathReferenceReport, PeerViolation, ReferenceReport
+    from trajcli.judge.judgement import Judgement
     from trajcli.limits.tool_bound import ToolPeak
+    from trajcli.output.joined_rows import JoinedRows
     from trajcli.output.recording import LogOptions
 
 _FEW_STEPS = 9  # in acceleration: of more the largest says most
@@ -56,6 +58,7 @@ def plan_and_write(job: str, options: PlanCommand) -> Plan:
         ):  # what is not finite is for the checks to find, not for numpy to print
             plan = plan_job(loaded)
         grid = grid_of(plan)
+        plan, rows = _beside_rows(plan, grid, form, options)
         refusal, judged = _refusal(plan, options), None
         if refusal is None and options.reference:
             refusal = _contradicted(plan)
@@ -64,7 +67,7 @@ def plan_and_write(job: str, options: PlanCommand) -> Plan:
         if refusal is None and not options.no_output:
             write_rows(plan, grid, options.output, options.digits or "fixed", form=form, log=log)
     if options.report is not None or options.reference:
-        _report(plan, options, judged)  # behind the rows: where it stands, they do
+        _report(plan, options, judged, rows)  # behind the rows: where it stands, they do
     if refusal is not None:
         raise refusal
     if not options.quiet:
@@ -74,6 +77,19 @@ def plan_and_write(job: str, options: PlanCommand) -> Plan:
         if judged is not None:
             _summarise_consumer(judged)
     return plan
+
+
+def _beside_rows(
+    plan: Plan, grid: Grid, form: StreamFormat, options: PlanCommand
+) -> tuple[Plan, tuple[JoinedRows, Judgement] | None]:
+    """Return a plan with the event of rows that pass a limit between them, and what was judged of them."""
+    if not plan.verdict.passed:
+        return plan, None
+    from trajcli.output.joined import joined_rows, with_event
+
+    rows = joined_rows(plan, grid, form, options.digits or "fixed")
+    plan, judged = with_event(plan, rows)
+    return plan, None if judged is None else (rows, judged)
 
 
 def _log_options(options: PlanCommand) -> LogOptions | None:
@@ -215,10 +231,19 @@ def _write_resolved(loaded: LoadedJob, path: str) -> None:
     write_text(dump_job(loaded), path)
 
 
-def _report(plan: Plan, options: PlanCommand, judged: ProfileJudgement | None) -> None:
+def _report(
+    plan: Plan,
+    options: PlanCommand,
+    judged: ProfileJudgement | None,
+    rows: tuple[JoinedRows, Judgement] | None,
+) -> None:
     from trajcli.output.report import report_of
 
     report = report_of(plan, peers=options.reference)
+    if rows is not None:
+        from trajcli.output.joined import rows_report
+
+        report = report.model_copy(update={"rows": rows_report(*rows)})
     if judged is not None:
         from trajcli.output.consumer import consumer_report
 

@@ -330,6 +330,31 @@ class KnotsReport(ReportPart):
     deviation: KnotsDeviation
 
 
+class WorstOfRows(ReportPart):
+    """The limit that the curve through the rows passes by the largest factor."""
+
+    kind: str
+    joint: Annotated[str | None, Field(description="null: the tool.")]
+    move: int | None
+    row: Annotated[int, Field(description="The row that it stands at, or behind; from 1.")]
+    time: Annotated[float, Field(description="Of that row, s, as written.")]
+    value: Annotated[float, Field(description="SI.")]
+    limit: Annotated[float, Field(description="SI.")]
+
+
+class RowsReport(ReportPart):
+    """What becomes of the limits as the rows are joined by what their columns state."""
+
+    interpolation: Literal["linear", "cubic", "quintic"]
+    verdict: Annotated[
+        Literal["satisfied", "exceeded"], Field(description="exceeded: the event joined_over_limit.")
+    ]
+    worst: WorstOfRows | None = None
+    rate_that_keeps: Annotated[
+        float | None, Field(description="Hz; a higher rate whose rows keep every limit; null: none found.")
+    ] = None
+
+
 class Report(ReportPart):
     """What became of a job."""
 
@@ -361,4 +386,8 @@ class Report(ReportPart):
     knots: Annotated[
         KnotsReport | None,
         Field(description="Of /joint_trajectory; null where a limit is broken, or the motion lasts months."),
+    ] = None
+    rows: Annotated[
+        RowsReport | None,
+        Field(description="Of the rows as written; null where a limit is broken, or nothing joins them."),
     ] = None

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from trajcli.job.read import LoadedJob
     from trajcli.judge.consumer import ConsumerJudge
     from trajcli.judge.recorded_tool import ToolJudge
+    from trajcli.judge.rows.planned_rows import RowComparison
     from trajcli.kinematics.following.motion import ToolMotion
     from trajcli.planning.plan import Plan
 
@@ -105,6 +106,8 @@ def check_file(source: str | ByteSource, options: CheckOptions, plan: Plan | Non
     requirements = _requirements(options, given, shown, consumer)
     if consumer is not None and options.interpolate is None and consumer().profile.interpolation is not None:
         requirements = replace(requirements, interpolate=consumer().profile.interpolation)
+    compared = _compared(opened, given, options)
+    requirements = replace(requirements, planned=compared is not None and compared.planned)
     by_time = None if "move" in motion.quantities else _moves_by_time(given, motion)
 
     def blocks() -> Iterable[RecordedMotion]:
@@ -117,7 +120,7 @@ def check_file(source: str | ByteSource, options: CheckOptions, plan: Plan | Non
     if given.loaded is not None and "move" not in motion.quantities and by_time is None:
         notes = (*notes, "no column `move`: limits and paths of single moves are not judged")
     judged = replace(judgement, notes=notes, events=given.events, source=motion.source)
-    judged = _beside_plan(judged, opened, given, options)
+    judged = _beside_plan(judged, compared, options)
     return CheckedFile(judged, robot, shown, given.loaded, given.plan, motion)
 
 
@@ -142,13 +145,19 @@ def _opened(source: ByteSource, options: CheckOptions, given: _Given, declared: 
     )
 
 
-def _beside_plan(judgement: Judgement, source: ByteSource, given: _Given, options: CheckOptions) -> Judgement:
-    """Return the judgement that says whether the rows are those of the motion that the job plans."""
+def _compared(source: ByteSource, given: _Given, options: CheckOptions) -> RowComparison | None:
+    """Return whether the rows are those of the motion that the job plans; None where it plans none."""
     if given.plan is None or not given.plan.verdict.passed:
-        return judgement
+        return None
     from trajcli.judge.rows.planned_rows import compare_with_plan
 
-    found = compare_with_plan(source, given.plan, options.topic, options.field)
+    return compare_with_plan(source, given.plan, options.topic, options.field)
+
+
+def _beside_plan(judgement: Judgement, found: RowComparison | None, options: CheckOptions) -> Judgement:
+    """Return the judgement that says whether the rows are those of the motion that the job plans."""
+    if found is None:
+        return judgement
     if found.planned and options.interpolate is None and options.profile is None:
         return as_planned(judgement)
     if found.planned:

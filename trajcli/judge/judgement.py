@@ -114,5 +114,5 @@ def as_planned(judgement: Judgement) -> Judgement:
         worst = max(over, key=lambda finding: finding.excess)
         what = worst.kind.replace("_", " ") + ("" if worst.joint is None else f" of {worst.joint}")
         said = f"joined_over_limit: the rows, joined between them, pass the limit of the {what}"
-        events = (*events, f"{said}, by a factor of {worst.excess:.4g}")
+        events = (*events, f"{said}, by a factor of {worst.excess:.6g}")
     return replace(judgement, findings=worst_first(findings), events=events, planned_rows=True)

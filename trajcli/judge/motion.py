@@ -49,6 +49,7 @@ class Requirements:
         end: The state in which it shall end; None where nobody says.
         tool: Makes the judge of the tool; None for an arm without geometry.
         consumer: Makes the judge by the rules of a consumer; None for none.
+        planned: Whether they are rows of a verified motion: then all is told that their curve passes.
     """
 
     robot: Robot
@@ -59,6 +60,17 @@ class Requirements:
     end: State | None = None
     tool: Callable[[], ToolJudge] | None = None
     consumer: Callable[[], ConsumerJudge] | None = None
+    planned: bool = False
+
+    def robot_between(self, before: int, after: int) -> Robot:
+        """Return the arm with the limits in force between rows of two moves: the looser of both."""
+        first, second = self.by_move.get(before, self.robot), self.by_move.get(after, self.robot)
+        return first if first is second else replace(first, limits=_looser(first.limits, second.limits))
+
+    def carries_one(self, before: int, after: int) -> bool:
+        """Return whether the tool carries the same in two moves: else no row says when it changed."""
+        first, second = self.by_move.get(before, self.robot), self.by_move.get(after, self.robot)
+        return first.payload is second.payload
 
 
 def judge_motion(blocks: Callable[[], Iterable[RecordedMotion]], requirements: Requirements) -> Judgement:
@@ -236,11 +248,11 @@ class MotionJudge:
         window = self._window(kept, last, ends=ends)
         changes = changes_of(window)
         flips = None if self._tool is None else self._tool.changes_branch
-        asked = self._requirements.interpolate is not None
+        asked = self._requirements.interpolate is not None or self._requirements.planned
         for (before, after), low, high in window.runs():
-            robot, pieces = self._robot_of(before, after), slice(low, high)
+            robot, pieces = self._requirements.robot_between(before, after), slice(low, high)
             arguments = (window, pieces, robot.limits, before, self._axes, self._worst)
-            carries_one = self._carries_one(before, after)
+            carries_one = self._requirements.carries_one(before, after)
             judge_limits(JudgedRun(window, pieces, robot, before, self._worst, asked, carries_one))
             judge_consistency(*arguments, changes, flips)
             if self._tool is not None:
@@ -269,17 +281,6 @@ class MotionJudge:
             begins=self._begins,
             ends=ends,
         )
-
-    def _robot_of(self, before: int, after: int) -> Robot:
-        """Return the arm with the limits in force between rows of two moves: the looser of both."""
-        known, robot = self._requirements.by_move, self._requirements.robot
-        first, second = known.get(before, robot), known.get(after, robot)
-        return first if first is second else replace(first, limits=_looser(first.limits, second.limits))
-
-    def _carries_one(self, before: int, after: int) -> bool:
-        """Return whether the tool carries the same in two moves: else no row says when it changed."""
-        known, robot = self._requirements.by_move, self._requirements.robot
-        return known.get(before, robot).payload is known.get(after, robot).payload
 
     def _of_ends(self, first: _Rows, last: _Rows) -> list[Finding]:
         required, resolution = self._requirements, self._resolution

@@ -1,0 +1,108 @@
+"""Rows of plans as their consumer joins them, against scipy's Hermite curves through all rows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.interpolate import BPoly
+
+import trajcli
+from trajcli.job.read import load_job
+from trajcli.output import joined_rows as module
+from trajcli.output.joined import cure_of, joined_rows, rows_report, with_event
+from trajcli.output.write import grid_of
+from trajcli.planning.plan import Plan, plan_job
+from trajcli.samples import sample
+from trajcli.streams.formats import FORMATS
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def planned(name: str, *sets: str) -> Plan:
+    with np.errstate(all="ignore"):
+        return plan_job(load_job(str(EXAMPLES / f"{name}.yaml"), sets))
+
+
+def factor_by_scipy(plan: Plan) -> float:
+    """Return the largest share of a joint's limit that Hermite curves through all rows use, by dense samples."""
+    groups = tuple(group for group in ("q", "qd", "qdd") if group in plan.loaded.job.output.columns)
+    grid, joints = grid_of(plan), len(plan.trajectory.joint_names)
+    rows = np.concatenate([*sample(plan.trajectory, grid, groups)]).reshape(grid.count, len(groups), joints)
+    t = np.concatenate([local for _, local in grid.blocks()])
+    curve, worst = BPoly.from_derivatives(t, rows), 0.0
+    lengths = np.diff(t)
+    long = lengths > 1e-4  # in shorter ones rounding is a jerk of its own
+    times = (t[:-1, None] + lengths[:, None] * np.linspace(1e-9, 1 - 1e-9, 41))[long].ravel()
+    owner = np.searchsorted([span.start for span in plan.trajectory.spans], times, "right") - 1
+    for order in range(1, 2 * len(groups)):
+        if order > min(len(groups), 3):
+            break
+        values = curve.derivative(order)(times)
+        bounds = np.stack([move.robot.limits.of_order(order) for move in plan.moves])[owner]
+        worst = max(worst, float(np.maximum(values / bounds[..., 0], values / bounds[..., 1]).max()))
+    return worst
+
+
+@pytest.mark.parametrize(
+    ("name", "sets"),
+    [
+        ("quintic", ()),
+        ("trapezoid", ()),
+        ("moveit_limits", ()),
+        ("ur5e_pick", ()),
+        ("ur5e_pick", ("output.rate=1000",)),
+        ("ur5e_pick", ("output.rows=knots",)),
+        ("ur5e_pick", ("output.columns=[t, q, qd]",)),
+        ("time_optimal", ()),
+        ("ur5e_poses", ()),
+    ],
+)
+def test_the_worst_factor_is_that_of_scipys_curve(name: str, sets: tuple[str, ...]) -> None:
+    plan = planned(name, *sets)
+    rows = joined_rows(plan, grid_of(plan), FORMATS["csv"], "full")
+    judged, expected = rows.judgement(), factor_by_scipy(plan)
+    assert judged is not None
+    found = max((finding.excess for finding in judged.findings if finding.limit), default=1.0)
+    assert found == pytest.approx(max(expected, 1.0), rel=2e-3)
+    assert bool(judged.events) == (expected > 1 + 1e-4)
+
+
+def test_no_row_is_read_where_the_curve_itself_proves_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    read: list[int] = []
+    monkeypatch.setattr(module, "sample", lambda *args, **named: read.append(1) or sample(*args, **named))
+    plan = planned("quintic")
+    rows = joined_rows(plan, grid_of(plan), FORMATS["csv"])
+    judged = rows.judgement()
+    assert (judged is not None and judged.events, read) == ((), [])
+
+
+def test_a_named_cure_cures() -> None:
+    plan = planned("ur5e_pick")
+    rows = joined_rows(plan, grid_of(plan), FORMATS["csv"])
+    shown, judged = with_event(plan, rows)
+    assert cure_of(rows) == "--rows knots"
+    assert [event.kind for event in shown.events] == ["joined_over_limit"]
+    assert "`--rows knots` keeps every limit" in shown.events[0].message
+    assert factor_by_scipy(planned("ur5e_pick", "output.rows=knots")) < 1 + 1e-4
+    assert judged is not None
+    report = rows_report(rows, judged)
+    assert (report.verdict, report.interpolation, report.rate_that_keeps) == ("exceeded", "quintic", None)
+    assert report.worst is not None
+    assert report.worst.value / report.worst.limit == pytest.approx(factor_by_scipy(plan), rel=2e-3)
+
+
+def test_plan_and_check_say_the_same(tmp_path: Path) -> None:
+    plan, file = planned("ur5e_pick"), tmp_path / "rows.csv"
+    trajcli.plan(EXAMPLES / "ur5e_pick.yaml").save(file)
+    from trajcli.judge.file import CheckOptions, check_file
+
+    own = joined_rows(plan, grid_of(plan), FORMATS["csv"]).judgement()
+    read = check_file(str(file), CheckOptions(), plan).judgement
+    assert own is not None
+    for found in (own, read):
+        assert found.verdict == "satisfied"
+    excess = [{(f.kind, f.joint, f.move): f.excess for f in found.findings} for found in (own, read)]
+    assert excess[0] == pytest.approx(excess[1], rel=1e-4)
+    assert own.events == read.events

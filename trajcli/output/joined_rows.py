@@ -1,0 +1,269 @@
+"""Rows of a plan as their consumer joins them: whether that curve keeps the limits that the plan keeps.
+
+Between two rows stands the polynomial that their columns determine. Where the planned curve is no more than
+that polynomial itself, of its degree and without a break inside, both are one curve, and no row is read. The
+other intervals are judged by what `trajcli check` judges recorded rows by.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajcli.columns import Group, joint_factors
+from trajcli.curves.hermite import hermite_coefficients
+from trajcli.curves.piecewise import Array
+from trajcli.findings import Collector, Finding, at_time
+from trajcli.frozen import frozen
+from trajcli.grids import AT_BREAK, Grid, KnotGrid, ListedGrid, UniformGrid
+from trajcli.judge.intervals import Intervals
+from trajcli.judge.joint_limits import JudgedRun, judge_limits
+from trajcli.judge.judgement import Judgement, as_planned
+from trajcli.judge.motion import Requirements
+from trajcli.judge.reconstruction import Interpolation, chosen_interpolation
+from trajcli.judge.rounding import PieceRows, stated_errors
+from trajcli.kinematics.robot import ToolLimits
+from trajcli.planning.plan import Plan
+from trajcli.samples import sample
+from trajcli.streams.recorded_motion import Resolution
+
+if TYPE_CHECKING:
+    from trajcli.judge.recorded_tool import ToolJudge
+
+_ROWS = 65536  # whose times are looked at together
+_JUDGED = 1024  # intervals that are judged together
+_DEGREES = {"linear": 1, "cubic": 3, "quintic": 5}
+_SPACING = 4.0  # units in the last place of a length
+_CONTINUOUS = 1e-9  # of the largest value of a joint: a step below that is rounding
+_PERIOD = 1e-9  # relative: what the last row may be off its grid by
+_HALF_UNIT = 0.5e-9  # of nine decimals
+_STATES: tuple[Group, ...] = ("q", "qd", "qdd")
+_OF_POSES: tuple[Group, ...] = ("pose", "twist", "twistd")  # from which the joints are found back
+_OF_A_TOOL = 6  # joints whose rates those of the tool tell
+
+
+@frozen
+class JoinedRows:
+    """Rows of a plan that a consumer joins.
+
+    Attributes:
+        plan: A plan that verifies.
+        grid: Where its rows stand.
+        groups: Its columns.
+        exact: Whether the numbers are written with every bit.
+    """
+
+    plan: Plan
+    grid: Grid
+    groups: tuple[Group, ...]
+    exact: bool = False
+
+    @property
+    def interpolation(self) -> Interpolation | None:
+        """How the columns join the rows; None where no positions or poses with times are among them."""
+        of_poses = _OF_POSES[: 3 if len(self.plan.trajectory.joint_names) == _OF_A_TOOL else 1]
+        wanted = _STATES if set(_STATES) & set(self.groups) else of_poses
+        there = [group in self.groups for group in wanted]
+        if "t" not in self.groups or not there[0]:
+            return None
+        return chosen_interpolation(None, *[*there, False, False][1:3])
+
+    def judgement(self, *, first_only: bool = False) -> Judgement | None:
+        """Return what the joined curve does against the limits; None where nothing says how it is joined.
+
+        Args:
+            first_only: Whether one group of intervals that is over a limit is enough.
+
+        Raises:
+            InputError: When efforts are limited, and a link of the arm has no inertia.
+        """
+        chosen, plan, worst = self.interpolation, self.plan, Collector()
+        if chosen is None:
+            return None
+        required = Requirements(plan.loaded.robot, {move.index: move.robot for move in plan.moves})
+        tool = _tool_of(plan)
+        judged = Judgement((), chosen, self.grid.count, planned_rows=True)
+        for window in self._windows(chosen):
+            for (before, after), low, high in window.runs():
+                robot, pieces = required.robot_between(before, after), slice(low, high)
+                carries_one = required.carries_one(before, after)
+                judge_limits(JudgedRun(window, pieces, robot, before, worst, True, carries_one))
+                if tool is not None:
+                    tool.see(window, pieces, robot, before)
+            findings = (*worst.findings(), *(() if tool is None else tool.findings()))
+            judged = as_planned(replace(judged, findings=tuple(map(self._in_time, findings)), events=()))
+            if first_only and judged.findings:
+                break
+        return judged
+
+    def _in_time(self, finding: Finding) -> Finding:
+        """Return a finding about intervals one behind the other with the time of its row."""
+        grid, row = self.grid, (finding.row or 1) - 1
+        if isinstance(grid, UniformGrid):
+            time = min(row / grid.rate, grid.duration) + grid.start_time
+        else:
+            time = float(next(grid.blocks(grid.count))[0][row])
+        message = finding.message.replace(at_time(finding.time or 0.0), at_time(time))
+        return replace(finding, time=time, message=message)
+
+    def _windows(self, chosen: Interpolation) -> Iterator[_Pairs]:
+        """Yield the intervals in which the joined curve may be another than the planned one, many at once."""
+        kept: list[tuple[Array, NDArray[np.int64]]] = []
+        count = 0
+        for times, first in self._blocks():
+            index = self._unproven(times, _DEGREES[chosen])
+            for low in range(0, index.size, _JUDGED):
+                part = index[low : low + _JUDGED]
+                kept.append((np.stack([times[part], times[part + 1]]), part + first))
+                count += part.size
+                if count >= _JUDGED:
+                    yield self._pairs(kept, chosen)
+                    kept, count = [], 0
+        if kept:
+            yield self._pairs(kept, chosen)
+
+    def _blocks(self) -> Iterator[tuple[Array, int]]:
+        """Yield times of rows from the start, with the last one before them, and the index of the first."""
+        before, first = np.empty(0), 0
+        for _, local in self.grid.blocks(_ROWS):
+            times = np.append(before, local)
+            yield times, first - before.size
+            before, first = local[-1:], first + local.size
+
+    def _unproven(self, times: Array, degree: int) -> NDArray[np.int64]:
+        """Return the intervals in which the curve is not what their rows determine, rising indices."""
+        curve, count = self.plan.trajectory.curve, times.size - 1
+        near = max(AT_BREAK, _SPACING * float(np.spacing(curve.end)))
+        found = np.zeros(count + 2, dtype=bool)
+        low, high = np.searchsorted(curve.breaks, (times[0] - near, times[-1] + near))
+        inside = curve.breaks[low:high]
+        after = np.searchsorted(times, inside - near)  # the first row that is not before it
+        off: Array = np.abs(times[np.minimum(after, count)] - inside)
+        on_row = off <= near
+        found[after[np.logical_not(on_row)]] = True  # the interval before the row `after`, counted from 1
+        steps: NDArray[np.bool_] = self._steps(degree)[low:high]
+        at = after[np.logical_and(on_row, steps)]
+        found[at] = found[at + 1] = True
+        high_degree: NDArray[np.bool_] = np.any(curve.coefficients[: -(degree + 1)], axis=(0, 2))
+        for piece in np.flatnonzero(high_degree[max(low - 1, 0) : high]) + max(low - 1, 0):
+            ends = np.searchsorted(times, curve.breaks[piece : piece + 2])
+            found[ends[0] : ends[1] + 1] = True
+        return np.flatnonzero(found[1 : count + 1])
+
+    def _steps(self, degree: int) -> NDArray[np.bool_]:
+        """Return at which breaks a derivative steps that the rows state, shape (pieces + 1,)."""
+        return self._steps_of_order[degree // 2]
+
+    @cached_property
+    def _steps_of_order(self) -> tuple[NDArray[np.bool_], ...]:
+        curve = self.plan.trajectory.curve
+        steps = [np.zeros(curve.pieces + 1, dtype=bool)]
+        for order in (1, 2):
+            first, last = curve.piece_ends(order)
+            room = _CONTINUOUS * np.maximum(np.abs(first), np.abs(last)).max(axis=0)
+            here = np.zeros_like(steps[0])
+            here[1:-1] = (np.abs(first[1:] - last[:-1]) > room).any(axis=1)
+            steps.append(steps[-1] | here)
+        return tuple(steps)
+
+    def _pairs(self, kept: list[tuple[Array, NDArray[np.int64]]], chosen: Interpolation) -> _Pairs:
+        """Return the rows before and after intervals as a window in which all are judged."""
+        ends, index = (np.concatenate([part[k] for part in kept], axis=-1) for k in (0, 1))
+        times, where = np.unique(ends, return_inverse=True)
+        rows = self._rows(times, np.unique(np.stack([index, index + 1])), (_DEGREES[chosen] + 1) // 2)
+        where = where.reshape(2, -1)
+        lengths = ends[1] - ends[0]
+        if isinstance(self.grid, UniformGrid):
+            period = 1.0 / self.grid.rate
+            lengths = np.where(np.abs(lengths - period) <= _PERIOD * period, period, lengths)
+        joints = len(self.plan.trajectory.joint_names)
+        states = rows[:, :-1].reshape(len(rows), -1, joints)[where]
+        moves = rows[:, -1].astype(np.int64)[where]
+        factors = joint_factors(self.plan.trajectory.joint_types, self.plan.loaded.output_units)
+        rounding = np.zeros(joints) if self.exact else _HALF_UNIT * np.asarray(factors)
+        return _Pairs(
+            t=np.append(0.0, np.cumsum(lengths)),
+            lengths=lengths,
+            late=_SPACING * np.spacing(lengths),
+            states=tuple(
+                np.concatenate([states[0, :, k], states[1, -1:, k]]) if k < states.shape[2] else None
+                for k in range(3)
+            ),
+            rows=index + 1,
+            moves=moves[0],
+            interpolation=chosen,
+            resolution=Resolution(0.0, rounding, rounding, rounding),
+            first=0,
+            last=lengths.size,
+            begins=False,
+            ends=False,
+            stated=states.transpose(2, 0, 1, 3),
+            moves_after=moves[1],
+        )
+
+    def _rows(self, times: Array, index: NDArray[np.int64], stated: int) -> Array:
+        """Return states and moves of some rows, SI, shape (N, stated n + 1).
+
+        Args:
+            times: Of these rows, from the start, s, shape (N,).
+            index: Which they are, shape (N,).
+            stated: How many of position, velocity and acceleration.
+        """
+        plan, grid = self.plan, self.grid
+        part: Grid = ListedGrid(plan.trajectory.duration, times)
+        if isinstance(grid, KnotGrid):
+            _, at, of_knot = np.intersect1d(index, grid.at, assume_unique=True, return_indices=True)
+            part = KnotGrid(grid.duration, times, at, grid.states[:, of_knot])
+        groups = (*_STATES[:stated], "move")
+        return np.concatenate([*sample(plan.trajectory, part, groups, robot=plan.loaded.robot)])
+
+
+@frozen
+class _Pairs(Intervals):
+    """Intervals that need not be neighbours, one behind the other in a time of their own.
+
+    Attributes:
+        stated: What the rows before and after them state, shape (orders, 2, m, n).
+        moves_after: Index of the move of the row after each, shape (m,).
+    """
+
+    stated: Array
+    moves_after: NDArray[np.int64]
+
+    @cached_property
+    def coefficients(self) -> Array:
+        """Of the pieces, (degree + 1, m, n), highest power first."""
+        return hermite_coefficients(self.stated[:, 0], self.stated[:, 1], self.lengths[:, None])
+
+    def piece_rows(self, piece: NDArray[np.intp], joint: NDArray[np.intp], count: int) -> PieceRows:
+        """Return what stands at the ends of pieces (m,), for one joint each."""
+        ends = tuple(values[:, piece, joint] for values in self.stated[:count])
+        absolute = self.resolution.q[joint]
+        errors = tuple(stated_errors(both, absolute, 0.0).max(axis=0) for both in ends)
+        return PieceRows(self.lengths[piece], self.late[piece], ends, errors)
+
+    def runs(self) -> Iterator[tuple[tuple[int, int], int, int]]:
+        """Yield the moves before and after intervals, and the first and the last + 1 of those alike."""
+        changes = (np.diff(self.moves) != 0) | (np.diff(self.moves_after) != 0)
+        edges = [0, *(np.flatnonzero(changes) + 1).tolist(), self.moves.size]
+        for low, high in pairwise(edges):
+            yield (int(self.moves[low]), int(self.moves_after[low])), low, high
+
+    def row_at(self, piece: int, local: float) -> int:
+        """Return the number of the row at a time within a piece, or before it."""
+        return int(self.rows[piece]) + int(local >= self.lengths[piece] * (1 - 1e-12))
+
+
+def _tool_of(plan: Plan) -> ToolJudge | None:
+    """Return the judge of the limits of the tool, where there are any."""
+    if all(move.robot.limits.tcp == ToolLimits() for move in plan.moves):
+        return None
+    from trajcli.judge.recorded_tool import ToolJudge
+
+    return ToolJudge(plan.loaded.robot, {})
