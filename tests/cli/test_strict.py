@@ -246,5 +246,5 @@ def test_a_finer_grid_is_a_remark(tmp_path: Path, capfd: pytest.CaptureFixture[s
     assert call(capfd, "plan", example, "--no-output", "--report", str(report)).code == 0
     view = json.loads(report.read_text())
     assert [event["kind"] for event in view["events"]] == ["joined_over_limit"]
-    assert {remark["kind"] for remark in view["remarks"]} == {"refined"}
+    assert {remark["kind"] for remark in view["remarks"]} == {"refined", "bound"}
     assert "refined: the grid was refined" in call(capfd, "explain", example).out

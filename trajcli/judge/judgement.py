@@ -112,7 +112,9 @@ def as_planned(judgement: Judgement) -> Judgement:
     events = judgement.events
     if over:
         worst = max(over, key=lambda finding: finding.excess)
-        what = worst.kind.replace("_", " ") + ("" if worst.joint is None else f" of {worst.joint}")
+        of_tool = worst.kind.startswith("tool_")
+        what = worst.kind.removeprefix("tool_").replace("_", " ")
+        what += " of the tool" if of_tool else "" if worst.joint is None else f" of {worst.joint}"
         said = f"joined_over_limit: the rows, joined between them, pass the limit of the {what}"
         events = (*events, f"{said}, by a factor of {worst.excess:.6g}")
     return replace(judgement, findings=worst_first(findings), events=events, planned_rows=True)
