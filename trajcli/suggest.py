@@ -68,6 +68,13 @@ def did_you_mean(name: str, names: Iterable[str]) -> str | None:
     return f"did you mean '{near}'?" if near is not None else None
 
 
+def named_like(name: str, names: Iterable[str]) -> str | None:
+    """Return the hint that asks for the names that begin with `name`, else for the nearest; or None."""
+    every = list(names)
+    longer = [f"'{each}'" for each in every if name and _plain(each).startswith(_plain(name))]
+    return f"did you mean {' or '.join(longer)}?" if longer else did_you_mean(name, every)
+
+
 def valid_names(names: Iterable[str], what: str = "valid names") -> str | None:
     """Return the hint that lists the valid names, of many the first; None when there are none."""
     every = list(names)

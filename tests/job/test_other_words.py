@@ -35,6 +35,16 @@ def problems(text: str) -> list[tuple[int, str]]:
         ("planner: cubic, to: {joints: [1]}, duration: 1", "wait: 2", 5, "{planner: hold, duration: 2}"),
         ("planner: cubic, to: {joints: [1]}, duration: 1", "stop: 2", 5, "{planner: hold, duration: 2}"),
         ("planner: cubic, to: {joints: [1]}, duration: 1", "movej: 2", 5, "{planner: jerk_limited, ...}"),
+        ("planner: cubic, to: {joints: [1]}, duration: 1", "repeat: {times: 3}", 5, "a job has no loops"),
+        ("planner: cubic, to: {joints: [1]}, duration: 1", "mark: here", 5, "the column `move`"),
+        ("planner: cubic, to: {joints: [1]}, duration: 1", "gripper: 1", 5, "attach and detach"),
+        ("planner: cubic, to: {joints: [1]}, duration: 1", "goto: a", 5, "{planner: jerk_limited, to: a}"),
+        ("{planner: cubic, to: {joints: [1]}, duration: 1}", "wait", 5, "{planner: hold, duration: ...}"),
+        ("{planner: cubic, to: {joints: [1]}, duration: 1}", "[1, 2]", 5, "{planner: ..., to: ...}"),
+        ("duration: 1", "duration: 1, wait: 2", 5, "{planner: hold, duration: ...}"),
+        ("duration: 1", "duration: 1, accel: 2", 5, "under `limits`: {acceleration: ...}"),
+        ("joints: [1]", "joints: [1,5]", 5, "decimals have a point"),
+        ("version: 1", "version: 1\nframes: {a: {xyz: [0, 0, 0]}}", 2, "poses are in world"),
         ("planner: cubic", "planner: stop", 5, "{planner: jerk_limited, to: {velocity: 0}}"),
         (
             "{joints: 1}",
@@ -48,6 +58,29 @@ def test_what_is_meant_is_said(old: str, new: str, line: int, said: str) -> None
     found = problems(JOB.replace(old, new))
     assert [place for place, _ in found] == [line]
     assert said in found[0][1]
+
+
+def test_the_name_of_a_point_among_the_moves_is_where_a_move_goes() -> None:
+    text = JOB.replace("{planner: cubic, to: {joints: [1]}, duration: 1}", "there")
+    (found,) = problems(text + "points: {there: {joints: [1]}}\n")
+    assert "write `- {planner: jerk_limited, to: there}`" in found[1]
+
+
+@pytest.mark.parametrize(
+    ("start", "line", "whose"), [("{joints: [2]}", 3, "the start:"), ("a", 6, "point 'a':")]
+)
+def test_a_start_outside_its_limit_is_blamed_on_itself(start: str, line: int, whose: str) -> None:
+    from trajcli.output.report import verification_error
+    from trajcli.planning.plan import plan_job
+
+    text = JOB.replace("joints: 1}", "joints: [{position: [-1, 1.5]}]}").replace(
+        "start: {joints: [0]}", f"start: {start}"
+    )
+    plan = plan_job(job_from_text(text + "points: {a: {joints: [2]}}\n"))
+    (found,) = verification_error(plan).problems
+    assert found.place is not None
+    assert (found.place.line, found.move) == (line, 0)
+    assert f"{whose} the position of j1 reaches 2 rad at t = 0 s, its limit is 1.5 rad" in found.text()
 
 
 def test_a_move_that_stands_for_another_word_is_read_when_it_is_written_so() -> None:

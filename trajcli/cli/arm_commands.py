@@ -28,6 +28,7 @@ from trajcli.cli.options import (
 _NUMBER_LIKE = re.compile(r"[-+]?(?:\.?[0-9][^=]*|\.?nan|\.?inf(?:inity)?)", re.IGNORECASE)
 JOINED = ("--qd", "--qdd", "--near", "--point", "--s")
 """Options that take all the numbers behind them."""
+ROBOT_FILES = (".yaml", ".yml", ".urdf")
 
 
 class NumbersParser(typer.core.TyperCommand):
@@ -40,7 +41,18 @@ class NumbersParser(typer.core.TyperCommand):
             if getattr(parameter, "is_flag", None) is not None:  # an option
                 count = 0 if parameter.is_flag else parameter.nargs  # type: ignore[attr-defined]
                 takes |= dict.fromkeys(parameter.opts, count)
-        return super().parse_args(ctx, sorted_words(joined(args), takes))
+        words = sorted_words(joined(args), takes)
+        self._refuse_robot_as_argument(ctx, words)
+        return super().parse_args(ctx, words)
+
+    def _refuse_robot_as_argument(self, ctx: typer.Context, words: list[str]) -> None:
+        """Say where the robot stands, where it is the first argument of a command that takes an option."""
+        options, first = words[: words.index("--")], words[words.index("--") + 1 :][:1]
+        takes_robot = any("--robot" in each.opts for each in self.get_params(ctx))
+        given = any(each in ("--robot", "-r") or each.startswith(("--robot=", "-r")) for each in options)
+        a_robot = bool(first) and (first[0].endswith(ROBOT_FILES) or first[0] in robot_names(""))
+        if takes_robot and a_robot and not given:
+            ctx.fail(f"The robot is an option: trajcli {ctx.info_name} --robot {first[0]} ...")
 
 
 def joined(args: list[str]) -> list[str]:

@@ -118,9 +118,13 @@ def run_retime(options: RetimeCommand) -> int:
     from trajcli.editing.kept_limits import kept_limits
     from trajcli.editing.retiming import retime
     from trajcli.queries.arm import stated_units
+    from trajcli.streams.byte_source import ByteSource
+    from trajcli.streams.reading import refuse_job
 
     arm = [name for name in (options.job, options.robot) if name is not None]
     _check_output([options.file, *arm], options)
+    if not arm:
+        refuse_job(ByteSource(options.file))
     limits = kept_limits(options.job, options.robot)
     robot = limits.robot
     motion = read_motion(

@@ -173,8 +173,8 @@ class CheckCommand(Command):
         str | None,
         typer.Option(
             "--limits",
-            metavar="FILE",
-            help="Of the joints and the tool instead of the robot's: as under `limits` in a job.",
+            metavar="FILE|LIMITS",
+            help="Instead of the robot's: as under `limits` in a job, in a file or as {velocity: 2}.",
         ),
     ] = None
     columns: Annotated[

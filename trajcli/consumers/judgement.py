@@ -31,7 +31,7 @@ from trajcli.errors import InputError
 from trajcli.findings import Finding
 from trajcli.frozen import frozen
 from trajcli.streams.recorded_motion import RecordedMotion
-from trajcli.suggest import did_you_mean, valid_names
+from trajcli.suggest import named_like, valid_names
 
 CHECKS: Mapping[str, type[RuleCheck]] = {
     "at_rest": AtRest,
@@ -91,7 +91,7 @@ def load_profile(name: str, folder: Path | None = None) -> Profile:
     """
     names = profile_names(folder)
     if name not in names:
-        hint = did_you_mean(name, names) or valid_names(names, "profiles")
+        hint = named_like(name, names) or valid_names(names, "profiles")
         raise InputError(f"there is no profile '{name}'", hint=hint)
     parameters: Mapping[str, Mapping[str, Any]] = {key: each.parameters for key, each in CHECKS.items()}
     return read_profile(name, parameters, folder)

@@ -29,13 +29,18 @@ def with_limits_file(robot: Robot, path: str, units: Units) -> tuple[Robot, tupl
 
     Args:
         robot: With limits of its own, which those of the file replace.
-        path: Of the file.
+        path: Of the file, or limits as YAML: `{velocity: 2}`.
         units: Of its plain numbers, unless it says them itself: `units: {angle: deg}`.
 
     Raises:
         InputError: With every flaw of the file.
         FileError: When it cannot be read.
     """
+    if path.startswith("{"):
+        return _applied(robot, parse_document(path, "--limits"), units)
+    if path.replace(".", "", 1).isdigit():
+        hint = f"one that holds such as `velocity: {path}`, or write --limits '{{velocity: {path}}}'"
+        raise InputError(f"--limits expects a file, got {path}", hint=hint)
     return _applied(robot, read_document(path), units)
 
 

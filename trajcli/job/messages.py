@@ -12,6 +12,7 @@ from pydantic_core import ErrorDetails
 from trajcli.errors import Problem
 from trajcli.job.yaml.document import Node
 from trajcli.job.yaml.load import Document
+from trajcli.language.limits import LimitsSpec
 from trajcli.language.numbers import AT_KEY, FieldPath, Flaw, shown
 from trajcli.planners import ALSO_CALLED, HANDLING, PLANNERS
 from trajcli.suggest import abridged, did_you_mean, valid_names
@@ -61,19 +62,42 @@ _KEYS_ELSEWHERE = {
     "torque": "effort",
     "tcp": "tool",
     "waypoint": "to",
-    "wobj": "frames",
-    "uframe": "frames",
 }
 """Keys of other programs, with that of a job where such a key may stand."""
 _ENTRIES_ELSEWHERE = {
-    "wait": "write `- {{planner: hold, duration: {value}}}`: the arm stands for that long",
-    "sleep": "write `- {{planner: hold, duration: {value}}}`: the arm stands for that long",
-    "dwell": "write `- {{planner: hold, duration: {value}}}`: the arm stands for that long",
-    "pause": "write `- {{planner: hold, duration: {value}}}`: the arm stands for that long",
+    **dict.fromkeys(
+        ("wait", "sleep", "dwell", "pause", "delay"),
+        "write `- {{planner: hold, duration: {value}}}`: the arm stands for that long",
+    ),
+    **dict.fromkeys(
+        ("repeat", "loop", "for", "while", "times"),
+        "a job has no loops: write the moves once more, or join rows with `trajcli concat`",
+    ),
+    **dict.fromkeys(
+        ("mark", "label", "comment", "marker", "id"),
+        "write it behind a `#`; rows say by the column `move` which move they belong to",
+    ),
+    **dict.fromkeys(
+        ("io", "output", "signal", "set", "gripper", "grip", "open", "close", "event"),
+        "a job has only motions: what happens between moves is done where the column `move` of the rows "
+        "changes; what the tool then carries is said by attach and detach",
+    ),
+    **dict.fromkeys(
+        ("goto", "go", "move", "move_to", "moveto"),
+        "write `- {{planner: jerk_limited, to: {value}}}`",
+    ),
     "stop": "every move ends at rest unless its target has a velocity; to stand still for 2 s write "
     "`- {{planner: hold, duration: 2}}`",
 }
 """Entries among the moves of other programs, with what says the same."""
+_NOT_HERE = {
+    **dict.fromkeys(
+        ("frames", "frame", "wobj", "workobject", "uframe"),
+        "poses are in world: `base` says where the arm stands, and a pose beside another is "
+        "`{{from: POINT, offset: ..., frame: tool}}`",
+    ),
+}
+"""Sections of other programs, with what says the same."""
 _PLANNERS_ELSEWHERE = {
     "stop": "every move ends at rest unless its target has a velocity; a moving arm is stopped by "
     "`{planner: jerk_limited, to: {velocity: 0}}`",
@@ -125,7 +149,9 @@ def _flaws(
         return [((*path, "planner"), *_unknown_planner(detail["input"]), False)]
     message, hint = _text(kind, context, detail["input"])
     if hint is None and kind in ("model_type", "model_attributes_type"):
-        hint = valid_names(_field_names(model, loc), "its keys")
+        hint = _meant_word(path, detail["input"], document) or valid_names(
+            _field_names(model, loc), "its keys"
+        )
     return [(path, message, hint, False)]
 
 
@@ -154,8 +180,14 @@ def _unknown_planner(move: object) -> tuple[str, str | None]:
 
 def _other_key(key: str, names: Sequence[str]) -> str | None:
     """Return the key that is meant where another stands: that of other programs, or the nearest name."""
-    meant = _KEYS_ELSEWHERE.get(key.casefold())
-    return f"did you mean '{meant}'?" if meant in names else did_you_mean(key, names)
+    word = key.casefold()
+    meant = _KEYS_ELSEWHERE.get(word, word)
+    if meant in names:
+        return f"did you mean '{meant}'?"
+    if meant in LimitsSpec.model_fields and "limits" in names:
+        return f"it stands under `limits`: {{{meant}: ...}}"
+    elsewhere = _NOT_HERE.get(word) or _ENTRIES_ELSEWHERE.get(word)
+    return did_you_mean(key, names) if elsewhere is None else elsewhere.format(value="...")
 
 
 def _meant_by_others(name: str, node: Node | None) -> bool:
@@ -218,13 +250,25 @@ def _meant_entry(entry: Mapping[Any, object]) -> str:
     for key, value in entry.items():
         word = str(key).casefold()
         if word in _ENTRIES_ELSEWHERE:
-            return _ENTRIES_ELSEWHERE[word].format(value=value if isinstance(value, int | float) else "...")
+            return _ENTRIES_ELSEWHERE[word].format(
+                value=abridged(str(value)) if isinstance(value, int | float | str) else "..."
+            )
         if word in PLANNERS or word in ALSO_CALLED:
             return f"write `- {{planner: {ALSO_CALLED.get(word, word)}, ...}}`"
         near = did_you_mean(str(key), (*HANDLING, "planner"))
         if near:
             return near
     return f"{_every_planner()}; between moves stand {' and '.join(HANDLING)}"
+
+
+def _meant_word(path: FieldPath, value: object, document: Document) -> str | None:
+    """Return what an entry of the moves that is no mapping should be; None where it is no such entry."""
+    if path[:1] != ("moves",) or len(path) != 2:
+        return None
+    if not isinstance(value, str):
+        return "write `- {planner: ..., to: ...}`"
+    points = document.node(("points", value))
+    return f"write `- {{planner: jerk_limited, to: {value}}}`" if points else _meant_entry({value: None})
 
 
 def _described(field: FieldInfo) -> str | None:

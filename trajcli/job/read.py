@@ -91,6 +91,14 @@ class LoadedJob:
             None,
         )
 
+    def start_meant(self) -> tuple[str, Place]:
+        """Return by what name the start goes, and where it stands: there, or where its point is given."""
+        named = self.document.node(("start",))
+        point = None if named is None else named.value
+        if isinstance(point, str) and point in self.job.points:
+            return f"the start, point '{point}'", self.document.place(("points", point))
+        return "the start", self.document.place(("start",))
+
     def place_of_move(self, index: int) -> Place:
         """Return where a move stands in the file."""
         return self.document.place(("moves", index))

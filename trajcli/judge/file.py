@@ -15,6 +15,7 @@ from trajcli.judge.judgement import Judgement, as_planned
 from trajcli.judge.motion import JUDGED_ROWS, Requirements, judge_motion
 from trajcli.kinematics.robot import Robot
 from trajcli.streams.byte_source import ByteSource
+from trajcli.streams.reading import refuse_job
 from trajcli.streams.recorded_motion import MotionFile, RecordedMotion, motion_of, open_motion
 from trajcli.units import Units, joint_quantity
 
@@ -96,9 +97,11 @@ def check_file(source: str | ByteSource, options: CheckOptions, plan: Plan | Non
     """
     from trajcli.queries.arm import stated_units
 
+    opened = source if isinstance(source, ByteSource) else ByteSource(source)
+    if plan is None and options.job is None and options.robot is None:
+        refuse_job(opened)
     given = _carrying(_given(options) if plan is None else _of_plan(plan), options)
     robot = given.robot
-    opened = source if isinstance(source, ByteSource) else ByteSource(source)
     declared = None if plan is not None else stated_units(options.job or options.robot or "")
     motion = _opened(opened, options, given, declared)
     shown = _shown_units(options, given)

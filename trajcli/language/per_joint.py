@@ -52,9 +52,8 @@ def read_per_joint(
     elif isinstance(value, list | tuple):
         items = {i: (i, item) for i, item in enumerate(value)}
         if names is not None and len(value) != len(names):
-            raise FlawError(
-                f"expected {len(names)} values, one for each joint, got {len(value)}", hint=_listed(names)
-            )
+            hint = _listed(names) + "; decimals have a point" * (len(value) > len(names))
+            raise FlawError(f"expected {len(names)} values, one for each joint, got {len(value)}", hint=hint)
     elif names is None and context is SI:
         raise FlawError(f"expected a list with one value for each joint, got {shown(value)}")
     else:

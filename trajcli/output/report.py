@@ -420,6 +420,9 @@ def _excess(finding: Finding) -> tuple[float, float]:
 
 
 def _problem(plan: Plan, finding: Finding) -> Problem:
-    index = finding.move or 0
-    text = f"move {index} ({plan.trajectory.spans[index].planner}): {finding.text(plan.loaded.say)}"
+    index, said = finding.move or 0, finding.text(plan.loaded.say)
+    if finding.kind == "position" and finding.time == plan.trajectory.curve.start:
+        whose, position = plan.loaded.start_meant()
+        return replace(finding, move=index).problem(f"{whose}: {said}", position)
+    text = f"move {index} ({plan.trajectory.spans[index].planner}): {said}"
     return replace(finding, move=index).problem(text, plan.loaded.place_of_move(index))

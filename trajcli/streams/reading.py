@@ -96,6 +96,17 @@ def open_rows_of(
     return TextRows(source)
 
 
+def refuse_job(source: ByteSource) -> None:
+    """Refuse a job in the place of a motion, and a file that is not there, before more is asked for.
+
+    Raises:
+        FileError: When it cannot be read.
+        InputError: When it is YAML and holds no motion.
+    """
+    if format_of_rows(source) == "ros":
+        _message(source)
+
+
 def format_of_rows(source: ByteSource) -> str:
     """Return "mcap", "npy", "ros", "jsonl" or "csv", by the first bytes or the name of a file.
 

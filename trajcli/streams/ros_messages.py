@@ -148,6 +148,9 @@ def _trajectory(document: Any, file: str) -> Mapping[str, Any]:  # noqa: ANN401
         if "points" in inner and "joint_names" in inner:
             return inner
         inner = next((inner[key] for key in _WRAPPERS if key in inner), None)
+    if isinstance(document, Mapping) and "moves" in document:
+        hint = f"`trajcli plan {file} -o rows.csv` writes its rows"
+        raise InputError(f"{file} is a job, and no motion yet", hint=hint)
     raise InputError(
         f"{file} holds no joint trajectory",
         hint="expected the keys joint_names and points, as in trajectory_msgs/msg/JointTrajectory",

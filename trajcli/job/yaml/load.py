@@ -158,7 +158,10 @@ class _Walk:
         if isinstance(root.value, dict):
             return
         kind = "a list" if isinstance(root.value, list) else f"the single value {root.text[:40]}"
-        hint = "write a space after each colon" if isinstance(root.value, str) and ":" in root.value else None
+        text = root.value if isinstance(root.value, str) else ""
+        hint = "write a space after each colon" if ":" in text else None
+        if self.file.endswith((".csv", ".txt")) and "," in text:
+            hint = "rows are judged by `trajcli check`, and drawn by `trajcli plot`"
         self._report(f"expected a mapping (lines of `key: value`), got {kind}", root, hint)
 
     def _only_document(self) -> Node | None:
