@@ -130,6 +130,8 @@ class JointConstraint:
         upper, lower = np.isfinite(self.acceleration[:, 1]), np.isfinite(self.acceleration[:, 0])
         limits = np.concatenate([self.acceleration[upper, 1], -self.acceleration[lower, 0]])
         q, first, second = self.path.evaluate_orders(s, (0, 1, 2), side=side).transpose(1, 0, 2)
+        sizes = np.abs(first).max(axis=0)
+        first = np.where(sizes > _ROUNDING * sizes.max(), first, 0.0)  # rounding moves no joint that rests
         work, a, b = (
             np.concatenate([each[:, upper], -each[:, lower]], axis=1) for each in (q, first, second)
         )

@@ -7,6 +7,7 @@ IEEE Trans. Robotics 34 (2018).
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -33,7 +34,9 @@ from trajcli.kinematics.following.motion import motion_along
 from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.robot import Robot, ToolLimits
-from trajcli.limits.kinds import path_constraints
+from trajcli.limits.kinds import TOOL_KINDS, path_constraints
+from trajcli.limits.tolerances import TOOL_RELATIVE
+from trajcli.limits.tool import limits_tool, tool_peaks
 from trajcli.planners.boundary_states import missing_limit
 from trajcli.planners.effort_limits import (
     effort_constraints,
@@ -49,7 +52,6 @@ from trajcli.planners.tool_path.law import LawSpec
 _FINER = 0.5  # of the tolerance, for q(s): what the law multiplies it with must still be within
 _CORNERS = 16  # of the polygon inside the circle of accelerations
 _BETWEEN = 6  # times in a piece at which the limits of the tool are looked at, its ends included
-_STRETCHED = 1e-9
 _BESIDE = 1e-13  # of the length: so far before its end the last sample of an interval is
 _EVEN = 1e-6  # of the square of the turning: an axis that changes by less stays
 
@@ -89,7 +91,7 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
             )
 
         solved = solved_within_efforts(curve, robot, solve)
-        remaining = _remaining_stretch(joints.executed, solved.law, tcp)
+        remaining = _remaining_stretch(robot, solved.trajectory, tcp)
     least = spec.minimum_duration or 0.0
     factor = max(remaining, least / solved.trajectory.duration)
     law, trajectory = (
@@ -142,15 +144,17 @@ def _events(solved: TimeOptimalMotion, robot: Robot, remaining: float, *, fastes
     return tuple(events)
 
 
-def _remaining_stretch(path: ToolPath, law: PiecewisePolynomial, limits: ToolLimits) -> float:
-    """Return how many times longer the law must last to keep the tool's limits between grid points."""
-    part = np.linspace(0.0, 1.0, _BETWEEN)
-    times = (law.breaks[:-1, None] + law.lengths[:, None] * part).reshape(-1)
-    crossings = path.crossings(law, law.breaks)
-    reference = path.at_time(law, np.clip(times, law.start, law.end), "right", crossings)
-    speed, acceleration = _used(reference.first, reference.second, limits).max(axis=1).tolist()
-    worst: float = max(speed, acceleration**0.5)
-    return worst * (1 + _STRETCHED) if worst > 1 else 1.0
+def _remaining_stretch(robot: Robot, trajectory: PiecewisePolynomial, limits: ToolLimits) -> float:
+    """Return how many times longer the motion must last to keep the tool's limits, as checks judge them."""
+    tcp = replace(limits, jerk=np.inf, angular_jerk=np.inf)
+    limited = replace(robot, limits=replace(robot.limits, tcp=tcp))
+    if not limits_tool(limited):
+        return 1.0
+    peaks = tool_peaks(limited, trajectory.breaks, trajectory.coefficients)
+    kinds = [kind for kind in TOOL_KINDS if kind.key in peaks]
+    factors = [(peaks[k.key].most / getattr(limits, k.key)) ** (1 / (k.order or 1)) for k in kinds]
+    worst = max(factors, default=1.0)
+    return float(worst) if worst > 1 + TOOL_RELATIVE else 1.0
 
 
 def _limits(spec: LawSpec, limits: ToolLimits) -> ToolLimits:
