@@ -47,6 +47,8 @@ class NumbersParser(typer.core.TyperCommand):
 
     def _refuse_robot_as_argument(self, ctx: typer.Context, words: list[str]) -> None:
         """Say where the robot stands, where it is the first argument of a command that takes an option."""
+        if "--" not in words:
+            return
         options, first = words[: words.index("--")], words[words.index("--") + 1 :][:1]
         takes_robot = any("--robot" in each.opts for each in self.get_params(ctx))
         given = any(each in ("--robot", "-r") or each.startswith(("--robot=", "-r")) for each in options)
