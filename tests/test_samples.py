@@ -253,3 +253,15 @@ def test_a_block_holds_only_its_own_pieces_whatever_their_number():
     expected = PPoly(curve.coefficients[:, :300], curve.breaks[:301])(first[:, 0])
     np.testing.assert_allclose(first[:, 1:4], expected, rtol=1e-9, atol=1e-12)
     assert peak < 4e6
+
+
+@pytest.mark.parametrize("ramp", [1e-14, 9e-10, 2e-9])
+def test_a_row_beside_a_ramp_too_short_for_stamps_has_the_acceleration_outside_of_it(ramp):
+    """Between two ramps 2 s with qdd = 0.6 u - 0.6, written by hand: -0.6 at its beginning, 0.6 at its end."""
+    table = [[0.0, 0.1, 0.0], [0.5 / ramp, -0.3, -0.5 / ramp], [0.0, 1.0, 1.0], [0.0, 0.0, 1.6]]
+    curve = PiecewisePolynomial([0.0, ramp, 2.0 + ramp, 2.0 + 2 * ramp], np.array(table)[:, :, None])
+    rows = rows_of(trajectory_of(curve), UniformGrid(curve.end, 1.0), ("qdd", "qddd"), size=2)
+    told = ramp > 1e-9
+    expected = [1 / ramp if told else -0.6, 0.0, -1 / ramp if told else 0.6]
+    np.testing.assert_allclose(rows[[0, 1, -1], 0], expected, rtol=1e-6, atol=1e-6)
+    assert abs(rows[[0, -1], 1] - (0.0 if told else 0.6)).max() < 1e-6

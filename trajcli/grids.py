@@ -12,14 +12,14 @@ from math import ceil, isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.curves.piecewise import Array, read_only
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, read_only
 from trajcli.errors import InputError
 from trajcli.frozen import comparable, frozen
 
 ROWS = 4096  # rows of a block: long enough to hide the cost of a call, short enough for the cache
 AT_BREAK = 1e-12  # s: a row this close before a break is at it; rounding decides no row's side
+NANOSECOND = 1e-9  # s: the last decimal of a time in a file: rows closer than this would show the same time
 
-_NANOSECOND = 1e-9  # the last decimal of a time in a file: rows closer than this would show the same time
 _END = 1e-6  # of a period: an end this close to a grid time replaces that row
 
 
@@ -42,7 +42,7 @@ class UniformGrid:
             raise InputError(f"the rate is {self.rate:g} Hz, expected a finite number above 0")
         if not isfinite(self.start_time):
             raise InputError(f"the start time is {self.start_time:g} s, expected a finite number")
-        finest = max(2 * _NANOSECOND, 8 * self._spacing)
+        finest = max(2 * NANOSECOND, 8 * self._spacing)
         if 1 / self.rate < finest:
             raise InputError(
                 f"the rate of {self.rate:g} Hz is too high: the times of neighbouring rows would be equal",
@@ -52,7 +52,7 @@ class UniformGrid:
     @property
     def count(self) -> int:
         """Number of rows, at least 1."""
-        near = max(_END / self.rate, _NANOSECOND, 2 * self._spacing)
+        near = max(_END / self.rate, NANOSECOND, 2 * self._spacing)
         return max(ceil((self.duration - near) * self.rate), 0) + 1
 
     @property
@@ -90,14 +90,14 @@ class ListedGrid:
         low, high = self.start_time, self.start_time + self.duration
         if times.ndim != 1 or times.size == 0:
             raise InputError("the list of times is empty", hint="give at least one time, or a rate")
-        inside = (times >= low - _NANOSECOND) & (times <= high + _NANOSECOND)
+        inside = (times >= low - NANOSECOND) & (times <= high + NANOSECOND)
         if not inside.all():
             raise InputError(
                 f"the time {times[~inside][0]:.12g} s lies outside the trajectory",
                 hint=f"it lasts from {low:.12g} s to {high:.12g} s",
             )
         times = read_only(np.clip(times, low, high))
-        close = np.flatnonzero(np.diff(times) <= _NANOSECOND)
+        close = np.flatnonzero(np.diff(times) <= NANOSECOND)
         if close.size:
             first, second = times[close[0]], times[close[0] + 1]
             raise InputError(
@@ -169,3 +169,30 @@ def onto_breaks(local: Array, breaks: Array) -> Array:
     following = breaks[np.minimum(np.searchsorted(breaks, local, "right"), breaks.size - 1)]
     near = max(AT_BREAK, 4 * float(np.spacing(breaks[-1])))
     return np.where((following - local <= near) & (local > breaks[0]), np.maximum(following, local), local)
+
+
+def leave_short_pieces(
+    curve: PiecewisePolynomial, times: Array, orders: Sequence[int], rows: Array, within: float = NANOSECOND
+) -> None:
+    """Take the acceleration, and its derivative, of rows beside too short pieces from outside of these.
+
+    While such a piece lasts it may be immense, and whoever joins the rows would keep it for a whole period.
+
+    Args:
+        curve: What the rows are of.
+        times: Of the rows, on the curve, shape (N,).
+        orders: Of the derivatives that they hold.
+        rows: Shape (N, orders, n), the curve's units; written to.
+        within: A piece that is no longer than this is too short, s.
+    """
+    if (curve.lengths > within).all():
+        return
+    first_of_end = curve.breaks[np.searchsorted(curve.breaks, curve.end - within)]
+    last = curve.breaks[np.searchsorted(curve.breaks, times + within, "right") - 1]
+    at_end = last == curve.end
+    beside = np.flatnonzero((last > times) & ~at_end)
+    for position, order in enumerate(orders):
+        if order >= 2:
+            rows[beside, position] = curve.evaluate(last[beside], order)
+            if curve.start < first_of_end < curve.end:
+                rows[at_end, position] = curve.evaluate(first_of_end, order, side="left")

@@ -18,7 +18,7 @@ from trajcli.curves.hermite import hermite_coefficients
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, distinct, read_only, taylor_shift
 from trajcli.errors import InputError
 from trajcli.frozen import comparable, frozen
-from trajcli.grids import KnotGrid, UniformGrid
+from trajcli.grids import KnotGrid, UniformGrid, leave_short_pieces
 from trajcli.trajectory import Trajectory
 
 Nanoseconds = NDArray[np.int64]
@@ -215,21 +215,11 @@ def _states(trajectory: Trajectory, whole: Nanoseconds) -> Array:
     near = curve.breaks[np.clip(np.searchsorted(curve.breaks, times), 0, curve.pieces)]
     on_break = np.abs(near - times) <= np.maximum(_ROUNDING, 4 * np.spacing(near))
     times = np.minimum(np.where(on_break, near, times), curve.end)
-    states = curve.evaluate_orders(times, (0, 1, 2)).transpose(1, 0, 2).copy()
-    _accelerate_beside_short_pieces(curve, times, states[2])
+    rows = curve.evaluate_orders(times, (0, 1, 2))
+    leave_short_pieces(curve, times, (0, 1, 2), rows, (_NEAREST - 1) / _PER_SECOND)
+    states = rows.transpose(1, 0, 2).copy()
     states[1, -1, trajectory.end.velocity == 0.0] = 0.0
     return states
-
-
-def _accelerate_beside_short_pieces(curve: PiecewisePolynomial, times: Array, accelerations: Array) -> None:
-    """Where breaks are one knot, take the acceleration outside of them: between them it may be immense."""
-    group = (_NEAREST - 1) / _PER_SECOND
-    last = curve.breaks[np.clip(np.searchsorted(curve.breaks, times + group) - 1, 0, curve.pieces)]
-    after = np.flatnonzero((last > times) & (last < curve.end))
-    accelerations[after] = curve.evaluate(last[after], 2)
-    first = curve.breaks[np.searchsorted(curve.breaks, curve.end - group)]
-    if curve.start < first < curve.end:
-        accelerations[-1] = curve.evaluate(first, 2, side="left")
 
 
 def _missed(curve: PiecewisePolynomial, whole: Nanoseconds, states: Array) -> Array:

@@ -22,7 +22,7 @@ from trajcli.columns import (
 )
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import InputError
-from trajcli.grids import AT_BREAK, ROWS, Grid, KnotGrid, onto_breaks
+from trajcli.grids import AT_BREAK, NANOSECOND, ROWS, Grid, KnotGrid, leave_short_pieces, onto_breaks
 from trajcli.kinematics.robot import Robot
 from trajcli.trajectory import Trajectory
 from trajcli.units import Units
@@ -64,7 +64,9 @@ def sample(
     orders, last, first = _orders(groups), None, 0
     for times, local in grid.blocks(size):
         local = onto_breaks(local, curve.breaks)
-        motion = _in_units(_window(curve, local), factors).evaluate_orders(local, orders)
+        window = _window(curve, local, factors)
+        motion = window.evaluate_orders(local, orders)
+        leave_short_pieces(window, local, orders, motion)
         if isinstance(grid, KnotGrid):
             motion = motion * factors
             grid.put_states(first, orders, motion)
@@ -145,15 +147,13 @@ def _efforts(trajectory: Trajectory, robot: Robot | None, owner: NDArray[np.intp
     return efforts
 
 
-def _in_units(curve: PiecewisePolynomial, factors: Array) -> PiecewisePolynomial:
-    return PiecewisePolynomial(curve.breaks, curve.coefficients / factors)
-
-
-def _window(curve: PiecewisePolynomial, local: Array) -> PiecewisePolynomial:
-    """Return the pieces that hold the sorted times `local`, so that a block costs what it holds."""
-    ends = np.searchsorted(curve.breaks, local[[0, -1]], "right") - 1
-    first, last = np.clip(ends, 0, curve.pieces - 1)
-    return PiecewisePolynomial(curve.breaks[first : last + 2], curve.coefficients[:, first : last + 1])
+def _window(curve: PiecewisePolynomial, local: Array, factors: Array) -> PiecewisePolynomial:
+    """Return the pieces that hold the sorted times `local`, and those beside: a block costs what it holds."""
+    ends = np.searchsorted(curve.breaks, (local[0] - NANOSECOND, local[-1] + NANOSECOND), "right")
+    first, last = np.clip((ends[0] - 2, ends[1]), 0, curve.pieces - 1)
+    return PiecewisePolynomial(
+        curve.breaks[first : last + 2], curve.coefficients[:, first : last + 1] / factors
+    )
 
 
 class _Starts:
@@ -185,5 +185,8 @@ def _path_law(trajectory: Trajectory, starts: _Starts, local: Array) -> Array:
         if law is not None:
             rows = np.flatnonzero(owner == index)
             times = np.clip(local[rows] - trajectory.spans[index].start, law.start, law.end)
-            values[rows] = law.evaluate_orders(onto_breaks(times, law.breaks), (0, 1, 2))[:, :, 0]
+            times = onto_breaks(times, law.breaks)
+            of_law = law.evaluate_orders(times, (0, 1, 2))
+            leave_short_pieces(law, times, (0, 1, 2), of_law)
+            values[rows] = of_law[:, :, 0]
     return values

@@ -105,6 +105,10 @@ def job(kind: str) -> dict[str, Any]:
                 }
             ],
         ),
+        "velocity_step": (
+            {**ONE, "limits": {"velocity": 1}},
+            [{"planner": "trapezoid", "to": {"joints": [1]}, "acceleration": 1.0e15}],
+        ),
         "units": (
             {
                 "robot": "ur5e",

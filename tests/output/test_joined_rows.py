@@ -33,7 +33,7 @@ def factor_by_scipy(plan: Plan) -> float:
     t = np.concatenate([local for _, local in grid.blocks()])
     curve, worst = BPoly.from_derivatives(t, rows), 0.0
     lengths = np.diff(t)
-    long = lengths > 1e-4  # in shorter ones rounding is a jerk of its own
+    long = lengths > (1e-4 if len(groups) > 2 else 1e-5)  # in shorter ones rounding is a jerk of its own
     times = (t[:-1, None] + lengths[:, None] * np.linspace(1e-9, 1 - 1e-9, 41))[long].ravel()
     owner = np.searchsorted([span.start for span in plan.trajectory.spans], times, "right") - 1
     for order in range(1, 2 * len(groups)):
@@ -57,6 +57,8 @@ def factor_by_scipy(plan: Plan) -> float:
         ("ur5e_pick", ("output.columns=[t, q, qd]",)),
         ("time_optimal", ()),
         ("ur5e_poses", ()),
+        ("sync", ()),  # ramps of 1e-14 s: steps of the velocity, which no cure takes away
+        ("sync", ("output.rows=knots", "output.columns=[t, q, qd]")),
     ],
 )
 def test_the_worst_factor_is_that_of_scipys_curve(name: str, sets: tuple[str, ...]) -> None:

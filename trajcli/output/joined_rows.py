@@ -21,7 +21,7 @@ from trajcli.curves.hermite import hermite_coefficients
 from trajcli.curves.piecewise import Array
 from trajcli.findings import Collector, Finding, at_time
 from trajcli.frozen import frozen
-from trajcli.grids import AT_BREAK, Grid, KnotGrid, ListedGrid, UniformGrid
+from trajcli.grids import AT_BREAK, NANOSECOND, Grid, KnotGrid, ListedGrid, UniformGrid
 from trajcli.judge.intervals import Intervals
 from trajcli.judge.joint_limits import JudgedRun, judge_limits
 from trajcli.judge.judgement import Judgement, as_planned
@@ -164,11 +164,13 @@ class JoinedRows:
     def _steps_of_order(self) -> tuple[NDArray[np.bool_], ...]:
         curve = self.plan.trajectory.curve
         steps = [np.zeros(curve.pieces + 1, dtype=bool)]
+        short = np.flatnonzero(curve.lengths <= NANOSECOND)  # what they do between two rows is a step there
         for order in (1, 2):
             first, last = curve.piece_ends(order)
             room = _CONTINUOUS * np.maximum(np.abs(first), np.abs(last)).max(axis=0)
             here = np.zeros_like(steps[0])
             here[1:-1] = (np.abs(first[1:] - last[:-1]) > room).any(axis=1)
+            here[short] = here[short + 1] = True
             steps.append(steps[-1] | here)
         return tuple(steps)
 

@@ -23,6 +23,7 @@ from trajcli.errors import (
     TrajcliError,
 )
 from trajcli.frozen import frozen
+from trajcli.grids import NANOSECOND
 from trajcli.job.limits import with_move_limits
 from trajcli.job.read import LoadedJob
 from trajcli.kinematics.robot import QUANTITIES, Payload, Robot
@@ -112,7 +113,7 @@ def plan_job(loaded: LoadedJob, carried: Carried | None = None, *, advise: bool 
     if hint is not None:
         events.append(Event("units", hint))
     trajectory = _joined(moves, loaded, _first_state(loaded, _first_moving(moves), events))
-    events += _ends_moving(loaded, moves)
+    events += [*_ends_moving(loaded, moves), *_velocity_steps(trajectory)]
     report_progress("checking the trajectory")
     verdict = verify(trajectory, [move.robot.limits for move in moves], [move.promise for move in moves])
     if advise and not verdict.passed:
@@ -319,6 +320,23 @@ def _ends_moving(loaded: LoadedJob, moves: Sequence[PlannedMove]) -> Iterator[Ev
         "velocity": Amount(float(velocity[joint]), 1, joint),
     }
     yield Event("ends_moving", message, last.index, amounts)
+
+
+def _velocity_steps(trajectory: Trajectory) -> Iterator[Event]:
+    """Yield the event of ramps that are over before the next time that stamps can tell."""
+    curve = trajectory.curve
+    first, last = curve.piece_ends(1)
+    steps = np.where((curve.lengths <= NANOSECOND)[:, None], np.abs(last - first), 0.0)
+    if not (steps > JUMP_ABSOLUTE).any():
+        return
+    piece, joint = np.unravel_index(steps.argmax(), steps.shape)
+    time, length = curve.breaks[piece] - curve.start, curve.lengths[piece]
+    message = (
+        f"the velocity of {{joint}} changes by {{step}} in {length:.3g} s, at t = {time:.6g} s: "
+        f"in stamps of {NANOSECOND:g} s that is a step, and no row has its acceleration"
+    )
+    step = Amount(float(steps[piece, joint]), 1, int(joint))
+    yield Event("velocity_step", message, None, {"joint": trajectory.joint_names[joint], "step": step})
 
 
 def _first_moving(moves: Sequence[PlannedMove]) -> PlannedMove:
