@@ -209,7 +209,7 @@ def _on_grid(path, constraint):
     from trajcli.curves.time_optimal.collocation import interval_rows
     from trajcli.curves.time_optimal.constraints import JointConstraint
     from trajcli.curves.time_optimal.passes import solve
-    from trajcli.curves.time_optimal.time_law import law_of
+    from trajcli.curves.time_optimal.time_law import law_pieces
 
     velocity = np.tile([-VELOCITY, VELOCITY], (6, 1))
     velocities = JointConstraint(path, velocity, velocity * np.inf)
@@ -217,7 +217,7 @@ def _on_grid(path, constraint):
 
     def run():
         rows = interval_rows(grid, [velocities, constraint()], nowhere)
-        return law_of(grid, solve(rows, 0.0, 0.0).x).duration
+        return float(law_pieces(grid, solve(rows, 0.0, 0.0).x).durations.sum())
 
     return run, _shown
 

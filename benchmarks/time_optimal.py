@@ -20,7 +20,7 @@ def ours():
     from trajcli.curves.time_optimal.collocation import interval_rows
     from trajcli.curves.time_optimal.constraints import JointConstraint
     from trajcli.curves.time_optimal.passes import solve
-    from trajcli.curves.time_optimal.time_law import law_of
+    from trajcli.curves.time_optimal.time_law import law_pieces
 
     s, points, velocity, acceleration = _problem()
     spline = CubicSpline(s, points, bc_type="not-a-knot")
@@ -29,7 +29,7 @@ def ours():
 
     def run():
         rows = interval_rows(grid, [JointConstraint(path, velocity, acceleration)], nowhere)
-        return law_of(grid, solve(rows, 0.0, 0.0).x).duration
+        return float(law_pieces(grid, solve(rows, 0.0, 0.0).x).durations.sum())
 
     return run, _shown
 

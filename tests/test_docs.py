@@ -17,7 +17,7 @@ from docs.planner_pages import WISHES
 from docs.svg_comparison import is_current, same_picture
 from trajcli.cli.app import app
 from trajcli.job.read import job_from_text
-from trajcli.job.robot import read_robot_file
+from trajcli.job.robot import read_sheet
 from trajcli.job.schema import schema_of
 from trajcli.planners import PLANNERS
 from trajcli.planning.plan import plan_job
@@ -267,7 +267,7 @@ def test_jobs_and_robots_can_be_used_as_they_stand(text: str, tmp_path: Path) ->
         return  # limits and messages, which a command of the page reads
     if "joints" in content:
         (tmp_path / "robot.yaml").write_text(text, encoding="utf-8")
-        assert read_robot_file(str(tmp_path / "robot.yaml")).joints
+        assert read_sheet(str(tmp_path / "robot.yaml")).robot.joints
     else:
         plan = plan_job(job_from_text(text))
         assert plan.verdict.passed

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from streams.mcap.conftest import read_mcap
 
 from trajcli.columns import columns_of, parse_column
 from trajcli.curves.piecewise import Array
@@ -16,7 +17,6 @@ from trajcli.job.read import job_from_text
 from trajcli.output.write import write_plan
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.samples import sample
-from trajcli.streams.mcap.read import read_mcap
 from trajcli.streams.reading import read_table
 from trajcli.units import Quantity, Units
 

@@ -18,6 +18,7 @@ LONG_FILES: dict[str, str] = {}
 SMALL_FILE = 150
 SMALL_FILES = {
     "checks/target.py": "one file a judgement, as those beside it",
+    "judge/stamps.py": "time stamps are a subject beside motions",
     "kinematics/inverse/families/planar.py": "one file a family; `choose` is their table",
     "kinematics/inverse/families/three_parallel.py": "one file a family; `choose` is their table",
 }

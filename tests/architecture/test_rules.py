@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+import dead_code_rules
 import file_rules
 import floor_rules
 import function_rules
@@ -13,7 +14,13 @@ from sources import ROOT, Offence, Planted, Rule, Sources, the_sources
 
 from trajcli.planners import PLANNERS
 
-RULES = [*file_rules.RULES, *function_rules.RULES, *floor_rules.RULES, *word_rules.RULES]
+RULES = [
+    *dead_code_rules.RULES,
+    *file_rules.RULES,
+    *function_rules.RULES,
+    *floor_rules.RULES,
+    *word_rules.RULES,
+]
 PLANTED = [
     pytest.param(rule, planted, id=f"{rule.name}-{number}")
     for rule in RULES

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from hermite_curves import hermite_pieces
 from scipy.interpolate import PPoly
 from scipy.optimize import minimize_scalar
 
-from trajcli.curves.hermite import hermite_pieces
 from trajcli.curves.piecewise import PiecewisePolynomial, concatenate
 from trajcli.kinematics.robot import Limits
 from trajcli.trajectory import Span, State, Trajectory

@@ -6,12 +6,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from hermite_curves import hermite_pieces
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from motions import between, limits, state, trajectory
 
 from trajcli.checks.continuity import JERK_HINT, acceleration_steps, check_continuity
-from trajcli.curves.hermite import hermite_pieces
 from trajcli.curves.piecewise import PiecewisePolynomial, constant
 from trajcli.trajectory import State, Trajectory
 

@@ -7,10 +7,10 @@ import re
 
 import numpy as np
 import pytest
+from hermite_curves import hermite_pieces
 
 from trajcli.checks.tool import SampledTool, check_tool
 from trajcli.checks.verify import limit_findings, verify
-from trajcli.curves.hermite import hermite_pieces
 from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import PiecewisePolynomial, concatenate, constant
 from trajcli.geometry.paths.orientation import AxisAngleOrientation, SegmentProgress

@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from running import COMMAND, EXAMPLES, JOB, call
-
-from trajcli.streams.mcap.read import read_mcap
+from streams.mcap.conftest import read_mcap
 
 Capture = pytest.CaptureFixture[str]
 

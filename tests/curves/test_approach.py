@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hermite_curves import hermite_pieces
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from trajcli.curves.approach import ROOM, ApproachLimits, approach_uses, uses_of_pieces
-from trajcli.curves.hermite import hermite_pieces
 from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import PiecewisePolynomial
 

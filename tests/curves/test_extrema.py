@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from hermite_curves import hermite_pieces
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
@@ -13,7 +14,6 @@ from scipy.interpolate import PPoly
 from scipy.optimize import brentq, minimize_scalar
 
 from trajcli.curves.extrema import peaks, peaks_between, piece_extremes
-from trajcli.curves.hermite import hermite_pieces
 from trajcli.curves.piecewise import PiecewisePolynomial, constant, taylor_shift
 
 ORDERS = (0, 1, 2, 3)

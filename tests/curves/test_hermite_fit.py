@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from hermite_curves import hermite_pieces
 from scipy.optimize import brentq
 
-from trajcli.curves.hermite import hermite_pieces
 from trajcli.curves.hermite_fit import FitError, fit
 from trajcli.curves.operations import times_at
 from trajcli.curves.piecewise import PiecewisePolynomial

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hermite_curves import hermite_pieces
 from recorded_rows import judged, rows_of
 
-from trajcli.curves.hermite import hermite_pieces
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.findings import Finding
 from trajcli.judge.judgement import Judgement

@@ -18,26 +18,8 @@ from functools import cache
 from math import comb, factorial
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from trajcli.curves.piecewise import Array, PiecewisePolynomial
-
-
-def hermite_pieces(breaks: ArrayLike, derivatives: ArrayLike) -> PiecewisePolynomial:
-    """Return the curve whose derivatives at every break are given.
-
-    Args:
-        breaks: Shape (m,), strictly increasing, m >= 2.
-        derivatives: Shape (k, m, n): value, first, ... (k-1)-th derivative at each break.
-
-    Returns:
-        Pieces of degree 2k - 1 with k - 1 continuous derivatives.
-    """
-    times = np.asarray(breaks, dtype=np.float64)
-    given = np.asarray(derivatives, dtype=np.float64)
-    return PiecewisePolynomial(
-        times, hermite_coefficients(given[:, :-1], given[:, 1:], np.diff(times)[:, None])
-    )
+from trajcli.curves.piecewise import Array
 
 
 def hermite_coefficients(start: Array, end: Array, duration: Array) -> Array:

@@ -326,16 +326,6 @@ def load_sheet(name: str | Path) -> RobotSheet:
     raise InputError(f"the catalogue has no robot '{name}'", hint=_suggestion(name, names))
 
 
-def read_robot_file(path: str) -> Robot:
-    """Return the robot of a robot file, which has its own units.
-
-    Raises:
-        InputError: With every flaw of the file.
-        FileError: When it cannot be read.
-    """
-    return read_sheet(path).robot
-
-
 def is_urdf(path: str | Path) -> bool:
     """Return whether the name of a file ends as that of a URDF, or of XML."""
     return str(path).lower().endswith(_URDF_ENDINGS)

@@ -141,10 +141,3 @@ def _origin(first: float, period: float, error: float) -> float:
     steps = np.rint(first / period)
     near = abs(first - steps * period) <= error and abs(steps) < 2**40
     return float(steps * period) if near else first
-
-
-def _simplest_period(low: float, high: float) -> float:
-    """Return the simplest fraction of a second in an interval; its middle where that holds zero."""
-    if low <= 0.0:
-        return 0.5 * (low + high)
-    return float(simplest_between(Fraction(low), Fraction(high)))

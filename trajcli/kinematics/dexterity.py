@@ -26,14 +26,12 @@ class Dexterity:
         manipulability: Shape (*batch,): Yoshikawa's measure of the Jacobian as it is, in m and rad: the
             product of its min(6, n) singular values, which is sqrt(det(J J^T)) for six joints and more and
             sqrt(det(J^T J)) for fewer.
-        singular_values: Shape (*batch, min(6, n)), of the scaled Jacobian, largest first.
         condition: Shape (*batch,): largest over smallest singular value; infinite where the rank is lost.
         rank: Shape (*batch,): number of singular values above 1e-9 of the largest.
         length: The characteristic length, m.
     """
 
     manipulability: Array
-    singular_values: Array
     condition: Array
     rank: NDArray[np.intp]
     length: float
@@ -73,7 +71,7 @@ def dexterity(robot: Robot, q: ArrayLike) -> Dexterity:
     full = rank == values.shape[-1]
     smallest = np.where(full, values[..., -1], 1.0)
     condition: Array = np.where(full, values[..., 0] / smallest, np.inf)
-    return Dexterity(manipulability, values, condition, rank, length)
+    return Dexterity(manipulability, condition, rank, length)
 
 
 def singular_directions(robot: Robot, q: ArrayLike) -> SingularDirections:

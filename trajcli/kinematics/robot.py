@@ -130,15 +130,6 @@ class Payload:
         com = ", ".join(f"{x:g}" for x in self.com.tolist())
         return f"{type(self).__name__}({self.mass:g} kg at [{com}] m)"
 
-    def with_mass(self, mass: float) -> Payload:
-        """Return the same payload with another mass; its inertia grows with the mass.
-
-        Raises:
-            InputError: When the mass is negative.
-        """
-        share = mass / self.mass if self.mass > 0.0 else 1.0
-        return Payload(mass, self.com, self.inertia * share)
-
 
 def point_mass(mass: float, com: ArrayLike = (0.0, 0.0, 0.0)) -> Payload:
     """Return a payload without extent.

@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from topp_paths import assert_motion, polyline, spline, symmetric
+from topp_paths import SpeedCap, assert_motion, polyline, spline, symmetric
 
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.curves.time_optimal.constraints import SpeedConstraint
 from trajcli.curves.time_optimal.parameterization import time_optimal
 
 CASES = yaml.safe_load((Path(__file__).parents[2] / "oracles" / "time_optimal.yaml").read_text())["cases"]
@@ -128,10 +127,10 @@ def test_a_circle_at_constant_speed():
 
 def test_a_speed_cap_along_the_path():
     path = polyline([[0.0], [1.0]])
-    cap = SpeedConstraint(lambda s: np.full(s.size, 0.25))
+    cap = SpeedCap(lambda s: np.full(s.size, 0.25))
     found = time_optimal(path, symmetric(1.0), symmetric(1.0), further=[cap])
     assert found.trajectory.duration == pytest.approx(fastest(1.0, 0.25, 1.0, 1.0), rel=1e-9)
-    cap = SpeedConstraint(lambda s: np.where(s < 0.5, inf, 0.25))
+    cap = SpeedCap(lambda s: np.where(s < 0.5, inf, 0.25))
     found = time_optimal(path, symmetric(1.0), symmetric(1.0), further=[cap])
     expected = fastest(0.5, 1.0, 1.0, 1.0, 0.0, 0.25) + fastest(0.5, 0.25, 1.0, 1.0, 0.25, 0.0)
     assert found.trajectory.duration == pytest.approx(expected, rel=2e-3)

@@ -11,7 +11,6 @@ from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.time_optimal.constraints import (
     ApproachConstraint,
     JointConstraint,
-    SpeedConstraint,
     corners,
     is_at_rest,
 )
@@ -103,12 +102,6 @@ def test_where_velocity_alone_is_limited_its_excess_is_that_between_grid_points(
         assert (excess[over] >= used[over] / scale * (1 - 1e-9)).all()
         assert (excess[over] <= used[over] / scale * 1.2).all()
         assert (excess[~over] <= 1.1).all()
-
-
-def test_a_speed_limit_is_a_cap_on_the_square_of_the_speed():
-    rows = SpeedConstraint(lambda s: 1.0 + s).rows(S, "right")
-    np.testing.assert_allclose(rows.cap, (1.0 + S) ** 2)
-    assert rows.a.shape == rows.b.shape == rows.c.shape == (41, 0)
 
 
 def allowed(position, limits, joint):

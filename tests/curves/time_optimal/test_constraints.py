@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from topp_paths import over, polyline, random_bounds, spline, symmetric
+from topp_paths import SpeedCap, dense, over, polyline, random_bounds, spline, symmetric
 
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.time_optimal import parameterization
-from trajcli.curves.time_optimal.constraints import ConstraintRows, JointConstraint, SpeedConstraint
+from trajcli.curves.time_optimal.constraints import JointConstraint
 from trajcli.curves.time_optimal.parameterization import UnsettledSpeedError, time_optimal
 from trajcli.curves.time_optimal.time_law import LawPieces, law_and_trajectory, law_pieces
 
@@ -20,16 +20,6 @@ def random_law(rng) -> LawPieces:
     x[[0, -1]] = 0.0
     mean, ramps = np.diff(x) / (2 * np.diff(grid)), rng.uniform(-3, 3, 60)
     return law_pieces(grid, x, mean - ramps, mean + ramps)
-
-
-def dense(law: LawPieces) -> np.ndarray:
-    """Return s, sd and sdd at 401 times of each piece, shape (3, 401, N), from numpy's own polynomials."""
-    t = np.linspace(0.0, 1.0, 401)[:, None] * law.durations
-    rows = []
-    for k, column in enumerate(law.coefficients.T):
-        polynomial = np.poly1d(column)
-        rows.append([polynomial.deriv(order)(t[:, k]) for order in range(3)])
-    return np.array(rows).transpose(1, 2, 0)
 
 
 def used_by_definition(path, law, velocity, acceleration):
@@ -68,37 +58,11 @@ def test_the_excess_of_joints_bounds_what_is_used_and_is_near_to_it(seed):
     )
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_the_excess_of_a_speed_limit_is_the_largest_share_of_it(seed):
-    law = random_law(np.random.default_rng(seed))
-    s, sd, _ = dense(law)
-    excess = SpeedConstraint(lambda s: np.full(s.size, 1.2)).excess(law)
-    np.testing.assert_allclose(excess[0], sd.max(axis=0) / 1.2, rtol=1e-5)
-    assert (excess[0] >= sd.max(axis=0) / 1.2 * (1 - 1e-12)).all()
-    assert not excess[1].any()
-    excess = SpeedConstraint(lambda s: 1.5 + np.sin(20 * s)).excess(law)
-    np.testing.assert_allclose(excess[0], (sd / (1.5 + np.sin(20 * s))).max(axis=0), rtol=5e-3)
-
-
-class Wave:
+class Wave(SpeedCap):
     """A speed limit that is 1 at every 96th part of [0, 1], where grid points stand, and 0.7 between them."""
 
-    estimate, bounds_sdd = 1.0, False
-
-    def limit(self, s):
-        return 1.0 - 0.3 * np.sin(96 * np.pi * s) ** 2
-
-    def rows(self, s, side):
-        nothing = np.empty((s.size, 0))
-        return ConstraintRows(nothing, nothing, nothing, self.limit(s) ** 2)
-
-    def largest(self, s, side):
-        return self.limit(s) ** 2
-
-    def excess(self, law):
-        s, sd, _ = dense(law)
-        used = (sd / self.limit(s)).max(axis=0)
-        return np.stack([used, np.zeros_like(used)])
+    def __init__(self):
+        super().__init__(lambda s: 1.0 - 0.3 * np.sin(96 * np.pi * s) ** 2)
 
 
 class BlindWave(Wave):

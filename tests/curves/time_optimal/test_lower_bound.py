@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from topp_paths import polyline, random_bounds, spline, symmetric
+from topp_paths import SpeedCap, polyline, random_bounds, spline, symmetric
 
-from trajcli.curves.time_optimal.constraints import JointConstraint, SpeedConstraint
+from trajcli.curves.time_optimal.constraints import JointConstraint
 from trajcli.curves.time_optimal.lower_bound import lower_bound
 from trajcli.curves.time_optimal.parameterization import time_optimal
 
@@ -30,7 +30,7 @@ def test_a_cap_and_limits_along_the_path_count_too():
     plain = lower_bound(joints, (), FREE, places, REST)
     assert plain == pytest.approx(1.0 / 9.0 + 0.09, rel=1e-6)
     assert lower_bound(joints, (), (0.5, 4.0), places, REST) == pytest.approx(2.0 + 0.125, rel=1e-6)
-    half = SpeedConstraint(lambda s: np.where((s > 0.45) & (s < 0.55), 0.0, np.inf) + 0.5)
+    half = SpeedCap(lambda s: np.where((s > 0.45) & (s < 0.55), 0.0, np.inf) + 0.5)
     assert lower_bound(joints, (half,), FREE, places, REST) > 1.2 * plain
 
 

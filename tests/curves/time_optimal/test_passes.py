@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from hermite_curves import hermite_pieces
 from scipy.optimize import linprog
 from topp_paths import random_bounds, spline, symmetric
 
-from trajcli.curves.hermite import hermite_pieces
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.time_optimal.collocation import interval_rows
 from trajcli.curves.time_optimal.constraints import ConstraintRows, JointConstraint

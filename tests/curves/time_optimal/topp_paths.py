@@ -7,7 +7,9 @@ from scipy.interpolate import CubicSpline
 
 from trajcli.curves.extrema import peaks
 from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.curves.time_optimal.constraints import ConstraintRows
 from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion
+from trajcli.curves.time_optimal.time_law import LawPieces
 
 TOLERANCE = 1e-9
 
@@ -45,6 +47,37 @@ def over(
         float(np.maximum(peak.high / bounds[:, 1], peak.low / bounds[:, 0]).max())
         for peak, bounds in zip(found, (velocity, acceleration), strict=True)
     )
+
+
+def dense(law: LawPieces) -> np.ndarray:
+    """Return s, sd and sdd at 401 times of each piece, shape (3, 401, N), from numpy's own polynomials."""
+    t = np.linspace(0.0, 1.0, 401)[:, None] * law.durations
+    rows = []
+    for k, column in enumerate(law.coefficients.T):
+        polynomial = np.poly1d(column)
+        rows.append([polynomial.deriv(order)(t[:, k]) for order in range(3)])
+    return np.array(rows).transpose(1, 2, 0)
+
+
+class SpeedCap:
+    """A limit of sd by s; it is looked at densely between grid points."""
+
+    estimate, bounds_sdd = 1.0, False
+
+    def __init__(self, limit):
+        self.limit = limit
+
+    def rows(self, s, side):
+        nothing = np.empty((s.size, 0))
+        return ConstraintRows(nothing, nothing, nothing, self.limit(s) ** 2)
+
+    def largest(self, s, side):
+        return self.limit(s) ** 2
+
+    def excess(self, law):
+        s, sd, _ = dense(law)
+        used = (sd / self.limit(s.reshape(-1)).reshape(s.shape)).max(axis=0)
+        return np.stack([used, np.zeros_like(used)])
 
 
 def assert_motion(found: TimeOptimalMotion, path: PiecewisePolynomial, velocity, acceleration) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from followed_paths import CASES
+from hermite_curves import hermite_pieces
 
-from trajcli.curves.hermite import hermite_pieces
 from trajcli.geometry.paths.chain import join
 from trajcli.geometry.paths.orientation import FixedOrientation
 from trajcli.geometry.paths.pose import PoseCurve

@@ -9,7 +9,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from trajcli.streams.recorded.stamp_period import fit_period
+from trajcli.streams.recorded.stamp_period import PeriodFit
+
+
+def fit_period(blocks, rounding, relative=0.0):
+    """Return the grid of stamps (N,), or of blocks of them."""
+    fit = PeriodFit()
+    for block in [blocks] if isinstance(blocks, np.ndarray) else blocks:
+        fit.add(block)
+    return fit.result(rounding, relative)
 
 
 @settings(max_examples=200, deadline=None)

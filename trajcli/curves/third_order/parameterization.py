@@ -54,13 +54,11 @@ class JerkLimitedMotion(TimeOptimalMotion):
     """A near time-optimal motion, whose law has quartic pieces.
 
     Attributes:
-        second_order: The optimum without limits of jerk: no motion is faster.
         steps: Number of convex steps.
         bounding_joint: The joint that alone needs the lower bound between its turning points; None where it
             is that without limits of jerk.
     """
 
-    second_order: TimeOptimalMotion
     steps: int
     bounding_joint: int | None
 
@@ -130,7 +128,6 @@ def jerk_limited_time_optimal(
         second.stops,
         times,
         max(second.lower_bound, alone),
-        second,
         search.steps,
         joint if alone > second.lower_bound else None,
     )

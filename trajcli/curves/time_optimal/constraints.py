@@ -12,7 +12,6 @@ Source: Pham and Pham (2018), sections II and III, for the rows.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -33,7 +32,6 @@ _KINK = 1e-9  # of the largest derivative of a joint: a jump above it is a corne
 _ROUNDING = 1e-13  # of the largest derivative of all joints: the same, where one hardly moves
 _NEARLY = 0.999  # of an approach limit: what uses less is not looked at closely
 _MOST = 1e3  # excess that is told: limits lowered by more would be rounding
-_SAMPLES = 9  # of a speed limit within an interval, both ends included
 
 
 @frozen
@@ -167,45 +165,6 @@ class JointConstraint:
 
 
 @frozen
-class SpeedConstraint:
-    """A limit of sd itself; between grid points it is sampled, and where sd is largest.
-
-    Attributes:
-        limit: From points (p,) of the path to the largest sd there, (p,), positive or infinite; where it
-            jumps, a grid point must stand, with the lower value.
-    """
-
-    estimate: ClassVar[float] = 1.0
-    bounds_sdd: ClassVar[bool] = False
-
-    limit: Callable[[Array], Array]
-
-    def rows(self, s: Array, side: Side) -> ConstraintRows:
-        """Return no rows, and the limit as cap, at points (p,)."""
-        del side
-        nothing = np.empty((s.size, 0))
-        return ConstraintRows(nothing, nothing, nothing, self.limit(s) ** 2)
-
-    def largest(self, s: Array, side: Side) -> Array:
-        """Return the caps at points (p,)."""
-        return self.rows(s, side).cap
-
-    def excess(self, law: LawPieces) -> Array:
-        """Return what is used of the limit at samples of each piece, and zeros for acceleration, (2, N)."""
-        samples = np.linspace(0.0, 1.0, _SAMPLES)[:, None] * law.durations
-        sdd = derivative_coefficients(law.coefficients, 2)
-        if len(sdd) == 3:
-            turning = np.clip(
-                _roots(*sdd), 0.0, law.durations
-            )  # where sdd is zero, sd is largest or smallest
-            samples = np.concatenate([samples, turning])
-        sd = horner(derivative_coefficients(law.coefficients, 1), samples)
-        limits = self.limit(horner(law.coefficients, samples).reshape(-1)).reshape(sd.shape)
-        used = (sd / limits).max(axis=0)
-        return np.stack([used, np.zeros_like(used)])
-
-
-@frozen
 class ApproachConstraint:
     """Limits of the velocities with which joints approach the ends of their ranges; the excess is exact.
 
@@ -242,13 +201,6 @@ class ApproachConstraint:
             uses, _ = uses_of_pieces(q, pieces.durations, self.limits, _NEARLY)
             excess[0, block] = np.minimum(uses.max(axis=1, initial=0.0), _MOST)
         return excess
-
-
-def _roots(a: Array, b: Array, c: Array) -> Array:
-    """Return the roots of a t^2 + b t + c, shape (2, N); zeros where there are none."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        q = -0.5 * (b + np.copysign(np.sqrt(np.maximum(b**2 - 4.0 * a * c, 0.0)), b))
-        return np.nan_to_num(np.stack([q / a, c / q]), posinf=0.0, neginf=0.0)
 
 
 def is_at_rest(path: PiecewisePolynomial) -> tuple[bool, bool]:

@@ -97,16 +97,6 @@ def _leads_forward(mean: Array, v: Array, D: Array, near: Array, far: Array) -> 
     return np.asarray((under > 0.0) & (v[:-1] + near * h / 3.0 >= 0.0) & (v[1:] - far * h / 3.0 >= 0.0))
 
 
-def law_of(grid: Array, x: Array) -> PiecewisePolynomial:
-    """Return s(t), one piece of constant sdd for each interval, from t = 0 on.
-
-    Args:
-        grid: Grid points, shape (N + 1,).
-        x: sd^2 there; two neighbours must not both be zero.
-    """
-    return _law(law_pieces(grid, x))
-
-
 def law_and_trajectory(
     path: PiecewisePolynomial, pieces: LawPieces
 ) -> tuple[PiecewisePolynomial, PiecewisePolynomial]:

@@ -47,7 +47,6 @@ class Identifiability:
         rank: How many combinations of parameters they determine.
         basis: Shape (p, rank): changes of the parameters, rad and m, that span what is determined; they have
             no part of what is not (orthogonal in the scaled parameters).
-        singular_values: Shape (p,), of the scaled Jacobian, the largest first; zeros where rows are missing.
         combinations: Changes of the parameters that leave all measured numbers as they are, each a list of
             those that take part. As few as can be take part: each combination is what one parameter, that
             no other combination holds, does alike with parameters before it.
@@ -55,7 +54,6 @@ class Identifiability:
 
     rank: int
     basis: Array
-    singular_values: Array
     combinations: tuple[tuple[Share, ...], ...]
 
 
@@ -73,13 +71,11 @@ def identifiability(jacobian: Array, parameters: Sequence[ArmParameter], length:
     seen = lengths > _NO_COLUMN * lengths.max(initial=0.0)
     scale = np.where(seen, 1.0 / np.where(seen, lengths, 1.0), 0.0)
     _, found, right = np.linalg.svd(triangle * scale)
-    values = np.zeros(len(parameters))
-    values[: len(found)] = found
-    rank = int(np.count_nonzero(values > RANK_TOLERANCE * values[0])) if values[0] > 0 else 0
+    rank = int(np.count_nonzero(found > RANK_TOLERANCE * found[:1]))
     # a parameter without a column stays in its own unit, and is a combination by itself
     changes = units * np.where(seen, scale, 1.0)
     combinations = _combinations(right[rank:] * changes, parameters, length)
-    return Identifiability(rank, right[:rank].T * changes[:, None], values, combinations)
+    return Identifiability(rank, right[:rank].T * changes[:, None], combinations)
 
 
 def _combinations(

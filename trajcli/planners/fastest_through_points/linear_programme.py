@@ -157,7 +157,7 @@ class _Newton:
         if q:
             shared = np.broadcast_to(s_answer[:, None], (segments, joints, s_answer.shape[1]))
             rest = np.concatenate([both, shared], axis=2)
-            w_answer += (self._w_inverse @ w[..., None] - self._w_gain @ rest[..., None])[..., 0]
+            w_answer[...] = (self._w_inverse @ w[..., None] - self._w_gain @ rest[..., None])[..., 0]
         return answer
 
     def _points(self, known: Array) -> Array:

@@ -12,14 +12,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
 from trajcli.planners.fastest_through_points.problem import WaypointProblem
 
 _DIFFERENCE = 1e-5  # of the scale of a state
-_APART = 1e-9  # relative: durations that differ by less are equal
 
 
 @frozen
@@ -32,13 +30,11 @@ class StateTimes:
             there is none.
         slopes: Of `alone` by velocity and acceleration before and after, in units of their scales, shape
             (K, n, 4).
-        lifted: Whether the common duration is longer than that of each joint and the given one, shape (K,).
     """
 
     alone: Array
     together: Array
     slopes: Array
-    lifted: NDArray[np.bool_]
 
     @property
     def duration(self) -> float:
@@ -96,8 +92,7 @@ def state_times(problem: WaypointProblem, states: Array, together: Array | None 
     changes = np.stack([times[1 + 2 * k] - times[2 + 2 * k] for k in range(4)], axis=2)
     spans = spans / np.concatenate([scales, scales], axis=1)
     slopes = np.where(np.isfinite(changes) & (spans > 0), changes / np.where(spans > 0, spans, 1.0), 0.0)
-    usual = np.maximum(times[0].max(axis=1), problem.least)
-    return StateTimes(times[0], common, slopes, common > usual * (1 + _APART))
+    return StateTimes(times[0], common, slopes)
 
 
 def _box(problem: WaypointProblem) -> tuple[Array, Array]:

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
-from trajcli.errors import FileError, InputError
+from trajcli.errors import InputError
 from trajcli.frozen import frozen
 from trajcli.streams.mcap import definitions, records
 from trajcli.streams.mcap.decode import (
@@ -59,45 +58,19 @@ class LoggedMotion:
     effort: Array
 
 
-def read_mcap(path: str | Path, topic: str | None = None, field: str | None = None) -> LoggedMotion:
-    """Read the motion of a topic of a file, as `read_log` does.
-
-    Raises:
-        FileError: When the file cannot be read.
-        InputError: When it is no whole MCAP file, or has no such topic.
-    """
-    try:
-        with Path(path).open("rb") as stream:
-            return read_log(stream, str(path), topic, field)
-    except OSError as error:
-        raise FileError(f"cannot read {path}: {error.strerror or error}") from error
-
-
-def read_log(stream: BinaryIO, file: str, topic: str | None = None, field: str | None = None) -> LoggedMotion:
-    """Read the motion of a topic of JointState, JointTrajectory or JointTrajectoryControllerState.
+def log_blocks(
+    stream: BinaryIO, file: str, topic: str | None = None, field: str | None = None
+) -> Iterator[LoggedMotion]:
+    """Yield the motion of a topic of JointState, JointTrajectory or JointTrajectoryControllerState in blocks.
 
     Of a log that trajcli wrote, /joint_states has the accelerations of /joint_accelerations, and times count
-    from its epoch.
+    from its epoch. There is at least one block.
 
     Args:
         stream: The file, open at its first byte.
         file: Its name, for messages.
         topic: The topic; /joint_states unless given, or else the only one that can be read.
         field: Of JointTrajectoryControllerState, the state that is read, such as "reference".
-
-    Raises:
-        InputError: When it is no whole MCAP file, or has no such topic.
-    """
-    blocks = list(log_blocks(stream, file, topic, field))
-    first = blocks[0]
-    joined = {name: np.concatenate([getattr(block, name) for block in blocks]) for name in _ARRAYS}
-    return LoggedMotion(file, first.topic, first.joint_names, **joined)
-
-
-def log_blocks(
-    stream: BinaryIO, file: str, topic: str | None = None, field: str | None = None
-) -> Iterator[LoggedMotion]:
-    """Yield the motion of a topic block by block, as `read_log` reads it, at least one.
 
     Raises:
         InputError: When it is no whole MCAP file, or has no such topic.

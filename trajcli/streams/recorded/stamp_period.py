@@ -8,7 +8,7 @@ of seconds is taken, such as 1/24.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from fractions import Fraction
 from math import floor
 
@@ -44,23 +44,6 @@ class StampGrid:
     def times(self, first: int, count: int) -> Array:
         """Return points of the grid, s, shape (count,), from the index `first` on, which counts from 0."""
         return np.asarray(self.start + np.arange(first, first + count) * self.period, dtype=np.float64)
-
-
-def fit_period(times: Array | Iterable[Array], rounding: float, relative: float = 0.0) -> StampGrid | None:
-    """Return the grid on which all stamps lie within their rounding; None where they lie on none.
-
-    Stamps that are doubled or go backward lie on none, nor do fewer than three, nor those whose rounding is
-    coarse against the period.
-
-    Args:
-        times: Stamps, s, shape (N,), or blocks of them.
-        rounding: Half a unit of their last decimal, s.
-        relative: Their rounding as a share of each, such as 2^-24 of single precision.
-    """
-    fit = PeriodFit()
-    for block in [times] if isinstance(times, np.ndarray) else times:
-        fit.add(block)
-    return fit.result(rounding, relative)
 
 
 class PeriodFit:
