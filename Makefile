@@ -5,8 +5,9 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 # pytest needs streams to write to: where one is closed, nobody reads it
 STREAMS := (: 9>&1) 2>/dev/null || exec >/dev/null; (: 9>&2) || exec 2>/dev/null;
+# neighbours stay in one process, which plans and starts what they share once;
 # compiled tests are kept whatever the environment says: to compile them takes longer than to import them
-PYTEST := $(STREAMS) PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n auto
+PYTEST := $(STREAMS) PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n auto --dist worksteal
 PEERS := .venv-peers
 EXTRAS ?= dev  # dev,dask,docs,viewers: also what the tests of viewers, of the site and of clusters need
 

@@ -23,4 +23,4 @@ def few(cases: Sequence[T], count: int = 6) -> Sequence[T]:
 
 def few_examples(count: int) -> int:
     """Return how many examples Hypothesis draws where a test asks for so many."""
-    return min(count, max(10, count // 6)) if QUICK else count
+    return min(count, max(min(5, count // 2), count // 12)) if QUICK else count

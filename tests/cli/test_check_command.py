@@ -11,6 +11,7 @@ import pytest
 from running import EXAMPLES, ROOT, call, run
 
 import trajcli
+from trajcli.cli.app import app
 
 GOAL = ROOT / "tests/oracles/recorded/ur_goal.yaml"
 LIMITS = ROOT / "tests/judge/recordings/five.yaml"
@@ -73,14 +74,20 @@ def test_findings_for_continuous_integration(capfd: pytest.CaptureFixture[str], 
     assert "(row 1)" in out
 
 
+def plan_quietly(*words: str) -> None:
+    with pytest.raises(SystemExit) as left:
+        app(["plan", *words, "-q"])
+    assert not left.value.code
+
+
 @pytest.fixture(scope="module")
 def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with a job and its rows in all formats."""
     folder = tmp_path_factory.mktemp("planned")
     (folder / "job.yaml").write_text(JOB)
     for name in ("rows.csv", "rows.jsonl", "rows.mcap", "rows.yaml"):
-        assert run("plan", folder / "job.yaml", "-q", "-o", folder / name).code == 0
-    assert run("plan", folder / "job.yaml", "-q", "--si", "-o", folder / "si.csv").code == 0
+        plan_quietly(str(folder / "job.yaml"), "-o", str(folder / name))
+    plan_quietly(str(folder / "job.yaml"), "--si", "-o", str(folder / "si.csv"))
     return folder
 
 

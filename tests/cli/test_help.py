@@ -26,6 +26,17 @@ OTHER_NAMES = {
 }
 
 
+# the command as it is shown, and moves whose times need no search: the example plans them anew for each mass
+TIMED = {0: "pick", 2: "place", 4: "home"}
+SHORTER = {
+    "payload": [
+        word
+        for move, to in TIMED.items()
+        for word in ("--set", f"moves.{move}={{planner: quintic, to: {to}, duration: 4}}")
+    ]
+}
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_each_command_has_an_example_that_runs(
     name: str, capfd: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -39,7 +50,7 @@ def test_each_command_has_an_example_that_runs(
     (tmp_path / "there.csv").write_text("t,q1\n0,0\n1,1\n")
     (tmp_path / "back.csv").write_text("t,q1\n0,1\n1,0\n")
     (tmp_path / "arm.urdf").symlink_to(ROOT / "tests/urdf/models/ur5.urdf")
-    words = shlex.split(example)
+    words = shlex.split(example) + SHORTER.get(name, [])
     if "rows.csv" in words[1:]:
         call(capfd, "plan", "examples/ur5e_pick.yaml", "-o", "rows.csv")
     assert words[0] == name

@@ -36,8 +36,8 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def rows(folder: Path) -> str:
-    return shell("trajcli plan job.yaml -q", folder).stdout
+def rows(folder: Path, capfd: pytest.CaptureFixture[str]) -> str:
+    return call(capfd, "plan", folder / "job.yaml", "-q").out
 
 
 def test_rows_hold_no_summary_where_standard_error_is_closed(folder: Path, rows: str) -> None:

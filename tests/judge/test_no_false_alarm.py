@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ ONCE = json.loads((Path(__file__).parent / "recordings/false_alarms.json").read_
 LONGEST = 4.0  # s: of a longer motion there are only more rows alike
 
 
+@cache
 def verified_plan(seed: int) -> Plan | None:
     """Return the plan of a random job, at a random rate; None where it has none, or breaks a limit."""
     return plan_of(random_fields(seed))

@@ -54,7 +54,7 @@ def test_the_rank_is_that_of_differences_and_combinations_change_no_measurement(
     assert told.rank == difference_rank(robot, q, parameters, part)
     assert told.rank + len(told.combinations) == len(parameters)
     for shares in told.combinations:
-        for row in q[:8]:
+        for row in few(list(q[:8]), 3):
             plain = seen_part(pose_of(robot, row, {}), part)
             for step in (1e-5, -1e-5):
                 moved = pose_of(robot, row, {share.parameter: step * share.weight for share in shares})

@@ -103,7 +103,7 @@ def test_each_segment_is_evaluated_as_often_in_a_long_path(fields, monkeypatch):
 
     monkeypatch.setattr(position.Line, "evaluate", counting)
     costs = []
-    for count in (20, 60):
+    for count in (12, 36):
         counted.clear()
         zigzag(count, law=law, **fields)
         costs.append((len(counted), sum(counted)))

@@ -9,7 +9,7 @@ from waypoint_problems import LISTS, missed, most_used, planned, stopping
 
 ONE_JOINT = [pytest.param(case, id=case["id"]) for case in LISTS["one_joint"]]
 EXAMPLES = [pytest.param(case, id=case["id"]) for case in LISTS["examples"] if len(case["waypoints"]) < 10]
-FEW = np.random.default_rng(7).choice(len(LISTS["waypoints"]), len(few(range(8), 3)), replace=False)
+FEW = np.random.default_rng(7).choice(len(LISTS["waypoints"]), len(few(range(8), 2)), replace=False)
 WANTED, NEVER = 1.002, 1.03
 
 
