@@ -114,3 +114,48 @@ def test_stamps_are_later_than_all_before_them(stamps, wrong, blocks) -> None:
     assert sum(each.count for each in found) == len(wrong)
     assert {each.row for each in found} <= set(wrong)
     assert all((each.severity, each.certainty) == ("error", "exceeded") for each in found)
+
+
+@pytest.mark.parametrize(
+    ("last", "over"), [(0.0, 0.0), (-2.0, 0.0), (-1.0, 0.0), (1e-3, 1e-3), (-2.001, -1e-3)]
+)
+@pytest.mark.parametrize("joint", range(3))
+def test_the_last_row_has_an_acceleration_of_the_end(joint: int, last: float, over: float) -> None:
+    """The planned motion ends with -2 and then rests: a row may have either, or what a filter makes of both."""
+    rows = motion()
+    qdd = np.zeros((4, 3))
+    qdd[-1, joint] = last
+    before = np.where(np.arange(3) == joint, -2.0, 0.0)
+    state = State(END, np.zeros(3), np.zeros(3))
+    required = Requirements(bare_robot(unlimited(3)), end=state, start_tolerance=TOLERANCE, end_before=before)
+    found = judge_motion(lambda: [replace(rows, qdd=qdd)], required).findings
+    found = [each for each in found if each.rule == "state"]
+    assert bool(found) == bool(over)
+    for each in found:
+        assert (each.kind, each.quantity, each.joint) == ("end", "acceleration", f"j{joint + 1}")
+        assert each.value - each.limit == pytest.approx(over, rel=1e-6)
+        assert "an acceleration of" in each.message
+
+
+@pytest.mark.parametrize("blocks", [3, 400])
+def test_a_row_dropped_with_its_stamps_kept_is_a_warning(blocks: int) -> None:
+    t = np.arange(401) * 0.01
+    kept = np.delete(np.arange(401), [77, 200, 201])
+    q = np.repeat(np.sin(t)[kept, None], 3, axis=1)
+    nothing = Resolution(0.0, np.zeros(3), np.zeros(3), np.zeros(3))
+    rows = RecordedMotion(t[kept], q, None, None, None, None, None, None, nothing, "rows")
+    (found,) = (each for each in judged(rows, end=False, blocks=blocks).findings if each.kind == "time")
+    assert (found.severity, found.count, found.row) == ("warning", 2, 200)
+    assert (found.value, found.limit) == pytest.approx((0.03, 0.01))
+    sparse = np.unique(np.concatenate([np.arange(0, 401, 4), np.arange(0, 401, 10)]))  # of no one period
+    rows = replace(rows, t=t[sparse], q=np.repeat(np.sin(t)[sparse, None], 3, axis=1))
+    assert not [each for each in judged(rows, end=False).findings if each.kind == "time"]
+
+
+def test_a_single_row_is_a_motion_of_no_duration() -> None:
+    one = part(motion(), slice(0, 1))
+    robot = bare_robot(unlimited(3))
+    assert judge_motion(lambda: [one], Requirements(robot)).verdict == "satisfied"
+    low = replace(robot.limits, position=np.array([[-1.0, 1.0], [-0.1, 1.0], [-1.0, 1.0]]))
+    (found,) = judge_motion(lambda: [one], Requirements(replace(robot, limits=low))).findings
+    assert (found.kind, found.joint, found.value, found.limit) == ("position", "j2", -0.2, -0.1)

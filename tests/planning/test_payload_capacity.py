@@ -153,12 +153,28 @@ def test_gravity_that_is_too_much_without_any_payload_is_the_error_of_the_job() 
     assert not isinstance(refused.value, InputError)
 
 
+def test_a_duration_that_binds_is_the_cause(tmp_path, capsys) -> None:  # type: ignore[no-untyped-def]
+    quickest = "{planner: time_optimal, through: [{joints: [60, 50]}, {joints: [20, 90]}], duration: 1.6}"
+    text = CARRYING.replace("{planner: quintic, to: {joints: [20, 90]}, duration: 1.5}", quickest)
+    found = payload_capacity(job_from_text(text.replace("MASS", "0.5")))
+    assert found.mass is not None
+    assert found.cause is not None
+    assert "it shall last 1.6 s" in found.cause
+    assert (found.move, found.joint, found.effort, found.limit) == (2, None, None, None)
+    assert verifies(text, found.mass)
+    assert not verifies(text, found.mass * 1.001)
+    job = tmp_path / "job.yaml"
+    job.write_text(text.replace("MASS", "0.5"))
+    assert run_payload(PayloadCommand(job=str(job))) == 0
+    assert capsys.readouterr().out.splitlines()[1] == f"  with more, {found.cause}"
+
+
 def test_the_command_for_people_and_programs(tmp_path, capsys) -> None:  # type: ignore[no-untyped-def]
     job = tmp_path / "job.yaml"
     job.write_text(CARRYING.replace("MASS", "0.5"))
     assert run_payload(PayloadCommand(job=str(job), as_json=True)) == 0
     told = json.loads(capsys.readouterr().out)
-    assert list(told) == ["mass", "joint", "move", "time", "effort", "limit"]
+    assert list(told) == ["mass", "joint", "move", "time", "effort", "limit", "cause"]
     assert (told["joint"], told["move"]) in (("a", 2), ("b", 2))
     assert run_payload(PayloadCommand(job=str(job), override=["moves.1.attach.mass=0.1"], at=2)) == 0
     first, second = capsys.readouterr().out.splitlines()

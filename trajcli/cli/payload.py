@@ -27,7 +27,7 @@ def run_payload(options: PayloadCommand) -> int:
     with progress():
         capacity = payload_capacity(loaded, options.at)
     if options.as_json:
-        names = ("mass", "joint", "move", "time", "effort", "limit")
+        names = ("mass", "joint", "move", "time", "effort", "limit", "cause")
         print_json({name: getattr(capacity, name) for name in names})
     else:
         print_lines(_lines(loaded, capacity))
@@ -44,6 +44,7 @@ def _lines(loaded: LoadedJob, capacity: PayloadCapacity) -> Iterator[str]:
         return
     yield f"largest mass {where} in {moves}: {_rounded_down(capacity.mass)} kg"
     if capacity.joint is None or capacity.effort is None:
+        yield f"  with more, {capacity.cause}"
         return
     unit = effort_unit(loaded.robot.joint_types[loaded.robot.joint_names.index(capacity.joint)])
     when = "" if capacity.time is None else f", t = {capacity.time:.6g} s"

@@ -19,7 +19,7 @@ import numpy as np
 from trajcli.curves.extrema import critical_points
 from trajcli.curves.node_bound import NODES_DEGREE, NodeSurvey, at_nodes, hull_matrices, node_survey
 from trajcli.curves.piecewise import Array, control_points, derivative_coefficients, distinct, taylor_shift
-from trajcli.dynamics.newton_euler import InverseDynamics, direction
+from trajcli.dynamics.newton_euler import REST, InverseDynamics, direction
 from trajcli.frozen import frozen
 from trajcli.kinematics.power_series import growth, series_exponential, series_product
 
@@ -168,7 +168,11 @@ def needed_stretch(survey: EffortSurvey, joint: int, sign: int, limit: float, ro
 
 
 def effort_survey(
-    dynamics: InverseDynamics, breaks: Array, coefficients: Array, limits: Array | None = None
+    dynamics: InverseDynamics,
+    breaks: Array,
+    coefficients: Array,
+    limits: Array | None = None,
+    still: float = REST,
 ) -> EffortSurvey:
     """Return the efforts of a motion as what bounds them for all t.
 
@@ -177,13 +181,14 @@ def effort_survey(
         breaks: Of the joints' curve, (P + 1,), s.
         coefficients: Of its pieces, (degree + 1, P, n), highest power first, from the break on.
         limits: Lower and upper bounds of the efforts, shape (n, 2), where bounds are needed for these.
+        still: Of `cut_where_joints_turn`.
     """
     long = np.diff(breaks) > 0
     starts, lengths = breaks[:-1][long], np.diff(breaks)[long]
     least = np.full(len(dynamics.links), np.inf) if limits is None else np.abs(limits).min(axis=1)
     nodes = node_survey(
         lambda coefficients, lengths: _known(dynamics, coefficients, lengths),
-        cut_where_joints_turn(dynamics, starts, lengths, coefficients[:, long]),
+        cut_where_joints_turn(dynamics, starts, lengths, coefficients[:, long], still),
         lambda values: _slack(values, least),
         _HALVINGS,
     )
@@ -217,7 +222,7 @@ def _known(dynamics: InverseDynamics, coefficients: Array, lengths: Array) -> tu
 
 
 def cut_where_joints_turn(
-    dynamics: InverseDynamics, starts: Array, lengths: Array, coefficients: Array
+    dynamics: InverseDynamics, starts: Array, lengths: Array, coefficients: Array, still: float = REST
 ) -> tuple[Array, Array, Array]:
     """Return starts, lengths and coefficients of pieces in which no joint with Coulomb friction turns back.
 
@@ -226,6 +231,8 @@ def cut_where_joints_turn(
         starts: Of the pieces of the joints' curve, s, shape (P,).
         lengths: Of the pieces, above 0, s, shape (P,).
         coefficients: Of the pieces, (degree + 1, P, n), highest power first, from their starts on.
+        still: A joint that is no faster than this until the piece ends, or since it began, rests there and
+            does not turn, rad/s or m/s.
     """
     rubs = np.array([joint.friction.coulomb > 0.0 for joint in dynamics.robot.joints])
     if not rubs.any() or not lengths.size:
@@ -239,8 +246,11 @@ def cut_where_joints_turn(
     owners: list[int] = []
     cuts: list[float] = []
     for piece, length in enumerate(lengths.tolist()):
-        inner = distinct(roots[:, piece, turns[piece]].reshape(-1))
-        inner = inner[(inner > _EDGE * length) & (inner < (1.0 - _EDGE) * length)]
+        of_joints = [
+            _turns(roots[:, piece, joint], rubbing[:, piece, joint], length, still)
+            for joint in np.flatnonzero(turns[piece])
+        ]
+        inner = distinct(np.concatenate([np.empty(0), *of_joints]))
         cuts += [0.0, *inner.tolist()]
         owners += [piece] * (inner.size + 1)
     owner, begins = np.array(owners), np.array(cuts)
@@ -249,6 +259,19 @@ def cut_where_joints_turn(
     chosen = coefficients[:, owner]
     shifted = taylor_shift(chosen, np.broadcast_to(begins[:, None], chosen.shape[1:]))
     return starts[owner] + begins, ends - begins, shifted
+
+
+def _turns(roots: Array, coefficients: Array, length: float, still: float) -> Array:
+    """Return when, of times (k,), a joint turns on a piece, but for what rounding makes of rest."""
+    inner = roots[(roots > _EDGE * length) & (roots < (1.0 - _EDGE) * length)]
+    slopes = derivative_coefficients(coefficients, 1)
+    for side, end in ((-1, length), (0, 0.0)):
+        while inner.size:
+            beyond = np.array([0.5 * (inner[side] + end), end])
+            if np.abs(np.polyval(slopes, beyond)).max() > still:
+                break
+            inner = np.delete(inner, side)
+    return inner
 
 
 def effort_majorants(dynamics: InverseDynamics, start: Array, rising: Array) -> Array:

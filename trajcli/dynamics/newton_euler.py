@@ -40,7 +40,7 @@ from trajcli.kinematics.columns import (
 from trajcli.kinematics.robot import Payload, Robot
 from trajcli.kinematics.serial_chain import blocks, configurations, links_of
 
-_REST = 1e-12  # rad/s or m/s
+REST = 1e-12  # rad/s or m/s
 _NO_SCREW: tuple[float, ...] = (0.0, 1.0, 0.0)
 
 
@@ -264,7 +264,7 @@ class InverseDynamics:
 
 def direction(rates: Array) -> Array:
     """Return the signs of joint velocities; what rounding leaves of none has no direction."""
-    return np.where(np.abs(rates) > _REST, np.sign(rates), 0.0)
+    return np.where(np.abs(rates) > REST, np.sign(rates), 0.0)
 
 
 def dynamic_links(robot: Robot) -> tuple[DynamicLink, ...]:

@@ -9,6 +9,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount
 from trajcli.findings import Collector, Finding, FindingSeverity, NamedJoints, at_time, excess_amounts
 from trajcli.judge.rounding import stated_errors
+from trajcli.kinematics.robot import QUANTITIES
 from trajcli.streams.recorded_motion import Resolution
 from trajcli.trajectory import State
 
@@ -33,12 +34,17 @@ def judge_start(
     """
     return [
         *_position(row, start.position, tolerance, resolution, axes, "start"),
-        *_velocity(row, start.velocity, resolution, axes, "start", "error"),
+        *_rate(row, (start.velocity, start.velocity), 1, resolution, axes, ("start", "error")),
     ]
 
 
 def judge_end(
-    row: EndState, end: State | None, tolerance: Array | None, resolution: Resolution, axes: NamedJoints
+    row: EndState,
+    end: State | None,
+    tolerance: Array | None,
+    resolution: Resolution,
+    axes: NamedJoints,
+    before: Array | None = None,
 ) -> list[Finding]:
     """Return where the last row is not the state in which the motion shall end.
 
@@ -50,13 +56,22 @@ def judge_end(
         tolerance: How near, rad or m, shape (n,).
         resolution: Rounding of the file.
         axes: The joints.
+        before: Its acceleration where that steps in the end, shape (n,): rows have one of both.
     """
     if end is None or tolerance is None:
         rest = np.zeros(len(axes.joint_names))
-        return _velocity(row, rest, resolution, axes, "end", "warning")
+        return _rate(row, (rest, rest), 1, resolution, axes, ("end", "warning"))
     return [
         *_position(row, end.position, tolerance, resolution, axes, "end"),
-        *_velocity(row, end.velocity, resolution, axes, "end", "error"),
+        *_rate(row, (end.velocity, end.velocity), 1, resolution, axes, ("end", "error")),
+        *_rate(
+            row,
+            (end.acceleration, end.acceleration if before is None else before),
+            2,
+            resolution,
+            axes,
+            ("end", "error"),
+        ),
     ]
 
 
@@ -101,24 +116,30 @@ def _position(
     ]
 
 
-def _velocity(
+def _rate(
     row: EndState,
-    wanted: Array,
+    wanted: tuple[Array, Array],
+    order: int,
     resolution: Resolution,
     axes: NamedJoints,
-    kind: str,
-    severity: FindingSeverity,
+    end: tuple[str, FindingSeverity],
 ) -> list[Finding]:
-    time, number, (_, qd, _) = row
-    if qd is None or not np.isfinite(qd).all():
+    """Return where a row has another velocity, or acceleration, than one between two of them, each (n,)."""
+    time, number, states = row
+    rates = states[order]
+    if rates is None or not np.isfinite(rates).all():
         return []
-    room = stated_errors(qd, resolution.qd, resolution.relative)[0] + _REST
-    over = np.abs(qd[0] - wanted)
+    rounding = (resolution.qd, resolution.qdd)[order - 1]
+    nearest = np.clip(rates[0], np.minimum(*wanted), np.maximum(*wanted))
+    room = stated_errors(rates, rounding, resolution.relative)[0] + _REST * np.maximum(1.0, np.abs(nearest))
+    over = np.abs(rates[0] - nearest)
     joint = int((over - room).argmax())
     if over[joint] <= room[joint]:
         return []
-    value, limit = float(qd[0, joint]), float(wanted[joint])
+    value, limit = float(rates[0, joint]), float(nearest[joint])
+    kind, severity = end
     which = "first" if kind == "start" else "last"
+    what = QUANTITIES[order]
     return [
         Finding(
             rule="state",
@@ -130,11 +151,11 @@ def _velocity(
             time=time,
             row=number,
             count=int((over > room).sum()),
-            quantity="velocity",
+            quantity=what,
             rounding=float(room[joint]),
-            message=f"the {which} row has a velocity of {{joint}} of {{value}} {at_time(time)}, "
-            "expected {limit}",
-            amounts=excess_amounts(axes, joint, 1, value, limit),
+            message=f"the {which} row has {'an' if order > 1 else 'a'} {what} of {{joint}} of {{value}} "
+            f"{at_time(time)}, expected {{limit}}",
+            amounts=excess_amounts(axes, joint, order, value, limit),
         )
     ]
 

@@ -11,9 +11,11 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, TrajcliError
 from trajcli.frozen import comparable, frozen
+from trajcli.grids import ListedGrid
 from trajcli.judge.judgement import Judgement, as_planned
 from trajcli.judge.motion import JUDGED_ROWS, Requirements, judge_motion
 from trajcli.kinematics.robot import Robot
+from trajcli.samples import sample
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import refuse_job
 from trajcli.streams.recorded_motion import MotionFile, RecordedMotion, motion_of, open_motion
@@ -290,16 +292,19 @@ def _requirements(
     tool = _tool_of(given)
     if given.plan is None or given.loaded is None:
         return Requirements(given.robot, interpolate=options.interpolate, tool=tool, consumer=consumer)
+    trajectory = given.plan.trajectory
+    at_end = ListedGrid(trajectory.duration, np.array([trajectory.duration]))
     tolerance = np.array(_tolerances(options.start_tolerance, given.robot, units))
     return Requirements(
         given.robot,
         {move.index: move.robot for move in given.plan.moves},
         options.interpolate,
-        given.plan.trajectory.start,
+        trajectory.start,
         tolerance,
-        given.plan.trajectory.end,
+        trajectory.end,
         tool,
         consumer,
+        end_before=next(sample(trajectory, at_end, ("qdd",)))[0],
     )
 
 

@@ -332,6 +332,7 @@ def _fast_approaches(
     return _FastApproaches(piece, joint, local, distance, speed, sign * bound, rounding, used)
 
 
+_STILL = 1e-9  # rad/s or m/s: rest, as files of nine decimals tell it
 _ACCELERATED = 3  # degree from which on pieces have an acceleration
 
 
@@ -350,7 +351,7 @@ def _judge_efforts(run: JudgedRun) -> None:
         return
     dynamics, coefficients = InverseDynamics(run.robot), window.coefficients[:, curved]
     breaks = np.concatenate([[0.0], np.cumsum(window.lengths[curved])])
-    survey = effort_survey(dynamics, breaks, coefficients, limits)
+    survey = effort_survey(dynamics, breaks, coefficients, limits, _still(window))
     stated = _stated_efforts(dynamics, window, curved)
     for joint, bounds in enumerate(limits.tolist()):
         for sign, limit in ((1, bounds[1]), (-1, -bounds[0])):
@@ -360,15 +361,25 @@ def _judge_efforts(run: JudgedRun) -> None:
                 over.add(float((sign * stated[:, joint]).max()))
 
 
+def _still(window: Intervals) -> float:
+    """Return how fast a joint at rest may seem by the rounding of rows, rad/s or m/s."""
+    return max(_STILL, 2 * float(np.max(window.resolution.qd)))
+
+
 def _stated_efforts(dynamics: InverseDynamics, window: Intervals, curved: NDArray[np.intp]) -> Array:
-    """Return the efforts that rows state, or the mean accelerations between them, shape (m, n)."""
+    """Return the efforts that rows state, or the mean accelerations between them, shape (m, n).
+
+    At rest friction is that of the motion beside.
+    """
     q, qd, qdd = (*window.states, None, None)[:3]
-    ends = np.unique(np.concatenate([curved, curved + 1]))
-    if qdd is not None and qd is not None and q is not None:
-        return dynamics.effort(q[ends], qd[ends], qdd[ends])
     middle = window.lengths[curved, None] / 2
     chosen = window.coefficients[:, curved]
     here, rate = (horner(derivative_coefficients(chosen, order), middle) for order in (0, 1))
+    if qdd is not None and qd is not None and q is not None:
+        ends = np.concatenate([curved, curved + 1])
+        rates, still = qd[ends], _still(window)
+        beside = still * np.sign(np.concatenate([rate, rate]))
+        return dynamics.effort(q[ends], np.where(np.abs(rates) <= still, beside, rates), qdd[ends])
     first = derivative_coefficients(chosen, 1)
     change = (horner(first, 2 * middle) - first[-1]) / (2 * middle)
     return dynamics.effort(here, rate, change)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Problem
-from trajcli.findings import Collector, Finding, NamedJoints
+from trajcli.findings import Collector, Finding, NamedJoints, at_time
 from trajcli.frozen import frozen
 from trajcli.judge.consistency import changes_of, judge_consistency
 from trajcli.judge.ends import judge_end, judge_order_of_stamps, judge_start
@@ -33,6 +33,8 @@ JUDGED_ROWS = 16384
 _FIRST_ROWS = 256  # that are seen together: they show the period
 _EXACT = 4.0  # units in the last place of a length between exact stamps
 _SEEN = 1e-9  # of the period: stamps that are moved by less are as they were
+_MOST = 9  # intervals of one period for each longer one: then a longer one is a hole
+_STANDS = 1.0  # s: any length will do
 _TURNS = 4.0 * np.pi  # rad: no joint goes there, and degrees read as radians do
 
 
@@ -50,6 +52,7 @@ class Requirements:
         tool: Makes the judge of the tool; None for an arm without geometry.
         consumer: Makes the judge by the rules of a consumer; None for none.
         planned: Whether they are rows of a verified motion: then all is told that their curve passes.
+        end_before: Acceleration that may step into that of the end, shape (n,); None where it does not.
     """
 
     robot: Robot
@@ -61,6 +64,7 @@ class Requirements:
     tool: Callable[[], ToolJudge] | None = None
     consumer: Callable[[], ConsumerJudge] | None = None
     planned: bool = False
+    end_before: Array | None = None
 
     def robot_between(self, before: int, after: int) -> Robot:
         """Return the arm with the limits in force between rows of two moves: the looser of both."""
@@ -129,6 +133,7 @@ class MotionJudge:
         self._requirements, self._snap, self._worst = requirements, snap, Collector()
         robot = requirements.robot
         self._axes = robot
+        self._holes, self._regular = Collector(), 0
         self._stamps: Stamps | None = None
         self._interpolation: Interpolation = "linear"
         self._kept: _Rows | None = None
@@ -179,15 +184,18 @@ class MotionJudge:
             self._begin(block)
             self._see(block)
         kept, stamps = self._kept, self._stamps
-        if kept is None or stamps is None or self._first_state is None or kept.t.size < 2:
-            where = self._source or "the motion"
-            raise InputError(
-                f"{where} has {self._count} row{'s' * (self._count != 1)}, a motion has two at least"
-            )
-        self._judge(kept.t.size - 1, ends=True)
+        if kept is None or stamps is None or self._first_state is None:
+            raise InputError(f"{self._source or 'the motion'} has no rows, a motion has one at least")
+        if kept.t.size == 1:  # a motion of no duration: the arm stands there
+            self._interpolation, held = "hold", replace(kept, states=(kept.states[0], None, None))
+            self._kept = held.followed_by(replace(held, t=held.t + _STANDS))
+        self._judge(max(kept.t.size - 1, 1), ends=True)
         findings = [*self._worst.findings(), *self._of_ends(self._first_state, kept.part(slice(-1, None)))]
         if self._tool is not None:
             findings += self._tool.findings()
+        holes = () if self._requirements.planned else tuple(self._holes.findings())
+        if self._regular >= _MOST * sum(finding.count for finding in holes):
+            findings += holes
         notes = [*_note_on_stamps(stamps), *(() if self._tool is None else self._tool.notes)]
         if self._consumer is not None:
             of_consumer, unjudged = self._consumer.result()
@@ -246,6 +254,7 @@ class MotionJudge:
         if kept is None or self._resolution is None or last <= self._judged:
             return
         window = self._window(kept, last, ends=ends)
+        self._see_holes(window)
         changes = changes_of(window)
         flips = None if self._tool is None else self._tool.changes_branch
         asked = self._requirements.interpolate is not None or self._requirements.planned
@@ -260,6 +269,35 @@ class MotionJudge:
         gone = max(last - BESIDE, 0)
         self._kept, self._judged = kept.part(slice(gone, None)), last - gone
         self._begins = self._begins and gone == 0
+
+    def _see_holes(self, window: Intervals) -> None:
+        """Note intervals of two periods and more, and count those of one."""
+        if self._stamps is None or self._stamps.lattice is None:
+            return
+        periods = window.lengths[window.first : window.last] / self._stamps.lattice.period
+        neighbours = np.diff(window.rows[window.first : window.last + 1]) == 1  # no wrong stamp between them
+        long = np.flatnonzero((np.rint(periods) > 1) & neighbours)
+        self._regular += int((np.rint(periods) == 1).sum())
+
+        def make(k: int) -> Finding:
+            at = window.first + int(long[k])
+            row, length, times = int(window.rows[at + 1]), float(window.lengths[at]), float(periods[long[k]])
+            text = f"row {row} stands {times:.4g} periods after the row before it {at_time(window.t[at + 1])}"
+            return Finding(
+                rule="time",
+                severity="warning",
+                kind="time",
+                joint=None,
+                value=length,
+                limit=length / times,
+                time=float(window.t[at + 1]),
+                row=row,
+                message=f"{text}, and most rows stand one: is one missing?",
+            )
+
+        if long.size:
+            nothing = np.full(long.size, -1)
+            self._holes.add("time", -1, nothing, periods[long], make, severity="warning")
 
     def _window(self, kept: _Rows, last: int, *, ends: bool) -> Intervals:
         assert self._stamps is not None and self._resolution is not None  # noqa: S101, PT018
@@ -290,7 +328,8 @@ class MotionJudge:
             state = (float(first.t[0]), int(first.rows[0]), first.states)
             findings += judge_start(state, required.start, required.start_tolerance, resolution, self._axes)
         state = (float(last.t[0]), int(last.rows[0]), last.states)
-        return findings + judge_end(state, required.end, required.start_tolerance, resolution, self._axes)
+        tolerance, before = required.start_tolerance, required.end_before
+        return findings + judge_end(state, required.end, tolerance, resolution, self._axes, before)
 
 
 def _joined(blocks: list[RecordedMotion]) -> RecordedMotion:

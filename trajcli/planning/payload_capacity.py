@@ -46,6 +46,7 @@ class PayloadCapacity:
         time: When, s from the start of the trajectory.
         effort: Of the joint there, N m or N.
         limit: That it reaches.
+        cause: What is wrong with more, in words; None where any mass will do.
     """
 
     mass: float | None
@@ -56,6 +57,7 @@ class PayloadCapacity:
     time: float | None = None
     effort: float | None = None
     limit: float | None = None
+    cause: str | None = None
 
 
 def payload_capacity(loaded: LoadedJob, at: int | None = None) -> PayloadCapacity:
@@ -209,25 +211,19 @@ class _Search:
         capacity = PayloadCapacity(low, self.template, self.moves)
         failed = self.attempt(high)
         if isinstance(failed, Plan):
-            efforts = [found for found in failed.verdict.findings if found.kind == "effort"]
-            worst = max(efforts, key=lambda found: found.excess, default=None)
-            if worst is None:
-                return capacity
-            return replace(
-                capacity,
-                joint=worst.joint,
-                move=worst.move,
-                time=worst.time,
-                effort=worst.value,
-                limit=worst.limit,
-            )
+            worst = max(failed.verdict.findings, key=lambda found: (found.kind == "effort", found.excess))
+            binds = replace(capacity, move=worst.move, time=worst.time, cause=worst.text(self._loaded.say))
+            if worst.kind != "effort":
+                return binds
+            return replace(binds, joint=worst.joint, effort=worst.value, limit=worst.limit)
         problem = failed.problems[0]
-        known = problem.time if problem.time is not None else self._time(low, problem)
+        binds = replace(capacity, move=problem.move, time=problem.time, cause=problem.message)
+        if problem.joint is None or problem.kind not in ("effort", None):
+            return binds
         return replace(
-            capacity,
+            binds,
             joint=problem.joint,
-            move=problem.move,
-            time=known,
+            time=problem.time if problem.time is not None else self._time(low, problem),
             effort=problem.value,
             limit=problem.limit if problem.limit is not None else _amount(problem, "limit"),
         )

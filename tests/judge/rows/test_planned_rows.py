@@ -105,6 +105,19 @@ def test_listed_times_are_known(tmp_path: Path) -> None:
     assert judged(without, file).planned_rows is False
 
 
+@pytest.mark.parametrize("ending", ["csv", "jsonl", "mcap", "yaml"])
+def test_a_plan_of_no_duration_is_read_again(ending: str, tmp_path: Path) -> None:
+    fields = {"version": 1, "robot": {"joints": 2}, "limits": {"velocity": 1, "acceleration": 2, "jerk": 20}}
+    fields |= {
+        "start": {"joints": [0.1, 0.2]},
+        "moves": [{"planner": "quintic", "to": {"joints": [0.1, 0.2]}}],
+    }
+    plan, file = plan_job(random_jobs.loaded(fields)), tmp_path / f"rows.{ending}"
+    write_plan(plan, str(file))
+    found = judged(plan, file)
+    assert (found.rows, found.planned_rows, found.verdict) == (1, True, "satisfied")
+
+
 def missing(rows: Rows, rng: np.random.Generator) -> Rows:
     return np.delete(rows, rng.integers(0, len(rows)), axis=0)
 
