@@ -1,14 +1,19 @@
 """Knots of a trajectory: states from which quintic interpolation reproduces it.
 
 A controller that interpolates position, velocity and acceleration runs the quintic Hermite polynomial
-between neighbouring knots. A knot stands at each break of the curve, rounded to whole nanoseconds, with the
-state that the curve has at the rounded time. Where the curve is no quintic, knots are inserted; where its
-acceleration steps, one stands closely before the step.
+between neighbouring knots, one without accelerations the cubic. A knot stands at each break of the curve,
+rounded to whole nanoseconds, with the state that the curve has at the rounded time. Where the curve is no
+such polynomial, knots are inserted. Where the acceleration steps by a, quintics have one knot a little before
+and one as much behind, at the distance d: between them the acceleration rises evenly, which takes the
+position further by a d^2 / 6, and the knot behind holds that. A quintic between states of the curve itself
+would pass the accelerations on both sides by a twentieth of the step.
 
 Source: Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), section 2.1.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,16 +29,19 @@ from trajcli.trajectory import Trajectory
 Nanoseconds = NDArray[np.int64]
 
 LARGEST_DEVIATION = 1e-6  # rad or m: what quintics between knots may miss, where knots can be inserted
-_NEAREST = 1000  # ns: knots closer than this are one, and no closer ones are inserted
+_NEAREST = 1000  # ns: no closer knots are inserted, nor rows beside them
+_ONE = 10_000  # ns: breaks closer than this have one knot, as rounding is a jerk of 60 e / h^3 between two
 _PER_SECOND = 1e9
 _LONGEST = 2.0**53 / _PER_SECOND  # s: in longer motions float64 tells no nanoseconds apart
 _ROUNDING = 1e-12  # s: a time this close to a break is the break
 _CONTINUOUS = 1e-9  # of the largest acceleration of its joint: a step below that is rounding
-_STEP_DEVIATION = 1e-9  # rad or m: what the knots around a step of the acceleration may miss
-_STEP_BASIS = 0.01728  # the maximum of u^3 (1 - u)^2 / 2: what an acceleration that is wrong at one end costs
-_SHORTEST_STEP = 20_000  # ns: over a shorter interval, rounding would show in the acceleration
+_RAMP = 1e-5  # of the largest velocity: what changes by more between two knots is a ramp too short for them
+_STEP_DEVIATION = 2e-8  # rad or m: what knots around a step of the acceleration may miss
+_SHORTEST_STEP = 10_000  # ns: over a shorter interval, rounding would show in the acceleration
+_LONGEST_STEP = 200_000  # ns: what a small step needs
+_FEWER = 0.1  # of the deviation, between cubics: tools on paths promise a millionth themselves
 _MOST_PARTS = 64  # of an interval that is divided at once
-_ORDER = 6  # of the quintic's error: half the interval misses 2^-6 as much
+_QUINTIC = 3  # derivatives that quintics share with a curve at their ends, of twice the order in their error
 
 
 @comparable
@@ -87,14 +95,16 @@ def has_knots(trajectory: Trajectory) -> bool:
     return trajectory.duration <= _LONGEST
 
 
-def knots_of(trajectory: Trajectory) -> Knots:
-    """Return the knots of a trajectory, so many that quintics between them are within `LARGEST_DEVIATION`.
+def knots_of(trajectory: Trajectory, stated: int = _QUINTIC) -> Knots:
+    """Return the knots of a trajectory, so many that polynomials between them are within `LARGEST_DEVIATION`.
 
     The deviation is that of polynomials, at the roots of the derivative of their difference. Knots are at
-    least a microsecond apart: breaks that are closer are one knot, and the deviation says what that costs.
+    least a microsecond apart: breaks nearer than ten are one knot, and the deviation says what that costs.
 
     Args:
         trajectory: One without jumps of position and velocity.
+        stated: How many of position, velocity and acceleration stand in the rows, 2 or 3: between them are
+            cubics or quintics.
 
     Raises:
         InputError: When it is so long that float64 tells no nanoseconds apart.
@@ -105,14 +115,24 @@ def knots_of(trajectory: Trajectory) -> Knots:
             f"the trajectory lasts {trajectory.duration:.6g} s, and knots stand at whole nanoseconds",
             hint=f"up to {_LONGEST:.6g} s they can be told apart; rows at a rate have no such bound",
         )
-    whole = _first_knots(curve)
+    whole, further = _first_knots(curve, stated)
     while True:
         states = _states(trajectory, whole)
-        missed = _missed(curve, whole, states)
-        inserted = _insertions(whole, missed[0].max(axis=1))
+        for time, shift in further.items():
+            states[0, np.searchsorted(whole, time)] += shift
+        missed = _missed(curve, whole, states[:stated])
+        inserted = _insertions(whole, missed[0].max(axis=1), stated)
         if not inserted.size:
             return Knots(whole, states[0], states[1], states[2], _deviation(missed))
         whole = np.sort(np.concatenate([whole, inserted]))
+
+
+def stated_by(columns: Sequence[str]) -> int:
+    """Return how many of position, velocity and acceleration rows of such columns state, 2 or 3.
+
+    Rows of neither velocity nor acceleration have the knots of those with both.
+    """
+    return _QUINTIC - 1 if "qd" in columns and "qdd" not in columns else _QUINTIC
 
 
 def knots_at(trajectory: Trajectory, times: Array) -> Knots:
@@ -168,42 +188,67 @@ def _deviation(missed: Array) -> Deviation:
     return Deviation(position, velocity, acceleration, (joints[0], joints[1], joints[2]))
 
 
-def _first_knots(curve: PiecewisePolynomial) -> Nanoseconds:
-    """Return the breaks in whole nanoseconds, and a time closely before each step of the acceleration."""
+def _first_knots(curve: PiecewisePolynomial, stated: int) -> tuple[Nanoseconds, dict[int, Array]]:
+    """Return the breaks in whole nanoseconds, of quintics two about each step of the acceleration.
+
+    Behind a step the position is another: the second value says by how much, (n,) at each such time.
+    """
     breaks = curve.breaks - curve.start
     whole = np.rint(breaks * _PER_SECOND).astype(np.int64)
-    steps = _steps(curve)
-    up = np.append(np.append(False, steps > 0), True)  # behind a step, and nowhere before the end
+    steps = _steps(curve, np.arange(breaks.size))
+    up = np.arange(breaks.size) == curve.pieces
+    up |= np.asarray(steps.any(axis=1))  # behind a step, and nowhere before the end
     spacing = np.maximum(_ROUNDING, 4 * np.spacing(breaks))
     whole += up & (whole / _PER_SECOND < breaks - spacing)
     kept = _apart(whole)
-    whole, sizes = whole[kept], np.concatenate([[0.0], steps, [0.0]])[kept]
-    lengths = np.diff(whole, prepend=whole[0])
+    times, steps = whole[kept], _steps(curve, kept)
+    sizes = np.abs(steps).max(axis=1, initial=0.0)
+    if stated < _QUINTIC or not sizes.any():
+        return times, {}
+    lengths = np.diff(times)
+    nearest = np.minimum(np.append(lengths[:1], lengths), np.append(lengths, lengths[-1:]))
     with np.errstate(divide="ignore"):
-        before = np.sqrt(_STEP_DEVIATION / (_STEP_BASIS * sizes)) * _PER_SECOND
-    before = np.maximum(np.minimum(before, lengths / 4), _SHORTEST_STEP)
-    stands = (sizes > 0) & (lengths >= 2 * before)
-    return np.sort(np.concatenate([whole, whole[stands] - before[stands].astype(np.int64)]))
+        half = np.minimum(np.sqrt(6 * _STEP_DEVIATION / sizes) * _PER_SECOND, _LONGEST_STEP)
+    half = np.maximum(np.minimum(half, nearest / 4), _SHORTEST_STEP)
+    split = np.flatnonzero((sizes > 0) & (nearest >= 4 * half))
+    away = half[split].astype(np.int64)
+    behind = times[split] + away
+    shifts = steps[split] * ((away / _PER_SECOND) ** 2 / 6)[:, None]
+    both = np.concatenate([np.delete(times, split), times[split] - away, behind])
+    return np.sort(both), dict(zip(behind.tolist(), shifts, strict=True))
 
 
-def _steps(curve: PiecewisePolynomial) -> Array:
-    """Return the largest step of the acceleration at each inner break, shape (pieces - 1,); 0 for none."""
-    first, last = curve.piece_ends(2)
-    steps = np.abs(first[1:] - last[:-1])
-    scale = np.maximum(np.abs(first), np.abs(last)).max(axis=0, initial=0.0)
-    largest: Array = np.where(steps > _CONTINUOUS * scale, steps, 0.0).max(axis=1, initial=0.0)
-    return largest
+def _steps(curve: PiecewisePolynomial, kept: NDArray[np.intp]) -> Array:
+    """Return the step of the acceleration at some breaks, shape (k, n); 0 for none, and at the ends.
+
+    Args:
+        curve: The curve.
+        kept: Which breaks, the first and the last among them; what lies between two belongs to the first.
+    """
+    steps: Array = np.zeros((kept.size, curve.dimension))
+    if kept.size <= 2:
+        return steps
+    before, after = kept[1:-1] - 1, kept[2:] - 1
+    lasting = curve.lengths >= _ONE / _PER_SECOND
+    real = []
+    for order, little in ((1, _RAMP), (2, _CONTINUOUS)):
+        first, last = curve.piece_ends(order)
+        scale = np.maximum(np.abs(first), np.abs(last))[lasting].max(axis=0, initial=0.0)
+        steps[1:-1] = first[after] - last[before]
+        real.append(np.abs(steps) > little * scale)
+    steps[np.logical_or(~real[1], real[0].any(axis=1)[:, None])] = 0.0
+    return steps
 
 
 def _apart(whole: Nanoseconds) -> NDArray[np.intp]:
     """Return the indices of times that stay when those too close to an earlier one, or to the end, go."""
     if whole[-1] == whole[0]:
         return np.array([0])
-    if (np.diff(whole) >= _NEAREST).all():
+    if (np.diff(whole) >= _ONE).all():
         return np.arange(whole.size)
     kept, last = [0], int(whole[0])
     for index, time in enumerate(whole[:-1].tolist()):
-        if time - last >= _NEAREST and whole[-1] - time >= _NEAREST:
+        if time - last >= _ONE and whole[-1] - time >= _ONE:
             kept.append(index)
             last = time
     return np.array([*kept, whole.size - 1])
@@ -223,7 +268,7 @@ def _states(trajectory: Trajectory, whole: Nanoseconds) -> Array:
 
 
 def _missed(curve: PiecewisePolynomial, whole: Nanoseconds, states: Array) -> Array:
-    """Return what quintics miss in each of the k intervals between knots, orders 0 to 2, (3, k, n)."""
+    """Return what polynomials miss in each of the k intervals between knots, orders 0 to 2, (3, k, n)."""
     missed = np.zeros((3, whole.size - 1, curve.dimension))
     if whole.size < 2:
         return missed
@@ -233,22 +278,21 @@ def _missed(curve: PiecewisePolynomial, whole: Nanoseconds, states: Array) -> Ar
     within = starts + lengths / 2
     interval = np.clip(np.searchsorted(times, within, "right") - 1, 0, times.size - 2)
     piece = np.clip(np.searchsorted(curve.breaks, within, "right") - 1, 0, curve.pieces - 1)
-    quintics = hermite_coefficients(states[:, :-1], states[:, 1:], (np.diff(whole) / _PER_SECOND)[:, None])
+    joined = hermite_coefficients(states[:, :-1], states[:, 1:], (np.diff(whole) / _PER_SECOND)[:, None])
     difference = taylor_shift(curve.coefficients[:, piece], (starts - curve.breaks[piece])[:, None])
-    short = max(0, quintics.shape[0] - difference.shape[0])
+    short = max(0, joined.shape[0] - difference.shape[0])
     difference = np.concatenate([np.zeros((short, *difference.shape[1:])), difference])
-    difference[-quintics.shape[0] :] -= taylor_shift(
-        quintics[:, interval], (starts - times[interval])[:, None]
-    )
+    difference[-joined.shape[0] :] -= taylor_shift(joined[:, interval], (starts - times[interval])[:, None])
     for order, (low, high) in enumerate(piece_extremes(difference, lengths, (0, 1, 2))):
         np.maximum.at(missed[order], interval, np.maximum(-low, high))
     return missed
 
 
-def _insertions(whole: Nanoseconds, missed: Array) -> Nanoseconds:
+def _insertions(whole: Nanoseconds, missed: Array, stated: int) -> Nanoseconds:
     """Return times inside the intervals that miss too much, as long as these can be divided."""
     lengths = np.diff(whole)
-    wanted = np.ceil((missed / LARGEST_DEVIATION) ** (1 / _ORDER) * (1 + _ROUNDING))
+    allowed = LARGEST_DEVIATION * (1.0 if stated == _QUINTIC else _FEWER)
+    wanted = np.ceil((missed / allowed) ** (0.5 / stated) * (1 + _ROUNDING))
     parts = np.minimum(np.clip(wanted, 1, _MOST_PARTS).astype(np.int64), lengths // _NEAREST)
     times = [
         whole[k] + lengths[k] * np.arange(1, parts[k]) // parts[k] for k in np.flatnonzero(parts > 1).tolist()

@@ -54,30 +54,82 @@ def test_rows_that_their_consumer_takes(
 
 
 @pytest.mark.parametrize(
-    ("text", "profile", "old", "new", "rule"),
-    [
-        (FR3, "franka-fr3", "duration: 2}", "duration: 2.0003}", "fr3-period"),
-        (FR3, "franka-fr3", "duration: 2}", "duration: 2}\noutput: {rate: 500}", "fr3-period"),
-        (UR, "ur-servoj", "rate: 500", "rate: 125", "servoj-period"),
-        (UR, "franka-fr3", "rate: 500", "rate: 1000", "fr3-joints"),
-        (FR3, "ur-servoj", "duration: 2}", "duration: 2}\noutput: {rate: 500}", "servoj-joints"),
-    ],
+    ("text", "profile", "rule"), [(UR, "franka-fr3", "fr3-joints"), (FR3, "ur-servoj", "servoj-joints")]
 )
 def test_rows_that_their_consumer_refuses(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], text: str, profile: str, rule: str
+) -> None:
+    target = tmp_path / "rows.csv"
+    code, _, err = call(capfd, "plan", job(tmp_path, text), "--for", profile, "-o", str(target))
+    assert code == 1
+    assert f"error: {rule}: " in err
+    assert not target.exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "profile", "old", "new", "count"),
+    [
+        (FR3, "franka-fr3", "duration: 2}", "duration: 2.0003}", 2002),
+        (FR3, "franka-fr3", "duration: 2}", "duration: 2}\noutput: {rate: 500}", 2001),
+        (UR, "ur-servoj", "rate: 500", "rate: 125, columns: [t, q]", 501),
+        (UR, "ur-servoj", "rate: 500", "times: [0, 0.3, 1]", 501),
+    ],
+)
+def test_the_consumer_brings_its_rows(
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
     text: str,
     profile: str,
     old: str,
     new: str,
-    rule: str,
+    count: int,
 ) -> None:
-    target = tmp_path / "rows.csv"
-    code, _, err = call(capfd, "plan", job(tmp_path, text, old, new), "--for", profile, "-o", str(target))
-    assert code == 1
-    assert f"error: {rule}: " in err
-    assert not target.exists()
-    assert ("align: true" in err) == ("period" in rule)
+    """Rate, whole periods and columns are those of the profile, whatever the job says; one line says so."""
+    code, out, err = call(capfd, "plan", job(tmp_path, text, old, new), "--for", profile)
+    assert code == 0, err
+    header, *rows = out.splitlines()
+    assert len(rows) == count
+    assert header.startswith("t,q1")
+    assert "qdd1" in header
+    said = f"{profile} takes rows at {1000 if profile == 'franka-fr3' else 500} Hz, moves of whole periods"
+    assert (said in err) == ("output" in new or "rate" in new or "times" in new)
+
+
+@pytest.mark.parametrize(
+    ("options", "output", "line"),
+    [
+        (["--for", "ur-servoj", "--rate", "125"], "rate: 500", None),
+        (["--for", "ur-servoj", "--rows", "knots"], "rate: 500", None),
+        ([], "for: ur-servoj, rate: 125", 6),
+        ([], "for: ur-servoj, rows: both", 6),
+        ([], "for: ur-servo", 6),
+    ],
+)
+def test_rows_at_another_rate_are_refused(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], options: list[str], output: str, line: int | None
+) -> None:
+    text = job(tmp_path, UR, "rate: 500", output)
+    code, _, err = call(capfd, "plan", text, *options, "--no-output")
+    assert code == 2
+    known = (
+        "did you mean 'ur-servoj'?" if output == "for: ur-servo" else "ur-servoj takes rows at 500 Hz, and"
+    )
+    assert known in err
+    if line is not None:
+        assert f"job.yaml:{line}:" in err
+
+
+def test_a_job_names_its_consumer(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """What the job does not say of its rows is as the consumer takes them; what it says goes before."""
+    bare = job(tmp_path, UR, "rate: 500", "for: ur-servoj")
+    code, out, err = call(capfd, "plan", bare)
+    assert (code, len(out.splitlines()), "for ur-servoj at 500 Hz" in err) == (0, 502, True)
+    resolved = tmp_path / "resolved.yaml"
+    assert call(capfd, "plan", bare, "--resolved", str(resolved), "--no-output")[0] == 0
+    assert call(capfd, "plan", str(resolved))[:2] == (0, out)
+    own = job(tmp_path, UR, "rate: 500", "for: ur-servoj, columns: [t, q]")
+    code, out, err = call(capfd, "plan", own)
+    assert (code, out.splitlines()[0]) == (0, "t,q1,q2,q3,q4,q5,q6")
 
 
 def test_a_jump_in_acceleration_is_jerk_to_the_robot(
@@ -117,16 +169,16 @@ def test_decimals_count_as_they_are_written(tmp_path: Path, capfd: pytest.Captur
 
 
 def test_warnings_and_strict(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    text = job(tmp_path, UR.replace("rate: 500", "rate: 500, columns: [t, q]"))
+    text = job(tmp_path, UR.replace("rate: 500", "rate: 500, columns: [t, q], for: ros-jtc"))
     report = tmp_path / "report.json"
-    code, _, err = call(capfd, "plan", text, "--for", "ros-jtc", "--no-output", "--report", str(report))
+    code, _, err = call(capfd, "plan", text, "--no-output", "--report", str(report))
     assert code == 0
     assert "jtc-positions-only" in err
     findings = json.loads(report.read_text())["consumer"]["findings"]
     assert {(each["rule"], each["severity"], each["move"]) for each in findings} == {
         ("jtc-positions-only", "warning", 0)
     }
-    code, _, err = call(capfd, "plan", text, "--for", "ros-jtc", "--no-output", "--strict")
+    code, _, err = call(capfd, "plan", text, "--no-output", "--strict")
     assert code == 1
     assert "error: jtc-positions-only" in err
 
@@ -146,8 +198,8 @@ def test_a_form_may_be_named_for_a_consumer_without_output(
 def test_names_and_columns(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     code, _, err = call(capfd, "plan", job(tmp_path, UR), "--for", "ur-servo", "--no-output")
     assert (code, "did you mean 'ur-servoj'?" in err) == (2, True)
-    text = job(tmp_path, UR.replace("rate: 500", "rate: 500, columns: [t, qd]"))
-    code, _, err = call(capfd, "plan", text, "--for", "ur-servoj", "--no-output")
+    text = job(tmp_path, UR.replace("rate: 500", "columns: [t, qd], for: ur-servoj"))
+    code, _, err = call(capfd, "plan", text, "--no-output")
     assert code == 2
     assert "cannot be judged by ur-servoj" in err
     assert "`output.columns` needs t and q" in err

@@ -11,7 +11,7 @@ from scipy.interpolate import BPoly
 import trajcli
 from trajcli.job.read import load_job
 from trajcli.output import joined_rows as module
-from trajcli.output.joined import cure_of, joined_rows, rows_report, with_event
+from trajcli.output.joined import joined_rows, rows_report, rows_that_keep, with_event
 from trajcli.output.write import grid_of
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.samples import sample
@@ -83,8 +83,8 @@ def test_no_row_is_read_where_the_curve_itself_proves_it(monkeypatch: pytest.Mon
 def test_a_named_cure_cures() -> None:
     plan = planned("ur5e_pick")
     rows = joined_rows(plan, grid_of(plan), FORMATS["csv"])
-    shown, judged = with_event(plan, rows)
-    assert cure_of(rows) == "--rows knots"
+    shown, judged = with_event(plan, rows, FORMATS["csv"])
+    assert next(rows_that_keep(rows)).options == "--rows knots"
     assert [event.kind for event in shown.events] == ["joined_over_limit"]
     assert "`--rows knots` keeps every limit" in shown.events[0].message
     assert factor_by_scipy(planned("ur5e_pick", "output.rows=knots")) < 1 + 1e-4

@@ -241,6 +241,7 @@ def batch(
     *,
     form: FormatName = "csv",
     rows: Literal["rate", "knots", "both"] | None = None,
+    consumer: str | None = None,
     processes: int | None = None,
     force: bool = False,
     timeout: float | None = 600.0,
@@ -252,6 +253,7 @@ def batch(
         output: The folder of the rows; beside their jobs where left out.
         form: Their format.
         rows: Where they stand, instead of what each job says.
+        consumer: Profile of the consumer that all are planned for, instead of `output.for`.
         processes: At most; one a core where left out.
         force: Whether unchanged jobs are planned again.
         timeout: What a job may take, s; None for ever.
@@ -270,7 +272,7 @@ def batch(
     ledgers = Ledgers(found.jobs)
     known = {} if force else ledgers.known()
     tasks = [Task(job, known.get(job.output)) for job in found.jobs]
-    setup = BatchSetup(form, found.owners(), rows)
+    setup = BatchSetup(form, found.owners(), rows, consumer)
     outcomes: list[JobOutcome] = []
     count = min(processes or usable_cores(), len(tasks))
     try:

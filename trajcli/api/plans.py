@@ -16,7 +16,8 @@ from trajcli.job.read import LoadedJob, job_from_text, load_job
 from trajcli.job.report import Report
 from trajcli.job.robot import load_sheet
 from trajcli.kinematics.robot import Limits, Robot
-from trajcli.planning.plan import Plan, plan_job
+from trajcli.output.delivered import delivered
+from trajcli.planning.plan import Plan
 
 if TYPE_CHECKING:
     from trajcli.judge.judgement import Judgement
@@ -31,14 +32,20 @@ class PlannedJob(Plan):
     """A planned and judged job, with its outputs.
 
     `verdict` says whether it verifies, `trajectory` is callable. See `Plan` for the rest.
+
+    Attributes:
+        digits: With which its rows are written as text, unless `save` says others.
     """
 
-    def save(self, path: str | Path, *, digits: Digits = "fixed") -> None:
+    digits: Digits = "fixed"
+
+    def save(self, path: str | Path, *, digits: Digits | None = None) -> None:
         """Write the rows, as `trajcli plan -o PATH` does: the ending of the name says in which format.
 
         Args:
             path: The file; it appears whole or not at all.
-            digits: Of text formats: "fixed" for nine decimals, "full" for as many as restore each bit.
+            digits: Of text formats: "fixed" for nine decimals, "full" for as many as restore each bit; left
+                out, as many as the consumer needs, which are nine unless it is planned for one.
 
         Raises:
             VerificationError: When the plan breaks a limit; nothing is written.
@@ -47,7 +54,7 @@ class PlannedJob(Plan):
         """
         from trajcli.output.write import write_plan
 
-        write_plan(self, str(path), digits)
+        write_plan(self, str(path), digits or self.digits)
 
     def report(self) -> Report:
         """Return the report, as `trajcli plan --report` writes it."""
@@ -153,6 +160,7 @@ def plan(
     *,
     overrides: Sequence[str] = (),
     rows: Literal["rate", "knots", "both"] | None = None,
+    consumer: str | None = None,
 ) -> PlannedJob:
     """Return the plan of a job with its verdict: one with findings is no error here, only `save` refuses it.
 
@@ -162,14 +170,17 @@ def plan(
         job: The path of a job file, its YAML text, a mapping as YAML would give it, or a job that was read.
         overrides: Such as "moves.0.duration=3", as `--set` takes them; for files only.
         rows: Where rows stand, instead of what `output.rows` says; for files only.
+        consumer: Profile of the consumer that it is planned for, such as "ros-jtc", instead of `output.for`.
 
     Raises:
         InputError: With every flaw of the job at once.
         PlanningError: When a move has no curve.
+        VerificationError: When its rows, as the consumer joins them, keep neither rules nor limits.
         FileError: When a file cannot be read.
     """
     try:
-        planned = plan_job(_loaded(job, [*overrides, *(() if rows is None else (f"output.rows={rows}",))]))
+        said = [*overrides, *(() if rows is None else (f"output.rows={rows}",))]
+        planned, digits = delivered(_loaded(job, said), consumer, rows=rows is not None)
     except TrajcliError as error:
         for problem in error.problems:
             where = "" if problem.place is None else str(problem.place)
@@ -177,7 +188,7 @@ def plan(
             if note:
                 error.add_note(note)
         raise
-    return PlannedJob(**vars(planned))
+    return PlannedJob(**vars(planned), digits=digits)
 
 
 def check(

@@ -17,8 +17,8 @@ from trajcli.frozen import comparable, frozen
 from trajcli.job.read import files_of, job_of_document
 from trajcli.job.yaml.load import Document, parse_document
 from trajcli.job.yaml.source import read_bytes
+from trajcli.output.delivered import delivered
 from trajcli.output.write import grid_of, write_rows
-from trajcli.planning.plan import plan_job
 from trajcli.streams.formats import FormatName, format_of
 
 BUG = 70
@@ -33,16 +33,19 @@ class BatchSetup:
         form: The format of the rows.
         outputs: The job behind each file that will be written, by the file's real path.
         rows: Replaces `output.rows` of each job; None leaves it.
+        consumer: Profile for which each job is planned; None for the one that it names.
     """
 
     form: FormatName
     outputs: Mapping[str, str]
     rows: str | None = None
+    consumer: str | None = None
 
     @property
     def said(self) -> str:
         """What the batch says of the rows, for the hash of what they are made of."""
-        return self.form if self.rows is None else f"{self.form} {self.rows}"
+        consumer = None if self.consumer is None else f"for {self.consumer}"
+        return " ".join(word for word in (self.form, self.rows, consumer) if word is not None)
 
     def document(self, document: Document) -> Document:
         """Return a job with what the batch says of the rows."""
@@ -148,14 +151,16 @@ def _written(task: Task, setup: BatchSetup, hashed: _Hash) -> LedgerEntry:
     files = tuple(path for what, path in files_of(document) if what != "the job")
     hashed.value = hash_of_inputs(Path(job.job).name, content, files, setup.said)
     with np.errstate(all="ignore"):  # what is not finite is for the checks to find
-        plan = plan_job(job_of_document(setup.document(document)))
+        form = format_of(job.output, setup.form)
+        loaded = job_of_document(setup.document(document))
+        plan, digits = delivered(loaded, setup.consumer, form, rows=setup.rows is not None)
         grid = grid_of(plan)
         if not plan.verdict.passed:
             from trajcli.output.report import verification_error
 
             raise verification_error(plan)
         _make_folder(Path(job.output).parent)
-        write_rows(plan, grid, job.output, "fixed", form=format_of(job.output, setup.form))
+        write_rows(plan, grid, job.output, digits, form=form)
     after = hash_of_inputs(Path(job.job).name, content, files, setup.said)
     # where a file has changed meanwhile, nobody knows of which content the rows were made
     kept = hashed.value if after == hashed.value else None

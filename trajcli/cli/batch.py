@@ -38,7 +38,7 @@ def run_batch(options: BatchCommand) -> int:
     record = Ledgers(found.jobs)
     known = {} if options.force else record.known()
     tasks = [Task(job, known.get(job.output)) for job in found.jobs]
-    setup = BatchSetup(options.form, found.owners(), options.rows)
+    setup = BatchSetup(options.form, found.owners(), options.rows, options.consumer)
     progress = _Progress(len(tasks))
     try:
         with closing(_outcomes(tasks, setup, options, (count, timeout), progress.show)) as outcomes:

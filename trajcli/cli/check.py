@@ -17,7 +17,9 @@ from trajcli.units import Units, amount_text
 
 if TYPE_CHECKING:
     from trajcli.cli.job_commands import CheckCommand
+    from trajcli.job.read import LoadedJob
     from trajcli.peers.motion_reference import MotionReference
+    from trajcli.planning.plan import Plan
 
 _MOST, _FEW = 30, 4  # findings that a table lists: of those that are certain, and of each other group
 _JOINED = {
@@ -30,6 +32,13 @@ _JOINED = {
 }
 
 
+def _delivered(loaded: LoadedJob, profile: str | None) -> Plan:
+    """Return the plan of a job for a consumer."""
+    from trajcli.output.delivered import plan_of
+
+    return plan_of(loaded, profile)
+
+
 def run_check(options: CheckCommand) -> int:
     """Judge a file and print what was found; return 0 when nothing is certainly wrong, else 1.
 
@@ -37,7 +46,7 @@ def run_check(options: CheckCommand) -> int:
         InputError: When the file is no trajectory, or options do not fit.
         FileError: When a file cannot be read.
     """
-    checked = check_file(options.file, options.part(CheckOptions))
+    checked = check_file(options.file, options.part(CheckOptions), delivered=_delivered)
     beside = None
     if options.reference:
         from trajcli.peers.motion_reference import compared

@@ -10,9 +10,9 @@ from trajcli.cli.polynomials import amount, blend_lines, knot_lines, law_lines, 
 from trajcli.cli.progress import progress
 from trajcli.errors import InputError
 from trajcli.job.read import load_job
+from trajcli.output.delivered import plan_of
 from trajcli.output.explain import explanation
 from trajcli.planners import HANDLING
-from trajcli.planning.plan import plan_job
 from trajcli.streams.whole_file import standard_output
 
 if TYPE_CHECKING:
@@ -210,7 +210,7 @@ def run_explain(options: ExplainCommand) -> int:
         known = "its only move is 0" if count == 1 else f"its moves are 0 to {count - 1}"
         raise InputError(f"--move {options.move}: {loaded.name} has no such move", hint=known)
     with progress():
-        plan = plan_job(loaded)
+        plan = plan_of(loaded)
         explained = explanation(
             plan,
             move=options.move,

@@ -10,7 +10,16 @@ from typing import Annotated, Literal
 import typer
 
 from trajcli.cli.command import Command, CommandLine
-from trajcli.cli.options import JobErrors, JobFile, Json, Overrides, RowTimes, profile_words, robot_names
+from trajcli.cli.options import (
+    Consumer,
+    JobErrors,
+    JobFile,
+    Json,
+    Overrides,
+    RowTimes,
+    profile_words,
+    robot_names,
+)
 
 
 class PlanCommand(CommandLine):
@@ -79,15 +88,7 @@ class PlanCommand(CommandLine):
             help="Compare each move with the fastest under the same limits, along a path with toppra.",
         ),
     ] = False
-    consumer: Annotated[
-        str | None,
-        typer.Option(
-            "--for",
-            metavar="PROFILE",
-            help="Judge the rows as written by the rules of a consumer, such as ros-jtc: `trajcli profiles`.",
-            autocompletion=profile_words,
-        ),
-    ] = None
+    consumer: Consumer = None
     no_output: Annotated[bool, typer.Option("--no-output", help="Only judge: write no rows.")] = False
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on stderr.")] = False
     si: Annotated[

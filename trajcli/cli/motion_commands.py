@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 import typer
 
 from trajcli.cli.command import Command
-from trajcli.cli.options import RowTimes, robot_names
+from trajcli.cli.options import Consumer, RowTimes, robot_names
 
 MotionSource = Annotated[
     str, typer.Argument(metavar="FILE", help="CSV, MCAP, ROS messages, JSON lines, .npy; - is stdin.")
@@ -74,6 +74,7 @@ class BatchCommand(Command):
         Literal["csv", "mcap", "jsonl", "ros", "ros-goal"], typer.Option("--format", help="Of the rows.")
     ] = "csv"
     rows: RowTimes = None
+    consumer: Consumer = None
     force: Annotated[bool, typer.Option("--force", help="Plan unchanged jobs, too.")] = False
     timeout: Annotated[
         str | None,

@@ -30,6 +30,15 @@ Overrides = Annotated[
         "--set", metavar="PATH=VALUE", help="Override a value of the job, such as moves.0.duration=3."
     ),
 ]
+Consumer = Annotated[
+    str | None,
+    typer.Option(
+        "--for",
+        metavar="PROFILE",
+        help="Plan for a consumer, such as ros-jtc, and judge the rows by its rules: `trajcli profiles`.",
+        autocompletion=profile_words,
+    ),
+]
 RowTimes = Annotated[
     Literal["rate", "knots", "both"] | None,
     typer.Option(

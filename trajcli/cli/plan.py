@@ -22,12 +22,12 @@ from trajcli.streams.whole_file import identity
 
 if TYPE_CHECKING:
     from trajcli.cli.job_commands import PlanCommand
-    from trajcli.consumers.judgement import ProfileJudgement
     from trajcli.consumers.profile import Profile
     from trajcli.job.report import MoveReport
     from trajcli.job.reports.comparisons import PathReferenceReport, PeerViolation, ReferenceReport
     from trajcli.judge.judgement import Judgement
     from trajcli.limits.tool_bound import ToolPeak
+    from trajcli.output.for_consumer import ForConsumer
     from trajcli.output.joined_rows import JoinedRows
     from trajcli.output.recording import LogOptions
 
@@ -42,8 +42,9 @@ def plan_and_write(job: str, options: PlanCommand) -> Plan:
         TrajcliError: When anything is wrong; then no rows were written.
     """
     form = _check_options(options)
-    profile = _profile(options)
     loaded = load_job(job, options.override, rate=options.rate, rows=options.rows, si=options.si)
+    wanted = _wanted(loaded, options)
+    loaded = loaded if wanted is None else wanted[0]
     _check_inputs_stay(loaded, options)
     log = _log_options(options)
     if log is not None:
@@ -56,40 +57,59 @@ def plan_and_write(job: str, options: PlanCommand) -> Plan:
         with np.errstate(
             all="ignore"
         ):  # what is not finite is for the checks to find, not for numpy to print
-            plan = plan_job(loaded)
+            made = None if wanted is None else _made(wanted, form, options)
+            plan = plan_job(loaded) if made is None else made.plan
         grid = grid_of(plan)
-        plan, rows = _beside_rows(plan, grid, form, options)
-        refusal, judged = _refusal(plan, options), None
+        plan, rows = _beside_rows(plan, grid, form, options, made)
+        refusal = _refusal(plan, options, made)
         if refusal is None and options.reference:
             refusal = _contradicted(plan)
-        if refusal is None and profile is not None:
-            judged, refusal = _judged(plan, grid, profile, form, options)
         if refusal is None and not options.no_output:
-            write_rows(plan, grid, options.output, options.digits or "fixed", form=form, log=log)
+            digits = (options.digits or "fixed") if made is None else made.digits
+            write_rows(plan, grid, options.output, digits, form=form, log=log)
     if options.report is not None or options.reference:
-        _report(plan, options, judged, rows)  # behind the rows: where it stands, they do
+        _report(plan, options, made, rows)  # behind the rows: where it stands, they do
     if refusal is not None:
         raise refusal
     if not options.quiet:
         written = 0 if options.no_output or form.content == "knots" else grid.count
         missing = form.content == "log" and loaded.robot.convention is None
         _summarise(plan, written, geometry_missing=missing)
-        if judged is not None:
-            _summarise_consumer(judged)
+        if made is not None:
+            _summarise_consumer(made)
     return plan
 
 
 def _beside_rows(
-    plan: Plan, grid: Grid, form: StreamFormat, options: PlanCommand
+    plan: Plan, grid: Grid, form: StreamFormat, options: PlanCommand, made: ForConsumer | None
 ) -> tuple[Plan, tuple[JoinedRows, Judgement] | None]:
     """Return a plan with the event of rows that pass a limit between them, and what was judged of them."""
     if not plan.verdict.passed:
         return plan, None
+    if made is not None:
+        return plan, None if made.joined is None else (made.rows, made.joined)
     from trajcli.output.joined import joined_rows, with_event
 
     rows = joined_rows(plan, grid, form, options.digits or "fixed")
-    plan, judged = with_event(plan, rows)
+    plan, judged = with_event(plan, rows, form)
     return plan, None if judged is None else (rows, judged)
+
+
+def _wanted(loaded: LoadedJob, options: PlanCommand) -> tuple[LoadedJob, Profile, str] | None:
+    """Return the job as the consumer takes its rows that the command line, or it, names; and what that is."""
+    if options.consumer is None and loaded.job.output.consumer is None:
+        return None
+    from trajcli.output.for_consumer import job_for
+
+    kept = {"rate": options.rate is not None, "rows": options.rows is not None}
+    return job_for(loaded, options.consumer, kept)
+
+
+def _made(wanted: tuple[LoadedJob, Profile, str], form: StreamFormat, options: PlanCommand) -> ForConsumer:
+    """Return the plan for a consumer."""
+    from trajcli.output.for_consumer import Writing, plan_for
+
+    return plan_for(*wanted, Writing(form, options.digits, _log_options(options)))
 
 
 def _log_options(options: PlanCommand) -> LogOptions | None:
@@ -99,15 +119,6 @@ def _log_options(options: PlanCommand) -> LogOptions | None:
     from trajcli.output.recording import LogOptions
 
     return options.part(LogOptions)
-
-
-def _profile(options: PlanCommand) -> Profile | None:
-    """Return the rules of the consumer that is named."""
-    if options.consumer is None:
-        return None
-    from trajcli.consumers.judgement import load_profile
-
-    return load_profile(options.consumer)
 
 
 def _contradicted(plan: Plan) -> VerificationError | None:
@@ -132,36 +143,34 @@ def _contradicted(plan: Plan) -> VerificationError | None:
     return VerificationError(*problems) if problems else None
 
 
-def _judged(
-    plan: Plan, grid: Grid, profile: Profile, form: StreamFormat, options: PlanCommand
-) -> tuple[ProfileJudgement, VerificationError | None]:
-    """Return what the rows do against the rules of their consumer, and why they are not written."""
-    from trajcli.output.consumer import judge_as_written, refusal_of
-
-    digits = options.digits or "fixed"
-    judged = judge_as_written(plan, grid, profile, form, digits=digits, log=_log_options(options))
-    return judged, refusal_of(plan, judged, strict=options.strict)
-
-
-def _summarise_consumer(judged: ProfileJudgement) -> None:
+def _summarise_consumer(made: ForConsumer) -> None:
     from trajcli.output.consumer import counted
 
-    warnings = [f"  {each.rule}: {each.message}{counted(each)}" for each in judged.findings]
-    unjudged = ", ".join(rule for rule, _ in judged.unjudged)
-    lines = [f"for {judged.profile.name}: all necessary rules are kept", *warnings]
-    lines += [f"  not judged: {unjudged}"] if unjudged else []
+    lines = [*made.said, made.summary]
+    if made.rules is not None:
+        unjudged = ", ".join(rule for rule, _ in made.rules.unjudged)
+        lines.append(f"for {made.profile.name}: all necessary rules are kept")
+        lines += [f"  {each.rule}: {each.message}{counted(each)}" for each in made.rules.findings]
+        lines += [f"  not judged: {unjudged}"] if unjudged else []
     print("\n".join(lines), file=sys.stderr)  # noqa: T201
 
 
-def _refusal(plan: Plan, options: PlanCommand) -> VerificationError | None:
-    """Return why no rows are written: the findings, or the concessions that `--strict` refuses."""
+def _refusal(plan: Plan, options: PlanCommand, made: ForConsumer | None) -> VerificationError | None:
+    """Return why no rows are written: findings, concessions that `--strict` refuses, or the consumer."""
     if not plan.verdict.passed:
         from trajcli.output.report import verification_error
 
         return verification_error(plan, every=options.every or options.errors != "text")
     if options.strict and plan.events:
         return VerificationError(*(_problem(plan, event) for event in plan.events))
-    return None
+    if made is None:
+        return None
+    from trajcli.output.consumer import refusal_of
+    from trajcli.output.for_consumer import refusal
+
+    if made.rules is not None:
+        return refusal_of(plan, made.rules, strict=options.strict)
+    return refusal(made, ()) if made.over else None
 
 
 def _problem(plan: Plan, event: Event) -> Problem:
@@ -234,7 +243,7 @@ def _write_resolved(loaded: LoadedJob, path: str) -> None:
 def _report(
     plan: Plan,
     options: PlanCommand,
-    judged: ProfileJudgement | None,
+    made: ForConsumer | None,
     rows: tuple[JoinedRows, Judgement] | None,
 ) -> None:
     from trajcli.output.report import report_of
@@ -244,10 +253,10 @@ def _report(
         from trajcli.output.joined import rows_report
 
         report = report.model_copy(update={"rows": rows_report(*rows)})
-    if judged is not None:
+    if made is not None and made.rules is not None:
         from trajcli.output.consumer import consumer_report
 
-        report = report.model_copy(update={"consumer": consumer_report(plan, judged)})
+        report = report.model_copy(update={"consumer": consumer_report(plan, made.rules)})
     if options.report is not None:
         write_text(report.model_dump_json(indent=2) + "\n", options.report)
     from trajcli.job.reports.part import in_units

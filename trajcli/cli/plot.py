@@ -14,7 +14,8 @@ from trajcli.cli.outcome import print_remark
 from trajcli.cli.progress import progress
 from trajcli.errors import InputError, Problem, VerificationError
 from trajcli.job.read import files_of, load_job
-from trajcli.planning.plan import Plan, plan_job
+from trajcli.output.delivered import plan_of
+from trajcli.planning.plan import Plan
 from trajcli.plots.choice import parse_quantities, split_names
 from trajcli.plots.picture import picture_of
 from trajcli.plots.write import format_of_picture, rendered
@@ -97,7 +98,7 @@ def _refuse_findings(plan: Plan | None, judged: Sequence[CheckedFile | None], op
 
 def _planned(job: str, overrides: Sequence[str]) -> Plan:
     with progress(), np.errstate(all="ignore"):
-        return plan_job(load_job(job, overrides))
+        return plan_of(load_job(job, overrides))
 
 
 def _files_and_joints(words: Sequence[str], joints: Sequence[str]) -> tuple[list[str], tuple[str, ...]]:

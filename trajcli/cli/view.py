@@ -41,13 +41,13 @@ def run_view(options: ViewCommand) -> int:
 
 def _view_job(options: ViewCommand) -> int:
     from trajcli.job.read import files_of, load_job
-    from trajcli.planning.plan import plan_job
+    from trajcli.output.delivered import plan_of
     from trajcli.player.scene import scene_of_plan
 
     loaded = load_job(options.source, options.override)
     _check_inputs_stay(options.output, [path for _, path in files_of(loaded.document)])
     with progress(), np.errstate(all="ignore"):  # what is not finite is for the checks to find
-        plan = plan_job(loaded)
+        plan = plan_of(loaded)
     page = page_of(scene_of_plan(plan), compress=options.compress)
     _write(page, options.output)
     if plan.verdict.passed:

@@ -11,6 +11,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, Literal
 
+from trajcli.columns import GROUPS, Group
 from trajcli.errors import InputError, Problem
 from trajcli.frozen import frozen
 from trajcli.job.yaml.document import Document
@@ -22,7 +23,8 @@ PROFILES = Path(__file__).parent.parent / "profiles"
 
 RuleSeverity = Literal["necessary", "recommended"]
 _SEVERITIES = ("necessary", "recommended")
-_HEAD = {"title": str, "interpolation": str, "note": str, "sources": dict, "rules": list}
+_HEAD = {"title": str, "interpolation": str, "note": str, "rows": dict, "sources": dict, "rules": list}
+_ROWS = ("rate", "align", "columns")
 _RULE = ("id", "check", "severity", "text", "parameters", "source")
 _SOURCE = ("text", "commit", "date")
 _INTERPOLATIONS = ("hold", "linear", "cubic", "quintic", "jtc", "jtc-upsampling")
@@ -65,6 +67,21 @@ class ConsumerRule:
 
 
 @frozen
+class WantedRows:
+    """Rows as a consumer takes them.
+
+    Attributes:
+        columns: What stands in a row.
+        rate: Hz; None where it takes rows at any times.
+        align: Whether each move lasts a whole number of periods.
+    """
+
+    columns: tuple[Group, ...] = ("t", "q", "qd", "qdd")
+    rate: float | None = None
+    align: bool = False
+
+
+@frozen
 class Profile:
     """What a consumer asks of a motion.
 
@@ -74,6 +91,7 @@ class Profile:
         interpolation: How it runs from row to row, by the name that `--interpolate` takes; None where that
             is not known.
         note: What a user should know beside the rules.
+        rows: As it takes them.
         rules: In the order of the file.
     """
 
@@ -81,6 +99,7 @@ class Profile:
     title: str
     interpolation: str | None
     note: str | None
+    rows: WantedRows
     rules: tuple[ConsumerRule, ...]
 
 
@@ -121,7 +140,10 @@ def read_profile(name: str, checks: Mapping[str, Mapping[str, Any]], folder: Pat
         )
         for each in plain["rules"]
     )
-    return Profile(name, plain["title"], plain.get("interpolation"), plain.get("note"), rules)
+    asked = plain.get("rows", {})
+    columns = tuple(asked.get("columns", WantedRows.columns))
+    rows = WantedRows(columns, asked.get("rate"), asked.get("align", False))
+    return Profile(name, plain["title"], plain.get("interpolation"), plain.get("note"), rows, rules)
 
 
 def _flaws(document: Document, checks: Mapping[str, Mapping[str, Any]]) -> Iterator[Problem]:
@@ -137,6 +159,7 @@ def _flaws(document: Document, checks: Mapping[str, Mapping[str, Any]]) -> Itera
     if interpolation is not None and interpolation not in _INTERPOLATIONS:
         text = f"unknown interpolation '{interpolation}'"
         yield Problem(text, valid_names(_INTERPOLATIONS), document.place(("interpolation",)))
+    yield from _of_rows(document, plain.get("rows", {}))
     for key, source in plain.get("sources", {}).items():
         yield from _of_keys(document, ("sources", key), source, _SOURCE, ("text", "date"))
     seen: set[str] = set()
@@ -146,6 +169,19 @@ def _flaws(document: Document, checks: Mapping[str, Mapping[str, Any]]) -> Itera
         if name in seen:
             yield Problem(f"the rule '{name}' stands twice", None, document.place(("rules", index, "id")))
         seen.add(str(name))
+
+
+def _of_rows(document: Document, rows: Mapping[str, Any]) -> Iterator[Problem]:
+    """Yield what is wrong with the rows that a consumer takes."""
+    yield from _of_keys(document, ("rows",), rows, _ROWS, ())
+    columns = rows.get("columns")
+    if columns is not None and not (isinstance(columns, list) and columns and {*columns} <= {*GROUPS}):
+        text = "`columns`: expected a list of groups of columns"
+        yield Problem(text, valid_names(GROUPS), document.place(("rows", "columns")))
+    if not (rows.get("rate") is None or (_is_number(rows["rate"]) and rows["rate"] > 0)):
+        yield Problem("`rate`: expected a number above 0, Hz", None, document.place(("rows", "rate")))
+    if not isinstance(rows.get("align", False), bool):
+        yield Problem("`align`: expected true or false", None, document.place(("rows", "align")))
 
 
 def _of_rule(

@@ -39,7 +39,8 @@ def dump_job(loaded: LoadedJob) -> str:
     """
     robot, job = loaded.robot, loaded.job
     context = ReadingContext(loaded.units, robot.joint_names, robot.joint_types)
-    written = job.model_dump(context=context, exclude={"robot", "base", "tool", "limits"}, exclude_none=True)
+    left_out = {"robot", "base", "tool", "limits"}
+    written = job.model_dump(context=context, exclude=left_out, exclude_none=True, by_alias=True)
     moves = [_without_empty(move) if "planner" in move else move for move in map(_move, written["moves"])]
     ordered = {
         "version": job.version,

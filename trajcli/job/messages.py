@@ -294,7 +294,7 @@ def _path_in_file(loc: FieldPath, document: Document, prefix: FieldPath) -> Fiel
 def _field_names(model: type[BaseModel], loc: FieldPath) -> list[str]:
     """Return the keys that may stand at `loc`, read off the model."""
     fields = _model_at(model, loc).model_fields
-    return [name for name, field in fields.items() if not field.exclude]
+    return [field.alias or name for name, field in fields.items() if not field.exclude]
 
 
 def _model_at(model: type[BaseModel], loc: FieldPath) -> type[BaseModel]:

@@ -172,6 +172,14 @@ class Output(Model):
             description="Groups of columns, in this order; pose, twist, twistd need a robot with geometry.",
         ),
     ] = ("t", "q", "qd", "qdd")
+    consumer: Annotated[
+        Annotated[str, Name("Profile of the consumer for which the job is planned, such as ros-jtc.")] | None,
+        Field(
+            alias="for",
+            description="Profile of the consumer that the rows are for, such as ros-jtc: "
+            "what is not said of the rows is as it takes them, and they keep all limits as it joins them.",
+        ),
+    ] = None
 
     @model_validator(mode="after")
     def _fits_together(self) -> Output:

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from trajcli.kinematics.following.motion import ToolMotion
     from trajcli.planning.plan import Plan
 
+Delivered = Callable[["LoadedJob", str | None], "Plan"]
+"""Returns the plan of a job for a consumer."""
 _START_TOLERANCE = 1e-3  # rad or m: what a controller takes for the state that it is in
 _SAME_DURATION = 1e-6  # s: a file that lasts as long as the plan, within that, is taken for its motion
 _ENTIRE = ("jtc-upsampling",)  # interpolations that need all rows at once
@@ -85,13 +87,19 @@ class _Given:
     shown: Units | None = None
 
 
-def check_file(source: str | ByteSource, options: CheckOptions, plan: Plan | None = None) -> CheckedFile:
+def check_file(
+    source: str | ByteSource,
+    options: CheckOptions,
+    plan: Plan | None = None,
+    delivered: Delivered | None = None,
+) -> CheckedFile:
     """Return the judgement of a file.
 
     Args:
         source: Its path; "-" is standard input. An opened one is read from its first byte on.
         options: What it is judged by.
         plan: Of a job that was planned before; the options then name no job and no robot.
+        delivered: Returns the plan of a job for a consumer, by the name of its profile, None for its own.
 
     Raises:
         InputError: When it is no motion, or options do not fit it or each other.
@@ -102,7 +110,10 @@ def check_file(source: str | ByteSource, options: CheckOptions, plan: Plan | Non
     opened = source if isinstance(source, ByteSource) else ByteSource(source)
     if plan is None and options.job is None and options.robot is None:
         refuse_job(opened)
-    given = _carrying(_given(options) if plan is None else _of_plan(plan), options)
+    given = _given(options) if plan is None else _of_plan(plan)
+    if plan is None and delivered is not None:
+        given = _as_delivered(opened, given, options, delivered)
+    given = _carrying(given, options)
     robot = given.robot
     declared = None if plan is not None else stated_units(options.job or options.robot or "")
     motion = _opened(opened, options, given, declared)
@@ -127,6 +138,21 @@ def check_file(source: str | ByteSource, options: CheckOptions, plan: Plan | Non
     judged = replace(judgement, notes=notes, events=given.events, source=motion.source)
     judged = _beside_plan(judged, compared, options)
     return CheckedFile(judged, robot, shown, given.loaded, given.plan, motion)
+
+
+def _as_delivered(source: ByteSource, given: _Given, options: CheckOptions, delivered: Delivered) -> _Given:
+    """Return the same with the plan for the consumer, where the rows are those of that one."""
+    loaded = given.loaded
+    if given.plan is None or loaded is None or (options.profile or loaded.job.output.consumer) is None:
+        return given
+    try:
+        with np.errstate(all="ignore"):
+            other = delivered(loaded, options.profile)
+    except TrajcliError:
+        return given  # what the job plans by itself is judged by its rules
+    found = _of_plan(other)
+    compared = _compared(source, found, options)
+    return found if compared is not None and compared.planned else given
 
 
 def _opened(source: ByteSource, options: CheckOptions, given: _Given, declared: Units | None) -> MotionFile:

@@ -95,18 +95,22 @@ def worst_first(findings: Sequence[Finding]) -> tuple[Finding, ...]:
 _RATES_OF_ROWS = ("continuity", "derivative", "time")
 
 
-def as_planned(judgement: Judgement) -> Judgement:
+def as_planned(judgement: Judgement, slack: float = JOINED_RELATIVE) -> Judgement:
     """Return the judgement of rows that are those of a verified motion, whose curve is proven already.
 
     They hold no jumps and no false derivatives, whatever their rate, and what rounding explains is nothing.
     What the curve that joins them passes is a warning, and an event.
+
+    Args:
+        judgement: Of these rows.
+        slack: Relative: what the joined curve may be above a limit.
     """
     findings = [
         replace(finding, severity="warning")
         for finding in judgement.findings
         if finding.severity == "warning"
         or (finding.rule not in _RATES_OF_ROWS and finding.certainty == "exceeded")
-        if finding.excess > 1 + JOINED_RELATIVE
+        if finding.excess > 1 + slack
     ]
     over = [f for f in findings if f.rule != "state" and f.limit]
     events = judgement.events

@@ -59,7 +59,16 @@ class ToolJudge:
             elif motion is not None:
                 self._recorded[move] = RecordedPath(robot, motion, move, self._worst)
 
-    def see(self, window: Intervals, pieces: slice, robot: Robot, move: int, *, asked: bool = True) -> None:
+    def see(
+        self,
+        window: Intervals,
+        pieces: slice,
+        robot: Robot,
+        move: int,
+        *,
+        asked: bool = True,
+        since: Array | None = None,
+    ) -> None:
         """Judge the tool in the pieces of one move.
 
         Args:
@@ -68,15 +77,19 @@ class ToolJudge:
             robot: The arm with the limits in force.
             move: Its index, -1 for none.
             asked: Whether somebody asked for the curve between the rows.
+            since: Where the rows are those of a planned motion, and the pieces need not be neighbours: when
+                each begins, s from the start of the move, shape (pieces,).
         """
         if limits_tool(robot) and int(window.highest[pieces].max(initial=0)) > 0:
             for low in range(pieces.start, pieces.stop, _PIECES):
                 some = slice(low, min(low + _PIECES, pieces.stop))
                 self._judge_limits(window, some, robot, move, asked=asked)
         path = self._recorded.get(move)
-        if path is not None:
+        if path is not None and since is not None:
+            path.see_between(window, pieces, since)
+        elif path is not None:
             path.see(window, pieces)
-        if self._paths is None or path is not None:
+        if since is None and (self._paths is None or path is not None):
             self._judge_singularity(window, pieces, move)
 
     def findings(self) -> Iterator[Finding]:

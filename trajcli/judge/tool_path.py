@@ -68,6 +68,21 @@ class RecordedPath:
                 middle = horner(window.coefficients[:, inner], half[:, None])
                 self._judge(middle, window.t[inner] + half, window.rows[inner], room[kept], (along, half))
 
+    def see_between(self, window: Intervals, pieces: slice, since: Array) -> None:
+        """Judge the middles of pieces that begin in places of the planned motion.
+
+        Args:
+            window: The rows, whose pieces need not be neighbours.
+            pieces: Which ones.
+            since: When each of them begins, s from the start of the move, shape (pieces,).
+        """
+        half = 0.5 * window.lengths[pieces]
+        middle = horner(window.coefficients[:, pieces], half[:, None])
+        law = self._motion.law
+        along = law.evaluate(np.clip(since, law.start, law.end))[:, 0]
+        room = self._room(middle, window)
+        self._judge(middle, window.t[pieces] + half, window.rows[pieces], room, (along, half))
+
     def _room(self, q: Array, window: Intervals) -> Array:
         """Return by how much the tool may be off by the rounding of the rows, m and rad alike, (N,)."""
         off = stated_errors(q, np.asarray(window.resolution.q), window.resolution.relative)

@@ -355,5 +355,6 @@ class Model(BaseModel):
         # `duration:` with nothing behind it is a slip of the pen: only what a file leaves out is left out
         if info.context is None or not isinstance(data, dict) or None not in data.values():
             return data
-        optional = {name for name, field in cls.model_fields.items() if field.default is None}
+        fields = cls.model_fields.items()
+        optional = {field.alias or name for name, field in fields if field.default is None}
         return {key: NULL if value is None and key in optional else value for key, value in data.items()}

@@ -53,7 +53,7 @@ def judge_as_written(
     from trajcli.streams.recorded_motion import open_motion
 
     robot = plan.loaded.robot
-    around = Surroundings(robot.joint_names, plan.trajectory.start.position, robot.limits)
+    around = Surroundings(robot.joint_names, plan.moves[0].start.position, robot.limits)
     with TemporaryDirectory(prefix="trajcli-") as folder:
         path = str(Path(folder) / f"rows{_ending(form)}")
         write_rows(plan, grid, path, digits, form=form, log=log)

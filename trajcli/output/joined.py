@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from trajcli.columns import Group
 from trajcli.errors import InputError
-from trajcli.grids import Grid, KnotGrid, UniformGrid
+from trajcli.frozen import frozen
+from trajcli.grids import Grid, UniformGrid
 from trajcli.judge.judgement import Judgement
-from trajcli.knots import has_knots, knot_grid, knots_of
+from trajcli.knots import has_knots, knot_grid, knots_of, stated_by
 from trajcli.output.joined_rows import JoinedRows
 from trajcli.planners.planner import Event
 from trajcli.planning.plan import Plan
@@ -24,6 +27,8 @@ _FASTER = (2, 4, 8, 16)  # times the rate
 _FASTEST = 8000.0  # Hz: no controller takes rows at more
 _MOST = 200_000  # rows that are tried
 _STATES: tuple[Group, ...] = ("t", "q", "qd", "qdd")
+_WITHOUT_JERK = 2  # derivatives that are judged of cubics
+_WITHOUT_ACCELERATION = _STATES[:3]
 
 
 def joined_rows(plan: Plan, grid: Grid, form: StreamFormat, digits: Digits = "fixed") -> JoinedRows:
@@ -38,18 +43,26 @@ def joined_rows(plan: Plan, grid: Grid, form: StreamFormat, digits: Digits = "fi
     output, exact = plan.loaded.job.output, not form.decimals or digits == "full"
     if form.content == "rows":
         return JoinedRows(plan, grid, tuple(output.columns), exact)
+    orders = stated_by(output.columns) if form.content == "knots" else 3
     if form.content == "knots" and output.rows in (None, "knots"):
-        grid = knot_grid(plan.trajectory, knots_of(plan.trajectory), None, output.start_time)
-    return JoinedRows(plan, grid, ("t", "q", "qd", "qdd"), exact)
+        knots = knots_of(plan.trajectory, orders)
+        grid = knot_grid(plan.trajectory, knots, None, output.start_time)
+    return JoinedRows(plan, grid, _STATES[: orders + 1], exact)
 
 
-def with_event(plan: Plan, rows: JoinedRows) -> tuple[Plan, Judgement | None]:
+def with_event(plan: Plan, rows: JoinedRows, form: StreamFormat) -> tuple[Plan, Judgement | None]:
     """Return a plan with the event of rows that pass a limit between them, and what was judged."""
     judged = rows.judgement()
     if judged is None or not judged.events:
         return plan, judged
-    kind, _, text = cured(judged, rows).events[0].partition(": ")
-    return replace(plan, events=(*plan.events, Event(kind, text))), judged
+    kind, _, text = judged.events[0].partition(": ")
+    other = next(rows_that_keep(rows, form), None)
+    cure = (
+        "neither its knots nor higher rates cure that"
+        if other is None
+        else f"`{other.options}` keeps every limit"
+    )
+    return replace(plan, events=(*plan.events, Event(kind, f"{text}; {cure}"))), judged
 
 
 def rows_report(rows: JoinedRows, judged: Judgement) -> RowsReport:
@@ -69,14 +82,58 @@ def rows_report(rows: JoinedRows, judged: Judgement) -> RowsReport:
 
 
 def keeps(rows: JoinedRows) -> bool:
-    """Return whether the curve that joins rows keeps every limit."""
+    """Return whether the curve that joins rows keeps every limit; where that of the jerk is judged."""
+    if rows.judged_orders == _WITHOUT_JERK and "qdd" in rows.plan.loaded.job.output.columns:
+        limited = any(np.isfinite(move.robot.limits.jerk).any() for move in rows.plan.moves)
+        if limited and not rows.same_curve:
+            return False  # between cubics the acceleration steps
     judged = rows.judgement(first_only=True)
     return judged is not None and not judged.events
 
 
-def cure_of(rows: JoinedRows) -> str | None:
-    """Return the options of `trajcli plan` with which rows keep the limits, joined; None where none do."""
-    return next((words for words, other in _cures(rows) if keeps(other)), None)
+@frozen
+class OtherRows:
+    """Other rows of the same motion.
+
+    Attributes:
+        rows: The rows.
+        output: What the job would say of them: keys of `output`, and their values.
+    """
+
+    rows: JoinedRows
+    output: Mapping[str, Any]
+
+    @property
+    def options(self) -> str:
+        """Options of `trajcli plan` that make them."""
+        named = {key: value for key, value in self.output.items() if key != "columns"}
+        words = [f"--{key} {f'{value:g}' if key == 'rate' else value}" for key, value in named.items()]
+        return " ".join(
+            [*words, *([set_columns(self.output["columns"])] if "columns" in self.output else [])]
+        )
+
+
+def set_columns(columns: Sequence[Group]) -> str:
+    """Return the option of `trajcli plan` that says which columns are written."""
+    return f'--set "output.columns=[{", ".join(columns)}]"'
+
+
+def rows_that_keep(rows: JoinedRows, form: StreamFormat | None = None) -> Iterator[OtherRows]:
+    """Yield other rows of the same motion with which it keeps the limits, joined, the simplest first.
+
+    Args:
+        rows: As they are.
+        form: In which they are written; None for a table.
+    """
+    return (other for other in _others(rows, form) if keeps(other.rows))
+
+
+def _at_knots(rows: JoinedRows, groups: tuple[Group, ...], output: Mapping[str, Any]) -> OtherRows:
+    """Return the rows at the knots of the same motion."""
+    trajectory = rows.plan.trajectory
+    knots = knots_of(trajectory, stated_by(groups))
+    grid = knot_grid(trajectory, knots, None, rows.grid.start_time)
+    return OtherRows(replace(rows, grid=grid, groups=groups), output)
 
 
 def rate_that_keeps(rows: JoinedRows) -> float | None:
@@ -94,36 +151,24 @@ def rate_that_keeps(rows: JoinedRows) -> float | None:
     return None
 
 
-def _cures(rows: JoinedRows) -> Iterator[tuple[str, JoinedRows]]:
-    """Yield other rows of the same motion with the options that make them, the simplest first."""
-    columns = None if {*_STATES} <= {*rows.groups} else _STATES
-    columned = f'--set "output.columns=[{", ".join(_STATES)}]"'
-    if "q" not in rows.groups and columns is None:
+def _others(rows: JoinedRows, form: StreamFormat | None) -> Iterator[OtherRows]:
+    """Yield other rows of the same motion, the simplest first."""
+    full = None if {*_STATES} <= {*rows.groups} else _STATES
+    if "q" not in rows.groups and full is None:
         return  # rows of the tool alone
+    content = "rows" if form is None else form.content
     if isinstance(rows.grid, UniformGrid) and has_knots(rows.plan.trajectory):
-        trajectory, start = rows.plan.trajectory, rows.grid.start_time
-        at_knots = replace(rows, grid=knot_grid(trajectory, knots_of(trajectory), None, start))
         if "q" in rows.groups:
-            yield "--rows knots", at_knots
-        yield f"--rows knots {columned}", replace(at_knots, groups=_STATES)
-        third = f'--rows knots --set "output.columns=[{", ".join(_STATES[:3])}]"'
-        yield third, replace(at_knots, groups=_STATES[:3])
-    if columns is not None:
-        yield columned, replace(rows, groups=columns)
-    if isinstance(rows.grid, KnotGrid):
-        yield f'--set "output.columns=[{", ".join(_STATES[:3])}]"', replace(rows, groups=_STATES[:3])
+            yield _at_knots(rows, rows.groups, {"rows": "knots"})
+        if content == "rows":
+            for columns in (_STATES, _WITHOUT_ACCELERATION):
+                yield _at_knots(rows, columns, {"rows": "knots", "columns": columns})
+    if full is not None and content == "rows":
+        yield OtherRows(replace(rows, groups=full), {"columns": full})
+    if content != "log" and "qdd" in rows.groups:
+        shorter = replace(rows, groups=_WITHOUT_ACCELERATION)
+        yield OtherRows(shorter, {"columns": _WITHOUT_ACCELERATION})
     rate = rate_that_keeps(rows)
     if rate is not None:
-        yield f"--rate {rate:g}", replace(rows, grid=UniformGrid(rows.grid.duration, rate))
-
-
-def cured(judgement: Judgement, rows: JoinedRows) -> Judgement:
-    """Return a judgement whose event says what would make the rows keep the limits between them."""
-    if not judgement.events or not any(text.startswith("joined_over_limit") for text in judgement.events):
-        return judgement
-    cure = cure_of(rows)
-    said = "neither its knots nor higher rates cure that" if cure is None else f"`{cure}` keeps every limit"
-    events = (
-        f"{text}; {said}" if text.startswith("joined_over_limit") else text for text in judgement.events
-    )
-    return replace(judgement, events=tuple(events))
+        grid = UniformGrid(rows.grid.duration, rate, rows.grid.start_time)
+        yield OtherRows(replace(rows, grid=grid), {"rate": rate})

@@ -7,7 +7,7 @@ other intervals are judged by what `trajcli check` judges recorded rows by.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.columns import Group, joint_factors
+from trajcli.curves.extrema import piece_extremes
 from trajcli.curves.hermite import hermite_coefficients
 from trajcli.curves.piecewise import Array
 from trajcli.findings import Collector, Finding, at_time
@@ -28,7 +29,8 @@ from trajcli.judge.judgement import Judgement, as_planned
 from trajcli.judge.motion import Requirements
 from trajcli.judge.reconstruction import Interpolation, chosen_interpolation
 from trajcli.judge.rounding import PieceRows, stated_errors
-from trajcli.kinematics.robot import ToolLimits
+from trajcli.kinematics.robot import Robot, ToolLimits
+from trajcli.limits.tolerances import JOINED_RELATIVE
 from trajcli.planning.plan import Plan
 from trajcli.samples import sample
 from trajcli.streams.recorded_motion import Resolution
@@ -43,6 +45,8 @@ _SPACING = 4.0  # units in the last place of a length
 _CONTINUOUS = 1e-9  # of the largest value of a joint: a step below that is rounding
 _PERIOD = 1e-9  # relative: what the last row may be off its grid by
 _HALF_UNIT = 0.5e-9  # of nine decimals
+_TWO = 2
+_OF_ROUNDING = {"linear": (1.0,), "cubic": (1.5, 6.0), "quintic": (1.875, 10 / 3**0.5, 60.0)}
 _STATES: tuple[Group, ...] = ("q", "qd", "qdd")
 _OF_POSES: tuple[Group, ...] = ("pose", "twist", "twistd")  # from which the joints are found back
 _OF_A_TOOL = 6  # joints whose rates those of the tool tell
@@ -74,11 +78,18 @@ class JoinedRows:
             return None
         return chosen_interpolation(None, *[*there, False, False][1:3])
 
-    def judgement(self, *, first_only: bool = False) -> Judgement | None:
+    @property
+    def judged_orders(self) -> int:
+        """How many derivatives of the joined curve are judged: what steps from row to row has no next one."""
+        chosen = self.interpolation
+        return 0 if chosen is None else (_DEGREES[chosen] + 1) // 2
+
+    def judgement(self, *, first_only: bool = False, slack: float = JOINED_RELATIVE) -> Judgement | None:
         """Return what the joined curve does against the limits; None where nothing says how it is joined.
 
         Args:
             first_only: Whether one group of intervals that is over a limit is enough.
+            slack: Relative: what the joined curve may be above a limit.
 
         Raises:
             InputError: When efforts are limited, and a link of the arm has no inertia.
@@ -86,8 +97,7 @@ class JoinedRows:
         chosen, plan, worst = self.interpolation, self.plan, Collector()
         if chosen is None:
             return None
-        required = Requirements(plan.loaded.robot, {move.index: move.robot for move in plan.moves})
-        tool = _tool_of(plan)
+        required, tool = self._requirements, _tool_of(plan)
         judged = Judgement((), chosen, self.grid.count, planned_rows=True)
         for window in self._windows(chosen):
             for (before, after), low, high in window.runs():
@@ -95,12 +105,65 @@ class JoinedRows:
                 carries_one = required.carries_one(before, after)
                 judge_limits(JudgedRun(window, pieces, robot, before, worst, True, carries_one))
                 if tool is not None:
-                    tool.see(window, pieces, robot, before)
+                    since = window.begun[pieces] - plan.trajectory.spans[self._numbers[before]].start
+                    tool.see(window, pieces, robot, before, since=since)
             findings = (*worst.findings(), *(() if tool is None else tool.findings()))
-            judged = as_planned(replace(judged, findings=tuple(map(self._in_time, findings)), events=()))
+            seen = replace(judged, findings=tuple(map(self._in_time, findings)), events=())
+            judged = as_planned(seen, slack)
             if first_only and judged.findings:
                 break
         return judged
+
+    @cached_property
+    def _numbers(self) -> Mapping[int, int]:
+        """Of moves, counted from 0, by their index."""
+        return {move.index: number for number, move in enumerate(self.plan.moves)}
+
+    @property
+    def _requirements(self) -> Requirements:
+        plan = self.plan
+        return Requirements(plan.loaded.robot, {move.index: move.robot for move in plan.moves})
+
+    @cached_property
+    def same_curve(self) -> bool:
+        """Whether the joined curve is the planned one itself, by its degree and its breaks."""
+        chosen = self.interpolation
+        blocks = () if chosen is None else self._blocks()
+        return chosen is not None and not any(self._unproven(t, _DEGREES[chosen]).size for t, _ in blocks)
+
+    def rounding(self) -> float:
+        """Return which share of a limit the decimals of the rows alone may make up, between the nearest two.
+
+        A position that is off by e at one end of a quintic of length h makes a jerk of 60 e / h^3, an
+        acceleration of 10 e / (sqrt(3) h^2) and a velocity of 15 e / (8 h); of a cubic it is 6 e / h^2 and
+        3 e / (2 h).
+        """
+        chosen, plan = self.interpolation, self.plan
+        if self.exact or chosen is None or self.grid.count < _TWO:
+            return 0.0
+        length = min(float(np.diff(times).min()) for times, _ in self._blocks() if times.size > 1)
+        factors = joint_factors(plan.trajectory.joint_types, plan.loaded.output_units)
+        unit = 2 * _HALF_UNIT * np.asarray(factors) / length ** np.arange(1, 4)[:, None]
+        noise = unit[: len(_OF_ROUNDING[chosen])] * np.array(_OF_ROUNDING[chosen])[:, None]
+        limits = [[np.abs(m.robot.limits.of_order(k)).min(axis=1) for k in (1, 2, 3)] for m in plan.moves]
+        least = np.min(limits, axis=0)[: len(noise)]
+        return float((noise / least).max(initial=0.0))
+
+    def uses(self) -> Iterator[tuple[float, int, int, int]]:
+        """Yield what the planned curve and the joined one use at most of limits of joints.
+
+        Yields:
+            Which share, of which derivative, 1 to 3, which joint, and the index of the move.
+        """
+        for move, peaks in zip(self.plan.moves, self.plan.verdict.peaks, strict=True):
+            yield from _shares(move.robot, [(each.low, each.high) for each in peaks[1:4]], move.index)
+        chosen, required = self.interpolation, self._requirements
+        for window in () if chosen is None else self._windows(chosen):
+            extremes = piece_extremes(window.coefficients, window.lengths, (1, 2, 3))
+            for (before, after), first, last in window.runs():
+                robot = required.robot_between(before, after)
+                part = [(low[first:last].min(axis=0), high[first:last].max(axis=0)) for low, high in extremes]
+                yield from _shares(robot, part, before)
 
     def _in_time(self, finding: Finding) -> Finding:
         """Return a finding about intervals one behind the other with the time of its row."""
@@ -207,6 +270,7 @@ class JoinedRows:
             ends=False,
             stated=states.transpose(2, 0, 1, 3),
             moves_after=moves[1],
+            begun=ends[0],
         )
 
     def _rows(self, times: Array, index: NDArray[np.int64], stated: int) -> Array:
@@ -233,10 +297,12 @@ class _Pairs(Intervals):
     Attributes:
         stated: What the rows before and after them state, shape (orders, 2, m, n).
         moves_after: Index of the move of the row after each, shape (m,).
+        begun: When each begins, s from the start of the trajectory, shape (m,).
     """
 
     stated: Array
     moves_after: NDArray[np.int64]
+    begun: Array
 
     @cached_property
     def coefficients(self) -> Array:
@@ -262,10 +328,23 @@ class _Pairs(Intervals):
         return int(self.rows[piece]) + int(local >= self.lengths[piece] * (1 - 1e-12))
 
 
+def _shares(
+    robot: Robot, extremes: Sequence[tuple[Array, Array]], move: int
+) -> Iterator[tuple[float, int, int, int]]:
+    """Yield for each derivative from the first on the largest share of a limit, and whose it is."""
+    for order, (low, high) in enumerate(extremes, 1):
+        bounds = robot.limits.of_order(order)
+        used = np.maximum(low / bounds[:, 0], high / bounds[:, 1])
+        joint = int(used.argmax())
+        yield float(used[joint]), order, joint, move
+
+
 def _tool_of(plan: Plan) -> ToolJudge | None:
-    """Return the judge of the limits of the tool, where there are any."""
-    if all(move.robot.limits.tcp == ToolLimits() for move in plan.moves):
+    """Return the judge of the limits of the tool, and of its paths, where there are any."""
+    paths = {move.index: move.planned.tool for move in plan.moves}
+    limited = any(move.robot.limits.tcp != ToolLimits() for move in plan.moves)
+    if not limited and all(path is None for path in paths.values()):
         return None
     from trajcli.judge.recorded_tool import ToolJudge
 
-    return ToolJudge(plan.loaded.robot, {})
+    return ToolJudge(plan.loaded.robot, paths)

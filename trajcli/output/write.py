@@ -37,10 +37,11 @@ def grid_of(plan: Plan) -> Grid:
             return ListedGrid(duration, np.array(output.times), output.start_time)
         if output.rows in (None, "rate"):
             return UniformGrid(duration, output.rate, output.start_time)
-        from trajcli.knots import knot_grid, knots_of
+        from trajcli.knots import knot_grid, knots_of, stated_by
 
         rate = None if output.rows == "knots" else output.rate
-        return knot_grid(plan.trajectory, knots_of(plan.trajectory), rate, output.start_time)
+        knots = knots_of(plan.trajectory, stated_by(output.columns))
+        return knot_grid(plan.trajectory, knots, rate, output.start_time)
     except InputError as error:
         key = "rate" if output.times is None else "times"
         raise error.located(place=plan.loaded.document.place(("output", key))) from None
@@ -92,7 +93,10 @@ def _write_options(
 ) -> WriteOptions:
     """Return what the rows of a plan do not say in a format."""
     if form.content == "knots":
-        return WriteOptions(goal=cache(lambda: Goal(plan.trajectory.joint_names, points_of(plan, grid))))
+        names, columns = plan.trajectory.joint_names, plan.loaded.job.output.columns
+        from trajcli.knots import stated_by
+
+        return WriteOptions(goal=cache(lambda: Goal(names, points_of(plan, grid), stated_by(columns))))
     if form.content == "log":
         from trajcli.output.recording import LogOptions, check_log_options, recording_of
 
@@ -104,10 +108,11 @@ def _write_options(
 
 def points_of(plan: Plan, grid: Grid) -> Knots:
     """Return the points of a message of ROS: the knots, or the rows where the job asks for these."""
-    from trajcli.knots import knots_at, knots_of
+    from trajcli.knots import knots_at, knots_of, stated_by
 
-    if plan.loaded.job.output.rows in (None, "knots"):
-        return knots_of(plan.trajectory)
+    output = plan.loaded.job.output
+    if output.rows in (None, "knots"):
+        return knots_of(plan.trajectory, stated_by(output.columns))
     return knots_at(plan.trajectory, np.concatenate([local for _, local in grid.blocks()]))
 
 

@@ -329,6 +329,18 @@ class Planner(Model):
         """
         raise TypeError(f"{type(self).__name__} does not say how to plan")
 
+    def on_rows(self, start: State, robot: Robot, period: float, least: float) -> Planned | None:
+        """Return the move with all breaks of its curve on rows; None where the method has no such motion.
+
+        Args:
+            start: As for `plan`.
+            robot: Likewise.
+            period: Of the rows, s.
+            least: Shortest duration, s.
+        """
+        del start, robot, period, least
+        return None
+
 
 @frozen
 class PlannedMove:

@@ -28,13 +28,14 @@ from trajcli.job.limits import with_move_limits
 from trajcli.job.read import LoadedJob
 from trajcli.kinematics.robot import QUANTITIES, Payload, Robot
 from trajcli.language.targets import Target
-from trajcli.limits.kinds import has_further_limits
 from trajcli.limits.tolerances import JUMP_ABSOLUTE
 from trajcli.planners.planner import Event, PlannedMove, Planner, Resolve
+from trajcli.planning.planned_move import plan_move_within
 from trajcli.progress import report_progress
 from trajcli.trajectory import State, Trajectory
 
 if TYPE_CHECKING:
+    from trajcli.planning.adaptation import Adaptation
     from trajcli.planning.resolve_poses import ResolvedPose
 
 Carried = Callable[[int, Payload | None], Payload | None]
@@ -87,20 +88,27 @@ class Plan:
         return ", ".join(parts.values())
 
 
-def plan_job(loaded: LoadedJob, carried: Carried | None = None, *, advise: bool = True) -> Plan:
+def plan_job(
+    loaded: LoadedJob,
+    carried: Carried | None = None,
+    *,
+    advise: bool = True,
+    adapted: Adaptation | None = None,
+) -> Plan:
     """Return the plan of a job, with its verdict: a verdict with findings is no error here.
 
     Args:
         loaded: The job.
         carried: What the tool carries in a move instead, by its index and what the job says.
         advise: Whether findings come with what would help, which is tried out.
+        adapted: By what moves are planned otherwise than their limits alone say.
 
     Raises:
         InputError: When a move loosens a limit, or lacks one it needs.
         PlanningError: When a move has no curve.
     """
     poses: dict[int | None, ResolvedPose] = {}
-    moves = _plan_moves(loaded, poses, carried)
+    moves = _plan_moves(loaded, poses, carried, adapted)
     events = [*loaded.events, *_events_of(poses.get(None), None)]
     for move in moves:
         events += _events_of(poses.get(move.index), move.index)
@@ -127,7 +135,10 @@ def plan_job(loaded: LoadedJob, carried: Carried | None = None, *, advise: bool 
 
 
 def _plan_moves(
-    loaded: LoadedJob, poses: dict[int | None, ResolvedPose], carried: Carried | None
+    loaded: LoadedJob,
+    poses: dict[int | None, ResolvedPose],
+    carried: Carried | None,
+    adapted: Adaptation | None,
 ) -> list[PlannedMove]:
     """Return the moves of a job, and note how its poses are reached.
 
@@ -152,7 +163,7 @@ def _plan_moves(
             with _errors_of(loaded, index, planner, begun):
                 reachable = planner.with_joint_targets(partial(resolve, index=index), state.position)
                 with _points_of_errors(loaded, index):
-                    move = _plan_move(loaded, used, index, reachable.coming_from(origin), start)
+                    move = _plan_move(loaded, used, index, reachable.coming_from(origin), start, adapted)
             moves.append(move)
             begun += float(move.planned.curve.breaks[-1])
             state = move.planned.end
@@ -243,55 +254,28 @@ def _events_of(pose: ResolvedPose | None, index: int | None) -> list[Event]:
     return [replace(event, move=index) for event in nearest_rotation_events(pose)]
 
 
-def _plan_move(loaded: LoadedJob, carrying: Robot, index: int, planner: Planner, start: State) -> PlannedMove:
+def _plan_move(
+    loaded: LoadedJob,
+    carrying: Robot,
+    index: int,
+    planner: Planner,
+    start: State,
+    adapted: Adaptation | None,
+) -> PlannedMove:
     """Return a move of the robot with what its tool carries then."""
     robot = with_move_limits(carrying, planner.limits, index)
-    return plan_move_within(loaded, index, planner, start, robot)
+    if adapted is None:
+        return plan_move_within(loaded, index, planner, start, robot)
+    from trajcli.planning.adaptation import without_bounds
 
-
-def plan_move_within(
-    loaded: LoadedJob, index: int, planner: Planner, start: State, robot: Robot
-) -> PlannedMove:
-    """Return a move of a job, planned, and retimed as the job asks for.
-
-    Args:
-        loaded: The job.
-        index: Of the move.
-        planner: Of the move, its target by joints.
-        start: State in which it begins.
-        robot: With the limits in force.
-
-    Raises:
-        InputError: When it lacks a limit.
-        PlanningError: When it has no curve.
-    """
-    job = loaded.job
-    over_limit = planner.when_over_limit or job.when_over_limit
-    try:
-        move = PlannedMove(index, planner, start, robot, planner.plan(start, robot), over_limit)
-    except PlanningError as error:
-        if over_limit != "slow":
-            raise
-        from trajcli.planning.retime import long_enough
-
-        move = long_enough(index, planner, start, robot, error)
-    limits = robot.limits
-    if has_further_limits(limits):
-        from trajcli.planning.retime import keep_further_limits
-
-        move = keep_further_limits(move)
-    if over_limit == "slow":
-        from trajcli.planning.retime import slow_to_limits
-
-        move = slow_to_limits(move)
-    if job.output.align:
-        from trajcli.planning.retime import align_to_period
-
-        move = align_to_period(move, job.output.rate)
-    if limits.has_effort and not planner.handles:
-        from trajcli.planning.retime import require_holdable
-
-        require_holdable(move)
+    output = loaded.job.output
+    key = adapted.key(index, start, (output.rate, output.align))
+    move = adapted.known.get(key)
+    if move is None:
+        move = plan_move_within(loaded, index, planner, start, adapted.within(robot, index), adapted)
+        if adapted.tightens(index):
+            move = replace(move, robot=robot, planned=without_bounds(move.planned))
+        adapted.known[key] = move
     return move
 
 

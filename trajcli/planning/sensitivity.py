@@ -22,7 +22,8 @@ from trajcli.errors import TrajcliError
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import QUANTITIES, Limits
 from trajcli.planners.planner import PlannedMove, Planner
-from trajcli.planning.plan import Plan, plan_move_within
+from trajcli.planning.plan import Plan
+from trajcli.planning.planned_move import plan_move_within
 from trajcli.progress import report_progress
 
 BindingQuantity = Literal["velocity", "acceleration", "jerk", "velocity_by_position"]

@@ -37,10 +37,12 @@ class Goal:
     Attributes:
         joint_names: n names.
         knots: With n joints.
+        orders: How many of position, velocity and acceleration its points state.
     """
 
     joint_names: tuple[str, ...]
     knots: Knots
+    orders: int = 3
 
 
 @frozen
@@ -151,7 +153,7 @@ def _write_ros(
     from trajcli.streams.ros_yaml import write_ros_yaml
 
     goal = _made(options.goal)
-    write_ros_yaml(goal.joint_names, goal.knots, out, message)
+    write_ros_yaml(goal.joint_names, goal.knots, out, message, goal.orders)
     yield from rows
 
 
@@ -169,7 +171,7 @@ def _verify_ros(
     goal = _made(options.goal)
     for _ in rows:  # the file is written when they have ended
         pass
-    verify_ros_yaml(written, goal.joint_names, goal.knots, message)
+    verify_ros_yaml(written, goal.joint_names, goal.knots, message, goal.orders)
 
 
 def _made(make: Callable[[], T] | None) -> T:

@@ -29,14 +29,17 @@ _USES = {
 }
 _BILLION = 1_000_000_000
 _BLOCK = 1024  # points written at a time
+_KEYS = ("positions", "velocities", "accelerations")
 _NUMBERS = r"\[([^\]]*)\]"
 _POINT = re.compile(
-    rf" *- \{{positions: {_NUMBERS}, velocities: {_NUMBERS}, accelerations: {_NUMBERS}, "
+    rf" *- \{{positions: {_NUMBERS}, velocities: {_NUMBERS}(?:, accelerations: {_NUMBERS})?, "
     r"time_from_start: \{sec: ([0-9]+), nanosec: ([0-9]+)\}\}\n"
 )
 
 
-def write_ros_yaml(joint_names: Sequence[str], knots: Knots, out: BinaryIO, message: RosMessage) -> None:
+def write_ros_yaml(
+    joint_names: Sequence[str], knots: Knots, out: BinaryIO, message: RosMessage, orders: int = 3
+) -> None:
     """Write the knots as a message, or as a goal.
 
     Args:
@@ -44,14 +47,17 @@ def write_ros_yaml(joint_names: Sequence[str], knots: Knots, out: BinaryIO, mess
         knots: With n joints.
         out: Where to.
         message: "ros" for JointTrajectory, "ros-goal" for the goal of FollowJointTrajectory.
+        orders: How many of position, velocity and acceleration the points state, 2 or 3.
     """
     out.write("".join(_head(joint_names, message)).encode())
     indent = "  " * (message == "ros-goal")
     for low in range(0, len(knots.nanoseconds), _BLOCK):
-        out.write("".join(_points(knots, slice(low, low + _BLOCK), indent)).encode())
+        out.write("".join(_points(knots, slice(low, low + _BLOCK), indent, orders)).encode())
 
 
-def verify_ros_yaml(written: BinaryIO, joint_names: Sequence[str], knots: Knots, message: RosMessage) -> None:
+def verify_ros_yaml(
+    written: BinaryIO, joint_names: Sequence[str], knots: Knots, message: RosMessage, orders: int = 3
+) -> None:
     """Read a stream from its beginning and compare every number, bit by bit, with the knots behind it.
 
     Args:
@@ -59,6 +65,7 @@ def verify_ros_yaml(written: BinaryIO, joint_names: Sequence[str], knots: Knots,
         joint_names: As in `write_ros_yaml`.
         knots: As in `write_ros_yaml`.
         message: As in `write_ros_yaml`.
+        orders: As in `write_ros_yaml`.
 
     Raises:
         TrajcliError: When the head, a number or the count of points differs.
@@ -67,10 +74,10 @@ def verify_ros_yaml(written: BinaryIO, joint_names: Sequence[str], knots: Knots,
     for line in _head(joint_names, message):
         if written.readline() != line.encode():
             raise TrajcliError(f"the file read back does not hold {line.strip()!r} where it was written")
-    states = (knots.position, knots.velocity, knots.acceleration)
+    states = (knots.position, knots.velocity, knots.acceleration)[:orders]
     for index, time in enumerate(knots.nanoseconds.tolist()):
         point = _POINT.fullmatch(written.readline().decode(errors="replace"))
-        if point is None:
+        if point is None or (point[3] is None) != (orders < len(_KEYS)):
             raise TrajcliError(f"point {index} of the file read back is none")
         same = all(
             [float(text) for text in point[k + 1].split(", ")] == rows[index].tolist()
@@ -94,17 +101,13 @@ def _head(joint_names: Sequence[str], message: RosMessage) -> Iterator[str]:
     yield f"{indent}points:\n"
 
 
-def _points(knots: Knots, rows: slice, indent: str) -> Iterator[str]:
+def _points(knots: Knots, rows: slice, indent: str, orders: int) -> Iterator[str]:
     """Yield a line for each point."""
-    states = zip(knots.position[rows], knots.velocity[rows], knots.acceleration[rows], strict=True)
-    for time, (position, velocity, acceleration) in zip(
-        knots.nanoseconds[rows].tolist(), states, strict=True
-    ):
+    states = (knots.position[rows], knots.velocity[rows], knots.acceleration[rows])[:orders]
+    for time, *values in zip(knots.nanoseconds[rows].tolist(), *states, strict=True):
         seconds, rest = divmod(time, _BILLION)
-        yield (
-            f"{indent}- {{positions: {_list(position)}, velocities: {_list(velocity)}, "
-            f"accelerations: {_list(acceleration)}, time_from_start: {{sec: {seconds}, nanosec: {rest}}}}}\n"
-        )
+        said = ", ".join(f"{key}: {_list(each)}" for key, each in zip(_KEYS, values, strict=False))
+        yield f"{indent}- {{{said}, time_from_start: {{sec: {seconds}, nanosec: {rest}}}}}\n"
 
 
 def _list(values: Array) -> str:

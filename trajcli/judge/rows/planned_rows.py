@@ -207,8 +207,8 @@ def _grids(plan: Plan, stamps: _Stamps) -> Iterator[Grid]:
         asked = ListedGrid(duration, np.array(output.times), output.start_time)
     found: list[Grid] = [] if asked is None else [asked]
     found += [UniformGrid(duration, rate, stamps.first) for rate in _rates(plan, stamps)]
-    if has_knots(plan.trajectory):
-        knots = knots_of(plan.trajectory)
+    for stated in (2, 3) if has_knots(plan.trajectory) else ():
+        knots = knots_of(plan.trajectory, stated)
         found.append(knot_grid(plan.trajectory, knots, None, stamps.first))
         if stamps.count > knots.times.size:
             found.append(knot_grid(plan.trajectory, knots, output.rate, stamps.first))

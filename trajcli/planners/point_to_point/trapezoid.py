@@ -106,6 +106,32 @@ class Trapezoid(PointToPoint):
             self._together(start, end, robot) if self.synchronize == "time" else self._each(start, end, robot)
         )
 
+    def on_rows(self, start: State, robot: Robot, period: float, least: float) -> Planned | None:
+        """Return the move between states of rest whose ramps last whole periods."""
+        end = self.to.as_state()
+        displacement = end.position - start.position
+        moving = np.flatnonzero(displacement)
+        if self.synchronize == "none" or not moving.size or not (start.at_rest and end.at_rest):
+            return None
+        from trajcli.planners.point_to_point.whole_periods import PhasesInPeriods
+
+        if self.duration is not None and self.velocity is not None:
+            return None  # the acceleration follows from both
+        speed, faster, slower = self._rates(displacement, robot)[0]
+        size = np.abs(displacement[moving])
+        bounds = [float((each[moving] / size).min()) for each in (speed, np.minimum(faster, slower))]
+        laws = PhasesInPeriods(period, smooth=False)
+        known = laws.common([1.0], [bounds], max(least, self.duration or 0.0))
+        if known is None:
+            return None
+        count, ((_, ramp, cruise),) = known
+        top = 1.0 / (period * (count - ramp))
+        knots = ((ramp * period, top), (cruise * period, top), (ramp * period, 0.0))
+        profile = VelocityProfile(0.0, tuple(knot for knot in knots if knot[0] > 0))
+        law = profile.curve(0.0, 1.0, count * period)
+        phases = tuple(Phase(*phase) for phase in profile.phases())
+        return Planned(along_line(start.position, displacement, law), end, law=law, phases=phases)
+
     def _together(self, start: State, end: State, robot: Robot) -> Planned:
         displacement = end.position - start.position
         initial, final = (_along(displacement, state.velocity, robot) for state in (start, end))

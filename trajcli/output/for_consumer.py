@@ -1,0 +1,448 @@
+"""Plans for a consumer: rows as it takes them, which keep its rules and all limits as it joins them.
+
+Where the rows of the plan do not, other rows of the same motion may; else the motion is planned within
+tighter limits, or with the breaks of its curves on rows, whichever lasts less.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from trajcli.consumers.judgement import ProfileJudgement, load_profile
+from trajcli.consumers.profile import Profile
+from trajcli.errors import InputError, TrajcliError, VerificationError
+from trajcli.findings import Finding
+from trajcli.frozen import frozen
+from trajcli.grids import Grid, KnotGrid, UniformGrid
+from trajcli.job.read import LoadedJob
+from trajcli.judge.judgement import Judgement
+from trajcli.kinematics.robot import QUANTITIES
+from trajcli.knots import has_knots
+from trajcli.limits.kinds import KIND_OF, STRETCHABLE
+from trajcli.output.consumer import judge_as_written
+from trajcli.output.joined import joined_rows, rows_that_keep, set_columns
+from trajcli.output.joined_rows import JoinedRows
+from trajcli.output.write import grid_of
+from trajcli.planners.planner import Event
+from trajcli.planning.adaptation import Adaptation, Cap
+from trajcli.planning.plan import Plan, plan_job
+from trajcli.progress import report_progress
+from trajcli.streams.decimals import Digits
+from trajcli.streams.formats import DEFAULT, StreamFormat
+
+_ROUNDS = 16  # of tightening: a jerk that switches between rows is less than twice its limit
+_LESS = 1 - 1e-9  # of a limit that is tightened
+_SLACK = 1e-6  # relative: what a joined curve may be above a limit
+_SLOWEST = 0.7  # of the speed, in one round, where the tool leaves its path between rows
+_HOPELESS = 1e3  # times a limit: a step of velocity, which no motion of any duration is without
+_FURTHEST = 30.0  # times the tolerance: to what a tool leaves its path by, slowness is no help
+_LITTLE = 1.003  # times a limit: such a move is stretched, as another one might be found within less
+_COARSE = 0.05  # of a limit: what decimals alone may make up between knots
+_LONGER = 1e-9  # relative: a duration that differs by less is the same
+
+
+@frozen
+class Writing:
+    """How rows are written.
+
+    Attributes:
+        form: The format.
+        digits: Of numbers that are written as text; None for nine decimals, or every bit where these are few.
+        log: What the command line says about a log.
+    """
+
+    form: StreamFormat = DEFAULT
+    digits: Digits | None = None
+    log: Any = None
+
+
+@frozen
+class ForConsumer:
+    """A plan, and what its consumer makes of its rows.
+
+    Attributes:
+        plan: Its job says the rows.
+        profile: Of the consumer.
+        grid: Where the rows stand.
+        rows: As they are joined.
+        joined: What the joined curve does against the limits; None where the plan does not verify.
+        rules: What the rows do against the rules; None likewise, and where the joined curve is over a limit.
+        shortest: How long the motion lasts when nobody joins its rows, s.
+        digits: With which its numbers are written as text.
+        chosen: Whether that is because nine decimals are few.
+        said: What there is to say about its rows, one line each.
+    """
+
+    plan: Plan
+    profile: Profile
+    grid: Grid
+    rows: JoinedRows
+    joined: Judgement | None
+    rules: ProfileJudgement | None
+    shortest: float
+    digits: Digits
+    chosen: bool = False
+    said: tuple[str, ...] = ()
+
+    @property
+    def over(self) -> tuple[Finding, ...]:
+        """What keeps the rows from being written: limits, and necessary rules."""
+        limits = () if self.joined is None else (f for f in self.joined.findings if f.limit)
+        rules = () if self.rules is None else (f for f in self.rules.findings if f.severity == "error")
+        return (*limits, *rules)
+
+    @property
+    def keeps(self) -> bool:
+        """Whether the rows may be written."""
+        return self.plan.verdict.passed and not self.over
+
+    @property
+    def uses_over(self) -> list[tuple[float, int, int, int]]:
+        """Limits that are passed between rows at knots, as `JoinedRows.uses` says: some stand very near.
+
+        What the rounding of their stamps makes is no fault of the motion, but the consumer runs it.
+        """
+        judged = self.rows.judged_orders
+        uses = self.rows.uses() if isinstance(self.grid, KnotGrid) else ()
+        return [use for use in uses if use[0] > 1 + _SLACK and use[1] <= judged]
+
+    @cached_property
+    def coarse(self) -> bool:
+        """Whether the decimals of rows at knots make up much of a limit."""
+        return isinstance(self.grid, KnotGrid) and self.rows.rounding() > _COARSE
+
+    @property
+    def clean(self) -> bool:
+        """Whether the rows may be written, and rounding makes nothing of them that is worth speaking of."""
+        return self.keeps and not self.uses_over and not self.coarse
+
+    def with_every_bit(self) -> ForConsumer:
+        """Return the same with numbers that are written with all their bits."""
+        return replace(self, rows=replace(self.rows, exact=True), digits="full", chosen=True)
+
+    @property
+    def where(self) -> str:
+        """The consumer, and where the rows stand, in words."""
+        grid = self.grid
+        rows = "its knots" if isinstance(grid, KnotGrid) else "given times"
+        return f"for {self.profile.name} at {f'{grid.rate:g} Hz' if isinstance(grid, UniformGrid) else rows}"
+
+    @cached_property
+    def summary(self) -> str:
+        """What is used of the limits as the rows will be joined, and how much longer the motion lasts."""
+        used = max(self.rows.uses(), default=None)
+        words = ""
+        if used is not None and used[0] > 0:
+            share, order, joint, _ = used
+            name = self.plan.trajectory.joint_names[joint]
+            words = f", {100 * share:.4g} % of the {QUANTITIES[order]} of {name} used"
+        longer = self.plan.trajectory.duration / self.shortest - 1 if self.shortest else 0.0
+        cost = f"; {100 * longer:.2g} % longer than between the rows" if longer > _LONGER else ""
+        bits = ", every bit of its numbers written" if self.digits == "full" and self.chosen else ""
+        return f"{self.where}{bits}: joined as it will be{words}{cost}"
+
+
+def job_for(loaded: LoadedJob, name: str | None, kept: Mapping[str, bool]) -> tuple[LoadedJob, Profile, str]:
+    """Return a job whose output is as a consumer takes it, the consumer, and what it brought.
+
+    Args:
+        loaded: The job.
+        name: Of its profile, from the command line, where it goes before what the job says of its rows; None
+            for that of the job, which goes behind.
+        kept: Of `rate` and `rows`: whether the command line gives it.
+
+    Raises:
+        InputError: When there is no such profile, or it takes rows at another rate.
+    """
+    output = loaded.job.output
+    try:
+        profile = load_profile(name or output.consumer or "")
+    except InputError as error:
+        raise error if name else error.located(place=loaded.document.place(("output", "for"))) from None
+    wanted, given = profile.rows, output.model_fields_set
+    stays = {key: kept.get(key, False) if name else key in given for key in ("rate", "rows")}
+    changed: dict[str, Any] = {"consumer": profile.name}
+    if wanted.rate is not None:
+        _refuse_other_rows(loaded, profile, stays)
+        changed |= {"rate": wanted.rate, "times": None, "rows": "rate"}
+    elif name and not stays["rows"]:
+        changed["rows"] = None
+    if wanted.align and (name or "align" not in given):
+        changed |= {"align": True, "times": None}
+    if name or "columns" not in given:
+        changed["columns"] = wanted.columns
+    other = output.model_copy(update=changed)
+    brought = f"{profile.name} takes {_in_words(profile)}"
+    differs = {key for key in changed if key in given and getattr(output, key) != changed[key]}
+    said = f"{brought}: that goes before `output` of the job" if differs - {"consumer"} else ""
+    return replace(loaded, job=loaded.job.model_copy(update={"output": other})), profile, said
+
+
+def _refuse_other_rows(loaded: LoadedJob, profile: Profile, stays: Mapping[str, bool]) -> None:
+    """Refuse rows at other times than those of a consumer with a rate of its own."""
+    output, rate = loaded.job.output, profile.rows.rate
+    wrong = ("rate", f"{output.rate:g} Hz") if stays["rate"] and output.rate != rate else None
+    if stays["rows"] and output.rows in ("knots", "both"):
+        wrong = "rows", f"`rows: {output.rows}`"
+    if wrong is not None:
+        key, what = wrong
+        text = f"{profile.name} takes rows at {rate:g} Hz, and {what} is asked for"
+        raise InputError(text, hint=f"leave the {key} out").located(
+            place=loaded.document.place(("output", key))
+        )
+
+
+def _in_words(profile: Profile) -> str:
+    """Return the rows that a consumer takes."""
+    rows = profile.rows
+    rate = [] if rows.rate is None else [f"rows at {rows.rate:g} Hz"]
+    align = ["moves of whole periods"] if rows.align else []
+    return ", ".join([*rate, *align, f"columns {', '.join(rows.columns)}"])
+
+
+def plan_for(loaded: LoadedJob, profile: Profile, brought: str, writing: Writing) -> ForConsumer:
+    """Return the plan of a job for a consumer; where rows keep no limits, and the job says so, a slower one.
+
+    Args:
+        loaded: From `job_for`, as the other two.
+        profile: Of the consumer.
+        brought: What it brought.
+        writing: How the rows are written.
+
+    Raises:
+        VerificationError: When they do not keep them, and the job says `when_over_limit: error`; it names
+            what was tried and helps.
+        InputError: When a move loosens a limit, or lacks one it needs.
+        PlanningError: When a move has no curve.
+    """
+    search = _Search(loaded, profile, writing)
+    said = (brought,) if brought else ()
+    first = search.attempt(loaded)
+    if first.keeps or not first.plan.verdict.passed or not all(map(_is_rate, first.over)):
+        return replace(first, said=said)
+    if loaded.job.when_over_limit == "error":
+        raise refusal(first, search.help(first))
+    other = search.other_rows(first)
+    made = search.slower(first) if other is None else other[0]
+    return replace(made, said=(*said, *made.said))
+
+
+def refusal(made: ForConsumer, remedies: Iterable[str]) -> VerificationError:
+    """Return why rows are not written for a consumer: what is worst, and what helps."""
+    plan = made.plan
+    worst = max(made.over, key=lambda found: found.excess).said_by(plan.loaded.say)
+    others = len({found.move for found in made.over} - {worst.move})
+    more = f" (and in {others} more move{'s' * (others > 1)})" if others else ""
+    hint = "; ".join(remedies) or "neither other rows nor a slower motion was found that keeps them"
+    of_rule = made.rules is not None and worst in made.rules.findings
+    text = f"{worst.rule if of_rule else made.where}: {worst.message}{more}"
+    problem = replace(worst, hint=hint).problem(text, plan.loaded.place_of_move(worst.move or 0))
+    return VerificationError(replace(problem, severity="error", kind=worst.rule if of_rule else worst.kind))
+
+
+def _is_rate(finding: Finding) -> bool:
+    """Return whether other rows, or a slower motion, may help against a finding of its kind."""
+    return (finding.kind in STRETCHABLE or finding.kind == "deviation") and finding.move is not None
+
+
+def _curable(finding: Finding) -> bool:
+    """Return whether a slower motion may help against a finding."""
+    worst = _FURTHEST if finding.kind == "deviation" else _HOPELESS
+    return _is_rate(finding) and bool(finding.limit) and finding.excess < worst
+
+
+class _Search:
+    """Search for the smallest remedy of rows that pass a limit as their consumer joins them."""
+
+    def __init__(self, loaded: LoadedJob, profile: Profile, writing: Writing) -> None:
+        self._loaded, self._profile, self._writing = loaded, profile, writing
+        self._shortest: float | None = None
+
+    def attempt(self, loaded: LoadedJob, adapted: Adaptation | None = None) -> ForConsumer:
+        """Return a plan with what its consumer makes of it."""
+        return self._judged(plan_job(loaded, adapted=adapted))
+
+    def _judged(self, plan: Plan) -> ForConsumer:
+        writing, grid, digits = self._writing, grid_of(plan), self._writing.digits or "fixed"
+        shortest = plan.trajectory.duration if self._shortest is None else self._shortest
+        self._shortest = shortest
+        rows = joined_rows(plan, grid, writing.form, digits)
+        if not plan.verdict.passed:
+            return ForConsumer(plan, self._profile, grid, rows, None, None, shortest, digits)
+        joined, rules = rows.judgement(slack=_SLACK), None
+        if joined is None or not any(finding.limit for finding in joined.findings):
+            rules = judge_as_written(plan, grid, self._profile, writing.form, digits=digits, log=writing.log)
+        made = ForConsumer(plan, self._profile, grid, rows, joined, rules, shortest, digits)
+        return made.with_every_bit() if made.coarse and writing.digits is None else made
+
+    def other_rows(self, made: ForConsumer) -> tuple[ForConsumer, Mapping[str, Any]] | None:
+        """Return the motion with other rows that the consumer takes and that keep all, and what changes."""
+        output, loaded = made.plan.loaded.job.output, made.plan.loaded
+        for other in rows_that_keep(made.rows, self._writing.form):
+            if self._profile.rows.rate is not None and {*other.output} != {"columns"}:
+                continue
+            job = loaded.job.model_copy(update={"output": output.model_copy(update=other.output)})
+            found = self._judged(replace(made.plan, loaded=replace(loaded, job=job)))
+            if found.clean:
+                words = ["rows at its knots"] if "rows" in other.output else []
+                words += [f"rows at {other.output['rate']:g} Hz"] if "rate" in other.output else []
+                words += (
+                    [f"columns {', '.join(other.output['columns'])}"] if "columns" in other.output else []
+                )
+                text = f"{' and '.join(words)} keep all limits as {self._profile.name} joins them"
+                return _with_event(found, "other_rows", text), other.output
+        return None
+
+    def slower(self, first: ForConsumer) -> ForConsumer:
+        """Return the shortest motion that was found whose rows keep all; `first` where none was."""
+        best: ForConsumer | None = None
+        for loaded, adapted in self._candidates(first):
+            with suppress(TrajcliError):
+                best = self._tightened(loaded, adapted, best) or best
+        if best is None:
+            return first
+        longer = best.plan.trajectory.duration / first.plan.trajectory.duration
+        text = f"{best.where}: stretched {longer:.6g} times so that its rows, joined, keep all limits"
+        return _with_event(best, "slowed", text)
+
+    def _candidates(self, first: ForConsumer) -> Iterator[tuple[LoadedJob, Adaptation]]:
+        """Yield jobs with rows that they may have, and how their moves are planned."""
+        yield self._loaded, Adaptation()
+        output, form = self._loaded.job.output, self._writing.form
+        columns: list[dict[str, Any]] = [{}]
+        jerk = any(np.isfinite(move.robot.limits.jerk).any() for move in first.plan.moves)
+        if "qdd" in output.columns and form.content != "log" and not jerk:
+            columns.append({"columns": self._profile.rows.columns[:3]})
+        if self._profile.rows.rate is None and has_knots(first.plan.trajectory):
+            for change in columns:
+                yield self._with_output({"rows": "knots", "times": None, **change}), Adaptation()
+        if isinstance(first.grid, UniformGrid) and form.content != "knots":
+            for change in columns:
+                yield self._with_output({"align": True, **change}), Adaptation(period=1 / first.grid.rate)
+
+    def _with_output(self, change: Mapping[str, Any]) -> LoadedJob:
+        output = self._loaded.job.output.model_copy(update=change)
+        return replace(self._loaded, job=self._loaded.job.model_copy(update={"output": output}))
+
+    def _tightened(
+        self, loaded: LoadedJob, adapted: Adaptation, best: ForConsumer | None
+    ) -> ForConsumer | None:
+        """Return a motion whose rows keep all, within tighter limits where that is needed.
+
+        Args:
+            loaded: The job.
+            adapted: How its moves are planned.
+            best: The shortest that is known; one that lasts longer is of no use.
+        """
+        for count in range(_ROUNDS):
+            report_progress(f"planning for {self._profile.name}, round {count + 1}")
+            made = self.attempt(loaded, adapted)
+            if best is not None and made.plan.trajectory.duration >= best.plan.trajectory.duration:
+                return None
+            if made.clean or not made.plan.verdict.passed:
+                return made if made.clean else None
+            tighter = _tighter(made, adapted)
+            if tighter is None:
+                return None
+            adapted = tighter
+        return None
+
+    def help(self, first: ForConsumer) -> Iterator[str]:
+        """Yield what helps, each tried, with its duration."""
+        other = self.other_rows(first)
+        if other is not None:
+            changed = dict(other[1])
+            columns = changed.pop("columns", None)
+            options = [f"--{key} {value}" for key, value in changed.items()]
+            instead = ""
+            if columns is not None:  # `--for` brings its own
+                options += [f"--set output.for={self._profile.name}", set_columns(columns)]
+                instead = " in place of `--for`"
+            duration = first.plan.trajectory.duration
+            yield f"`{' '.join(options)}`{instead} keeps all limits, with {duration:.6g} s as now"
+        job = self._loaded.job.model_copy(update={"when_over_limit": "slow"})
+        slow = _Search(replace(self._loaded, job=job), self._profile, self._writing)
+        slower = slow.slower(first)
+        if slower.keeps:
+            duration = slower.plan.trajectory.duration
+            yield f"`--set when_over_limit=slow` keeps all limits, with {duration:.6g} s"
+
+
+def _with_event(made: ForConsumer, kind: str, text: str) -> ForConsumer:
+    """Return a plan with one more event."""
+    events = (*made.plan.events, Event(kind, text))
+    return replace(made, plan=replace(made.plan, events=events))
+
+
+def _tighter(made: ForConsumer, adapted: Adaptation) -> Adaptation | None:
+    """Return how moves are planned so that rows do not pass what they pass now; None where nothing helps."""
+    plan, caps, longer = made.plan, dict(adapted.caps), dict[int, float]()
+    moves = {move.index: number for number, move in enumerate(plan.moves)}
+    if not all(map(_curable, made.over)):
+        return None
+    for kind, excess, joint, index in _passed(made):
+        for number in _movers(plan, moves[index]):
+            move = plan.moves[number]
+            if move.over_limit != "slow":
+                continue
+            if kind == "deviation":
+                _slow_down(caps, plan, number, max(excess**-0.5, _SLOWEST))
+            elif excess < _LITTLE and adapted.period is None and move.at_rest:
+                factor = excess ** (1 / (KIND_OF[kind].order or 1)) / _LESS
+                longer[move.index] = max(longer.get(move.index, 1.0), factor)
+            else:
+                _tighten(caps, plan, number, (kind, excess, joint))
+    if caps == adapted.caps and not longer:
+        return None
+    stretches = {index: adapted.stretches.get(index, 1.0) * factor for index, factor in longer.items()}
+    return replace(adapted, caps=caps, stretches={**adapted.stretches, **stretches})
+
+
+def _passed(made: ForConsumer) -> Iterator[tuple[str, float, int, int]]:
+    """Yield the kind of each limit that is passed, how many times, the joint (-1 for none) and the move."""
+    for share, order, joint, index in made.uses_over:
+        yield QUANTITIES[order], share, joint, index
+    names = made.plan.trajectory.joint_names
+    for finding in made.over:
+        joint = -1 if finding.joint is None else names.index(finding.joint)
+        yield finding.kind, finding.excess, joint, finding.move or 0
+
+
+def _movers(plan: Plan, number: int) -> Iterator[int]:
+    """Yield a move; where the arm stands in it, those beside it, whose rows its own are joined with."""
+    if plan.verdict.peaks[number][1].magnitude.any():
+        yield number
+        return
+    yield from (other for other in (number - 1, number + 1) if 0 <= other < len(plan.moves))
+
+
+def _slow_down(caps: dict[Cap, float], plan: Plan, number: int, share: float) -> None:
+    """Lower all caps of a move so that it moves at a share of its speed."""
+    for order in (1, 2, 3):
+        for joint, peak in enumerate(plan.verdict.peaks[number][order].magnitude.tolist()):
+            key = plan.moves[number].index, QUANTITIES[order], joint
+            if peak:
+                caps[key] = min(caps.get(key, np.inf), peak) * share**order
+
+
+def _tighten(caps: dict[Cap, float], plan: Plan, number: int, passed: tuple[str, float, int]) -> None:
+    """Lower the cap of a move: of the kind that is passed, by how many times, and whose it is."""
+    name, excess, joint = passed
+    move, kind = plan.moves[number], KIND_OF[name]
+    limits, share, reached = move.robot.limits, _LESS / excess, np.inf
+    if kind.of_tool:
+        limit = float(getattr(limits.tcp, kind.key))
+    elif name == "velocity_by_position":
+        limit, share = float(limits.velocity_by_position[joint, 0]), share**2
+    else:
+        limit = float(np.abs(getattr(limits, kind.key)[joint]).max())
+        if name in QUANTITIES:
+            reached = float(plan.verdict.peaks[number][kind.order or 0].magnitude[joint]) or np.inf
+    key = move.index, name, joint
+    caps[key] = min(caps.get(key, np.inf), reached, limit) * share

@@ -1,0 +1,76 @@
+"""Moves planned for what a consumer makes of their rows: within tighter limits, or from row to row."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import field, replace
+from typing import Any
+
+import numpy as np
+
+from trajcli.frozen import frozen
+from trajcli.kinematics.robot import Robot
+from trajcli.limits.kinds import KIND_OF
+from trajcli.planners.planner import Planned, PlannedMove
+from trajcli.planning.retime import with_duration
+from trajcli.trajectory import State
+
+Cap = tuple[int, str, int]
+"""What is tightened: index of a move, kind of a limit, index of a joint, -1 for the tool."""
+
+
+@frozen
+class Adaptation:
+    """By what moves are planned otherwise than their limits alone say.
+
+    Attributes:
+        caps: Magnitudes within which they are planned, SI.
+        stretches: How many times longer a move lasts behind that, by its index.
+        period: Of rows on which the breaks of their curves shall fall, s; None for any.
+        known: Moves that were planned already, with all that they depend on.
+    """
+
+    caps: Mapping[Cap, float] = field(default_factory=dict)
+    stretches: Mapping[int, float] = field(default_factory=dict)
+    period: float | None = None
+    known: dict[Any, PlannedMove] = field(default_factory=dict)
+
+    def tightens(self, move: int) -> bool:
+        """Return whether a limit of a move is tightened."""
+        return any(index == move for index, _, _ in self.caps)
+
+    def key(self, move: int, start: State, grid: tuple[float, bool]) -> Any:  # noqa: ANN401
+        """Return all that a move depends on beside the job: its start, the grid of its rows, and this."""
+        own = ((*key[1:], cap) for key, cap in self.caps.items() if key[0] == move)
+        state = b"".join(each.tobytes() for each in (start.position, start.velocity, start.acceleration))
+        return move, state, grid, tuple(sorted(own)), self.stretches.get(move, 1.0), self.period
+
+    def stretched(self, move: PlannedMove) -> PlannedMove:
+        """Return a move that lasts longer, where it shall."""
+        factor = self.stretches.get(move.index, 1.0)
+        return move if factor == 1 or move.duration == 0 else with_duration(move, move.duration * factor)
+
+    def within(self, robot: Robot, move: int) -> Robot:
+        """Return the robot with the limits within which a move is planned."""
+        limits = robot.limits
+        for (index, name, joint), cap in self.caps.items():
+            if index != move:
+                continue
+            kind = KIND_OF[name]
+            if kind.of_tool:
+                limits = replace(limits, tcp=replace(limits.tcp, **{kind.key: cap}))
+                continue
+            bounds = np.array(getattr(limits, kind.key))
+            if name == "velocity_by_position":
+                bounds[joint, 0] = cap
+            else:
+                bounds[joint] = np.clip(bounds[joint], -cap, cap)
+            changed: dict[str, Any] = {kind.key: bounds}
+            limits = replace(limits, **changed)
+        return robot if limits is robot.limits else replace(robot, limits=limits)
+
+
+def without_bounds(planned: Planned) -> Planned:
+    """Return a motion within tightened limits without what it says of the fastest within them."""
+    events = tuple(event for event in planned.events if event.kind != "bound")
+    return replace(planned, events=events, certificate=None, binding_phases=False)
