@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
+import shlex
 from pathlib import Path
 
 import pytest
 from running import call
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
 FR3 = """\
 version: 1
 robot: fr3
@@ -203,3 +206,22 @@ def test_names_and_columns(tmp_path: Path, capfd: pytest.CaptureFixture[str]) ->
     assert code == 2
     assert "cannot be judged by ur-servoj" in err
     assert "`output.columns` needs t and q" in err
+
+
+def test_a_refusal_names_what_was_tried_and_helps(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Each remedy, followed to the letter, gives the duration that it states."""
+    for name, profile in (("ur5e_pick", "ros-jtc"), ("time_optimal", "ur-servoj"), ("sync", "ros-jtc")):
+        job, rows = str(EXAMPLES / f"{name}.yaml"), str(tmp_path / "rows.csv")
+        code, _, err = call(capfd, "plan", job, "--for", profile, "-o", rows)
+        assert (code, Path(rows).exists()) == (1, False)
+        assert re.search(
+            rf"error: for {profile} at \d+ Hz: the (jerk|acceleration|velocity) of \w+ reaches", err
+        )
+        remedies = re.findall(r"`(--[^`]+)`( in place of `--for`)? keeps all limits, with ([\d.]+) s", err)
+        assert remedies
+        for options, instead, duration in remedies:
+            named = [] if instead else ["--for", profile]
+            code, _, err = call(capfd, "plan", job, *named, *shlex.split(options), "-o", rows)
+            assert code == 0, err
+            assert f", {duration} s, " in err
+            Path(rows).unlink()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.interpolate import BPoly
+from joined_by_scipy import largest_share
 
 import trajcli
 from trajcli.job.read import load_job
@@ -26,23 +26,8 @@ def planned(name: str, *sets: str) -> Plan:
 
 
 def factor_by_scipy(plan: Plan) -> float:
-    """Return the largest share of a joint's limit that Hermite curves through all rows use, by dense samples."""
-    groups = tuple(group for group in ("q", "qd", "qdd") if group in plan.loaded.job.output.columns)
-    grid, joints = grid_of(plan), len(plan.trajectory.joint_names)
-    rows = np.concatenate([*sample(plan.trajectory, grid, groups)]).reshape(grid.count, len(groups), joints)
-    t = np.concatenate([local for _, local in grid.blocks()])
-    curve, worst = BPoly.from_derivatives(t, rows), 0.0
-    lengths = np.diff(t)
-    long = lengths > (1e-4 if len(groups) > 2 else 1e-5)  # in shorter ones rounding is a jerk of its own
-    times = (t[:-1, None] + lengths[:, None] * np.linspace(1e-9, 1 - 1e-9, 41))[long].ravel()
-    owner = np.searchsorted([span.start for span in plan.trajectory.spans], times, "right") - 1
-    for order in range(1, 2 * len(groups)):
-        if order > min(len(groups), 3):
-            break
-        values = curve.derivative(order)(times)
-        bounds = np.stack([move.robot.limits.of_order(order) for move in plan.moves])[owner]
-        worst = max(worst, float(np.maximum(values / bounds[..., 0], values / bounds[..., 1]).max()))
-    return worst
+    """Return the largest share of a joint's limit that Hermite curves through all rows use."""
+    return largest_share(plan, grid_of(plan), 1e-4 if "qdd" in plan.loaded.job.output.columns else 1e-6)
 
 
 @pytest.mark.parametrize(

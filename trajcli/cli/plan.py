@@ -168,9 +168,8 @@ def _refusal(plan: Plan, options: PlanCommand, made: ForConsumer | None) -> Veri
     from trajcli.output.consumer import refusal_of
     from trajcli.output.for_consumer import refusal
 
-    if made.rules is not None:
-        return refusal_of(plan, made.rules, strict=options.strict)
-    return refusal(made, ()) if made.over else None
+    broken = None if made.rules is None else refusal_of(plan, made.rules, strict=options.strict)
+    return broken or (refusal(made, ()) if made.over else None)
 
 
 def _problem(plan: Plan, event: Event) -> Problem:

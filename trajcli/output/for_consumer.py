@@ -75,7 +75,8 @@ class ForConsumer:
         rules: What the rows do against the rules; None likewise, and where the joined curve is over a limit.
         shortest: How long the motion lasts when nobody joins its rows, s.
         digits: With which its numbers are written as text.
-        chosen: Whether that is because nine decimals are few.
+        decimal: Whether they are written as text.
+        chosen: Whether every digit is written because nine decimals are few.
         said: What there is to say about its rows, one line each.
     """
 
@@ -87,6 +88,7 @@ class ForConsumer:
     rules: ProfileJudgement | None
     shortest: float
     digits: Digits
+    decimal: bool = True
     chosen: bool = False
     said: tuple[str, ...] = ()
 
@@ -104,27 +106,21 @@ class ForConsumer:
 
     @property
     def uses_over(self) -> list[tuple[float, int, int, int]]:
-        """Limits that are passed between rows at knots, as `JoinedRows.uses` says: some stand very near.
+        """Limits of joints that are passed between rows, as `JoinedRows.uses` says.
 
-        What the rounding of their stamps makes is no fault of the motion, but the consumer runs it.
+        Where rows stand very near, their stamps and last bits explain some; but the consumer runs them.
         """
-        judged = self.rows.judged_orders
-        uses = self.rows.uses() if isinstance(self.grid, KnotGrid) else ()
-        return [use for use in uses if use[0] > 1 + _SLACK and use[1] <= judged]
+        return [u for u in self.rows.uses() if u[0] > 1 + _SLACK and u[1] <= self.rows.judged_orders]
 
     @cached_property
     def coarse(self) -> bool:
-        """Whether the decimals of rows at knots make up much of a limit."""
-        return isinstance(self.grid, KnotGrid) and self.rows.rounding() > _COARSE
+        """Whether the decimals of the rows make up much of a limit."""
+        return self.digits == "fixed" and self.decimal and self.rows.rounding() > _COARSE
 
     @property
     def clean(self) -> bool:
         """Whether the rows may be written, and rounding makes nothing of them that is worth speaking of."""
         return self.keeps and not self.uses_over and not self.coarse
-
-    def with_every_bit(self) -> ForConsumer:
-        """Return the same with numbers that are written with all their bits."""
-        return replace(self, rows=replace(self.rows, exact=True), digits="full", chosen=True)
 
     @property
     def where(self) -> str:
@@ -223,7 +219,7 @@ def plan_for(loaded: LoadedJob, profile: Profile, brought: str, writing: Writing
     """
     search = _Search(loaded, profile, writing)
     said = (brought,) if brought else ()
-    first = search.attempt(loaded)
+    first = search.attempt(loaded, rules=True)
     if first.keeps or not first.plan.verdict.passed or not all(map(_is_rate, first.over)):
         return replace(first, said=said)
     if loaded.job.when_over_limit == "error":
@@ -264,22 +260,32 @@ class _Search:
         self._loaded, self._profile, self._writing = loaded, profile, writing
         self._shortest: float | None = None
 
-    def attempt(self, loaded: LoadedJob, adapted: Adaptation | None = None) -> ForConsumer:
+    def attempt(
+        self, loaded: LoadedJob, adapted: Adaptation | None = None, *, rules: bool = False
+    ) -> ForConsumer:
         """Return a plan with what its consumer makes of it."""
-        return self._judged(plan_job(loaded, adapted=adapted))
+        return self._judged(plan_job(loaded, adapted=adapted), by_rules=rules)
 
-    def _judged(self, plan: Plan) -> ForConsumer:
+    def _judged(self, plan: Plan, *, by_rules: bool = False) -> ForConsumer:
+        """Return what the consumer makes of a plan; by rules only where rows keep the limits, or as asked."""
+        # the curve is judged by exact numbers; what their decimals make of it is looked at apart
         writing, grid, digits = self._writing, grid_of(plan), self._writing.digits or "fixed"
         shortest = plan.trajectory.duration if self._shortest is None else self._shortest
         self._shortest = shortest
-        rows = joined_rows(plan, grid, writing.form, digits)
+        rows = joined_rows(plan, grid, writing.form, "full")
         if not plan.verdict.passed:
-            return ForConsumer(plan, self._profile, grid, rows, None, None, shortest, digits)
+            return ForConsumer(
+                plan, self._profile, grid, rows, None, None, shortest, digits, writing.form.decimals
+            )
         joined, rules = rows.judgement(slack=_SLACK), None
-        if joined is None or not any(finding.limit for finding in joined.findings):
+        if by_rules or joined is None or not any(finding.limit for finding in joined.findings):
             rules = judge_as_written(plan, grid, self._profile, writing.form, digits=digits, log=writing.log)
-        made = ForConsumer(plan, self._profile, grid, rows, joined, rules, shortest, digits)
-        return made.with_every_bit() if made.coarse and writing.digits is None else made
+        made = ForConsumer(
+            plan, self._profile, grid, rows, joined, rules, shortest, digits, writing.form.decimals
+        )
+        if made.coarse and writing.digits is None:
+            return replace(made, digits="full", chosen=True)
+        return made
 
     def other_rows(self, made: ForConsumer) -> tuple[ForConsumer, Mapping[str, Any]] | None:
         """Return the motion with other rows that the consumer takes and that keep all, and what changes."""
@@ -308,6 +314,8 @@ class _Search:
         if best is None:
             return first
         longer = best.plan.trajectory.duration / first.plan.trajectory.duration
+        if longer <= 1 + _LONGER:
+            return _with_event(best, "for_consumer", f"{best.where}: its breaks fall on rows")
         text = f"{best.where}: stretched {longer:.6g} times so that its rows, joined, keep all limits"
         return _with_event(best, "slowed", text)
 

@@ -46,6 +46,7 @@ _CONTINUOUS = 1e-9  # of the largest value of a joint: a step below that is roun
 _PERIOD = 1e-9  # relative: what the last row may be off its grid by
 _HALF_UNIT = 0.5e-9  # of nine decimals
 _TWO = 2
+_MOVED = 1e-13  # rad or m
 _OF_ROUNDING = {"linear": (1.0,), "cubic": (1.5, 6.0), "quintic": (1.875, 10 / 3**0.5, 60.0)}
 _STATES: tuple[Group, ...] = ("q", "qd", "qdd")
 _OF_POSES: tuple[Group, ...] = ("pose", "twist", "twistd")  # from which the joints are found back
@@ -132,14 +133,14 @@ class JoinedRows:
         return chosen is not None and not any(self._unproven(t, _DEGREES[chosen]).size for t, _ in blocks)
 
     def rounding(self) -> float:
-        """Return which share of a limit the decimals of the rows alone may make up, between the nearest two.
+        """Return which share of a limit nine decimals alone may make up, between the nearest two rows.
 
         A position that is off by e at one end of a quintic of length h makes a jerk of 60 e / h^3, an
         acceleration of 10 e / (sqrt(3) h^2) and a velocity of 15 e / (8 h); of a cubic it is 6 e / h^2 and
         3 e / (2 h).
         """
         chosen, plan = self.interpolation, self.plan
-        if self.exact or chosen is None or self.grid.count < _TWO:
+        if chosen is None or self.grid.count < _TWO:
             return 0.0
         length = min(float(np.diff(times).min()) for times, _ in self._blocks() if times.size > 1)
         factors = joint_factors(plan.trajectory.joint_types, plan.loaded.output_units)
@@ -217,7 +218,20 @@ class JoinedRows:
         for piece in np.flatnonzero(high_degree[max(low - 1, 0) : high]) + max(low - 1, 0):
             ends = np.searchsorted(times, curve.breaks[piece : piece + 2])
             found[ends[0] : ends[1] + 1] = True
+        low, high = np.searchsorted(self._moved, (times[0] - near, times[-1] + near))
+        at = np.searchsorted(times, self._moved[low:high] - near)
+        found[at] = found[at + 1] = True
         return np.flatnonzero(found[1 : count + 1])
+
+    @cached_property
+    def _moved(self) -> Array:
+        """Times of knots whose position is not that of the curve: behind steps of the acceleration."""
+        grid, curve = self.grid, self.plan.trajectory.curve
+        if not isinstance(grid, KnotGrid):
+            return np.empty(0)
+        times = grid.local[grid.at]
+        off = np.abs(grid.states[0] - curve.evaluate(np.minimum(times + curve.start, curve.end)))
+        return np.asarray(times[(off > _MOVED).any(axis=1)])
 
     def _steps(self, degree: int) -> NDArray[np.bool_]:
         """Return at which breaks a derivative steps that the rows state, shape (pieces + 1,)."""

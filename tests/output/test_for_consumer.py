@@ -1,0 +1,143 @@
+"""Plans for a consumer: rows that keep all limits as they are joined, against scipy's curves."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from joined_by_scipy import largest_share
+
+import trajcli
+from trajcli.curves.operations import scale_time
+from trajcli.grids import UniformGrid
+from trajcli.job.read import load_job
+from trajcli.output.for_consumer import ForConsumer, Writing, job_for, plan_for
+from trajcli.planners.point_to_point.whole_periods import PhasesInPeriods, profile_in_periods
+from trajcli.streams.formats import FORMATS
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+WITHIN = 1e-6
+
+
+def made_for(name: str, profile: str, *sets: str, form: str = "csv") -> ForConsumer:
+    loaded = load_job(str(EXAMPLES / f"{name}.yaml"), ("when_over_limit=slow", *sets))
+    with np.errstate(all="ignore"):
+        return plan_for(*job_for(loaded, profile, {}), Writing(FORMATS[form]))  # type: ignore[index]
+
+
+@pytest.mark.parametrize(
+    ("name", "profile", "longest"),
+    [
+        ("ur5e_pick", "ros-jtc", 1.0),  # at its knots
+        ("ur5e_pick", "ur-servoj", 1.001),  # with its breaks on rows
+        ("ur5e_pick", "ur-passthrough", 1.005),
+        ("time_optimal", "ros-jtc", 1.001),  # at its knots, without accelerations
+        ("time_optimal", "ur-servoj", 1.14),
+        ("moveit_limits", "ros-jtc", 1.0),
+        ("sync", "ros-jtc", 1.11),  # at 2 Hz, with ramps that no row can show
+        ("scara_pick", "ros-jtc", 1.0),
+        ("trapezoid", "ros-jtc", 1.0),
+    ],
+)
+def test_rows_keep_all_limits_as_they_are_joined(name: str, profile: str, longest: float) -> None:
+    made = made_for(name, profile)
+    assert made.keeps
+    share = largest_share(made.plan, made.grid, 1e-4 if made.rows.interpolation == "quintic" else 1e-6)
+    assert share <= 1 + 10 * WITHIN, f"{share - 1:.3g} above a limit"
+    assert made.plan.trajectory.duration <= made.shortest * longest * (1 + 1e-9)
+    said = re.search(r"([\d.]+) % longer", made.summary)
+    longer = made.plan.trajectory.duration / made.shortest - 1
+    assert (said is None) == (longer <= WITHIN)
+    if said is not None:
+        assert float(said[1]) == pytest.approx(100 * longer, rel=0.06)
+
+
+def test_the_summary_says_what_the_joined_curve_uses() -> None:
+    made = made_for("time_optimal", "ur-servoj")
+    assert made.summary.startswith("for ur-servoj at 500 Hz: joined as it will be, ")
+    said = re.search(r"([\d.]+) % of the (\w+) of (\w+) used", made.summary)
+    assert said is not None
+    share = largest_share(made.plan, made.grid, 1e-4)
+    assert float(said[1]) == pytest.approx(100 * share, rel=2e-3)
+
+
+@pytest.mark.parametrize("name", ["ur5e_pick", "time_optimal"])
+def test_no_smaller_uniform_stretch_does_it(name: str) -> None:
+    """Scaled as a whole by ever more, the planned motion keeps its limits between rows no sooner."""
+    made, rate = made_for(name, "ur-servoj"), 500.0
+    with np.errstate(all="ignore"):
+        plan = trajcli.plan_job(
+            load_job(str(EXAMPLES / f"{name}.yaml"), ("output.align=true", f"output.rate={rate}"))
+        )
+    factor = made.plan.trajectory.duration / plan.trajectory.duration
+    for less in np.linspace(1.0, factor, 8, endpoint=False)[1:]:
+        longer = plan.trajectory.duration * less
+        slower = replace(
+            plan,
+            trajectory=replace(
+                plan.trajectory,
+                curve=scale_time(plan.trajectory.curve, less),
+                spans=tuple(
+                    replace(span, start=span.start * less, end=span.end * less)
+                    for span in plan.trajectory.spans
+                ),
+            ),
+        )
+        grid = UniformGrid(longer, rate)
+        assert largest_share(slower, grid, 1e-4) > 1 + WITHIN
+
+
+def test_python_and_batch_plan_for_a_consumer(tmp_path: Path) -> None:
+    job = tmp_path / "job.yaml"
+    job.write_text((EXAMPLES / "ur5e_pick.yaml").read_text() + "\nwhen_over_limit: slow\n")
+    plan = trajcli.plan(job, consumer="ur-servoj")
+    plan.save(tmp_path / "python.csv")
+    (outcome,) = trajcli.batch([job], tmp_path / "out", consumer="ur-servoj", processes=1)
+    assert outcome.outcome == "written"
+    text = (tmp_path / "python.csv").read_text()
+    assert (tmp_path / "out" / "job.csv").read_text() == text
+    assert text.count("\n") == round(plan.trajectory.duration * 500) + 2
+
+
+@pytest.mark.parametrize("smooth", [True, False])
+def test_phases_of_whole_periods(smooth: bool) -> None:
+    """Every law has its distance, keeps its limits, breaks on rows, and lasts hardly longer than the fastest."""
+    rng = np.random.default_rng(5)
+    for _ in range(60):
+        period = float(rng.choice([1e-3, 2e-3, 8e-3]))
+        distance = float(10 ** rng.uniform(-2, 1))
+        bounds = [float(10 ** rng.uniform(low, high)) for low, high in ((-0.5, 0.7), (0, 1.3), (1.5, 3))]
+        fastest = _fastest(distance, *bounds, smooth=smooth)
+        found = PhasesInPeriods(period, smooth=smooth).common([distance], [bounds], fastest)
+        assert found is not None
+        count, (lengths,) = found
+        assert sum(lengths[k] * n for k, n in enumerate((4 if smooth else 2, 2, 1))) == count
+        curve = profile_in_periods(0.3, -distance, lengths, period, smooth=smooth).curve()
+        assert curve.evaluate(np.array([curve.end]))[0, 0] == pytest.approx(
+            0.3 - distance, abs=1e-9 * distance
+        )
+        rows = curve.breaks / period
+        assert np.abs(rows - np.rint(rows)).max() < 1e-6
+        for order, bound in enumerate(bounds[: 3 if smooth else 2], 1):
+            ends = np.abs(np.stack(curve.piece_ends(order)))
+            assert ends.max() <= bound * (1 + 1e-9)
+        assert count * period <= fastest * 1.001 + 5 * period
+
+
+def _fastest(distance: float, velocity: float, acceleration: float, jerk: float, *, smooth: bool) -> float:
+    """Return the duration of the fastest motion from rest to rest, by ruckig."""
+    ruckig = pytest.importorskip("ruckig")
+    wanted = ruckig.InputParameter(1)
+    wanted.target_position, wanted.max_velocity, wanted.max_acceleration = (
+        [distance],
+        [velocity],
+        [acceleration],
+    )
+    if smooth:
+        wanted.max_jerk = [jerk]
+    answer = ruckig.Trajectory(1)
+    ruckig.Ruckig(1).calculate(wanted, answer)
+    return float(answer.duration)
