@@ -119,6 +119,7 @@ def as_planned(judgement: Judgement, slack: float = JOINED_RELATIVE) -> Judgemen
         of_tool = worst.kind.startswith("tool_")
         what = worst.kind.removeprefix("tool_").replace("_", " ")
         what += " of the tool" if of_tool else "" if worst.joint is None else f" of {worst.joint}"
-        said = f"joined_over_limit: the rows, joined between them, pass the limit of the {what}"
+        passed = "tolerance of the path of the tool" if worst.kind == "deviation" else f"limit of the {what}"
+        said = f"joined_over_limit: the rows, joined between them, pass the {passed}"
         events = (*events, f"{said}, by a factor of {worst.excess:.6g}")
     return replace(judgement, findings=worst_first(findings), events=events, planned_rows=True)
