@@ -62,3 +62,26 @@ def _matrices(k: int) -> tuple[Array, Array]:
     to_r = shift @ inverse
     from_a = to_r @ (np.eye(k, dtype=int) - taylor)
     return from_a[:, 1:].astype(np.float64), to_r.astype(np.float64)
+
+
+_ERRORS = {
+    2: (1 / 384, 3**0.5 / 216, 1 / 12, 1 / 2),
+    3: (1 / 46080, 5**0.5 / 30000, 1 / 1920, 1 / 120),
+}
+
+
+def hermite_errors(bound: Array, length: float, stated: int) -> Array:
+    """Return by how much a Hermite polynomial of a smooth curve is off at most, and its derivatives up to 3.
+
+    Args:
+        bound: Of the magnitude of the curve's derivative of order 2 `stated`, any shape.
+        length: Of the interval.
+        stated: How many of position, velocity and acceleration both share at its ends, 2 or 3.
+
+    Returns:
+        Shape (4, *bound.shape).
+
+    Source: Birkhoff and Priver, Hermite interpolation errors for derivatives (1967), table of constants for
+        cubics and quintics.
+    """
+    return np.stack([c * length ** (2 * stated - k) * bound for k, c in enumerate(_ERRORS[stated])])

@@ -31,6 +31,7 @@ from trajcli.judge.reconstruction import Interpolation, chosen_interpolation
 from trajcli.judge.rounding import PieceRows, stated_errors
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.limits.tolerances import JOINED_RELATIVE
+from trajcli.output.period_bound import pieces_within
 from trajcli.planning.plan import Plan
 from trajcli.samples import sample
 from trajcli.streams.recorded_motion import Resolution
@@ -45,6 +46,7 @@ _SPACING = 4.0  # units in the last place of a length
 _CONTINUOUS = 1e-9  # of the largest value of a joint: a step below that is rounding
 _PERIOD = 1e-9  # relative: what the last row may be off its grid by
 _HALF_UNIT = 0.5e-9  # of nine decimals
+_NEGLIGIBLE = 2e-7  # relative: what is above a limit between rows by less needs no look
 _TWO = 2
 _MOVED = 1e-13  # rad or m
 _OF_ROUNDING = {"linear": (1.0,), "cubic": (1.5, 6.0), "quintic": (1.875, 10 / 3**0.5, 60.0)}
@@ -214,14 +216,23 @@ class JoinedRows:
         steps: NDArray[np.bool_] = self._steps(degree)[low:high]
         at = after[np.logical_and(on_row, steps)]
         found[at] = found[at + 1] = True
-        high_degree: NDArray[np.bool_] = np.any(curve.coefficients[: -(degree + 1)], axis=(0, 2))
-        for piece in np.flatnonzero(high_degree[max(low - 1, 0) : high]) + max(low - 1, 0):
+        other = self._others(degree)
+        for piece in np.flatnonzero(other[max(low - 1, 0) : high]) + max(low - 1, 0):
             ends = np.searchsorted(times, curve.breaks[piece : piece + 2])
             found[ends[0] : ends[1] + 1] = True
         low, high = np.searchsorted(self._moved, (times[0] - near, times[-1] + near))
         at = np.searchsorted(times, self._moved[low:high] - near)
         found[at] = found[at + 1] = True
         return np.flatnonzero(found[1 : count + 1])
+
+    def _others(self, degree: int) -> NDArray[np.bool_]:
+        """Return which pieces are not of the degree of the joined curve, nor as near to one as counts."""
+        curve = self.plan.trajectory.curve
+        other: NDArray[np.bool_] = np.any(curve.coefficients[: -(degree + 1)], axis=(0, 2))
+        if degree > 1 and isinstance(self.grid, UniformGrid) and other.any():
+            within = pieces_within(self.plan, 1 / self.grid.rate, (degree + 1) // 2, _NEGLIGIBLE)
+            other = np.logical_and(other, np.logical_not(within))
+        return other
 
     @cached_property
     def _moved(self) -> Array:
