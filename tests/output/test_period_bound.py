@@ -79,7 +79,7 @@ def test_a_path_of_the_tool_counts() -> None:
     judged = joined_rows(plan, grid_of(plan), FORMATS["csv"], "full").judgement(slack=1e-6)
     monkey = pytest.MonkeyPatch()
     monkey.setattr(
-        "trajcli.output.joined_rows.pieces_within", lambda *_: np.zeros(plan.trajectory.curve.pieces, bool)
+        "trajcli.output.period_bound.pieces_within", lambda *_: np.zeros(plan.trajectory.curve.pieces, bool)
     )
     all_seen = joined_rows(plan, grid_of(plan), FORMATS["csv"], "full").judgement(slack=1e-6)
     monkey.undo()

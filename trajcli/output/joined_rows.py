@@ -31,7 +31,6 @@ from trajcli.judge.reconstruction import Interpolation, chosen_interpolation
 from trajcli.judge.rounding import PieceRows, stated_errors
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.limits.tolerances import JOINED_RELATIVE
-from trajcli.output.period_bound import pieces_within
 from trajcli.planning.plan import Plan
 from trajcli.samples import sample
 from trajcli.streams.recorded_motion import Resolution
@@ -230,6 +229,8 @@ class JoinedRows:
         curve = self.plan.trajectory.curve
         other: NDArray[np.bool_] = np.any(curve.coefficients[: -(degree + 1)], axis=(0, 2))
         if degree > 1 and isinstance(self.grid, UniformGrid) and other.any():
+            from trajcli.output.period_bound import pieces_within
+
             within = pieces_within(self.plan, 1 / self.grid.rate, (degree + 1) // 2, _NEGLIGIBLE)
             other = np.logical_and(other, np.logical_not(within))
         return other
