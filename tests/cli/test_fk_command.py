@@ -249,3 +249,42 @@ def test_a_remark_speaks_the_units_of_the_columns(arms, tmp_path):
     # 5 deg = 0.08726646259971647 rad: nine decimals round it up, beyond the limit
     assert arms.call("fk", "--robot", path, "-", stdin="q1,q2\n0.087266463,0.05\n").err == ""
     assert "in 1 of 1 rows" in arms.call("fk", "--robot", path, "-", stdin="q1,q2\n0.087266464,0.05\n").err
+
+
+@pytest.mark.parametrize("command", ["fk", "ik", "jacobian"])
+def test_a_base_may_be_said(arms, command):
+    base, joints = "{xyz: [0.1, 0.2, 0.3], rpy: [0, 0, 90]}", (10, -80, 70, 20, 80, 30)
+    from_base = np.array(arms.json("fk", "-r", "ur5e", "--frame", "base", *joints)["matrix"])
+    moved = arms.json("fk", "-r", "ur5e", "--base", base, *joints)
+    turned = np.array([[0, -1, 0, 0.1], [1, 0, 0, 0.2], [0, 0, 1, 0.3], [0, 0, 0, 1]])
+    assert np.array(moved["matrix"]) == pytest.approx(turned @ from_base, abs=1e-12)
+    if command == "ik":
+        w, x, y, z = moved["quat_wxyz"]
+        asked = f"{{xyz: {moved['xyz']}, quat_wxyz: [{w}, {x}, {y}, {z}]}}"
+        answers = arms.json("ik", "-r", "ur5e", "--base", base, "--pose", asked)
+        nearest = [np.abs(np.array(one["joints"]) - joints).max() for one in answers]
+        assert min(nearest) < 1e-6
+    if command == "jacobian":
+        told = [arms.json("jacobian", "-r", "ur5e", *more, *joints) for more in ((), ("--base", base))]
+        own, there = (np.array(each["jacobian"]) for each in told)
+        in_world = np.array(arms.json("fk", "-r", "ur5e", *joints)["matrix"])
+        turn = turned[:3, :3] @ from_base[:3, :3] @ in_world[:3, :3].T
+        assert there == pytest.approx(np.kron(np.eye(2), turn) @ own, abs=1e-12)
+
+
+def test_a_base_counts_for_nothing_from_the_base(arms):
+    refused = arms.call("fk", "-r", "ur5e", "--frame", "base", "--base", "{xyz: [0, 0, 1]}", *HOME)
+    assert refused.code == 2
+    assert "leave --base out" in refused.err
+
+
+def test_rows_made_with_a_tool_say_that_it_is_missing(arms):
+    tool = "{xyz: [0, 0, 0.12]}"
+    pose = arms.json("fk", "-r", "ur5e", "--tool", tool, *HOME)
+    cells = [*np.radians(np.array(HOME, float)), *pose["xyz"], *pose["quat_wxyz"]]
+    rows = "q1,q2,q3,q4,q5,q6,x,y,z,qw,qx,qy,qz\n" + ",".join(map(repr, map(float, cells))) + "\n"
+    bare = arms.call("fk", "-r", "ur5e", "-", stdin=rows)
+    assert "up to 0.12 m from that of UR5e" in bare.err
+    assert "--tool, --base or --robot JOB" in bare.err
+    for more in (("--tool", tool), ("--frame", "base")):
+        assert arms.call("fk", "-r", "ur5e", *more, "-", stdin=rows).err == ""

@@ -10,9 +10,8 @@ from collections.abc import Mapping
 from typing import Annotated, Literal
 
 import typer
-import typer.core
 
-from trajcli.cli.command import Command
+from trajcli.cli.command import Command, Words
 from trajcli.cli.options import (
     ArmUnits,
     Base,
@@ -31,7 +30,7 @@ JOINED = ("--qd", "--qdd", "--near", "--point", "--s")
 ROBOT_FILES = (".yaml", ".yml", ".urdf")
 
 
-class NumbersParser(typer.core.TyperCommand):
+class NumbersParser(Words):
     """Takes `--qd 1 -2 3` as one option and `-90` as a number, with or without `--` before it."""
 
     def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]
@@ -119,6 +118,7 @@ class FkCommand(NumbersCommand):
     robot: RobotName
     joints: Joints
     tool: Tool = None
+    base: Base = None
     frame: Annotated[
         Literal["world", "base"], typer.Option("--frame", help="Where the pose is counted from.")
     ] = "world"
@@ -167,6 +167,7 @@ class IkCommand(NumbersCommand):
         typer.Option("--tolerance", metavar="TOL", help="What an answer may miss by, m and rad: 1e-12 to 1."),
     ] = 1e-6
     tool: Tool = None
+    base: Base = None
     units: ArmUnits = None
     si: Si = False
     as_json: Json = False
@@ -185,6 +186,7 @@ class JacobianCommand(NumbersCommand):
     robot: RobotName
     joints: Joints
     tool: Tool = None
+    base: Base = None
     frame: Annotated[
         Literal["world", "base", "tcp"], typer.Option("--frame", help="In whose axes the rows are written.")
     ] = "world"

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from trajcli.cli.numbers import number, table_lines
-from trajcli.cli.outcome import print_json, print_lines, print_remark
-from trajcli.errors import Amount, Place, Problem, at_least
+from trajcli.cli.outcome import error_as_json, print_json, print_lines, print_remark, report_error
+from trajcli.errors import Amount, InputError, Place, Problem, TrajcliError, at_least
 from trajcli.findings import Finding
 from trajcli.judge.file import CheckedFile, CheckOptions, check_file
 from trajcli.judge.judgement import Judgement
+from trajcli.output.annotations import AnnotationForm, annotations_of, render_annotations
+from trajcli.streams.reading import motion_files
 from trajcli.units import Units, amount_text
 
 if TYPE_CHECKING:
@@ -40,36 +42,73 @@ def _delivered(loaded: LoadedJob, profile: str | None) -> Plan:
 
 
 def run_check(options: CheckCommand) -> int:
-    """Judge a file and print what was found; return 0 when nothing is certainly wrong, else 1.
+    """Judge files and print what was found; return 0 when nothing is certainly wrong, else 1 or worse.
 
     Raises:
-        InputError: When the file is no trajectory, or options do not fit.
-        FileError: When a file cannot be read.
+        InputError: When the only file is no trajectory, or options do not fit.
+        FileError: When the only file cannot be read.
     """
-    checked = check_file(options.file, options.part(CheckOptions), delivered=_delivered)
-    beside = None
-    if options.reference:
-        from trajcli.peers.motion_reference import compared
+    files = [file for name in options.files for file in motion_files(name)]
+    form, alone, code = _form(options, files), files == options.files[:1], 0
+    found, problems = list[dict[str, Any]](), list[Problem]()
+    for file in files:
+        try:
+            checked, beside = _judged(file, options)
+        except TrajcliError as error:
+            if alone:
+                raise
+            code = max(code, error.exit_code)
+            found.append({"file": file, **error_as_json(error)})
+            problems += annotations_of(error, file)
+            if form in ("table", "json"):
+                report_error(error, options.errors)
+            continue
+        code = max(code, _failed(checked.judgement, strict=options.strict))
+        problems += _annotations(checked, file)
+        mapping = checked.judgement.as_json() | ({} if beside is None else {"reference": _view(beside)})
+        found.append(mapping if alone else {"file": file, **mapping})
+        if form == "table":
+            print_lines([*_lines(checked), *([] if beside is None else _beside(beside, checked.units))])
+        for event in checked.judgement.events:
+            print_remark(f"  event: {event}" if alone else f"{file}: event: {event}")
+    if form == "json":
+        print_json(found[0] if alone else found)
+    elif form != "table":
+        _print_annotations(problems, form, files)
+    return code
 
-        judgement, beside = compared(checked)
-        checked = replace(checked, judgement=judgement)
-    judgement = checked.judgement
-    if options.form == "json":
-        print_json(judgement.as_json() | ({} if beside is None else {"reference": _view(beside)}))
-    elif options.form == "table":
-        print_lines([*_lines(checked), *([] if beside is None else _beside(beside, checked.units))])
-    else:
-        from trajcli.output.annotations import render_annotations
 
-        text = render_annotations([*_annotations(checked, options.file)], options.form, [options.file])
-        if text:
-            print_lines([text.removesuffix("\n")])
-    for event in judgement.events:
-        print_remark(f"  event: {event}")
-    return int(
-        not judgement.passed
-        or (options.strict and (judgement.verdict != "satisfied" or bool(judgement.events)))
-    )
+def _form(
+    options: CheckCommand, files: Sequence[str]
+) -> Literal["table", "json", "junit", "sarif", "github"]:
+    """Return what is printed."""
+    if files.count("-") > 1:
+        raise InputError("standard input can be read once")
+    if options.as_json and options.form not in ("table", "json"):
+        raise InputError(f"--json and --format {options.form} exclude each other", hint="leave one out")
+    return "json" if options.as_json else options.form
+
+
+def _print_annotations(problems: Sequence[Problem], form: AnnotationForm, files: Sequence[str]) -> None:
+    text = render_annotations(problems, form, files)
+    if text:
+        print_lines([text.removesuffix("\n")])
+
+
+def _judged(file: str, options: CheckCommand) -> tuple[CheckedFile, MotionReference | None]:
+    """Return a file with its judgement, and with how it compares with peers where that is asked."""
+    checked = check_file(file, options.part(CheckOptions), delivered=_delivered)
+    if not options.reference:
+        return checked, None
+    from trajcli.peers.motion_reference import compared
+
+    judgement, beside = compared(checked)
+    return replace(checked, judgement=judgement), beside
+
+
+def _failed(judgement: Judgement, *, strict: bool) -> int:
+    conceded = judgement.verdict != "satisfied" or bool(judgement.events)
+    return int(not judgement.passed or (strict and conceded))
 
 
 def _lines(checked: CheckedFile) -> Iterator[str]:

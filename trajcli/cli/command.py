@@ -19,6 +19,25 @@ from trajcli.cli.options import Errors
 from trajcli.cli.outcome import ErrorForm, exit_code
 
 P = TypeVar("P")
+_MEANT = {
+    "-j": "-j is how many processes `batch` uses; say --job, or --json",
+    "--json": "rows are JSON with --format jsonl, the report of `plan` with --report FILE, "
+    "and `batch` prints nothing else",
+}
+
+
+class Words(typer.core.TyperCommand):
+    """Takes words apart, and says what an option means where a command has none of that name."""
+
+    def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]
+        """Return what is left of the words when options are taken away."""
+        try:
+            return super().parse_args(ctx, args)
+        except Exception as error:
+            meant = _MEANT.get(getattr(error, "option_name", ""))
+            if meant is None or type(error).__name__ != "NoSuchOption":
+                raise
+            ctx.fail(f"{error}: {meant}")
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True)
@@ -35,7 +54,7 @@ class CommandLine:
 
     example: ClassVar[str]
     module: ClassVar[str] = ""
-    parser: ClassVar[type[typer.core.TyperCommand]] = typer.core.TyperCommand
+    parser: ClassVar[type[typer.core.TyperCommand]] = Words
     errors: ErrorForm
 
     def __init__(self, **given: Any) -> None:  # noqa: ANN401

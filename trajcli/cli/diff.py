@@ -2,30 +2,81 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from trajcli.cli.outcome import print_lines
-from trajcli.comparison.difference import compare, describe, parse_tolerances
-from trajcli.errors import InputError
-from trajcli.streams.reading import is_log, read_table
+from trajcli.cli.outcome import error_as_json, print_json, print_lines, report_error
+from trajcli.comparison.difference import as_json, compare, describe, parse_tolerances
+from trajcli.errors import InputError, TrajcliError
+from trajcli.streams.reading import is_log, motion_files, read_table
 
 if TYPE_CHECKING:
     from trajcli.cli.file_commands import DiffCommand
 
 
 def run_diff(options: DiffCommand) -> int:
-    """Compare two files and print what differs; return 0 when nothing does, else 1.
+    """Compare files and print what differs; return 0 when nothing does, else 1, or 2 where one cannot be.
 
     Raises:
-        InputError: When they cannot be compared.
-        FileError: When one cannot be read.
+        InputError: When nothing can be compared.
+        FileError: When a file cannot be read.
     """
-    a, b, topic = options.a, options.b, options.topic
-    if a == b == "-":
+    *others, last = options.files
+    if not others:
+        raise InputError("diff compares two files, and there is one", hint="trajcli diff A B")
+    if others == ["-"] and last == "-":
         raise InputError("only one of the files can be standard input")
-    if topic is not None and not (is_log(a) or is_log(b)):
-        raise InputError("--topic is about MCAP, and neither file is one", hint="leave --topic out")
+    alone = len(others) == 1 and not any(Path(name).is_dir() for name in options.files)
     tolerances = [parse_tolerances(text) if text else {} for text in (options.atol, options.rtol)]
-    difference = compare(read_table(a, topic), read_table(b, topic), *tolerances, resample=options.resample)
-    print_lines([describe(difference)])
-    return 0 if difference.equal else 1
+    code, found = 0, list[dict[str, Any]]()
+    for a, b in [(others[0], last)] if alone else _pairs(others, last):
+        try:
+            lacking = [name for name in (a, b) if not alone and not Path(name).is_file()]
+            mapping, text = _without(a, b, lacking[0]) if lacking else _compared(a, b, options, tolerances)
+        except TrajcliError as error:
+            if alone:
+                raise
+            report_error(error, options.errors)
+            mapping, text = {"equal": False, "files": [a, b], **error_as_json(error)}, None
+        code = max(code, mapping.get("exit", int(not mapping["equal"])))
+        found.append(mapping)
+        if text is not None and not options.as_json:
+            print_lines([text])
+    if options.as_json:
+        print_json(found[0] if alone else found)
+    return code
+
+
+def _compared(
+    a: str, b: str, options: DiffCommand, tolerances: Sequence[Mapping[str, float]]
+) -> tuple[dict[str, Any], str]:
+    """Return how two files compare, for programs and for people."""
+    if options.topic is not None and not (is_log(a) or is_log(b)):
+        raise InputError("--topic is about MCAP, and neither file is one", hint="leave --topic out")
+    tables = read_table(a, options.topic), read_table(b, options.topic)
+    difference = compare(*tables, *tolerances, resample=options.resample)
+    return as_json(difference), describe(difference)
+
+
+def _without(a: str, b: str, lacking: str) -> tuple[dict[str, Any], str]:
+    """Return that one of two files is not there, for programs and for people."""
+    text = f"different: {b if lacking == a else a} has no counterpart {lacking}"
+    return {"equal": False, "files": [a, b], "lacking": lacking}, text
+
+
+def _pairs(others: Sequence[str], folder: str) -> Iterator[tuple[str, str]]:
+    """Yield pairs of files of the same names; of two folders also those that one of them lacks.
+
+    Raises:
+        InputError: When the last name is none of a folder.
+    """
+    if not Path(folder).is_dir():
+        raise InputError(f"several files are compared with those of a folder, and {folder} is none")
+    for other in others:
+        if Path(other).is_dir():
+            sides = (other, folder)
+            names = {str(Path(file).relative_to(side)) for side in sides for file in motion_files(side)}
+            yield from ((str(Path(other, name)), str(Path(folder, name))) for name in sorted(names))
+        else:
+            yield other, str(Path(folder, Path(other).name))

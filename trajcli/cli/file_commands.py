@@ -14,12 +14,17 @@ from trajcli.cli.options import Json, Overrides, profile_words
 
 
 class DiffCommand(Command):
-    """Compare two files column by column. Exit 0: equal, 1: different, 2: cannot be compared."""
+    """Compare files column by column, in folders by name. Exit 0: equal, 1: different, 2: not comparable."""
 
     example = "trajcli diff old.csv new.csv --atol 1e-9"
 
-    a: Annotated[str, typer.Argument(metavar="A", help="A CSV or MCAP file; - is CSV from standard input.")]
-    b: Annotated[str, typer.Argument(metavar="B", help="The file to compare it with.")]
+    files: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="A... B",
+            help="Two files, or files and folders and the folder to compare them with; - is CSV from stdin.",
+        ),
+    ]
     atol: Annotated[
         str,
         typer.Option(
@@ -41,6 +46,7 @@ class DiffCommand(Command):
             show_default="/joint_states",
         ),
     ] = None
+    as_json: Json = False
 
 
 class PlotCommand(Command):

@@ -16,6 +16,8 @@ from trajcli.streams.whole_file import standard_output
 if TYPE_CHECKING:
     from trajcli.cli.arm_commands import FkCommand
 
+_SAME_TOOL = 1e-6  # m: more than nine decimals of degrees leave open
+
 
 def run_fk(options: FkCommand) -> int:
     """Print the pose of the tcp, or one for each row of standard input; return the exit code.
@@ -24,7 +26,16 @@ def run_fk(options: FkCommand) -> int:
         InputError: When robot, joints, tool or rows are not as they should be.
         FileError: When a file cannot be read, or standard output not written.
     """
-    arm = open_arm(options.robot, options.tool, units=options.units, si=options.si, frame=options.frame)
+    if options.frame == "base" and options.base is not None:
+        raise InputError("--frame base counts from the base, wherever it is", hint="leave --base out")
+    arm = open_arm(
+        options.robot,
+        options.tool,
+        base=options.base,
+        units=options.units,
+        si=options.si,
+        frame=options.frame,
+    )
     if options.joints == ["-"]:
         return _stream(arm, options)
     q = arm.joint_values(options.joints)
@@ -64,6 +75,9 @@ def _stream(arm: ArmInUnits, options: FkCommand) -> int:
     with standard_output() as out:
         write_csv(blocks, columns, out, options.digits)
     _remark(arm, watch, rows=True)
+    if watch.tool_off > _SAME_TOOL and options.frame == "world":
+        off = f"the rows say where their tcp is, up to {watch.tool_off:.6g} m from that of {arm.robot.name}"
+        print_remark(f"{off}: they were made with another tool or base; say --tool, --base or --robot JOB")
     return 0
 
 

@@ -31,7 +31,7 @@ def run_ik(options: IkCommand) -> int:
         FileError: When a file cannot be read, or standard output not written.
     """
     _check(options)
-    arm = open_arm(options.robot, options.tool, units=options.units, si=options.si)
+    arm = open_arm(options.robot, options.tool, base=options.base, units=options.units, si=options.si)
     near = None if options.near is None else arm.joint_values([options.near], "--near")
     if near is not None:
         _remark_on(arm, near)

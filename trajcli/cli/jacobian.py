@@ -25,7 +25,7 @@ def run_jacobian(options: JacobianCommand) -> int:
         InputError: When robot, joints, rates, tool or rows are not as they should be.
         FileError: When a file cannot be read, or standard output not written.
     """
-    arm = open_arm(options.robot, options.tool, units=options.units, si=options.si)
+    arm = open_arm(options.robot, options.tool, base=options.base, units=options.units, si=options.si)
     if options.joints == ["-"]:
         return _stream(arm, options)
     q = arm.joint_values(options.joints)

@@ -153,8 +153,11 @@ class CheckCommand(Command):
 
     example = "trajcli check rows.csv --job examples/ur5e_pick.yaml"
 
-    file: Annotated[
-        str, typer.Argument(metavar="FILE", help="A CSV, JSON lines, ROS, MCAP or .npy file; - is stdin.")
+    files: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="FILE|DIR...", help="CSV, JSON lines, ROS, MCAP or .npy, and folders of such; - is stdin."
+        ),
     ]
     job: Annotated[
         str | None,
@@ -235,6 +238,7 @@ class CheckCommand(Command):
         Literal["table", "json", "junit", "sarif", "github"],
         typer.Option("--format", help="Of what is printed."),
     ] = "table"
+    as_json: Json = False
     reference: Annotated[
         bool,
         typer.Option(

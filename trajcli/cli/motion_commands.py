@@ -102,7 +102,7 @@ class RetimeCommand(EditCommand):
 
     file: MotionSource
     job: Annotated[
-        str | None, typer.Option("--job", "-j", metavar="JOB", help="The job whose limits are kept.")
+        str | None, typer.Option("--job", metavar="JOB", help="The job whose limits are kept.")
     ] = None
     robot: Annotated[
         str | None,

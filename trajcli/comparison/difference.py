@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from math import isfinite
+from typing import Any
 
 import numpy as np
 
@@ -237,6 +238,27 @@ def describe(difference: Difference) -> str:
     if difference.worst.difference > 0:
         lines.append("worst: " + _text(difference.worst))
     return "\n".join(lines + _columns(difference))
+
+
+def as_json(difference: Difference) -> dict[str, Any]:
+    """Return a comparison as a mapping that JSON can hold, in the units of the first file."""
+
+    def as_mapping(value: ValueDifference | None) -> dict[str, Any] | None:
+        return None if value is None else dict(vars(value))
+
+    return {
+        "equal": difference.equal,
+        "files": list(difference.files),
+        "rows": difference.rows,
+        "columns": [
+            {"count": column.count, "worst": as_mapping(column.worst), "first": as_mapping(column.first)}
+            for column in difference.columns
+        ],
+        "missing": [{"column": name, "file": difference.files[i]} for name, i in difference.missing],
+        "ended": difference.ended
+        and {"file": difference.files[difference.ended[0]], "time": difference.ended[1]},
+        "notes": list(difference.notes),
+    }
 
 
 def _columns(difference: Difference) -> list[str]:

@@ -264,7 +264,10 @@ class LimitWatch:
         outside: How many of them have a joint outside its limits.
         first: The first of these; None while there is none.
         remark: On the first joint beyond two turns, as `beyond_two_turns` says it; None while there is none.
+        tool_off: How far the tcp is from where rows that say it have it, m, at most.
     """
+
+    tool_off = 0.0
 
     def __init__(self, robot: Robot) -> None:
         """Watch the position limits of a robot."""
@@ -272,6 +275,10 @@ class LimitWatch:
         self.first: JointOutsideLimits | None = None
         self.remark: str | None = None
         self._robot = robot
+
+    def see_tool(self, off: float) -> None:
+        """Count how far the tcp of the next rows is from where they say, m."""
+        self.tool_off = max(self.tool_off, off)
 
     def see(
         self,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.columns import Column, Group, columns_of, parse_column
+from trajcli.columns import Column, Group, columns_of, kinds_of, parse_column
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Place, Problem
 from trajcli.geometry.rotation import quaternion_from_matrix, without_jumps
@@ -93,6 +93,8 @@ def _poses(
     arm: ArmInUnits, rows: TableBlocks, inputs: JointColumns, watch: LimitWatch | None
 ) -> Iterator[Array]:
     last = None
+    places = {column.kind: (i, column.factor) for i, column in enumerate(map(parse_column, rows.names))}
+    known = [places[axis] for axis in "xyz"] if places.keys() >= {*kinds_of("pose")} else []
     for block in rows.blocks:
         q = inputs.values(block)
         refuse_far(q, rows.file)
@@ -102,6 +104,9 @@ def _poses(
         poses = forward(arm.robot, q)
         quaternions = without_jumps(quaternion_from_matrix(poses[:, :3, :3]), last)
         last = quaternions[-1]
+        if known and watch is not None:
+            stated = np.stack([block[:, i] * unit for i, unit in known], axis=1)
+            watch.see_tool(float(np.linalg.norm(stated - poses[:, :3, 3], axis=1).max()))
         yield np.hstack([inputs.times(block), poses[:, :3, 3] / arm.length_factor, quaternions])
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from trajcli.errors import InputError
+from trajcli.errors import InputError, utf8
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.row_sources import EXACT, ArrayRows, RowSource, TextRows, in_columns
 from trajcli.streams.table import Table
@@ -146,6 +146,22 @@ def holds_motion(path: str | Path) -> bool:
     """Return whether a file is one of rows or messages by its name or first bytes, and no job."""
     ending = Path(str(path)).suffix.lower()
     return ending in ENDINGS_OF_ROWS or is_log(path) or (ending in _YAML and is_ros_message(path))
+
+
+def motion_files(name: str) -> list[str]:
+    """Return the files of motions below a folder by name, but no hidden ones; of a file its own name.
+
+    Raises:
+        InputError: When a folder holds none.
+    """
+    if not Path(name).is_dir():
+        return [name]
+    paths = [path for path in sorted(Path(name).rglob("[!.]*")) if path.is_file()]
+    visible = (path for path in paths if not any(p.startswith(".") for p in path.relative_to(name).parts))
+    found = [str(path) for path in visible if holds_motion(path)]
+    if not found:
+        raise InputError(f"there is no motion in the folder {utf8(name)}", hint="expected such as .csv files")
+    return found
 
 
 def is_ros_message(path: str | Path) -> bool:
