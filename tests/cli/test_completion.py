@@ -43,8 +43,11 @@ def test_names_of_robots_complete(words: tuple[str, ...]) -> None:
     beginning = {name for name in catalogue_names() if name.startswith("ur")}
     assert len(beginning) > 5
     assert set(completed("trajcli", *words, "ur")) == beginning
-    assert completed("trajcli", *words, "kr16") == ["kr16_2"]
-    assert completed("trajcli", *words, "no_such") == []
+
+
+def test_one_name_or_none_completes() -> None:
+    assert completed("trajcli", "robots", "kr16") == ["kr16_2"]
+    assert completed("trajcli", "fk", "--robot", "no_such") == []
 
 
 def test_commands_complete() -> None:

@@ -27,12 +27,11 @@ OTHER_NAMES = {
 
 
 # the command as it is shown, and moves whose times need no search: the example plans them anew for each mass
-TIMED = {0: "pick", 2: "place", 4: "home"}
 SHORTER = {
     "payload": [
-        word
-        for move, to in TIMED.items()
-        for word in ("--set", f"moves.{move}={{planner: quintic, to: {to}, duration: 4}}")
+        *("--set", "moves.0={planner: hold, duration: 1}"),
+        *("--set", "moves.2={planner: quintic, to: place, duration: 4}"),
+        *("--set", "moves.4={planner: hold, duration: 1}"),
     ]
 }
 

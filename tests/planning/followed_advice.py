@@ -10,6 +10,7 @@ import json
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 from trajcli.errors import InputError, MissingLimitError, PlanningError, TrajcliError
@@ -35,9 +36,14 @@ class Complaint:
 
 def complaints(job: Job) -> list[Complaint]:
     """Return what is wrong with a job; nothing where it passes."""
+    return list(_complaints(json.dumps(job)))
+
+
+@cache
+def _complaints(text: str) -> list[Complaint]:
+    """Several complaints often have the same advice, which leads to the same job."""
     try:
-        loaded = job_from_text(json.dumps(job))
-        plan = plan_job(loaded)
+        plan = plan_job(job_from_text(text))
     except (PlanningError, MissingLimitError) as error:
         return [_of_problem(error, p) for p in error.problems]
     return [
