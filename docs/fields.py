@@ -86,7 +86,13 @@ def field_table(model: type[BaseModel], left_out: Mapping[str, str] | None = Non
         left_out: What it means that an optional field is left out, by field.
     """
     rows = [
-        [f"`{name}`", _form(field), _unit(field), _default(name, field, left_out or {}), _description(field)]
+        [
+            f"`{field.alias or name}`",
+            _form(field),
+            _unit(field),
+            _default(name, field, left_out or {}),
+            _description(field),
+        ]
         for name, field in model.model_fields.items()
         if name not in hidden_fields(model)
     ]

@@ -23,11 +23,11 @@ SETUP = BatchSetup("csv", {})
 
 
 def outcome_of(error: BaseException, folder: Path, monkeypatch: pytest.MonkeyPatch) -> JobOutcome:
-    def broken(*_: object) -> None:
+    def broken(*_: object, **__: object) -> None:
         raise error
 
     (folder / "a.yaml").write_text(JOB)
-    monkeypatch.setattr(task, "plan_job", broken)
+    monkeypatch.setattr(task, "delivered", broken)
     return run_task(Task(BatchJob(str(folder / "a.yaml"), str(folder / "a.csv")), None), SETUP)
 
 
@@ -54,14 +54,14 @@ def test_a_file_that_changes_while_it_is_planned_is_planned_next_time(
 ) -> None:
     robot = tmp_path / "arm.yaml"
     robot.write_text("joints: [{velocity: 2}]\n")
-    plan = task.plan_job
+    plan = task.delivered
 
-    def slow(loaded: object) -> object:
-        planned = plan(loaded)  # type: ignore[arg-type]
+    def slow(loaded: object, *given: object, **named: object) -> object:
+        planned = plan(loaded, *given, **named)  # type: ignore[arg-type]
         robot.write_text("joints: [{velocity: 3}]\n")
         return planned
 
-    monkeypatch.setattr(task, "plan_job", slow)
+    monkeypatch.setattr(task, "delivered", slow)
     job = BatchJob(str(tmp_path / "a.yaml"), str(tmp_path / "a.csv"))
     Path(job.job).write_text(JOB.replace("{joints: [{velocity: 90}]}", "{file: arm.yaml}"))
     first = run_task(Task(job, None), SETUP)
