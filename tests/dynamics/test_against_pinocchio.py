@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from extras import require_module
 
 from trajcli.dynamics.newton_euler import InverseDynamics
 from trajcli.kinematics.robot import Friction, Payload
@@ -49,7 +50,9 @@ def test_efforts_gravity_and_mass_matrix(arm):
 @pytest.mark.parametrize("name", ["ur5", "panda", "xarm7", "so101", "kr16_2"])
 def test_whole_urdfs_of_the_models(name):
     """The files themselves, fixed links and branches included, read by both."""
-    pin = pytest.importorskip("pinocchio")
+    require_module("pinocchio", "pin")
+    import pinocchio as pin
+
     read = robot_of_urdf((MODELS / f"{name}.urdf").read_bytes(), name, exact=True)
     full = pin.buildModelFromUrdf(str(MODELS / f"{name}.urdf"))
     locked = [full.getJointId(joint) for joint in list(full.names)[1:] if joint not in read.robot.joint_names]
