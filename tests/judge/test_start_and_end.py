@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from recorded_rows import bare_robot, part
 
 from trajcli.findings import Finding
+from trajcli.job.read import load_job
+from trajcli.judge.file import CheckOptions, check_file
 from trajcli.judge.judgement import Judgement
 from trajcli.judge.motion import Requirements, judge_motion
 from trajcli.kinematics.robot import unlimited
+from trajcli.output.write import write_plan
+from trajcli.planning.plan import plan_job
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 from trajcli.trajectory import State
 
@@ -116,25 +121,48 @@ def test_stamps_are_later_than_all_before_them(stamps, wrong, blocks) -> None:
     assert all((each.severity, each.certainty) == ("error", "exceeded") for each in found)
 
 
-@pytest.mark.parametrize(
-    ("last", "over"), [(0.0, 0.0), (-2.0, 0.0), (-1.0, 0.0), (1e-3, 1e-3), (-2.001, -1e-3)]
-)
+@pytest.mark.parametrize("wanted", [0.0, -2.0, np.nan])
+@pytest.mark.parametrize("over", [0.0, 1e-3, -1e-3])
 @pytest.mark.parametrize("joint", range(3))
-def test_the_last_row_has_an_acceleration_of_the_end(joint: int, last: float, over: float) -> None:
-    """The planned motion ends with -2 and then rests: a row may have either, or what a filter makes of both."""
-    rows = motion()
+def test_the_last_row_has_the_acceleration_of_the_end(joint: int, over: float, wanted: float) -> None:
+    """What the planned motion ends with; where it steps in the end, nobody says how rows brake."""
+    end = np.where(np.arange(3) == joint, wanted, 0.0)
     qdd = np.zeros((4, 3))
-    qdd[-1, joint] = last
-    before = np.where(np.arange(3) == joint, -2.0, 0.0)
-    state = State(END, np.zeros(3), np.zeros(3))
-    required = Requirements(bare_robot(unlimited(3)), end=state, start_tolerance=TOLERANCE, end_before=before)
-    found = judge_motion(lambda: [replace(rows, qdd=qdd)], required).findings
+    qdd[-1] = np.nan_to_num(end)
+    qdd[-1, joint] += over
+    state = State(END, np.zeros(3), end)
+    required = Requirements(bare_robot(unlimited(3)), end=state, start_tolerance=TOLERANCE)
+    found = judge_motion(lambda: [replace(motion(), qdd=qdd)], required).findings
     found = [each for each in found if each.rule == "state"]
-    assert bool(found) == bool(over)
+    assert bool(found) == (bool(over) and np.isfinite(wanted))
     for each in found:
-        assert (each.kind, each.quantity, each.joint) == ("end", "acceleration", f"j{joint + 1}")
+        assert (each.kind, each.quantity, each.joint, each.severity) == (
+            "end",
+            "acceleration",
+            f"j{joint + 1}",
+            "error",
+        )
         assert each.value - each.limit == pytest.approx(over, rel=1e-6)
         assert "an acceleration of" in each.message
+
+
+@pytest.mark.parametrize(("planner", "judged"), [("quintic", True), ("cubic", False)])
+def test_an_acceleration_that_steps_in_the_end_is_not_promised(
+    planner: str, judged: bool, tmp_path: Path
+) -> None:
+    job, file = tmp_path / "job.yaml", tmp_path / "rows.csv"
+    job.write_text(
+        "{version: 1, robot: {joints: 1}, limits: {velocity: 9, acceleration: 50, jerk: null}, start: {joints: [0]}, "
+        f"moves: [{{planner: {planner}, to: {{joints: [1]}}, duration: 1}}], output: {{rate: 100}}}}"
+    )
+    write_plan(plan_job(load_job(str(job))), str(file), "full")
+    head, *lines = file.read_text().splitlines()
+    values = [float(text) for text in lines[-1].split(",")]
+    file.write_text(
+        "\n".join([head, *lines[:-1], ",".join(map(repr, [*values[:-1], values[-1] - 0.5]))]) + "\n"
+    )
+    found = check_file(str(file), CheckOptions(job=str(job))).judgement
+    assert any(each.kind == "end" and each.quantity == "acceleration" for each in found.findings) is judged
 
 
 @pytest.mark.parametrize("blocks", [3, 400])

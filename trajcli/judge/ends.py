@@ -34,7 +34,7 @@ def judge_start(
     """
     return [
         *_position(row, start.position, tolerance, resolution, axes, "start"),
-        *_rate(row, (start.velocity, start.velocity), 1, resolution, axes, ("start", "error")),
+        *_rate(row, start.velocity, 1, resolution, axes, ("start", "error")),
     ]
 
 
@@ -44,7 +44,6 @@ def judge_end(
     tolerance: Array | None,
     resolution: Resolution,
     axes: NamedJoints,
-    before: Array | None = None,
 ) -> list[Finding]:
     """Return where the last row is not the state in which the motion shall end.
 
@@ -52,21 +51,20 @@ def judge_end(
 
     Args:
         row: The last one.
-        end: Where it shall end; None where nobody says.
+        end: Where it shall end; None where nobody says. An acceleration that nobody says is NaN.
         tolerance: How near, rad or m, shape (n,).
         resolution: Rounding of the file.
         axes: The joints.
-        before: Its acceleration where that steps in the end, shape (n,): rows have one of both.
     """
     if end is None or tolerance is None:
         rest = np.zeros(len(axes.joint_names))
-        return _rate(row, (rest, rest), 1, resolution, axes, ("end", "warning"))
+        return _rate(row, rest, 1, resolution, axes, ("end", "warning"))
     return [
         *_position(row, end.position, tolerance, resolution, axes, "end"),
-        *_rate(row, (end.velocity, end.velocity), 1, resolution, axes, ("end", "error")),
+        *_rate(row, end.velocity, 1, resolution, axes, ("end", "error")),
         *_rate(
             row,
-            (end.acceleration, end.acceleration if before is None else before),
+            end.acceleration,
             2,
             resolution,
             axes,
@@ -118,25 +116,25 @@ def _position(
 
 def _rate(
     row: EndState,
-    wanted: tuple[Array, Array],
+    wanted: Array,
     order: int,
     resolution: Resolution,
     axes: NamedJoints,
     end: tuple[str, FindingSeverity],
 ) -> list[Finding]:
-    """Return where a row has another velocity, or acceleration, than one between two of them, each (n,)."""
+    """Return where a row has another velocity, or acceleration, than is wanted, shape (n,)."""
     time, number, states = row
     rates = states[order]
     if rates is None or not np.isfinite(rates).all():
         return []
     rounding = (resolution.qd, resolution.qdd)[order - 1]
-    nearest = np.clip(rates[0], np.minimum(*wanted), np.maximum(*wanted))
-    room = stated_errors(rates, rounding, resolution.relative)[0] + _REST * np.maximum(1.0, np.abs(nearest))
-    over = np.abs(rates[0] - nearest)
+    said = np.isfinite(wanted)
+    room = stated_errors(rates, rounding, resolution.relative)[0] + _REST
+    over = np.where(said, np.abs(rates[0] - wanted), 0.0)
     joint = int((over - room).argmax())
     if over[joint] <= room[joint]:
         return []
-    value, limit = float(rates[0, joint]), float(nearest[joint])
+    value, limit = float(rates[0, joint]), float(wanted[joint])
     kind, severity = end
     which = "first" if kind == "start" else "last"
     what = QUANTITIES[order]

@@ -11,11 +11,9 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, TrajcliError
 from trajcli.frozen import comparable, frozen
-from trajcli.grids import ListedGrid
 from trajcli.judge.judgement import Judgement, as_planned
 from trajcli.judge.motion import JUDGED_ROWS, Requirements, judge_motion
 from trajcli.kinematics.robot import Robot
-from trajcli.samples import sample
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import refuse_job
 from trajcli.streams.recorded_motion import MotionFile, RecordedMotion, motion_of, open_motion
@@ -32,6 +30,7 @@ if TYPE_CHECKING:
 Delivered = Callable[["LoadedJob", str | None], "Plan"]
 """Returns the plan of a job for a consumer."""
 _START_TOLERANCE = 1e-3  # rad or m: what a controller takes for the state that it is in
+_STEP = 1e-6  # rad/s^2 or m/s^2: an acceleration that changes by more in the end steps there
 _SAME_DURATION = 1e-6  # s: a file that lasts as long as the plan, within that, is taken for its motion
 _ENTIRE = ("jtc-upsampling",)  # interpolations that need all rows at once
 
@@ -319,7 +318,10 @@ def _requirements(
     if given.plan is None or given.loaded is None:
         return Requirements(given.robot, interpolate=options.interpolate, tool=tool, consumer=consumer)
     trajectory = given.plan.trajectory
-    at_end = ListedGrid(trajectory.duration, np.array([trajectory.duration]))
+    last = trajectory.curve.evaluate(trajectory.curve.end, 2, side="left")
+    kept = (
+        np.abs(last - trajectory.end.acceleration) <= _STEP
+    )  # one that steps there is none that is promised
     tolerance = np.array(_tolerances(options.start_tolerance, given.robot, units))
     return Requirements(
         given.robot,
@@ -327,10 +329,9 @@ def _requirements(
         options.interpolate,
         trajectory.start,
         tolerance,
-        trajectory.end,
+        replace(trajectory.end, acceleration=np.where(kept, trajectory.end.acceleration, np.nan)),
         tool,
         consumer,
-        end_before=next(sample(trajectory, at_end, ("qdd",)))[0],
     )
 
 

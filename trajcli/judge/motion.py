@@ -48,11 +48,10 @@ class Requirements:
         interpolate: How rows are joined; None for the highest that the columns allow.
         start: The state in which it shall begin; None where nobody says.
         start_tolerance: How near, rad or m by joint, shape (n,).
-        end: The state in which it shall end; None where nobody says.
+        end: The state in which it shall end; None where nobody says; an acceleration of NaN is not judged.
         tool: Makes the judge of the tool; None for an arm without geometry.
         consumer: Makes the judge by the rules of a consumer; None for none.
         planned: Whether they are rows of a verified motion: then all is told that their curve passes.
-        end_before: Acceleration that may step into that of the end, shape (n,); None where it does not.
     """
 
     robot: Robot
@@ -64,7 +63,6 @@ class Requirements:
     tool: Callable[[], ToolJudge] | None = None
     consumer: Callable[[], ConsumerJudge] | None = None
     planned: bool = False
-    end_before: Array | None = None
 
     def robot_between(self, before: int, after: int) -> Robot:
         """Return the arm with the limits in force between rows of two moves: the looser of both."""
@@ -328,8 +326,7 @@ class MotionJudge:
             state = (float(first.t[0]), int(first.rows[0]), first.states)
             findings += judge_start(state, required.start, required.start_tolerance, resolution, self._axes)
         state = (float(last.t[0]), int(last.rows[0]), last.states)
-        tolerance, before = required.start_tolerance, required.end_before
-        return findings + judge_end(state, required.end, tolerance, resolution, self._axes, before)
+        return findings + judge_end(state, required.end, required.start_tolerance, resolution, self._axes)
 
 
 def _joined(blocks: list[RecordedMotion]) -> RecordedMotion:
