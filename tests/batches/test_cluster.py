@@ -135,7 +135,7 @@ def test_a_scheduler_that_is_not_there(
 @pytest.mark.usefixtures("folder")
 def test_without_dask_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     Path("distributed.py").write_text("raise ImportError")
-    monkeypatch.setenv("PYTHONPATH", str(Path.cwd()))
+    monkeypatch.setenv("PYTHONPATH", str(Path.cwd()), prepend=os.pathsep)
     code, _, err = run("jobs", "--engine", "dask", "--scheduler", "tcp://127.0.0.1:9")
     assert code == 2
     assert "the engine dask needs the packages dask and distributed" in err
