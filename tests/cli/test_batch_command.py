@@ -10,9 +10,10 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree as ET
 
 import pytest
-from running import COMMAND, ENDLESS, EXAMPLES, FAST, IMPOSSIBLE, JOB, ROOT, call, run
+from running import COMMAND, ENDLESS, EXAMPLES, FAST, IMPOSSIBLE, JOB, ROOT, SLOWED, call, run
 
 Capture = pytest.CaptureFixture[str]
 ROBOT = "joints: [{velocity: 2}]\n"
@@ -152,19 +153,70 @@ def test_one_broken_job_never_stops_the_others(folder: Path, capfd: Capture) -> 
     assert (problem["file"], problem["line"], problem["joint"]) == ("jobs/fast.yaml", 6, "j1")
     assert found["fast"]["output"] is found["fast"]["duration"] is None
     assert files("out") == {"a.csv", "z.csv", STEM}
-    assert err.startswith("7 jobs: 5 failed, 2 written, ")
+    *named, last = err.splitlines()
+    assert sorted(line.split(": ")[0] for line in named) == sorted(
+        [*(f"jobs/{name}.yaml" for name in ("bytes", "fast", "impossible", "junk")), "none.yaml"]
+    )
+    assert "jobs/fast.yaml: failed: move 0 (quintic): the velocity of j1 reaches 225 deg/s" in err
+    assert last.startswith("7 jobs: 5 failed, 2 written, ")
 
 
-def test_a_failed_job_leaves_what_was_written_and_is_planned_next_time(folder: Path, capfd: Capture) -> None:
+def test_rows_of_a_job_that_fails_now_are_set_aside(folder: Path, capfd: Capture) -> None:
     write(a=JOB)
     assert batch(capfd)[0] == 0
     kept = Path("out/a.csv").read_bytes()
     write(a=FAST)
-    for _ in range(2):
-        assert batch(capfd) == (1, {"a": "failed"})
-        assert Path("out/a.csv").read_bytes() == kept
+    failed = call(capfd, "batch", "jobs", "-o", "out", "--force")
+    assert "  out/a.csv was of an earlier batch: it is out/a.csv.stale now\n" in failed.err
+    assert batch(capfd) == (1, {"a": "failed"})
+    assert Path("out/a.csv.stale").read_bytes() == kept
+    assert files("out") == {"a.csv.stale", STEM}
     write(a=JOB)
-    assert batch(capfd) == (0, {"a": "unchanged"})
+    assert batch(capfd) == (0, {"a": "written"})
+    assert files("out") == {"a.csv", STEM}
+    assert Path("out/a.csv").read_bytes() == kept
+
+
+def test_a_file_that_no_batch_wrote_stays(folder: Path, capfd: Capture) -> None:
+    write(a=JOB)
+    assert batch(capfd)[0] == 0
+    write(a=FAST, b=FAST)
+    for name in "ab":
+        Path(f"out/{name}.csv").write_text("of somebody else")
+    assert batch(capfd)[0] == 1
+    assert files("out") == {"a.csv", "b.csv", STEM}
+
+
+def test_annotations_of_a_batch_are_one_document(folder: Path, capfd: Capture) -> None:
+    write(a=JOB, fast=FAST, junk="moves: [\n")
+    code, out, err = call(capfd, "batch", "jobs", "-o", "out", "--errors", "junit")
+    assert (code, len(lines(out))) == (2, 3)
+    suites = {suite.get("name"): suite.get("failures") for suite in ET.fromstring(err.encode())}
+    assert suites == {"jobs/a.yaml": "0", "jobs/fast.yaml": "1", "jobs/junk.yaml": "1"}
+    results = json.loads(call(capfd, "batch", "jobs", "-o", "out", "--errors", "sarif").err)["runs"][0][
+        "results"
+    ]
+    assert {one["ruleId"] for one in results} == {"velocity", "input"}
+    commands = call(capfd, "batch", "jobs", "-o", "out", "--errors", "github").err.splitlines()
+    assert sorted(line.split(",")[0] for line in commands) == [
+        "::error file=jobs/fast.yaml",
+        "::error file=jobs/junk.yaml",
+    ]
+    told = [
+        json.loads(line)
+        for line in call(capfd, "batch", "jobs", "-o", "o", "-q", "--errors", "json").err.splitlines()
+    ]
+    assert sorted(one["exit"] for one in told) == [1, 2]
+
+
+def test_events_fail_a_job_that_is_strict(folder: Path, capfd: Capture) -> None:
+    write(a=JOB, slow=SLOWED)
+    assert batch(capfd) == (0, {"a": "written", "slow": "written"})
+    code, out, _ = call(capfd, "batch", "jobs", "-o", "out", "--strict")
+    found = lines(out)
+    assert (code, found["a"]["outcome"], found["slow"]["outcome"]) == (1, "written", "failed")
+    assert found["slow"]["error"].startswith("slowed: stretched 2.5 times")
+    assert call(capfd, "plan", "jobs/slow.yaml", "--no-output", "--strict").code == 1
 
 
 @pytest.mark.usefixtures("folder")

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 from planned_examples import planned_example
-from running import EXAMPLES, FAST, JOB, ROOT, SLOWED, call
+from running import EXAMPLES, FAST, IMPOSSIBLE, JOB, ROOT, SLOWED, call
 from tiers import few
 
 from trajcli.errors import TrajcliError
@@ -41,12 +41,25 @@ def test_a_file_holds_what_standard_output_would(job: Path, capfd: Capture) -> N
     assert Path("rows.csv").read_text() == rows
 
 
-def test_a_failed_plan_leaves_an_earlier_file(job: Path, capfd: Capture) -> None:
+@pytest.mark.parametrize(("text", "code"), [(FAST, 1), (IMPOSSIBLE, 3)])
+def test_rows_of_an_earlier_plan_are_set_aside(text: str, code: int, job: Path, capfd: Capture) -> None:
+    Path("rows.csv").write_text("kept")
+    job.write_text(text)
+    failed = call(capfd, "plan", job, "-o", "rows.csv")
+    assert failed.code == code
+    assert "rows.csv was of an earlier plan: it is rows.csv.stale now" in failed.err
+    assert Path("rows.csv.stale").read_text() == "kept"
+    assert {path.name for path in Path().iterdir()} == {"job.yaml", "rows.csv.stale"}
+
+
+@pytest.mark.parametrize("words", [["--no-output"], ["-o", "rows.csv", "--set", "robot={file: none}"]])
+def test_rows_stay_where_nothing_was_planned_in_their_place(
+    words: list[str], job: Path, capfd: Capture
+) -> None:
     Path("rows.csv").write_text("kept")
     job.write_text(FAST)
-    assert call(capfd, "plan", job, "-o", "rows.csv").code == 1
+    assert call(capfd, "plan", job, *words).code > 0
     assert Path("rows.csv").read_text() == "kept"
-    assert {path.name for path in Path().iterdir()} == {"job.yaml", "rows.csv"}
 
 
 def test_a_report_of_a_verified_plan(job: Path, capfd: Capture) -> None:

@@ -245,8 +245,11 @@ def batch(
     processes: int | None = None,
     force: bool = False,
     timeout: float | None = 600.0,
+    strict: bool = False,
 ) -> list[JobOutcome]:
     """Plan many jobs in processes of their own, as `trajcli batch` does; return what came of each.
+
+    Rows that an earlier batch wrote for a job that fails now get the name of their file with `.stale` behind.
 
     Args:
         jobs: Job files, and folders of them.
@@ -257,6 +260,7 @@ def batch(
         processes: At most; one a core where left out.
         force: Whether unchanged jobs are planned again.
         timeout: What a job may take, s; None for ever.
+        strict: Whether events fail a job.
 
     Raises:
         InputError: When there is no job, or two have one output.
@@ -272,7 +276,7 @@ def batch(
     ledgers = Ledgers(found.jobs)
     known = {} if force else ledgers.known()
     tasks = [Task(job, known.get(job.output)) for job in found.jobs]
-    setup = BatchSetup(form, found.owners(), rows, consumer)
+    setup = BatchSetup(form, found.owners(), rows, consumer, strict)
     outcomes: list[JobOutcome] = []
     count = min(processes or usable_cores(), len(tasks))
     try:
@@ -280,6 +284,8 @@ def batch(
             for outcome in done:
                 if outcome.entry is not None and outcome.outcome == "written":
                     ledgers.add(outcome.job, outcome.entry)
+                elif outcome.exit_code:
+                    ledgers.set_aside(outcome.job)
                 outcomes.append(outcome)
     finally:
         ledgers.write()

@@ -8,11 +8,11 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from time import monotonic
 
-from trajcli.batches.ledger import LEDGER_NAME, LedgerEntry, read_ledger, write_ledger
+from trajcli.batches.ledger import LEDGER_NAME, LedgerEntry, hash_of_file, read_ledger, write_ledger
 from trajcli.errors import FileError, InputError, utf8
 from trajcli.frozen import comparable, frozen
 from trajcli.streams.formats import ENDINGS, FormatName
-from trajcli.streams.whole_file import identity
+from trajcli.streams.whole_file import identity, set_aside
 
 _YAML = (".yaml", ".yml")
 _KEY_OF_JOBS = re.compile(rb"""(?m)(?:^|^\s*\{\s*|,\s*)["']?(?:version|start|moves)["']?\s*:""")
@@ -147,9 +147,16 @@ class Ledgers:
 
     def add(self, job: BatchJob, entry: LedgerEntry) -> None:
         """Take the entry of an output that was written, and write all there are now and then."""
+        Path(f"{job.output}.stale").unlink(missing_ok=True)
         self._entries[job.output] = entry
         if monotonic() - self._written > _PERIOD:
             self.write()
+
+    def set_aside(self, job: BatchJob) -> str | None:
+        """Rename rows that an earlier batch wrote and this one could not; return their name then."""
+        entry = read_ledger(self._paths[job.output]).get(_name(job.output))
+        written = entry is not None and hash_of_file(job.output) == entry.output
+        return set_aside(job.output) if written else None
 
     def write(self) -> None:
         """Write all entries into the ledgers of their folders."""

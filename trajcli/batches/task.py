@@ -34,18 +34,20 @@ class BatchSetup:
         outputs: The job behind each file that will be written, by the file's real path.
         rows: Replaces `output.rows` of each job; None leaves it.
         consumer: Profile for which each job is planned; None for the one that it names.
+        strict: Whether events are errors.
     """
 
     form: FormatName
     outputs: Mapping[str, str]
     rows: str | None = None
     consumer: str | None = None
+    strict: bool = False
 
     @property
     def said(self) -> str:
         """What the batch says of the rows, for the hash of what they are made of."""
         consumer = None if self.consumer is None else f"for {self.consumer}"
-        return " ".join(word for word in (self.form, self.rows, consumer) if word is not None)
+        return " ".join(word for word in (self.form, self.rows, consumer, "strict" * self.strict) if word)
 
     def document(self, document: Document) -> Document:
         """Return a job with what the batch says of the rows."""
@@ -153,7 +155,9 @@ def _written(task: Task, setup: BatchSetup, hashed: _Hash) -> LedgerEntry:
     with np.errstate(all="ignore"):  # what is not finite is for the checks to find
         form = format_of(job.output, setup.form)
         loaded = job_of_document(setup.document(document))
-        plan, digits = delivered(loaded, setup.consumer, form, rows=setup.rows is not None)
+        plan, digits = delivered(
+            loaded, setup.consumer, form, rows=setup.rows is not None, strict=setup.strict
+        )
         grid = grid_of(plan)
         if not plan.verdict.passed:
             from trajcli.output.report import verification_error

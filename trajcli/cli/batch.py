@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 from trajcli.batches.jobs import BatchJobs, Ledgers, find_jobs
 from trajcli.batches.task import BatchSetup, JobOutcome, Task
 from trajcli.cli.frames import problem_as_json
-from trajcli.cli.outcome import print_remark
+from trajcli.cli.outcome import ErrorForm, print_remark, report_error
 from trajcli.cli.progress import ERASE, WIDTH, is_terminal
-from trajcli.errors import InputError, utf8
+from trajcli.errors import FileError, InputError, PlanningError, TrajcliError, VerificationError, utf8
 from trajcli.streams.whole_file import standard_output
 
 if TYPE_CHECKING:
@@ -38,15 +38,21 @@ def run_batch(options: BatchCommand) -> int:
     record = Ledgers(found.jobs)
     known = {} if options.force else record.known()
     tasks = [Task(job, known.get(job.output)) for job in found.jobs]
-    setup = BatchSetup(options.form, found.owners(), options.rows, options.consumer)
+    setup = BatchSetup(options.form, found.owners(), options.rows, options.consumer, options.strict)
     progress = _Progress(len(tasks))
     try:
         with closing(_outcomes(tasks, setup, options, (count, timeout), progress.show)) as outcomes:
-            _print_outcomes(outcomes, progress, record)
+            failed = _print_outcomes(outcomes, progress, record, options.errors)
     finally:
         progress.erase()
         record.write()
-    if not options.quiet:
+    if options.errors != "text" and options.errors != "json":
+        from trajcli.output.annotations import annotations_of, render_annotations
+
+        problems = [each for outcome in failed for each in annotations_of(_error(outcome), outcome.job.job)]
+        text = render_annotations(problems, options.errors, [job.job for job in found.jobs])
+        print(text, end="", file=sys.stderr)  # noqa: T201
+    elif not options.quiet:
         _say_what_came(found, progress)
     return progress.worst
 
@@ -100,15 +106,46 @@ def _timeout(options: BatchCommand) -> float | None:
     return seconds or None
 
 
-def _print_outcomes(outcomes: Iterator[JobOutcome], progress: _Progress, record: Ledgers) -> None:
-    """Print a line for each outcome as soon as it is there."""
+def _print_outcomes(
+    outcomes: Iterator[JobOutcome], progress: _Progress, record: Ledgers, errors: ErrorForm
+) -> list[JobOutcome]:
+    """Print a line for each outcome as soon as it is there, and why jobs failed; return the failed ones."""
+    failed = list[JobOutcome]()
     with standard_output() as out:
         for outcome in outcomes:
             if outcome.entry is not None and outcome.outcome == "written":
                 record.add(outcome.job, outcome.entry)
             progress.erase()
             _print_line(out, _as_json(outcome))
+            if outcome.exit_code:
+                failed.append(outcome)
+                _say_why(outcome, record.set_aside(outcome.job), errors)
             progress.add(outcome)
+    return failed
+
+
+def _say_why(outcome: JobOutcome, aside: str | None, errors: ErrorForm) -> None:
+    """Say why a job failed, and where rows are that an earlier batch wrote for it."""
+    if errors == "json":
+        report_error(_error(outcome), errors)
+    if errors == "text":
+        print_remark(f"{utf8(outcome.job.job)}: {outcome.outcome}: {_first(outcome)}")
+        if aside is not None:
+            print_remark(f"  {utf8(outcome.job.output)} was of an earlier batch: it is {utf8(aside)} now")
+
+
+def _error(outcome: JobOutcome) -> TrajcliError:
+    """Return the error that a job failed with."""
+    known = (InputError, VerificationError, PlanningError, FileError)
+    kind = next((each for each in known if each.exit_code == outcome.exit_code), TrajcliError)
+    return kind(*outcome.problems)
+
+
+def _first(outcome: JobOutcome) -> str | None:
+    """Return the first thing that is wrong with a job, and how many more there are."""
+    problems = outcome.problems
+    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+    return problems[0].text() + more if problems else None
 
 
 def _print_line(out: BinaryIO, value: dict[str, Any]) -> None:
@@ -120,14 +157,12 @@ def _print_line(out: BinaryIO, value: dict[str, Any]) -> None:
 
 def _as_json(outcome: JobOutcome) -> dict[str, Any]:
     """Return an outcome as a mapping that JSON can hold, with the same keys for every job."""
-    problems = outcome.problems
-    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
     return {
         "job": outcome.job.job,
         "outcome": outcome.outcome,
         "exit": outcome.exit_code,
-        "error": problems[0].text() + more if problems else None,
-        "problems": [problem_as_json(problem) for problem in problems],
+        "error": _first(outcome),
+        "problems": [problem_as_json(problem) for problem in outcome.problems],
         "duration": outcome.duration,
         "output": outcome.output,
         "hash": outcome.inputs,

@@ -9,8 +9,8 @@ from typing import Annotated, Literal
 
 import typer
 
-from trajcli.cli.command import Command
-from trajcli.cli.options import Consumer, RowTimes, robot_names
+from trajcli.cli.command import Command, CommandLine
+from trajcli.cli.options import Consumer, JobErrors, RowTimes, robot_names
 
 MotionSource = Annotated[
     str, typer.Argument(metavar="FILE", help="CSV, MCAP, ROS messages, JSON lines, .npy; - is stdin.")
@@ -53,7 +53,7 @@ class EditCommand(Command):
     quiet: Quiet = False
 
 
-class BatchCommand(Command):
+class BatchCommand(CommandLine):
     """Plan many jobs, and write each; unchanged ones are skipped. Prints a line of JSON for each job."""
 
     example = "trajcli batch examples/cubic.yaml examples/quintic.yaml -o rows"
@@ -93,6 +93,10 @@ class BatchCommand(Command):
         ),
     ] = None
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on stderr.")] = False
+    strict: Annotated[
+        bool, typer.Option("--strict", help="A job with an event fails: a concession, or a warning of --for.")
+    ] = False
+    errors: JobErrors = "text"
 
 
 class RetimeCommand(EditCommand):
@@ -172,7 +176,7 @@ class ConvertCommand(EditCommand):
     file: MotionSource
 
 
-MOTION_COMMANDS = (
+MOTION_COMMANDS: tuple[type[CommandLine], ...] = (
     BatchCommand,
     RetimeCommand,
     ResampleCommand,

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from trajcli.cli.progress import progress
 from trajcli.curves.extrema import peaks
-from trajcli.errors import Amount, InputError, Problem, VerificationError
+from trajcli.errors import Amount, InputError, Problem, TrajcliError, VerificationError
 from trajcli.grids import Grid
 from trajcli.job.read import LoadedJob, files_of, load_job
 from trajcli.kinematics.robot import QUANTITIES
 from trajcli.output.write import grid_of, write_rows, write_text
-from trajcli.planners.planner import Event, PlannedMove
+from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.streams.formats import StreamFormat, format_of
-from trajcli.streams.whole_file import identity
+from trajcli.streams.whole_file import identity, set_aside
 
 if TYPE_CHECKING:
     from trajcli.cli.job_commands import PlanCommand
@@ -53,7 +54,10 @@ def plan_and_write(job: str, options: PlanCommand) -> Plan:
         check_log_options(log, loaded.robot, loaded.job.output.start_time)
     if options.resolved is not None:
         _write_resolved(loaded, options.resolved)
-    with progress(to_terminal=options.output in (None, "-") and not options.no_output):
+    with (
+        _older_rows_aside(options),
+        progress(to_terminal=options.output in (None, "-") and not options.no_output),
+    ):
         with np.errstate(
             all="ignore"
         ):  # what is not finite is for the checks to find, not for numpy to print
@@ -70,6 +74,7 @@ def plan_and_write(job: str, options: PlanCommand) -> Plan:
     if options.report is not None or options.reference:
         _report(plan, options, made, rows)  # behind the rows: where it stands, they do
     if refusal is not None:
+        _set_aside(options)
         raise refusal
     if not options.quiet:
         written = 0 if options.no_output or form.content == "knots" else grid.count
@@ -78,6 +83,22 @@ def plan_and_write(job: str, options: PlanCommand) -> Plan:
         if made is not None:
             _summarise_consumer(made)
     return plan
+
+
+@contextmanager
+def _older_rows_aside(options: PlanCommand) -> Iterator[None]:
+    """Take rows of an earlier plan out of the way where a new one fails."""
+    try:
+        yield
+    except TrajcliError:
+        _set_aside(options)
+        raise
+
+
+def _set_aside(options: PlanCommand) -> None:
+    aside = None if options.no_output or options.output is None else set_aside(options.output)
+    if aside is not None:
+        print(f"{options.output} was of an earlier plan: it is {aside} now", file=sys.stderr)  # noqa: T201
 
 
 def _beside_rows(
@@ -162,7 +183,9 @@ def _refusal(plan: Plan, options: PlanCommand, made: ForConsumer | None) -> Veri
 
         return verification_error(plan, every=options.every or options.errors != "text")
     if options.strict and plan.events:
-        return VerificationError(*(_problem(plan, event) for event in plan.events))
+        from trajcli.output.report import concession_error
+
+        return concession_error(plan)
     if made is None:
         return None
     from trajcli.output.consumer import refusal_of
@@ -170,12 +193,6 @@ def _refusal(plan: Plan, options: PlanCommand, made: ForConsumer | None) -> Veri
 
     broken = None if made.rules is None else refusal_of(plan, made.rules, strict=options.strict)
     return broken or (refusal(made, ()) if made.over else None)
-
-
-def _problem(plan: Plan, event: Event) -> Problem:
-    place = None if event.move is None else plan.loaded.place_of_move(event.move)
-    hint = "leave --strict out to accept it"
-    return Problem(f"{event.kind}: {event.message}", hint, place, event.move, kind=event.kind)
 
 
 def _check_options(options: PlanCommand) -> StreamFormat:

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from trajcli.job.read import LoadedJob
+from trajcli.output.write import grid_of
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.streams.decimals import Digits
 from trajcli.streams.formats import DEFAULT, StreamFormat
 
 
 def delivered(
-    loaded: LoadedJob, profile: str | None = None, form: StreamFormat = DEFAULT, *, rows: bool = False
+    loaded: LoadedJob,
+    profile: str | None = None,
+    form: StreamFormat = DEFAULT,
+    *,
+    rows: bool = False,
+    strict: bool = False,
 ) -> tuple[Plan, Digits]:
     """Return the plan of a job for its consumer, where there is one, and with which digits it is written.
 
@@ -20,6 +26,7 @@ def delivered(
         profile: Of the consumer, instead of the one that the job names.
         form: In which the rows are written.
         rows: Whether somebody else than the job says where they stand.
+        strict: Whether events are an error, and warnings of the consumer's rules.
 
     Raises:
         VerificationError: When its rows, as the consumer joins them, keep neither rules nor limits.
@@ -27,13 +34,33 @@ def delivered(
         PlanningError: When a move has no curve.
     """
     if profile is None and loaded.job.output.consumer is None:
-        return plan_job(loaded), "fixed"
+        plan = plan_job(loaded)
+        if strict and plan.verdict.passed:
+            from trajcli.output.joined import joined_rows, with_event
+
+            grid = grid_of(plan)
+            _refuse_events(with_event(plan, joined_rows(plan, grid, form, "fixed"), form)[0])
+        return plan, "fixed"
     from trajcli.output.for_consumer import Writing, job_for, plan_for, refusal
 
     made = plan_for(*job_for(loaded, profile, {"rows": rows}), Writing(form))
     if made.plan.verdict.passed and not made.keeps:
         raise refusal(made, ())
+    if strict and made.plan.verdict.passed:
+        from trajcli.output.consumer import refusal_of
+
+        _refuse_events(made.plan)
+        broken = None if made.rules is None else refusal_of(made.plan, made.rules, strict=True)
+        if broken is not None:
+            raise broken
     return made.plan, made.digits
+
+
+def _refuse_events(plan: Plan) -> None:
+    if plan.events:
+        from trajcli.output.report import concession_error
+
+        raise concession_error(plan)
 
 
 def plan_of(loaded: LoadedJob, profile: str | None = None) -> Plan:

@@ -40,7 +40,7 @@ from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.knots import Knots, has_knots, knots_of
 from trajcli.output.effort_report import effort_reports, efforts_report, most_used, payload_report
 from trajcli.output.sensitivity import at_limit_of
-from trajcli.planners.planner import PlannedMove
+from trajcli.planners.planner import Event, PlannedMove
 from trajcli.planning.plan import Plan
 from trajcli.trajectory import Span, Trajectory
 from trajcli.units import joint_units
@@ -387,6 +387,17 @@ def verification_error(plan: Plan, *, every: bool = True) -> VerificationError:
     for finding in findings:
         alike.setdefault(_cause(finding, units), []).append(finding)
     return VerificationError(*(_worst(plan, group) for group in alike.values()))
+
+
+def concession_error(plan: Plan) -> VerificationError:
+    """Return the error of a plan that verifies with events, for whoever accepts none."""
+
+    def problem(event: Event) -> Problem:
+        where = None if event.move is None else plan.loaded.place_of_move(event.move)
+        hint = "leave --strict out to accept it"
+        return Problem(f"{event.kind}: {event.message}", hint, where, event.move, kind=event.kind)
+
+    return VerificationError(*map(problem, plan.events))
 
 
 def _cause(finding: Finding, units: str | None) -> tuple[int | str | None, ...]:

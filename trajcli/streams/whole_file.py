@@ -117,6 +117,20 @@ def _hint(error: OSError) -> str | None:
     return None
 
 
+def set_aside(path: str) -> str | None:
+    """Rename what is in a file, which is of no use under its name any more; return its name then.
+
+    Where there is no file, or it is a device or a pipe, or cannot be renamed, nothing is done.
+    """
+    if path == "-" or is_special(path) or not Path(path).is_file():
+        return None
+    aside = f"{path}.stale"
+    with suppress(OSError):
+        Path(path).replace(aside)
+        return aside
+    return None
+
+
 def is_special(path: str) -> bool:
     """Return whether a path is an open descriptor such as /dev/stdout, a device or a pipe."""
     if descriptor_of(path) is not None:
