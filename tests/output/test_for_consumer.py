@@ -14,7 +14,7 @@ import trajcli
 from trajcli.curves.operations import scale_time
 from trajcli.grids import UniformGrid
 from trajcli.job.read import load_job
-from trajcli.output.for_consumer import ForConsumer, Writing, job_for, plan_for
+from trajcli.output.delivery.for_consumer import ForConsumer, Writing, job_for, plan_for
 from trajcli.planners.point_to_point.whole_periods import PhasesInPeriods, profile_in_periods
 from trajcli.streams.formats import FORMATS
 

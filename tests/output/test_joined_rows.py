@@ -10,8 +10,8 @@ from joined_by_scipy import largest_share
 
 import trajcli
 from trajcli.job.read import load_job
-from trajcli.output import joined_rows as module
-from trajcli.output.joined import joined_rows, rows_report, rows_that_keep, with_event
+from trajcli.output.delivery import joined_rows as module
+from trajcli.output.delivery.joined import joined_rows, rows_report, rows_that_keep, with_event
 from trajcli.output.write import grid_of
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.samples import sample

@@ -12,8 +12,8 @@ from joined_by_scipy import largest_share
 from trajcli.curves.hermite import hermite_coefficients, hermite_errors
 from trajcli.grids import UniformGrid
 from trajcli.job.read import load_job
-from trajcli.output.joined import joined_rows
-from trajcli.output.period_bound import pieces_within
+from trajcli.output.delivery.joined import joined_rows
+from trajcli.output.delivery.period_bound import pieces_within
 from trajcli.output.write import grid_of
 from trajcli.planning.plan import plan_job
 from trajcli.streams.formats import FORMATS
@@ -79,7 +79,8 @@ def test_a_path_of_the_tool_counts() -> None:
     judged = joined_rows(plan, grid_of(plan), FORMATS["csv"], "full").judgement(slack=1e-6)
     monkey = pytest.MonkeyPatch()
     monkey.setattr(
-        "trajcli.output.period_bound.pieces_within", lambda *_: np.zeros(plan.trajectory.curve.pieces, bool)
+        "trajcli.output.delivery.period_bound.pieces_within",
+        lambda *_: np.zeros(plan.trajectory.curve.pieces, bool),
     )
     all_seen = joined_rows(plan, grid_of(plan), FORMATS["csv"], "full").judgement(slack=1e-6)
     monkey.undo()

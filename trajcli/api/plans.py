@@ -16,7 +16,7 @@ from trajcli.job.read import LoadedJob, job_from_text, load_job
 from trajcli.job.report import Report
 from trajcli.job.robot import load_sheet
 from trajcli.kinematics.robot import Limits, Robot
-from trajcli.output.delivered import delivered
+from trajcli.output.delivery.delivered import delivered
 from trajcli.planning.plan import Plan
 
 if TYPE_CHECKING:

@@ -36,7 +36,7 @@ _JOINED = {
 
 def _delivered(loaded: LoadedJob, profile: str | None) -> Plan:
     """Return the plan of a job for a consumer."""
-    from trajcli.output.delivered import plan_of
+    from trajcli.output.delivery.delivered import plan_of
 
     return plan_of(loaded, profile)
 

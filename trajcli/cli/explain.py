@@ -10,7 +10,7 @@ from trajcli.cli.polynomials import amount, blend_lines, knot_lines, law_lines, 
 from trajcli.cli.progress import progress
 from trajcli.errors import InputError
 from trajcli.job.read import load_job
-from trajcli.output.delivered import plan_of
+from trajcli.output.delivery.delivered import plan_of
 from trajcli.output.explain import explanation
 from trajcli.planners import HANDLING
 from trajcli.streams.whole_file import standard_output

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from trajcli.job.reports.comparisons import PathReferenceReport, PeerViolation, ReferenceReport
     from trajcli.judge.judgement import Judgement
     from trajcli.limits.tool_bound import ToolPeak
-    from trajcli.output.for_consumer import ForConsumer
-    from trajcli.output.joined_rows import JoinedRows
+    from trajcli.output.delivery.for_consumer import ForConsumer
+    from trajcli.output.delivery.joined_rows import JoinedRows
     from trajcli.output.recording import LogOptions
 
 _FEW_STEPS = 9  # in acceleration: of more the largest says most
@@ -109,7 +109,7 @@ def _beside_rows(
         return plan, None
     if made is not None:
         return plan, None if made.joined is None else (made.rows, made.joined)
-    from trajcli.output.joined import joined_rows, with_event
+    from trajcli.output.delivery.joined import joined_rows, with_event
 
     rows = joined_rows(plan, grid, form, options.digits or "fixed")
     plan, judged = with_event(plan, rows, form)
@@ -120,7 +120,7 @@ def _wanted(loaded: LoadedJob, options: PlanCommand) -> tuple[LoadedJob, Profile
     """Return the job as the consumer takes its rows that the command line, or it, names; and what that is."""
     if options.consumer is None and loaded.job.output.consumer is None:
         return None
-    from trajcli.output.for_consumer import job_for
+    from trajcli.output.delivery.for_consumer import job_for
 
     kept = {"rate": options.rate is not None, "rows": options.rows is not None}
     return job_for(loaded, options.consumer, kept)
@@ -128,7 +128,7 @@ def _wanted(loaded: LoadedJob, options: PlanCommand) -> tuple[LoadedJob, Profile
 
 def _made(wanted: tuple[LoadedJob, Profile, str], form: StreamFormat, options: PlanCommand) -> ForConsumer:
     """Return the plan for a consumer."""
-    from trajcli.output.for_consumer import Writing, plan_for
+    from trajcli.output.delivery.for_consumer import Writing, plan_for
 
     return plan_for(*wanted, Writing(form, options.digits, _log_options(options)))
 
@@ -189,7 +189,7 @@ def _refusal(plan: Plan, options: PlanCommand, made: ForConsumer | None) -> Veri
     if made is None:
         return None
     from trajcli.output.consumer import refusal_of
-    from trajcli.output.for_consumer import refusal
+    from trajcli.output.delivery.for_consumer import refusal
 
     broken = None if made.rules is None else refusal_of(plan, made.rules, strict=options.strict)
     return broken or (refusal(made, ()) if made.over else None)
@@ -266,7 +266,7 @@ def _report(
 
     report = report_of(plan, peers=options.reference)
     if rows is not None:
-        from trajcli.output.joined import rows_report
+        from trajcli.output.delivery.joined import rows_report
 
         report = report.model_copy(update={"rows": rows_report(*rows)})
     if made is not None and made.rules is not None:

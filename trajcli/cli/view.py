@@ -41,7 +41,7 @@ def run_view(options: ViewCommand) -> int:
 
 def _view_job(options: ViewCommand) -> int:
     from trajcli.job.read import files_of, load_job
-    from trajcli.output.delivered import plan_of
+    from trajcli.output.delivery.delivered import plan_of
     from trajcli.player.scene import scene_of_plan
 
     loaded = load_job(options.source, options.override)

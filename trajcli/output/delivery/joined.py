@@ -14,7 +14,7 @@ from trajcli.frozen import frozen
 from trajcli.grids import Grid, UniformGrid
 from trajcli.judge.judgement import Judgement
 from trajcli.knots import has_knots, knot_grid, knots_of, stated_by
-from trajcli.output.joined_rows import JoinedRows
+from trajcli.output.delivery.joined_rows import JoinedRows
 from trajcli.planners.planner import Event
 from trajcli.planning.plan import Plan
 from trajcli.streams.decimals import Digits

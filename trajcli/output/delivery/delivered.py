@@ -36,12 +36,12 @@ def delivered(
     if profile is None and loaded.job.output.consumer is None:
         plan = plan_job(loaded)
         if strict and plan.verdict.passed:
-            from trajcli.output.joined import joined_rows, with_event
+            from trajcli.output.delivery.joined import joined_rows, with_event
 
             grid = grid_of(plan)
             _refuse_events(with_event(plan, joined_rows(plan, grid, form, "fixed"), form)[0])
         return plan, "fixed"
-    from trajcli.output.for_consumer import Writing, job_for, plan_for, refusal
+    from trajcli.output.delivery.for_consumer import Writing, job_for, plan_for, refusal
 
     made = plan_for(*job_for(loaded, profile, {"rows": rows}), Writing(form))
     if made.plan.verdict.passed and not made.keeps:

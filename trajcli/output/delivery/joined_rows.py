@@ -229,7 +229,7 @@ class JoinedRows:
         curve = self.plan.trajectory.curve
         other: NDArray[np.bool_] = np.any(curve.coefficients[: -(degree + 1)], axis=(0, 2))
         if degree > 1 and isinstance(self.grid, UniformGrid) and other.any():
-            from trajcli.output.period_bound import pieces_within
+            from trajcli.output.delivery.period_bound import pieces_within
 
             within = pieces_within(self.plan, 1 / self.grid.rate, (degree + 1) // 2, _NEGLIGIBLE)
             other = np.logical_and(other, np.logical_not(within))

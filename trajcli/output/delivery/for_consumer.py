@@ -24,25 +24,19 @@ from trajcli.job.read import LoadedJob
 from trajcli.judge.judgement import Judgement
 from trajcli.kinematics.robot import QUANTITIES
 from trajcli.knots import has_knots
-from trajcli.limits.kinds import KIND_OF, STRETCHABLE
 from trajcli.output.consumer import judge_as_written
-from trajcli.output.joined import joined_rows, rows_that_keep, set_columns
-from trajcli.output.joined_rows import JoinedRows
+from trajcli.output.delivery.joined import joined_rows, rows_that_keep, set_columns
+from trajcli.output.delivery.joined_rows import JoinedRows
 from trajcli.output.write import grid_of
 from trajcli.planners.planner import Event
-from trajcli.planning.adaptation import Adaptation, Cap
+from trajcli.planning.adaptation import Adaptation
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.progress import report_progress
 from trajcli.streams.decimals import Digits
 from trajcli.streams.formats import DEFAULT, StreamFormat
 
 _ROUNDS = 16  # of tightening: a jerk that switches between rows is less than twice its limit
-_LESS = 1 - 1e-9  # of a limit that is tightened
 _SLACK = 1e-6  # relative: what a joined curve may be above a limit
-_SLOWEST = 0.7  # of the speed, in one round, where the tool leaves its path between rows
-_HOPELESS = 1e3  # times a limit: a step of velocity, which no motion of any duration is without
-_FURTHEST = 30.0  # times the tolerance: to what a tool leaves its path by, slowness is no help
-_LITTLE = 1.003  # times a limit: such a move is stretched, as another one might be found within less
 _COARSE = 0.05  # of a limit: what decimals alone may make up between knots
 _LONGER = 1e-9  # relative: a duration that differs by less is the same
 
@@ -220,7 +214,11 @@ def plan_for(loaded: LoadedJob, profile: Profile, brought: str, writing: Writing
     search = _Search(loaded, profile, writing)
     said = (brought,) if brought else ()
     first = search.attempt(loaded, rules=True)
-    if first.keeps or not first.plan.verdict.passed or not all(map(_is_rate, first.over)):
+    if first.keeps or not first.plan.verdict.passed:
+        return replace(first, said=said)
+    from trajcli.output.delivery.tightening import may_be_cured
+
+    if not all(map(may_be_cured, first.over)):
         return replace(first, said=said)
     if loaded.job.when_over_limit == "error":
         raise refusal(first, search.help(first))
@@ -232,25 +230,14 @@ def plan_for(loaded: LoadedJob, profile: Profile, brought: str, writing: Writing
 def refusal(made: ForConsumer, remedies: Iterable[str]) -> VerificationError:
     """Return why rows are not written for a consumer: what is worst, and what helps."""
     plan = made.plan
-    worst = max(made.over, key=lambda found: found.excess).said_by(plan.loaded.say)
+    found = max(made.over, key=lambda found: found.excess)
+    of_rule, worst = made.rules is not None and found in made.rules.findings, found.said_by(plan.loaded.say)
     others = len({found.move for found in made.over} - {worst.move})
     more = f" (and in {others} more move{'s' * (others > 1)})" if others else ""
     hint = "; ".join(remedies) or "neither other rows nor a slower motion was found that keeps them"
-    of_rule = made.rules is not None and worst in made.rules.findings
     text = f"{worst.rule if of_rule else made.where}: {worst.message}{more}"
     problem = replace(worst, hint=hint).problem(text, plan.loaded.place_of_move(worst.move or 0))
     return VerificationError(replace(problem, severity="error", kind=worst.rule if of_rule else worst.kind))
-
-
-def _is_rate(finding: Finding) -> bool:
-    """Return whether other rows, or a slower motion, may help against a finding of its kind."""
-    return (finding.kind in STRETCHABLE or finding.kind == "deviation") and finding.move is not None
-
-
-def _curable(finding: Finding) -> bool:
-    """Return whether a slower motion may help against a finding."""
-    worst = _FURTHEST if finding.kind == "deviation" else _HOPELESS
-    return _is_rate(finding) and bool(finding.limit) and finding.excess < worst
 
 
 class _Search:
@@ -348,6 +335,8 @@ class _Search:
             adapted: How its moves are planned.
             best: The shortest that is known; one that lasts longer is of no use.
         """
+        from trajcli.output.delivery.tightening import tightened
+
         for count in range(_ROUNDS):
             report_progress(f"planning for {self._profile.name}, round {count + 1}")
             made = self.attempt(loaded, adapted)
@@ -355,7 +344,7 @@ class _Search:
                 return None
             if made.clean or not made.plan.verdict.passed:
                 return made if made.clean else None
-            tighter = _tighter(made, adapted)
+            tighter = tightened(made.plan, made.over, made.uses_over, adapted)
             if tighter is None:
                 return None
             adapted = tighter
@@ -386,71 +375,3 @@ def _with_event(made: ForConsumer, kind: str, text: str) -> ForConsumer:
     """Return a plan with one more event."""
     events = (*made.plan.events, Event(kind, text))
     return replace(made, plan=replace(made.plan, events=events))
-
-
-def _tighter(made: ForConsumer, adapted: Adaptation) -> Adaptation | None:
-    """Return how moves are planned so that rows do not pass what they pass now; None where nothing helps."""
-    plan, caps, longer = made.plan, dict(adapted.caps), dict[int, float]()
-    moves = {move.index: number for number, move in enumerate(plan.moves)}
-    if not all(map(_curable, made.over)):
-        return None
-    for kind, excess, joint, index in _passed(made):
-        for number in _movers(plan, moves[index]):
-            move = plan.moves[number]
-            if move.over_limit != "slow":
-                continue
-            if kind == "deviation":
-                _slow_down(caps, plan, number, max(excess**-0.5, _SLOWEST))
-            elif excess < _LITTLE and adapted.period is None and move.at_rest:
-                factor = excess ** (1 / (KIND_OF[kind].order or 1)) / _LESS
-                longer[move.index] = max(longer.get(move.index, 1.0), factor)
-            else:
-                _tighten(caps, plan, number, (kind, excess, joint))
-    if caps == adapted.caps and not longer:
-        return None
-    stretches = {index: adapted.stretches.get(index, 1.0) * factor for index, factor in longer.items()}
-    return replace(adapted, caps=caps, stretches={**adapted.stretches, **stretches})
-
-
-def _passed(made: ForConsumer) -> Iterator[tuple[str, float, int, int]]:
-    """Yield the kind of each limit that is passed, how many times, the joint (-1 for none) and the move."""
-    for share, order, joint, index in made.uses_over:
-        yield QUANTITIES[order], share, joint, index
-    names = made.plan.trajectory.joint_names
-    for finding in made.over:
-        joint = -1 if finding.joint is None else names.index(finding.joint)
-        yield finding.kind, finding.excess, joint, finding.move or 0
-
-
-def _movers(plan: Plan, number: int) -> Iterator[int]:
-    """Yield a move; where the arm stands in it, those beside it, whose rows its own are joined with."""
-    if plan.verdict.peaks[number][1].magnitude.any():
-        yield number
-        return
-    yield from (other for other in (number - 1, number + 1) if 0 <= other < len(plan.moves))
-
-
-def _slow_down(caps: dict[Cap, float], plan: Plan, number: int, share: float) -> None:
-    """Lower all caps of a move so that it moves at a share of its speed."""
-    for order in (1, 2, 3):
-        for joint, peak in enumerate(plan.verdict.peaks[number][order].magnitude.tolist()):
-            key = plan.moves[number].index, QUANTITIES[order], joint
-            if peak:
-                caps[key] = min(caps.get(key, np.inf), peak) * share**order
-
-
-def _tighten(caps: dict[Cap, float], plan: Plan, number: int, passed: tuple[str, float, int]) -> None:
-    """Lower the cap of a move: of the kind that is passed, by how many times, and whose it is."""
-    name, excess, joint = passed
-    move, kind = plan.moves[number], KIND_OF[name]
-    limits, share, reached = move.robot.limits, _LESS / excess, np.inf
-    if kind.of_tool:
-        limit = float(getattr(limits.tcp, kind.key))
-    elif name == "velocity_by_position":
-        limit, share = float(limits.velocity_by_position[joint, 0]), share**2
-    else:
-        limit = float(np.abs(getattr(limits, kind.key)[joint]).max())
-        if name in QUANTITIES:
-            reached = float(plan.verdict.peaks[number][kind.order or 0].magnitude[joint]) or np.inf
-    key = move.index, name, joint
-    caps[key] = min(caps.get(key, np.inf), reached, limit) * share

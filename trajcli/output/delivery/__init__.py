@@ -1,0 +1,1 @@
+"""Rows as whoever gets them joins them, and plans whose rows keep all limits so."""
