@@ -49,8 +49,10 @@ def test_the_robot_file_reads_as_the_same_robot(
 
 
 def test_what_was_decided_is_said(capfd: Capture) -> None:
-    code, out, err = call(capfd, "urdf", MODELS / "xarm7.urdf")
+    code, out, err = call(capfd, "urdf", "-v", MODELS / "xarm7.urdf")
     assert code == 0
+    (short,) = call(capfd, "urdf", MODELS / "xarm7.urdf").err.splitlines()
+    assert short == f"{err.splitlines()[0]}; {len(err.splitlines()) - 1} more notes: -v says them"
     lines = err.splitlines()
     assert "from link world to link link_eef" in lines[0]
     assert "6 angles of joint origins" in lines[1]
@@ -58,7 +60,7 @@ def test_what_was_decided_is_said(capfd: Capture) -> None:
     assert out.startswith("name: UF_ROBOT\nunits: {angle: rad, length: m}\n")
     assert "effort: [-50.0, 50.0]" in out
     assert "the tree also ends in ee_link" in call(capfd, "urdf", MODELS / "ur5.urdf").err
-    assert "effort 0 is a placeholder, effort null" in call(capfd, "urdf", MODELS / "iiwa14.urdf").err
+    assert "effort 0 is a placeholder, effort null" in call(capfd, "urdf", "-v", MODELS / "iiwa14.urdf").err
 
 
 def test_root_tip_and_refusals(capfd: Capture, tmp_path: Path) -> None:

@@ -341,6 +341,9 @@ class UrdfCommand(Command):
         str | None,
         typer.Option("--output", "-o", metavar="FILE", help="Write the robot file instead of printing it."),
     ] = None
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Every note on what was decided, not only the first.")
+    ] = False
 
 
 class CalibrateCommand(Command):

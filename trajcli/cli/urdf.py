@@ -33,8 +33,13 @@ def run_urdf(options: UrdfCommand) -> int:
         print_lines([text.rstrip("\n")])
     else:
         _write(text, options.file, str(options.output))
-    for remark in read.remarks:
-        print_remark(f"{name}: {remark}")
+    first, *more = read.remarks
+    if options.verbose:
+        for remark in read.remarks:
+            print_remark(f"{name}: {remark}")
+    else:
+        notes = f"; {len(more)} more note{'s' * (len(more) > 1)}: -v says them" if more else ""
+        print_remark(f"{name}: {first}{notes}")
     return 0
 
 
