@@ -18,8 +18,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from trajcli.version import __version__
-
 if TYPE_CHECKING:
     from trajcli.api.motions import Motion, batch, plot, resample, retime, view
     from trajcli.api.plans import Arm, InverseSolution, PlannedJob, check, load_robot, plan
@@ -47,6 +45,7 @@ if TYPE_CHECKING:
     from trajcli.output.write import write_plan
     from trajcli.planning.plan import Plan, plan_job
     from trajcli.trajectory import Rows, State, Trajectory
+    from trajcli.version import __version__
 
 _HOMES = {
     "trajcli.api.plans": ("Arm", "InverseSolution", "PlannedJob", "check", "load_robot", "plan"),
@@ -75,6 +74,7 @@ _HOMES = {
     "trajcli.output.report": ("report_of", "verification_error"),
     "trajcli.output.write": ("write_plan",),
     "trajcli.trajectory": ("Rows", "State", "Trajectory"),
+    "trajcli.version": ("__version__",),
 }
 _MODULES = {name: module for module, names in _HOMES.items() for name in names}
 

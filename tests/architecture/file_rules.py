@@ -19,8 +19,6 @@ SMALL_FILE = 150
 SMALL_FILES = {
     "checks/target.py": "one file a judgement, as those beside it",
     "judge/stamps.py": "time stamps are a subject beside motions",
-    "kinematics/inverse/families/planar.py": "one file a family; `choose` is their table",
-    "kinematics/inverse/families/three_parallel.py": "one file a family; `choose` is their table",
 }
 """Why a small file that one file alone imports is a file of its own."""
 

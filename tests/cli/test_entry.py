@@ -8,16 +8,17 @@ import pytest
 
 from trajcli.__main__ import _NoPlugins
 from trajcli.cli import app as commands
-from trajcli.cli.app import app
 
 
 def names_after(monkeypatch: pytest.MonkeyPatch, *words: str) -> list[str]:
     """Return which commands the entry point makes for a command line."""
-    monkeypatch.setattr(app, "registered_commands", list(app.registered_commands))
+    made = []
+    register = commands.register
+    monkeypatch.setattr(commands, "register", lambda app, some: (made.extend(some), register(app, some)))
     monkeypatch.setattr(sys, "argv", ["trajcli", *words])
     with pytest.raises(SystemExit):
         commands.run()
-    return [info.callback.__name__ for info in app.registered_commands if info.callback]
+    return [command.word() for command in made]
 
 
 def test_only_the_command_that_is_named_is_made(monkeypatch, capsys):

@@ -6,18 +6,15 @@ Only typer is imported here: `--help` must stay fast.
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from importlib import import_module
 from itertools import pairwise
 from typing import Any
 
 import typer
 import typer.core
 
-from trajcli.cli.arm_commands import ARM_COMMANDS
-from trajcli.cli.command import register
-from trajcli.cli.file_commands import FILE_COMMANDS
-from trajcli.cli.job_commands import JOB_COMMANDS
-from trajcli.cli.motion_commands import MOTION_COMMANDS
+from trajcli.cli.command import CommandLine, register
 
 _JUDGE = "trajcli plan JOB --no-output"
 _OTHER_NAMES = {
@@ -78,32 +75,49 @@ def _form_of_errors(words: Sequence[str]) -> Any:  # noqa: ANN401
     return next(asked, None)
 
 
-app = typer.Typer(
-    name="trajcli",
-    cls=Commands,
-    help="Trajectory planning for serial robots: a YAML job in, a verified sample stream out. "
-    "`trajcli --version` prints the version.",
-    epilog="Example: trajcli init job.yaml && trajcli plan job.yaml\n\n"
-    "Exit codes: 0 done and verified, 1 judged and found wrong, 2 wrong input, 3 no curve exists, "
-    "4 file trouble, 70 a bug in trajcli.",
-    rich_markup_mode=None,
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
+def application(commands: Sequence[type[CommandLine]]) -> typer.Typer:
+    """Return the application with some commands."""
+    made = typer.Typer(
+        name="trajcli",
+        cls=Commands,
+        help="Trajectory planning for serial robots: a YAML job in, a verified sample stream out. "
+        "`trajcli --version` prints the version.",
+        epilog="Example: trajcli init job.yaml && trajcli plan job.yaml\n\n"
+        "Exit codes: 0 done and verified, 1 judged and found wrong, 2 wrong input, 3 no curve exists, "
+        "4 file trouble, 70 a bug in trajcli.",
+        rich_markup_mode=None,
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    made.callback()(lambda: None)  # typer then asks for a command's name also where there is only one
+    register(made, commands)
+    return made
 
 
-@app.callback()
-def commands() -> None:
-    """Let typer ask for a command's name also where `run` leaves only one."""
-
-
-register(app, (*JOB_COMMANDS, *FILE_COMMANDS, *ARM_COMMANDS, *MOTION_COMMANDS))
+def commands_of_groups() -> Iterator[tuple[type[CommandLine], ...]]:
+    """Yield the commands of one module after the other, in the order of `--help`."""
+    for group in ("job", "file", "arm", "motion"):
+        yield import_module(f"trajcli.cli.{group}_commands").COMMANDS
 
 
 def run() -> None:
-    """Run the command that the command line names; where it names none, print help."""
-    # Typer makes every command it knows: more work than a plan.
-    known = {info.callback.__name__: info for info in app.registered_commands if info.callback}
-    app.registered_commands = [known[word] for word in sys.argv[1:2] if word in known] or [*known.values()]
-    app()
+    """Run the command that the command line names; where it names none, print help.
+
+    Typer makes every command it knows: more work than a plan, so it gets one.
+    """
+    seen: list[type[CommandLine]] = []
+    for commands in commands_of_groups():
+        for command in commands:
+            if sys.argv[1:2] == [command.word()]:
+                application([command])()
+                return
+        seen += commands
+    application(seen)()
+
+
+def __getattr__(name: str) -> typer.Typer:
+    if name != "app":
+        raise AttributeError(f"module 'trajcli.cli.app' has no attribute '{name}'")
+    app = globals()["app"] = application([each for commands in commands_of_groups() for each in commands])
+    return app

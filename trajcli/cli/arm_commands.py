@@ -444,7 +444,7 @@ class MobilityCommand(Command):
     as_json: Json = False
 
 
-ARM_COMMANDS = (
+COMMANDS = (
     FkCommand,
     IkCommand,
     JacobianCommand,

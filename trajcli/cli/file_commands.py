@@ -152,4 +152,4 @@ class InitCommand(Command):
     force: Annotated[bool, typer.Option("--force", help="Overwrite the file if it exists.")] = False
 
 
-FILE_COMMANDS = (DiffCommand, PlotCommand, ViewCommand, ProfilesCommand, SchemaCommand, InitCommand)
+COMMANDS = (DiffCommand, PlotCommand, ViewCommand, ProfilesCommand, SchemaCommand, InitCommand)

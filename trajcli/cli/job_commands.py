@@ -250,4 +250,4 @@ class CheckCommand(Command):
     ] = False
 
 
-JOB_COMMANDS: tuple[type[CommandLine], ...] = (PlanCommand, ExplainCommand, PayloadCommand, CheckCommand)
+COMMANDS: tuple[type[CommandLine], ...] = (PlanCommand, ExplainCommand, PayloadCommand, CheckCommand)

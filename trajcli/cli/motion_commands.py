@@ -176,7 +176,7 @@ class ConvertCommand(EditCommand):
     file: MotionSource
 
 
-MOTION_COMMANDS: tuple[type[CommandLine], ...] = (
+COMMANDS: tuple[type[CommandLine], ...] = (
     BatchCommand,
     RetimeCommand,
     ResampleCommand,

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import ValidationError
@@ -28,10 +28,12 @@ from trajcli.job.yaml.load import Document, parse_document, read_document
 from trajcli.kinematics.robot import Robot, unlimited
 from trajcli.language.limits import JobLimitsSpec, LimitsSpec
 from trajcli.language.numbers import FieldPath, ReadingContext
-from trajcli.language.recorded import Recorded
 from trajcli.language.targets import PoseFields, Target
 from trajcli.planners.planner import Event
 from trajcli.units import Units, amount_text
+
+if TYPE_CHECKING:
+    from trajcli.language.recorded import Recorded
 
 _UNREAD = Robot("unread", (), unlimited(0), None, np.eye(4), np.eye(4))
 """Stands for a robot whose own flaws are known, while the rest of the job is read."""

@@ -40,7 +40,6 @@ from trajcli.language.numbers import (
 )
 from trajcli.language.per_joint import UNLIMITED, LowerUpper
 from trajcli.language.poses import Pose
-from trajcli.suggest import did_you_mean, nearest, nearest_names
 from trajcli.units import Quantity, Units
 
 if TYPE_CHECKING:
@@ -283,9 +282,12 @@ def find_sheet(value: Any, document: Document, units: Units) -> RobotSheet:  # n
             raise InputError(
                 Problem("a robot inside a job uses the job's units", "leave `units` out here", place)
             )
-        near = nearest(key, ["file", "urdf", *RobotModel.model_fields])
-        if "joints" not in value and near in ("file", "urdf"):
-            raise InputError(Problem(f"unknown key '{key}'", f"did you mean '{near}'?", place))
+        if "joints" not in value:
+            from trajcli.suggest import nearest
+
+            near = nearest(key, ["file", "urdf", *RobotModel.model_fields])
+            if near in ("file", "urdf"):
+                raise InputError(Problem(f"unknown key '{key}'", f"did you mean '{near}'?", place))
     robot = _validated(value, document, ("robot",), units).as_robot()
     return RobotSheet(robot, units, None, None, None, None)
 
@@ -413,6 +415,8 @@ def _from_urdf_entry(value: Mapping[str, Any], document: Document) -> RobotSheet
     }
     for key, given in value.items():
         if key not in kinds:
+            from trajcli.suggest import did_you_mean
+
             hint = did_you_mean(key, kinds) or "beside `urdf` stand root, tip and exact"
             place = document.place(("robot", key), key=True)
             raise InputError(Problem(f"unknown key '{key}' beside `urdf`", hint, place))
@@ -453,6 +457,8 @@ def _looks_like_a_path(name: str) -> bool:
 
 def _suggestion(name: str, names: list[str]) -> str:
     """Return which robots are meant, and how to see all."""
+    from trajcli.suggest import did_you_mean, nearest_names
+
     near = did_you_mean(name, names) or f"its nearest names are {', '.join(nearest_names(name, names))}"
     return f"{near}{'' if near.endswith('?') else ';'} `trajcli robots` lists all {len(names)}"
 

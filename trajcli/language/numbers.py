@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import (
     BaseModel,
@@ -24,8 +24,6 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from trajcli.frozen import comparable
-from trajcli.language.recorded import Recorded
-from trajcli.suggest import LONGEST_NAME, abridged, flaw_of_name
 from trajcli.units import (
     Quantity,
     UnitError,
@@ -34,6 +32,9 @@ from trajcli.units import (
     parse_quantity,
     unit_name,
 )
+
+if TYPE_CHECKING:
+    from trajcli.language.recorded import Recorded
 
 MAX_JOINTS = 12
 LARGEST_POSITION = 1e12
@@ -114,6 +115,8 @@ NULL = _Null()
 def shown(value: object) -> str:
     """Return a value of a file as it is quoted in messages."""
     if isinstance(value, str):
+        from trajcli.suggest import abridged
+
         return f'"{abridged(value)}"'
     if value is None or value is NULL:
         return "null"
@@ -333,6 +336,8 @@ class Name(FieldType):
         """Return the name."""
         if not isinstance(value, str):
             raise FlawError(f"expected a text, got {shown(value)}")
+        from trajcli.suggest import flaw_of_name
+
         flaw = flaw_of_name(value)
         if flaw is not None:
             raise FlawError(flaw)
@@ -340,6 +345,8 @@ class Name(FieldType):
 
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of a text of one line."""
+        from trajcli.suggest import LONGEST_NAME
+
         return {"type": "string", "minLength": 1, "maxLength": LONGEST_NAME}
 
 

@@ -14,7 +14,6 @@ from trajcli.curves.piecewise import Array
 from trajcli.language.numbers import AT_KEY, SI, FlawError, ReadingContext, refuse, shown, written_number
 from trajcli.language.poses import Pose
 from trajcli.language.targets import AIMS, PoseFields, Target
-from trajcli.suggest import did_you_mean, valid_names
 from trajcli.units import Quantity
 
 RELATIVE_DEFINITION = "relative to "
@@ -109,6 +108,8 @@ def _names_from(name: str, context: ReadingContext) -> list[str]:
 
 
 def _known(name: str, points: Mapping[str, Any]) -> str:
+    from trajcli.suggest import did_you_mean, valid_names
+
     return did_you_mean(name, points) or valid_names(points, "points") or "the job has no `points`"
 
 
@@ -178,6 +179,8 @@ def _moved(value: Mapping[str, Any], point: _Fields, context: ReadingContext) ->
             text = f"from and {key} exclude each other"
             raise FlawError(text, key, AT_KEY, hint=f"say how far from the point: offset: {{{key}: ...}}")
         if key not in (*RELATIVE_FIELDS, *BESIDE):
+            from trajcli.suggest import did_you_mean, valid_names
+
             known = (*RELATIVE_FIELDS, *BESIDE[:3])
             raise FlawError(
                 f"unknown key '{key}'", key, AT_KEY, hint=did_you_mean(key, known) or valid_names(known)

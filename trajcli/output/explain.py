@@ -163,8 +163,8 @@ def _pose(plan: Plan, index: int | None) -> PoseReport | None:
 
 def _resolved(pose: ResolvedPose, plan: Plan) -> PoseReport:
     """Return how a pose was reached, in SI."""
+    from trajcli.kinematics.inverse.target import ranks
     from trajcli.planning.resolve_poses import asked_names
-    from trajcli.queries.inverse import free_directions, ranks
 
     solutions, joints, robot = pose.solutions, pose.joints, plan.loaded.robot
     asked, units = asked_names(pose.target.configuration), joint_units(robot.joint_types)
@@ -172,6 +172,7 @@ def _resolved(pose: ResolvedPose, plan: Plan) -> PoseReport:
     free = None
     if solutions.free[pose.branch].any():
         from trajcli.queries.arm import ArmInUnits
+        from trajcli.queries.inverse import free_directions
 
         free = _plain(next(free_directions(ArmInUnits(robot, plan.loaded.units), joints, pose.ik_target)))
     return PoseReport(

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from trajcli.curves.approach import ApproachUse
 from trajcli.curves.extrema import Peaks
 from trajcli.job.report import MoveReport, Report
 from trajcli.job.reports.comparisons import AtLimitReport, SavingReport
@@ -15,6 +14,7 @@ from trajcli.planning.plan import Plan
 from trajcli.planning.sensitivity import times_at_limits
 
 if TYPE_CHECKING:
+    from trajcli.curves.approach import ApproachUse
     from trajcli.planning.sensitivity import Saving
 
 _NOTHING = 1e-9  # relative to the duration: what rounding leaves of no saving

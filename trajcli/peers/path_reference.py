@@ -14,20 +14,22 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from trajcli.curves.extrema import peaks
 from trajcli.curves.operations import compose
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
-from trajcli.curves.time_optimal.constraints import JointConstraint, is_at_rest
 from trajcli.errors import PlanningError
 from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Limits
 from trajcli.limits.tolerances import exceeds
-from trajcli.peers.geometric_path import GeometricPath
 from trajcli.planners.planner import PlannedMove
+
+if TYPE_CHECKING:
+    from trajcli.curves.time_optimal.constraints import JointConstraint
+    from trajcli.peers.geometric_path import GeometricPath
 
 _UNLIMITED = 1e3  # times the largest limit of its kind: the solver of toppra takes no infinite ones
 _FEWEST, _MOST = 100, 2000  # points of the grid of one smooth path
@@ -95,6 +97,8 @@ def path_reference(move: PlannedMove) -> PathReference | None:
     Raises:
         PlanningError: When toppra finds no motion.
     """
+    from trajcli.curves.time_optimal.constraints import JointConstraint, is_at_rest
+
     plane = move.planned.phase_plane
     joints = (
         None
@@ -126,6 +130,8 @@ def reference_along(
     """
     if not (np.isfinite(limits.velocity).any() or np.isfinite(limits.acceleration).any()):
         return None
+    from trajcli.curves.time_optimal.constraints import JointConstraint
+
     path = geometric.path
     joints = JointConstraint(path, limits.velocity, limits.acceleration)
     speeds = (0.0, 0.0)

@@ -11,11 +11,10 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from trajcli.curves.approach import ApproachUse, durations_at_limit
 from trajcli.curves.extrema import Peaks, durations_above
 from trajcli.curves.piecewise import Array, derivative_coefficients
 from trajcli.errors import TrajcliError
@@ -25,6 +24,9 @@ from trajcli.planners.planner import PlannedMove, Planner
 from trajcli.planning.plan import Plan
 from trajcli.planning.planned_move import plan_move_within
 from trajcli.progress import report_progress
+
+if TYPE_CHECKING:
+    from trajcli.curves.approach import ApproachUse
 
 BindingQuantity = Literal["velocity", "acceleration", "jerk", "velocity_by_position"]
 _BINDING: tuple[BindingQuantity, ...] = ("velocity", "acceleration", "jerk")
@@ -108,6 +110,8 @@ def times_at_limits(
         ]
     near = uses is None or any(use.used >= 1 - NEAR for use in uses)
     if near and move.robot.limits.has_velocity_by_position and curve.degree > 1:
+        from trajcli.curves.approach import durations_at_limit
+
         limits = move.robot.limits.approach
         seconds = durations_at_limit(curve.coefficients, curve.lengths, limits, NEAR)
         for joint, each in zip(limits.limited.tolist(), seconds.tolist(), strict=True):

@@ -7,26 +7,18 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, PlanningError
 from trajcli.geometry.rotation import Flags
-from trajcli.kinematics.dexterity import RANK_TOLERANCE, characteristic_length
-from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.joint_turns import all_turns
 from trajcli.kinematics.inverse.solutions import Solutions, check_reachable
 from trajcli.kinematics.inverse.solve import reached_if_turned, solve
-from trajcli.kinematics.inverse.target import IkTarget, residual_jacobian
-from trajcli.kinematics.jacobian import jacobian
-from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.inverse.target import IkTarget, held_jacobian, rank_of, ranks
 from trajcli.language.targets import Configuration
 
 if TYPE_CHECKING:
     from trajcli.queries.arm import ArmInUnits
-
-_LOST = max(RANK_TOLERANCE, 1e-7)  # of the largest singular value: answers meet their target within rounding
-_AROUND, _SPREAD = 4, 0.1  # configurations, rad or m: an arm is regular almost everywhere around
 
 
 def find_answers(
@@ -158,37 +150,10 @@ def _answer(
 
 def free_directions(arm: ArmInUnits, joints: Array, target: IkTarget) -> Iterator[Array]:
     """Yield unit vectors (n,) of joint values, in the user's units, that leave what is fixed of the pose."""
-    _, values, right = np.linalg.svd(_held(arm.robot, joints[None], target)[0])
+    _, values, right = np.linalg.svd(held_jacobian(arm.robot, joints[None], target)[0])
     from trajcli.queries.jacobian import simplest
 
-    rank = min(int(_rank(values)), len(joints) - 1)
+    rank = min(int(rank_of(values)), len(joints) - 1)
     for direction in simplest(right[rank:]):
         shown = direction / arm.joint_factors
         yield shown / np.linalg.norm(shown)
-
-
-def ranks(robot: Robot, joints: Array, target: IkTarget) -> tuple[NDArray[np.intp], int]:
-    """Return in how many directions of what the target fixes the tcp can move: (K,) here, and nearby.
-
-    Args:
-        robot: The arm.
-        joints: Shape (K, n), rad or m, K >= 1.
-        target: One target.
-    """
-    count = joints.shape[1]
-    steps = _SPREAD * np.cos(np.square(np.arange(1.0, _AROUND * count + 1.0))).reshape(_AROUND, count)
-    held = _held(robot, np.vstack([joints, joints[:1] + steps]), target)
-    values = np.asarray(np.linalg.svd(held, compute_uv=False), dtype=np.float64)
-    counts = _rank(values)
-    return counts[: len(joints)], int(counts.max())
-
-
-def _held(robot: Robot, joints: Array, target: IkTarget) -> Array:
-    """Return the Jacobians (K, m, n) of what the target fixes, lengths divided by the length of the arm."""
-    held = residual_jacobian(target.flat(), forward(robot, joints), jacobian(robot, joints))
-    held[:, : sum(target.position)] /= characteristic_length(robot)
-    return held
-
-
-def _rank(values: Array) -> NDArray[np.intp]:
-    return np.asarray(np.count_nonzero(values > _LOST * values[..., :1], axis=-1))

@@ -12,7 +12,6 @@ from trajcli.curves.piecewise import Array
 from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.families.method import Branch, IkMethod
-from trajcli.kinematics.inverse.link_products import FEW, poses_and_jacobians
 from trajcli.kinematics.inverse.target import IkTarget, closure_of
 from trajcli.kinematics.robot import Robot
 
@@ -83,8 +82,12 @@ def closures(robot: Robot, target: IkTarget, joints: Array) -> Array:
     count, branches, poses = joints.shape
     repeated = target.rows(np.tile(np.arange(poses), branches))
     values = joints.reshape(count, -1).T
-    few = len(values) <= FEW and count > target.coordinates
-    poses_there = poses_and_jacobians(robot, values)[0] if few else forward(robot, values)
+    poses_there = None
+    if count > target.coordinates:
+        from trajcli.kinematics.inverse.link_products import FEW, poses_and_jacobians
+
+        poses_there = poses_and_jacobians(robot, values)[0] if len(values) <= FEW else None
+    poses_there = forward(robot, values) if poses_there is None else poses_there
     closure = closure_of(repeated, poses_there)
     return closure.T.reshape(2, branches, poses).copy()
 

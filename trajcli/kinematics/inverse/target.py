@@ -10,15 +10,21 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import frozen
 from trajcli.geometry.rotation import AXES, AxisName, exp, log
+from trajcli.kinematics.dexterity import RANK_TOLERANCE, characteristic_length
+from trajcli.kinematics.forward import forward
+from trajcli.kinematics.jacobian import jacobian
+from trajcli.kinematics.robot import Robot
 
 OrientationConstraint = Literal["all", "direction", "yaw", "pitch", "none"]
 _WHOLE = (True, True, True)
+_LOST = max(RANK_TOLERANCE, 1e-7)  # of the largest singular value: answers meet their target within rounding
+_AROUND, _SPREAD = 4, 0.1  # configurations, rad or m: an arm is regular almost everywhere around
 _UNCHANGED = 1e-12  # by a turn of any joint, relative to the arm: rounding
 _ALMOST_UPRIGHT = 1e-12  # of a unit vector: the heading of a vertical direction is not defined
 
@@ -265,3 +271,30 @@ def _check(xyz: Array | None, named: dict[str, Array]) -> None:
     if pitch is not None and (np.abs(pitch) > np.pi / 2).any():
         worst = float(np.abs(pitch).max())
         raise InputError(f"a pitch is an elevation within pi/2 of level, this one is {worst:.6g} rad")
+
+
+def held_jacobian(robot: Robot, joints: Array, target: IkTarget) -> Array:
+    """Return the Jacobians (K, m, n) of what the target fixes, lengths divided by the length of the arm."""
+    held = residual_jacobian(target.flat(), forward(robot, joints), jacobian(robot, joints))
+    held[:, : sum(target.position)] /= characteristic_length(robot)
+    return held
+
+
+def rank_of(values: Array) -> NDArray[np.intp]:
+    """Return how many singular values (..., m) are above what rounding leaves of the largest, shape (...)."""
+    return np.asarray(np.count_nonzero(values > _LOST * values[..., :1], axis=-1))
+
+
+def ranks(robot: Robot, joints: Array, target: IkTarget) -> tuple[NDArray[np.intp], int]:
+    """Return in how many directions of what the target fixes the tcp can move: (K,) here, and nearby.
+
+    Args:
+        robot: The arm.
+        joints: Shape (K, n), rad or m, K >= 1.
+        target: One target.
+    """
+    count = joints.shape[1]
+    steps = _SPREAD * np.cos(np.square(np.arange(1.0, _AROUND * count + 1.0))).reshape(_AROUND, count)
+    held = held_jacobian(robot, np.vstack([joints, joints[:1] + steps]), target)
+    counts = rank_of(np.asarray(np.linalg.svd(held, compute_uv=False), dtype=np.float64))
+    return counts[: len(joints)], int(counts.max())

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from importlib import import_module
 
 import numpy as np
 
 from trajcli.kinematics.dexterity import RANK_TOLERANCE, characteristic_length
-from trajcli.kinematics.inverse.families import planar, positioning, spherical_wrist, three_parallel
 from trajcli.kinematics.inverse.families.method import IkMethod
 from trajcli.kinematics.inverse.families.screw_axes import AxisGeometry, axis_geometry
 from trajcli.kinematics.jacobian import jacobian
 from trajcli.kinematics.robot import Robot
 
-FAMILIES = (planar.match, spherical_wrist.match, three_parallel.match, positioning.match)
+FAMILIES = {"planar": 4, "spherical_wrist": 7, "three_parallel": 7, "positioning": 7}
+"""Modules of this folder, and the most joints of their arms: each is loaded when it is tried."""
 _CONFIGURATIONS = 3  # configurations: an arm that is singular in all of them is so everywhere
 
 
@@ -32,8 +33,11 @@ def method_for(robot: Robot) -> IkMethod:
         InputError: When the robot has no geometry.
     """
     arm = axis_geometry(robot)
-    for match in FAMILIES if not any(joint.beta for joint in robot.joints) else ():
-        method = match(arm)
+    tried = {} if any(joint.beta for joint in robot.joints) else FAMILIES
+    for name, most in tried.items():
+        if len(robot.joints) > most:
+            continue
+        method: IkMethod | None = import_module(f"{__package__}.{name}").match(arm)
         if method is not None and _every_joint_counts(robot, method):
             return method
     return _held_method(robot) or numeric_method(arm)
