@@ -7,29 +7,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-LONGEST_NAME = 200
-"""Characters of a name that a file gives: more would fill messages."""
-_UNPRINTED = ("Cc", "Cf", "Cs", "Zl", "Zp")  # controls, marks of direction, halves of pairs, breaks of lines
 _QUOTED = 100  # characters of a text in messages
 _LONGEST = 64  # characters: nobody mistypes more, and difflib's time grows with the square
 _LISTED = 12
-
-
-def flaw_of_name(name: str) -> str | None:
-    """Return what is wrong with a name that a file gives; None where nothing is.
-
-    Control characters in a name could write commands into the log of a continuous integration.
-    """
-    if not name:
-        return "expected a text that is not empty"
-    if len(name) > LONGEST_NAME:
-        return f"a name has at most {LONGEST_NAME} characters, '{abridged(name)}' has {len(name)}"
-    if name.isprintable():
-        return None
-    from unicodedata import category
-
-    bad = next((letter for letter in name if category(letter) in _UNPRINTED), None)
-    return None if bad is None else f"a name holds no control characters, got U+{ord(bad):04X} in {name!r}"
 
 
 def abridged(text: str) -> str:

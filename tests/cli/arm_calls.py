@@ -13,7 +13,7 @@ import typer
 from running import Outcome
 from yaml_files import read_yaml
 
-from trajcli.cli.arm_commands import ARM_COMMANDS
+from trajcli.cli.arm_commands import COMMANDS
 from trajcli.cli.command import register
 
 ORACLES = Path(__file__).parents[1] / "oracles"
@@ -22,7 +22,7 @@ ORACLES = Path(__file__).parents[1] / "oracles"
 @cache
 def arm_app() -> typer.Typer:
     app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
-    register(app, ARM_COMMANDS)
+    register(app, COMMANDS)
     return app
 
 

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from trajcli.curves.hermite import hermite_coefficients
 from trajcli.curves.piecewise import Array, derivative_coefficients, horner
 from trajcli.frozen import frozen
 from trajcli.judge.reconstruction import Interpolation, piece_coefficients, stated_orders
@@ -154,3 +155,41 @@ def explained_by_law(
     highest, beyond = (jumps[piece, joint] for jumps in window.jumps)
     explained = share * length**below * highest + _CURVED * length ** (below + 1) * beyond
     return np.where(length <= DENSE, explained, -np.inf)
+
+
+@frozen
+class JoinedPairs(Intervals):
+    """Intervals that need not be neighbours, one behind the other in a time of their own.
+
+    Attributes:
+        stated: What the rows before and after them state, shape (orders, 2, m, n).
+        moves_after: Index of the move of the row after each, shape (m,).
+        begun: When each begins, s from the start of the trajectory, shape (m,).
+    """
+
+    stated: Array
+    moves_after: NDArray[np.int64]
+    begun: Array
+
+    @cached_property
+    def coefficients(self) -> Array:
+        """Of the pieces, (degree + 1, m, n), highest power first."""
+        return hermite_coefficients(self.stated[:, 0], self.stated[:, 1], self.lengths[:, None])
+
+    def piece_rows(self, piece: NDArray[np.intp], joint: NDArray[np.intp], count: int) -> PieceRows:
+        """Return what stands at the ends of pieces (m,), for one joint each."""
+        ends = tuple(values[:, piece, joint] for values in self.stated[:count])
+        absolute = self.resolution.q[joint]
+        errors = tuple(stated_errors(both, absolute, 0.0).max(axis=0) for both in ends)
+        return PieceRows(self.lengths[piece], self.late[piece], ends, errors)
+
+    def runs(self) -> Iterator[tuple[tuple[int, int], int, int]]:
+        """Yield the moves before and after intervals, and the first and the last + 1 of those alike."""
+        changes = (np.diff(self.moves) != 0) | (np.diff(self.moves_after) != 0)
+        edges = [0, *(np.flatnonzero(changes) + 1).tolist(), self.moves.size]
+        for low, high in pairwise(edges):
+            yield (int(self.moves[low]), int(self.moves_after[low])), low, high
+
+    def row_at(self, piece: int, local: float) -> int:
+        """Return the number of the row at a time within a piece, or before it."""
+        return int(self.rows[piece]) + int(local >= self.lengths[piece] * (1 - 1e-12))

@@ -10,16 +10,17 @@ and rest at both ends.
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.hermite import hermite_coefficients
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.curves.splines.cubic import clamped
 from trajcli.errors import InputError
-from trajcli.streams.recorded_motion import RecordedMotion
+
+if TYPE_CHECKING:
+    from trajcli.streams.recorded_motion import RecordedMotion
 
 Interpolation = Literal["hold", "linear", "cubic", "quintic", "jtc", "jtc-upsampling"]
 INTERPOLATIONS: tuple[Interpolation, ...] = ("hold", "linear", "cubic", "quintic", "jtc", "jtc-upsampling")
@@ -79,6 +80,8 @@ def piece_coefficients(
     if _STATED.get(interpolation) == 0:
         return q[None, :-1].copy()
     if interpolation == "jtc-upsampling":
+        from trajcli.curves.splines.cubic import clamped
+
         times = np.append(0.0, np.cumsum(lengths))
         rest = np.zeros(q.shape[1])
         return clamped(times, q, rest, rest).coefficients

@@ -37,6 +37,9 @@ if TYPE_CHECKING:
     from trajcli.language.recorded import Recorded
 
 MAX_JOINTS = 12
+LONGEST_NAME = 200
+"""Characters of a name that a file gives: more would fill messages."""
+_UNPRINTED = ("Cc", "Cf", "Cs", "Zl", "Zp")  # controls, marks of direction, halves of pairs, breaks of lines
 LARGEST_POSITION = 1e12
 """Magnitude of an angle or a length, rad or m, that no robot reaches."""
 LARGEST_RATE = 1e30
@@ -110,6 +113,25 @@ class _Null:
 
 
 NULL = _Null()
+
+
+def flaw_of_name(name: str) -> str | None:
+    """Return what is wrong with a name that a file gives; None where nothing is.
+
+    Control characters in a name could write commands into the log of a continuous integration.
+    """
+    if not name:
+        return "expected a text that is not empty"
+    if len(name) > LONGEST_NAME:
+        from trajcli.suggest import abridged
+
+        return f"a name has at most {LONGEST_NAME} characters, '{abridged(name)}' has {len(name)}"
+    if name.isprintable():
+        return None
+    from unicodedata import category
+
+    bad = next((letter for letter in name if category(letter) in _UNPRINTED), None)
+    return None if bad is None else f"a name holds no control characters, got U+{ord(bad):04X} in {name!r}"
 
 
 def shown(value: object) -> str:
@@ -336,8 +358,6 @@ class Name(FieldType):
         """Return the name."""
         if not isinstance(value, str):
             raise FlawError(f"expected a text, got {shown(value)}")
-        from trajcli.suggest import flaw_of_name
-
         flaw = flaw_of_name(value)
         if flaw is not None:
             raise FlawError(flaw)
@@ -345,8 +365,6 @@ class Name(FieldType):
 
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of a text of one line."""
-        from trajcli.suggest import LONGEST_NAME
-
         return {"type": "string", "minLength": 1, "maxLength": LONGEST_NAME}
 
 

@@ -21,8 +21,8 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Place, Problem, utf8
 from trajcli.frozen import frozen
-from trajcli.language.numbers import LARGEST_POSITION, LARGEST_RATE
-from trajcli.suggest import did_you_mean, flaw_of_name, valid_names
+from trajcli.language.numbers import LARGEST_POSITION, LARGEST_RATE, flaw_of_name
+from trajcli.suggest import did_you_mean, valid_names
 
 MAX_BYTES = 10_000_000
 MAX_DEPTH = 100

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from trajcli.job.read import LoadedJob
-from trajcli.output.write import grid_of
 from trajcli.planning.plan import Plan, plan_job
-from trajcli.streams.decimals import Digits
-from trajcli.streams.formats import DEFAULT, StreamFormat
+
+if TYPE_CHECKING:
+    from trajcli.streams.decimals import Digits
+    from trajcli.streams.formats import StreamFormat
 
 
 def delivered(
     loaded: LoadedJob,
     profile: str | None = None,
-    form: StreamFormat = DEFAULT,
+    form: StreamFormat | None = None,
     *,
     rows: bool = False,
     strict: bool = False,
@@ -24,7 +27,7 @@ def delivered(
     Args:
         loaded: The job.
         profile: Of the consumer, instead of the one that the job names.
-        form: In which the rows are written.
+        form: In which the rows are written; None for a table.
         rows: Whether somebody else than the job says where they stand.
         strict: Whether events are an error, and warnings of the consumer's rules.
 
@@ -37,13 +40,16 @@ def delivered(
         plan = plan_job(loaded)
         if strict and plan.verdict.passed:
             from trajcli.output.delivery.joined import joined_rows, with_event
+            from trajcli.output.write import grid_of
+            from trajcli.streams.formats import DEFAULT
 
-            grid = grid_of(plan)
-            _refuse_events(with_event(plan, joined_rows(plan, grid, form, "fixed"), form)[0])
+            form = form or DEFAULT
+            _refuse_events(with_event(plan, joined_rows(plan, grid_of(plan), form, "fixed"), form)[0])
         return plan, "fixed"
     from trajcli.output.delivery.for_consumer import Writing, job_for, plan_for, refusal
+    from trajcli.streams.formats import DEFAULT
 
-    made = plan_for(*job_for(loaded, profile, {"rows": rows}), Writing(form))
+    made = plan_for(*job_for(loaded, profile, {"rows": rows}), Writing(form or DEFAULT))
     if made.plan.verdict.passed and not made.keeps:
         raise refusal(made, ())
     if strict and made.plan.verdict.passed:

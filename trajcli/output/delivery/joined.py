@@ -13,7 +13,6 @@ from trajcli.errors import InputError
 from trajcli.frozen import frozen
 from trajcli.grids import Grid, UniformGrid
 from trajcli.judge.judgement import Judgement
-from trajcli.knots import has_knots, knot_grid, knots_of, stated_by
 from trajcli.output.delivery.joined_rows import JoinedRows
 from trajcli.planners.planner import Event
 from trajcli.planning.plan import Plan
@@ -43,6 +42,8 @@ def joined_rows(plan: Plan, grid: Grid, form: StreamFormat, digits: Digits = "fi
     output, exact = plan.loaded.job.output, not form.decimals or digits == "full"
     if form.content == "rows":
         return JoinedRows(plan, grid, tuple(output.columns), exact)
+    from trajcli.knots import knot_grid, knots_of, stated_by
+
     orders = stated_by(output.columns) if form.content == "knots" else 3
     if form.content == "knots" and output.rows in (None, "knots"):
         knots = knots_of(plan.trajectory, orders)
@@ -130,6 +131,8 @@ def rows_that_keep(rows: JoinedRows, form: StreamFormat | None = None) -> Iterat
 
 def _at_knots(rows: JoinedRows, groups: tuple[Group, ...], output: Mapping[str, Any]) -> OtherRows:
     """Return the rows at the knots of the same motion."""
+    from trajcli.knots import knot_grid, knots_of, stated_by
+
     trajectory = rows.plan.trajectory
     knots = knots_of(trajectory, stated_by(groups))
     grid = knot_grid(trajectory, knots, None, rows.grid.start_time)
@@ -156,6 +159,8 @@ def _others(rows: JoinedRows, form: StreamFormat | None) -> Iterator[OtherRows]:
     full = None if {*_STATES} <= {*rows.groups} else _STATES
     if "q" not in rows.groups and full is None:
         return  # rows of the tool alone
+    from trajcli.knots import has_knots
+
     content = "rows" if form is None else form.content
     if isinstance(rows.grid, UniformGrid) and has_knots(rows.plan.trajectory):
         if "q" in rows.groups:

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,24 +17,20 @@ from numpy.typing import NDArray
 
 from trajcli.columns import Group, joint_factors
 from trajcli.curves.extrema import piece_extremes
-from trajcli.curves.hermite import hermite_coefficients
 from trajcli.curves.piecewise import Array
 from trajcli.findings import Collector, Finding, at_time
 from trajcli.frozen import frozen
 from trajcli.grids import AT_BREAK, NANOSECOND, Grid, KnotGrid, ListedGrid, UniformGrid
-from trajcli.judge.intervals import Intervals
-from trajcli.judge.joint_limits import JudgedRun, judge_limits
 from trajcli.judge.judgement import Judgement, as_planned
-from trajcli.judge.motion import Requirements
 from trajcli.judge.reconstruction import Interpolation, chosen_interpolation
-from trajcli.judge.rounding import PieceRows, stated_errors
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.limits.tolerances import JOINED_RELATIVE
 from trajcli.planning.plan import Plan
 from trajcli.samples import sample
-from trajcli.streams.recorded_motion import Resolution
 
 if TYPE_CHECKING:
+    from trajcli.judge.intervals import JoinedPairs
+    from trajcli.judge.motion import Requirements
     from trajcli.judge.recorded_tool import ToolJudge
 
 _ROWS = 65536  # whose times are looked at together
@@ -99,9 +94,12 @@ class JoinedRows:
         chosen, plan, worst = self.interpolation, self.plan, Collector()
         if chosen is None:
             return None
-        required, tool = self._requirements, _tool_of(plan)
+        tool = _tool_of(plan)
         judged = Judgement((), chosen, self.grid.count, planned_rows=True)
         for window in self._windows(chosen):
+            from trajcli.judge.joint_limits import JudgedRun, judge_limits
+
+            required = self._requirements
             for (before, after), low, high in window.runs():
                 robot, pieces = required.robot_between(before, after), slice(low, high)
                 carries_one = required.carries_one(before, after)
@@ -121,8 +119,10 @@ class JoinedRows:
         """Of moves, counted from 0, by their index."""
         return {move.index: number for number, move in enumerate(self.plan.moves)}
 
-    @property
+    @cached_property
     def _requirements(self) -> Requirements:
+        from trajcli.judge.motion import Requirements
+
         plan = self.plan
         return Requirements(plan.loaded.robot, {move.index: move.robot for move in plan.moves})
 
@@ -159,8 +159,9 @@ class JoinedRows:
         """
         for move, peaks in zip(self.plan.moves, self.plan.verdict.peaks, strict=True):
             yield from _shares(move.robot, [(each.low, each.high) for each in peaks[1:4]], move.index)
-        chosen, required = self.interpolation, self._requirements
+        chosen = self.interpolation
         for window in () if chosen is None else self._windows(chosen):
+            required = self._requirements
             extremes = piece_extremes(window.coefficients, window.lengths, (1, 2, 3))
             for (before, after), first, last in window.runs():
                 robot = required.robot_between(before, after)
@@ -177,7 +178,7 @@ class JoinedRows:
         message = finding.message.replace(at_time(finding.time or 0.0), at_time(time))
         return replace(finding, time=time, message=message)
 
-    def _windows(self, chosen: Interpolation) -> Iterator[_Pairs]:
+    def _windows(self, chosen: Interpolation) -> Iterator[JoinedPairs]:
         """Yield the intervals in which the joined curve may be another than the planned one, many at once."""
         kept: list[tuple[Array, NDArray[np.int64]]] = []
         count = 0
@@ -263,8 +264,11 @@ class JoinedRows:
             steps.append(steps[-1] | here)
         return tuple(steps)
 
-    def _pairs(self, kept: list[tuple[Array, NDArray[np.int64]]], chosen: Interpolation) -> _Pairs:
+    def _pairs(self, kept: list[tuple[Array, NDArray[np.int64]]], chosen: Interpolation) -> JoinedPairs:
         """Return the rows before and after intervals as a window in which all are judged."""
+        from trajcli.judge.intervals import JoinedPairs
+        from trajcli.streams.recorded_motion import Resolution
+
         ends, index = (np.concatenate([part[k] for part in kept], axis=-1) for k in (0, 1))
         times, where = np.unique(ends, return_inverse=True)
         rows = self._rows(times, np.unique(np.stack([index, index + 1])), (_DEGREES[chosen] + 1) // 2)
@@ -278,7 +282,7 @@ class JoinedRows:
         moves = rows[:, -1].astype(np.int64)[where]
         factors = joint_factors(self.plan.trajectory.joint_types, self.plan.loaded.output_units)
         rounding = np.zeros(joints) if self.exact else _HALF_UNIT * np.asarray(factors)
-        return _Pairs(
+        return JoinedPairs(
             t=np.append(0.0, np.cumsum(lengths)),
             lengths=lengths,
             late=_SPACING * np.spacing(lengths),
@@ -314,44 +318,6 @@ class JoinedRows:
             part = KnotGrid(grid.duration, times, at, grid.states[:, of_knot])
         groups = (*_STATES[:stated], "move")
         return np.concatenate([*sample(plan.trajectory, part, groups, robot=plan.loaded.robot)])
-
-
-@frozen
-class _Pairs(Intervals):
-    """Intervals that need not be neighbours, one behind the other in a time of their own.
-
-    Attributes:
-        stated: What the rows before and after them state, shape (orders, 2, m, n).
-        moves_after: Index of the move of the row after each, shape (m,).
-        begun: When each begins, s from the start of the trajectory, shape (m,).
-    """
-
-    stated: Array
-    moves_after: NDArray[np.int64]
-    begun: Array
-
-    @cached_property
-    def coefficients(self) -> Array:
-        """Of the pieces, (degree + 1, m, n), highest power first."""
-        return hermite_coefficients(self.stated[:, 0], self.stated[:, 1], self.lengths[:, None])
-
-    def piece_rows(self, piece: NDArray[np.intp], joint: NDArray[np.intp], count: int) -> PieceRows:
-        """Return what stands at the ends of pieces (m,), for one joint each."""
-        ends = tuple(values[:, piece, joint] for values in self.stated[:count])
-        absolute = self.resolution.q[joint]
-        errors = tuple(stated_errors(both, absolute, 0.0).max(axis=0) for both in ends)
-        return PieceRows(self.lengths[piece], self.late[piece], ends, errors)
-
-    def runs(self) -> Iterator[tuple[tuple[int, int], int, int]]:
-        """Yield the moves before and after intervals, and the first and the last + 1 of those alike."""
-        changes = (np.diff(self.moves) != 0) | (np.diff(self.moves_after) != 0)
-        edges = [0, *(np.flatnonzero(changes) + 1).tolist(), self.moves.size]
-        for low, high in pairwise(edges):
-            yield (int(self.moves[low]), int(self.moves_after[low])), low, high
-
-    def row_at(self, piece: int, local: float) -> int:
-        """Return the number of the row at a time within a piece, or before it."""
-        return int(self.rows[piece]) + int(local >= self.lengths[piece] * (1 - 1e-12))
 
 
 def _shares(
