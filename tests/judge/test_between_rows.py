@@ -1,0 +1,256 @@
+"""What only the curve between rows has: when it is an error, and whose it is.
+
+The oracle is a motion whose largest value is known: a parabola (or a ramp, of the highest derivative that the
+pieces have) that the rows give back exactly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import factorial
+
+import numpy as np
+import pytest
+from numpy.polynomial import Polynomial
+from recorded_rows import bare_robot
+
+from trajcli.findings import Finding
+from trajcli.judge import joint_limits
+from trajcli.judge.motion import Requirements, judge_motion
+from trajcli.kinematics.robot import Joint, Limits, LinkInertia, Payload, Robot, unlimited
+from trajcli.streams.recorded_motion import RecordedMotion, Resolution
+
+PERIOD, PIECES, FAR = 0.008, 9, 1e6
+PEAK, OVER = 1.0, 0.01
+"""Largest value of the derivative that is limited, and how much of it is beyond the limit."""
+SIDES = [1, -1]
+LAW, LAST = 0.14, 1.4
+"""Shares of the step that a change of the law explains: below the highest derivative, and of this itself."""
+
+
+def motion_of(*columns: np.ndarray | None, t: np.ndarray, moves: list[int] | None = None) -> RecordedMotion:
+    """Return rows of some joints without rounding."""
+    stated = [*columns, None, None][:3]
+    exact = np.zeros(stated[0].shape[1])
+    move = None if moves is None else np.array(moves)
+    return RecordedMotion(t, *stated, None, None, move, None, Resolution(0.0, exact, exact, exact), "rows")
+
+
+def peaked(
+    order: int,
+    orders: int,
+    share: float,
+    side: int = 1,
+    *,
+    at: float = 0.5,
+    bent: float = 24.0,
+    period: float = PERIOD,
+) -> RecordedMotion:
+    """Return rows whose derivative of some order is largest, `PEAK`, within the piece in the middle.
+
+    Args:
+        order: Of that derivative.
+        orders: 2 for positions and velocities, 3 for accelerations, too.
+        share: `OVER` by the step of the highest derivative of a piece, times powers of the period.
+        side: 1 for a largest value, -1 for a least one.
+        at: Where in the piece, as a part of it.
+        bent: The parabola falls by this times `OVER` in one period.
+        period: s.
+    """
+    t = period * np.arange(PIECES + 1.0)
+    middle, before, level = (PIECES // 2 + at) * period, (PIECES // 2 - 1) * period, orders
+    below = level - order
+    shape = (
+        Polynomial([PEAK, 0.0, -bent * OVER / period**2]) if below else Polynomial([PEAK, 4 * OVER / period])
+    )
+    wave = shape.integ(order) if order else shape
+    if not below:  # it is largest in the last row
+        middle, before = t[-1], t[-4]
+    step = (-1.0) ** (below + 1) * OVER / (share * period**below)
+    rows = []
+    for k in range(orders):
+        early = np.where(t < before, t - before, 0.0) ** (level - k) / factorial(level - k)
+        rows.append(side * (wave.deriv(k)(t - middle) + step * early)[:, None])
+    return motion_of(*rows, t=t)
+
+
+def bounded(order: int, side: int, bound: float) -> Limits:
+    """Return a limit of one order on one side; on the other there is room."""
+    kind = ("position", "velocity", "acceleration", "jerk")[order]
+    row = [-FAR, bound] if side > 0 else [-bound, FAR]
+    return replace(unlimited(1), **{kind: np.array([row])})
+
+
+def over(motion: RecordedMotion, robot: Robot, **asked: object) -> list[Finding]:
+    """Return what is over limits."""
+    judgement = judge_motion(lambda: [motion], Requirements(robot, **asked))
+    return [found for found in judgement.findings if found.rule == "limit"]
+
+
+CASES = [(0, 2, LAW), (1, 2, LAW), (2, 2, LAST), (1, 3, LAW), (2, 3, LAW), (3, 3, LAST)]
+"""Order that is limited, columns, and the share that is explained."""
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_rows_that_stand_far_apart_explain_nothing(order: int) -> None:
+    for period, severity in ((0.01, "warning"), (0.0101, "error")):
+        motion = peaked(order, order + 1, LAW, period=period)
+        (found,) = over(motion, bare_robot(bounded(order, 1, PEAK - OVER)))
+        assert found.severity == severity
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("order", [1, 2])
+def test_what_rows_state_or_two_of_them_make_certain_is_an_error(order: int, side: int) -> None:
+    """The parabola falls by c in one period: c/4 until the next rows, and c/12 in the mean between these."""
+    for bent, severity in ((12.2, "warning"), (11.8, "error"), (3.9, "error")):
+        motion = peaked(order, order + 1, LAW, side, bent=bent)
+        (found,) = over(motion, bare_robot(bounded(order, side, PEAK - OVER)))
+        assert found.severity == severity, bent
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("at", [0.3, 0.7])
+def test_a_row_at_either_end_states_it(at: float, side: int) -> None:
+    """Only the row nearer to the peak is over the limit."""
+    motion = peaked(1, 2, LAW, side, at=at, bent=1 / 0.4**2)
+    (found,) = over(motion, bare_robot(bounded(1, side, PEAK - OVER)))
+    assert found.severity == "error"
+
+
+def approach(side: int, bound: float) -> Limits:
+    """Return a limit by position so far from the end of the range that it is nearly the same everywhere."""
+    position = [-9.0 * FAR, FAR] if side > 0 else [-FAR, 9.0 * FAR]
+    by_position = np.array([[bound**2 / (2 * FAR), 0.0]])
+    return replace(unlimited(1), position=np.array([position]), velocity_by_position=by_position)
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("at", [0.3, 0.7])
+def test_a_row_at_either_end_approaches_too_fast(at: float, side: int) -> None:
+    motion = peaked(1, 2, LAW, side, at=at, bent=1 / 0.4**2)
+    (found,) = over(motion, bare_robot(approach(side, PEAK - OVER)))
+    assert found.severity == "error"
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_an_approach_in_a_later_move_has_its_own_place(side: int) -> None:
+    """At 0.5 s the second joint is 0.02 m before its end, where 0.2 m/s are allowed, at 0.4 m/s."""
+    t = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+    q = np.zeros((t.size, 2))
+    q[:, 1] = side * np.array([0.0, 0.01, 0.02, 0.03, 0.04, 0.08, 0.08])
+    end = [-9.0, 0.1] if side > 0 else [-0.1, 9.0]
+    by_position = np.array([[np.inf, 0.0], [1.0, 0.0]])
+    limits = replace(unlimited(2), position=np.array([[-9.0, 9.0], end]), velocity_by_position=by_position)
+    (found,) = over(motion_of(q, t=t, moves=[0, 0, 1, 1, 1, 1, 1]), bare_robot(limits), interpolate="linear")
+    assert (found.kind, found.joint, found.move, found.row) == ("velocity_by_position", "j2", 1, 6)
+    assert [found.time, found.value, found.limit] == pytest.approx([0.5, side * 0.4, side * 0.2], rel=1e-6)
+
+
+@pytest.mark.parametrize("worst", [1, 5])
+@pytest.mark.parametrize("side", SIDES)
+def test_pieces_of_every_degree_are_judged(worst: int, side: int) -> None:
+    """Rows with accelerations make quintics, those without cubics: from rest to rest 1.875 and 1.5 d/T."""
+    t, distances = np.arange(8.0), np.array([0.0, 0.3, 0.0, 0.0, 0.0, 0.3, 0.0])
+    distances[worst] = 0.4
+    q = side * np.append(0.0, np.cumsum(distances))[:, None]
+    qdd = np.where(np.arange(8) < 4, np.nan, 0.0)[:, None]
+    peaks = np.where(np.arange(7) < 4, 1.5, 1.875) * distances
+    limits = bounded(1, side, 0.4)
+    (found,) = over(motion_of(q, np.zeros_like(q), qdd, t=t), bare_robot(limits), interpolate="jtc")
+    assert found.count == 2
+    assert found.value == pytest.approx(side * peaks.max(), rel=1e-9)
+    assert found.time == pytest.approx(peaks.argmax() + 0.5)
+
+
+def test_of_many_pieces_the_worst_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rows state more than is allowed nearly everywhere; a piece that ends slower is fastest in between."""
+    monkeypatch.setattr(joint_limits, "_MANY", 4)
+    t, speed = np.arange(9.0), np.array([2.0, 2, 2, 2, 1.5, 1.5, 2, 0, 0])[:, None]
+    distance = np.array([2.0, 2, 2, 1.75, 2.5, 1.75, 1, 0.8])  # the last one from rest to rest
+    q = np.append(0.0, np.cumsum(distance))[:, None]
+    peak = 1.5 + 1.5 * (2.5 - 1.5)  # of a cubic: the speed at both ends, and 3/2 of what the mean is above it
+    limits = bounded(1, 1, 1.0)
+    (found,) = over(motion_of(q, speed, t=t), bare_robot(limits), interpolate="cubic")
+    assert (found.count, found.row) == (8, 5)
+    assert [found.value, found.time] == pytest.approx([peak, 4.5])
+
+
+# Slides: the force of one is its mass times its acceleration.
+
+MASS = 2.0
+
+
+def slides(side: int, size: float, joints: int = 1, payload: Payload | None = None) -> Robot:
+    """Return slides at right angles to each other, each of 2 kg; the force of the last one has a limit."""
+    links = [LinkInertia(MASS, (0.0, 0.0, 0.0), (0.0,) * 6) for k in range(joints)]
+    turned = [Joint(f"s{k}", "prismatic", alpha=k * np.pi / 2, link=links[k]) for k in range(joints)]
+    effort = np.full((joints, 2), [-np.inf, np.inf])
+    effort[-1] = [-FAR, size] if side > 0 else [-size, FAR]
+    limits = replace(unlimited(joints), effort=effort)
+    nothing = np.zeros(3)
+    return Robot(
+        "slides", tuple(turned), limits, "modified", np.eye(4), np.eye(4), gravity=nothing, payload=payload
+    )
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_a_force_that_only_the_curve_has_is_a_warning(side: int) -> None:
+    """Rows have 0.06 less than the peak."""
+    motion = peaked(2, 3, LAW, side)
+    robot = slides(side, MASS * (PEAK - OVER))
+    (found,) = over(motion, robot)
+    assert (found.kind, found.severity, found.row) == ("effort", "warning", PIECES // 2 + 1)
+    assert found.value == pytest.approx(side * MASS * PEAK, rel=1e-5)
+    assert found.time == pytest.approx((PIECES / 2) * PERIOD, rel=1e-3)
+    (asked_for,) = over(motion, robot, interpolate="quintic")
+    (sparse,) = over(peaked(2, 3, LAW, side, period=0.0101), robot)
+    (stated,) = over(peaked(2, 3, LAW, side, bent=3.9), robot)
+    assert asked_for.severity == sparse.severity == stated.severity == "error"
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_forces_of_other_joints_say_nothing_about_this_one(side: int) -> None:
+    """The first slide is ten times as fast and moves both: its rows state more than the second one may."""
+    alone = peaked(2, 3, LAW, side)
+    both = [np.concatenate([10 * rows, rows], axis=1) for rows in (alone.q, alone.qd, alone.qdd)]
+    (found,) = over(motion_of(*both, t=alone.t), slides(side, MASS * (PEAK - OVER), joints=2))
+    assert (found.joint, found.severity) == ("s1", "warning")
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("row", [0, 3, 5])
+def test_one_row_that_states_the_force_is_enough(row: int, side: int) -> None:
+    """An acceleration that is largest in one row, linear beside it; the first and the last one count, too."""
+    t = PERIOD * np.arange(6)
+    qdd = side * np.where(np.arange(6) == row, 1.0, 0.5)
+    qd = np.append(0.0, np.cumsum(PERIOD * (qdd[1:] + qdd[:-1]) / 2))
+    q = np.append(0.0, np.cumsum(PERIOD * (qd[1:] + qd[:-1]) / 2 - PERIOD**2 * np.diff(qdd) / 12))
+    motion = motion_of(*(each[:, None] for each in (q, qd, qdd)), t=t)
+    (found,) = over(motion, slides(side, MASS * 0.9))
+    assert (found.severity, found.row) == ("error", row + 1)
+    assert found.value == pytest.approx(side * MASS, rel=1e-5)
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_velocities_alone_state_a_force(side: int) -> None:
+    """A cubic of 0.02 m/s more in 8 ms has 2.5 m/s^2 in the mean, and twice its bend at its ends."""
+    for mean, severity in ((0.95, "warning"), (1.05, "error")):
+        t = PERIOD * np.arange(8)
+        qd = side * np.where(np.arange(8) < 4, 0.0, mean * PERIOD)
+        q = np.append(0.0, np.cumsum(PERIOD * (qd[1:] + qd[:-1]) / 2))
+        q[4:] += side * PERIOD**2 * 0.2 / 6
+        (found,) = over(motion_of(q[:, None], qd[:, None], t=t), slides(side, MASS))
+        assert (found.kind, found.severity) == ("effort", severity)
+        assert found.value == pytest.approx(side * MASS * (mean + 0.2), rel=1e-5)
+
+
+def test_no_row_says_when_a_payload_changed() -> None:
+    """Only between the last row of a move and the first of the next the slide is accelerated."""
+    t, q = np.arange(6.0), np.array([0.0, 0, 0, 1, 1, 1])[:, None]
+    motion = motion_of(q, np.zeros_like(q), np.zeros_like(q), t=t, moves=[0, 0, 0, 1, 1, 1])
+    size = MASS * 10 / 3**0.5 * 0.99  # of a quintic from rest to rest over 1 m in 1 s
+    same, carrying = slides(1, size), slides(1, size, payload=Payload(1.0, np.zeros(3), np.zeros((3, 3))))
+    assert [found.kind for found in over(motion, same, by_move={0: same, 1: same})] == ["effort"]
+    assert over(motion, same, by_move={0: same, 1: carrying}) == []
+    assert over(motion, same, by_move={0: carrying, 1: same}) == []
