@@ -225,3 +225,43 @@ def test_a_refusal_names_what_was_tried_and_helps(tmp_path: Path, capfd: pytest.
             assert code == 0, err
             assert f", {duration} s, " in err
             Path(rows).unlink()
+
+
+RAMPS = """\
+version: 1
+units: {angle: deg}
+robot: ur5e
+limits: {velocity: 57, acceleration: 120, jerk: null}
+start: {joints: [0, -90, 90, 0, 90, 0]}
+moves:
+  - {planner: trapezoid, to: {joints: [90, -60, 80, 0, 90, 0]}, duration: 1}
+"""
+
+
+def test_a_remedy_in_place_of_for_works_beside_what_the_job_says(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A job's own rate, rows and alignment go before a consumer that it names: the options answer each."""
+    duration = "duration: 2.5, velocity: [45, 15, 5, 1, 1, 1]"
+    text = (
+        RAMPS.replace("duration: 1", duration)
+        + "output: {rate: 125, align: false, rows: knots, columns: [t, q]}\n"
+    )
+    file = job(tmp_path, text)
+    code, _, err = call(capfd, "plan", file, "--for", "ur-servoj", "--no-output")
+    assert code == 1
+    found = re.search(r"`(--[^`]+)` in place of `--for` keeps all limits, with 2.5 s as now", err)
+    assert found is not None
+    code, out, err = call(capfd, "plan", file, *shlex.split(found[1]))
+    assert (code, len(out.splitlines()), "for ur-servoj at 500 Hz" in err) == (0, 1252, True)
+
+
+def test_what_a_move_concedes_is_said_of_its_phases_in_periods_too(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A duration that is too short is conceded first; then the ramps are laid on rows."""
+    file = job(tmp_path, RAMPS + "when_over_limit: slow\n")
+    code, _, err = call(capfd, "plan", file, "--for", "ur-servoj", "--no-output")
+    assert code == 0
+    assert "slowed: move 0: stretched 2.0" in err
+    assert "slowed: for ur-servoj at 500 Hz: stretched 1.0" in err

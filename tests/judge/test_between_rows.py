@@ -24,6 +24,8 @@ PERIOD, PIECES, FAR = 0.008, 9, 1e6
 PEAK, OVER = 1.0, 0.01
 """Largest value of the derivative that is limited, and how much of it is beyond the limit."""
 SIDES = [1, -1]
+ALONE = np.array([0, 0, 0, 0, 1, 2, 2, 2, 2, 2])
+"""Moves of rows, by which the piece in the middle has findings of its own."""
 LAW, LAST = 0.14, 1.4
 """Shares of the step that a change of the law explains: below the highest derivative, and of this itself."""
 
@@ -65,7 +67,7 @@ def peaked(
     )
     wave = shape.integ(order) if order else shape
     if not below:  # it is largest in the last row
-        middle, before = t[-1], t[-4]
+        middle, before = t[-1], t[-3]
     step = (-1.0) ** (below + 1) * OVER / (share * period**below)
     rows = []
     for k in range(orders):
@@ -91,6 +93,22 @@ CASES = [(0, 2, LAW), (1, 2, LAW), (2, 2, LAST), (1, 3, LAW), (2, 3, LAW), (3, 3
 """Order that is limited, columns, and the share that is explained."""
 
 
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize(("order", "orders", "share"), CASES)
+def test_a_change_of_the_law_explains_so_much(order: int, orders: int, share: float, side: int) -> None:
+    limits = bounded(order, side, PEAK - OVER)
+    for size, severity in ((1.0, "warning"), (2.2, "error")):
+        motion = peaked(order, orders, size * share, side)
+        (found,) = over(motion, bare_robot(limits))
+        assert (found.severity, found.certainty) == (severity, "exceeded")
+        assert found.value == pytest.approx(side * PEAK, rel=1e-6)
+        assert found.text().endswith("changes its law") == (severity == "warning")
+        (asked_for,) = over(motion, bare_robot(limits), interpolate=("cubic", "quintic")[orders - 2])
+        (planned,) = over(motion, bare_robot(limits), planned=True)
+        assert asked_for.severity == planned.severity == "error"
+        assert "law" not in asked_for.text()
+
+
 @pytest.mark.parametrize("order", [1, 2])
 def test_rows_that_stand_far_apart_explain_nothing(order: int) -> None:
     for period, severity in ((0.01, "warning"), (0.0101, "error")):
@@ -113,23 +131,37 @@ def test_what_rows_state_or_two_of_them_make_certain_is_an_error(order: int, sid
 @pytest.mark.parametrize("at", [0.3, 0.7])
 def test_a_row_at_either_end_states_it(at: float, side: int) -> None:
     """Only the row nearer to the peak is over the limit."""
-    motion = peaked(1, 2, LAW, side, at=at, bent=1 / 0.4**2)
-    (found,) = over(motion, bare_robot(bounded(1, side, PEAK - OVER)))
+    motion = replace(peaked(1, 2, LAW, side, at=at, bent=1 / 0.4**2), move=ALONE)
+    (found,) = (each for each in over(motion, bare_robot(bounded(1, side, PEAK - OVER))) if each.move == 1)
     assert found.severity == "error"
 
 
 def approach(side: int, bound: float) -> Limits:
     """Return a limit by position so far from the end of the range that it is nearly the same everywhere."""
-    position = [-9.0 * FAR, FAR] if side > 0 else [-FAR, 9.0 * FAR]
+    position = [-1e4 * FAR, FAR] if side > 0 else [-FAR, 1e4 * FAR]
     by_position = np.array([[bound**2 / (2 * FAR), 0.0]])
     return replace(unlimited(1), position=np.array([position]), velocity_by_position=by_position)
 
 
 @pytest.mark.parametrize("side", SIDES)
+def test_a_change_of_the_law_explains_so_much_of_an_approach(side: int) -> None:
+    limits = approach(side, PEAK - OVER)
+    for size, severity in ((1.0, "warning"), (2.2, "error")):
+        motion = peaked(1, 2, size * LAW, side)
+        (found,) = over(motion, bare_robot(limits))
+        assert (found.kind, found.severity) == ("velocity_by_position", severity)
+        (asked_for,) = over(motion, bare_robot(limits), interpolate="cubic")
+        assert asked_for.severity == "error"
+    for period, severity in ((0.01, "warning"), (0.0101, "error")):
+        (found,) = over(peaked(1, 2, LAW, side, period=period), bare_robot(limits))
+        assert found.severity == severity
+
+
+@pytest.mark.parametrize("side", SIDES)
 @pytest.mark.parametrize("at", [0.3, 0.7])
 def test_a_row_at_either_end_approaches_too_fast(at: float, side: int) -> None:
-    motion = peaked(1, 2, LAW, side, at=at, bent=1 / 0.4**2)
-    (found,) = over(motion, bare_robot(approach(side, PEAK - OVER)))
+    motion = replace(peaked(1, 2, LAW, side, at=at, bent=1 / 0.4**2), move=ALONE)
+    (found,) = (each for each in over(motion, bare_robot(approach(side, PEAK - OVER))) if each.move == 1)
     assert found.severity == "error"
 
 
@@ -167,10 +199,10 @@ def test_of_many_pieces_the_worst_is_found(monkeypatch: pytest.MonkeyPatch) -> N
     """Rows state more than is allowed nearly everywhere; a piece that ends slower is fastest in between."""
     monkeypatch.setattr(joint_limits, "_MANY", 4)
     t, speed = np.arange(9.0), np.array([2.0, 2, 2, 2, 1.5, 1.5, 2, 0, 0])[:, None]
-    distance = np.array([2.0, 2, 2, 1.75, 2.5, 1.75, 1, 0.8])  # the last one from rest to rest
+    distance = np.array([2.0, 2, 2, 1.75, 2.5, 1.75, 1, 0.65])  # the last one from rest to rest
     q = np.append(0.0, np.cumsum(distance))[:, None]
     peak = 1.5 + 1.5 * (2.5 - 1.5)  # of a cubic: the speed at both ends, and 3/2 of what the mean is above it
-    limits = bounded(1, 1, 1.0)
+    limits = bounded(1, 1, 0.9)  # which the last one passes in between only, by 0.075
     (found,) = over(motion_of(q, speed, t=t), bare_robot(limits), interpolate="cubic")
     assert (found.count, found.row) == (8, 5)
     assert [found.value, found.time] == pytest.approx([peak, 4.5])

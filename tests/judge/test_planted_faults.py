@@ -131,6 +131,17 @@ def test_a_doubled_stamp_is_found() -> None:
     assert judgement.verdict == "exceeded"
 
 
+@pytest.mark.parametrize(("by", "word"), [(0.0, "doubled"), (-0.0005, "earlier")])
+def test_a_stamp_is_compared_with_those_of_blocks_before(by: float, word: str) -> None:
+    """The first row of the second block is not later than the last one of the first."""
+    motion = rows_of(quintic(), 1e-3, decimals=9)
+    stamps = motion.t.copy()
+    stamps[500] = stamps[499] + by
+    found = worst(judged(replace(motion, t=stamps), limits(0.5), 500), "time", None)
+    assert (found.row, found.count, found.limit) == (501, 1, pytest.approx(0.499))
+    assert word in found.message
+
+
 @pytest.mark.parametrize(("value", "word"), [(np.nan, "nan"), (np.inf, "inf"), (0.1, "earlier")])
 def test_a_bad_stamp_is_found(value: float, word: str) -> None:
     motion = rows_of(quintic(), 1e-3, decimals=9)

@@ -40,6 +40,7 @@ def profile_view(profile: Profile) -> dict[str, Any]:
         "title": profile.title,
         "interpolation": profile.interpolation,
         "note": profile.note,
+        "rows": {"rate": profile.rows.rate, "align": profile.rows.align, "columns": profile.rows.columns},
         "rules": [
             {
                 "id": rule.id,
@@ -74,6 +75,7 @@ def _rules(profile: Profile) -> Iterator[str]:
     yield f"{profile.name}: {profile.title}"
     if profile.interpolation:
         yield f"interpolation: {profile.interpolation}"
+    yield from textwrap.wrap(f"takes: {profile.rows.words}", _WIDTH, subsequent_indent="  ")
     if profile.note:
         yield from textwrap.wrap(f"note: {profile.note}", _WIDTH, subsequent_indent="  ")
     for rule in profile.rules:

@@ -80,6 +80,13 @@ class WantedRows:
     rate: float | None = None
     align: bool = False
 
+    @property
+    def words(self) -> str:
+        """What it takes, for people."""
+        rate = [] if self.rate is None else [f"rows at {self.rate:g} Hz"]
+        align = ["moves of whole periods"] if self.align else []
+        return ", ".join([*rate, *align, f"columns {', '.join(self.columns)}"])
+
 
 @frozen
 class Profile:

@@ -86,7 +86,7 @@ def _on_rows(move: PlannedMove, period: float) -> PlannedMove | None:
         planned = move.planner.on_rows(move.start, move.robot, period, least)
         if planned is None:
             return None
-        other = replace(move, planned=planned)
+        other = replace(move, planned=replace(planned, events=move.planned.events))
         kept = _within_limits(other)
         if kept.duration == other.duration:
             return other

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -35,6 +35,9 @@ from trajcli.progress import report_progress
 from trajcli.streams.decimals import Digits
 from trajcli.streams.formats import DEFAULT, StreamFormat
 
+if TYPE_CHECKING:
+    from trajcli.output.recording import LogOptions
+
 _ROUNDS = 16  # of tightening: a jerk that switches between rows is less than twice its limit
 _SLACK = 1e-6  # relative: what a joined curve may be above a limit
 _COARSE = 0.05  # of a limit: what decimals alone may make up between knots
@@ -53,7 +56,7 @@ class Writing:
 
     form: StreamFormat = DEFAULT
     digits: Digits | None = None
-    log: Any = None
+    log: LogOptions | None = None
 
 
 @frozen
@@ -168,7 +171,7 @@ def job_for(loaded: LoadedJob, name: str | None, kept: Mapping[str, bool]) -> tu
     if name or "columns" not in given:
         changed["columns"] = wanted.columns
     other = output.model_copy(update=changed)
-    brought = f"{profile.name} takes {_in_words(profile)}"
+    brought = f"{profile.name} takes {profile.rows.words}"
     differs = {key for key in changed if key in given and getattr(output, key) != changed[key]}
     said = f"{brought}: that goes before `output` of the job" if differs - {"consumer"} else ""
     return replace(loaded, job=loaded.job.model_copy(update={"output": other})), profile, said
@@ -186,14 +189,6 @@ def _refuse_other_rows(loaded: LoadedJob, profile: Profile, stays: Mapping[str, 
         raise InputError(text, hint=f"leave the {key} out").located(
             place=loaded.document.place(("output", key))
         )
-
-
-def _in_words(profile: Profile) -> str:
-    """Return the rows that a consumer takes."""
-    rows = profile.rows
-    rate = [] if rows.rate is None else [f"rows at {rows.rate:g} Hz"]
-    align = ["moves of whole periods"] if rows.align else []
-    return ", ".join([*rate, *align, f"columns {', '.join(rows.columns)}"])
 
 
 def plan_for(loaded: LoadedJob, profile: Profile, brought: str, writing: Writing) -> ForConsumer:
@@ -259,17 +254,14 @@ class _Search:
         writing, grid, digits = self._writing, grid_of(plan), self._writing.digits or "fixed"
         shortest = plan.trajectory.duration if self._shortest is None else self._shortest
         self._shortest = shortest
-        rows = joined_rows(plan, grid, writing.form, "full")
+        rows, decimal = joined_rows(plan, grid, writing.form, "full"), writing.form.decimals
+        made = ForConsumer(plan, self._profile, grid, rows, None, None, shortest, digits, decimal)
         if not plan.verdict.passed:
-            return ForConsumer(
-                plan, self._profile, grid, rows, None, None, shortest, digits, writing.form.decimals
-            )
+            return made
         joined, rules = rows.judgement(slack=_SLACK), None
         if by_rules or joined is None or not any(finding.limit for finding in joined.findings):
             rules = judge_as_written(plan, grid, self._profile, writing.form, digits=digits, log=writing.log)
-        made = ForConsumer(
-            plan, self._profile, grid, rows, joined, rules, shortest, digits, writing.form.decimals
-        )
+        made = replace(made, joined=joined, rules=rules)
         if made.coarse and writing.digits is None:
             return replace(made, digits="full", chosen=True)
         return made
@@ -359,7 +351,11 @@ class _Search:
             options = [f"--{key} {value}" for key, value in changed.items()]
             instead = ""
             if columns is not None:  # `--for` brings its own
-                options += [f"--set output.for={self._profile.name}", set_columns(columns)]
+                options += [
+                    *self._said_by_job(),
+                    f"--set output.for={self._profile.name}",
+                    set_columns(columns),
+                ]
                 instead = " in place of `--for`"
             duration = first.plan.trajectory.duration
             yield f"`{' '.join(options)}`{instead} keeps all limits, with {duration:.6g} s as now"
@@ -369,6 +365,17 @@ class _Search:
         if slower.keeps:
             duration = slower.plan.trajectory.duration
             yield f"`--set when_over_limit=slow` keeps all limits, with {duration:.6g} s"
+
+    def _said_by_job(self) -> Iterator[str]:
+        """Yield options for what the job says of its rows, which goes before a consumer that it names."""
+        wanted, document = self._profile.rows, self._loaded.document
+        output = self._loaded.job.output
+        if wanted.rate is not None and document.node(("output", "rate")) is not None:
+            yield f"--rate {wanted.rate:g}"
+        if document.node(("output", "rows")) is not None and output.rows in (None, "rate"):
+            yield "--rows rate"
+        if wanted.align and document.node(("output", "align")) is not None:
+            yield "--set output.align=true"
 
 
 def _with_event(made: ForConsumer, kind: str, text: str) -> ForConsumer:

@@ -41,7 +41,6 @@ _CONTINUOUS = 1e-9  # of the largest value of a joint: a step below that is roun
 _PERIOD = 1e-9  # relative: what the last row may be off its grid by
 _HALF_UNIT = 0.5e-9  # of nine decimals
 _NEGLIGIBLE = 2e-7  # relative: what is above a limit between rows by less needs no look
-_TWO = 2
 _MOVED = 1e-13  # rad or m
 _OF_ROUNDING = {"linear": (1.0,), "cubic": (1.5, 6.0), "quintic": (1.875, 10 / 3**0.5, 60.0)}
 _STATES: tuple[Group, ...] = ("q", "qd", "qdd")
@@ -141,7 +140,7 @@ class JoinedRows:
         3 e / (2 h).
         """
         chosen, plan = self.interpolation, self.plan
-        if chosen is None or self.grid.count < _TWO:
+        if chosen is None or self.grid.count == 1:
             return 0.0
         length = min(float(np.diff(times).min()) for times, _ in self._blocks() if times.size > 1)
         factors = joint_factors(plan.trajectory.joint_types, plan.loaded.output_units)

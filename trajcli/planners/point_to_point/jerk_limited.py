@@ -86,57 +86,12 @@ class JerkLimited(PointToPoint):
     def on_rows(self, start: State, robot: Robot, period: float, least: float) -> Planned | None:
         """Return the move between states of rest whose phases last whole periods."""
         end = self._end(start)
-        displacement = end.position - start.position
-        moving = np.flatnonzero(displacement)
-        if self.to.joints is None or self.synchronize == "none" or not moving.size:
+        if self.to.joints is None or self.synchronize == "none" or not (start.at_rest and end.at_rest):
             return None
-        if not (start.at_rest and end.at_rest):
-            return None
-        from trajcli.planners.point_to_point.whole_periods import PhasesInPeriods, rates_forward
+        from trajcli.planners.point_to_point.whole_periods import jerk_limited_in_periods
 
-        bounds = rates_forward(displacement, robot)[moving]
-        smooth, sizes = bool(np.isfinite(bounds[:, 2]).all()), np.abs(displacement[moving])
         on_line = self.synchronize == "phase"
-        distances = [1.0] if on_line else sizes.tolist()
-        each = [(bounds / sizes[:, None]).min(axis=0)] if on_line else [*bounds]
-        known = PhasesInPeriods(period, smooth=smooth).common(distances, each, least)
-        if known is None:
-            return None
-        return self._in_periods(start, end, *known, period, smooth=smooth)
-
-    def _in_periods(
-        self,
-        start: State,
-        end: State,
-        count: int,
-        lengths: Sequence[tuple[int, int, int]],
-        period: float,
-        *,
-        smooth: bool,
-    ) -> Planned:
-        """Return the move of `count` periods whose phases last so many each."""
-        from trajcli.planners.point_to_point.whole_periods import profile_in_periods
-
-        displacement = end.position - start.position
-        if self.synchronize == "phase":
-            profile = profile_in_periods(0.0, 1.0, lengths[0], period, smooth=smooth)
-            law = profile.curve()
-            curve = along_line(start.position, displacement, law)
-            return Planned(curve, end, law, tuple(profile.phases(None)))
-        curves, phases, todo = [], [], iter(lengths)
-        for joint, (origin, distance) in enumerate(
-            zip(start.position.tolist(), displacement.tolist(), strict=True)
-        ):
-            if not distance:
-                curves.append(
-                    PiecewisePolynomial(np.array([0.0, count * period]), np.full((1, 1, 1), origin))
-                )
-                continue
-            profile = profile_in_periods(origin, distance, next(todo), period, smooth=smooth)
-            curves.append(profile.curve())
-            phases += profile.phases(joint)
-        phases.sort(key=lambda phase: (phase.start, phase.joint or 0))
-        return Planned(merge_breaks(curves), end, phases=tuple(phases))
+        return jerk_limited_in_periods(start, end, robot, period, least, on_line=on_line)
 
     def _end(self, start: State) -> State:
         """Return the target; under velocity control its position means nothing."""

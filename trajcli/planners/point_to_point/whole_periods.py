@@ -11,10 +11,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from trajcli.curves.operations import along_line, merge_breaks
 from trajcli.curves.phases import PhaseChain
-from trajcli.curves.piecewise import Array
+from trajcli.curves.piecewise import Array, constant
 from trajcli.kinematics.robot import Robot
+from trajcli.planners.planner import Phase, Planned
 from trajcli.planners.ruckig import PhaseProfile
+from trajcli.trajectory import State
 
 _WHOLE = 1e-9  # of a period: what is this close to whole is whole
 _LONGEST = 4.0  # times the fastest: a period that is too coarse for more is no help
@@ -125,3 +128,43 @@ def profile_in_periods(
     final = np.array([displacement, *(0.0,) * (2 if smooth else 1)])
     chain = PhaseChain(np.zeros(final.size), final, times, values).with_cruises()
     return PhaseProfile(start, chain, sum(counts) * period)
+
+
+def jerk_limited_in_periods(
+    start: State, end: State, robot: Robot, period: float, least: float, *, on_line: bool
+) -> Planned | None:
+    """Return a move between states of rest whose phases last whole periods; None where none keeps its limits.
+
+    Args:
+        start: At rest.
+        end: At rest.
+        robot: With the limits in force.
+        period: s.
+        least: Shortest duration, s.
+        on_line: Whether one law moves all joints along a straight line; else they arrive together.
+    """
+    displacement = end.position - start.position
+    moving = np.flatnonzero(displacement)
+    bounds = rates_forward(displacement, robot)[moving]
+    if not moving.size or not np.isfinite(bounds[:, :2]).all():
+        return None
+    smooth, sizes = bool(np.isfinite(bounds[:, 2]).all()), np.abs(displacement[moving])
+    distances = [1.0] if on_line else sizes.tolist()
+    each = [(bounds / sizes[:, None]).min(axis=0)] if on_line else [*bounds]
+    known = PhasesInPeriods(period, smooth=smooth).common(distances, each, least)
+    if known is None:
+        return None
+    count, lengths = known
+    if on_line:
+        profile = profile_in_periods(0.0, 1.0, lengths[0], period, smooth=smooth)
+        law = profile.curve()
+        return Planned(along_line(start.position, displacement, law), end, law, tuple(profile.phases(None)))
+    curves = [constant([origin], count * period) for origin in start.position.tolist()]
+    phases: list[Phase] = []
+    for joint, own in zip(moving.tolist(), lengths, strict=True):
+        origin, distance = float(start.position[joint]), float(displacement[joint])
+        profile = profile_in_periods(origin, distance, own, period, smooth=smooth)
+        curves[joint] = profile.curve()
+        phases += profile.phases(joint)
+    phases.sort(key=lambda phase: (phase.start, phase.joint or 0))
+    return Planned(merge_breaks(curves), end, phases=tuple(phases))
