@@ -18,7 +18,6 @@ LONG_FILES: dict[str, str] = {}
 SMALL_FILE = 150
 SMALL_FILES = {
     "checks/target.py": "one file a judgement, as those beside it",
-    "judge/stamps.py": "time stamps are a subject beside motions",
 }
 """Why a small file that one file alone imports is a file of its own."""
 

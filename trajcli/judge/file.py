@@ -10,12 +10,14 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, TrajcliError
+from trajcli.findings import Finding
 from trajcli.frozen import comparable, frozen
-from trajcli.judge.judgement import Judgement, as_planned
+from trajcli.judge.judgement import Judgement, as_planned, worst_first
 from trajcli.judge.motion import JUDGED_ROWS, Requirements, judge_motion
 from trajcli.kinematics.robot import Robot
 from trajcli.streams.byte_source import ByteSource
-from trajcli.streams.reading import refuse_job
+from trajcli.streams.reading import open_rows_of, refuse_job
+from trajcli.streams.recorded.column_roles import note_of_unread
 from trajcli.streams.recorded_motion import MotionFile, RecordedMotion, motion_of, open_motion
 from trajcli.units import Units, joint_quantity
 
@@ -32,6 +34,7 @@ Delivered = Callable[["LoadedJob", str | None], "Plan"]
 _START_TOLERANCE = 1e-3  # rad or m: what a controller takes for the state that it is in
 _STEP = 1e-6  # rad/s^2 or m/s^2: an acceleration that changes by more in the end steps there
 _SAME_DURATION = 1e-6  # s: a file that lasts as long as the plan, within that, is taken for its motion
+_NAMED = ("csv", "jsonl")  # formats with columns that are not about joints
 _ENTIRE = ("jtc-upsampling",)  # interpolations that need all rows at once
 
 
@@ -131,7 +134,11 @@ def check_file(
         return rows if by_time is None else map(by_time, rows)
 
     judgement = judge_motion(blocks, requirements)
-    notes = (*motion.notes, *given.notes, *judgement.notes)
+    of_tool, read = _of_tool_columns(opened, options, given, motion, by_time, planned=requirements.planned)
+    judgement = replace(judgement, findings=worst_first([*judgement.findings, *of_tool]))
+    unread = note_of_unread([name for name in motion.unread if name not in read])
+    known = [note for note in motion.notes if note not in note_of_unread(motion.unread)]
+    notes = (*known, *unread, *given.notes, *judgement.notes)
     if given.loaded is not None and "move" not in motion.quantities and by_time is None:
         notes = (*notes, "no column `move`: limits and paths of single moves are not judged")
     judged = replace(judgement, notes=notes, events=given.events, source=motion.source)
@@ -160,7 +167,7 @@ def _opened(source: ByteSource, options: CheckOptions, given: _Given, declared: 
     if given.plan is not None and options.columns is None and options.topic is None:
         from trajcli.judge.rows.tool_rows import joints_found_back
 
-        found = joints_found_back(source, given.robot, given.plan.trajectory.start.position)
+        found = joints_found_back(source, given.robot, given.plan)
         if found is not None:
             return motion_of(found, joints=joints, joint_types=types)
     return open_motion(
@@ -194,6 +201,38 @@ def _beside_plan(judgement: Judgement, found: RowComparison | None, options: Che
         return replace(judgement, planned_rows=True)
     note = f"these are no rows of the motion that the job plans: {found.difference}"
     return replace(judgement, notes=(*judgement.notes, note), planned_rows=False)
+
+
+def _of_tool_columns(
+    source: ByteSource,
+    options: CheckOptions,
+    given: _Given,
+    motion: MotionFile,
+    by_time: Callable[[RecordedMotion], RecordedMotion] | None,
+    *,
+    planned: bool,
+) -> tuple[list[Finding], set[str]]:
+    """Return what is wrong with the columns about the tool beside joints, and the names of those columns.
+
+    Only a job says which tool it is; rows of its plan are compared with that as a whole.
+    """
+    if given.loaded is None or given.robot.convention is None or motion.format not in _NAMED:
+        return [], set()
+    from trajcli.judge.tool_columns import judge_tool_columns, open_tool_table
+
+    joints = len(given.robot.joints)
+    rows = open_rows_of(source, topic=options.topic, field=options.field, joints=joints)
+    table = open_tool_table(rows, JUDGED_ROWS)
+    if table is None:
+        return [], set()
+    read = {column.name for column in table.columns}
+    if planned:
+        return [], read
+    paths = None if given.plan is None else {move.index: move.planned.tool for move in given.plan.moves}
+    blocks = motion.blocks(JUDGED_ROWS)
+    return judge_tool_columns(
+        blocks if by_time is None else map(by_time, blocks), table, given.robot, paths
+    ), read
 
 
 def _moves_by_time(given: _Given, motion: MotionFile) -> Callable[[RecordedMotion], RecordedMotion] | None:

@@ -19,7 +19,7 @@ from trajcli.judge.intervals import BESIDE, Intervals
 from trajcli.judge.joint_limits import JudgedRun, judge_limits
 from trajcli.judge.judgement import Judgement, worst_first
 from trajcli.judge.reconstruction import Interpolation, chosen_interpolation
-from trajcli.judge.stamps import Stamps, UnfitError
+from trajcli.judge.rows.stamps import Stamps, UnfitError
 from trajcli.kinematics.robot import QUANTITIES, Limits, Robot
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 from trajcli.trajectory import State

@@ -15,7 +15,7 @@ from trajcli.kinematics.robot import JointType
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import open_rows_of
 from trajcli.streams.recorded.column_names import MOVE
-from trajcli.streams.recorded.column_roles import ColumnRoles, assign_roles, ordered_joints
+from trajcli.streams.recorded.column_roles import ColumnRoles, assign_roles, note_of_unread, ordered_joints
 from trajcli.streams.recorded.column_units import (
     ColumnScales,
     is_own_language,
@@ -119,6 +119,7 @@ class MotionFile:
         period: The grid of its time stamps; None where they lie on none.
         rows: How many there are.
         largest: Largest magnitudes of the positions, rad or m, shape (n,).
+        unread: Names of the columns that are not used.
         notes: Sentences about what was taken for what, and what was left out.
     """
 
@@ -150,7 +151,8 @@ class MotionFile:
             for key, found in roles.joints.items()
         }
         self.quantities = (*roles.joints, *((MOVE,) if self._move is not None else ()))
-        self.notes = (*rows.notes, *roles.notes, *scales.notes)
+        self.unread = roles.rest
+        self.notes = (*rows.notes, *note_of_unread(roles.rest), *scales.notes)
         self._kept: list[Array] | None = []
         self._read_all(scales)
 

@@ -1,1 +1,1 @@
-"""Rows of a file beside the plan of a job: samples of it or not, and joints behind rows of the tool."""
+"""Rows of a file: their time stamps, whether they are those of a plan, and joints behind rows of the tool."""

@@ -182,7 +182,7 @@ def _read(rows: RowSource, columns: Sequence[Column]) -> tuple[Array | None, _St
         if kept is not None:
             kept.append(block)
             kept = kept if numbers <= _KEPT else None
-    halves = _halves(rows, columns)
+    halves = halves_of(rows, columns)
     if not rising or count < 1:
         return None, None, halves
     rounding = halves[time] if halves[time] else (_NANOSECOND if rows.format in ("mcap", "ros") else 0.0)
@@ -190,8 +190,8 @@ def _read(rows: RowSource, columns: Sequence[Column]) -> tuple[Array | None, _St
     return (None if kept is None else np.concatenate(kept)), stamps, halves
 
 
-def _halves(rows: RowSource, columns: Sequence[Column]) -> Array:
-    """Return half a unit of the last decimal of each column, in its units, shape (m,)."""
+def halves_of(rows: RowSource, columns: Sequence[Column]) -> Array:
+    """Return half a unit of the last decimal of each column, once all rows were taken, in its units, (m,)."""
     decimals = rows.decimals(range(len(columns)))
     exact = (decimals == EXACT) | (decimals.max() >= FULL_DECIMALS)
     halves = np.where(exact, 0.0, _HALF * 10.0 ** -np.maximum(decimals, 0).astype(np.float64))

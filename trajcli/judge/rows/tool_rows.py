@@ -1,8 +1,10 @@
-"""Rows of the tool alone: joints found back from recorded poses, twists and accelerations.
+"""Rows of the tool alone: joints found back from recorded poses, velocities, or distances along paths.
 
 Poses name their joints by inverse kinematics: of all answers within the limits the one nearest to the row
-before, from the start that the job says. Twists and accelerations are then those of the joints by the inverse
-of the Jacobian J: qd = J^-1 V, qdd = J^-1 (A - Jdot qd), where it has one.
+before, from the start that the job says. Velocities V and accelerations A of the tool are then those of the
+joints by the inverse of the Jacobian J: qd = J^-1 V, qdd = J^-1 (A - Jdot qd), where it has one. Without
+poses qd is integrated from the start; of an arm with more than six joints the smallest is taken. Where a
+file has distances s along the paths of the job alone, the joints follow these paths, as the plan does.
 """
 
 from __future__ import annotations
@@ -10,97 +12,278 @@ from __future__ import annotations
 import numpy as np
 
 from trajcli.columns import Column, kinds_of, parse_column
+from trajcli.curves.operations import times_at
 from trajcli.curves.piecewise import Array
-from trajcli.kinematics.jacobian import jacobian, tcp_acceleration
+from trajcli.errors import InputError
+from trajcli.frozen import frozen
+from trajcli.kinematics.jacobian import jacobian, jacobian_dot_qd
 from trajcli.kinematics.robot import Robot
-from trajcli.queries.arm import ArmInUnits
-from trajcli.queries.inverse_stream import joints_of
+from trajcli.planning.plan import Plan
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import open_rows_of
 from trajcli.streams.recorded.column_roles import NamedFile
-from trajcli.streams.row_sources import EXACT, ArrayRows, unplaced
+from trajcli.streams.row_sources import EXACT, ArrayRows, RowSource, unplaced
 from trajcli.streams.table import TableBlocks
 from trajcli.units import Units
 
 _TOLERANCE = 1e-6  # m and rad: what the answers may miss of rounded poses
 _REGULAR = 1e3  # largest over smallest singular value: beyond it rates of the tool do not tell the joints'
-_LOST = 1  # decimals of a pose that its joints do not have
+_LOST = 1  # decimals of a pose, or of s, that its joints do not have
 _RATES_LOST = 3  # likewise of rates of the tool
+_SAME_DURATION = 1e-6  # s: a file that lasts as long as the plan, within that, has its moves
 
 
-def joints_found_back(source: ByteSource, robot: Robot, start: Array) -> ArrayRows | None:
-    """Return rows of joints that take the tool through the poses of a file; None where it has other columns.
+@frozen
+class _ToolRows:
+    """Rows about the tool, of a whole file.
+
+    Attributes:
+        rows: The file.
+        columns: What each column is.
+        values: In their units, shape (N, m).
+    """
+
+    rows: RowSource
+    columns: tuple[Column, ...]
+    values: Array
+
+    def index(self, kind: str) -> int | None:
+        """Return which column is of a kind; None where none is."""
+        return next((k for k, column in enumerate(self.columns) if column.kind == kind), None)
+
+    def has(self, group: str) -> bool:
+        """Return whether all columns of a group are there."""
+        return all(self.index(kind) is not None for kind in kinds_of(group))
+
+    def group(self, group: str) -> Array:
+        """Return the columns of a group in SI, (N, k)."""
+        at = [index for kind in kinds_of(group) if (index := self.index(kind)) is not None]
+        return np.asarray(self.values[:, at] * [self.columns[k].factor for k in at])
+
+    def decimals(self, kind: str) -> int:
+        """Return the decimals of a column, in m or rad; `EXACT` where nothing is rounded."""
+        at = self.index(kind)
+        assert at is not None  # noqa: S101
+        found = int(self.rows.decimals(range(len(self.columns)))[at])
+        # a millimetre has three decimals of a metre, a degree nearly two of a radian
+        return found if found == EXACT else found + {"mm": 3, "deg": 1}.get(self.columns[at].unit or "", 0)
+
+
+@frozen
+class _Found:
+    """Joints found back: positions, and velocities and accelerations where they are known, each (N, n).
+
+    Attributes:
+        states: Of them.
+        decimals: That each has, `EXACT` where nothing was rounded.
+        note: How they were found.
+    """
+
+    states: tuple[Array, ...]
+    decimals: tuple[int, ...]
+    note: str
+
+
+def joints_found_back(source: ByteSource, robot: Robot, plan: Plan) -> ArrayRows | None:
+    """Return rows of joints that move the tool as a file says; None where it has joints, or none.
 
     Args:
         source: The file.
         robot: Whose tool it is, in world.
-        start: Joints from which the first row is reached, rad or m, shape (n,).
+        plan: Of the job: the joints from which the first row is reached, and the paths of its moves.
 
     Raises:
-        InputError: When the file cannot be read as rows.
+        InputError: When the file cannot be read as rows, or nothing says of which move a row is.
         PlanningError: When a pose cannot be reached within the limits.
     """
     if robot.convention is None:
         return None
     rows = open_rows_of(source)
     columns = tuple(map(parse_column, rows.named.names))
-    at = {column.kind: index for index, column in enumerate(columns)}
-    if any(column.joint is not None for column in columns) or not {"t", "x", "y", "z"} <= at.keys():
+    kinds = {column.kind for column in columns}
+    groups = [group for group in ("pose", "twist", "path") if {*kinds_of(group)} <= kinds]
+    placed = {"x", "y", "z"} <= kinds
+    if any(column.joint is not None for column in columns) or "t" not in kinds or not (groups or placed):
         return None
-    values = np.concatenate(list(rows.blocks(range(len(columns)), ())))
-    poses = TableBlocks(rows.named.names, iter([values]), source.file)
-    times_and_joints = np.concatenate(
-        list(joints_of(ArmInUnits(robot, Units()), poses, start, _TOLERANCE).blocks)
-    )
-    decimals = rows.decimals(range(len(columns)))
-    of_pose = int(decimals[at["x"]]) + (3 if columns[at["x"]].unit == "mm" else 0)
-    q = times_and_joints[:, 1:]
-    groups = [("q", q, of_pose - _LOST)]
-    groups += [
-        (kind, rates, of_pose - _RATES_LOST)
-        for kind, rates in zip(("qd", "qdd"), _rates(robot, q, values, columns), strict=False)
-    ]
-    names, parts, written = ["t"], [times_and_joints[:, :1]], [int(decimals[at["t"]])]
-    for kind, rates, digits in groups:
-        names += [f"{kind}{joint + 1}" for joint in range(q.shape[1])]
-        parts.append(rates)
-        written += [digits if decimals[at["x"]] != EXACT else EXACT] * q.shape[1]
-    if "move" in at:
+    of_tool = _ToolRows(rows, columns, np.concatenate(list(rows.blocks(range(len(columns)), ()))))
+    start = plan.trajectory.start.position
+    if placed:
+        found = _of_poses(of_tool, robot, start)
+    elif "twist" in groups:
+        found = _of_twists(of_tool, robot, start)
+    else:
+        found = _along_paths(of_tool, plan)
+    return _as_rows(of_tool, found)
+
+
+def _as_rows(of_tool: _ToolRows, found: _Found) -> ArrayRows:
+    """Return the joints as rows of a file in SI, with its times and moves."""
+    time = of_tool.index("t")
+    assert time is not None  # noqa: S101
+    decimals = of_tool.rows.decimals(range(len(of_tool.columns)))
+    names, parts, written = ["t"], [of_tool.values[:, [time]]], [int(decimals[time])]
+    for kind, states, digits in zip(("q", "qd", "qdd"), found.states, found.decimals, strict=False):
+        names += [f"{kind}{joint + 1}" for joint in range(states.shape[1])]
+        parts.append(states)
+        written += [digits] * states.shape[1]
+    move = of_tool.index("move")
+    if move is not None:
         names.append("move")
-        parts.append(values[:, [at["move"]]])
+        parts.append(of_tool.values[:, [move]])
         written.append(0)
-    note = "the joints are found back from the poses, from the job's start on"
     return ArrayRows(
         "csv",
-        NamedFile(source.file, tuple(names), unplaced),
+        NamedFile(of_tool.rows.named.file, tuple(names), unplaced),
         np.concatenate(parts, axis=1),
         np.array(written, dtype=np.int64),
         np.zeros(len(names)),
         si=True,
-        notes=(note,),
+        notes=(found.note,),
     )
 
 
-def _rates(robot: Robot, q: Array, values: Array, columns: tuple[Column, ...]) -> list[Array]:
+def _of_poses(of_tool: _ToolRows, robot: Robot, start: Array) -> _Found:
+    """Return the joints by inverse kinematics, row by row from a start."""
+    from trajcli.queries.arm import ArmInUnits
+    from trajcli.queries.inverse_stream import joints_of
+
+    named = of_tool.rows.named
+    poses = TableBlocks(named.names, iter([of_tool.values]), named.file)
+    stream = joints_of(ArmInUnits(robot, Units()), poses, start, _TOLERANCE)
+    q = np.concatenate(list(stream.blocks))[:, 1:]
+    states = (q, *_rates(robot, q, of_tool))
+    written = of_tool.decimals("x")
+    lost = (_LOST, _RATES_LOST, _RATES_LOST)
+    decimals = tuple(EXACT if written == EXACT else max(written - less, 0) for less in lost)
+    return _Found(states, decimals, "the joints are found back from the poses, from the job's start on")
+
+
+def _rates(robot: Robot, q: Array, of_tool: _ToolRows) -> list[Array]:
     """Return the rates of the joints (N, n) that the file's rates of the tool say, velocities first."""
-    twist, twistd = (_of_group(group, values, columns) for group in ("twist", "twistd"))
-    if twist is None or q.shape[1] != twist.shape[1]:
+    if not of_tool.has("twist") or q.shape[1] > 6:
         return []
     slopes = jacobian(robot, q)
     if np.linalg.cond(slopes).max() > _REGULAR:
         return []
-    qd: Array = np.asarray(np.linalg.solve(slopes, twist[..., None])[..., 0])
-    if twistd is None:
+    inverse = np.linalg.pinv(slopes)
+    qd = np.asarray((inverse @ of_tool.group("twist")[..., None])[..., 0])
+    if not of_tool.has("twistd"):
         return [qd]
-    bias = tcp_acceleration(robot, q, qd, np.zeros_like(qd))
-    return [qd, np.asarray(np.linalg.solve(slopes, (twistd - bias)[..., None])[..., 0])]
+    rest = of_tool.group("twistd") - jacobian_dot_qd(robot, q, qd)
+    return [qd, np.asarray((inverse @ rest[..., None])[..., 0])]
 
 
-def _of_group(group: str, values: Array, columns: tuple[Column, ...]) -> Array | None:
-    """Return the columns of a group in SI, (N, 6); None where one is missing."""
-    at = {column.kind: index for index, column in enumerate(columns)}
-    kinds = kinds_of(group)
-    if not set(kinds) <= at.keys():
-        return None
-    index = [at[kind] for kind in kinds]
-    return np.asarray(values[:, index] * [columns[k].factor for k in index])
+def _of_twists(of_tool: _ToolRows, robot: Robot, start: Array) -> _Found:
+    """Return the joints by integration of their velocities from a start, by the method of Runge and Kutta.
+
+    Between two rows the velocity of the tool changes linearly, or as its derivative says at both.
+    """
+    twist, t = of_tool.group("twist"), of_tool.values[:, of_tool.index("t")]
+    twistd = of_tool.group("twistd") if of_tool.has("twistd") else None
+
+    def slope(q: Array, velocity: Array) -> Array:
+        return np.asarray(np.linalg.pinv(jacobian(robot, q), rcond=1.0 / _REGULAR) @ velocity)
+
+    steps = np.diff(t)
+    middle = 0.5 * (twist[:-1] + twist[1:])
+    if twistd is not None:
+        middle = middle + steps[:, None] * (twistd[:-1] - twistd[1:]) / 8.0
+    q, qd = np.empty((t.size, start.size)), np.empty((t.size, start.size))
+    q[0], qd[0] = start, slope(start, twist[0])
+    for k, step in enumerate(steps.tolist()):
+        second = slope(q[k] + 0.5 * step * qd[k], middle[k])
+        third = slope(q[k] + 0.5 * step * second, middle[k])
+        fourth = slope(q[k] + step * third, twist[k + 1])
+        q[k + 1] = q[k] + step / 6.0 * (qd[k] + 2.0 * second + 2.0 * third + fourth)
+        qd[k + 1] = slope(q[k + 1], twist[k + 1])
+    states = [q, qd]
+    if twistd is not None:
+        rest = twistd - jacobian_dot_qd(robot, q, qd)
+        inverse = np.linalg.pinv(jacobian(robot, q), rcond=1.0 / _REGULAR)
+        states.append(np.asarray((inverse @ rest[..., None])[..., 0]))
+    written = of_tool.decimals("vx")
+    lost = _RATES_LOST + int(np.ceil(np.log10(max(float(t[-1] - t[0]), 1.0))))  # roundings add up
+    digits = EXACT if written == EXACT else max(written - lost, 0)
+    note = "the joints are integrated from the velocities of the tool, from the job's start on"
+    return _Found(tuple(states), (digits,) * 3, note)
+
+
+def _along_paths(of_tool: _ToolRows, plan: Plan) -> _Found:
+    """Return the joints that follow the job's paths; in moves without a path those of the plan.
+
+    Raises:
+        InputError: When nothing says of which move a row is, or no joints are there.
+    """
+    from trajcli.kinematics.following.follower import LostError, follower
+
+    t = of_tool.values[:, of_tool.index("t")]
+    along, owner = of_tool.group("path"), _moves_of(of_tool, plan)
+    since, faster = _in_plan(t - t[0], owner, plan)
+    q, qd, qdd = (plan.trajectory.curve.evaluate(since, k) * faster[:, None] ** k for k in range(3))
+    for move, span in zip(plan.moves, plan.trajectory.spans, strict=True):
+        motion, rows = move.planned.tool, np.flatnonzero(owner == span.index)
+        if motion is None or motion.path is None or motion.pure_rotation or motion.overlaps or not rows.size:
+            continue
+        s_of_rows, sd, sdd = along[rows].T
+        times = times_at(motion.law, s_of_rows)
+        guess = move.planned.curve.evaluate(np.clip(times, 0.0, move.planned.curve.end))
+        first = move.planned.curve.evaluate(np.zeros(1))[0]
+        try:
+            found = follower(move.robot, motion.path.at_s, first, 0.0).exact(s_of_rows, "right", guess)
+        except LostError as error:
+            file, s = of_tool.rows.named.file, float(error.s[0])
+            raise InputError(
+                f"{file}: no joints near those of the plan are at s = {s:.9g} of move {span.index}"
+            ) from error
+        q[rows], qd[rows] = found[0], found[1] * sd[:, None]
+        qdd[rows] = found[2] * np.square(sd)[:, None] + found[1] * sdd[:, None]
+    written = of_tool.decimals("s")
+    decimals = tuple(
+        EXACT if written == EXACT else max(written - less, 0) for less in (_LOST, _RATES_LOST, _RATES_LOST)
+    )
+    note = "the joints follow the paths of the job; in moves without a path they are those of the plan"
+    return _Found((q, qd, qdd), decimals, note)
+
+
+def _in_plan(since: Array, owner: Array, plan: Plan) -> tuple[Array, Array]:
+    """Return for each row the time in the plan that has as much of its move done, and how much faster it is.
+
+    Args:
+        since: Times from the first row, s, shape (N,).
+        owner: Index of the move of each row, shape (N,).
+        plan: Of the job.
+    """
+    duration = plan.trajectory.duration
+    found, faster = np.clip(since, 0.0, duration), np.ones(since.size)
+    if abs(since[-1] - duration) <= _SAME_DURATION:
+        return found, faster
+    for span in plan.trajectory.spans:
+        rows = np.flatnonzero(owner == span.index)
+        if rows.size > 1:
+            after = since[min(int(rows[-1]) + 1, since.size - 1)]
+            faster[rows] = span.duration / max(after - since[rows[0]], 1e-9)
+            within = span.start + (since[rows] - since[rows[0]]) * faster[rows]
+            found[rows] = np.minimum(within, min(span.end, duration))
+    return found, faster
+
+
+def _moves_of(of_tool: _ToolRows, plan: Plan) -> Array:
+    """Return the index of the move of each row, (N,).
+
+    Raises:
+        InputError: When nothing says it.
+    """
+    at, trajectory = of_tool.index("move"), plan.trajectory
+    if at is not None:
+        return np.asarray(of_tool.values[:, at])
+    since = of_tool.values[:, of_tool.index("t")]
+    since = since - since[0]
+    if len(trajectory.spans) > 1 and abs(since[-1] - trajectory.duration) > _SAME_DURATION:
+        raise InputError(
+            f"{of_tool.rows.named.file} lasts {since[-1]:.9g} s, the plan {trajectory.duration:.9g} s: "
+            "which moves its distances s are of is not known",
+            hint="write the column `move`, too, or the pose",
+        )
+    starts = np.array([span.start for span in trajectory.spans])
+    later = np.clip(np.searchsorted(starts, since, "right") - 1, 0, None)
+    return np.asarray(np.array([float(span.index) for span in trajectory.spans])[later])

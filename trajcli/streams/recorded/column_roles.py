@@ -48,7 +48,7 @@ class ColumnRoles:
         joint_names: n names of joints; None where the file numbers them.
         fixed: Indices of columns of text that must be the same in all rows.
         nanoseconds: Whether times without a unit are ns, as `rostopic echo -p` prints them.
-        notes: Sentences about what was taken, and what was left out.
+        rest: Names of the columns that are not used.
     """
 
     time: int
@@ -58,7 +58,7 @@ class ColumnRoles:
     joint_names: tuple[str, ...] | None
     fixed: tuple[int, ...] = ()
     nanoseconds: bool = False
-    notes: tuple[str, ...] = ()
+    rest: tuple[str, ...] = ()
 
     @property
     def taken(self) -> tuple[int, ...]:
@@ -146,7 +146,6 @@ class _Assignment:
         self._names = [self._read(name) for name in file.names]
         self._echo = any(name.startswith(_ECHO) for name in file.names)
         self._chosen: dict[str, ColumnGroup] = {}
-        self._notes: list[str] = []
 
     def _read(self, text: str) -> ColumnName:
         plain, unit = split_unit(text)
@@ -167,10 +166,9 @@ class _Assignment:
         joints = {quantity: tuple(found[key] for key in keys) for quantity, found in self._chosen.items()}
         move = self._move()
         names, fixed = self._joint_names(keys)
-        self._note_rest({time, move, *fixed, *(index for found in joints.values() for index in found)})
-        return ColumnRoles(
-            time, joints, move, tuple(self._names), names, fixed, self._echo, tuple(self._notes)
-        )
+        used = {time, move, *fixed, *(index for found in joints.values() for index in found)}
+        rest = tuple(name for index, name in enumerate(self._file.names) if index not in used)
+        return ColumnRoles(time, joints, move, tuple(self._names), names, fixed, self._echo, rest)
 
     # --columns
 
@@ -370,11 +368,11 @@ class _Assignment:
         columns = tuple(in_rows[int(key)] for key in keys)
         return tuple(self._file.first[index].strip().strip('"') for index in columns), columns
 
-    def _note_rest(self, used: set[int | None]) -> None:
-        rest = [name for index, name in enumerate(self._file.names) if index not in used]
-        if rest:
-            more = f" and {len(rest) - _SHOWN} more" if len(rest) > _SHOWN else ""
-            self._notes.append(f"columns that are not read: {', '.join(rest[:_SHOWN])}{more}")
+
+def note_of_unread(names: Sequence[str]) -> tuple[str, ...]:
+    """Return the sentence that names the columns that are not read; nothing where there are none."""
+    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    return (f"columns that are not read: {', '.join(names[:_SHOWN])}{more}",) if names else ()
 
 
 def _numbered_form(stem: str) -> str:

@@ -1,0 +1,207 @@
+"""Columns about the tool: beside joints against what these make of it, and alone as a motion of the tool."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from trajcli.errors import InputError
+from trajcli.findings import Finding
+from trajcli.job.read import job_from_text
+from trajcli.judge.file import CheckOptions, check_file
+from trajcli.judge.judgement import Judgement
+from trajcli.output.write import write_plan
+from trajcli.planning.plan import Plan, plan_job
+
+Rows = NDArray[np.float64]
+JOB = """
+version: 1
+units: {angle: deg, length: mm}
+robot: ur5e
+limits: {velocity: 180, acceleration: 800, jerk: 8000, tcp: {speed: 200, acceleration: 1000}}
+start: {joints: [0, -90, 90, -90, -90, 20]}
+moves:
+  - {planner: jerk_limited, to: {joints: [10, -90, 95, -95, -90, 0]}}
+  - {planner: line, to: {xyz: [400, 0, 350]}, law: {shape: jerk_limited, jerk: 10000}}
+"""
+EVERYTHING = "[t, q, qd, qdd, pose, twist, twistd, path, move]"
+ALONE = ("[t, pose]", "[t, pose, twist]", "[t, twist, twistd]", "[t, twist]", "[t, path]", "[t, path, move]")
+
+
+def planned(columns: str, rate: int = 100) -> Plan:
+    text = f"{JOB}output: {{rate: {rate}, columns: {columns}}}\n"
+    return plan_job(job_from_text(text))
+
+
+def written(plan: Plan, file: Path) -> tuple[list[str], Rows]:
+    """Return names and rows of the plan."""
+    write_plan(plan, str(file))
+    head, *lines = file.read_text(encoding="utf-8").splitlines()
+    return head.split(","), np.array([[float(cell) for cell in line.split(",")] for line in lines])
+
+
+def judged(plan: Plan, names: list[str], rows: Rows, file: Path) -> Judgement:
+    lines = [",".join(f"{value:.9f}" for value in row) for row in rows]
+    file.write_text("\n".join([",".join(names), *lines]) + "\n", encoding="utf-8")
+    return check_file(str(file), CheckOptions(), plan).judgement
+
+
+def of_tool(found: Judgement) -> dict[str | None, Finding]:
+    """Return the findings about columns of the tool by their quantity."""
+    return {finding.quantity: finding for finding in found.findings if finding.kind == "tool"}
+
+
+@pytest.mark.parametrize("columns", ALONE)
+def test_rows_of_the_tool_alone_are_known(columns: str, tmp_path: Path) -> None:
+    plan, file = planned(columns), tmp_path / "rows.csv"
+    names, rows = written(plan, file)
+    assert check_file(str(file), CheckOptions(), plan).judgement.planned_rows is True
+    found = judged(plan, names, np.delete(rows, 50, axis=0), file)
+    assert found.planned_rows is False
+
+
+@pytest.mark.parametrize("columns", ALONE)
+def test_the_tool_twice_as_fast_is_over_its_limits(columns: str, tmp_path: Path) -> None:
+    # of a motion in half the time, velocities double and accelerations are four times as large
+    plan, file = planned(columns), tmp_path / "rows.csv"
+    names, rows = written(plan, file)
+    rows[:, names.index("t")] /= 2.0
+    for k, name in enumerate(names):
+        of_first = name.startswith(("v", "w", "sd"))
+        of_second = name.startswith(("a", "e", "sdd"))
+        rows[:, k] *= 4.0 if of_second else 2.0 if of_first else 1.0
+    if columns == "[t, path]":
+        with pytest.raises(InputError, match="which moves its distances s are of"):
+            judged(plan, names, rows, file)
+        return
+    found = judged(plan, names, rows, file)
+    speed = max(
+        (finding for finding in found.findings if finding.kind == "tool_speed"),
+        key=lambda finding: finding.excess,
+    )
+    assert speed.value == pytest.approx(2 * 0.2, rel=2e-3)
+    assert found.verdict == "exceeded"
+
+
+def test_a_tool_beside_its_line_is_found_without_joints(tmp_path: Path) -> None:
+    plan, file = planned("[t, pose, move]"), tmp_path / "rows.csv"
+    names, rows = written(plan, file)
+    on_line = np.flatnonzero(rows[:, -1] == 1)
+    row = int(on_line[len(on_line) // 2])
+    rows[row, names.index("z_mm")] += 1.0
+    found = judged(plan, names, rows, file)
+    beside = next(finding for finding in found.findings if finding.kind == "deviation")
+    assert (beside.row, beside.certainty) == (row + 1, "exceeded")
+    assert 0.7e-3 < (beside.value or 0.0) <= 1.0001e-3
+
+
+FAULTS: list[tuple[str, float, str, float]] = [
+    ("x_mm", 1.0, "position", 1e-3),
+    ("vz_mm", 1.0, "velocity", 1e-3),
+    ("wy_deg", 1.0, "angular velocity", np.pi / 180),
+    ("ax_mm", 10.0, "acceleration", 1e-2),
+    ("ez_deg", 10.0, "angular acceleration", np.pi / 18),
+]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, list[str], Rows]:
+    plan = planned(EVERYTHING)
+    return (plan, *written(plan, tmp_path_factory.mktemp("whole") / "rows.csv"))
+
+
+@pytest.mark.parametrize(("name", "by", "quantity", "value"), FAULTS, ids=str)
+def test_a_wrong_column_beside_joints_is_found(
+    name: str,
+    by: float,
+    quantity: str,
+    value: float,
+    whole: tuple[Plan, list[str], Rows],
+    tmp_path: Path,
+) -> None:
+    plan, names, rows = whole[0], whole[1], whole[2].copy()
+    rows[40, names.index(name)] += by
+    found = of_tool(judged(plan, names, rows, tmp_path / "rows.csv"))
+    assert set(found) == {quantity}
+    assert (found[quantity].row, found[quantity].count) == (41, 1)
+    assert found[quantity].value == pytest.approx(value, rel=1e-4)
+    assert 0 < (found[quantity].limit or 0.0) < 1e-3 * value
+
+
+def test_a_turned_pose_beside_joints_is_found(whole: tuple[Plan, list[str], Rows], tmp_path: Path) -> None:
+    plan, names, rows = whole[0], whole[1], whole[2].copy()
+    at = names.index("qw")
+    w, x, y, z = rows[30, at : at + 4]
+    half = 0.5 * 0.01  # about x of the tool: the quaternion times (cos, sin, 0, 0)
+    c, s = np.cos(half), np.sin(half)
+    rows[30, at : at + 4] = (w * c - x * s, x * c + w * s, y * c + z * s, z * c - y * s)
+    found = of_tool(judged(plan, names, rows, tmp_path / "rows.csv"))
+    assert set(found) == {"orientation"}
+    assert found["orientation"].value == pytest.approx(0.01, rel=1e-4)
+    rows[30, at : at + 4] = -rows[30, at : at + 4]  # the same rotation
+    again = of_tool(judged(plan, names, rows, tmp_path / "rows.csv"))
+    assert again["orientation"].value == pytest.approx(0.01, rel=1e-4)
+
+
+def test_a_place_that_the_tool_is_not_at_is_found(
+    whole: tuple[Plan, list[str], Rows], tmp_path: Path
+) -> None:
+    plan, names, rows = whole[0], whole[1], whole[2].copy()
+    on_line = np.flatnonzero(rows[:, names.index("move")] == 1)
+    row, at = int(on_line[len(on_line) // 3]), names.index("s_mm")
+    rows[row, at] += 2.0
+    found = of_tool(judged(plan, names, rows, tmp_path / "rows.csv"))
+    assert found["position"].value == pytest.approx(2e-3, rel=1e-3)
+    assert (found["position"].row, found["position"].move) == (row + 1, 1)
+    rows[:, at] = whole[2][:, at]
+    rows[5, at] = 3.0  # of a move in joint space
+    found = of_tool(judged(plan, names, rows, tmp_path / "rows.csv"))
+    assert (found["position"].value, found["position"].move) == (pytest.approx(3e-3), 0)
+
+
+@pytest.mark.parametrize(("name", "columns"), [("sd_mm", EVERYTHING), ("vz_mm", "[t, q, twist]")])
+def test_a_rate_that_is_none_is_found(name: str, columns: str, tmp_path: Path) -> None:
+    plan, file = planned(columns), tmp_path / "rows.csv"
+    names, rows = written(plan, file)
+    right = judged(plan, names, rows[:-1], file)
+    assert not [finding for finding in right.findings if finding.kind in ("derivative", "tool", "jump")]
+    rows[:, names.index(name)] *= 1.1
+    found = judged(plan, names, rows, file)
+    wrong = [finding for finding in found.findings if finding.kind == "derivative"]
+    assert [(finding.joint, finding.certainty) for finding in wrong] == [(None, "exceeded")]
+
+
+def later(rows: Rows) -> Rows:
+    return rows[1:]
+
+
+def earlier(rows: Rows) -> Rows:
+    return rows[:-1]
+
+
+def sparse(rows: Rows) -> Rows:
+    return np.concatenate([rows[:-1:3], rows[-4:-1]])
+
+
+@pytest.mark.parametrize("part", [later, earlier, sparse], ids=lambda part: part.__name__)
+def test_true_columns_of_other_rows_are_no_faults(
+    part: Callable[[Rows], Rows], whole: tuple[Plan, list[str], Rows], tmp_path: Path
+) -> None:
+    plan, names, rows = whole
+    found = judged(plan, names, part(rows), tmp_path / "rows.csv")
+    assert found.planned_rows is False
+    assert of_tool(found) == {}
+    assert not [note for note in found.notes if "not read" in note]
+
+
+def test_columns_that_nobody_knows_are_still_named(
+    whole: tuple[Plan, list[str], Rows], tmp_path: Path
+) -> None:
+    plan, names, rows = whole
+    found = judged(plan, [*names, "light"], np.hstack([rows, rows[:, :1]]), tmp_path / "rows.csv")
+    assert [note for note in found.notes if "not read" in note] == ["columns that are not read: light"]
+    assert found.planned_rows is False
