@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -14,6 +14,7 @@ from trajcli.errors import InputError
 from trajcli.frozen import frozen
 from trajcli.judge.reconstruction import reconstruct
 from trajcli.kinematics.robot import JointType
+from trajcli.streams.decimals import DECIMALS
 from trajcli.streams.recorded_motion import (
     MotionFile,
     RecordedMotion,
@@ -26,8 +27,6 @@ from trajcli.units import Units
 ORDERS = ("q", "qd", "qdd", "qddd")
 """Quantities of joints by the order of their derivative."""
 
-TIME_DECIMALS = 9
-"""Decimals of time stamps that are made anew: nanoseconds."""
 _ROUNDED = 12  # decimals; where there are more, scaling costs more digits than rounding gives
 _SAME_TIME = 1e-12  # s: stamps that decimals say exactly
 
@@ -98,6 +97,16 @@ class EditedMotion:
             columns = tuple(_with_decimals(column, decimals) for column in columns)
         return EditedMotion(rows, columns, self.format, (*self.notes, *notes))
 
+    def with_planned_decimals(self, quantities: Sequence[str]) -> EditedMotion:
+        """Return the motion with some quantities of joints written with at least the decimals of a plan."""
+        columns = tuple(
+            replace(column, decimals=max(column.decimals, DECIMALS))
+            if column.quantity in quantities and column.decimals is not None
+            else column
+            for column in self.columns
+        )
+        return replace(self, columns=columns)
+
     def as_written(self) -> EditedMotion:
         """Return the motion that a reader of its file finds: rounded to the decimals of its columns.
 
@@ -142,7 +151,7 @@ def decimals_for(motion: EditedMotion, t: Array) -> int | None:
     if column.decimals is None:
         return None
     said = rounded(t / column.factor, column.decimals) * column.factor
-    return None if bool((np.abs(said - t) <= _SAME_TIME + np.spacing(np.abs(t))).all()) else TIME_DECIMALS
+    return None if bool((np.abs(said - t) <= _SAME_TIME + np.spacing(np.abs(t))).all()) else DECIMALS
 
 
 def read_motion(

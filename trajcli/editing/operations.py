@@ -7,8 +7,6 @@ same rows; rows between them are those of the curve that the columns determine.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
-from math import log10
 
 import numpy as np
 
@@ -16,12 +14,9 @@ from trajcli.curves.piecewise import Array
 from trajcli.editing.edited_motion import ORDERS, EditedMotion, decimals_for
 from trajcli.errors import InputError, Problem, VerificationError
 from trajcli.grids import UniformGrid
-from trajcli.streams.recorded_motion import WrittenColumn
 
 _NO_EFFORT = "the columns of efforts are left out: they would be others"
 _SAME = 1e-9  # rad, m and their rates, beside the rounding of both files: states that agree
-_CARRIED = {1: (3.75, 1.0), 2: (11.55, 8.0, 1.0)}
-"""Largest derivatives of Hermite's quintic basis, for both ends: what rounding of q, qd, qdd does to them."""
 _NEAR = 1e-6  # of an interval: a stamp this near to a row is that of the row
 
 
@@ -107,7 +102,7 @@ def _at(motion: EditedMotion, times: Array) -> EditedMotion:
     if between.any():
         for name, values in _between_rows(motion, times[between]).items():
             quantities[name][between] = values
-        motion = _certain_decimals(motion, times[between])
+        motion = motion.with_planned_decimals(tuple(motion.quantities))
     before = np.clip(np.searchsorted(rows.t, times, side="right") - 1, 0, rows.t.size - 1)
     move = None if rows.move is None else rows.move[before]
     return motion.with_rows(times, quantities, move, decimals=decimals_for(motion, times))
@@ -129,40 +124,6 @@ def _of_curve(motion: EditedMotion) -> tuple[str, ...]:
     """Return the quantities that the curve takes from the rows."""
     rows = motion.rows
     return ORDERS[: 1 + (rows.qd is not None) * (1 + (rows.qdd is not None))]
-
-
-def _certain_decimals(motion: EditedMotion, times: Array) -> EditedMotion:
-    """Return a motion whose derivatives have as many decimals as are certain between rows.
-
-    Over an interval of length h, derivatives of the curve carry the rounding e of its ends: velocities e / h,
-    accelerations e / h^2, times the largest derivatives of Hermite's basis for both ends.
-    """
-    rows = motion.rows
-    known = _of_curve(motion)
-    at = np.clip(np.searchsorted(rows.t, times, side="right") - 1, 0, rows.t.size - 2)
-    shortest = float(np.diff(rows.t)[at].min())
-    rounding = [np.asarray(getattr(rows.resolution, name)) for name in ORDERS[:3]]
-    errors: dict[str, Array] = {}
-    for order, name in enumerate(known[1:], 1):
-        carried = enumerate(_CARRIED[order])
-        parts = [factor / shortest ** (order - below) * rounding[below] for below, factor in carried]
-        errors[name] = np.sum(parts, axis=0)
-    columns = tuple(_with_certain(column, errors) for column in motion.columns)
-    if columns == motion.columns:
-        return motion
-    fewer = {column.quantity for column, old in zip(columns, motion.columns, strict=True) if column != old}
-    names = " and ".join(name for name in known if name in fewer)
-    note = f"between rows fewer decimals of {names} are certain, and so many are written"
-    return replace(motion, columns=columns, notes=(*motion.notes, note))
-
-
-def _with_certain(column: WrittenColumn, errors: Mapping[str, Array]) -> WrittenColumn:
-    """Return a column with the decimals whose half unit is about its error."""
-    error = errors.get(column.quantity)
-    if error is None or column.decimals is None or column.joint is None or error[column.joint] <= 0:
-        return column
-    certain = round(-log10(2.0 * float(error[column.joint]) / column.factor))
-    return replace(column, decimals=max(min(column.decimals, certain), 0))
 
 
 def join(first: EditedMotion, second: EditedMotion) -> EditedMotion:

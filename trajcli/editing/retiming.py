@@ -20,19 +20,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
-from trajcli.editing.edited_motion import ORDERS, TIME_DECIMALS, EditedMotion
+from trajcli.editing.edited_motion import ORDERS, EditedMotion
 from trajcli.errors import InputError, Problem, VerificationError
 from trajcli.findings import Finding
 from trajcli.frozen import frozen
 from trajcli.judge.motion import Requirements, judge_motion
 from trajcli.limits.kinds import STRETCHABLE
+from trajcli.streams.decimals import DECIMALS
 from trajcli.streams.recorded_motion import RecordedMotion
 
 _FINE = 1e-4  # relative: how far above the smallest factor the one that is found may be
 _SLOWEST, _FASTEST = 1e6, 1e-9
 _TRIES = 40
 _SMALL_ROUNDING = 0.01  # of a limit: where it is more, it hides how far the limit is used
-_FEWER = 4  # decimals that rounding twice may cost at most
+_FEWER = 5  # times that derivatives are written with fewer decimals: as the file has them, and one less each
 _NUDGE = 1e-7  # relative: what the rounding of the rows that are written may ask for besides
 _AT_REST = 1e-9  # of the largest velocity of a joint: below that a border of two moves is at rest
 _MICROSECONDS = 1e-3  # s: intervals below this need stamps with more than nine decimals
@@ -264,12 +265,14 @@ def _assembled(motion: EditedMotion, ranges: list[slice], factors: list[float], 
     }
     notes = () if rows.tau is None else (_NO_EFFORT,)
     fine = float(np.diff(t).min()) < _MICROSECONDS
-    found = motion.with_rows(t, quantities, rows.move, *notes, decimals=TIME_DECIMALS + 3 * fine)
-    return found if not coarser else _coarser(found, coarser)
+    found = motion.with_rows(t, quantities, rows.move, *notes, decimals=DECIMALS + 3 * fine)
+    if not coarser:
+        return found.with_planned_decimals(ORDERS[1:])
+    return found if coarser == 1 else _coarser(found, coarser - 1)
 
 
 def _coarser(motion: EditedMotion, fewer: int) -> EditedMotion:
-    """Return a motion whose derivatives are written with fewer decimals."""
+    """Return a motion whose derivatives are written with fewer decimals than its file has."""
     columns = tuple(
         replace(column, decimals=max(column.decimals - fewer, 0))
         if column.quantity in ORDERS[1:] and column.decimals is not None

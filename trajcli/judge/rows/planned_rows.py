@@ -9,6 +9,7 @@ them a motion of its own.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -37,6 +38,7 @@ _ULPS = 8.0  # of a stamp
 _NO_GRID = (
     "its stamps are neither all times of one rate, nor the times of the job, nor the knots of its motion"
 )
+_ODD = ("qd", "qddd", "vx", "vy", "vz", "wx", "wy", "wz", "sd")  # change their sign when time goes back
 _NANOSECOND = 0.5e-9  # s: by how much the stamps of messages are rounded
 
 
@@ -130,7 +132,9 @@ def compare_with_plan(
         if first is None:
             return RowComparison(planned=True)
         difference = difference or first
-    return RowComparison(planned=False, difference=difference or _NO_GRID)
+    return RowComparison(
+        planned=False, difference=difference or _beside(of_file, plan, halves * factors, stamps)
+    )
 
 
 def _known(
@@ -262,6 +266,44 @@ def _first_difference(rows: _Rows, plan: Plan, grid: Grid, halves: Array, stamps
             if at is not None:
                 return known.said(block[at], expected[at], off[at] - room[at], done + at + 1)
         done += len(block)
+    return None
+
+
+def _beside(rows: _Rows, plan: Plan, halves: Array, stamps: _Stamps) -> str:
+    """Return what rows are whose stamps are none of the motion: a part of it, that backward, or others.
+
+    Args:
+        rows: The file.
+        plan: Of the job.
+        halves: Half a unit of each column, SI, shape (m,).
+        stamps: Of the file.
+    """
+    duration = plan.trajectory.duration
+    if rows.kept is None or stamps.count < 2 or np.diff(rows.kept[:, rows.time]).min() <= 2 * _NANOSECOND:
+        return _NO_GRID
+    first, last = stamps.first - plan.loaded.job.output.start_time, stamps.last[1] - stamps.first
+    if abs(last - duration) <= 2 * _NANOSECOND:
+        return _backward(rows, plan, halves, stamps) or _NO_GRID
+    after = first + last - duration
+    if after > 2 * _NANOSECOND:
+        return f"they last {last:.9g} s, and the motion {duration:.9g} s"
+    part = ListedGrid(duration, rows.kept[:, rows.time] - stamps.first + max(first, 0.0))
+    if first < -2 * _NANOSECOND or _first_difference(rows, plan, part, halves, stamps) is not None:
+        return _NO_GRID
+    return f"they are a part of it alone, from {first:.9g} s to {first + last:.9g} s of {duration:.9g} s"
+
+
+def _backward(rows: _Rows, plan: Plan, halves: Array, stamps: _Stamps) -> str | None:
+    """Return that rows are those of the motion from its end to its start; None where they are others."""
+    assert rows.kept is not None  # noqa: S101
+    signs = np.array([-1.0 if (column.kind in _ODD) else 1.0 for column in rows.columns])
+    turned = rows.kept[::-1] * signs
+    turned[:, rows.time] = stamps.last[1] - rows.kept[::-1, rows.time]
+    duration = plan.trajectory.duration
+    grid = ListedGrid(duration, np.clip(turned[:, rows.time], 0.0, duration))
+    back = replace(rows, kept=turned)
+    if _first_difference(back, plan, grid, halves, stamps) is None:
+        return "they are it backward, from its end to its start"
     return None
 
 

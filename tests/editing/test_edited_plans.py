@@ -1,0 +1,93 @@
+"""Rows made of planned ones: known as those of the plan where they are, else said to be what they are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from trajcli.editing.edited_motion import EditedMotion, ReadingOptions, read_motion
+from trajcli.editing.operations import cut, join, resample, reverse
+from trajcli.editing.writing import write_motion
+from trajcli.job.read import job_from_text
+from trajcli.judge.file import CheckOptions, check_file
+from trajcli.output.write import write_plan
+from trajcli.planning.plan import Plan, plan_job
+from trajcli.units import Units
+
+JOB = """
+version: 1
+robot: {joints: 2}
+limits: {velocity: 2, acceleration: 6, jerk: 100}
+start: {joints: [0, 0.4]}
+moves: [{planner: jerk_limited, to: {joints: [1, -1]}}, {planner: quintic, to: {joints: [0, 1]}, duration: 2.5}]
+output: {rate: 100}
+"""
+
+
+@pytest.fixture(scope="module")
+def plan() -> Plan:
+    return plan_job(job_from_text(JOB))
+
+
+@pytest.fixture
+def source(plan: Plan, tmp_path: Path) -> EditedMotion:
+    write_plan(plan, str(tmp_path / "plan.csv"))
+    return read_motion(str(tmp_path / "plan.csv"), ReadingOptions(), declared=Units())
+
+
+def said(plan: Plan, motion: EditedMotion, folder: Path) -> tuple[bool | None, str]:
+    """Return whether rows are those of the plan, and the sentence that says why not."""
+    write_motion(motion, str(folder / "edited.csv"))
+    found = check_file(str(folder / "edited.csv"), CheckOptions(), plan).judgement
+    return found.planned_rows, next((note for note in found.notes if "no rows of the motion" in note), "")
+
+
+def test_a_slice_is_a_part(plan: Plan, source: EditedMotion, tmp_path: Path) -> None:
+    known, why = said(plan, cut(source, 0.5, 1.25), tmp_path)
+    assert (known, "a part of it alone, from 0.5 s to 1.25 s of" in why) == (False, True)
+    wrong = cut(source, 0.5, 1.25)
+    wrong.rows.q[7, 0] += 1e-6
+    assert "a part of it" not in said(plan, wrong, tmp_path)[1]
+
+
+def test_parts_joined_again_are_the_plan(plan: Plan, source: EditedMotion, tmp_path: Path) -> None:
+    whole = join(cut(source, 0.0, 1.0), cut(source, 1.0, float(source.rows.t[-1])))
+    assert said(plan, whole, tmp_path) == (True, "")
+
+
+def test_the_way_back_is_said_to_be_it(plan: Plan, source: EditedMotion, tmp_path: Path) -> None:
+    known, why = said(plan, reverse(source), tmp_path)
+    assert (known, "backward" in why) == (False, True)
+    assert said(plan, reverse(reverse(source)), tmp_path) == (True, "")
+    wrong = reverse(source)
+    assert wrong.rows.qd is not None
+    wrong.rows.qd[:] *= -1
+    assert "backward" not in said(plan, wrong, tmp_path)[1]
+
+
+def test_a_longer_motion_is_said_to_be_longer(plan: Plan, source: EditedMotion, tmp_path: Path) -> None:
+    known, why = said(plan, join(source, reverse(source)), tmp_path)
+    assert (known, "they last" in why) == (False, True)
+
+
+def test_fewer_rows_are_rows_of_the_plan(plan: Plan, source: EditedMotion, tmp_path: Path) -> None:
+    assert said(plan, resample(source, 50.0), tmp_path) == (True, "")
+    known, why = said(plan, resample(source, 300.0), tmp_path)  # between the rows, as they are joined
+    assert (known, "the motion has" in why) == (False, True)
+
+
+def test_new_rows_have_the_decimals_of_a_plan(source: EditedMotion, tmp_path: Path) -> None:
+    coarse = tmp_path / "coarse.csv"
+    coarse.write_text("t,q1,qd1\n0,0.0,0.50\n1,0.5,0.50\n2,1.0,0.50\n", encoding="utf-8")
+    motion = read_motion(str(coarse), ReadingOptions(), declared=Units())
+    write_motion(resample(motion, 4.0), str(tmp_path / "fine.csv"))
+    lines = (tmp_path / "fine.csv").read_text(encoding="utf-8").splitlines()[1:]
+    rows = np.array([[float(cell) for cell in line.split(",")] for line in lines])
+    np.testing.assert_allclose(rows[:, 1], 0.5 * rows[:, 0], atol=1e-9)  # a straight line
+    every = {len(cell.partition(".")[2]) for line in lines for cell in line.split(",")}
+    assert every == {9}
+    write_motion(resample(source, 300.0), str(tmp_path / "fine.csv"))
+    cells = (tmp_path / "fine.csv").read_text(encoding="utf-8").splitlines()[2].split(",")[:-1]
+    assert {len(cell.partition(".")[2]) for cell in cells} == {9}
