@@ -7,11 +7,13 @@ each time. How many there are is said by `tiers`.
 import gc
 import os
 import signal
+from functools import cache
 from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: threads of small matrices only wait
 
 import pytest
+import typer.main
 from extras import pytest_terminal_summary as say_what_lacks
 from hypothesis import settings
 from tally import pytest_terminal_summary as say_what_campaigns_did
@@ -22,6 +24,7 @@ from tiers import TIER, few_examples
 settings.register_profile("fixed", derandomize=True, deadline=None)
 settings.register_profile("new", deadline=None)
 settings.load_profile("new" if TIER == "soak" else "fixed")
+typer.main.get_command = cache(typer.main.get_command)  # it makes all commands: longer than what most do
 ASKED = "_hypothesis_internal_use_settings"
 
 if (

@@ -7,15 +7,15 @@ import re
 import shlex
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 from yaml_files import read_yaml
 
+from docs.warm import warm_commands
+
 ROOT = Path(__file__).parents[1]
-PATH = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
 INPUT = re.compile(r"\$\{\{ inputs\.([\w-]+) \}\}")
 
 
@@ -39,7 +39,7 @@ def run(command: list[str], **environment: str) -> subprocess.CompletedProcess[s
         command,
         capture_output=True,
         text=True,
-        env={**os.environ, "PATH": PATH, **environment},
+        env={**os.environ, "PATH": f"{warm_commands()}:{os.environ['PATH']}", **environment},
         timeout=60,
         check=False,
     )

@@ -152,6 +152,7 @@ class Tracker:
     path: ToolPath
     joints: np.ndarray
     place: float = 0.0
+    asked: tuple[float, ToolReference] | None = None
 
     def __post_init__(self) -> None:
         n = len(self.robot.joints)
@@ -165,7 +166,9 @@ class Tracker:
 
     def off(self, joints: np.ndarray, place: float) -> np.ndarray:
         """Return (N, m): what is between the tcp of joints (N, n) and the path."""
-        demand, poses = self.path.at_s(np.array([place]), "left"), forward(self.robot, joints)
+        if self.asked is None or self.asked[0] != place:
+            self.asked = place, self.path.at_s(np.array([place]), "left")
+        demand, poses = self.asked[1], forward(self.robot, joints)
         parts = [poses[:, :3, 3] - demand.poses[0, :3, 3]]
         axis = poses[:, :3, "xyz".index(demand.tool_axis)]
         if demand.orientation == "all":
@@ -181,11 +184,15 @@ class Tracker:
             parts.append((np.arcsin(np.clip(axis[:, 2], -1, 1)) - demand.aims[0, 0])[:, None])
         return np.concatenate(parts, axis=1)
 
+    def linearised(self, joints: np.ndarray, place: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return that of joints (n,), shape (m,), and how they change it, (m, n)."""
+        n = joints.size
+        rows = self.off(joints + _STEP * np.concatenate([np.eye(n), -np.eye(n), np.zeros((1, n))]), place)
+        return rows[-1], (rows[:n] - rows[n:-1]).T / (2 * _STEP)
+
     def slopes(self, joints: np.ndarray, place: float) -> np.ndarray:
         """Return how the joints change that, (m, n)."""
-        n = joints.size
-        both = self.off(joints + _STEP * np.concatenate([np.eye(n), -np.eye(n)]), place)
-        return (both[:n] - both[n:]).T / (2 * _STEP)
+        return self.linearised(joints, place)[1]
 
     def ratio(self) -> float:
         """Return the smallest over the largest singular value, of the directions that are held too."""
@@ -202,13 +209,12 @@ class Tracker:
     def solved(self, guess: np.ndarray, place: float, rounds: int = 8) -> np.ndarray | None:
         """Return joint values near a guess, or None."""
         q = guess
-        for _ in range(rounds):
-            missed = np.concatenate([self.off(q[None], place)[0], self.held @ q - self.kept])
-            if np.abs(missed).max() < 1e-11:
+        for left in reversed(range(rounds + 1)):
+            off, slopes = self.linearised(q, place)
+            missed = np.concatenate([off, self.held @ q - self.kept])
+            if np.abs(missed).max() < 1e-11 or not left:
                 break
-            slopes = np.concatenate([self.slopes(q, place), self.held])
-            q = q - np.linalg.lstsq(slopes, missed, rcond=1e-10)[0]
-        missed = np.concatenate([self.off(q[None], place)[0], self.held @ q - self.kept])
+            q = q - np.linalg.lstsq(np.concatenate([slopes, self.held]), missed, rcond=1e-10)[0]
         good = np.abs(missed).max() < 1e-8
         return q if good else None
 

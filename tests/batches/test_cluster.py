@@ -109,7 +109,7 @@ def kill_when_under_way(cluster: Any) -> None:
     while not (Path("out/b.csv").exists() and list(Path("out").glob(".trajcli-*.part"))):
         assert time.monotonic() < end
         time.sleep(0.05)
-    time.sleep(3)  # the outcomes of the others have left the worker
+    time.sleep(2)  # the outcomes of the others have left the worker
     os.kill(next(iter(cluster.workers.values())).pid, signal.SIGKILL)
 
 

@@ -342,7 +342,7 @@ def test_no_process_outlives_the_one_that_began_it() -> None:
 
 @pytest.mark.usefixtures("folder")
 def test_killed_workers_and_endless_jobs_cost_their_own_job() -> None:
-    process = begin("--timeout", "4")
+    process = begin("--timeout", "2")
     until(both_under_way)
     os.kill(children(process.pid)[0], signal.SIGKILL)
     out, _ = process.communicate(timeout=60)

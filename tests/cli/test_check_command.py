@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from running import EXAMPLES, ROOT, call, run
+from running import EXAMPLES, ROOT, call
 
 import trajcli
 from trajcli.cli.app import app
@@ -100,9 +100,9 @@ def test_what_plan_writes_is_satisfied(capfd: pytest.CaptureFixture[str], planne
         assert judgement["period"] == 0.002
 
 
-def test_standard_input_is_a_file(planned: Path) -> None:
+def test_standard_input_is_a_file(planned: Path, capfd: pytest.CaptureFixture[str]) -> None:
     rows = (planned / "rows.csv").read_text()
-    done = run("check", "-", "--job", planned / "job.yaml", "--format", "json", stdin=rows)
+    done = call(capfd, "check", "-", "--job", planned / "job.yaml", "--format", "json", stdin=rows)
     assert done.code == 0
     assert json.loads(done.out)["rows"] == len(rows.splitlines()) - 1
 

@@ -8,7 +8,7 @@ from functools import reduce
 import numpy as np
 import pytest
 from arm_calls import Arms
-from running import run
+from running import call
 
 QUARTER = np.pi / 2
 WRIST = [(0.05, -QUARTER, 0.0), (0.0, QUARTER, 0.0), (0.0, 0.0, 0.1)]  # a, alpha, d of example 2.15
@@ -76,7 +76,7 @@ moves: [{{planner: cubic, duration: 5, to: {{xyz: [{x}, {y}, 0]}}}}]
 
 
 @pytest.mark.parametrize("stretch", [0.0, 180.0, 2.0, -100.0])
-def test_ik_and_explain_mean_the_same_by_singular(arms, tmp_path, stretch):
+def test_ik_and_explain_mean_the_same_by_singular(arms, tmp_path, stretch, capfd):
     """The determinant of the arm is a1 a2 sin(q2): it is singular stretched and folded, and there only."""
     q1, q2 = np.radians([35.0, stretch])
     x, y = (0.3 * f(q1) + 0.2 * f(q1 + q2) for f in (np.cos, np.sin))
@@ -86,7 +86,7 @@ def test_ik_and_explain_mean_the_same_by_singular(arms, tmp_path, stretch):
     assert all(answer["singular"] is lost and "free_direction" not in answer for answer in told)
     path = tmp_path / "job.yaml"
     path.write_text(JOB.format(x=x, y=y))
-    explained = run("explain", "--json", path)
+    explained = call(capfd, "explain", "--json", path)
     assert explained.code == 0, explained.err
     assert json.loads(explained.out)["moves"][0]["to_pose"]["singular"] is lost
 

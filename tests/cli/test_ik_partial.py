@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 from arm_calls import Arms
-from running import run
+from running import call
 
 
 @pytest.fixture
@@ -98,8 +98,8 @@ moves:
 """
 
 
-def test_a_job_names_the_branch_of_a_pitch():
-    outcome = run("plan", "-", "--set", "output.columns=[t, q]", stdin=JOB)
+def test_a_job_names_the_branch_of_a_pitch(capfd):
+    outcome = call(capfd, "plan", "-", "--set", "output.columns=[t, q]", stdin=JOB)
     assert outcome.code == 0
     first, pitch, *others = [float(cell) for cell in outcome.out.splitlines()[-1].split(",")[1:5]]
     assert first == pytest.approx(np.degrees(np.arctan2(0.2, 0.3)), abs=1e-8)

@@ -51,7 +51,9 @@ def test_rows_hold_no_summary_where_standard_error_is_closed(folder: Path, rows:
     assert (done.returncode, done.stdout) == (1, "")
 
 
-@pytest.mark.parametrize("words", ["plan job.yaml", "--help", "--version", "fk --help", "robots", "schema"])
+@pytest.mark.parametrize(
+    "words", ["plan job.yaml", "--help", "--version", "fk --help", "robots ur5e", "schema"]
+)
 @pytest.mark.parametrize("stream", ["&-", "/dev/full"])
 def test_a_closed_or_full_standard_output_is_4(folder: Path, words: str, stream: str) -> None:
     done = shell(f"trajcli {words} >{stream}", folder)
@@ -201,19 +203,27 @@ def test_an_output_never_overwrites_what_was_read(
     [
         "-o a.csv --report link.csv",
         "-o old.csv --report hard.csv",
-        "-o ./a.csv --resolved ../$(basename $PWD)/a.csv",
+        "-o ./a.csv --resolved jobs/../a.csv",
         "--report /dev/stdout",
         "-o /dev/stdout --report /dev/fd/1",
         "--report out.txt > out.txt",
     ],
 )
-def test_two_outputs_never_share_a_file(folder: Path, words: str) -> None:
+def test_two_outputs_never_share_a_file(
+    folder: Path, words: str, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(folder)
+    (folder / "jobs").mkdir()
     (folder / "link.csv").symlink_to("a.csv")
     (folder / "old.csv").write_text("old")
     (folder / "hard.csv").hardlink_to(folder / "old.csv")
-    done = shell(f"trajcli plan job.yaml {words}", folder)
-    assert done.returncode == 2
-    assert " cannot both go to " in done.stderr
+    if ">" in words or "/dev" in words:
+        done = shell(f"trajcli plan job.yaml {words}", folder)
+        outcome = Outcome(done.returncode, done.stdout, done.stderr)
+    else:
+        outcome = call(capfd, "plan", "job.yaml", *words.split())
+    assert outcome.code == 2
+    assert " cannot both go to " in outcome.err
     assert not (folder / "a.csv").exists()
     assert (folder / "old.csv").read_text() == "old"
 

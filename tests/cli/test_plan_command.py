@@ -114,7 +114,7 @@ def test_a_slowed_move_is_an_event(job: Path, capfd: Capture) -> None:
 
 
 EVERY = sorted(EXAMPLES.glob("*.yaml"))
-CALLED = few(EVERY, 8)
+CALLED = few(EVERY, 4)
 
 
 @pytest.mark.parametrize("example", EVERY, ids=lambda path: path.stem)

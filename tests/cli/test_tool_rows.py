@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from running import EXAMPLES, call, run
+from running import EXAMPLES, call
 
 from trajcli.streams.table import Table, read_csv
 
@@ -24,7 +24,7 @@ def planned(capfd: pytest.CaptureFixture[str], path: Path, *arguments: str) -> T
 def test_poses_are_those_of_fk(units: list[str], tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "rows.csv"
     rows = planned(capfd, path, *units, "--set", "output.columns=[t, q, pose]")
-    done = run("fk", "--robot", "ur5e", "--si", "-", stdin=path.read_text(encoding="utf-8"))
+    done = call(capfd, "fk", "--robot", "ur5e", "--si", "-", stdin=path.read_text(encoding="utf-8"))
     assert done.code == 0, done.err
     (tmp_path / "fk.csv").write_text(done.out, encoding="utf-8")
     peer = read_csv(str(tmp_path / "fk.csv"))

@@ -7,6 +7,7 @@ the derivatives of angular momenta. No recursion along the arm, no frame of a jo
 
 from __future__ import annotations
 
+import re
 from math import comb
 
 import numpy as np
@@ -34,9 +35,13 @@ def exponential(series: np.ndarray) -> np.ndarray:
 
 def times(one: np.ndarray, other: np.ndarray, subscripts: str) -> np.ndarray:
     """Return the product of two series of arrays, cut off as they are."""
-    return np.array(
-        [sum(np.einsum(subscripts, one[m], other[k - m]) for m in range(k + 1)) for k in range(len(one))]
-    )
+    first, second, both = re.split(",|->", subscripts)
+    each = f"{first},z{second}->z{both}"
+    products = [np.einsum(each, term, other[: len(one) - m]) for m, term in enumerate(one)]
+    result = products[0]
+    for m, product in enumerate(products[1:], 1):
+        result[m:] += product
+    return result
 
 
 def cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from tiers import few
 
 from trajcli.cli.job_commands import PayloadCommand
 from trajcli.cli.payload import run_payload
@@ -74,8 +75,8 @@ def verifies(text: str, mass: float) -> bool:
 def test_masses_up_to_the_largest_verify_from_outside(job: str, at: int | None, outside: str) -> None:
     found = payload_capacity(job_from_text(job), at)
     largest = float(found.mass or 0)
-    assert [part for part in (1e-3, 0.5, 0.99, 1) if not verifies(outside, part * largest)] == []
-    assert [part for part in (1 + 1e-6, 1.01, 2, 20) if verifies(outside, part * largest)] == []
+    assert [part for part in few((1, 0.99, 1e-3, 0.5), 2) if not verifies(outside, part * largest)] == []
+    assert [part for part in few((1 + 1e-6, 1.01, 20, 2), 2) if verifies(outside, part * largest)] == []
 
 
 def test_what_binds_is_said_with_its_place() -> None:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +10,7 @@ import pytest
 from independent_reader import ReadBack
 from scipy.spatial.transform import Rotation
 
+from trajcli.cli.app import app
 from trajcli.errors import InputError
 from trajcli.job.robot import catalogue_names, load_robot
 from trajcli.kinematics.forward import forward
@@ -148,11 +147,11 @@ def test_a_robot_without_geometry_or_with_unwritable_names_is_refused() -> None:
         urdf_of(replace(bare, convention="standard", joints=(Joint("a\x00"),)))
 
 
-def test_robots_prints_it() -> None:
-    command = [sys.executable, "-m", "trajcli", "robots"]
-    run = subprocess.run([*command, "ur5e", "--urdf"], capture_output=True, text=True, check=True)
-    assert run.stdout == urdf_of(load_robot("ur5e"))
+def test_robots_prints_it(capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match=r"^0$"):
+        app(["robots", "ur5e", "--urdf"])
+    assert capfd.readouterr().out == urdf_of(load_robot("ur5e"))
     for words in (["--urdf"], ["ur5e", "--urdf", "--json"], ["ur5e", "--urdf", "--yaml"]):
-        refused = subprocess.run([*command, *words], capture_output=True, text=True, check=False)
-        assert refused.returncode == 2
-        assert "--urdf" in refused.stderr
+        with pytest.raises(SystemExit, match=r"^2$"):
+            app(["robots", *words])
+        assert "--urdf" in capfd.readouterr().err

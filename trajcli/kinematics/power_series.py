@@ -36,9 +36,8 @@ def growth(coefficients: Array, lengths: Array, order: int) -> Array:
 def series_product(one: Array, other: Array) -> Array:
     """Return the product of two series, shape (K, P), cut off as they are."""
     result = np.zeros(one.shape)
-    for k, row in enumerate(one):
-        if row.any():
-            result[k:] += row * other[: len(other) - k]
+    for k in one.any(axis=1).nonzero()[0].tolist():
+        result[k:] += one[k] * other[: len(other) - k]
     return result
 
 

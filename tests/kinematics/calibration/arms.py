@@ -68,7 +68,7 @@ def true_changes(robot, rng, parameters=None) -> dict[ArmParameter, float]:
 
 def measured(robot, q, changes, rng=None, *, position=1e-4, angle=HUNDREDTH, part="pose"):
     """Return measurements of the robot with changed parameters; with noise where a generator is given."""
-    poses = np.array([pose_of(robot, row, changes) for row in q])
+    poses = pose_of(robot, np.asarray(q), changes)
     if rng is not None:
         poses[:, :3, 3] += rng.normal(size=(len(q), 3)) * position
         turns = Rotation.from_rotvec(rng.normal(size=(len(q), 3)) * angle)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -14,15 +12,15 @@ AXES = {"x": 0, "y": 1, "z": 2}
 
 
 def turn(axis, angle):
-    matrix, c, s = np.eye(4), math.cos(angle), math.sin(angle)
+    matrix, c, s = slide(axis, 0.0 * angle), np.cos(angle), np.sin(angle)
     i, j = ((1, 2), (2, 0), (0, 1))[AXES[axis]]
-    matrix[i, i], matrix[j, j], matrix[j, i], matrix[i, j] = c, c, s, -s
+    matrix[..., i, i], matrix[..., j, j], matrix[..., j, i], matrix[..., i, j] = c, c, s, -s
     return matrix
 
 
 def slide(axis, length):
-    matrix = np.eye(4)
-    matrix[AXES[axis], 3] = length
+    matrix = np.tile(np.eye(4), (*np.shape(length), 1, 1))
+    matrix[..., AXES[axis], 3] = length
     return matrix
 
 
@@ -34,12 +32,12 @@ def product(factors):
 
 
 def pose_of(robot: Robot, q: np.ndarray, changes: dict[ArmParameter, float]) -> np.ndarray:
-    """Return T_world_tcp (4, 4) at q (n,), every parameter changed by what `changes` says."""
+    """Return T_world_tcp (*batch, 4, 4) at q (*batch, n), every parameter changed by what `changes` says."""
     change = {
         (parameter.joint, parameter.owner, parameter.name): value for parameter, value in changes.items()
     }
     factors = [_frame(robot.base, "base", change)]
-    for index, (joint, value) in enumerate(zip(robot.joints, q, strict=True)):
+    for index, (joint, value) in enumerate(zip(robot.joints, np.moveaxis(q, -1, 0), strict=True)):
         number = {
             name: getattr(joint, name) + change.get((index, joint.name, name), 0.0)
             for name in ("theta", "d", "a", "alpha", "beta")
@@ -65,11 +63,10 @@ def _frame(pose, owner, change):
 def difference_jacobian(robot, joints, parameters, step=1e-6):
     """Return the Jacobian (N, 6, p) of the poses at joints (N, n), by central differences of the product."""
     result = np.empty((len(joints), 6, len(parameters)))
-    for row, q in enumerate(joints):
-        centre = pose_of(robot, q, {})
-        for column, parameter in enumerate(parameters):
-            high, low = (pose_of(robot, q, {parameter: sign * step}) for sign in (1, -1))
-            result[row, :3, column] = (high[:3, 3] - low[:3, 3]) / (2 * step)
-            spin = (high[:3, :3] - low[:3, :3]) / (2 * step) @ centre[:3, :3].T
-            result[row, 3:, column] = spin[2, 1], spin[0, 2], spin[1, 0]
+    centre = pose_of(robot, joints, {})[:, :3, :3]
+    for column, parameter in enumerate(parameters):
+        high, low = (pose_of(robot, joints, {parameter: sign * step})[:, :3] for sign in (1, -1))
+        slope = (high - low) / (2 * step)
+        spin = slope[..., :3] @ centre.swapaxes(1, 2)
+        result[..., column] = np.hstack([slope[..., 3], spin[:, (2, 0, 1), (1, 2, 0)]])
     return result

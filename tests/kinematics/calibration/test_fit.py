@@ -81,7 +81,7 @@ def test_exact_measurements_are_met_everywhere(name, convention, part):
         robot, measured(robot, configurations(robot, 60, rng), changes, part=part), parameters, LINEAR
     )
     elsewhere = configurations(robot, 20, rng)
-    expected = np.array([pose_of(robot, row, changes) for row in elsewhere])
+    expected = pose_of(robot, elsewhere, changes)
     size = slice(3, 4) if part == "position" else slice(4)
     np.testing.assert_allclose(forward(fit.robot, elsewhere)[:, :3, size], expected[:, :3, size], atol=1e-10)
 
@@ -207,7 +207,7 @@ def test_robust_losses_ignore_outliers(loss):
     )
     bad = Measurements(q, (MeasuredKind(np.arange(120), pose_target(poses)),))
     elsewhere = configurations(robot, 50, rng)
-    truth = np.array([pose_of(robot, row, changes) for row in elsewhere])
+    truth = pose_of(robot, elsewhere, changes)
 
     def missed(measurements, options):
         fit = calibrate(robot, measurements, parameters, options)
@@ -283,7 +283,7 @@ def test_far_from_nominal():
     changes = {parameter: rng.normal() * (0.3 if parameter.angular else 0.15) for parameter in parameters}
     q = configurations(robot, 80, rng)
     fit = calibrate(robot, measured(robot, q, changes), parameters, LINEAR)
-    expected = [pose_of(robot, row, changes) for row in q]
+    expected = pose_of(robot, q, changes)
     np.testing.assert_allclose(forward(fit.robot, q), expected, atol=1e-9)
 
 

@@ -130,20 +130,25 @@ class FollowingDiagnosis:
         }
         message = "{robot} does not reach the path beyond s = {place}: it stays up to {missed} away"
         hint = "move the path nearer to the arm"
-        if self._reached_with_free_roll(samples[~valid]):
+        far = answers.shortfall[~valid, 0].argsort()[::-1]
+        if self._reached_with_free_roll(samples[~valid][far]):
             axis = self.reference(samples[:1], "left").tool_axis
             hint += f", or give only the `direction` of the tool's {axis} axis at the target"
         return UnreachablePathError(Problem(message, hint, amounts=amounts))
 
     def _reached_with_free_roll(self, samples: Array) -> bool:
-        """Return whether the arm reaches the path at samples (k,) where the tool may roll about its axis."""
+        """Return whether the arm reaches the path, at samples (k,) from the worst on, with a free roll."""
         from trajcli.kinematics.inverse.solve import solve
 
         reference = self.reference(samples, "left")
         if reference.orientation != "all":
             return False
         target = replace(reference, orientation="direction").target()
-        return bool(solve(self.robot, target, None).valid.any(axis=-1).all())
+        parts = (
+            target.rows(slice(0, 1)),
+            target.rows(slice(1, None)),
+        )  # failures cost most
+        return all(solve(self.robot, part, None).valid.any(axis=-1).all() for part in parts)
 
     def _last_reached(self, low: float, high: float, known: Array) -> float:
         """Return how far beyond `low`, where joint values (k, n) are known, some meet the target."""
