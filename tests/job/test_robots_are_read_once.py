@@ -44,3 +44,7 @@ def test_what_one_computes_of_its_robot_is_not_in_another(parsed: list[str]) -> 
     first.fk([0.0] * 6)
     assert first.joint_names == load_robot("ur5e").joint_names
     assert len(parsed) == 1
+
+
+def test_all_robots_of_the_catalogue_are_kept() -> None:
+    assert robots._sheet_of.cache_info().maxsize > len(robots.catalogue_names())

@@ -388,7 +388,7 @@ def read_sheet(path: str) -> RobotSheet:
     return replace(sheet, robot=replace(sheet.robot))  # of its own: a robot keeps what was computed of it
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def _sheet_of(content: bytes, path: str) -> RobotSheet:
     """Return the sheet of a robot file's content: many jobs of one process read it once."""
     document = parse_document(content, path)

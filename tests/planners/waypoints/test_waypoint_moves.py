@@ -74,7 +74,7 @@ def test_faster_limits_scale_the_time():
 
 
 def test_more_starts_are_not_slower():
-    durations = [plan_of(starts=starts).trajectory.duration for starts in (1, 3, 5)]
+    durations = [plan_of(starts=starts).trajectory.duration for starts in (1, 2, 4)]
     assert durations[0] >= durations[1] * (1 - 1e-9) >= durations[2] * (1 - 2e-9)
 
 
