@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -101,6 +102,7 @@ def _along_path(rng: np.random.Generator, number: int, planner: str) -> dict[str
     }
 
 
+@cache
 def judged(number: int) -> tuple[str, bool, dict[str, float]]:
     """Return the planner of a job, whether it is verified, and then the largest share of each limit."""
     planner, used = PLANNERS[number % len(PLANNERS)], dict[str, float]()

@@ -36,7 +36,7 @@ def growth(coefficients: Array, lengths: Array, order: int) -> Array:
 def series_product(one: Array, other: Array) -> Array:
     """Return the product of two series, shape (K, P), cut off as they are."""
     result = np.zeros(one.shape)
-    for k in one.any(axis=1).nonzero()[0].tolist():
+    for k in np.flatnonzero(one.any(axis=1)).tolist():
         result[k:] += one[k] * other[: len(other) - k]
     return result
 

@@ -1,5 +1,6 @@
 """Jerk-limited laws along paths: against ruckig, reference durations, copp, and by laws of scale and symmetry."""
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -130,7 +131,7 @@ def test_below_the_stations_of_copp(seed):
 
 @pytest.mark.parametrize("seed", few(range(24)))
 def test_random_problems_keep_all_limits(seed):
-    judged(*random_problem(seed))
+    judged_problem(seed)
 
 
 @pytest.mark.soak
@@ -139,6 +140,12 @@ def test_a_thousand_random_problems_keep_all_limits(block, tally):
     for seed in range(1000 + 10 * block, 1010 + 10 * block):
         judged(*random_problem(seed))
     tally({"laws": 10})
+
+
+@cache
+def judged_problem(seed):
+    """Return the motion of a random problem, which keeps all limits."""
+    return judged(*random_problem(seed))
 
 
 def random_problem(seed):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from jerk_paths import PANDA, both, judged, spline
-from test_jerk_limited_laws import random_problem, ruckig_duration
+from test_jerk_limited_laws import judged_problem, random_problem, ruckig_duration
 
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.turning_bound import turning_bound
@@ -49,7 +49,7 @@ def test_half_of_a_motion_there_and_back_has_a_free_acceleration(jerk):
 @pytest.mark.parametrize("seed", range(12))
 def test_no_law_is_faster(seed):
     path, *bounds = random_problem(seed)
-    motion = judged(path, *bounds)
+    motion = judged_problem(seed)
     assert turning_bound(path, tuple(bounds), (0.0, 0.0))[0] <= motion.law.duration * (1 + 1e-9)
     assert motion.lower_bound <= motion.law.duration * (1 + 1e-9)
 
