@@ -38,6 +38,11 @@ class State:
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
+    def bits(self) -> bytes:
+        """All of it, as a key."""
+        return b"".join(each.tobytes() for each in (self.position, self.velocity, self.acceleration))
+
+    @property
     def at_rest(self) -> bool:
         """Whether velocity and acceleration are zero."""
         return not (self.velocity.any() or self.acceleration.any())
@@ -125,6 +130,7 @@ class Span:
         end: Seconds from the start of the trajectory; equals the next span's start.
         continuity: Derivatives that the planner promises to join without a jump: 1 or 2.
         payload: What the tool carries meanwhile; None for nothing.
+        round: In which round of a repeat it is, such as "slot 3 of 18"; empty outside of any.
     """
 
     index: int
@@ -133,6 +139,7 @@ class Span:
     end: float
     continuity: int
     payload: Payload | None = None
+    round: str = ""
 
     @property
     def duration(self) -> float:

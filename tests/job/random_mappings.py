@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from hypothesis import strategies as st
@@ -10,6 +11,8 @@ ANGLES = {"rad": 1.0, "deg": 57.0}
 NAMES = st.text(
     st.characters(codec="utf-8", exclude_categories=("Cs", "Cn", "Co")), min_size=1, max_size=8
 ).filter(lambda name: name.isprintable() and name == name.strip())
+
+POINT_NAMES = NAMES.filter(lambda name: re.fullmatch(r"[-+]?[.0-9]+[.eE0-9+-]*", name) is None)
 
 
 def numbers(low: float, high: float) -> st.SearchStrategy[float]:
@@ -110,7 +113,7 @@ def jobs(draw: st.DrawFn) -> dict[str, Any]:
             "length": draw(st.sampled_from(["m", "mm"])),
         },
         "robot": robot,
-        "points": {draw(NAMES): draw(states(count, 2))},
+        "points": {draw(POINT_NAMES): draw(states(count, 2))},
         "start": draw(states(count, 1)),
         "moves": draw(st.lists(moves(count), min_size=1, max_size=3)),
         "output": {"start_time": draw(numbers(-5, 5))},

@@ -35,7 +35,12 @@ def problems(text: str) -> list[tuple[int, str]]:
         ("planner: cubic, to: {joints: [1]}, duration: 1", "wait: 2", 5, "{planner: hold, duration: 2}"),
         ("planner: cubic, to: {joints: [1]}, duration: 1", "stop: 2", 5, "{planner: hold, duration: 2}"),
         ("planner: cubic, to: {joints: [1]}, duration: 1", "movej: 2", 5, "{planner: jerk_limited, ...}"),
-        ("planner: cubic, to: {joints: [1]}, duration: 1", "repeat: {times: 3}", 5, "a job has no loops"),
+        (
+            "planner: cubic, to: {joints: [1]}, duration: 1",
+            "loop: {times: 3}",
+            5,
+            "{repeat: 3, moves: [...]}",
+        ),
         ("planner: cubic, to: {joints: [1]}, duration: 1", "mark: here", 5, "the column `move`"),
         ("planner: cubic, to: {joints: [1]}, duration: 1", "gripper: 1", 5, "attach and detach"),
         ("planner: cubic, to: {joints: [1]}, duration: 1", "goto: a", 5, "{planner: jerk_limited, to: a}"),

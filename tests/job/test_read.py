@@ -96,8 +96,8 @@ def test_joints_that_a_mapping_of_rates_leaves_out_are_zero() -> None:
 
 def test_points_by_name() -> None:
     loaded = job(
-        "{planner: cubic, to: there, duration: 1}, {planner: cubic, to: here, duration: 1}",
-        points="{there: {joints: [1, 2]}, here: {joints: 3, velocity: 1}, again: there}",
+        "{planner: cubic, to: there, duration: 1}, {planner: cubic, to: near, duration: 1}",
+        points="{there: {joints: [1, 2]}, near: {joints: 3, velocity: 1}, again: there}",
         start="again",
     )
     assert loaded.job.start.joints == (1.0, 2.0)

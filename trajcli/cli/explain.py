@@ -241,7 +241,8 @@ def _lines(explained: Explanation, count: int, *, peers: bool = False) -> Iterat
     noted = [*explained.events, *explained.remarks]
     for move in explained.moves:
         yield ""
-        yield f"move {move.index}: {move.planner}, {move.duration:.10g} s, from t = {move.start:.10g} s"
+        named = move.planner if move.round is None else f"{move.planner}, {move.round}"
+        yield f"move {move.index}: {named}, {move.duration:.10g} s, from t = {move.start:.10g} s"
         yield from _carried(move)
         if move.planner in HANDLING:
             continue

@@ -149,7 +149,7 @@ def _contradicted(plan: Plan) -> VerificationError | None:
     found = contradictions_of(plan.trajectory.spans, [reference_of(move) for move in plan.moves])
     problems = [
         Problem(
-            f"move {one.move}: {one.message}",
+            f"{_where(plan, one.move)}{one.message}",
             one.hint,
             place=plan.loaded.place_of_move(one.move or 0),
             move=one.move,
@@ -355,7 +355,8 @@ def summary(plan: Plan, rows: int) -> str:
     if plan.verdict.steps:
         lines.append(f"  the acceleration steps{_steps(plan)}")
     lines += [
-        f"  {event.kind}: {_where(event.move)}{event.message}" for event in (*plan.events, *plan.remarks)
+        f"  {event.kind}: {_where(plan, event.move)}{event.message}"
+        for event in (*plan.events, *plan.remarks)
     ]
     return "\n".join(lines)
 
@@ -377,8 +378,9 @@ def _moves(indices: Sequence[int]) -> str:
     return f"move{'s' * (len(indices) > 1)} {', '.join(str(index) for index in indices[:5])}{more}"
 
 
-def _where(move: int | None) -> str:
-    return "" if move is None else f"move {move}: "
+def _where(plan: Plan, move: int | None) -> str:
+    words = "" if move is None else plan.loaded.document.round_of(move)
+    return "" if move is None else f"move {move} ({words}): " if words else f"move {move}: "
 
 
 def _tightest(plan: Plan) -> str:

@@ -71,7 +71,7 @@ _ENTRIES_ELSEWHERE = {
     ),
     **dict.fromkeys(
         ("repeat", "loop", "for", "while", "times"),
-        "a job has no loops: write the moves once more, or join rows with `trajcli concat`",
+        "write `- {{repeat: 3, moves: [...]}}`, or in place of 3 the name of points that are many",
     ),
     **dict.fromkeys(
         ("mark", "label", "comment", "marker", "id"),
@@ -157,7 +157,8 @@ def _flaws(
 
 def _without_key_of_entry(loc: FieldPath) -> FieldPath:
     """Return the path without the tag of an entry among the moves, which is a key of it, too."""
-    return (*loc[:2], *loc[3:]) if loc[:1] == ("moves",) and loc[2:3] and loc[2] in HANDLING else loc
+    at = {"moves": 2, "sequences": 3}.get(str(loc[0]), len(loc)) if loc else 0
+    return (*loc[:at], *loc[at + 1 :]) if loc[at : at + 1] and loc[at] in HANDLING else loc
 
 
 def _flaw(path: FieldPath, text: str, hint: str | None) -> tuple[FieldPath, str, str | None, bool]:

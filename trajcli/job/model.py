@@ -16,6 +16,7 @@ from pydantic import (
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     TypeAdapter,
+    ValidationError,
     field_validator,
     model_validator,
 )
@@ -34,6 +35,7 @@ from trajcli.language.numbers import (
     Model,
     Name,
     Number,
+    PointName,
     ReadingContext,
     refuse,
     shown,
@@ -207,16 +209,53 @@ class _Moves:
 
     @staticmethod
     def _read(value: Any, info: core_schema.ValidationInfo) -> list[Planner]:  # noqa: ANN401
-        entries = [_tagged(entry) for entry in value] if isinstance(value, list) else value
-        moves: list[Planner] = _adapter(_tags_of(entries)).validate_python(entries, context=info.context)
-        return moves
+        if not isinstance(value, list):
+            return _validated(value, info.context)
+        first: dict[int, int] = {}
+        for index, entry in enumerate(value):
+            first.setdefault(id(entry), index)
+        once = [value[index] for index in first.values()]
+        try:
+            moves = _validated([_tagged(entry) for entry in once], info.context)
+        except ValidationError:
+            if len(once) == len(value):
+                raise
+            stood = [_tagged(e) if first[id(e)] == n else _Moves._stand_in() for n, e in enumerate(value)]
+            return _validated(stood, info.context)  # for the places of the flaws
+        if len(once) == len(value):
+            return moves
+        known = dict(zip(first, moves, strict=True))
+        return [known[id(entry)] for entry in value]
+
+    @staticmethod
+    def _stand_in() -> Planner:
+        """Return a move without flaws, in the place of one that is read already."""
+        return HANDLING["detach"].model_construct()
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
+        from trajcli.job.program.schemas import STRUCTURES
+
         moves = handler(moves_adapter(PLANNERS).core_schema)
         beside = [handler(TypeAdapter(HANDLING[key]).core_schema) for key in HANDLING]
-        return {**moves, "items": {"anyOf": [moves["items"], *beside]}}
+        return {**moves, "items": {"anyOf": [moves["items"], *beside, *STRUCTURES]}}
+
+
+class _OrMany:
+    """Lets a grid or a list stand for a point in the schema: who reads one in a job has expanded it."""
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        from trajcli.job.program.schemas import MANY
+
+        one = handler(schema)
+        return {**one, "anyOf": [*one["anyOf"], *MANY]}
+
+
+def _validated(entries: Any, context: Any) -> list[Planner]:  # noqa: ANN401
+    return _adapter(_tags_of(entries)).validate_python(entries, context=context)
 
 
 def _tagged(entry: Any) -> Any:  # noqa: ANN401
@@ -260,8 +299,13 @@ class Job(Model):
         Gravity("Acceleration of a body that falls, in world, m/s^2 whatever the units."),
     ] = GRAVITY
     limits: Annotated[JobLimitsSpec | None, Field(description="Replace the robot's, then scale.")] = None
-    points: dict[Annotated[str, Name("Name of a point.")], NamedTarget] = Field(
-        default_factory=dict, description="Named states."
+    points: dict[Annotated[str, PointName("Name of a point.")], Annotated[NamedTarget, _OrMany()]] = Field(
+        default_factory=dict, description="Named states, or grids and lists of them."
+    )
+    sequences: dict[Annotated[str, Name("Name of a sequence.")], Annotated[list[Planner], _Moves()]] = Field(
+        default_factory=dict,
+        exclude=True,
+        description="Lists of moves by name, for `- call: NAME`; of a job that was read, those not called.",
     )
     start: Annotated[
         NamedTarget,

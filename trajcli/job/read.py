@@ -29,12 +29,14 @@ from trajcli.kinematics.robot import Robot, unlimited
 from trajcli.language.limits import JobLimitsSpec, LimitsSpec
 from trajcli.language.numbers import FieldPath, ReadingContext
 from trajcli.language.targets import PoseFields, Target
-from trajcli.planners.planner import Event
+from trajcli.planners.planner import Event, Planner
 from trajcli.units import Units, amount_text
 
 if TYPE_CHECKING:
     from trajcli.language.recorded import Recorded
 
+_STRUCTURES = frozenset(("repeat", "call"))
+"""Keys of entries among the moves that stand for other moves."""
 _UNREAD = Robot("unread", (), unlimited(0), None, np.eye(4), np.eye(4))
 """Stands for a robot whose own flaws are known, while the rest of the job is read."""
 
@@ -101,6 +103,11 @@ class LoadedJob:
             return f"the start, point '{point}'", self.document.place(("points", point))
         return "the start", self.document.place(("start",))
 
+    def called(self, index: int) -> str:
+        """Return by what a move goes in messages: its number and planner, and in which round it is."""
+        named = (self.job.moves[index].tag, self.document.round_of(index))
+        return f"move {index} ({', '.join(word for word in named if word)})"
+
     def place_of_move(self, index: int) -> Place:
         """Return where a move stands in the file."""
         return self.document.place(("moves", index))
@@ -166,22 +173,32 @@ def files_of(document: Document) -> Iterator[tuple[str, str]]:
     yield "the job", "-" if standard else document.file
     folder = Path() if standard else Path(document.file).parent
     root = document.plain()
-    robot, moves = root.get("robot"), root.get("moves")
+    robot, sequences = root.get("robot"), root.get("sequences")
     for key in ("file", "urdf"):
         if isinstance(robot, Mapping) and isinstance(robot.get(key), str):
             yield "the robot's file", str(folder / robot[key])
     limits = root.get("limits")
     if isinstance(limits, Mapping) and isinstance(limits.get("file"), str):
         yield "the file of limits", str(folder / limits["file"])
+    lists = [root.get("moves"), *(sequences.values() if isinstance(sequences, Mapping) else ())]
+    recordings = dict.fromkeys(path for moves in lists for path in _recordings(moves))
+    yield from (("the recording", str(folder / path)) for path in recordings)
+
+
+def _recordings(moves: Any) -> Iterator[str]:  # noqa: ANN401
+    """Yield the files of points of a list of moves, those that are repeated counted."""
     for move in moves if isinstance(moves, list) else []:
         through = move.get("through") if isinstance(move, Mapping) else None
         if isinstance(through, Mapping) and isinstance(through.get("csv"), str):
-            yield "the recording", str(folder / through["csv"])
+            yield through["csv"]
+        if isinstance(move, Mapping) and "repeat" in move:
+            yield from _recordings(move.get("moves"))
 
 
 def _load(document: Document) -> LoadedJob:
+    units = _units(_plain(document.node(("units",))))
+    document = _expanded(document, units)
     plain = dict(document.plain())
-    units = _units(plain.get("units"))
     problems: list[Problem] = []
     sheet: RobotSheet | None = None
     if "robot" in plain:
@@ -215,15 +232,47 @@ def _load(document: Document) -> LoadedJob:
         events = [*(Event(kind, message) for kind, message in sheet.concessions), *events]
     source = "the job" if sheet is None else sheet.source or _named_source(plain["robot"])
     loaded = LoadedJob(job, name, effective, document, (*noted, *events), source, context.has_far_angle)
+    _require_no_flaws(loaded)
+    return loaded
+
+
+def _require_no_flaws(loaded: LoadedJob) -> None:
+    """Refuse limits, columns and dynamics of a job that was read, and that do not fit its robot."""
     flaws = [
         *_loosened_by_moves(loaded),
         *_loosened_tool_limits(loaded),
         *_columns_without_geometry(loaded),
-        *flaws_of_dynamics(job, effective, document),
+        *flaws_of_dynamics(loaded.job, loaded.robot, loaded.document),
     ]
+    once: dict[Any, Problem] = {}
+    for flaw in flaws:  # of a move that is written once, several rounds say the same
+        once.setdefault((_position(flaw), flaw.joint, flaw.message), flaw)
     if flaws:
-        raise InputError(*sorted(flaws, key=_position))
-    return loaded
+        raise InputError(*sorted(once.values(), key=_position))
+
+
+def _expanded(document: Document, units: Units) -> Document:
+    """Return the document with its repeats and calls written out; itself where it has none."""
+    sections = document.root.value if isinstance(document.root.value, dict) else {}
+    moves, points = (sections[key].value if key in sections else None for key in ("moves", "points"))
+    entries = [entry.value for entry in moves] if isinstance(moves, list) else []
+    named = [point.value for point in points.values()] if isinstance(points, dict) else []
+    if not (
+        "sequences" in sections
+        or any(isinstance(entry, dict) and not entry.keys().isdisjoint(_STRUCTURES) for entry in entries)
+        or any(map(_is_many, named))
+    ):
+        return document
+    from trajcli.job.program.expand import expanded
+
+    return expanded(document, units)
+
+
+def _is_many(point: Any) -> bool:  # noqa: ANN401
+    """Return whether a point is a grid or a list of names."""
+    if isinstance(point, list):
+        return any(isinstance(item.value, str) for item in point)
+    return isinstance(point, dict) and "grid" in point
 
 
 def _named_source(value: Any) -> str:  # noqa: ANN401
@@ -243,6 +292,10 @@ def _with_limits_file(
     return of_file.under(spec), of_file.events
 
 
+def _plain(node: Node | None) -> Any:  # noqa: ANN401
+    return None if node is None else node.plain()
+
+
 def _texts(node: Node | None) -> Iterator[str]:
     """Yield every text below a node."""
     value = None if node is None else node.value
@@ -259,9 +312,18 @@ def _recorded(document: Document, robot: Robot, path: str) -> Recorded:
     return read_recording(path, document, robot)
 
 
+def _once(moves: Sequence[Planner]) -> Iterator[tuple[int, Planner]]:
+    """Yield each move with its index, one that is repeated once."""
+    seen: set[int] = set()
+    for index, move in enumerate(moves):
+        if id(move) not in seen:
+            seen.add(id(move))
+            yield index, move
+
+
 def _loosened_by_moves(loaded: LoadedJob) -> Iterator[Problem]:
     robot = loaded.robot
-    for index, move in enumerate(loaded.job.moves):
+    for index, move in _once(loaded.job.moves):
         for looser in looser_bounds(robot, move.limits) if move.limits is not None else ():
             problem = looser_problem(robot, looser, index)
             path = ("moves", index, "limits", looser.quantity)
@@ -271,7 +333,7 @@ def _loosened_by_moves(loaded: LoadedJob) -> Iterator[Problem]:
 
 
 def _loosened_tool_limits(loaded: LoadedJob) -> Iterator[Problem]:
-    for index, move in enumerate(loaded.job.moves):
+    for index, move in _once(loaded.job.moves):
         for name, amounts in looser_tool_bounds(loaded.robot, move.limits) if move.limits is not None else ():
             place = loaded.document.place(("moves", index, "limits", "tcp", name))
             before, after = (loaded.say(amount) for amount in amounts)

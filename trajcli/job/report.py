@@ -201,6 +201,10 @@ class MoveReport(ReportPart):
 
     index: Annotated[int, Field(description="From 0.")]
     planner: str
+    round: Annotated[
+        str | None,
+        Field(description="In which round of a repeat, such as slot 3 of 18; null outside of any."),
+    ] = None
     start: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
     end: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
     duration: ReportSeconds

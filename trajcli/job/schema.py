@@ -28,6 +28,7 @@ def schema_of(kind: SchemaKind) -> dict[str, Any]:
 
 def _job() -> dict[str, Any]:
     from trajcli.job.model import CATALOGUE_NAME, ROBOT_DEFINITION, Job
+    from trajcli.job.program.schemas import MOVES_DEFINITION
     from trajcli.job.robot import catalogue_names
     from trajcli.language.points import RELATIVE_DEFINITION
 
@@ -36,6 +37,7 @@ def _job() -> dict[str, Any]:
     definitions = {**schema["$defs"], **robot.pop("$defs", {}), "RobotModel": robot}
     stand_ins: dict[str, dict[str, Any]] = {
         ROBOT_DEFINITION: {"$ref": "#/$defs/RobotModel"},
+        MOVES_DEFINITION: {"$ref": "#/properties/moves"},
         CATALOGUE_NAME: {"enum": catalogue_names(), "description": "A robot of the catalogue."},
     }
     for name in ("Target", "Waypoint"):

@@ -126,6 +126,11 @@ class Payload:
             object.__setattr__(self, name, values)
         require_possible_solid(self.mass, self.com, self.inertia, least_mass=0.0)
 
+    @property
+    def bits(self) -> tuple[float, bytes, bytes]:
+        """All of it, as a key."""
+        return self.mass, self.com.tobytes(), self.inertia.tobytes()
+
     def __repr__(self) -> str:
         com = ", ".join(f"{x:g}" for x in self.com.tolist())
         return f"{type(self).__name__}({self.mass:g} kg at [{com}] m)"

@@ -8,6 +8,7 @@ uses and which joints the robot has; without one (a planner built in Python) val
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -366,6 +367,29 @@ class Name(FieldType):
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of a text of one line."""
         return {"type": "string", "minLength": 1, "maxLength": LONGEST_NAME}
+
+
+NO_NAMES = ("here", "world", "base", "tool", "stop")
+"""Words that stand where the name of a point or a frame may stand, and mean something else."""
+
+_DECIMAL = "[-+]?([.][0-9]+|[0-9]+([.][0-9]*)?)([eE][-+]?[0-9]+)?"
+
+
+class PointName(Name):
+    """A name of a point or a frame, which no other word can be taken for."""
+
+    def read(self, value: Any, context: ReadingContext) -> str:  # noqa: ANN401
+        """Return the name."""
+        name = super().read(value, context)
+        if name in NO_NAMES or re.fullmatch(_DECIMAL, name):
+            words = f"{', '.join(NO_NAMES)} and numbers have a meaning of their own"
+            raise FlawError(f"'{name}' is no name of a point or a frame", hint=f"choose another: {words}")
+        return name
+
+    def json_schema(self) -> JsonSchemaValue:
+        """Return the schema of such a name."""
+        others = [{"enum": list(NO_NAMES)}, {"pattern": f"^{_DECIMAL}$"}]
+        return {**super().json_schema(), "not": {"anyOf": others}}
 
 
 class Model(BaseModel):

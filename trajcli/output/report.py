@@ -144,6 +144,7 @@ def _move(plan: Plan, index: int, *, reference: bool, peers: bool) -> MoveReport
     return MoveReport(
         index=span.index,
         planner=span.planner,
+        round=span.round or None,
         start=span.start,
         end=span.end,
         duration=move.duration,
@@ -435,5 +436,5 @@ def _problem(plan: Plan, finding: Finding) -> Problem:
     if finding.kind == "position" and finding.time == plan.trajectory.curve.start:
         whose, position = plan.loaded.start_meant()
         return replace(finding, move=index).problem(f"{whose}: {said}", position)
-    text = f"move {index} ({plan.trajectory.spans[index].planner}): {said}"
+    text = f"{plan.loaded.called(index)}: {said}"
     return replace(finding, move=index).problem(text, plan.loaded.place_of_move(index))

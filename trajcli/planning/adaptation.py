@@ -42,8 +42,7 @@ class Adaptation:
     def key(self, move: int, start: State, grid: tuple[float, bool]) -> Any:  # noqa: ANN401
         """Return all that a move depends on beside the job: its start, the grid of its rows, and this."""
         own = ((*key[1:], cap) for key, cap in self.caps.items() if key[0] == move)
-        state = b"".join(each.tobytes() for each in (start.position, start.velocity, start.acceleration))
-        return move, state, grid, tuple(sorted(own)), self.stretches.get(move, 1.0), self.period
+        return move, start.bits, grid, tuple(sorted(own)), self.stretches.get(move, 1.0), self.period
 
     def stretched(self, move: PlannedMove) -> PlannedMove:
         """Return a move that lasts longer, where it shall."""

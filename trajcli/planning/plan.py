@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import field, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -154,16 +154,22 @@ def _plan_moves(
     before: Planner | None = None
     robot, begun = loaded.robot, 0.0
     origin: Target | None = loaded.job.start
+    aimed: Planner | None = None  # whose target the origin is
+    known = _Known(poses)
     for index, planner in enumerate(loaded.job.moves):
         report_progress(f"planning move {index + 1} of {len(loaded.job.moves)} ({planner.tag})")
         start = _handed_over(state, before, planner)
         robot = replace(robot, payload=planner.carried_after(robot.payload)) if planner.handles else robot
         used = robot if carried is None else replace(robot, payload=carried(index, robot.payload))
+        motion = (id(planner), id(aimed), start.bits, None if used.payload is None else used.payload.bits)
         try:
             with _errors_of(loaded, index, planner, begun):
-                reachable = planner.with_joint_targets(partial(resolve, index=index), state.position)
-                with _points_of_errors(loaded, index):
-                    move = _plan_move(loaded, used, index, reachable.coming_from(origin), start, adapted)
+                move = known.move(index, motion) if adapted is None else None
+                if move is None:
+                    reachable = planner.with_joint_targets(partial(resolve, index=index), state.position)
+                    with _points_of_errors(loaded, index):
+                        move = _plan_move(loaded, used, index, reachable.coming_from(origin), start, adapted)
+                    known.moves[motion] = move
             moves.append(move)
             begun += float(move.planned.curve.breaks[-1])
             state = move.planned.end
@@ -178,10 +184,33 @@ def _plan_moves(
                 raise
             break
         before, origin = planner, planner.target or origin
+        aimed = aimed if planner.target is None else planner
     if lacking:
         raise MissingLimitError(*_without_repeats(lacking))
     _require_start_acceleration(loaded, moves)
     return moves
+
+
+@frozen
+class _Known:
+    """Moves that are planned: rounds of a repeat that are the same motion are planned once.
+
+    Attributes:
+        poses: How poses are reached, by the index of the move.
+        moves: By all that a motion depends on beside the job.
+    """
+
+    poses: dict[int | None, ResolvedPose]
+    moves: dict[tuple[object, ...], PlannedMove] = field(default_factory=dict)
+
+    def move(self, index: int, motion: tuple[object, ...]) -> PlannedMove | None:
+        """Return a move that is the same motion as one before; None where none is."""
+        same = self.moves.get(motion)
+        if same is None:
+            return None
+        if same.index in self.poses:
+            self.poses[index] = self.poses[same.index]
+        return replace(same, index=index)
 
 
 _TAKEN_UP = 1e-6  # rad/s^2 or m/s^2, and relative: what rounding leaves of an acceleration at the start
@@ -357,7 +386,7 @@ def _joined(moves: list[PlannedMove], loaded: LoadedJob, first: State) -> Trajec
     spans, end = [], 0.0
     for move in moves:
         start, end = end, float(move.planned.curve.breaks[-1] + end)
-        spans.append(move.span(start, end))
+        spans.append(replace(move.span(start, end), round=loaded.document.round_of(move.index)))
     robot, last = loaded.robot, moves[-1].planned.end
     laws = tuple(_law_of_tool(move) for move in moves)
     return Trajectory(
@@ -394,7 +423,7 @@ def _errors_of(loaded: LoadedJob, index: int, planner: Planner, begun: float) ->
     except TrajcliError as error:
         problems = (
             replace(
-                problem.within(f"move {index} ({planner.tag})"),
+                problem.within(loaded.called(index)),
                 move=index,
                 time=None if problem.time is None else begun + problem.time,
             )

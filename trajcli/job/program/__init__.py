@@ -1,0 +1,1 @@
+"""Programs in job files: repeats, sequences and points that are many, as plain moves."""

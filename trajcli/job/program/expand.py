@@ -1,0 +1,275 @@
+"""Expansion of a program: repeats and calls as the plain moves that they stand for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from trajcli.errors import Place
+from trajcli.frozen import frozen
+from trajcli.job.program.many import MOST_ENTRIES, SECTIONS, ManyNames, Rounds
+from trajcli.job.yaml.document import Document, Node
+from trajcli.language.numbers import ReadingContext
+from trajcli.suggest import did_you_mean, valid_names
+from trajcli.units import Units
+
+_LONGEST_CHAIN = 100  # sequences, each called by the one before
+_Path = tuple[str | int, ...]
+
+
+class _Entry(NamedTuple):
+    """A move of the expanded list, where it is written, and the rounds in which it is reached."""
+
+    node: Node
+    path: _Path
+    rounds: str
+
+
+@frozen
+class ExpandedDocument(Document):
+    """A document whose repeats and calls are written out.
+
+    Attributes:
+        written: The document as it stands in the file.
+        paths: Where each move is written.
+        rounds: In which round each move is, such as "slot 3 of 18"; empty outside of repeats.
+        made: Where points and frames of rounds are written, and moves of sequences that nobody calls.
+    """
+
+    written: Document
+    paths: Sequence[_Path]
+    rounds: Sequence[str]
+    made: Mapping[_Path, _Path]
+
+    def place(self, path: Sequence[str | int], *, key: bool = False) -> Place:
+        """Return where in the file the deepest existing node on the path is written."""
+        return self.written.place(self._written(tuple(path)), key=key)
+
+    @property
+    def patches(self) -> Mapping[_Path, Document]:
+        """What options have replaced in the document as it stands in the file."""
+        return getattr(self.written, "patches", {})
+
+    def round_of(self, move: int) -> str:
+        """Return in which round of a repeat a move is reached; empty outside of any."""
+        return self.rounds[move]
+
+    def _written(self, path: _Path) -> _Path:
+        if path[:1] == ("moves",) and path[1:] and isinstance(path[1], int) and path[1] < len(self.paths):
+            return (*self.paths[path[1]], *path[2:])
+        for depth in (2, 3):
+            if path[:depth] in self.made:
+                return (*self.made[path[:depth]], *path[depth:])
+        return path
+
+    def plain(self) -> Any:  # noqa: ANN401
+        """Return the whole as dicts, lists and scalars; moves that are one in the file are one object."""
+        sections: dict[str, Node] = self.root.value  # type: ignore[assignment]
+        known: dict[int, Any] = {}
+        moves: list[Node] = sections["moves"].value  # type: ignore[assignment]
+        for node in moves:
+            if id(node) not in known:
+                known[id(node)] = node.plain()
+        others = {key: node.plain() for key, node in sections.items() if key != "moves"}
+        return {**others, "moves": [known[id(node)] for node in moves]}
+
+
+def expanded(document: Document, units: Units) -> ExpandedDocument:
+    """Return a document with its repeats and calls written out.
+
+    Args:
+        document: With moves and perhaps sequences.
+        units: Of its plain numbers.
+
+    Raises:
+        InputError: When a repeat, a call, a sequence or a point that is many is wrong, or the expanded list
+            of moves has more than a million entries.
+    """
+    names = ManyNames(document, ReadingContext(units))
+    names.check()
+    return _Expansion(document, names).document()
+
+
+class _Expansion:
+    """The expansion of one document."""
+
+    def __init__(self, document: Document, names: ManyNames) -> None:
+        self._document, self._names = document, names
+        node = document.node(("sequences",))
+        if node is not None and not isinstance(node.value, dict):
+            raise names.refused("expected a mapping {NAME: [move, ...]}", ("sequences",))
+        self._sequences: dict[str, Node] = {} if node is None else node.value  # type: ignore[assignment]
+        self._counted: dict[tuple[str, frozenset[str]], int] = {}
+        self._known: dict[tuple[Any, ...], Node] = {}
+
+    def document(self) -> ExpandedDocument:
+        moves = self._document.node(("moves",))
+        listed = moves is not None and isinstance(moves.value, list)
+        if moves is None or not listed:
+            raise self._names.refused("expected a list of moves", ("moves",))
+        count = self._count(moves, ("moves",), frozenset(), ())
+        if count > MOST_ENTRIES:
+            message = f"the moves are {count} entries when repeats and calls are written out"
+            raise self._names.refused(f"{message}, expected at most {MOST_ENTRIES}", ("moves",))
+        called = {name for name, _ in self._counted}
+        entries = list(self._entries(moves, ("moves",), {}, ""))
+        rest = {name: self._uncalled(name) for name in self._sequences if name not in called}
+        made: dict[_Path, _Path] = {
+            ("sequences", name, index): entry.path
+            for name, some in rest.items()
+            for index, entry in enumerate(some)
+        }
+        self._names.make_the_rest()
+        root = self._root(moves, entries, rest)
+        for section, some in self._names.made.items():
+            made |= {(section, name): path for name, (_, path) in some.items()}
+        paths, rounds = [entry.path for entry in entries], [entry.rounds for entry in entries]
+        return ExpandedDocument(
+            self._document.file, self._document.lines, root, self._document, paths, rounds, made
+        )
+
+    def _root(self, moves: Node, entries: list[_Entry], rest: Mapping[str, list[_Entry]]) -> Node:
+        sections: dict[str, Node] = dict(self._document.root.value)  # type: ignore[arg-type]
+        sections["moves"] = moves._replace(value=[entry.node for entry in entries])
+        for section in SECTIONS:
+            if section in sections and isinstance(sections[section].value, dict):
+                made = {name: node for name, (node, _) in self._names.made[section].items()}
+                sections[section] = sections[section]._replace(value={**self._names.single(section), **made})
+        if "sequences" in sections:
+            of_names = {
+                name: self._sequences[name]._replace(value=[entry.node for entry in some])
+                for name, some in rest.items()
+            }
+            sections["sequences"] = sections["sequences"]._replace(value=of_names)
+        return self._document.root._replace(value=sections)
+
+    def _uncalled(self, name: str) -> list[_Entry]:
+        """Return the moves of a sequence that nobody calls in the first of all rounds: they are read, too."""
+        path, bound = ("sequences", name), frozenset(self._names.counts)
+        self._count(self._sequences[name], path, bound, (name,))
+        first = dict.fromkeys(self._names.counts, 0)
+        return list(self._entries(self._sequences[name], path, first, ""))
+
+    def _count(self, listed: Node, path: _Path, bound: frozenset[str], chain: tuple[str, ...]) -> int:
+        """Return how many entries a list of moves becomes; refuse what is wrong with its repeats and calls.
+
+        Args:
+            listed: The list.
+            path: Where it stands.
+            bound: ManyNames that are many, of which the rounds say which one is meant.
+            chain: Sequences that are being called.
+        """
+        if not isinstance(listed.value, list):
+            raise self._names.refused("expected a list of moves", path)
+        if not listed.value:
+            raise self._names.refused("a list of moves is empty", path)
+        total = 0
+        for index, entry in enumerate(listed.value):
+            keys, here = entry.value if isinstance(entry.value, dict) else {}, (*path, index)
+            if "repeat" in keys:
+                total += self._count_repeat(entry, here, bound, chain)
+            elif "call" in keys:
+                total += self._count_call(entry, here, bound, chain)
+            else:
+                self._check_bound(entry, here, bound)
+                total += 1
+        return total
+
+    def _count_repeat(self, entry: Node, path: _Path, bound: frozenset[str], chain: tuple[str, ...]) -> int:
+        self._only(entry, ("repeat", "moves"), path)
+        over, moves = entry.child("repeat"), entry.child("moves")
+        if over is None or moves is None:
+            raise self._names.refused("a repeat needs `moves`", path, "such as {repeat: 3, moves: [...]}")
+        count, names = self._rounds(
+            over, (*path, "repeat")
+        )  # of two of a name, one in the other, the inner counts
+        for name in names:
+            left = [one for one in self._names.needs(name) if one not in (*bound, *names)]
+            if left:
+                message = f"'{name}' differs from round to round of {left[0]}"
+                raise self._names.refused(message, (*path, "repeat"), f"write it within `repeat: {left[0]}`")
+        return count * self._count(moves, (*path, "moves"), bound | set(names), chain)
+
+    def _rounds(self, over: Node, path: _Path) -> tuple[int, tuple[str, ...]]:
+        """Return how many rounds a repeat has, and the names over which it goes."""
+        if type(over.value) is int and over.value >= 1:
+            return over.value, ()
+        listed = over.value if isinstance(over.value, list) else [over]
+        counts = self._names.counts
+        for node in listed:
+            if not isinstance(node.value, str):
+                message = "expected a whole number of at least 1, or names that are many"
+                raise self._names.refused(f"{message}, got {node.text or 'a value of another kind'}", path)
+            if node.value not in counts:
+                hint = did_you_mean(node.value, counts) or valid_names(counts, "names that are many")
+                raise self._names.refused(
+                    f"'{node.value}' is not many", path, hint or "no point of the job is a grid or a list"
+                )
+        names = tuple(str(node.value) for node in listed)
+        if not names or len(set(names)) < len(names):
+            raise self._names.refused("expected different names", path)
+        if len({counts[name] for name in names}) > 1:
+            each = ", ".join(f"{name} is {counts[name]}" for name in names)
+            raise self._names.refused(f"names that are repeated together need equal counts: {each}", path)
+        return counts[names[0]], names
+
+    def _count_call(self, entry: Node, path: _Path, bound: frozenset[str], chain: tuple[str, ...]) -> int:
+        self._only(entry, ("call",), path)
+        called, at = entry.child("call"), (*path, "call")
+        name = None if called is None else called.value
+        if not isinstance(name, str) or name not in self._sequences:
+            known = self._sequences
+            hint = did_you_mean(str(name), known) or valid_names(known, "sequences")
+            raise self._names.refused(
+                f"there is no sequence '{name}'", at, hint or "the job has no `sequences`"
+            )
+        if name in chain:
+            circle = " -> ".join([*chain[chain.index(name) :], name])
+            raise self._names.refused(f"the sequence '{name}' calls itself ({circle})", at)
+        if len(chain) == _LONGEST_CHAIN:
+            raise self._names.refused(f"more than {_LONGEST_CHAIN} sequences call one another", at)
+        key = (name, bound)
+        if key not in self._counted:
+            counted = self._count(self._sequences[name], ("sequences", name), bound, (*chain, name))
+            self._counted[key] = counted
+        return self._counted[key]
+
+    def _check_bound(self, entry: Node, path: _Path, bound: frozenset[str]) -> None:
+        """Refuse a move that names one of many where no round says which."""
+        for name in self._names.needs_of(entry):
+            if name not in bound:
+                message = f"'{name}' is many ({self._names.counts[name]}), and no round says which is meant"
+                hint = f"write the move within `- {{repeat: {name}, moves: [...]}}`"
+                raise self._names.refused(message, path, hint)
+
+    def _only(self, entry: Node, keys: tuple[str, ...], path: _Path) -> None:
+        for key in entry.value if isinstance(entry.value, dict) else ():
+            if key not in keys:
+                hint = did_you_mean(key, keys) or valid_names(keys)
+                raise self._names.refused(f"unknown key '{key}'", (*path, key), hint, key=True)
+
+    def _entries(self, listed: Node, path: _Path, rounds: Rounds, words: str) -> Iterator[_Entry]:
+        """Yield the moves that a list stands for, in its rounds."""
+        items: list[Node] = listed.value  # type: ignore[assignment]
+        for index, entry in enumerate(items):
+            keys, here = entry.value if isinstance(entry.value, dict) else {}, (*path, index)
+            if "repeat" in keys:
+                count, names = self._rounds(keys["repeat"], (*here, "repeat"))
+                for number in range(count):
+                    now = {**rounds, **dict.fromkeys(names, number)}
+                    said = self._names.words(now, names) or f"round {number + 1} of {count}"
+                    both = f"{words}, {said}" if words else said
+                    yield from self._entries(keys["moves"], (*here, "moves"), now, both)
+            elif "call" in keys:
+                name = str(keys["call"].value)
+                yield from self._entries(self._sequences[name], ("sequences", name), rounds, words)
+            else:
+                yield _Entry(self._of_round(entry, rounds), here, words)
+
+    def _of_round(self, entry: Node, rounds: Rounds) -> Node:
+        """Return a move in a round; one that is the same in several is one node."""
+        needed = self._names.needs_of(entry)
+        key = (id(entry), *(rounds[name] for name in needed))
+        if key not in self._known:
+            self._known[key] = self._names.renamed(entry, rounds)
+        return self._known[key]

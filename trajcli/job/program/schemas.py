@@ -1,0 +1,77 @@
+"""JSON Schemas of what stands for moves and points: repeats, calls, grids and lists."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from trajcli.language.numbers import number_schema
+from trajcli.units import Quantity
+
+MOVES_DEFINITION = "a list of moves"
+"""Stands in a schema for the list of moves, which such an entry stands in."""
+_NAME = {"type": "string", "minLength": 1}
+_LISTED = {"type": "array", "items": _NAME, "minItems": 1, "uniqueItems": True}
+
+
+def _mapping(properties: dict[str, Any], *required: str, description: str) -> dict[str, Any]:
+    shape = {"type": "object", "properties": properties, "required": list(required)}
+    return {**shape, "additionalProperties": False, "description": description}
+
+
+STRUCTURES = (
+    _mapping(
+        {
+            "repeat": {
+                "anyOf": [{"type": "integer", "minimum": 1}, _NAME, _LISTED],
+                "description": "How often; or the name of points or frames that are many, a round for each; "
+                "or several such names, which go together.",
+            },
+            "moves": {"$comment": MOVES_DEFINITION},
+        },
+        "repeat",
+        "moves",
+        description="Moves that are done several times.",
+    ),
+    _mapping(
+        {"call": {**_NAME, "description": "Name of a sequence under `sequences`."}},
+        "call",
+        description="The moves of a sequence.",
+    ),
+)
+"""Entries among the moves that stand for several of them."""
+
+_STEP = _mapping(
+    {
+        "count": {"type": "integer", "minimum": 1, "description": "Places, the first included."},
+        "xyz": {
+            "type": "array",
+            "items": number_schema(Quantity("length")),
+            "minItems": 3,
+            "maxItems": 3,
+            "description": "From a place to the next (length unit).",
+        },
+    },
+    "count",
+    "xyz",
+    description="One direction of a grid.",
+)
+_GRID = _mapping(
+    {
+        "from": {**_NAME, "description": "The first place."},
+        "steps": {
+            "type": "array",
+            "items": _STEP,
+            "minItems": 1,
+            "description": "The directions; the last one turns fastest.",
+        },
+        "frame": {**_NAME, "description": "In whose axes the steps are: that of the first place."},
+    },
+    "from",
+    "steps",
+    description="Places in rows and columns.",
+)
+MANY = (
+    _mapping({"grid": _GRID}, "grid", description="Many: a place for each round of a repeat."),
+    {**_LISTED, "description": "Many: names, one for each round of a repeat."},
+)
+"""What stands under a name that is many."""
