@@ -6,6 +6,7 @@ import types
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
+import numpy as np
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
@@ -183,7 +184,13 @@ def _type_form(annotation: Any) -> str:  # noqa: ANN401
         return f"names, each with a {_type_form(arms[1])}"
     if origin in (Union, types.UnionType):
         return "[move](#moves)"
-    plain = {bool: "`true` or `false`", str: "text", float: "number", Planner: "[move](#moves)"}
+    plain = {
+        np.ndarray: "[pose](#poses)",
+        bool: "`true` or `false`",
+        str: "text",
+        float: "number",
+        Planner: "[move](#moves)",
+    }
     return plain[bare] if bare in plain else SECTIONS[bare]
 
 

@@ -49,7 +49,7 @@ def problems(text: str) -> list[tuple[int, str]]:
         ("duration: 1", "duration: 1, wait: 2", 5, "{planner: hold, duration: ...}"),
         ("duration: 1", "duration: 1, accel: 2", 5, "under `limits`: {acceleration: ...}"),
         ("joints: [1]", "joints: [1,5]", 5, "decimals have a point"),
-        ("version: 1", "version: 1\nframes: {a: {xyz: [0, 0, 0]}}", 2, "poses are in world"),
+        ("version: 1", "version: 1\nwobj: {a: {xyz: [0, 0, 0]}}", 2, "under `frames`"),
         ("planner: cubic", "planner: stop", 5, "{planner: jerk_limited, to: {velocity: 0}}"),
         (
             "{joints: 1}",

@@ -104,7 +104,7 @@ def test_relative_states_stand_wherever_a_state_may() -> None:
         ("  a: {joints: 0}\n  b: {from: a}\n", "7:13", "the point 'a' is given by its joints"),
         ("  a: {rpy: [0, 0, 0]}\n  b: {from: a}\n", "7:13", "the point 'a' has no position"),
         ("  a: {xyz: [1, 2, 3]}\n  b: {from: a}\n", "7:13", "the point 'a' has no whole orientation"),
-        ("  a: {xyz: [1, 2, 3]}\n  b: {from: a, frame: base}\n", "7:23", "expected tool or world"),
+        ("  a: {xyz: [1, 2, 3]}\n  b: {from: a, frame: floor}\n", "7:23", "there is no frame 'floor'"),
         ("  a: {xyz: [1, 2, 3]}\n  b: {from: a, offset: {z: 3}}\n", "7:25", "unknown key 'z'"),
         ("  a: {xyz: [1, 2, 3]}\n  b: {from: a, ofset: {z: 3}}\n", "7:16", "unknown key 'ofset'"),
         (

@@ -49,6 +49,7 @@ def dump_job(loaded: LoadedJob) -> str:
         "robot": robot_as_mapping(robot),
         **({} if job.gravity == GRAVITY else {"gravity": written["gravity"]}),
         "limits": {**_tool_limits(robot, context), **_efforts(robot)},
+        "frames": {key: frame for key, frame in written["frames"].items() if key == job.output.frame},
         "points": written["points"],
         "start": written["start"],
         "moves": [],

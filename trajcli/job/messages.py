@@ -92,9 +92,8 @@ _ENTRIES_ELSEWHERE = {
 """Entries among the moves of other programs, with what says the same."""
 _NOT_HERE = {
     **dict.fromkeys(
-        ("frames", "frame", "wobj", "workobject", "uframe"),
-        "poses are in world: `base` says where the arm stands, and a pose beside another is "
-        "`{{from: POINT, offset: ..., frame: tool}}`",
+        ("frame", "wobj", "workobject", "uframe"),
+        "frames stand under `frames` of the job, and a pose in one says `in: NAME`",
     ),
 }
 """Sections of other programs, with what says the same."""

@@ -174,6 +174,10 @@ class Output(Model):
             description="Groups of columns, in this order; pose, twist, twistd need a robot with geometry.",
         ),
     ] = ("t", "q", "qd", "qdd")
+    frame: Annotated[
+        Annotated[str, Name("The frame of the columns pose, twist and twistd; left out: world.")] | None,
+        Field(alias="in", description="The frame of the columns pose, twist and twistd; left out: world."),
+    ] = None
     consumer: Annotated[
         Annotated[str, Name("Profile of the consumer for which the job is planned, such as ros-jtc.")] | None,
         Field(
@@ -251,7 +255,7 @@ class _OrMany:
         from trajcli.job.program.schemas import MANY
 
         one = handler(schema)
-        return {**one, "anyOf": [*one["anyOf"], *MANY]}
+        return {"anyOf": [*one.get("anyOf", [one]), *MANY]}
 
 
 def _validated(entries: Any, context: Any) -> list[Planner]:  # noqa: ANN401
@@ -280,6 +284,24 @@ def _adapter(tags: frozenset[str]) -> TypeAdapter[list[Planner]]:
     return moves_adapter(tags)
 
 
+class FramePose(Pose):
+    """A pose that may be given in a frame of the job; it is read into T_world_frame."""
+
+    def read(self, value: Any, context: ReadingContext) -> np.ndarray:  # noqa: ANN401
+        """Return the pose in world, shape (4, 4)."""
+        if isinstance(value, np.ndarray):
+            return value
+        from trajcli.language.frames import pose_of_frame
+
+        return pose_of_frame(value, context)
+
+    def json_schema(self) -> JsonSchemaValue:
+        """Return the schema of a pose with `in`."""
+        name = {"type": "string", "description": "The frame in which it is given; left out: world."}
+        pose = super().json_schema()
+        return {**pose, "properties": {"in": name, **pose["properties"]}}
+
+
 class Job(Model):
     """One robot, named points, and the moves to plan."""
 
@@ -301,6 +323,12 @@ class Job(Model):
     limits: Annotated[JobLimitsSpec | None, Field(description="Replace the robot's, then scale.")] = None
     points: dict[Annotated[str, PointName("Name of a point.")], Annotated[NamedTarget, _OrMany()]] = Field(
         default_factory=dict, description="Named states, or grids and lists of them."
+    )
+    frames: dict[
+        Annotated[str, PointName("Name of a frame.")],
+        Annotated[np.ndarray, FramePose("A work object: a pose in world, or in another frame."), _OrMany()],
+    ] = Field(
+        default_factory=dict, description="Frames in which poses are given, or grids and lists of them."
     )
     sequences: dict[Annotated[str, Name("Name of a sequence.")], Annotated[list[Planner], _Moves()]] = Field(
         default_factory=dict,
@@ -340,6 +368,24 @@ class Job(Model):
         if first.joins == 1 and any(self.start.acceleration or ()):
             hint = "use quintic or jerk_limited for the first move, or leave it out"
             raise refuse([(("start",), f"{first.tag} cannot start with an acceleration", hint)])
+        return self
+
+    @model_validator(mode="after")
+    def _names_are_of_one_thing(self) -> Job:
+        both = [name for name in self.points if name in self.frames]
+        if both:
+            hint = "points and frames share names: choose another"
+            raise refuse([(("points", n, AT_KEY), f"'{n}' is a point and a frame", hint) for n in both])
+        return self
+
+    @model_validator(mode="after")
+    def _rows_are_in_a_frame(self) -> Job:
+        name, known = self.output.frame, (*self.frames, "world", "base")
+        if name is not None and name not in known:
+            from trajcli.suggest import did_you_mean, valid_names
+
+            hint = did_you_mean(name, known) or valid_names(known, "frames")
+            raise refuse([(("output", "in"), f"there is no frame '{name}'", hint)])
         return self
 
     @model_validator(mode="after")

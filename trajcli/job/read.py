@@ -27,7 +27,8 @@ from trajcli.job.yaml.document import Node
 from trajcli.job.yaml.load import Document, parse_document, read_document
 from trajcli.kinematics.robot import Robot, unlimited
 from trajcli.language.limits import JobLimitsSpec, LimitsSpec
-from trajcli.language.numbers import FieldPath, ReadingContext
+from trajcli.language.numbers import FieldPath, FlawError, ReadingContext
+from trajcli.language.poses import Pose
 from trajcli.language.targets import PoseFields, Target
 from trajcli.planners.planner import Event, Planner
 from trajcli.units import Units, amount_text
@@ -77,6 +78,14 @@ class LoadedJob:
         """Units of the rows that are written: those of the file, unless the job says others."""
         given = self.job.output.units
         return Units(given.angle or self.units.angle, given.length or self.units.length)
+
+    @property
+    def robot_of_rows(self) -> Robot:
+        """The robot as it stands in the frame in which the rows say where its tool is."""
+        name = self.job.output.frame
+        if name in (None, "world"):
+            return self.robot
+        return self.robot.seen_from(self.robot.base if name == "base" else self.job.frames[name])
 
     def say(self, amount: Amount) -> str:
         """Return a number of a message in the job's units."""
@@ -209,7 +218,9 @@ def _load(document: Document) -> LoadedJob:
     robot = None if sheet is None else sheet.robot
     given = {"robot": robot or _UNREAD} if "robot" in plain else {}
     context = ReadingContext(units, points=_points(plain.get("points")))
+    context.frames = _points(plain.get("frames"))
     if robot is not None:
+        context.base = _base(plain.get("base"), context, robot)
         context.joint_names, context.joint_types = robot.joint_names, robot.joint_types
         context.read_points = partial(_recorded, document, robot)
     try:
@@ -254,13 +265,15 @@ def _require_no_flaws(loaded: LoadedJob) -> None:
 def _expanded(document: Document, units: Units) -> Document:
     """Return the document with its repeats and calls written out; itself where it has none."""
     sections = document.root.value if isinstance(document.root.value, dict) else {}
-    moves, points = (sections[key].value if key in sections else None for key in ("moves", "points"))
+    moves, *named = (
+        sections[key].value if key in sections else None for key in ("moves", "points", "frames")
+    )
     entries = [entry.value for entry in moves] if isinstance(moves, list) else []
-    named = [point.value for point in points.values()] if isinstance(points, dict) else []
+    values = [node.value for some in named if isinstance(some, dict) for node in some.values()]
     if not (
         "sequences" in sections
         or any(isinstance(entry, dict) and not entry.keys().isdisjoint(_STRUCTURES) for entry in entries)
-        or any(map(_is_many, named))
+        or any(map(_is_many, values))
     ):
         return document
     from trajcli.job.program.expand import expanded
@@ -369,6 +382,14 @@ def _units(value: Any) -> Units:  # noqa: ANN401
         except ValidationError:
             continue
     return Units(**right)
+
+
+def _base(value: Any, context: ReadingContext, robot: Robot) -> np.ndarray:  # noqa: ANN401
+    """Return where the arm stands, as far as that is right; what is wrong is reported with the rest."""
+    try:
+        return robot.base if value is None else Pose("").read(value, context)
+    except FlawError:
+        return robot.base
 
 
 def _points(value: Any) -> Mapping[str, Any]:  # noqa: ANN401

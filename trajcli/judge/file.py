@@ -167,7 +167,7 @@ def _opened(source: ByteSource, options: CheckOptions, given: _Given, declared: 
     if given.plan is not None and options.columns is None and options.topic is None:
         from trajcli.judge.rows.tool_rows import joints_found_back
 
-        found = joints_found_back(source, given.robot, given.plan)
+        found = joints_found_back(source, given.plan.loaded.robot_of_rows, given.plan)
         if found is not None:
             return motion_of(found, joints=joints, joint_types=types)
     return open_motion(
@@ -231,7 +231,11 @@ def _of_tool_columns(
     paths = None if given.plan is None else {move.index: move.planned.tool for move in given.plan.moves}
     blocks = motion.blocks(JUDGED_ROWS)
     return judge_tool_columns(
-        blocks if by_time is None else map(by_time, blocks), table, given.robot, paths
+        blocks if by_time is None else map(by_time, blocks),
+        table,
+        given.robot,
+        paths,
+        given.loaded.robot_of_rows,
     ), read
 
 

@@ -99,6 +99,7 @@ def judge_tool_columns(
     table: ToolTable,
     robot: Robot,
     paths: Mapping[int, ToolMotion | None] | None,
+    seen: Robot,
 ) -> list[Finding]:
     """Return where columns about the tool are not what the joints beside them make of it.
 
@@ -107,8 +108,9 @@ def judge_tool_columns(
         table: The columns.
         robot: The arm.
         paths: Of the moves, where a job has a plan.
+        seen: The arm as it stands in the frame of the columns.
     """
-    judge = _Judge(table, robot, paths)
+    judge = _Judge(table, robot, paths, seen)
     for motion, values in zip(blocks, table.blocks(), strict=True):
         judge.see(motion, values)
     return judge.findings()
@@ -117,8 +119,10 @@ def judge_tool_columns(
 class _Judge:
     """A comparison in the making."""
 
-    def __init__(self, table: ToolTable, robot: Robot, paths: Mapping[int, ToolMotion | None] | None) -> None:
-        self._table, self._robot, self._paths = table, robot, paths
+    def __init__(
+        self, table: ToolTable, robot: Robot, paths: Mapping[int, ToolMotion | None] | None, seen: Robot
+    ) -> None:
+        self._table, self._in_world, self._paths, self._robot = table, robot, paths, seen
         self._arm = _REACH * max(characteristic_length(robot), 1.0)
         self._worst = Collector()
         self._rates: MotionJudge | None = None
@@ -143,6 +147,7 @@ class _Judge:
         elif twists:
             self._see_rates(motion, values, poses)
         if self._table.index("path") and self._paths is not None and motion.move is not None:
+            poses = poses if self._robot is self._in_world else forward(self._in_world, motion.q)
             self._compare_along_paths(motion, values[:, self._table.index("path")], poses, errors[0])
 
     def findings(self) -> list[Finding]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from math import inf
 from typing import TYPE_CHECKING, Literal
 
@@ -350,6 +350,12 @@ class Robot:
         joints = f"{len(self.joints)} joint{'s' * (len(self.joints) != 1)}"
         table = "bare joints" if self.convention is None else f"{self.convention} DH rows"
         return f"{type(self).__name__}({self.name!r}, {joints}, {table})"
+
+    def seen_from(self, frame: Array) -> Robot:
+        """Return the robot as it stands in a frame T_world_frame (4, 4), in which its tool is then said."""
+        base, axes = np.eye(4), frame[:3, :3].T
+        base[:3, :3], base[:3, 3] = axes @ self.base[:3, :3], axes @ (self.base[:3, 3] - frame[:3, 3])
+        return replace(self, base=base, gravity=axes @ self.gravity)
 
     @property
     def joint_names(self) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from pydantic import (
     BaseModel,
     ConfigDict,
@@ -69,6 +70,9 @@ class ReadingContext:
         joint_types: "revolute" or "prismatic" for each joint.
         points: The file's named points, as plain mappings.
         shifted: Relative points that were resolved, by name: their fields as in a file.
+        frames: The file's frames, as plain mappings.
+        placed: Frames that were resolved, by name: T_world_frame, (4, 4), m.
+        base: Where the arm stands, T_world_base, (4, 4), m.
         has_far_angle: Whether a pose has a plain angle of more than two turns, which is a slip of the unit.
         read_points: Reads a file of recorded joint values, its path relative to the job; raises FlawError.
     """
@@ -78,6 +82,9 @@ class ReadingContext:
     joint_types: tuple[str, ...] = ()
     points: Mapping[str, Any] = field(default_factory=dict)
     shifted: dict[str, dict[str, Any]] = field(default_factory=dict)
+    frames: Mapping[str, Any] = field(default_factory=dict)
+    placed: dict[str, np.ndarray] = field(default_factory=dict)
+    base: np.ndarray = field(default_factory=lambda: np.eye(4))
     has_far_angle: bool = False
     read_points: Callable[[str], Recorded] | None = None
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Annotated, Any
 
 import numpy as np
@@ -23,9 +24,10 @@ RELATIVE_FIELDS: dict[str, JsonSchemaValue] = {
     "from": {"type": "string", "description": "Name of a point that is given as a pose."},
     "offset": {**Pose("").json_schema(), "description": "How far from it; what it leaves out is zero."},
     "frame": {
-        "enum": ["tool", "world"],
+        "type": "string",
         "default": "tool",
-        "description": "Whose axes the offset is along and about: those of the tool there, or of world.",
+        "description": "Whose axes the offset is along and about: those of the tool there, of world, or of a "
+        "frame.",
     },
 }
 """Schema of what makes a state relative to a point."""
@@ -57,9 +59,9 @@ class Named:
         if not isinstance(value, Mapping | Target):
             hint = "write {joints: ...}, or the name of a point"
             raise refuse([((), f"expected a state, got {shown(value)}", hint)])
-        if isinstance(value, Mapping) and "from" in value:
+        if isinstance(value, Mapping) and ("from" in value or "in" in value):
             try:
-                value = _relative(value, context)
+                value = _relative(value, context) if "from" in value else _in_world(value, context)
             except FlawError as error:
                 raise refuse(error.flaws) from None
         return validate(value)
@@ -82,7 +84,7 @@ def _of_name(name: str, validate: core_schema.ValidatorFunctionWrapHandler, cont
         raise refuse(error.flaws) from None
     state = context.points[names[-1]]
     try:
-        if isinstance(state, Mapping) and "from" in state:
+        if isinstance(state, Mapping) and ("from" in state or "in" in state):
             state = _of_point(names[-1], context)
         return validate(state)
     except (FlawError, ValidationError):
@@ -141,13 +143,30 @@ def _of_point(name: str, context: ReadingContext) -> _Fields:
             raise FlawError(text, "from", hint="give one of them as a pose of its own")
         chain.append(following)
     last = chain.pop()
-    fields: _Fields = context.shifted[last] if last in context.shifted else dict(_mapping(last, context))
+    fields = context.shifted.get(last)
+    if fields is None:
+        fields = dict(_mapping(last, context))
+        if "in" in fields:
+            fields = context.shifted[last] = _elsewhere(partial(_in_world, fields, context))
     for link in reversed(chain):
-        try:
-            fields = context.shifted[link] = _moved(context.points[link], fields, context)
-        except FlawError:
-            raise _flaw_elsewhere() from None
+        moved = partial(_moved, context.points[link], fields, context)
+        fields = context.shifted[link] = _elsewhere(moved)
     return fields
+
+
+def _elsewhere(make: Callable[[], _Fields]) -> _Fields:
+    """Return the fields of another point, whose flaws are reported where that stands."""
+    try:
+        return make()
+    except FlawError:
+        raise _flaw_elsewhere() from None
+
+
+def _in_world(value: Mapping[str, Any], context: ReadingContext) -> _Fields:
+    """Return the fields of a state that is given in a frame, in world."""
+    from trajcli.language.frames import in_world
+
+    return in_world(value, context)
 
 
 def _mapping(name: str, context: ReadingContext) -> Mapping[str, Any]:
@@ -171,13 +190,14 @@ def _name_in(value: Mapping[str, Any], context: ReadingContext) -> str:
 
 def _moved(value: Mapping[str, Any], point: _Fields, context: ReadingContext) -> _Fields:
     """Return the fields of a relative state whose point has the fields `point`."""
-    offset, frame = _offset(value, context), value.get("frame", "tool")
-    if frame not in ("tool", "world"):
-        raise FlawError(f"expected tool or world, got {shown(frame)}", "frame")
+    offset, axes = _offset(value, context), _axes(value.get("frame", "tool"), context)
     for key in value:
-        if (key in PoseFields.model_fields and key not in BESIDE) or key == "joints":
+        if (key in PoseFields.model_fields and key not in BESIDE) or key in ("joints", "in"):
             text = f"from and {key} exclude each other"
-            raise FlawError(text, key, AT_KEY, hint=f"say how far from the point: offset: {{{key}: ...}}")
+            hint = f"say how far from the point: offset: {{{key}: ...}}"
+            if key == "in":
+                hint = "say along whose axes: `frame`"
+            raise FlawError(text, key, AT_KEY, hint=hint)
         if key not in (*RELATIVE_FIELDS, *BESIDE):
             from trajcli.suggest import did_you_mean, valid_names
 
@@ -186,7 +206,7 @@ def _moved(value: Mapping[str, Any], point: _Fields, context: ReadingContext) ->
                 f"unknown key '{key}'", key, AT_KEY, hint=did_you_mean(key, known) or valid_names(known)
             )
     pose = _pose_of(value["from"], point, context)
-    fields = _displaced(value["from"], pose, offset, frame)
+    fields = _displaced(value["from"], pose, offset, axes)
     return {**fields, **{key: value[key] for key in value if key in BESIDE}}
 
 
@@ -195,6 +215,19 @@ def _offset(value: Mapping[str, Any], context: ReadingContext) -> Array:
         return Pose("").read(value.get("offset", {}), context)
     except FlawError as error:
         error.flaws = [(("offset", *path), text, hint) for path, text, hint in error.flaws]
+        raise
+
+
+def _axes(frame: Any, context: ReadingContext) -> Array | None:  # noqa: ANN401
+    """Return the axes (3, 3) that an offset is along and about; None for those of the tool."""
+    if frame in ("tool", "world"):
+        return None if frame == "tool" else np.eye(3)
+    from trajcli.language.frames import frame_named
+
+    try:
+        return frame_named(frame, context)[:3, :3]
+    except FlawError as error:
+        error.flaws = [(("frame", *path), text, hint) for path, text, hint in error.flaws]
         raise
 
 
@@ -211,22 +244,27 @@ def _pose_of(name: str, point: _Fields, context: ReadingContext) -> PoseFields:
         raise _flaw_elsewhere() from None
 
 
-def _displaced(name: str, pose: PoseFields, offset: Array, frame: str) -> _Fields:
-    """Return the fields of a pose after an offset: T @ offset, or in world p + d and R_offset R."""
+def _displaced(name: str, pose: PoseFields, offset: Array, axes: Array | None) -> _Fields:
+    """Return the fields of a pose after an offset along and about axes (3, 3): those of the tool for None.
+
+    That is T @ offset, or p + A d and A R_offset A^T R.
+    """
     whole, turns = pose.rotation_form is not None, not np.array_equal(offset[:3, :3], np.eye(3))
     if not pose.gives_position:
         raise FlawError(f"the point '{name}' has no position to be relative to", "from")
-    if not whole and (turns or frame == "tool"):
-        what = "the offset cannot turn it" if frame == "world" else "the frame of the tool is not known there"
+    if not whole and (turns or axes is None):
+        what = "the frame of the tool is not known there" if axes is None else "the offset cannot turn it"
         hint = f"give '{name}' an orientation" + ("" if turns else ", or say `frame: world`")
         raise FlawError(f"the point '{name}' has no whole orientation: {what}", "from", hint=hint)
-    at, turn = pose.full_pose(), offset[:3, :3]
-    position = at[:3, 3] + (at[:3, :3] @ offset[:3, 3] if frame == "tool" else offset[:3, 3])
+    at = pose.full_pose()
+    along = at[:3, :3] if axes is None else axes
+    position = at[:3, 3] + along @ offset[:3, 3]
     fields = pose.model_dump(context=ReadingContext(), exclude_none=True, exclude={"xyz"})
     if turns or pose.rotation_form == "matrix":
         kept = fields.keys() - {pose.rotation_form, *AIMS}
         rotation = np.array([row[:3] for row in pose.matrix[:3]]) if pose.matrix else at[:3, :3]
         if turns:
-            rotation = at[:3, :3] @ turn if frame == "tool" else turn @ at[:3, :3]
+            turn = offset[:3, :3] if axes is None else axes @ offset[:3, :3] @ axes.T
+            rotation = at[:3, :3] @ turn if axes is None else turn @ at[:3, :3]
         fields = {**{key: fields[key] for key in kept}, "matrix": rotation.tolist()}
     return {"xyz": [written_number(float(x), Quantity("length")) for x in position], **fields}

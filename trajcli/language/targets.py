@@ -275,9 +275,15 @@ class Target(PoseFields, defer_build=False):  # made once, not for each planner 
     joints: JointPositions | None = None
     velocity: JointVelocities | None = None
     acceleration: JointAccelerations | None = None
+    frame: Annotated[
+        str | None,
+        Field(alias="in", exclude=True, description="The frame in which the pose is given; left out: world."),
+    ] = None
 
     @model_validator(mode="after")
     def _says_something(self) -> Target:
+        if self.frame is not None:
+            raise refuse([(("in",), "only a job has frames", "give the pose in world")])
         if self.joints is not None and self.gives_pose:
             key = self.pose_keys[0]
             raise refuse([((key,), f"joints and {key} exclude each other", "leave one of them out")])

@@ -80,7 +80,7 @@ def write_rows(
         groups = asked if form.content == "rows" else _groups_of_log(log, asked)
         units = Units() if form.si else loaded.output_units
         columns = columns_of(groups, loaded.robot.joint_types, units)
-        rows = _counted(sample(plan.trajectory, grid, groups, units, robot=loaded.robot), grid.count)
+        rows = _counted(sample(plan.trajectory, grid, groups, units, robot=loaded.robot_of_rows), grid.count)
     if path is not None and path != "-":
         write_verified(path, rows, columns, options, form)
         return

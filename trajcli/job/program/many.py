@@ -126,7 +126,8 @@ class ManyNames:
             return [str(node.value) for node in self._lists[name]]
         if name in self._grids:
             grid = self._grids[name]
-            return [str(node.value) for node in (grid.origin, grid.frame) if node is not None]
+            frame = self._frame_of(grid.origin) if grid.frame is None else str(grid.frame.value)
+            return [str(grid.origin.value), frame]
         return list(naming_texts(self._at[name][1]))
 
     def needs(self, name: str) -> tuple[str, ...]:
@@ -171,13 +172,25 @@ class ManyNames:
         grid = self._grids[name]
         offset = [written_number(x, _LENGTH) for x in grid.offset(rounds[name])]
         xyz = node._replace(value=[node._replace(value=x) for x in offset], keys=None)
-        frame = node._replace(value="world") if grid.frame is None else grid.frame
+        frame = node._replace(value=self._frame_of(grid.origin)) if grid.frame is None else grid.frame
         fields = {
             "from": grid.origin._replace(value=self.meant(str(grid.origin.value), rounds)),
             "offset": node._replace(value={"xyz": xyz}, keys=None),
             "frame": frame._replace(value=self.meant(str(frame.value), rounds)),
         }
         return node._replace(value=fields, keys=None)
+
+    def _frame_of(self, origin: Node) -> str:
+        """Return the name of the frame in which a point or a frame is given, by itself or by others."""
+        name, seen = str(origin.value), set[str]()
+        while name in self._at and name not in seen:
+            seen.add(name)
+            node = self._at[name][1]
+            named, start = node.child("in"), node.value if isinstance(node.value, str) else node.child("from")
+            if named is not None:
+                return str(named.value)
+            name = start if isinstance(start, str) else "" if start is None else str(start.value)
+        return "world"
 
     def renamed(self, node: Node, rounds: Rounds) -> Node:
         """Return a point or a move with the names that it means in a round; itself where it needs none."""

@@ -252,7 +252,7 @@ def _first_difference(rows: _Rows, plan: Plan, grid: Grid, halves: Array, stamps
         halves: Half a unit of each column, SI, shape (m,).
         stamps: Of the file.
     """
-    robot, done = plan.loaded.robot, 0
+    robot, done = plan.loaded.robot_of_rows, 0
     wanted = sample(plan.trajectory, grid, rows.groups, robot=robot, size=_ROWS)
     for block, planned, (_, local) in zip(rows.blocks(), wanted, grid.blocks(_ROWS), strict=True):
         expected = planned[:, rows.index]
@@ -361,7 +361,7 @@ class _Known:
         grids = (
             single if (np.diff(times) <= 2 * _NANOSECOND).any() else [ListedGrid(trajectory.duration, times)]
         )
-        robot = self.plan.loaded.robot
+        robot = self.plan.loaded.robot_of_rows
         parts = [part for grid in grids for part in sample(trajectory, grid, self.rows.groups, robot=robot)]
         return np.concatenate(parts)[:, self.rows.index]
 

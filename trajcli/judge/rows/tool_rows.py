@@ -89,7 +89,7 @@ def joints_found_back(source: ByteSource, robot: Robot, plan: Plan) -> ArrayRows
 
     Args:
         source: The file.
-        robot: Whose tool it is, in world.
+        robot: Whose tool it is, as it stands in the frame of the rows.
         plan: Of the job: the joints from which the first row is reached, and the paths of its moves.
 
     Raises:
