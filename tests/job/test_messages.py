@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-import yaml
+from yaml_files import read_yaml
 
 from trajcli.errors import InputError, Problem
 from trajcli.job.read import job_from_text
@@ -45,7 +45,7 @@ def changed(old: str, new: str) -> str:
     return JOB.replace(old, new)
 
 
-CASES = yaml.safe_load((Path(__file__).parent / "wrong_jobs.yaml").read_text(encoding="utf-8"))
+CASES = read_yaml(Path(__file__).parent / "wrong_jobs.yaml")
 SEVERAL = [
     ("moves:\n  - ", "moves: []\nmove:\n  "),  # the old list is now an unknown key
     ("{joints: [0, 0, 0, 0]}", "home"),  # a circle is said of each name in it

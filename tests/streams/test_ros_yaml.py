@@ -32,10 +32,14 @@ def text_of(trajectory, knots, message="ros"):
     return out.getvalue()
 
 
+def content_of(text):
+    return yaml.load(text, Loader=yaml.CSafeLoader)
+
+
 @pytest.mark.parametrize("name", QUINTICS + OTHERS)
 def test_the_controller_accepts_the_goal_and_runs_it_as_planned(name):
     trajectory, knots = planned(name)
-    message = yaml.safe_load(text_of(trajectory, knots))
+    message = content_of(text_of(trajectory, knots))
     controller.check(message, list(trajectory.joint_names))
     times = np.linspace(0, trajectory.duration, 400)
     position, velocity, acceleration = controller.run(message, times)
@@ -51,8 +55,8 @@ def test_the_controller_accepts_the_goal_and_runs_it_as_planned(name):
 
 def test_the_goal_of_the_action_wraps_the_same_trajectory():
     trajectory, knots = planned("ur5e_pick")
-    goal = yaml.safe_load(text_of(trajectory, knots, "ros-goal"))
-    assert goal == {"trajectory": yaml.safe_load(text_of(trajectory, knots))}
+    goal = content_of(text_of(trajectory, knots, "ros-goal"))
+    assert goal == {"trajectory": content_of(text_of(trajectory, knots))}
 
 
 def test_the_head_says_how_to_send_it():

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 from topp_paths import SpeedCap, assert_motion, polyline, spline, symmetric
+from yaml_files import read_yaml
 
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.time_optimal.parameterization import time_optimal
 
-CASES = yaml.safe_load((Path(__file__).parents[2] / "oracles" / "time_optimal.yaml").read_text())["cases"]
+CASES = read_yaml(Path(__file__).parents[2] / "oracles" / "time_optimal.yaml")["cases"]
 DURATIONS = [case for case in CASES if case["kind"] == "path_time_optimal"]
 
 

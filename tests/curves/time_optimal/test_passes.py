@@ -7,17 +7,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 from hermite_curves import hermite_pieces
 from scipy.optimize import linprog
 from topp_paths import random_bounds, spline, symmetric
+from yaml_files import read_yaml
 
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.time_optimal.collocation import interval_rows
 from trajcli.curves.time_optimal.constraints import ConstraintRows, JointConstraint
 from trajcli.curves.time_optimal.passes import UnreachableSpeedError, controllable, solve
 
-CASES = yaml.safe_load((Path(__file__).parents[2] / "oracles" / "time_optimal.yaml").read_text())["cases"]
+CASES = read_yaml(Path(__file__).parents[2] / "oracles" / "time_optimal.yaml")["cases"]
 NOWHERE = np.empty(0)
 
 

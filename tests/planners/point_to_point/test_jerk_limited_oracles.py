@@ -6,16 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
+from yaml_files import read_yaml
 
 from trajcli.kinematics.robot import Joint, Limits, Robot
 from trajcli.language.numbers import ReadingContext
 from trajcli.planners.point_to_point.jerk_limited import JerkLimited
 from trajcli.trajectory import State
 
-CASES = yaml.safe_load((Path(__file__).parents[2] / "oracles" / "jerk_limited.yaml").read_text("utf-8"))[
-    "cases"
-]
+CASES = read_yaml(Path(__file__).parents[2] / "oracles" / "jerk_limited.yaml")["cases"]
 
 
 def of_kind(kind):

@@ -256,7 +256,7 @@ def test_dense_points_of_two_joints_in_every_rule(rule):
     """Four times as many points on the same curve do not slow it down."""
     limits = {"velocity": 1.0, "acceleration": 5.0}
     durations = []
-    for count in (120, 480):
+    for count in (80, 320):
         u = np.linspace(0, 6, count + 1)
         q = np.stack([np.sin(u), np.sin(1.3 * u)], axis=1)
         points = [{"joints": row} for row in q[1:].tolist()]
