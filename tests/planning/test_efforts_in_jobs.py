@@ -6,8 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from trajcli.api.plans import plan
+from trajcli.curves.time_optimal.time_law import LawPieces
 from trajcli.dynamics.newton_euler import InverseDynamics
 from trajcli.errors import PlanningError
 
@@ -185,3 +187,36 @@ def test_what_is_carried_and_not_judged_is_said(limits, unjudged) -> None:
     assert ("effort" in said, "effort with 200 kg carried" in made.unchecked) == (unjudged, unjudged)
     empty = plan(job(move, limits={"velocity": 20, "acceleration": 40}))
     assert "effort" not in empty.unchecked
+
+
+def test_limits_that_are_lowered_in_vain_leave_the_law(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where lower limits change no speed, nothing is judged anew: the selection of what changed is empty."""
+    changed: list[bool] = []
+    differ = LawPieces.differ
+
+    def noted(self: LawPieces, other: LawPieces) -> NDArray[np.bool_]:
+        found = differ(self, other)
+        changed.append(bool(found.any()))
+        return found
+
+    monkeypatch.setattr(LawPieces, "differ", noted)
+    inertia, coulomb, effort = 0.02 + 2 * 0.3**2, 1.5, 5.0
+    link = {"mass": 2, "com": [0, 0, 0], "inertia": [0.02, 0.02, 0.02, 0, 0, 0]}
+    turn = {"a": 0.3, "velocity": 3, "acceleration": 30, "effort": effort, "friction": {"coulomb": coulomb}}
+    through = [{"joints": [q]} for q in (1.0, 0.5)]
+    made = plan(
+        {
+            "version": 1,
+            "robot": {"convention": "standard", "joints": [{"name": "turn", "link": link, **turn}]},
+            "limits": {"effort": "robot"},
+            "start": {"joints": [0]},
+            "moves": [{"planner": "time_optimal", "through": through, "to": {"joints": [-1]}}],
+        }
+    )
+    assert made.verdict.passed
+    assert False in changed
+    curve = made.trajectory.curve
+    t = np.linspace(curve.start, curve.end, 100_001)[1:-1]
+    speed, change = curve.evaluate(t, 1)[:, 0], curve.evaluate(t, 2)[:, 0]
+    share = np.abs(inertia * change + coulomb * np.sign(speed)).max() / effort  # the axis is vertical
+    assert 0.99 < share <= 1 + 1e-6
