@@ -168,7 +168,10 @@ WRONG_OPTIONS = [
     (("--no-output", "-o", "a.csv"), "--no-output and --output exclude each other"),
     (("--no-output", "--format", "mcap"), "--no-output and --format exclude each other"),
     (("--no-output", "--topics", "/x"), "--no-output and --topics exclude each other"),
-    (("-o", "a.txt"), "rows are written as CSV or MCAP or JSON lines or a ROS message, not as .txt"),
+    (
+        ("-o", "a.txt"),
+        "rows are written as CSV or MCAP or JSON lines or NPY or NPZ or a ROS message, not as .txt",
+    ),
     (("-o", "a.csv", "--format", "mcap"), "--format mcap contradicts the name of the file, a.csv"),
     (("-o", "a.csv", "--epoch", "1"), "--epoch is about MCAP, and the rows are written as CSV"),
     (("--compression", "lz4"), "--compression is about MCAP, and the rows are written as CSV"),

@@ -32,7 +32,7 @@ def test_a_pipe_needs_no_name(tmp_path):
 def test_a_name_without_an_ending_is_refused(tmp_path):
     with pytest.raises(
         InputError,
-        match=r"^rows are written as CSV or MCAP or JSON lines or a ROS message, not to a file without an ending, 'out'$",
+        match=r"^rows are written as CSV or MCAP or JSON lines or NPY or NPZ or a ROS message, not to a file without an ending, 'out'$",
     ):
         format_of(tmp_path / "a.csv" / "out")
 
@@ -44,9 +44,9 @@ def test_a_name_of_another_format_is_refused(ending, tmp_path):
     (problem,) = caught.value.problems
     assert (
         problem.message
-        == f"rows are written as CSV or MCAP or JSON lines or a ROS message, not as {ending.lower()}"
+        == f"rows are written as CSV or MCAP or JSON lines or NPY or NPZ or a ROS message, not as {ending.lower()}"
     )
-    assert problem.hint == "name the file .csv or .mcap or .jsonl or .yaml"
+    assert problem.hint == "name the file .csv or .mcap or .jsonl or .npy or .npz or .yaml"
     assert list(tmp_path.iterdir()) == []
 
 

@@ -57,9 +57,13 @@ def test_fields_have_names_and_widths(tmp_path):
     ("array", "message", "hint"),
     [
         (np.zeros(5), r"shape \(5,\)", r"(N, 1 + n)"),
-        (np.zeros((2, 5, 7)), "shape", "array[0]"),
+        (np.zeros((2, 2, 5, 7)), "shape", "(K, N, ...)"),
         (np.zeros((0, 7)), "shape", "(N, 1 + n)"),
-        (np.zeros((5, 6)), "6 columns for 6 joints; it seems to lack the time", "(N, 1 + n)"),
+        (
+            np.zeros((5, 6)),
+            "6 columns for 6 joints; it seems to lack the time, which --rate says",
+            "(N, 1 + n)",
+        ),
         (np.zeros((5, 9)), "9 columns for 6 joints", "(N, 1 + n)"),
         (np.zeros((5, 25)), "25 columns for 6 joints", "(N, 1 + n)"),
         (np.zeros((5, 7), dtype=complex), "complex", "(N, 1 + n)"),

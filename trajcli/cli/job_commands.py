@@ -38,11 +38,11 @@ class PlanCommand(CommandLine):
             "--output",
             "-o",
             metavar="FILE",
-            help="FILE.csv, .mcap, .jsonl or .yaml (a ROS message).",
+            help="FILE.csv, .mcap, .jsonl, .npy, .npz or .yaml (a ROS message).",
         ),
     ] = None
     form: Annotated[
-        Literal["csv", "mcap", "jsonl", "ros", "ros-goal"] | None,
+        Literal["csv", "mcap", "jsonl", "npy", "npz", "ros", "ros-goal"] | None,
         typer.Option("--format", help="Of stdout, and which message a .yaml holds.", show_default="csv"),
     ] = None
     report: Annotated[
@@ -156,7 +156,8 @@ class CheckCommand(Command):
     files: Annotated[
         list[str],
         typer.Argument(
-            metavar="FILE|DIR...", help="CSV, JSON lines, ROS, MCAP or .npy, and folders of such; - is stdin."
+            metavar="FILE|DIR...",
+            help="CSV, JSON lines, ROS, MCAP, .npy or .npz, and folders of such; - is stdin.",
         ),
     ]
     job: Annotated[
@@ -188,6 +189,9 @@ class CheckCommand(Command):
             metavar="MAP",
             help="What columns are, such as t=timestamp,q=target_q: prefixes or names.",
         ),
+    ] = None
+    rate: Annotated[
+        str | None, typer.Option("--rate", metavar="HZ", help="Rows per second of a file without time.")
     ] = None
     units: Annotated[
         str | None, typer.Option("--units", metavar="UNITS", help="Of columns that name none, as deg,mm.")

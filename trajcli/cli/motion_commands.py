@@ -13,7 +13,7 @@ from trajcli.cli.command import Command, CommandLine
 from trajcli.cli.options import Consumer, JobErrors, RowTimes, robot_names
 
 MotionSource = Annotated[
-    str, typer.Argument(metavar="FILE", help="CSV, MCAP, ROS messages, JSON lines, .npy; - is stdin.")
+    str, typer.Argument(metavar="FILE", help="CSV, MCAP, ROS messages, JSON lines, .npy, .npz; - is stdin.")
 ]
 MotionOutput = Annotated[
     str | None,
@@ -22,7 +22,7 @@ MotionOutput = Annotated[
     ),
 ]
 MotionForm = Annotated[
-    Literal["csv", "mcap", "jsonl", "ros", "ros-goal"] | None,
+    Literal["csv", "mcap", "jsonl", "npy", "npz", "ros", "ros-goal"] | None,
     typer.Option("--format", help="Of stdout, and which message a .yaml holds.", show_default="csv"),
 ]
 ColumnMap = Annotated[
@@ -71,7 +71,8 @@ class BatchCommand(CommandLine):
         str | None, typer.Option("-j", metavar="N", help="Processes at a time; else one a core.")
     ] = None
     form: Annotated[
-        Literal["csv", "mcap", "jsonl", "ros", "ros-goal"], typer.Option("--format", help="Of the rows.")
+        Literal["csv", "mcap", "jsonl", "npy", "npz", "ros", "ros-goal"],
+        typer.Option("--format", help="Of the rows."),
     ] = "csv"
     rows: RowTimes = None
     consumer: Consumer = None

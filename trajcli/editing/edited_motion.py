@@ -48,7 +48,7 @@ class EditedMotion:
     Attributes:
         rows: Its motion.
         columns: In the order of the file.
-        format: "csv", "jsonl", "ros", "mcap" or "npy".
+        format: "csv", "jsonl", "ros", "mcap", "npy" or "fields", as of `RowSource`.
         notes: What was taken for what, and what was left out.
     """
 

@@ -19,7 +19,7 @@ from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import open_rows_of, refuse_job
 from trajcli.streams.recorded.column_roles import note_of_unread
 from trajcli.streams.recorded_motion import MotionFile, RecordedMotion, motion_of, open_motion
-from trajcli.units import Units, joint_quantity
+from trajcli.units import Quantity, Units, joint_quantity
 
 if TYPE_CHECKING:
     from trajcli.job.read import LoadedJob
@@ -31,10 +31,11 @@ if TYPE_CHECKING:
 
 Delivered = Callable[["LoadedJob", str | None], "Plan"]
 """Returns the plan of a job for a consumer."""
+_LARGEST_RATE = 1e9  # rows per second
 _START_TOLERANCE = 1e-3  # rad or m: what a controller takes for the state that it is in
 _STEP = 1e-6  # rad/s^2 or m/s^2: an acceleration that changes by more in the end steps there
 _SAME_DURATION = 1e-6  # s: a file that lasts as long as the plan, within that, is taken for its motion
-_NAMED = ("csv", "jsonl")  # formats with columns that are not about joints
+_NAMED = ("csv", "jsonl", "fields")  # formats with columns that are not about joints
 _ENTIRE = ("jtc-upsampling",)  # interpolations that need all rows at once
 
 
@@ -46,6 +47,7 @@ class CheckOptions:
     robot: str | None = None
     limits: str | None = None
     columns: str | None = None
+    rate: str | None = None
     units: str | None = None
     topic: str | None = None
     field: str | None = None
@@ -109,7 +111,7 @@ def check_file(
     """
     from trajcli.queries.arm import stated_units
 
-    opened = source if isinstance(source, ByteSource) else ByteSource(source)
+    opened = source if isinstance(source, ByteSource) else ByteSource(source, _rate_of(options.rate))
     if plan is None and options.job is None and options.robot is None:
         refuse_job(opened)
     given = _given(options) if plan is None else _of_plan(plan)
@@ -144,6 +146,20 @@ def check_file(
     judged = replace(judgement, notes=notes, events=given.events, source=motion.source)
     judged = _beside_plan(judged, compared, options)
     return CheckedFile(judged, robot, shown, given.loaded, given.plan, motion)
+
+
+def _rate_of(word: str | None) -> float | None:
+    """Return the rows per second of a file without time, where somebody says them."""
+    if word is None:
+        return None
+    from trajcli.job.inline import inline_number
+
+    rate = inline_number(word, "--rate", Quantity("ratio"), Units())
+    if not 0 < rate <= _LARGEST_RATE:
+        raise InputError(
+            f"--rate: expected rows per second, above 0 and at most {_LARGEST_RATE:g}, got {word}"
+        )
+    return rate
 
 
 def _as_delivered(source: ByteSource, given: _Given, options: CheckOptions, delivered: Delivered) -> _Given:

@@ -23,16 +23,21 @@ class ByteSource:
 
     Attributes:
         file: Its name, for messages.
+        rate: Rows per second, where the file has no time and somebody says them; else None.
     """
 
-    def __init__(self, source: str | Path) -> None:
+    def __init__(self, source: str | Path, rate: float | None = None) -> None:
         """Open a path; "-" is standard input. What is no plain file is read to its end.
+
+        Args:
+            source: The path.
+            rate: As the attribute.
 
         Raises:
             FileError: When it cannot be read.
         """
         self.file = "stdin" if str(source) == "-" else str(source)
-        self._path = Path(source)
+        self.rate, self._path = rate, Path(source)
         self._spool: IO[bytes] | None = None
         if str(source) == "-" or is_special(str(source)):
             self._spool = SpooledTemporaryFile(max_size=_IN_MEMORY)  # noqa: SIM115

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-FormatName = Literal["csv", "mcap", "jsonl", "ros", "ros-goal"]
+FormatName = Literal["csv", "mcap", "jsonl", "npy", "npz", "ros", "ros-goal"]
 
 
 @frozen
@@ -125,6 +125,34 @@ def _verify_jsonl(
     verify_jsonl(written, rows, columns)
 
 
+def _write_arrays(
+    rows: Iterable[Array], columns: Sequence[Column], out: BinaryIO, options: WriteOptions, *, archive: bool
+) -> Iterator[Array]:
+    del options
+    from trajcli.streams.arrays import write_npy_blocks, write_npz_blocks
+
+    return (write_npz_blocks if archive else write_npy_blocks)(rows, columns, out)
+
+
+def _verify_arrays(
+    written: BinaryIO,
+    rows: Iterable[Array],
+    columns: Sequence[Column],
+    options: WriteOptions,
+    *,
+    archive: bool,
+) -> None:
+    del options
+    from trajcli.streams.arrays import verify_npy, verify_npz
+
+    (verify_npz if archive else verify_npy)(written, rows, columns)
+
+
+def _arrays(name: str, *, archive: bool) -> StreamFormat:
+    write, verify = partial(_write_arrays, archive=archive), partial(_verify_arrays, archive=archive)
+    return StreamFormat(name, write, verify, text=False)
+
+
 def _write_mcap(
     rows: Iterable[Array], columns: Sequence[Column], out: BinaryIO, options: WriteOptions
 ) -> Iterator[Array]:
@@ -189,6 +217,8 @@ FORMATS: Mapping[FormatName, StreamFormat] = {
     "csv": StreamFormat("CSV", _write_csv, _verify_csv, si=False, decimals=True, in_order=True),
     "mcap": StreamFormat("MCAP", _write_mcap, _verify_mcap, "log", text=False),
     "jsonl": StreamFormat("JSON lines", _write_jsonl, _verify_jsonl, in_order=True),
+    "npy": _arrays("NPY", archive=False),
+    "npz": _arrays("NPZ", archive=True),
     "ros": _ros("a ROS message", "ros"),
     "ros-goal": _ros("a ROS goal", "ros-goal"),
 }
@@ -196,6 +226,8 @@ ENDINGS: Mapping[str, tuple[FormatName, ...]] = {
     ".csv": ("csv",),
     ".mcap": ("mcap",),
     ".jsonl": ("jsonl",),
+    ".npy": ("npy",),
+    ".npz": ("npz",),
     ".yaml": ("ros", "ros-goal"),
 }
 """The formats that the ending of a file's name may stand for; the first unless another is asked for."""

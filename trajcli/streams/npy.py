@@ -1,4 +1,4 @@
-"""Arrays of numpy files: structured ones by their names, plain ones by the order t, q, qd, qdd."""
+"""Arrays of numpy files: those with names by these, plain ones by the order t, q, qd, qdd."""
 
 from __future__ import annotations
 
@@ -8,34 +8,37 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trajcli.columns import kinds_of
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.recorded.column_roles import NamedFile
-from trajcli.streams.row_sources import EXACT, unplaced
+from trajcli.streams.row_sources import EXACT, ArrayRows, unplaced
 
 _ROWS = 1 << 14  # rows at a time
 _LARGEST_ROW = 1 << 14  # bytes
 _LAYOUT = (
     "a structured array has fields such as t, q1, q2 or t, q; a plain one has the shape (N, 1 + n), of time "
-    "and positions, or (N, 1 + 2 n) and (N, 1 + 3 n) with velocities and accelerations behind them"
+    "and positions, or (N, 1 + 2 n) and (N, 1 + 3 n) with velocities and accelerations behind them; without "
+    "time, --rate says how many rows a second has; chunks stand one behind the other in (K, N, ...)"
 )
+_LARGEST_ARCHIVE = 1 << 31  # bytes of its arrays, which are held in memory
 _ORDERS = ("q", "qd", "qdd")
 
 
 class ArrayFile:
     """Rows of an array in a file, which are read when they are asked for."""
 
-    format = "npy"
     joint_names: tuple[str, ...] | None = None
     si = False
 
-    def __init__(self, source: ByteSource, joints: int | None = None) -> None:
+    def __init__(self, source: ByteSource, joints: int | None = None, *, timed: bool = True) -> None:
         """Read the shape of the array.
 
         Args:
             source: The file.
             joints: Number of joints that are expected; None where nobody knows.
+            timed: Whether the first column of a plain array is the time.
 
         Raises:
             FileError: When the file cannot be read.
@@ -45,28 +48,34 @@ class ArrayFile:
         with source.open() as stream:
             self._dtype, self._shape, fortran = _head(stream, source.file)
         self._plain = self._dtype.names is None
-        widest = self._dtype.itemsize * (self._shape[1] if self._plain and len(self._shape) == 2 else 1)
+        self.format = "npy" if self._plain else "fields"
+        widest = self._dtype.itemsize * (self._shape[-1] if self._plain and len(self._shape) > 1 else 1)
         if widest > _LARGEST_ROW:
             raise InputError(f"{source.file}: a row of {widest} bytes is none of a motion", hint=_LAYOUT)
         if fortran and len(self._shape) > 1:
             hint = "save it with numpy.ascontiguousarray"
             raise InputError(f"{source.file}: the array is stored column by column", hint=hint)
-        names, self.relative, notes = self._plain_names(joints) if self._plain else self._field_names()
+        if self._plain:
+            names, notes = plain_names(source.file, self._shape, joints, timed=timed)
+            self.relative = np.full(len(names), _share(self._dtype))
+        else:
+            names, self.relative, notes = self._field_names()
         self.notes: tuple[str, ...] = tuple(notes)
+        self._rows = int(np.prod(self._shape[:-1] if self._plain else self._shape, dtype=np.int64))
         self.named = NamedFile(source.file, tuple(names), unplaced)
 
     def blocks(self, taken: Sequence[int], fixed: Sequence[int]) -> Iterator[Array]:
         """Yield the rows of some columns."""
         del fixed  # numbers only
-        done, size = 0, self._dtype.itemsize * (self._shape[1] if self._plain else 1)
+        done, size = 0, self._dtype.itemsize * (self._shape[-1] if self._plain else 1)
         with self._source.open() as stream:
             _head(stream, self._source.file)
-            while done < self._shape[0]:
-                count = min(_ROWS, self._shape[0] - done)
+            while done < self._rows:
+                count = min(_ROWS, self._rows - done)
                 data = stream.read(count * size)
                 if len(data) < count * size:
                     found = done + len(data) // size
-                    message = f"{self._source.file} is cut: it has {found} of {self._shape[0]} rows"
+                    message = f"{self._source.file} is cut: it has {found} of {self._rows} rows"
                     raise InputError(message)
                 rows = self._numbers(np.frombuffer(data, self._dtype))[:, list(taken)]
                 self._refuse_not_finite(rows, taken, done)
@@ -79,7 +88,7 @@ class ArrayFile:
 
     def _numbers(self, data: NDArray[Any]) -> Array:
         if self._plain:
-            return data.reshape(-1, self._shape[1]).astype(np.float64)
+            return data.reshape(-1, self._shape[-1]).astype(np.float64)
         parts = [data[name].reshape(len(data), -1).astype(np.float64) for name in self._dtype.names or ()]
         return np.concatenate(parts, axis=1)
 
@@ -91,36 +100,145 @@ class ArrayFile:
             message = f"{self._source.file}: {name} is {rows[row, column]} in row {before + row + 1}"
             raise InputError(message, hint="expected finite numbers")
 
-    def _plain_names(self, joints: int | None) -> tuple[list[str], Array, list[str]]:
-        """Return the names of the columns of a plain array, by their number."""
-        file, shape = self._source.file, self._shape
-        if len(shape) != 2 or shape[1] < 2 or shape[0] < 1:
-            hint = (
-                f"of several chunks take one: numpy.save(file, array[0]); {_LAYOUT}"
-                if len(shape) > 2
-                else _LAYOUT
-            )
-            raise InputError(f"{file}: an array of shape {shape} is no table of rows", hint=hint)
-        rest = shape[1] - 1
-        count = rest if joints is None else joints
-        if rest % count or rest // count > len(_ORDERS):
-            time = "; it seems to lack the time" if shape[1] == count else ""
-            raise InputError(f"{file}: {shape[1]} columns for {count} joints{time}", hint=_LAYOUT)
-        names = [f"{kind}{joint + 1}" for kind in _ORDERS[: rest // count] for joint in range(count)]
-        notes = [f"columns are read as t, {names[0]} .. {names[-1]}"]
-        return ["t", *names], np.full(shape[1], _share(self._dtype)), notes
-
     def _field_names(self) -> tuple[list[str], Array, list[str]]:
         """Return the names of the columns of a structured array; a field of several numbers has one each."""
         names, shares = list[str](), list[float]()
         for field in self._dtype.names or ():
             of_field = self._dtype[field]
-            width = int(np.prod(of_field.shape, dtype=np.int64))
-            names += [field] if not of_field.shape else [f"{field}{joint + 1}" for joint in range(width)]
-            shares += [_share(of_field.base)] * width
-        if len(self._shape) != 1 or self._shape[0] < 1:
+            names += _names_of(field, of_field.shape)
+            shares += [_share(of_field.base)] * (len(names) - len(shares))
+        if not 1 <= len(self._shape) <= 2 or min(self._shape) < 1:
             raise InputError(f"{self._source.file}: a structured array of shape {self._shape}", hint=_LAYOUT)
-        return names, np.array(shares), []
+        return names, np.array(shares), _note_on_chunks(self._shape)
+
+
+def _names_of(field: str, shape: Sequence[int]) -> list[str]:
+    """Return the names of the columns of a field, whose rows have a shape."""
+    width = int(np.prod(shape, dtype=np.int64))
+    if not shape:
+        return [field]
+    kinds = kinds_of(field)
+    return list(kinds) if len(kinds) == width else [f"{field}{joint + 1}" for joint in range(width)]
+
+
+def _note_on_chunks(shape: Sequence[int]) -> list[str]:
+    """Return that chunks (K, N) are read one after the other, where there are any."""
+    chunks = f"{shape[0]} chunks of {shape[1]} rows are read one after the other" if len(shape) > 1 else ""
+    return [chunks] if chunks else []
+
+
+def plain_names(
+    file: str, shape: Sequence[int], joints: int | None, *, timed: bool
+) -> tuple[list[str], list[str]]:
+    """Return the names of the columns of a plain array, by their number, and notes.
+
+    Args:
+        file: Its name, for messages.
+        shape: Of the array: (N, m), or (K, N, m) of chunks.
+        joints: Number of joints that are expected; None where nobody knows.
+        timed: Whether the first column is the time.
+
+    Raises:
+        InputError: When it is no table, or has another number of columns.
+    """
+    if not 2 <= len(shape) <= 3 or shape[-1] < 1 + timed or min(shape) < 1:
+        raise InputError(f"{file}: an array of shape {tuple(shape)} is no table of rows", hint=_LAYOUT)
+    rest = shape[-1] - timed
+    count = rest if joints is None else joints
+    if rest % count or rest // count > len(_ORDERS):
+        lacks = timed and shape[-1] == count
+        time = "; it seems to lack the time, which --rate says" if lacks else ""
+        raise InputError(f"{file}: {shape[-1]} columns for {count} joints{time}", hint=_LAYOUT)
+    names = [f"{kind}{joint + 1}" for kind in _ORDERS[: rest // count] for joint in range(count)]
+    said = ["t"] * timed
+    note = f"columns are read as {', '.join([*said, f'{names[0]} .. {names[-1]}'])}"
+    return [*said, *names], [note, *_note_on_chunks(shape[:-1])]
+
+
+def open_archive(source: ByteSource, joints: int | None = None, *, timed: bool = True) -> ArrayRows:
+    """Return the rows of the arrays in an archive (.npz): of all that have as many rows as the first table.
+
+    Args:
+        source: The file.
+        joints: Number of joints that are expected; None where nobody knows.
+        timed: Whether the first column of a single plain array is the time.
+
+    Raises:
+        FileError: When it cannot be read.
+        InputError: When it is no archive of arrays, or holds no rows.
+    """
+    arrays = _arrays_of(source)
+    if len(arrays) == 1 and next(iter(arrays.values())).ndim > 1:
+        array = next(iter(arrays.values()))
+        names, notes = plain_names(source.file, array.shape, joints, timed=timed)
+        columns = array.reshape(-1, array.shape[-1])
+        return _rows_of(source.file, "npy", names, columns, [_share(array.dtype)] * len(names), notes)
+    tables = [array for array in arrays.values() if array.ndim > 1] or list(arrays.values())
+    if not tables or not tables[0].size:
+        raise InputError(f"{source.file} holds no rows", hint=_LAYOUT)
+    deep = tables[0].ndim > 2
+    rows = tables[0].shape[: 1 + deep]
+    taken = {
+        name: a for name, a in arrays.items() if a.shape[: len(rows)] == rows and a.ndim <= len(rows) + 1
+    }
+    names, shares, parts = list[str](), list[float](), list[Array]()
+    for name, array in taken.items():
+        found = _names_of(name, array.shape[len(rows) :])
+        names, shares = [*names, *found], [*shares, *[_share(array.dtype)] * len(found)]
+        parts.append(array.reshape(int(np.prod(rows)), -1).astype(np.float64))
+    rest = [name for name in arrays if name not in taken]
+    notes = [f"arrays that are not read: {', '.join(rest)}"] if rest else []
+    joined = np.concatenate(parts, axis=1)
+    return _rows_of(source.file, "fields", names, joined, shares, [*notes, *_note_on_chunks(rows)])
+
+
+def _rows_of(
+    file: str,
+    form: str,
+    names: Sequence[str],
+    columns: NDArray[Any],
+    shares: Sequence[float],
+    notes: Sequence[str],
+) -> ArrayRows:
+    numbers = columns.astype(np.float64)
+    finite = np.isfinite(numbers)
+    if not finite.all():
+        row, column = np.argwhere(~finite)[0].tolist()
+        message = f"{file}: {names[column]} is {numbers[row, column]} in row {row + 1}"
+        raise InputError(message, hint="expected finite numbers")
+    named = NamedFile(file, tuple(names), unplaced)
+    exact = np.full(len(names), EXACT, np.int64)
+    return ArrayRows(form, named, numbers, exact, np.array(shares), notes=tuple(notes))
+
+
+def _arrays_of(source: ByteSource) -> dict[str, NDArray[Any]]:
+    """Return the arrays of real numbers in an archive, by their names.
+
+    Raises:
+        InputError: When it is none, or too large.
+    """
+    import zipfile
+    import zlib
+
+    from numpy.lib import format as npy
+
+    found: dict[str, NDArray[Any]] = {}
+    try:
+        with source.open() as stream, zipfile.ZipFile(stream) as archive:
+            members = [member for member in archive.infolist() if member.filename.endswith(".npy")]
+            size = sum(member.file_size for member in members)
+            if size > _LARGEST_ARCHIVE:
+                raise InputError(f"{source.file} holds {size} bytes", hint="save one array of it as .npy")
+            for member in members:
+                with archive.open(member) as content:
+                    array = npy.read_array(content, allow_pickle=False)
+                if array.dtype.kind in "fiu" and array.ndim:
+                    found[member.filename.removesuffix(".npy")] = array
+    except (ValueError, zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, zlib.error) as error:
+        raise InputError(
+            f"{source.file} is no archive of numpy: {error}".split("\n", maxsplit=1)[0]
+        ) from error
+    return found
 
 
 def _head(stream: Any, file: str) -> tuple[np.dtype[Any], tuple[int, ...], bool]:  # noqa: ANN401

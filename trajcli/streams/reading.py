@@ -9,23 +9,31 @@ import numpy as np
 
 from trajcli.errors import InputError, utf8
 from trajcli.streams.byte_source import ByteSource
-from trajcli.streams.row_sources import EXACT, ArrayRows, RowSource, TextRows, in_columns
+from trajcli.streams.row_sources import EXACT, ArrayRows, RowSource, TextRows, TimedRows, in_columns
 from trajcli.streams.table import Table
 from trajcli.streams.whole_file import is_special
 
 _ALL_DECIMALS = 17  # of a float64
-ENDINGS_OF_ROWS = (".csv", ".txt", ".jsonl", ".mcap", ".npy")
+ENDINGS_OF_ROWS = (".csv", ".txt", ".jsonl", ".mcap", ".npy", ".npz")
 _YAML = (".yaml", ".yml")
 _HEAD = 1 << 16  # bytes of a file that are looked at
 _JOINT_NAMES = re.compile(rb"^[ \t{-]*[\"']?joint_names[\"']?[ \t]*:", re.MULTILINE)
 _MCAP = b"\x89MCAP0\r\n"
-_NPY = b"\x93NUMPY"
+_BY_FIRST_BYTES = (
+    (re.compile(re.escape(_MCAP)), "mcap"),
+    (re.compile(rb"\x93NUMPY"), "npy"),
+    (re.compile(rb"PK\x03\x04.{26}[^\x00]{1,200}?\.npy", re.DOTALL), "npz"),  # its first member is an array
+)
+_BY_ENDING = {
+    **{ending: ending[1:] for ending in (".mcap", ".npy", ".npz", ".jsonl", ".csv")},
+    **dict.fromkeys(_YAML, "ros"),
+}
 _OTHERS = {
     b"#ROSBAG": ("a bag of ROS 1", "`rosbags-convert` makes MCAP of it"),
     b"SQLite format 3": ("a bag of ROS 2 in SQLite", "`ros2 bag convert` makes MCAP of it"),
     b"PAR1": ("a parquet file", "trajcli.check takes its columns as arrays; or save them as CSV or .npy"),
     b"\x89HDF": ("an HDF5 file", "save its arrays as CSV or .npy"),
-    b"PK\x03\x04": ("an archive (.zip, .npz, .xlsx)", "save one table of it as CSV, or one array as .npy"),
+    b"PK\x03\x04": ("an archive (.zip, .xlsx)", "save one table of it as CSV, or arrays as .npz"),
     b"\x1f\x8b": ("compressed by gzip", "`gunzip -c FILE | trajcli ... -` unpacks it"),
 }
 """Files that are known by their first bytes and are not read: what they are, and what would be read."""
@@ -75,7 +83,14 @@ def open_rows_of(
         InputError: When it is no such file, or has no such topic.
     """
     source = path if isinstance(path, ByteSource) else ByteSource(path)
-    kind = format_of_rows(source)
+    rows = _rows_of_format(source, topic=topic, field=field, joints=joints)
+    return rows if source.rate is None else TimedRows(rows, source.rate)
+
+
+def _rows_of_format(
+    source: ByteSource, *, topic: str | None, field: str | None, joints: int | None
+) -> RowSource:
+    kind, timed = format_of_rows(source), source.rate is None
     if kind != "mcap" and (topic is not None or field is not None):
         option = "--topic" if topic is not None else "--field"
         raise InputError(f"{option} is about MCAP, and {source.file} is none", hint=f"leave {option} out")
@@ -92,7 +107,11 @@ def open_rows_of(
     if kind == "npy":
         from trajcli.streams.npy import ArrayFile
 
-        return ArrayFile(source, joints)
+        return ArrayFile(source, joints, timed=timed)
+    if kind == "npz":
+        from trajcli.streams.npy import open_archive
+
+        return open_archive(source, joints, timed=timed)
     return TextRows(source)
 
 
@@ -108,26 +127,21 @@ def refuse_job(source: ByteSource) -> None:
 
 
 def format_of_rows(source: ByteSource) -> str:
-    """Return "mcap", "npy", "ros", "jsonl" or "csv", by the first bytes or the name of a file.
+    """Return "mcap", "npy", "npz", "ros", "jsonl" or "csv", by the first bytes or the name of a file.
 
     Raises:
         FileError: When it cannot be read.
         InputError: When it is known to be of a format that is not read.
     """
     head = source.head(_HEAD)
+    known = next((kind for pattern, kind in _BY_FIRST_BYTES if pattern.match(head)), None)
+    if known is not None:
+        return known
     for magic, (what, hint) in _OTHERS.items():
         if head.startswith(magic):
             raise InputError(f"{source.file} is {what}, which is not read", hint=hint)
-    if head.startswith(_MCAP) or source.ending == ".mcap":
-        return "mcap"
-    if head.startswith(_NPY) or source.ending == ".npy":
-        return "npy"
-    if source.ending == ".jsonl":
-        return "jsonl"
-    if source.ending in _YAML:
-        return "ros"
-    if source.ending == ".csv":
-        return "csv"
+    if source.ending in _BY_ENDING:
+        return _BY_ENDING[source.ending]
     first = head.lstrip().split(b"\n", maxsplit=1)[0]
     if first.startswith(b"{"):
         from trajcli.streams.json_rows import is_json_object

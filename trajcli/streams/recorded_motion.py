@@ -111,7 +111,7 @@ class MotionFile:
 
     Attributes:
         source: Its name, for messages.
-        format: "csv", "jsonl", "ros", "mcap" or "npy".
+        format: "csv", "jsonl", "ros", "mcap", "npy" or "fields", as of `RowSource`.
         joints: n names; None where the file says none.
         columns: Names of the n columns of each quantity, as they are written.
         quantities: Of q, qd, qdd, qddd, tau and move those that it has.

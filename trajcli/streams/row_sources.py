@@ -12,6 +12,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import Place
 from trajcli.frozen import frozen
 from trajcli.streams.byte_source import ByteSource
+from trajcli.streams.recorded.column_names import TIME, read_name
 from trajcli.streams.recorded.column_roles import NamedFile
 from trajcli.streams.table import rows_of
 from trajcli.streams.text_layout import layout_of, read_header
@@ -30,7 +31,7 @@ class RowSource(Protocol):
     """Rows of a file whose columns have names.
 
     Attributes:
-        format: Of the file: "csv", "jsonl", "ros", "mcap" or "npy".
+        format: Of the file: "csv", "jsonl", "ros", "mcap", "npy", or "fields" of arrays with names.
         named: Names of the columns, and where they stand.
         joint_names: n names; None where the file says none beside its columns.
         si: Whether the format fixes the units: rad, m and s.
@@ -129,6 +130,53 @@ class ArrayRows:
     def decimals(self, taken: Sequence[int]) -> NDArray[np.int64]:
         """Return the decimals of the columns."""
         return self.written[list(taken)]
+
+
+class TimedRows:
+    """Rows of a file without time, at a rate: a column `t` stands in front of the others."""
+
+    def __init__(self, rows: RowSource, rate: float) -> None:
+        """Take the rows of a file.
+
+        Args:
+            rows: Of the file.
+            rate: Rows per second.
+
+        Raises:
+            InputError: When they have a time.
+        """
+        named = rows.named
+        known = next((name for name in named.names if read_name(name).quantity == TIME), None)
+        if known is not None:
+            raise named.wrong(
+                f"--rate is about rows without time, and {known} is one", "leave --rate out", known
+            )
+        self._rows, self._rate = rows, rate
+        self.format, self.joint_names, self.si = rows.format, rows.joint_names, rows.si
+        first = ("", *named.first) if named.first else ()
+        self.named = NamedFile(
+            named.file,
+            ("t", *named.names),
+            lambda name: named.place(None if name == "t" else name),
+            first,
+        )
+        self.relative = np.concatenate([[0.0], rows.relative])
+        self.notes = (*rows.notes, f"rows stand {1 / rate:.9g} s apart, as --rate says")
+
+    def blocks(self, taken: Sequence[int], fixed: Sequence[int]) -> Iterator[Array]:
+        """Yield the rows of some columns."""
+        others, done = [k - 1 for k in taken if k > 0], 0
+        for block in self._rows.blocks(others, [k - 1 for k in fixed]):
+            if len(others) == len(taken):
+                yield block
+            else:
+                yield np.hstack([((done + np.arange(len(block))) / self._rate)[:, None], block])
+            done += len(block)
+
+    def decimals(self, taken: Sequence[int]) -> NDArray[np.int64]:
+        """Return the decimals of some columns; times are exact."""
+        others = self._rows.decimals([k - 1 for k in taken if k > 0])
+        return others if len(others) == len(taken) else np.concatenate([[EXACT], others])
 
 
 def unplaced(name: str | None = None) -> Place | None:

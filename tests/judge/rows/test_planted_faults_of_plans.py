@@ -169,6 +169,24 @@ def put_log(names: Sequence[str], rows: Rows, file: Path) -> None:
         writer.finish()
 
 
+def take_array(file: Path) -> tuple[list[str], Rows]:
+    found = np.load(file)
+    names = list(found.dtype.names if file.suffix == ".npy" else found)
+    return names, np.hstack([np.reshape(found[name], (len(found["t"]), -1)) for name in names])
+
+
+def put_array(names: Sequence[str], rows: Rows, file: Path) -> None:
+    n = (rows.shape[1] - 1) // (len(names) - 1)
+    parts = {name: rows[:, 1 + k * n : 1 + (k + 1) * n] for k, name in enumerate(names[1:])}
+    if file.suffix == ".npz":
+        np.savez(file, t=rows[:, 0], **parts)
+        return
+    table = np.empty(len(rows), [("t", "f8"), *((name, "f8", (n,)) for name in parts)])
+    for name, values in {"t": rows[:, 0], **parts}.items():
+        table[name] = values
+    np.save(file, table)
+
+
 def stamp(row: Sequence[float]) -> dict[str, int]:
     return dict(zip(("sec", "nanosec"), divmod(round(row[0] * 1e9), 10**9), strict=True))
 
@@ -178,6 +196,8 @@ FORMATS = {
     "jsonl": (take_lines, put_lines),
     "yaml": (take_message, put_message),
     "mcap": (take_log, put_log),
+    "npy": (take_array, put_array),
+    "npz": (take_array, put_array),
 }
 
 
@@ -212,7 +232,7 @@ def faults_are_found(seeds: Sequence[int], ending: str, folder: Path) -> int:
 @pytest.mark.parametrize("ending", FORMATS)
 def test_rows_with_a_fault_are_never_those_of_the_motion(ending: str, tmp_path: Path) -> None:
     first = list(FORMATS).index(ending)
-    assert faults_are_found(few(range(first, 20, 2), 3), ending, tmp_path) >= 1
+    assert faults_are_found(few(range(first, 20, 2), 2), ending, tmp_path) >= 1
 
 
 @pytest.mark.soak

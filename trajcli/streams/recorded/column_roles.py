@@ -334,7 +334,8 @@ class _Assignment:
         if names:
             choices = " or ".join(f"--columns t={name}" for name in names)
             raise self._file.wrong(f"{len(names)} columns are times: {', '.join(names)}", choices)
-        hint = f"name it: --columns t=NAME; the columns are {', '.join(self._file.names[:_SHOWN])}"
+        known = ", ".join(self._file.names[:_SHOWN])
+        hint = f"name it: --columns t=NAME, or `check --rate HZ` where there is none; the columns are {known}"
         raise self._file.wrong("no column is the time, such as t or time", hint)
 
     def _stamp(self, found: Sequence[int]) -> int:

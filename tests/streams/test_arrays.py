@@ -1,0 +1,134 @@
+"""Arrays for numpy: what plans write, rows without time at a rate, chunks and archives, against numpy itself."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from trajcli.columns import columns_of
+from trajcli.errors import InputError, TrajcliError
+from trajcli.judge.file import CheckOptions, check_file
+from trajcli.judge.judgement import Judgement
+from trajcli.streams.arrays import verify_npy, verify_npz, write_npy_blocks, write_npz_blocks
+from trajcli.streams.byte_source import ByteSource
+from trajcli.streams.formats import write_verified
+from trajcli.streams.recorded_motion import open_motion
+from trajcli.units import Units
+
+COLUMNS = columns_of(("t", "q", "qd", "pose", "move"), ("revolute", "prismatic"), Units())
+ROWS = np.random.default_rng(1).normal(size=(23, len(COLUMNS)))
+ROWS[:, 0] = np.arange(23) / 10
+BLOCKS = (ROWS[:10], ROWS[10:])
+GROUPS = {"t": ROWS[:, 0], "q": ROWS[:, 1:3], "qd": ROWS[:, 3:5], "pose": ROWS[:, 5:12], "move": ROWS[:, 12]}
+ROBOT = "{joints: [{name: a, velocity: 2}, {name: b, velocity: 2}]}"
+
+
+@pytest.mark.parametrize("ending", ["npy", "npz"])
+def test_numpy_reads_what_is_written(ending: str, tmp_path: Path) -> None:
+    file = tmp_path / f"a.{ending}"
+    write_verified(file, iter(BLOCKS), COLUMNS)
+    found = np.load(file)
+    for name, values in GROUPS.items():
+        np.testing.assert_array_equal(found[name], values)
+    first = file.read_bytes()
+    write_verified(file, iter(BLOCKS), COLUMNS)
+    assert file.read_bytes() == first
+    motion = open_motion(file).whole()
+    np.testing.assert_array_equal(motion.q, ROWS[:, 1:3])
+    np.testing.assert_array_equal(motion.t, ROWS[:, 0])
+
+
+def test_a_pipe_gets_the_same_bytes(tmp_path: Path) -> None:
+    class Pipe(io.BytesIO):
+        def seekable(self) -> bool:
+            return False
+
+    write_verified(tmp_path / "a.npy", iter(BLOCKS), COLUMNS)
+    pipe = Pipe()
+    assert len(list(write_npy_blocks(BLOCKS, COLUMNS, pipe))) == 2
+    assert pipe.getvalue() == (tmp_path / "a.npy").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("write", "verify"), [(write_npy_blocks, verify_npy), (write_npz_blocks, verify_npz)]
+)
+def test_a_changed_byte_is_found(write: Callable[..., Iterable[object]], verify: Callable[..., None]) -> None:
+    out = io.BytesIO()
+    list(write(BLOCKS, COLUMNS, out))
+    verify(out, BLOCKS, COLUMNS)
+    with pytest.raises(TrajcliError, match=r"differ|goes on|number of rows"):
+        verify(out, BLOCKS[:1], COLUMNS)
+    other = ROWS.copy()
+    other[20, 4] = np.nextafter(other[20, 4], 1e9)
+    with pytest.raises(TrajcliError, match="differ"):
+        verify(out, (other[:10], other[10:]), COLUMNS)
+
+
+def judged(file: Path, rate: str | None = None) -> Judgement:
+    robot = file.parent / "robot.yaml"
+    robot.write_text(ROBOT, encoding="utf-8")
+    return check_file(str(file), CheckOptions(robot=str(robot), units="rad", rate=rate)).judgement
+
+
+def path_of(folder: Path, name: str, q: np.ndarray) -> Path:
+    file = folder / name
+    if name == "chunks.npy":
+        np.save(file, q.reshape(4, -1, 2))
+    elif name == "plain.npy":
+        np.save(file, q)
+    elif name == "chunks.npz":
+        np.savez(file, positions=q.reshape(4, -1, 2), success=np.ones(4))
+    elif name == "one.npz":
+        np.savez(file, q)
+    elif name == "named.npz":
+        np.savez(file, q=q, fps=np.array([30.0]))
+    else:
+        np.savetxt(file, q, delimiter=",", header="q1,q2", comments="", fmt="%.17g")
+    return file
+
+
+@pytest.mark.parametrize(
+    "name", ["chunks.npy", "plain.npy", "chunks.npz", "one.npz", "named.npz", "bare.csv"]
+)
+def test_positions_without_time_are_judged_at_a_rate(name: str, tmp_path: Path) -> None:
+    """Between two rows 0.07 rad apart at 50 Hz the velocity is 3.5 rad/s."""
+    q = np.zeros((48, 2))
+    q[20:, 1] = 0.07
+    file = path_of(tmp_path, name, q)
+    found = judged(file, "50")
+    worst = next(finding for finding in found.findings if finding.kind == "velocity")
+    assert (found.rows, worst.joint, worst.row) == (48, "b", 20)
+    assert worst.value == pytest.approx(3.5, rel=1e-9)
+    assert judged(file, "20").verdict == "satisfied"
+    with pytest.raises(InputError, match=r"time|array of shape"):
+        judged(file)
+
+
+def test_a_rate_beside_a_time_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("time,q1,q2\n0,0,0\n1,0,0\n", encoding="utf-8")
+    with pytest.raises(InputError, match="--rate is about rows without time, and time is one"):
+        judged(tmp_path / "a.csv", "50")
+    for word in ("0", "-1", "inf", "fast"):
+        with pytest.raises(InputError, match="--rate"):
+            judged(tmp_path / "a.csv", word)
+
+
+def test_chunks_with_time_follow_each_other(tmp_path: Path) -> None:
+    table = np.column_stack([np.arange(12) / 10, np.zeros((12, 2))])
+    np.save(tmp_path / "a.npy", table.reshape(3, 4, 3))
+    found = judged(tmp_path / "a.npy")
+    assert (found.rows, found.verdict) == (12, "satisfied")
+    assert "3 chunks of 4 rows are read one after the other" in found.notes
+
+
+def test_what_is_no_archive_of_arrays_is_one_error(tmp_path: Path) -> None:
+    whole = path_of(tmp_path, "named.npz", np.zeros((8, 2))).read_bytes()
+    for number, text in enumerate((whole[:50], whole[:-30], whole.replace(b"NUMPY", b"NUMPI"), b"")):
+        file = tmp_path / f"{number}.npz"
+        file.write_bytes(text)
+        with pytest.raises(InputError, match="archive"):
+            list(open_motion(ByteSource(file, 50.0)).blocks())
