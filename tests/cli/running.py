@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import subprocess
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, NamedTuple
 from unittest.mock import patch
@@ -47,12 +48,12 @@ def run(*arguments: str | Path, stdin: str = "", **options: Any) -> Outcome:
     return Outcome(done.returncode, done.stdout, done.stderr)
 
 
-def call(capfd: pytest.CaptureFixture[str], *arguments: str | Path, stdin: str = "") -> Outcome:
+def call(capfd: pytest.CaptureFixture[str], *arguments: str | Path, stdin: str | None = None) -> Outcome:
     """Run the command in this process: quicker, with the same exit."""
     from trajcli.cli.app import app
 
     capfd.readouterr()
-    text = io.TextIOWrapper(io.BufferedReader(io.BytesIO(stdin.encode())), encoding="utf-8")
-    with pytest.raises(SystemExit) as left, patch("sys.stdin", text):
+    text = None if stdin is None else io.TextIOWrapper(io.BufferedReader(io.BytesIO(stdin.encode())), "utf-8")
+    with pytest.raises(SystemExit) as left, nullcontext() if text is None else patch("sys.stdin", text):
         app([str(argument) for argument in arguments])
     return Outcome(left.value.code or 0, *capfd.readouterr())  # type: ignore[arg-type]
