@@ -95,7 +95,7 @@ def field_table(model: type[BaseModel], left_out: Mapping[str, str] | None = Non
             _description(field),
         ]
         for name, field in model.model_fields.items()
-        if name not in hidden_fields(model)
+        if name not in hidden_fields(model) and not (field.alias or name).startswith("\0")
     ]
     return table(["field", "what may stand there", "unit", "default", "meaning"], rows)
 

@@ -47,8 +47,10 @@ With `frame: tool` (the default) the offset is along and about the axes that the
 T_point T_offset: for a tool that looks down, negative z is above. With `frame: world`, or another frame, it
 is along and about the axes of that: the position is moved by `xyz`, the orientation turned about the tcp.
 
-The point is given as a pose, or relative to another point; not by its joints. Its `configuration` holds,
-too, if none stands beside `from`. A point without a whole orientation can only be displaced, with
+The point is given as a pose, by its joints or relative to another point, or it is `here`: where the arm
+stands before the move. Then, and from joints, the pose is found as the job is planned, with the tool in force
+there; above joints that were taught the arm stays on their branch. The `configuration` of a point holds, too,
+if none stands beside `from`. A point without a whole orientation can only be displaced, with
 `frame: world`. `velocity` and `acceleration`, and in a [waypoint](#points-on-the-path) `time` and `blend`,
 stand beside `from`."""
 

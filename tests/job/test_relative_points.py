@@ -101,7 +101,7 @@ def test_relative_states_stand_wherever_a_state_may() -> None:
         ("  a: {from: a}\n", "6:13", "the point 'a' is relative to itself (a -> a)"),
         ("  a: {from: bb}\n", "6:13", "there is no point 'bb'"),
         ("  a: {from: 3}\n", "6:13", "expected the name of a point, got 3"),
-        ("  a: {joints: 0}\n  b: {from: a}\n", "7:13", "the point 'a' is given by its joints"),
+        ("  a: {velocity: 0}\n  b: {from: a}\n", "7:13", "the point 'a' is given without a pose"),
         ("  a: {rpy: [0, 0, 0]}\n  b: {from: a}\n", "7:13", "the point 'a' has no position"),
         ("  a: {xyz: [1, 2, 3]}\n  b: {from: a}\n", "7:13", "the point 'a' has no whole orientation"),
         ("  a: {xyz: [1, 2, 3]}\n  b: {from: a, frame: floor}\n", "7:23", "there is no frame 'floor'"),

@@ -54,6 +54,7 @@ class LoadedJob:
         events: Concessions, such as a limit looser than the robot's.
         source: Where the numbers of the robot come from.
         has_far_angle: Whether a pose has an angle in rad that is probably meant in degrees.
+        waits: Whether a target is relative to what only the plan knows.
     """
 
     job: Job
@@ -63,6 +64,7 @@ class LoadedJob:
     events: tuple[Event, ...]
     source: str = "the job"
     has_far_angle: bool = False
+    waits: bool = False
 
     def __repr__(self) -> str:
         tags = ", ".join(move.tag for move in self.job.moves)
@@ -242,7 +244,10 @@ def _load(document: Document) -> LoadedJob:
     if sheet is not None:
         events = [*(Event(kind, message) for kind, message in sheet.concessions), *events]
     source = "the job" if sheet is None else sheet.source or _named_source(plain["robot"])
-    loaded = LoadedJob(job, name, effective, document, (*noted, *events), source, context.has_far_angle)
+    events = [*noted, *events]
+    loaded = LoadedJob(
+        job, name, effective, document, tuple(events), source, context.has_far_angle, context.waits
+    )
     _require_no_flaws(loaded)
     return loaded
 

@@ -73,6 +73,7 @@ class ReadingContext:
         frames: The file's frames, as plain mappings.
         placed: Frames that were resolved, by name: T_world_frame, (4, 4), m.
         base: Where the arm stands, T_world_base, (4, 4), m.
+        waits: Whether a target is given relative to what only the plan knows.
         has_far_angle: Whether a pose has a plain angle of more than two turns, which is a slip of the unit.
         read_points: Reads a file of recorded joint values, its path relative to the job; raises FlawError.
     """
@@ -85,6 +86,7 @@ class ReadingContext:
     frames: Mapping[str, Any] = field(default_factory=dict)
     placed: dict[str, np.ndarray] = field(default_factory=dict)
     base: np.ndarray = field(default_factory=lambda: np.eye(4))
+    waits: bool = False
     has_far_angle: bool = False
     read_points: Callable[[str], Recorded] | None = None
 

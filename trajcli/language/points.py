@@ -14,14 +14,14 @@ from pydantic_core import CoreSchema, core_schema
 from trajcli.curves.piecewise import Array
 from trajcli.language.numbers import AT_KEY, SI, FlawError, ReadingContext, refuse, shown, written_number
 from trajcli.language.poses import Pose
-from trajcli.language.targets import AIMS, PoseFields, Target
+from trajcli.language.targets import AIMS, RELATIVE, PoseFields, Relative, Target
 from trajcli.units import Quantity
 
 RELATIVE_DEFINITION = "relative to "
 """Begins a comment that stands in a schema for a state relative to a point; the name of its model ends it."""
 
 RELATIVE_FIELDS: dict[str, JsonSchemaValue] = {
-    "from": {"type": "string", "description": "Name of a point that is given as a pose."},
+    "from": {"type": "string", "description": "Name of a point, or here: where the arm stands then."},
     "offset": {**Pose("").json_schema(), "description": "How far from it; what it leaves out is zero."},
     "frame": {
         "type": "string",
@@ -34,6 +34,7 @@ RELATIVE_FIELDS: dict[str, JsonSchemaValue] = {
 
 BESIDE = ("configuration", "velocity", "acceleration", "time", "blend")
 """Fields of a state that may stand beside `from`."""
+HERE = "here"
 _LONGEST_CHAIN = 100  # points, each relative to the next
 _Fields = dict[str, Any]
 
@@ -54,6 +55,18 @@ class Named:
         info: core_schema.ValidationInfo,
     ) -> Any:  # noqa: ANN401
         context = info.context or SI
+        target = Named._target(value, validate, context)
+        if isinstance(target, Target) and target.waits:
+            context.waits = True
+        return target
+
+    @staticmethod
+    def _target(
+        value: Any,  # noqa: ANN401
+        validate: core_schema.ValidatorFunctionWrapHandler,
+        context: ReadingContext,
+    ) -> Any:  # noqa: ANN401
+        """Return the state that a value of a file stands for."""
         if isinstance(value, str):
             return _of_name(value, validate, context)
         if not isinstance(value, Mapping | Target):
@@ -123,14 +136,17 @@ def _flaw_elsewhere() -> FlawError:
 
 
 def _relative(value: Mapping[str, Any], context: ReadingContext) -> _Fields:
-    """Return the fields of the state that is given relative to a point."""
-    return _moved(value, _of_point(_name_in(value, context), context), context)
+    """Return the fields of the state that is given relative to a point, or to where the arm stands."""
+    if value["from"] == HERE:
+        return _moved(value, HERE, None, context)
+    name = _name_in(value, context)
+    return _moved(value, name, _of_point(name, context), context)
 
 
 def _of_point(name: str, context: ReadingContext) -> _Fields:
     """Return the fields of a point that may itself be relative to others, at most to a chain of 100."""
     chain = [name]
-    while chain[-1] not in context.shifted and "from" in _mapping(chain[-1], context):
+    while chain[-1] not in context.shifted and _mapping(chain[-1], context).get("from", HERE) != HERE:
         try:
             following = _name_in(context.points[chain[-1]], context)
         except FlawError:
@@ -148,9 +164,12 @@ def _of_point(name: str, context: ReadingContext) -> _Fields:
         fields = dict(_mapping(last, context))
         if "in" in fields:
             fields = context.shifted[last] = _elsewhere(partial(_in_world, fields, context))
+        elif "from" in fields:
+            fields = context.shifted[last] = _elsewhere(partial(_moved, fields, HERE, None, context))
     for link in reversed(chain):
-        moved = partial(_moved, context.points[link], fields, context)
-        fields = context.shifted[link] = _elsewhere(moved)
+        moved = partial(_moved, context.points[link], last, fields, context)
+        fields, last = _elsewhere(moved), link
+        context.shifted[link] = fields
     return fields
 
 
@@ -188,8 +207,15 @@ def _name_in(value: Mapping[str, Any], context: ReadingContext) -> str:
         raise
 
 
-def _moved(value: Mapping[str, Any], point: _Fields, context: ReadingContext) -> _Fields:
-    """Return the fields of a relative state whose point has the fields `point`."""
+def _moved(value: Mapping[str, Any], name: str, point: _Fields | None, context: ReadingContext) -> _Fields:
+    """Return the fields of a state that is relative to a point, or to where the arm stands.
+
+    Args:
+        value: The state.
+        name: Of the point, or "here".
+        point: Its fields; None for "here".
+        context: With all points.
+    """
     offset, axes = _offset(value, context), _axes(value.get("frame", "tool"), context)
     for key in value:
         if (key in PoseFields.model_fields and key not in BESIDE) or key in ("joints", "in"):
@@ -205,9 +231,15 @@ def _moved(value: Mapping[str, Any], point: _Fields, context: ReadingContext) ->
             raise FlawError(
                 f"unknown key '{key}'", key, AT_KEY, hint=did_you_mean(key, known) or valid_names(known)
             )
-    pose = _pose_of(value["from"], point, context)
-    fields = _displaced(value["from"], pose, offset, axes)
-    return {**fields, **{key: value[key] for key in value if key in BESIDE}}
+    beside = {key: value[key] for key in value if key in BESIDE}
+    if point is None or "joints" in point or "joints_by" in point or RELATIVE in point:
+        if axes is not None:
+            turned = np.eye(4)
+            turned[:3, :3], turned[:3, 3] = axes @ offset[:3, :3] @ axes.T, axes @ offset[:3, 3]
+            offset = turned
+        rows = tuple(map(tuple, offset.tolist()))
+        return {RELATIVE: Relative(name, rows, axes is not None), **beside}
+    return {**_displaced(name, _pose_of(name, point, context), offset, axes), **beside}
 
 
 def _offset(value: Mapping[str, Any], context: ReadingContext) -> Array:
@@ -234,10 +266,11 @@ def _axes(frame: Any, context: ReadingContext) -> Array | None:  # noqa: ANN401
 def _pose_of(name: str, point: _Fields, context: ReadingContext) -> PoseFields:
     """Return the pose of a point, which is not given by its joints."""
     given = {key: point[key] for key in PoseFields.model_fields if key in point}
-    if "joints" in point or not given:
-        by = "by its joints" if "joints" in point else "without a pose"
-        hint = "give it as a pose: `trajcli fk` prints that of joints"
-        raise FlawError(f"the point '{name}' is given {by}: nothing is relative to it", "from", hint=hint)
+    if not given:
+        hint = "give it as a pose, or by its joints"
+        raise FlawError(
+            f"the point '{name}' is given without a pose: nothing is relative to it", "from", hint=hint
+        )
     try:
         return PoseFields.model_validate(given, context=context)
     except ValidationError:

@@ -9,9 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 from pydantic import (
     Field,
+    InstanceOf,
+    SerializationInfo,
+    SerializerFunctionWrapHandler,
+    model_serializer,
     model_validator,
 )
-from pydantic.json_schema import JsonSchemaValue
+from pydantic.json_schema import JsonSchemaValue, SkipJsonSchema
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount, PlanningError, Problem
@@ -269,33 +273,90 @@ JointAccelerationMagnitudes = Annotated[
 ]
 
 
+@comparable
+class Relative:
+    """A displacement from a pose that only the plan knows.
+
+    Attributes:
+        origin: Name of a point that is given by its joints, or "here": where the arm stands then.
+        offset: How far from it, the rows of (4, 4), m.
+        in_world: Whether it is along and about the axes of world, not those of the tool.
+    """
+
+    origin: str
+    offset: tuple[Row, ...]
+    in_world: bool
+
+    def after(self, pose: Array) -> Array:
+        """Return a pose (4, 4) after the displacement."""
+        offset = np.array(self.offset)
+        if not self.in_world:
+            return np.asarray(pose @ offset)
+        result = np.eye(4)
+        result[:3, :3], result[:3, 3] = offset[:3, :3] @ pose[:3, :3], pose[:3, 3] + offset[:3, 3]
+        return result
+
+
+RELATIVE, NEAR = "\0relative", "\0near"
+"""Keys of what a target holds beside what a file gives: none can write them."""
+
+
 class Target(PoseFields, defer_build=False):  # made once, not for each planner that has it
     """The state that a point names, or that a move starts from or ends in: by its joints, or by a pose."""
 
     joints: JointPositions | None = None
     velocity: JointVelocities | None = None
     acceleration: JointAccelerations | None = None
+    joints_by: (
+        Annotated[
+            tuple[float, ...],
+            PerJoint(
+                0,
+                "How far each joint goes from where the arm stands; those left out of a mapping stay.",
+                zero_missing=True,
+            ),
+        ]
+        | None
+    ) = None
     frame: Annotated[
         str | None,
-        Field(alias="in", exclude=True, description="The frame in which the pose is given; left out: world."),
+        Field(alias="in", description="The frame in which the pose is given; left out: world."),
     ] = None
+    relative: SkipJsonSchema[InstanceOf[Relative] | None] = Field(None, alias=RELATIVE, exclude=True)
+    near: SkipJsonSchema[tuple[float, ...] | None] = Field(None, alias=NEAR, exclude=True)
 
     @model_validator(mode="after")
     def _says_something(self) -> Target:
         if self.frame is not None:
             raise refuse([(("in",), "only a job has frames", "give the pose in world")])
-        if self.joints is not None and self.gives_pose:
-            key = self.pose_keys[0]
-            raise refuse([((key,), f"joints and {key} exclude each other", "leave one of them out")])
-        if self.joints is None and self.velocity is None and not self.gives_pose:
+        given = [key for key in ("joints", "joints_by") if getattr(self, key) is not None]
+        given += [*self.pose_keys[:1], *(["from"] if self.relative is not None else [])]
+        if len(given) > 1:
+            text = f"{given[0]} and {given[1]} exclude each other"
+            raise refuse([((given[1],), text, "leave one of them out")])
+        if not given and self.velocity is None:
             text = "a state needs `joints` or a pose (or `velocity` alone, for a stop)"
             raise refuse([((), text, None)])
         return self
 
+    @model_serializer(mode="wrap")
+    def _written(self, serialize: SerializerFunctionWrapHandler, info: SerializationInfo) -> dict[str, Any]:
+        written: dict[str, Any] = serialize(self)
+        if self.relative is None or info.context is None:
+            return written
+        offset = Pose("").write(np.array(self.relative.offset), info.context)
+        frame = "world" if self.relative.in_world else "tool"
+        return {"from": self.relative.origin, "offset": offset, "frame": frame, **written}
+
+    @property
+    def waits(self) -> bool:
+        """Whether only the plan knows where it is: relative to where the arm stands, or to joints."""
+        return self.relative is not None or self.joints_by is not None
+
     @property
     def gives_joints_or_pose(self) -> bool:
         """Whether it says where to be, and not only how fast."""
-        return self.joints is not None or self.gives_pose
+        return self.joints is not None or self.gives_pose or self.waits
 
     def as_state(self) -> State:
         """Return the state; what is not given is zero.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import field, replace
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -30,7 +30,7 @@ from trajcli.kinematics.robot import QUANTITIES, Payload, Robot
 from trajcli.language.targets import Target
 from trajcli.limits.tolerances import JUMP_ABSOLUTE
 from trajcli.planners.planner import Event, PlannedMove, Planner, Resolve
-from trajcli.planning.planned_move import plan_move_within
+from trajcli.planning.planned_move import KnownMoves, placed, plan_move_within
 from trajcli.progress import report_progress
 from trajcli.trajectory import State, Trajectory
 
@@ -149,24 +149,25 @@ def _plan_moves(
     moves: list[PlannedMove] = []
     lacking: list[Problem] = []
     resolve = partial(_resolved, loaded=loaded, poses=poses)
+    standing: Target | None
     with _errors_at(loaded, loaded.document.place(("start",))):
-        state = resolve(loaded.job.start, np.zeros(len(loaded.robot.joints)), index=None).as_state()
+        origin = standing = placed(loaded, loaded.job.start, loaded.robot, None, None)
+        state = resolve(origin, np.zeros(len(loaded.robot.joints)), index=None).as_state()
     before: Planner | None = None
-    robot, begun = loaded.robot, 0.0
-    origin: Target | None = loaded.job.start
-    aimed: Planner | None = None  # whose target the origin is
-    known = _Known(poses)
+    robot, begun, aimed = loaded.robot, 0.0, 0  # the origin is the target of the planner of this id
+    known = KnownMoves(poses)
     for index, planner in enumerate(loaded.job.moves):
         report_progress(f"planning move {index + 1} of {len(loaded.job.moves)} ({planner.tag})")
         start = _handed_over(state, before, planner)
         robot = replace(robot, payload=planner.carried_after(robot.payload)) if planner.handles else robot
         used = robot if carried is None else replace(robot, payload=carried(index, robot.payload))
-        motion = (id(planner), id(aimed), start.bits, None if used.payload is None else used.payload.bits)
+        motion = (id(planner), aimed, start.bits, None if used.payload is None else used.payload.bits)
         try:
             with _errors_of(loaded, index, planner, begun):
+                there = placed(loaded, planner, robot, state.position, standing)
                 move = known.move(index, motion) if adapted is None else None
                 if move is None:
-                    reachable = planner.with_joint_targets(partial(resolve, index=index), state.position)
+                    reachable = there.with_joint_targets(partial(resolve, index=index), state.position)
                     with _points_of_errors(loaded, index):
                         move = _plan_move(loaded, used, index, reachable.coming_from(origin), start, adapted)
                     known.moves[motion] = move
@@ -175,7 +176,7 @@ def _plan_moves(
             state = move.planned.end
         except MissingLimitError as error:
             lacking += error.problems
-            end = _declared_end(planner, partial(resolve, index=index), state)
+            end = _declared_end(there, partial(resolve, index=index), state)
             if end is None:
                 break
             state = end
@@ -183,34 +184,13 @@ def _plan_moves(
             if not lacking:
                 raise
             break
-        before, origin = planner, planner.target or origin
-        aimed = aimed if planner.target is None else planner
+        before, origin = planner, there.target or origin
+        aimed = aimed if planner.target is None else id(planner)
+        standing = there.target or (standing if np.array_equal(state.position, start.position) else None)
     if lacking:
         raise MissingLimitError(*_without_repeats(lacking))
     _require_start_acceleration(loaded, moves)
     return moves
-
-
-@frozen
-class _Known:
-    """Moves that are planned: rounds of a repeat that are the same motion are planned once.
-
-    Attributes:
-        poses: How poses are reached, by the index of the move.
-        moves: By all that a motion depends on beside the job.
-    """
-
-    poses: dict[int | None, ResolvedPose]
-    moves: dict[tuple[object, ...], PlannedMove] = field(default_factory=dict)
-
-    def move(self, index: int, motion: tuple[object, ...]) -> PlannedMove | None:
-        """Return a move that is the same motion as one before; None where none is."""
-        same = self.moves.get(motion)
-        if same is None:
-            return None
-        if same.index in self.poses:
-            self.poses[index] = self.poses[same.index]
-        return replace(same, index=index)
 
 
 _TAKEN_UP = 1e-6  # rad/s^2 or m/s^2, and relative: what rounding leaves of an acceleration at the start
@@ -264,6 +244,7 @@ def _resolved(
     from trajcli.planning.resolve_poses import resolve_pose
 
     try:
+        near = near if target.near is None else np.array(target.near)
         resolved, poses[index] = resolve_pose(target, loaded.robot, near)
     except TrajcliError as error:
         name = loaded.point_meant(target, ("start",) if index is None else ("moves", index))

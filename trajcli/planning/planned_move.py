@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from dataclasses import field, replace
+from typing import TYPE_CHECKING, TypeVar
 
+from trajcli.curves.piecewise import Array
 from trajcli.errors import PlanningError
+from trajcli.frozen import frozen
 from trajcli.job.read import LoadedJob
 from trajcli.kinematics.robot import Robot
 from trajcli.limits.kinds import has_further_limits
@@ -13,9 +15,54 @@ from trajcli.planners.planner import PlannedMove, Planner
 from trajcli.trajectory import State
 
 if TYPE_CHECKING:
+    from trajcli.language.targets import Target
     from trajcli.planning.adaptation import Adaptation
+    from trajcli.planning.resolve_poses import ResolvedPose
 
+T = TypeVar("T")
 _TRIES = 20  # durations of a move with its breaks on rows
+
+
+@frozen
+class KnownMoves:
+    """Moves that are planned: rounds of a repeat that are the same motion are planned once.
+
+    Attributes:
+        poses: How poses are reached, by the index of the move.
+        moves: By all that a motion depends on beside the job.
+    """
+
+    poses: dict[int | None, ResolvedPose]
+    moves: dict[tuple[object, ...], PlannedMove] = field(default_factory=dict)
+
+    def move(self, index: int, motion: tuple[object, ...]) -> PlannedMove | None:
+        """Return a move that is the same motion as one before; None where none is."""
+        same = self.moves.get(motion)
+        if same is None:
+            return None
+        if same.index in self.poses:
+            self.poses[index] = self.poses[same.index]
+        return replace(same, index=index)
+
+
+def placed(loaded: LoadedJob, value: T, robot: Robot, joints: Array | None, standing: Target | None) -> T:
+    """Return a move or a target with joints or a pose in each target that waits for where the arm stands.
+
+    Args:
+        loaded: The job.
+        value: The move or the target.
+        robot: With the tool in force.
+        joints: Where the arm stands, (n,), rad or m; None before the start.
+        standing: How the job gives that; None where it does not.
+
+    Raises:
+        InputError: When nothing stands yet, or the arm has no geometry.
+    """
+    if not loaded.waits:
+        return value
+    from trajcli.planning.relative_targets import Stand
+
+    return Stand(robot, joints, standing, loaded.job.points).placed(value)
 
 
 def plan_move_within(

@@ -73,7 +73,7 @@ class ArcFields(Model):
             target = getattr(self, name)
             if target is not None:
                 yield from flaws_of_target(target, (name,), "an arc")
-        if self.via is not None and self.via.joints is None and not self.via.gives_position:
+        if self.via is not None and not (self.via.joints or self.via.waits or self.via.gives_position):
             yield ("via",), "the point that an arc passes needs `xyz`", None
 
 

@@ -293,7 +293,7 @@ def _placed(point: Waypoint, resolved: Target) -> Waypoint:
     """Return the point with the joints that reach it."""
     if not point.gives_pose:
         return point
-    return Waypoint(**resolved.model_dump(), time=point.time, blend=point.blend)
+    return Waypoint(**resolved.model_dump(by_alias=True), time=point.time, blend=point.blend)
 
 
 def via_points(points: PointTable, times: Array) -> ViaPoints:
