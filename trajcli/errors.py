@@ -90,6 +90,11 @@ def _towards(value: float, side: Literal["up", "down"] | None, digits: int = _DI
 Amounts = Mapping[str, Amount | str]
 """What stands for each `{name}` in a message: a number, or a text of the user's, such as a joint's name."""
 
+LONGEST_LINE = 4000
+"""Characters of a message, or of a line for people, at most."""
+_HALF_LINE = LONGEST_LINE // 2 - 3
+_CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069]")
+"""Control characters, ends of lines, and what turns the direction of a text."""
 _FIELD = re.compile(r"\{(\w+)\}")
 
 
@@ -150,19 +155,22 @@ class Problem:
 def said(message: str, amounts: Amounts, say: Callable[[Amount], str] = str) -> str:
     """Return a message with its amounts, which stand in it as `{name}`, as `say` writes them.
 
-    It is filled in one pass: braces inside of what is filled in are text.
+    It is filled in one pass: braces inside of what is filled in are text. Of a very long one the middle is
+    left out: a file may hold a name of a million characters.
     """
 
     def fill(match: re.Match[str]) -> str:
         amount = amounts.get(match[1], match[0])
         return amount if isinstance(amount, str) else say(amount)
 
-    return _FIELD.sub(fill, message) if amounts else message
+    text = _FIELD.sub(fill, message) if amounts else message
+    return text if len(text) <= LONGEST_LINE else f"{text[:_HALF_LINE]} ... {text[-_HALF_LINE:]}"
 
 
 def utf8(name: str) -> str:
-    """Return the name of a file with its bytes that are no UTF-8 as escapes, so that it can be written."""
-    return name.encode("utf-8", "backslashreplace").decode()
+    """Return the name of a file in one line: bytes that are no UTF-8, and control characters, as escapes."""
+    text = name.encode("utf-8", "backslashreplace").decode()
+    return _CONTROL.sub(lambda match: match[0].encode("unicode_escape").decode("ascii"), text)
 
 
 class TrajcliError(Exception):

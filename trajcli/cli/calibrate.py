@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trajcli.cli.numbers import number, table_lines
-from trajcli.cli.outcome import print_json, print_lines, print_remark
+from trajcli.cli.outcome import print_json, print_lines, print_remark, print_text
 from trajcli.columns import columns_of
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
@@ -188,7 +188,7 @@ def _plan(arm: ArmInUnits, length: float | None, options: CalibrateCommand) -> i
     if options.as_json:
         print_json(plan_report(arm, joints, plan, parameters))
     elif options.output is None:
-        print_lines(rows.decode().splitlines())
+        print_text(rows.decode())
     print_remark(_summary(plan, parameters, count))
     return 0
 

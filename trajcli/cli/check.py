@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from trajcli.cli.numbers import number, table_lines
-from trajcli.cli.outcome import error_as_json, print_json, print_lines, print_remark, report_error
+from trajcli.cli.outcome import error_as_json, print_json, print_lines, print_remark, print_text, report_error
 from trajcli.errors import Amount, InputError, Place, Problem, TrajcliError, at_least
 from trajcli.findings import Finding
 from trajcli.judge.file import CheckedFile, CheckOptions, check_file
@@ -92,7 +92,7 @@ def _form(
 def _print_annotations(problems: Sequence[Problem], form: AnnotationForm, files: Sequence[str]) -> None:
     text = render_annotations(problems, form, files)
     if text:
-        print_lines([text.removesuffix("\n")])
+        print_text(text)
 
 
 def _judged(file: str, options: CheckCommand) -> tuple[CheckedFile, MotionReference | None]:

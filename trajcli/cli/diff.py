@@ -42,7 +42,7 @@ def run_diff(options: DiffCommand) -> int:
         code = max(code, mapping.get("exit", int(not mapping["equal"])))
         found.append(mapping)
         if text is not None and not options.as_json:
-            print_lines([text])
+            print_lines(text.splitlines())
     if options.as_json:
         print_json(found[0] if alone else found)
     return code

@@ -9,6 +9,8 @@ import math
 import unicodedata
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from trajcli.errors import LONGEST_LINE
+
 if TYPE_CHECKING:
     from trajcli.errors import Place, Problem
 
@@ -43,9 +45,9 @@ def render_problem(problem: Problem, *, color: bool) -> str:
         color: Whether to use the terminal's colors.
     """
     paint = _painted if color else _plain
-    place, hint = problem.place, _shown(problem.advice() or "")
-    where = f"{_shown(place.file)}:{place.line}:{place.column}: " if place is not None else ""
-    rows = [f"{paint(where, _BOLD) if where else ''}{paint('error:', _RED)} {_shown(problem.text())}"]
+    place, hint = problem.place, shown(problem.advice() or "")
+    where = f"{shown(place.file)}:{place.line}:{place.column}: " if place is not None else ""
+    rows = [f"{paint(where, _BOLD) if where else ''}{paint('error:', _RED)} {shown(problem.text())}"]
     if place is None or not place.source.strip():
         return "\n".join([*rows, *([f"  {paint(hint, _CYAN)}"] if hint else [])])
     source, offset, length = _window(place)
@@ -95,13 +97,11 @@ def _plain(text: str, code: str) -> str:
     return text
 
 
-def _shown(text: str) -> str:
-    """Return a text with its control characters as escapes."""
-    return (
-        text
-        if text.isascii() and text.isprintable()
-        else "".join(_cell(character).text for character in text)
-    )
+def shown(text: str) -> str:
+    """Return a line for people: control characters as escapes, and of a very long one the beginning."""
+    short = text if len(text) <= LONGEST_LINE + len(_CUT) else text[:LONGEST_LINE] + _CUT
+    plain = short.isascii() and short.isprintable()
+    return short if plain else "".join(_cell(character).text for character in short)
 
 
 def _cell(character: str) -> _Cell:

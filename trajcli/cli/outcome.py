@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Iterable
 from typing import Any, Literal
 
-from trajcli.errors import Problem, TrajcliError
+from trajcli.errors import LONGEST_LINE, Problem, TrajcliError
 
 ErrorForm = Literal["text", "json", "github", "junit", "sarif"]
 
@@ -104,13 +104,31 @@ def wants_color() -> bool:
 
 
 def print_lines(lines: Iterable[str]) -> None:
-    """Print lines of text.
+    """Print lines for people: what a file names cannot begin another line, or be a command of a log.
 
     Raises:
         FileError: When standard output cannot be written.
         BrokenPipeError: When its reader has closed it.
     """
-    text = "\n".join(lines) + "\n"
+    print_text("".join(f"{_line(line)}\n" for line in lines))
+
+
+def _line(text: str) -> str:
+    """Return a line as it is shown; what is plain costs nothing."""
+    if len(text) <= LONGEST_LINE and text.isascii() and text.isprintable():
+        return text
+    from trajcli.cli.frames import shown
+
+    return shown(text)
+
+
+def print_text(text: str) -> None:
+    """Print a document as it is: JSON, YAML, XML.
+
+    Raises:
+        FileError: When standard output cannot be written.
+        BrokenPipeError: When its reader has closed it.
+    """
     from trajcli.streams.whole_file import standard_output  # `--help` writes by other means
 
     with standard_output() as out:
@@ -119,7 +137,7 @@ def print_lines(lines: Iterable[str]) -> None:
 
 def print_remark(text: str) -> None:
     """Print a line for people on standard error."""
-    print(text, file=sys.stderr)  # noqa: T201
+    print(_line(text), file=sys.stderr)  # noqa: T201
 
 
 def print_json(value: Any) -> None:  # noqa: ANN401
@@ -129,7 +147,7 @@ def print_json(value: Any) -> None:  # noqa: ANN401
         FileError: When standard output cannot be written.
         BrokenPipeError: When its reader has closed it.
     """
-    print_lines(["".join(_written(value, ""))])
+    print_text("".join(_written(value, "")) + "\n")
 
 
 def _written(value: Any, indent: str) -> Iterable[str]:  # noqa: ANN401

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from trajcli.cli.outcome import print_remark
 from trajcli.cli.progress import progress
 from trajcli.curves.extrema import peaks
 from trajcli.errors import Amount, InputError, Problem, TrajcliError, VerificationError
@@ -98,7 +99,7 @@ def _older_rows_aside(options: PlanCommand) -> Iterator[None]:
 def _set_aside(options: PlanCommand) -> None:
     aside = None if options.no_output or options.output is None else set_aside(options.output)
     if aside is not None:
-        print(f"{options.output} was of an earlier plan: it is {aside} now", file=sys.stderr)  # noqa: T201
+        print_remark(f"{options.output} was of an earlier plan: it is {aside} now")
 
 
 def _beside_rows(
@@ -173,7 +174,8 @@ def _summarise_consumer(made: ForConsumer) -> None:
         lines.append(f"for {made.profile.name}: all necessary rules are kept")
         lines += [f"  {each.rule}: {each.message}{counted(each)}" for each in made.rules.findings]
         lines += [f"  not judged: {unjudged}"] if unjudged else []
-    print("\n".join(lines), file=sys.stderr)  # noqa: T201
+    for line in lines:
+        print_remark(line)
 
 
 def _refusal(plan: Plan, options: PlanCommand, made: ForConsumer | None) -> VerificationError | None:
@@ -281,9 +283,9 @@ def _report(
     for move in report.moves if compared else []:
         if move.reference is not None:
             text = _compared(move, move.reference)
-            print(f"move {move.index} ({move.planner}): {text}", file=sys.stderr)  # noqa: T201
+            print_remark(f"move {move.index} ({move.planner}): {text}")
         for line in peer_lines(in_units(move, plan.loaded.units), "  "):
-            print(line, file=sys.stderr)  # noqa: T201
+            print_remark(line)
 
 
 def peer_lines(move: MoveReport, indent: str) -> Iterator[str]:
@@ -331,10 +333,11 @@ def _beside_toppra(move: MoveReport, other: PathReferenceReport) -> str:
 
 
 def _summarise(plan: Plan, rows: int, *, geometry_missing: bool) -> None:
-    print(summary(plan, rows), file=sys.stderr)  # noqa: T201
+    for line in summary(plan, rows).splitlines():
+        print_remark(line)
     if geometry_missing:
         text = "  the robot has no geometry: the log has no frames, no robot description and no tool path"
-        print(text, file=sys.stderr)  # noqa: T201
+        print_remark(text)
 
 
 def summary(plan: Plan, rows: int) -> str:

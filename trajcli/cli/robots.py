@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from trajcli.cli.numbers import number, numbers, table_lines
-from trajcli.cli.outcome import print_json, print_lines, print_remark
+from trajcli.cli.outcome import print_json, print_lines, print_remark, print_text
 from trajcli.errors import InputError
 from trajcli.job.robot import catalogue_names, is_urdf
 from trajcli.queries.arm import open_sheet
@@ -46,11 +46,11 @@ def run_robots(options: RobotsCommand) -> int:
         if sheet.text is None:
             hint = f"`trajcli plan {name} --no-output --resolved FILE` writes the job with its robot"
             raise InputError(f"{name} is a job, and no robot file", hint=hint)
-        print_lines([sheet.text.rstrip("\n")])
+        print_text(sheet.text.rstrip("\n") + "\n")
     elif options.as_urdf:
         from trajcli.urdf.write import urdf_of
 
-        print_lines([urdf_of(sheet.robot).rstrip("\n")])
+        print_text(urdf_of(sheet.robot).rstrip("\n") + "\n")
     elif options.as_json:
         print_json(robot_card(name, sheet))
     else:

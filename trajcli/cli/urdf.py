@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from trajcli.cli.outcome import print_lines, print_remark
+from trajcli.cli.outcome import print_remark, print_text
 from trajcli.errors import InputError, Place
 from trajcli.job.dump import dump_robot
 from trajcli.job.robot import read_urdf, urdf_sheet
@@ -30,7 +30,7 @@ def run_urdf(options: UrdfCommand) -> int:
         raise error.located(place=Place(name, 1, 1)) from None
     text = dump_robot(urdf_sheet(name, read))
     if options.output in (None, "-"):
-        print_lines([text.rstrip("\n")])
+        print_text(text.rstrip("\n") + "\n")
     else:
         _write(text, options.file, str(options.output))
     first, *more = read.remarks

@@ -11,7 +11,7 @@ import numpy as np
 from trajcli.columns import Column
 from trajcli.comparison.tables import Pair, align_rows, interpolate_rows, pair_columns, time_pair
 from trajcli.curves.piecewise import Array
-from trajcli.errors import InputError, Problem
+from trajcli.errors import InputError, Problem, utf8
 from trajcli.frozen import comparable
 from trajcli.streams.table import Table
 
@@ -221,18 +221,16 @@ def _flaw(entry: str, name: str, equals: str, number: str, known: Mapping[str, f
 
 def describe(difference: Difference) -> str:
     """Return lines for people, without a line feed at the end."""
-    a, b = difference.files
+    a, b = files = tuple(map(utf8, difference.files))
     what = f"{_count(difference.rows, 'row')}, {_count(len(difference.columns), 'column')}"
     lines = [
         f"{'equal' if difference.equal else 'different'}: {a} and {b} ({what} compared)",
         *difference.notes,
     ]
-    lines += [f"{difference.files[index]} has no column {name}" for name, index in difference.missing]
+    lines += [f"{files[index]} has no column {utf8(name)}" for name, index in difference.missing]
     if difference.ended is not None:
         index, time = difference.ended
-        lines.append(
-            f"{difference.files[index]} ends at t = {time:.12g} s, before {difference.files[1 - index]}"
-        )
+        lines.append(f"{files[index]} ends at t = {time:.12g} s, before {files[1 - index]}")
     if difference.first is not None:
         lines.append("first: " + _text(difference.first))
     if difference.worst.difference > 0:

@@ -21,7 +21,6 @@ from trajcli.errors import (
     Problem,
     TrajcliError,
     VerificationError,
-    utf8,
 )
 from trajcli.version import __version__
 
@@ -105,8 +104,13 @@ def _github(problem: Problem) -> str:
 
 def _github_data(text: str) -> str:
     """Return a message with the escapes that the runner undoes."""
-    text = utf8(text).replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+    text = _encodable(text).replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
     return _NO_XML.sub(_escaped, text)
+
+
+def _encodable(text: str) -> str:
+    """Return a text with what UTF-8 cannot hold as escapes."""
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 def _github_property(text: str) -> str:
@@ -210,7 +214,7 @@ def _sarif_result(problem: Problem, index: int) -> dict[str, Any]:
         "ruleId": str(problem.kind),
         "ruleIndex": index,
         "level": problem.severity,
-        "message": {"text": utf8(problem.message)},
+        "message": {"text": _encodable(problem.message)},
     }
     properties = {key: value for key, value in known.items() if value is not None}
     if properties:
