@@ -19,7 +19,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from trajcli.api.motions import Motion, batch, plot, resample, retime, view
+    from trajcli.api.motions import Motion, batch, plot, resample, retime, sweep, view
     from trajcli.api.plans import Arm, InverseSolution, PlannedJob, check, load_robot, plan
     from trajcli.checks.verify import Verdict
     from trajcli.curves.piecewise import PiecewisePolynomial
@@ -69,7 +69,7 @@ _HOMES = {
     "trajcli.job.robot": ("catalogue_names",),
     "trajcli.judge.judgement": ("Judgement",),
     "trajcli.kinematics.robot": ("Joint", "Limits", "Robot"),
-    "trajcli.api.motions": ("Motion", "batch", "plot", "resample", "retime", "view"),
+    "trajcli.api.motions": ("Motion", "batch", "plot", "resample", "retime", "sweep", "view"),
     "trajcli.planning.plan": ("Plan", "plan_job"),
     "trajcli.output.report": ("report_of", "verification_error"),
     "trajcli.output.write": ("write_plan",),
@@ -119,6 +119,7 @@ __all__ = [
     "report_of",
     "resample",
     "retime",
+    "sweep",
     "verification_error",
     "view",
     "write_plan",

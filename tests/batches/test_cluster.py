@@ -90,6 +90,20 @@ def test_a_cluster_does_what_processes_do(cluster: Any) -> None:
 
 
 @pytest.mark.usefixtures("folder")
+def test_a_sweep_is_the_same_table(cluster: Any, capfd: pytest.CaptureFixture[str]) -> None:
+    words = ["sweep", "jobs/a.yaml", "--vary", "moves.0.duration=0.1..1:4", "--vary", "name=x,y"]
+    engines = (["-j", "2"], ["--engine", "dask", "--scheduler", cluster.scheduler_address])
+    tables = []
+    for engine in engines:
+        with pytest.raises(SystemExit, match=r"^0$"):
+            app([*words, *engine])
+        tables.append(capfd.readouterr().out)
+    assert tables[0] == tables[1]
+    assert tables[0].count("exceeded") == 4
+    assert tables[0].count("verified") == 4
+
+
+@pytest.mark.usefixtures("folder")
 def test_a_killed_worker_costs_its_own_job(cluster: Any) -> None:
     Path("jobs/fast.yaml").write_text(
         JOB.replace("rate: 10", "rate: 1e6").replace("duration: 1}", "duration: 1000}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from trajcli.errors import InputError
@@ -117,3 +118,69 @@ def test_the_rest_of_the_file_keeps_its_places(path: Path) -> None:
     with pytest.raises(InputError) as caught:
         load_job(path, ["moves.0.duration=3"])
     assert str(caught.value.problems[0].place) == f"{path}:7:28"
+
+
+ARM = """\
+version: 1
+units: {angle: deg, length: mm}
+robot: ur5e
+start: {joints: [0, -90, 90, 0, 90, 0]}
+moves: [{planner: quintic, to: {joints: [10, -80, 90, 0, 90, 0]}, duration: 2}]
+"""
+
+
+@pytest.fixture
+def arm(tmp_path: Path) -> Path:
+    file = tmp_path / "arm.yaml"
+    file.write_text(ARM)
+    return file
+
+
+def test_what_the_job_leaves_out_is_written_first(arm: Path) -> None:
+    """The rest stays as it is without the setting; lengths are in mm and angles in degrees."""
+    plain = load_job(arm).robot
+    moved = load_job(arm, ["base.xyz.1=250", "tool.xyz.2=80"]).robot
+    assert moved.base[:3, 3].tolist() == [plain.base[0, 3], 0.25, plain.base[2, 3]]
+    np.testing.assert_allclose(moved.base[:3, :3], plain.base[:3, :3], atol=1e-15)  # half a turn about z
+    assert moved.base[0, 0] == -1
+    np.testing.assert_array_equal(moved.tool[:3, 3], [*plain.tool[:2, 3], 0.08])
+    turned = load_job(arm, ["base.rpy.2=90"]).robot
+    np.testing.assert_allclose(turned.base[:3, :3], [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-15)
+    assert load_job(arm, ["gravity.2=-1.62"]).job.gravity == (0, 0, -1.62)
+    assert load_job(arm, ["output.columns.3=pose"]).job.output.columns == ("t", "q", "qd", "pose")
+    start = load_job(arm, ["start.velocity.1=5"]).job.start
+    assert start.velocity == pytest.approx([0, np.radians(5), 0, 0, 0, 0])
+
+
+def test_a_limit_of_one_joint_leaves_the_others(arm: Path) -> None:
+    plain, other = (load_job(arm, settings).robot.limits for settings in ([], ["limits.velocity.2=[-7, 9]"]))
+    expected = plain.velocity.copy()
+    expected[2] = np.radians([-7, 9])
+    np.testing.assert_allclose(other.velocity, expected, rtol=1e-15)
+    np.testing.assert_array_equal(other.position, plain.position)
+    effort = load_job(arm, ["limits.effort.0=12"]).robot.limits.effort
+    assert effort.tolist() == [[-12, 12], [-150, 150], [-150, 150], *[[-28, 28]] * 3]
+    once = load_job(arm, ["limits={velocity: [1, 2, 3, 4, 5, 6]}", "moves.0.limits.velocity.2=2"])
+    assert once.job.moves[0].limits.velocity[2] == pytest.approx(np.radians([-2, 2]))
+    assert once.job.moves[0].limits.velocity[5] == pytest.approx(np.radians([-6, 6]))
+
+
+def test_settings_go_on_where_others_have_written(arm: Path) -> None:
+    whole = load_job(arm, ["base={xyz: [1, 2, 3]}"]).robot.base
+    parts = load_job(
+        arm, ["base={xyz: [0, 0, 0]}", "base.xyz.0=1", "base.xyz.1=2", "base.xyz.2=3"]
+    ).robot.base
+    np.testing.assert_array_equal(whole, parts)
+    turned = load_job(arm, ["base={xyz: [1, 2, 3]}", "base.rpy.0=90"]).robot.base
+    np.testing.assert_array_equal(turned[:3, 3], whole[:3, 3])
+    assert turned[2, 1] == 1
+
+
+def test_what_nothing_takes_the_place_of_is_asked_for(arm: Path) -> None:
+    with pytest.raises(InputError) as refused:
+        load_job(arm, ["moves.0.to.xyz.0=3"])
+    (problem,) = refused.value.problems
+    assert problem.message == (
+        "--set moves.0.to.xyz.0=3: the job has no moves.0.to.xyz, and nothing takes its place"
+    )
+    assert problem.hint == "write the whole of it: moves.0.to.xyz=[...]"

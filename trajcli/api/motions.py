@@ -13,13 +13,14 @@ import numpy as np
 from trajcli.api.plans import plan as planned_job
 from trajcli.curves.piecewise import Array
 from trajcli.editing.edited_motion import EditedMotion, ReadingOptions, read_motion
-from trajcli.errors import InputError, VerificationError
+from trajcli.errors import InputError, TrajcliError, VerificationError
 from trajcli.frozen import frozen
 from trajcli.planning.plan import Plan
 from trajcli.streams.reading import holds_motion
 from trajcli.streams.whole_file import whole_file
 
 if TYPE_CHECKING:
+    from trajcli.batches.sweep_table import SweepTable
     from trajcli.batches.task import JobOutcome
     from trajcli.editing.retiming import Stretch
     from trajcli.streams.formats import FormatName
@@ -291,6 +292,67 @@ def batch(
         ledgers.write()
     order = {job.job: index for index, job in enumerate(found.jobs)}
     return sorted(outcomes, key=lambda outcome: order[outcome.job.job])
+
+
+def sweep(
+    job: str | Path | Mapping[str, Any],
+    vary: Mapping[str, str | Sequence[Any]],
+    output: str | Path | None = None,
+    *,
+    samples: int | None = None,
+    seed: int = 0,
+    processes: int | None = None,
+    timeout: float | None = 600.0,
+    force: bool = False,
+) -> SweepTable:
+    """Plan one job over a grid of values in several processes, as `trajcli sweep` does; return the table.
+
+    Args:
+        job: A job file, the text of a job, or a mapping.
+        vary: By paths such as "limits.tcp.speed", the values: a list, or a text such as "100..500:9".
+        output: The file of the table, .csv or .jsonl, beside which what came of the points is kept for the
+            next time; nothing is written where left out.
+        samples: So many of the combinations, drawn evenly by chance; all where left out.
+        seed: Of that chance.
+        processes: At most; one a core where left out.
+        timeout: What a point may take, s; None for ever.
+        force: Whether points that are known are planned again.
+
+    Raises:
+        InputError: When a path leads nowhere, or there are too many points.
+        FileError: When the job cannot be read, or the table not written.
+        TrajcliError: When a process that planned a point has crashed.
+    """
+    from trajcli.batches.processes import run_in_processes, usable_cores
+    from trajcli.batches.sweep import PointLedger, axis_of, outcomes_of, parse_axis, sweep_of
+    from trajcli.batches.sweep_table import SweepRow, SweepTable, form_of_table
+    from trajcli.job.dump import mapping_text
+    from trajcli.job.yaml.source import read_bytes
+
+    if isinstance(job, Mapping) or "\n" in str(job):
+        file, content = "<text>", (mapping_text(job) if isinstance(job, Mapping) else str(job)).encode()
+    else:
+        file, content = str(job), read_bytes(str(job))
+    axes = [
+        parse_axis(f"{path}={values}") if isinstance(values, str) else axis_of(path, values)
+        for path, values in vary.items()
+    ]
+    swept = sweep_of(file, content, axes, samples, seed)
+    table = None if output is None else str(output)
+    if table is not None:
+        form_of_table(table)
+    count = min(processes or usable_cores(), len(swept.rows))
+    ledger = PointLedger(table, force=force)
+    rows = dict[int, SweepRow]()
+    run = partial(run_in_processes, count=count, timeout=timeout)
+    for row, outcome in outcomes_of(swept, ledger, run):
+        if outcome.point is None:
+            raise TrajcliError(*outcome.problems)
+        rows[row] = SweepRow(swept.values(swept.rows[row]), outcome.point)
+    made = SweepTable(tuple(axis.path for axis in axes), tuple(rows[row] for row in sorted(rows)))
+    if table is not None:
+        made.save(table)
+    return made
 
 
 def _is_motion(source: JobSource) -> bool:

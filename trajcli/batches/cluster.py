@@ -10,7 +10,7 @@ from threading import Lock
 from typing import Any
 
 from trajcli.batches.jobs import BatchJob
-from trajcli.batches.task import BUG, BatchSetup, JobOutcome, Task, run_task
+from trajcli.batches.task import BUG, JobOutcome, Setup, Task, run_task
 from trajcli.errors import FileError, InputError, Problem
 
 _CONNECTING = 10.0  # s until a scheduler that does not answer is given up
@@ -20,7 +20,7 @@ _ONE_AT_A_TIME = Lock()
 
 def run_on_cluster(
     tasks: Sequence[Task],
-    setup: BatchSetup,
+    setup: Setup,
     address: str | None,
     on_tick: Callable[[], None] = lambda: None,
 ) -> Generator[JobOutcome, None, None]:
@@ -79,10 +79,10 @@ def _absolute(task: Task) -> Task:
     known = task.known
     if known is not None:
         known = replace(known, files=tuple(str(Path(file).absolute()) for file in known.files))
-    return Task(job, known)
+    return replace(task, job=job, known=known)
 
 
-def _run_on_worker(task: Task, setup: BatchSetup) -> JobOutcome:
+def _run_on_worker(task: Task, setup: Setup) -> JobOutcome:
     with _ONE_AT_A_TIME:
         return run_task(task, setup)
 

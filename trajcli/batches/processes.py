@@ -14,7 +14,7 @@ from threading import Thread
 from time import monotonic
 from typing import Any, NoReturn
 
-from trajcli.batches.task import BUG, BatchSetup, JobOutcome, Task, run_task
+from trajcli.batches.task import BUG, JobOutcome, Setup, Task, run_task
 from trajcli.errors import PlanningError, Problem
 from trajcli.streams.whole_file import remove_unfinished
 
@@ -32,7 +32,7 @@ def usable_cores() -> int:
 class _Worker:
     """A process that does one task after the other, and the task that it does now."""
 
-    def __init__(self, context: Any, setup: BatchSetup, lifeline: tuple[Connection, Connection]) -> None:  # noqa: ANN401
+    def __init__(self, context: Any, setup: Setup, lifeline: tuple[Connection, Connection]) -> None:  # noqa: ANN401
         self.connection, theirs = Pipe()
         self.process = context.Process(target=_work, args=(theirs, lifeline, setup), daemon=True)
         self.process.start()
@@ -68,7 +68,7 @@ class _Worker:
 
 def run_in_processes(
     tasks: Sequence[Task],
-    setup: BatchSetup,
+    setup: Setup,
     count: int,
     timeout: float | None,
     on_tick: Callable[[], None] = lambda: None,
@@ -103,7 +103,7 @@ def run_in_processes(
 class _Workers:
     """The processes that are alive."""
 
-    def __init__(self, setup: BatchSetup, timeout: float | None) -> None:
+    def __init__(self, setup: Setup, timeout: float | None) -> None:
         self._setup, self._timeout = setup, timeout
         self._context, self._lifeline = _context(), Pipe(duplex=False)
         self._all: list[_Worker] = []
@@ -178,7 +178,7 @@ def _crashed(worker: _Worker, task: Task, seconds: float) -> JobOutcome:
     return JobOutcome(task.job, "crashed", BUG, (problem,), seconds=seconds, remains=False)
 
 
-def _work(connection: Connection, lifeline: tuple[Connection, Connection], setup: BatchSetup) -> None:
+def _work(connection: Connection, lifeline: tuple[Connection, Connection], setup: Setup) -> None:
     """Do the tasks that come, until none comes any more."""
     signal.signal(
         signal.SIGINT, signal.SIG_IGN

@@ -1,12 +1,16 @@
-"""One job of a batch: planned, judged and written unless it is unchanged; its outcome as a value."""
+"""One job of a batch: planned, judged and written unless it is unchanged; its outcome as a value.
+
+A sweep is done in the same way: each of its points is the one job with some values set, and has no file.
+"""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from time import monotonic
-from typing import Literal
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
@@ -21,8 +25,20 @@ from trajcli.output.delivery.delivered import delivered
 from trajcli.output.write import grid_of, write_rows
 from trajcli.streams.formats import FormatName, format_of
 
+if TYPE_CHECKING:
+    from trajcli.job.override import Setting
+
 BUG = 70
 OutcomeName = Literal["written", "unchanged", "failed", "crashed", "timed out"]
+PointVerdict = Literal["verified", "exceeded", "unreachable", "input"]
+
+
+class Setup(Protocol):
+    """What all jobs share, and what is done with one of them."""
+
+    def done(self, task: Task, hashed: InputsHash) -> JobOutcome:
+        """Return what comes of a job."""
+        ...
 
 
 @frozen
@@ -57,6 +73,19 @@ class BatchSetup:
 
         return overridden(document, [Setting(f"--rows {self.rows}", ("output", "rows"), self.rows)])
 
+    def done(self, task: Task, hashed: InputsHash) -> JobOutcome:
+        """Write the rows of a job, unless they are as they would be written.
+
+        Raises:
+            TrajcliError: Why there are none.
+        """
+        entry = _unchanged(task, self)
+        outcome: OutcomeName = "unchanged" if entry is not None else "written"
+        if entry is None:
+            entry = _written(task, self, hashed)
+        inputs = entry.inputs or hashed.value
+        return JobOutcome(task.job, outcome, 0, (), entry.duration, task.job.output, entry, inputs)
+
 
 @frozen
 class Task:
@@ -65,10 +94,31 @@ class Task:
     Attributes:
         job: What is read and written.
         known: What its output was made of when it was written; None to plan it in any case.
+        settings: What takes the place of the job's own values.
     """
 
     job: BatchJob
     known: LedgerEntry | None
+    settings: tuple[Setting, ...] = ()
+
+
+@comparable
+class SweepPoint:
+    """What comes of a job at one point of a sweep.
+
+    Attributes:
+        verdict: "verified"; "exceeded", a limit is; "unreachable", there is no motion; "input", it is no job.
+        duration: Of the trajectory, s; None where there is none.
+        tightest: The limit of which most is used, where and how much; None where there is none.
+        bound: No motion under these limits is shorter, s; None where nothing is known.
+        reason: Why it is not verified.
+    """
+
+    verdict: PointVerdict
+    duration: float | None = None
+    tightest: str | None = None
+    bound: float | None = None
+    reason: str | None = None
 
 
 @comparable
@@ -87,6 +137,7 @@ class JobOutcome:
         inputs: Hash of job, files, version and format; None where they could not be read.
         seconds: That it took.
         remains: Whether the process may do more jobs: not after it ran out of memory.
+        point: Of a sweep.
     """
 
     job: BatchJob
@@ -99,21 +150,15 @@ class JobOutcome:
     inputs: str | None = None
     seconds: float = 0.0
     remains: bool = True
+    point: SweepPoint | None = None
 
 
-def run_task(task: Task, setup: BatchSetup) -> JobOutcome:
+def run_task(task: Task, setup: Setup) -> JobOutcome:
     """Return what comes of a job; nothing is raised but what ends the process."""
     begun = monotonic()
-    job, hashed = task.job, _Hash()
+    job, hashed = task.job, InputsHash()
     try:
-        entry = _unchanged(task, setup)
-        outcome: OutcomeName = "unchanged" if entry is not None else "written"
-        if entry is None:
-            entry = _written(task, setup, hashed)
-        seconds = monotonic() - begun
-        return JobOutcome(
-            job, outcome, 0, (), entry.duration, job.output, entry, entry.inputs or hashed.value, seconds
-        )
+        return replace(setup.done(task, hashed), seconds=monotonic() - begun)
     except TrajcliError as error:
         code, problems, remains = error.exit_code, error.problems, True
     except MemoryError:
@@ -129,7 +174,7 @@ def run_task(task: Task, setup: BatchSetup) -> JobOutcome:
     )
 
 
-class _Hash:
+class InputsHash:
     """The hash of what a job is made of, once it is known."""
 
     value: str | None = None
@@ -144,7 +189,7 @@ def _unchanged(task: Task, setup: BatchSetup) -> LedgerEntry | None:
     return known if now == known.inputs else None
 
 
-def _written(task: Task, setup: BatchSetup, hashed: _Hash) -> LedgerEntry:
+def _written(task: Task, setup: BatchSetup, hashed: InputsHash) -> LedgerEntry:
     """Return the entry of an output that was planned, judged and written."""
     job = task.job
     content = read_bytes(job.job)

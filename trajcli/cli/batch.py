@@ -11,7 +11,7 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from trajcli.batches.jobs import BatchJobs, Ledgers, find_jobs
-from trajcli.batches.task import BatchSetup, JobOutcome, Task
+from trajcli.batches.task import BatchSetup, JobOutcome, Setup, Task
 from trajcli.cli.frames import problem_as_json
 from trajcli.cli.outcome import ErrorForm, print_remark, report_error
 from trajcli.cli.progress import ERASE, WIDTH, is_terminal
@@ -19,7 +19,7 @@ from trajcli.errors import FileError, InputError, PlanningError, TrajcliError, V
 from trajcli.streams.whole_file import standard_output
 
 if TYPE_CHECKING:
-    from trajcli.cli.motion_commands import BatchCommand
+    from trajcli.cli.motion_commands import BatchCommand, SweepCommand
 
 _TIMEOUT = 600.0  # s
 _SHOWN = 5  # names of files in a remark
@@ -33,15 +33,15 @@ def run_batch(options: BatchCommand) -> int:
         FileError: When a folder cannot be read, or a scheduler cannot be reached.
         BrokenPipeError: When the reader has closed the pipe.
     """
-    count, timeout = _processes(options), _timeout(options)
+    limits = processes_of(options), timeout_of(options)
     found = find_jobs(options.jobs, options.output, options.form)
     record = Ledgers(found.jobs)
     known = {} if options.force else record.known()
     tasks = [Task(job, known.get(job.output)) for job in found.jobs]
     setup = BatchSetup(options.form, found.owners(), options.rows, options.consumer, options.strict)
-    progress = _Progress(len(tasks))
+    progress = Progress(len(tasks))
     try:
-        with closing(_outcomes(tasks, setup, options, (count, timeout), progress.show)) as outcomes:
+        with closing(outcomes_of_tasks(tasks, setup, options, limits, progress.show)) as outcomes:
             failed = _print_outcomes(outcomes, progress, record, options.errors)
     finally:
         progress.erase()
@@ -57,10 +57,10 @@ def run_batch(options: BatchCommand) -> int:
     return progress.worst
 
 
-def _outcomes(
+def outcomes_of_tasks(
     tasks: Sequence[Task],
-    setup: BatchSetup,
-    options: BatchCommand,
+    setup: Setup,
+    options: BatchCommand | SweepCommand,
     limits: tuple[int, float | None],
     on_tick: Callable[[], None],
 ) -> Generator[JobOutcome, None, None]:
@@ -75,7 +75,7 @@ def _outcomes(
     return run_in_processes(tasks, setup, min(count, len(tasks)), timeout, on_tick)
 
 
-def _processes(options: BatchCommand) -> int:
+def processes_of(options: BatchCommand | SweepCommand) -> int:
     """Return how many processes there are at most."""
     from trajcli.batches.processes import usable_cores
 
@@ -91,7 +91,7 @@ def _processes(options: BatchCommand) -> int:
     return int(options.count)
 
 
-def _timeout(options: BatchCommand) -> float | None:
+def timeout_of(options: BatchCommand | SweepCommand) -> float | None:
     """Return how long a job may take, s; None for ever."""
     if options.timeout is None:
         return _TIMEOUT
@@ -107,7 +107,7 @@ def _timeout(options: BatchCommand) -> float | None:
 
 
 def _print_outcomes(
-    outcomes: Iterator[JobOutcome], progress: _Progress, record: Ledgers, errors: ErrorForm
+    outcomes: Iterator[JobOutcome], progress: Progress, record: Ledgers, errors: ErrorForm
 ) -> list[JobOutcome]:
     """Print a line for each outcome as soon as it is there, and why jobs failed; return the failed ones."""
     failed = list[JobOutcome]()
@@ -120,7 +120,7 @@ def _print_outcomes(
             if outcome.exit_code:
                 failed.append(outcome)
                 _say_why(outcome, record.set_aside(outcome.job), errors)
-            progress.add(outcome)
+            progress.add(outcome.outcome, outcome.exit_code)
     return failed
 
 
@@ -170,7 +170,7 @@ def _as_json(outcome: JobOutcome) -> dict[str, Any]:
     }
 
 
-def _say_what_came(found: BatchJobs, progress: _Progress) -> None:
+def _say_what_came(found: BatchJobs, progress: Progress) -> None:
     if found.no_jobs:
         shown = ", ".join(utf8(name) for name in found.no_jobs[:_SHOWN])
         more = f" and {len(found.no_jobs) - _SHOWN} more" if len(found.no_jobs) > _SHOWN else ""
@@ -178,11 +178,11 @@ def _say_what_came(found: BatchJobs, progress: _Progress) -> None:
     print_remark(f"{progress.total} job{'s' * (progress.total != 1)}: {progress.text}")
 
 
-class _Progress:
+class Progress:
     """How many jobs are done, with what outcome; shown on a terminal beside which no lines are printed."""
 
-    def __init__(self, total: int) -> None:
-        self.total, self.worst = total, 0
+    def __init__(self, total: int, one: str = "job") -> None:
+        self.total, self.worst, self._one = total, 0, one
         self._done: Counter[str] = Counter()
         self._shows = is_terminal(sys.stderr) and not is_terminal(sys.stdout)
         self._begun, self._visible = monotonic(), False
@@ -193,16 +193,16 @@ class _Progress:
         counts = [f"{number} {name}" for name, number in sorted(self._done.items(), key=lambda one: -one[1])]
         return f"{', '.join(counts)}, {monotonic() - self._begun:.3g} s"
 
-    def add(self, outcome: JobOutcome) -> None:
+    def add(self, outcome: str, exit_code: int) -> None:
         """Count a job that is done."""
-        self._done[outcome.outcome] += 1
-        self.worst = max(self.worst, outcome.exit_code)
+        self._done[outcome] += 1
+        self.worst = max(self.worst, exit_code)
         self.show()
 
     def show(self) -> None:
         """Write the line anew."""
         if self._shows:
-            line = f"{self._done.total()} of {self.total} jobs: {self.text}".replace(": ,", ",")
+            line = f"{self._done.total()} of {self.total} {self._one}s: {self.text}".replace(": ,", ",")
             sys.stderr.write(f"{ERASE}{line[:WIDTH]}")
             sys.stderr.flush()
             self._visible = True

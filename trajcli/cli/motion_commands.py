@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 import typer
 
 from trajcli.cli.command import Command, CommandLine
-from trajcli.cli.options import Consumer, JobErrors, RowTimes, robot_names
+from trajcli.cli.options import Consumer, JobErrors, JobFile, RowTimes, robot_names
 
 MotionSource = Annotated[
     str, typer.Argument(metavar="FILE", help="CSV, MCAP, ROS messages, JSON lines, .npy, .npz; - is stdin.")
@@ -37,6 +37,19 @@ FieldName = Annotated[
     str | None, typer.Option("--field", metavar="F", help="Of messages with several states: the one meant.")
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Nothing on stderr but errors.")]
+Count = Annotated[str | None, typer.Option("-j", metavar="N", help="Processes at a time; else one a core.")]
+Timeout = Annotated[
+    str | None,
+    typer.Option("--timeout", metavar="SECONDS", help="For each job; 0 for no end.", show_default="600"),
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Of the cluster, such as tcp://10.0.0.5:8786; else that of Dask's configuration.",
+    ),
+]
 
 
 class EditCommand(Command):
@@ -67,9 +80,7 @@ class BatchCommand(CommandLine):
             "--output", "-o", metavar="DIR", help="Where the rows go; else beside each job, under its name."
         ),
     ] = None
-    count: Annotated[
-        str | None, typer.Option("-j", metavar="N", help="Processes at a time; else one a core.")
-    ] = None
+    count: Count = None
     form: Annotated[
         Literal["csv", "mcap", "jsonl", "npy", "npz", "ros", "ros-goal"],
         typer.Option("--format", help="Of the rows."),
@@ -77,27 +88,73 @@ class BatchCommand(CommandLine):
     rows: RowTimes = None
     consumer: Consumer = None
     force: Annotated[bool, typer.Option("--force", help="Plan unchanged jobs, too.")] = False
-    timeout: Annotated[
-        str | None,
-        typer.Option("--timeout", metavar="SECONDS", help="For each job; 0 for no end.", show_default="600"),
-    ] = None
+    timeout: Timeout = None
     engine: Annotated[
         Literal["processes", "dask"],
         typer.Option("--engine", help="Processes of this machine, or the workers of a Dask cluster."),
     ] = "processes"
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            "--scheduler",
-            metavar="ADDRESS",
-            help="Of the cluster, such as tcp://10.0.0.5:8786; else that of Dask's configuration.",
-        ),
-    ] = None
+    scheduler: Scheduler = None
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on stderr.")] = False
     strict: Annotated[
         bool, typer.Option("--strict", help="A job with an event fails: a concession, or a warning of --for.")
     ] = False
     errors: JobErrors = "text"
+
+
+class SweepCommand(Command):
+    """Plan one job over a grid of values: a row each with verdict, duration, what binds, and a bound.
+
+    Points that an earlier sweep into the same table has planned are not planned again.
+    """
+
+    example = "trajcli sweep examples/quintic.yaml --vary moves.0.duration=1..3:3 --best duration"
+
+    job: JobFile
+    vary: Annotated[
+        list[str],
+        typer.Option(
+            "--vary",
+            metavar="PATH=VALUES",
+            help="A path as for --set, and its values: A..B:N, both ends included, or v1,v2,...",
+        ),
+    ]
+    samples: Annotated[
+        str | None,
+        typer.Option("--samples", metavar="N", help="So many of the combinations, drawn evenly by chance."),
+    ] = None
+    seed: Annotated[
+        str | None, typer.Option("--seed", metavar="S", help="Of that chance.", show_default="0")
+    ] = None
+    count: Count = None
+    engine: Annotated[
+        Literal["process", "dask"],
+        typer.Option("--engine", help="Processes of this machine, or the workers of a Dask cluster."),
+    ] = "process"
+    scheduler: Scheduler = None
+    timeout: Timeout = None
+    output: Annotated[
+        str | None,
+        typer.Option("--output", "-o", metavar="FILE", help="FILE.csv or .jsonl; else CSV to stdout."),
+    ] = None
+    plot: Annotated[
+        str | None,
+        typer.Option(
+            "--plot",
+            metavar="FILE",
+            help="FILE.svg, .png or .pdf: the durations, of two --vary as a map.",
+        ),
+    ] = None
+    best: Annotated[
+        str | None,
+        typer.Option(
+            "--best",
+            metavar="COLUMN",
+            help="Say the verified row with the smallest number in a column; with -COLUMN the largest.",
+        ),
+    ] = None
+    strict: Annotated[bool, typer.Option("--strict", help="Exit 1 when a row is not verified.")] = False
+    force: Annotated[bool, typer.Option("--force", help="Plan points that are known, too.")] = False
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on stderr.")] = False
 
 
 class RetimeCommand(EditCommand):
@@ -179,6 +236,7 @@ class ConvertCommand(EditCommand):
 
 COMMANDS: tuple[type[CommandLine], ...] = (
     BatchCommand,
+    SweepCommand,
     RetimeCommand,
     ResampleCommand,
     ConcatCommand,

@@ -202,9 +202,9 @@ def _block(mapping: Mapping[str, Any], indent: str = "") -> Iterator[str]:
             yield from _block(value, deeper)
         elif isinstance(value, list) and _holds_mappings(value):
             yield name
-            yield from (f"{deeper}- {_flow(item)}" for item in value)
+            yield from (f"{deeper}- {flow_text(item)}" for item in value)
         else:
-            yield f"{name} {_flow(value)}"
+            yield f"{name} {flow_text(value)}"
 
 
 def _holds_mappings(value: object) -> bool:
@@ -213,11 +213,12 @@ def _holds_mappings(value: object) -> bool:
     )
 
 
-def _flow(value: Any) -> str:  # noqa: ANN401
+def flow_text(value: Any) -> str:  # noqa: ANN401
+    """Return a value of lists, mappings and scalars as YAML on one line."""
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{_key(key)}: {_flow(item)}" for key, item in value.items()) + "}"
+        return "{" + ", ".join(f"{_key(key)}: {flow_text(item)}" for key, item in value.items()) + "}"
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_flow, value)) + "]"
+        return "[" + ", ".join(map(flow_text, value)) + "]"
     if isinstance(value, float) and not isfinite(value):
         return ".nan" if isnan(value) else ".inf" if value > 0 else "-.inf"
     return _text(value) if isinstance(value, str) else json.dumps(value)

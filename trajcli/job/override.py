@@ -1,18 +1,39 @@
-"""Overrides of a job: values such as `--set moves.0.duration=3` that replace the file's, or add to them."""
+"""Overrides of a job: values such as `--set moves.0.duration=3` that replace the file's, or add to them.
+
+A path into a pose, a list or a bound of joints that the job leaves out first writes what then counts: with
+`base.xyz.0=100` the rest of the base is that of the robot.
+"""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from trajcli.errors import InputError, Place
 from trajcli.frozen import frozen
 from trajcli.job.yaml.document import Document, Node
 from trajcli.job.yaml.load import MAX_DEPTH, parse_document
 
+if TYPE_CHECKING:
+    from trajcli.kinematics.robot import Robot
+
 _Steps = tuple[str | int, ...]
 _QUOTED = 40  # characters of a path without end that a message repeats
+_BARE = (
+    "xyz",
+    "rpy",
+    "quat_wxyz",
+    "quat_xyzw",
+    "rotvec",
+    "matrix",
+    "joints",
+    "direction",
+    "through",
+    "segments",
+)
+"""Lists that a job leaves out without another taking their place."""
 
 
 class Setting(NamedTuple):
@@ -29,7 +50,7 @@ class Setting(NamedTuple):
     value: str
 
 
-def parse_setting(text: str) -> Setting:
+def parse_setting(text: str, option: str = "--set") -> Setting:
     """Return what `PATH=VALUE` says, such as "moves.0.duration=3".
 
     Raises:
@@ -38,11 +59,13 @@ def parse_setting(text: str) -> Setting:
     name, equals, value = text.partition("=")
     steps = tuple(int(step) if step.isdecimal() else step for step in name.strip().split("."))
     if not equals or "" in steps:
-        raise InputError(f"--set {text}: expected PATH=VALUE", hint="such as --set moves.0.duration=3")
+        raise InputError(f"{option} {text}: expected PATH=VALUE", hint=f"such as {option} moves.0.duration=3")
     if len(steps) > MAX_DEPTH:
         depth = f"a path of {len(steps)} parts, a job is at most {MAX_DEPTH} levels deep"
-        raise InputError(f"--set {text[:_QUOTED]}...: {depth}", hint="such as --set moves.0.duration=3")
-    return Setting(f"--set {text}", steps, value or "null")
+        raise InputError(
+            f"{option} {text[:_QUOTED]}...: {depth}", hint=f"such as {option} moves.0.duration=3"
+        )
+    return Setting(f"{option} {text}", steps, value or "null")
 
 
 @frozen
@@ -73,15 +96,112 @@ def overridden(document: Document, settings: Sequence[Setting]) -> Document:
     """
     if not settings:
         return document
-    root = document.root
-    patches: dict[_Steps, Document] = {}
     for setting in settings:
-        patch = parse_document(setting.value, setting.option, any_root=True)
-        root = _with(root, setting.path, patch.root, setting.option)
-        depth = len(setting.path)
-        patches = {path: p for path, p in patches.items() if path[:depth] != setting.path}
-        patches[setting.path] = patch
-    return PatchedDocument(document.file, document.lines, root, patches)
+        document = _patched(_written_out(document, setting), setting)
+    return document
+
+
+def _patched(document: Document, setting: Setting) -> PatchedDocument:
+    """Return the document with one setting put in."""
+    patch = parse_document(setting.value, setting.option, any_root=True)
+    root, depth = _with(document.root, setting.path, patch.root, setting.option), len(setting.path)
+    before = document.patches if isinstance(document, PatchedDocument) else {}
+    kept = {path: each for path, each in before.items() if path[:depth] != setting.path}
+    return PatchedDocument(document.file, document.lines, root, {**kept, setting.path: patch})
+
+
+def _written_out(document: Document, setting: Setting) -> Document:
+    """Return the document with the first thing on a setting's path that it leaves out, as it then counts."""
+    path = setting.path
+    lacking = [depth for depth in range(1, len(path)) if document.node(path[:depth]) is None]
+    for depth in lacking:
+        default = _default(document, path[:depth], path[depth])
+        if default is not None:
+            return _patched(document, Setting(setting.option, path[:depth], json.dumps(default)))
+    for depth in lacking:
+        if isinstance(path[depth], int) and path[depth - 1] in _BARE:
+            left_out = ".".join(map(str, path[:depth]))
+            message = f"{setting.option}: the job has no {left_out}, and nothing takes its place"
+            raise InputError(message, hint=f"write the whole of it: {left_out}=[...]")
+    return document
+
+
+def _default(document: Document, path: _Steps, step: str | int) -> Any:  # noqa: ANN401
+    """Return what counts where a job leaves out the value at a path; None where a mapping may begin empty."""
+    *above, key = path
+    if (
+        key in ("xyz", "rpy")
+        and above
+        and (above in (["base"], ["tool"]) or above[0] in ("frames", "tools") or above[-1] == "offset")
+    ):
+        return [0, 0, 0]
+    if path in (("base",), ("tool",)):
+        return _pose_of_robot(document, str(key))
+    if not isinstance(step, int):
+        return None
+    if path == ("gravity",):
+        from trajcli.kinematics.robot import GRAVITY
+
+        return list(GRAVITY)
+    if path == ("output", "columns"):
+        from trajcli.job.model import Output
+
+        return list(Output.model_fields["columns"].default)
+    if key == "com":
+        return [0, 0, 0]
+    if "limits" in above and key != "tcp":
+        return _bounds_of_robot(document, path)
+    if key in ("velocity", "acceleration"):
+        return [0] * len(_robot(document).joints)
+    return None
+
+
+def _robot(document: Document) -> Robot:
+    """Return the robot of a job, as it is without the job's limits."""
+    from trajcli.job.model import UnitsSpec
+    from trajcli.job.robot import find_sheet
+
+    plain = document.plain()
+    units = UnitsSpec.model_validate(plain.get("units") or {}).as_units()
+    return find_sheet(plain.get("robot"), document, units).robot
+
+
+def _pose_of_robot(document: Document, key: str) -> dict[str, Any]:
+    """Return the robot's own base or tool, as it may stand in a job of any units."""
+    from trajcli.geometry.euler import rpy_from_matrix
+    from trajcli.language.numbers import written_number
+    from trajcli.units import Quantity
+
+    pose = getattr(_robot(document), key)
+    angles = rpy_from_matrix(pose[:3, :3]).angles.tolist()
+    return {
+        "xyz": [written_number(length, Quantity("length")) for length in pose[:3, 3].tolist()],
+        "rpy": [written_number(angle, Quantity("angle")) for angle in angles],
+    }
+
+
+def _bounds_of_robot(document: Document, path: _Steps) -> list[Any] | None:
+    """Return a limit of all joints, as the job says it above the move's, or as the robot has it."""
+    from trajcli.kinematics.robot import QUANTITIES
+    from trajcli.language.numbers import written_number
+    from trajcli.language.per_joint import UNLIMITED
+    from trajcli.units import joint_quantity
+
+    of_job = document.node(("limits", path[-1]))
+    if of_job is not None and isinstance(of_job.value, list):
+        value: list[Any] = of_job.plain()
+        return value
+    robot = _robot(document)
+    if path[-1] == "effort":
+        return [None if joint.effort == UNLIMITED else list(joint.effort) for joint in robot.joints]
+    if path[-1] not in QUANTITIES:
+        return None
+    order = QUANTITIES.index(str(path[-1]))
+    rows = zip(robot.joint_types, robot.limits.of_order(order).tolist(), strict=True)
+    return [
+        None if tuple(row) == UNLIMITED else [written_number(end, joint_quantity(kind, order)) for end in row]
+        for kind, row in rows
+    ]
 
 
 def _with(node: Node, steps: _Steps, new: Node, option: str) -> Node:

@@ -69,10 +69,14 @@ def rendered(picture: Picture, kind: str) -> bytes:
     import matplotlib as mpl
 
     with mpl.rc_context(settings()):
-        figure = figure_of(picture)
-        out = io.BytesIO()
-        metadata = {**_METADATA[kind], **({"Title": picture.title} if kind != "png" else {})}
-        getattr(_canvas(figure, kind), f"print_{kind}")(out, metadata=metadata)
+        return figure_bytes(figure_of(picture), kind, picture.title)
+
+
+def figure_bytes(figure: Any, kind: str, title: str) -> bytes:  # noqa: ANN401
+    """Return the bytes of a figure in one of `PICTURE_FORMATS`, which was drawn with `settings`."""
+    out = io.BytesIO()
+    metadata = {**_METADATA[kind], **({"Title": title} if kind != "png" else {})}
+    getattr(_canvas(figure, kind), f"print_{kind}")(out, metadata=metadata)
     return out.getvalue()
 
 

@@ -1,0 +1,363 @@
+"""Sweeps: values, points, what is kept of them, and tables; the oracle is each job by itself, and closed forms."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import random
+from collections.abc import Generator, Sequence
+from functools import partial
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import trajcli
+from trajcli.batches import sweep_table
+from trajcli.batches.processes import run_in_processes
+from trajcli.batches.sweep import PointLedger, Run, Sweep, SweepSetup, outcomes_of, parse_axis, sweep_of
+from trajcli.batches.sweep_table import SweepRow, SweepTable
+from trajcli.batches.task import JobOutcome, SweepPoint, Task, run_task
+from trajcli.errors import InputError, TrajcliError
+from trajcli.job.read import load_job
+from trajcli.job.yaml.load import parse_document
+from trajcli.planning.plan import plan_job
+
+JOB = """\
+version: 1
+units: {angle: deg}
+robot: {file: arm.yaml}
+limits: {velocity: 90, acceleration: 360}
+start: {joints: 0}
+moves:
+  - {planner: trapezoid, to: {joints: 30}}
+"""
+ARM = "joints: [{position: [-200, 200]}]\nunits: {angle: deg}\n"
+
+
+@pytest.fixture
+def job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.chdir(tmp_path)
+    Path("arm.yaml").write_text(ARM)
+    Path("job.yaml").write_text(JOB)
+    return "job.yaml"
+
+
+def here(tasks: Sequence[Task], setup: SweepSetup) -> Generator[JobOutcome, None, None]:
+    """Plan points in this process, the last one first."""
+    yield from (run_task(task, setup) for task in reversed(tasks))
+
+
+def swept(job: str, *varied: str, samples: int | None = None, seed: int = 0) -> Sweep:
+    return sweep_of(job, Path(job).read_bytes(), [parse_axis(text) for text in varied], samples, seed)
+
+
+def table_of(sweep: Sweep, run: Run = here, ledger: PointLedger | None = None) -> SweepTable:
+    found = dict(outcomes_of(sweep, ledger or PointLedger(None), run))
+    rows = [SweepRow(sweep.values(sweep.rows[row]), found[row].point) for row in sorted(found)]  # type: ignore[arg-type]
+    return SweepTable(tuple(axis.path for axis in sweep.axes), tuple(rows))
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("0..1:11", "0 0.1 0.2 0.3 0.4 0.5 0.6 0.7 0.8 0.9 1"),
+        ("100..500:5", "100 200 300 400 500"),
+        ("0.3..-0.3:3", "0.3 0 -0.3"),
+        ("1e-3..3e-3:3", "0.001 0.002 0.003"),
+        ("0..1:3", "0 0.5 1"),
+        ("0..1:4", f"0 {1 / 3!r} {2 / 3!r} 1"),
+        ("1.50,2,1e3", "1.5 2 1000"),
+        ("cubic,quintic", "cubic quintic"),
+        ("true,null", "true null"),
+    ],
+)
+def test_values_have_the_fewest_digits(text: str, values: str) -> None:
+    assert parse_axis(f"a.b={text}").values == tuple(values.split())
+
+
+def test_values_are_yaml() -> None:
+    axis = parse_axis('a=[400, 1.0, 3],{x: 1},0.2 m/s,"1","[x"')
+    assert axis.values == ("[400, 1, 3]", "{x: 1}", "0.2 m/s", '"1"', '"[x"')
+    read = [parse_document(text, "", any_root=True).plain() for text in axis.values]
+    assert read == [[400, 1, 3], {"x": 1}, "0.2 m/s", "1", "[x"]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a", "expected PATH=VALUE"),
+        ("a=", "expected PATH=A..B:N or PATH=v1,v2,..."),
+        ("a=1..2", "a range needs how many values"),
+        ("a=1..2:1", "a range needs how many values, 2 to 1000000"),
+        ("a=1..2:x", "a range needs how many values"),
+        ("a=1..2:9999999", "a range needs how many values"),
+        ("a=[1", "is never closed"),
+    ],
+)
+def test_what_says_no_values_is_refused(text: str, message: str) -> None:
+    with pytest.raises(InputError) as refused:
+        parse_axis(text)
+    assert message in str(refused.value)
+    assert "--vary a" in refused.value.problems[0].text() + str(refused.value.problems[0].place)
+
+
+@pytest.mark.usefixtures("job")
+@pytest.mark.parametrize(
+    ("varied", "message"),
+    [
+        ([], "nothing is varied"),
+        (["limits.velocty=1,2"], "unknown key 'velocty'"),
+        (["moves.1.duration=1,2"], "there is no '1' in a list of 1 entry"),
+        (["start.joints.x.y=1"], "--vary start.joints.x.y=1"),
+        (["moves.0.duration=1,2", "moves.0.duration=3"], "--vary moves.0.duration stands twice"),
+        (["limits.velocity=1..2:2000", "limits.acceleration=1..2:2000"], "has 4000000 combinations"),
+    ],
+)
+def test_what_cannot_be_begun_is_one_error(varied: list[str], message: str) -> None:
+    with pytest.raises(InputError) as refused:
+        swept("job.yaml", *varied)
+    (problem,) = refused.value.problems
+    assert message in problem.text()
+
+
+def test_a_path_of_which_some_values_fit_is_swept(job: str) -> None:
+    table = table_of(swept(job, "moves.0.duration=-1,1,x"))
+    assert [row.point.verdict for row in table.rows] == ["input", "verified", "input"]
+    assert table.rows[0].point.reason == "expected a number above 0 s, got -1"
+
+
+VARIED = (
+    "moves.0.planner=trapezoid,quintic,jerk_limited",
+    "moves.0.to.joints=30,300",
+    "moves.0.duration=0.2,1",
+)
+
+
+def test_rows_are_those_of_single_plans(job: str) -> None:
+    table = table_of(swept(job, *VARIED))
+    verdicts = set()
+    for row in table.rows:
+        settings = [f"{path}={value}" for path, value in zip(table.paths, row.values, strict=True)]
+        try:
+            plan = plan_job(load_job(job, settings))
+        except TrajcliError as error:
+            expected = {2: "input", 3: "unreachable"}[error.exit_code]
+            assert (row.point.verdict, row.point.duration) == (expected, None)
+        else:
+            expected = "verified" if plan.verdict.passed else "exceeded"
+            assert (row.point.verdict, row.point.duration) == (expected, plan.trajectory.duration)
+        verdicts.add(expected)
+    assert verdicts == {"verified", "exceeded", "unreachable", "input"}
+    assert [row.values[2] for row in table.rows[:3]] == ["0.2", "1", "0.2"]
+
+
+def test_what_binds_and_the_bound_have_closed_forms(job: str) -> None:
+    """From rest to rest it takes d / v + v / a; a quintic over d in T is fastest at 15/8 d / T."""
+    table = table_of(
+        swept(
+            job,
+            "moves.0={planner: trapezoid, to: {joints: 30}},{planner: quintic, to: {joints: 30}, duration: 1}",
+        )
+    )
+    fastest, quintic = (row.point for row in table.rows)
+    assert fastest.duration == pytest.approx(30 / 90 + 90 / 360, rel=1e-9)
+    assert [fastest.bound, quintic.bound] == pytest.approx([30 / 90 + 90 / 360] * 2, rel=1e-9)
+    used = 15 / 8 * 30 / 90
+    assert quintic.tightest == f"velocity of j1 in move 0, {100 * used:.4g} % used"
+    unlimited = table_of(swept(job, "limits.acceleration=null,360")).rows
+    assert [row.point.verdict for row in unlimited] == ["input", "verified"]
+    held = "moves.0={planner: hold, duration: 2},{planner: quintic, to: {joints: 30}, duration: 1}"
+    hold, free = table_of(swept(job, held, "limits.acceleration=null,360")).rows[::2]
+    assert (hold.point.bound, free.point.bound) == (2, None)
+
+
+def test_neither_order_nor_number_of_processes_shows(job: str) -> None:
+    sweep = swept(job, *VARIED)
+    texts = {table_of(sweep).text("csv")}
+    for count in (1, 3):
+        texts.add(table_of(sweep, partial(run_in_processes, count=count, timeout=None)).text("csv"))
+
+    def shuffled(tasks: Sequence[Task], setup: SweepSetup) -> Generator[JobOutcome, None, None]:
+        chosen = random.Random(1).sample(tasks, len(tasks))
+        yield from (run_task(task, setup) for task in chosen)
+
+    texts.add(table_of(sweep, shuffled).text("csv"))
+    assert len(texts) == 1
+
+
+@pytest.mark.usefixtures("job")
+def test_samples_are_drawn_evenly_and_again() -> None:
+    varied = ("limits.velocity=1..90:101", "limits.acceleration=1..360:99")
+    rows = swept("job.yaml", *varied, samples=30, seed=4).rows
+    ends = np.linspace(0, 101 * 99, 31)
+    assert all(low - 1 <= row <= high for low, row, high in zip(ends[:-1], rows, ends[1:], strict=True))
+    assert len(set(rows)) == 30
+    assert swept("job.yaml", *varied, samples=30, seed=4).rows == rows
+    assert swept("job.yaml", *varied, samples=30, seed=5).rows != rows
+    assert list(swept("job.yaml", "limits.velocity=1,2,3", samples=3).rows) == [0, 1, 2]
+    vast = ("limits.velocity=1..90:2000", "limits.acceleration=1..360:2000")
+    assert len(set(swept("job.yaml", *vast, samples=9).rows)) == 9
+    for samples in (0, 4):
+        with pytest.raises(InputError, match=f"--samples {samples}: expected 1 to 3 of 3 combinations"):
+            swept("job.yaml", "limits.velocity=1,2,3", samples=samples)
+
+
+class Counted:
+    """Plans points in this process, and counts them."""
+
+    def __init__(self) -> None:
+        self.planned = 0
+
+    def __call__(self, tasks: Sequence[Task], setup: SweepSetup) -> Generator[JobOutcome, None, None]:
+        for task in tasks:
+            self.planned += 1
+            yield run_task(task, setup)
+
+
+def test_points_that_are_known_are_not_planned_again(job: str) -> None:
+    def count(*varied: str, force: bool = False) -> tuple[int, str]:
+        counted = Counted()
+        text = table_of(swept(job, *varied), counted, PointLedger("table.csv", force=force)).text("csv")
+        return counted.planned, text
+
+    first = count("limits.velocity=50..90:5")
+    assert first[0] == 5
+    assert count("limits.velocity=50..90:5") == (0, first[1])
+    assert count("limits.velocity=50..90:9")[0] == 4
+    assert count("limits.velocity=50..90:9", force=True)[0] == 9
+    assert count("limits.acceleration=50..90:2")[0] == 2
+    assert count("limits.velocity=50..90:5")[0] == 5  # only what is in the table is kept
+    Path("arm.yaml").write_text(ARM.replace("200", "190"))
+    assert count("limits.velocity=50..90:5")[0] == 5
+    Path(job).write_text(JOB.replace("30", "31"))
+    changed = count("limits.velocity=50..90:5")
+    assert (changed[0], changed[1] != first[1]) == (5, True)
+
+
+def test_what_was_done_before_the_end_is_not_lost(job: str) -> None:
+    sweep = swept(job, "limits.velocity=50..90:7")
+    counted = Counted()
+    begun = outcomes_of(sweep, PointLedger("table.csv"), counted)
+    assert len(list(islice(begun, 4))) == 4
+    begun.close()
+    (kept,) = Path().glob(".table.csv.*")
+    kept.write_text(kept.read_text() + '{"inputs": "half wri')
+    rest = Counted()
+    text = table_of(sweep, rest, PointLedger("table.csv")).text("csv")
+    assert (counted.planned, rest.planned) == (4, 3)
+    assert text == table_of(sweep).text("csv")
+    assert len(kept.read_text().splitlines()) == 7
+
+
+def test_a_point_of_a_file_that_changed_meanwhile_is_planned_next_time(job: str) -> None:
+    def changing(tasks: Sequence[Task], setup: SweepSetup) -> Generator[JobOutcome, None, None]:
+        for task in tasks:
+            yield run_task(task, setup)
+            Path("arm.yaml").write_text(ARM + "# another\n")
+
+    sweep = swept(job, "limits.velocity=50..90:4")
+    table_of(sweep, changing, PointLedger("table.csv"))
+    Path("arm.yaml").write_text(ARM)
+    counted = Counted()
+    table_of(sweep, counted, PointLedger("table.csv"))
+    assert counted.planned == 3
+
+
+POINTS = [
+    SweepPoint("verified", 2.0, "velocity of j1 in move 0, 50 % used", 1.5),
+    SweepPoint("exceeded", 0.5, 'jerk of "j1"', 0.25, "too fast"),
+    SweepPoint("verified", 1.0, None, None),
+    SweepPoint("unreachable", reason="too far"),
+]
+TABLE = SweepTable(("a.b", "c"), tuple(
+    SweepRow((str(number), text), point)
+    for number, (text, point) in enumerate(zip(["[1, 2]", "x", "-7", "0.5"], POINTS, strict=True))
+))  # fmt: skip
+
+
+def test_a_table_is_read_by_others(tmp_path: Path) -> None:
+    TABLE.save(tmp_path / "t.csv")
+    head, *rows = csv.reader(io.StringIO((tmp_path / "t.csv").read_text()))
+    assert head == ["a.b", "c", "verdict", "duration", "tightest", "bound"]
+    assert rows[0] == ["0", "[1, 2]", "verified", "2", "velocity of j1 in move 0, 50 % used", "1.5"]
+    assert rows[1] == ["1", "x", "exceeded", "0.5", 'jerk of "j1"', "0.25"]
+    assert rows[3] == ["3", "0.5", "unreachable", "", "", ""]
+    TABLE.save(tmp_path / "t.jsonl")
+    values = [json.loads(line) for line in (tmp_path / "t.jsonl").read_text().splitlines()]
+    assert list(values[0]) == head
+    assert [value["c"] for value in values] == [[1, 2], "x", -7, 0.5]
+    assert [value["bound"] for value in values] == [1.5, 0.25, None, None]
+    with pytest.raises(InputError, match=r"\.csv or \.jsonl"):
+        TABLE.save(tmp_path / "t.txt")
+
+
+@pytest.mark.parametrize(
+    ("column", "row"), [("duration", 2), ("-duration", 0), ("bound", 0), ("a.b", 0), ("-a.b", 2)]
+)
+def test_the_best_row_is_verified(column: str, row: int) -> None:
+    assert TABLE.best(column) is TABLE.rows[row]
+
+
+def test_there_may_be_no_best_row() -> None:
+    assert SweepTable(("a",), (SweepRow(("1",), POINTS[3]),)).best("duration") is None
+    with pytest.raises(InputError, match="c holds other things than numbers"):
+        TABLE.best("c")
+    with pytest.raises(InputError, match="no column of numbers 'durations'"):
+        TABLE.best("-durations")
+
+
+def drawn(table: SweepTable) -> dict[str, list[np.ndarray]]:
+    """Return the data of what is drawn, by its name."""
+    found: dict[str, list[np.ndarray]] = {}
+    figure = sweep_table._figure(table)
+    for axes in figure.axes:
+        for line in axes.lines:
+            found.setdefault(line.get_gid() or "", []).append(np.array(line.get_data()))
+        for image in axes.images:
+            found.setdefault(image.get_gid() or "", []).append(image.get_array())
+    return found
+
+
+def test_a_curve_shows_every_row(tmp_path: Path) -> None:
+    table = SweepTable(("a.b",), tuple(SweepRow((row.values[0],), row.point) for row in TABLE.rows))
+    lines = drawn(table)
+    np.testing.assert_array_equal(lines["verified"][0], [[0, 1, 2, 3], [2, np.nan, 1, np.nan]])
+    np.testing.assert_array_equal(lines["bound"][0][1], [1.5, 0.25, np.nan, np.nan])
+    np.testing.assert_array_equal(lines["exceeded"][0], [[1], [0.5]])
+    np.testing.assert_array_equal(lines["missing"][0][0], [3])
+    names = SweepTable(("a.b",), (SweepRow(("x",), POINTS[0]), SweepRow(("y",), POINTS[2])))
+    np.testing.assert_array_equal(drawn(names)["verified"][0], [[0, 1], [2, 1]])
+    table.plot(tmp_path / "a.svg")
+    table.plot(tmp_path / "b.svg")
+    assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
+    assert b"a.b" in (tmp_path / "a.svg").read_bytes()
+
+
+def test_a_map_shows_every_row(tmp_path: Path) -> None:
+    values = [("10", "2"), ("10", "1"), ("9", "2"), ("9", "1")]
+    rows = [SweepRow(value, point) for value, point in zip(values, POINTS, strict=True)]
+    found = drawn(SweepTable(("a", "b"), tuple(rows)))
+    np.testing.assert_array_equal(found["durations"][0].filled(np.nan), [[np.nan, 0.5], [1.0, 2.0]])
+    np.testing.assert_array_equal(found["exceeded"][0], [[1], [0]])
+    with pytest.raises(InputError, match="one or two values, not of 3"):
+        SweepTable(("a", "b", "c"), ()).plot(tmp_path / "a.svg")
+    with pytest.raises(InputError, match=r"not written as \.jpg"):
+        TABLE.plot(tmp_path / "a.jpg")
+
+
+def test_from_python(job: str) -> None:
+    vary = {"limits.velocity": [60, 90], "moves.0.to.joints": "10..30:3"}
+    table = trajcli.sweep(job, vary, "table.csv", processes=1)
+    assert repr(table) == "SweepTable(limits.velocity, moves.0.to.joints: 6 rows, 6 verified)"
+    assert Path("table.csv").read_text() == table.text("csv")
+    again = trajcli.sweep(Path(job), vary, "table.csv")
+    assert again.text("csv") == table.text("csv")
+    best = table.best("-duration")
+    assert best is not None
+    assert best.values == ("60", "30")
+    assert best.point.duration == pytest.approx(30 / 60 + 60 / 360, rel=1e-9)
+    text = JOB.replace("{file: arm.yaml}", "{joints: 1}")
+    assert trajcli.sweep(text, {"limits.velocity": [60, 90]}).rows[0].point.verdict == "verified"

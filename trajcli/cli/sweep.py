@@ -1,0 +1,115 @@
+"""`trajcli sweep`: one job over a grid of values, a row of a table for each."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from functools import partial
+from typing import TYPE_CHECKING
+
+from trajcli.batches.sweep import PointLedger, Sweep, outcomes_of, parse_axis, sweep_of
+from trajcli.batches.sweep_table import (
+    SweepRow,
+    SweepTable,
+    check_column,
+    check_picture,
+    form_of_table,
+)
+from trajcli.batches.task import SweepPoint
+from trajcli.cli.batch import Progress, outcomes_of_tasks, processes_of, timeout_of
+from trajcli.cli.outcome import print_lines, print_remark, report_error
+from trajcli.errors import InputError, TrajcliError, utf8
+from trajcli.job.yaml.source import read_bytes
+from trajcli.streams.whole_file import standard_output
+
+if TYPE_CHECKING:
+    from trajcli.cli.motion_commands import SweepCommand
+
+
+def run_sweep(options: SweepCommand) -> int:
+    """Plan a job at every point, and write the table; return the exit code.
+
+    Raises:
+        InputError: When nothing can be begun: a path that leads nowhere, options that do not fit.
+        FileError: When the job cannot be read or the table not written, or a scheduler cannot be reached.
+    """
+    limits = processes_of(options), timeout_of(options)
+    sweep = _sweep(options)
+    paths = tuple(axis.path for axis in sweep.axes)
+    form = "csv" if options.output is None else form_of_table(options.output)
+    if options.best is not None:
+        check_column(paths, options.best)
+    if options.plot is not None:
+        check_picture(paths, options.plot)
+    ledger = PointLedger(options.output, force=options.force)
+    progress = Progress(len(sweep.rows), "point")
+    run = partial(outcomes_of_tasks, options=options, limits=limits, on_tick=progress.show)
+    points = dict[int, SweepPoint]()
+    try:
+        with closing(outcomes_of(sweep, ledger, run)) as outcomes:
+            for row, outcome in outcomes:
+                if outcome.point is None:
+                    progress.erase()
+                    report_error(TrajcliError(*outcome.problems), options.errors)
+                else:
+                    points[row] = outcome.point
+                progress.add(outcome.point.verdict if outcome.point else outcome.outcome, outcome.exit_code)
+    finally:
+        progress.erase()
+    rows = (SweepRow(sweep.values(sweep.rows[row]), points[row]) for row in sorted(points))
+    table = SweepTable(paths, tuple(rows))
+    if options.output is None:
+        with standard_output() as out:
+            out.write(table.text(form).encode())
+    else:
+        table.save(options.output)
+    if options.plot is not None:
+        table.plot(options.plot)
+    _say_what_came(table, progress, options)
+    failed = options.strict and any(row.point.verdict != "verified" for row in table.rows)
+    return progress.worst or int(failed)
+
+
+def _sweep(options: SweepCommand) -> Sweep:
+    """Return what is planned."""
+    samples, seed = (_count(*each) for each in (("--samples", options.samples), ("--seed", options.seed)))
+    if seed is not None and samples is None:
+        raise InputError("--seed is about points drawn by chance", hint="say how many with --samples N")
+    content = read_bytes(options.job)
+    file = "<stdin>" if options.job == "-" else options.job
+    return sweep_of(file, content, [parse_axis(text) for text in options.vary], samples, seed or 0)
+
+
+def _count(option: str, text: str | None) -> int | None:
+    if text is not None and not (text.isascii() and text.isdigit()):
+        raise InputError(f"{option} expects a whole number, got '{text}'")
+    return None if text is None else int(text)
+
+
+def _say_what_came(table: SweepTable, progress: Progress, options: SweepCommand) -> None:
+    """Say how many rows had each verdict, why the first of each is not verified, and which is best."""
+    if not options.quiet:
+        print_remark(f"{len(table.rows)} row{'s' * (len(table.rows) != 1)}: {progress.text}")
+        first = dict[str, SweepRow]()
+        for row in table.rows:
+            first.setdefault(row.point.verdict, row)
+        for verdict, row in first.items():
+            if verdict != "verified":
+                print_remark(f"  {verdict} at {_where(table, row)}: {row.point.reason}")
+    if options.best is None:
+        return
+    best = table.best(options.best)
+    name = options.best.removeprefix("-")
+    if best is None:
+        text = f"best {name}: no row is verified"
+    else:
+        value = table.cells(best)[table.columns.index(name)]
+        text = f"best {name}: {value} at {_where(table, best)}"
+    if options.output is None:
+        print_remark(text)
+    else:
+        print_lines([text])
+
+
+def _where(table: SweepTable, row: SweepRow) -> str:
+    """Return the values of a row with their paths."""
+    return utf8(", ".join(f"{path}={value}" for path, value in zip(table.paths, row.values, strict=True)))
