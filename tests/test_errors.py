@@ -104,7 +104,13 @@ JOBS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 }
 
 
-SLOW = ("out of reach", "singularity")  # searches that end after a second
+SLOW = (
+    "out of reach",
+    "singularity",
+    "arrival",
+    "pose",
+    "points",
+)  # an arm of six joints is read, and searches
 PLAIN = {
     "Jo0Nt": "{}",
     "RoBot": "{}",

@@ -66,15 +66,15 @@ def test_json_lines_and_a_map(job: Path, capfd: Capture) -> None:
         "--vary",
         "moves.0.to.joints=[10],[20]",
         "-o",
-        "table.jsonl",
+        "new/table.jsonl",
         "--plot",
         "map.png",
         "--best",
         "-bound",
     )
     code, out, _ = call(capfd, "sweep", job, "--vary", "moves.0.duration=1,2", *words)
-    assert (code, out) == (0, "best bound: no row is verified\n")
-    rows = [json.loads(line) for line in Path("table.jsonl").read_text().splitlines()]
+    assert (code, out) == (0, "best bound: no verified row has one\n")
+    rows = [json.loads(line) for line in Path("new/table.jsonl").read_text().splitlines()]
     assert [(row["moves.0.duration"], row["moves.0.to.joints"]) for row in rows] == [
         (1, [10]), (1, [20]), (2, [10]), (2, [20])
     ]  # fmt: skip

@@ -345,10 +345,11 @@ def sweep(
     ledger = PointLedger(table, force=force)
     rows = dict[int, SweepRow]()
     run = partial(run_in_processes, count=count, timeout=timeout)
-    for row, outcome in outcomes_of(swept, ledger, run):
-        if outcome.point is None:
-            raise TrajcliError(*outcome.problems)
-        rows[row] = SweepRow(swept.values(swept.rows[row]), outcome.point)
+    with closing(outcomes_of(swept, ledger, run)) as outcomes:
+        for row, outcome in outcomes:
+            if outcome.point is None:
+                raise TrajcliError(*outcome.problems)
+            rows[row] = SweepRow(swept.values(swept.rows[row]), outcome.point)
     made = SweepTable(tuple(axis.path for axis in axes), tuple(rows[row] for row in sorted(rows)))
     if table is not None:
         made.save(table)

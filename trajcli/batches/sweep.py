@@ -22,7 +22,7 @@ import numpy as np
 
 from trajcli.batches.jobs import BatchJob
 from trajcli.batches.ledger import hash_of_inputs
-from trajcli.batches.task import InputsHash, JobOutcome, PointVerdict, SweepPoint, Task
+from trajcli.batches.task import InputsHash, JobOutcome, PointVerdict, SweepPoint, Task, make_folder
 from trajcli.errors import InputError, TrajcliError
 from trajcli.frozen import frozen
 from trajcli.job.dump import flow_text
@@ -282,10 +282,15 @@ class PointLedger:
     Args:
         table: The file of the table; None where nothing is kept.
         force: Whether what is there does not count.
+
+    Raises:
+        FileError: When the folder of the table cannot be made.
     """
 
     def __init__(self, table: str | None, *, force: bool = False) -> None:
         self._path = None if table is None else Path(table).with_name(f".{Path(table).name}.sweep.jsonl")
+        if self._path is not None:
+            make_folder(self._path.parent)
         self.known = dict[str, SweepPoint]() if force or self._path is None else _points(self._path)
 
     @property

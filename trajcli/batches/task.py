@@ -208,7 +208,7 @@ def _written(task: Task, setup: BatchSetup, hashed: InputsHash) -> LedgerEntry:
             from trajcli.output.report import verification_error
 
             raise verification_error(plan)
-        _make_folder(Path(job.output).parent)
+        make_folder(Path(job.output).parent)
         write_rows(plan, grid, job.output, digits, form=form)
     after = hash_of_inputs(Path(job.job).name, content, files, setup.said)
     # where a file has changed meanwhile, nobody knows of which content the rows were made
@@ -226,7 +226,12 @@ def _check_files_stay(document: Document, setup: BatchSetup) -> None:
             raise InputError(message, hint=hint)
 
 
-def _make_folder(folder: Path) -> None:
+def make_folder(folder: Path) -> None:
+    """Make the folder of an output, where it is not there.
+
+    Raises:
+        FileError: When that cannot be done.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

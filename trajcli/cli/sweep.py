@@ -100,7 +100,7 @@ def _say_what_came(table: SweepTable, progress: Progress, options: SweepCommand)
     best = table.best(options.best)
     name = options.best.removeprefix("-")
     if best is None:
-        text = f"best {name}: no row is verified"
+        text = f"best {name}: no verified row has one"
     else:
         value = table.cells(best)[table.columns.index(name)]
         text = f"best {name}: {value} at {_where(table, best)}"

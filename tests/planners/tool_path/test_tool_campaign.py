@@ -11,6 +11,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from tiers import few
 from tool_campaign import KINDS, ROBOTS, StoppedError, Task, Tracker, task, way_of
 from tool_jobs import job_text
 
@@ -127,7 +128,7 @@ def refused(text: str, tracker: Tracker) -> str:
     return reason
 
 
-@pytest.mark.parametrize("number", FIXED)
+@pytest.mark.parametrize("number", few(FIXED, 21))
 def test_a_task_is_planned_or_refused_for_a_reason(number):
     judge(number)
 
