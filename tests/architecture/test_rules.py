@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 
 import dead_code_rules
 import file_rules
@@ -75,3 +76,9 @@ def test_contributing_shows_the_same_floors() -> None:
 
 def test_folders_of_one_shape_exist() -> None:
     assert file_rules.ONE_SHAPE.keys() <= the_sources().folders
+
+
+def test_files_of_tests_have_names_of_their_own() -> None:
+    """Pytest refuses a second file of a name."""
+    names = Counter(path.name for path in (ROOT / "tests").rglob("test_*.py"))
+    assert [name for name, count in names.items() if count > 1] == []

@@ -107,7 +107,7 @@ class SweepCommand(Command):
     Points that an earlier sweep into the same table has planned are not planned again.
     """
 
-    example = "trajcli sweep examples/quintic.yaml --vary moves.0.duration=1..3:3 --best duration"
+    example = "trajcli sweep examples/quintic.yaml --vary moves.0.duration=1..3:3"
 
     job: JobFile
     vary: Annotated[
