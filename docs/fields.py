@@ -102,7 +102,7 @@ def field_table(model: type[BaseModel], left_out: Mapping[str, str] | None = Non
 
 def hidden_fields(model: type[BaseModel]) -> set[str]:
     """Return the fields that every planner has, for a planner; they are described once."""
-    return {"planner", "limits", "when_over_limit"} if model in PLANNERS.values() else set()
+    return {"planner", *Planner.model_fields} if model in PLANNERS.values() else set()
 
 
 def field_type(field: FieldInfo) -> FieldType | None:
@@ -186,6 +186,7 @@ def _type_form(annotation: Any) -> str:  # noqa: ANN401
         return "[move](#moves)"
     plain = {
         np.ndarray: "[pose](#poses)",
+        Any: "[defaults](#defaults)",
         bool: "`true` or `false`",
         str: "text",
         float: "number",

@@ -24,6 +24,7 @@ from trajcli.language.waypoints import Waypoint
 from trajcli.planners import PLANNERS
 from trajcli.planners.planner import Planner
 from trajcli.planners.point_to_point.point_to_point import PointToPoint
+from trajcli.planners.tool_path.defaults import Defaults
 
 _INTRODUCTION = """\
 A job is one YAML document. Numbers follow YAML 1.2; anchors, tags, duplicate keys, unknown keys, NaN
@@ -179,6 +180,23 @@ from a file beside the job, with a column for each joint (`q1`, `q1_deg`, or the
 points have times, `t`. A first row of a table that is where the arm stands is the start itself; times
 then count from it. Rows of a table that are nearer than `merge` to the one before are left out."""
 
+_STRAIGHT = """\
+Any move with a target `to` may have an `approach`: it goes by its own planner to the point that lies so far
+from the target, then straight to it. `retreat` comes before any move: straight back from where it stands.
+
+| key | what may stand there | default |
+|---|---|---|
+| `distance` | number above 0, a length; `approach: 80` is `{distance: 80}` | required |
+| `axis` | `x`, `-x`, `y`, `-y`, `z`, `-z` or a list of 3 numbers | `-z` |
+| `frame` | whose axis: `tool`, `world` or a frame | `tool` |
+| `law` | that of the straight part | the job's default, else time_optimal |
+
+Each part is a move of its own, a `line` where it is straight; all have the move's label and limits."""
+
+_DEFAULTS = """\
+What a job states under `defaults` holds for every `line`, `arc`, `path` and `screw`, the straight parts of
+approaches among them, and for nothing in joint space."""
+
 _MOVES = """\
 Each move starts in the state in which the one before it ended: position and velocity, and the
 acceleration where both planners have continuity 2 (else it is zero). Where a `duration` may be left
@@ -248,7 +266,8 @@ def job_reference() -> str:
     parts += ["### Dynamics of a joint", _DYNAMICS]
     parts += ["#### Friction", field_table(FrictionSpec), "#### Link", field_table(LinkSpec)]
     parts += ["### Poses", _POSES]
-    parts += ["## Moves", _MOVES.rstrip(), _common_fields()]
+    parts += ["## Moves", _MOVES.rstrip(), _common_fields(), "### Approach and retreat", _STRAIGHT]
+    parts += ["### Defaults", _DEFAULTS, field_table(Defaults)]
     parts += ["### Payload", _PAYLOAD, field_table(PayloadSpec)]
     parts += tool_path_sections()
     parts += ["## Planners"]

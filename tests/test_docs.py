@@ -71,7 +71,7 @@ def test_every_planner_has_its_page(name: str) -> None:
     classes = {int(number) for number in re.findall(r"[Cc]ontinuity (\d)", guarantees)}
     assert PLANNERS[name].continuity in classes
     assert shown(page)
-    assert table_fields(section(page, "## Fields")) == MOVES[name] - {"planner", "limits", "when_over_limit"}
+    assert table_fields(section(page, "## Fields")) == MOVES[name] - SHARED
     assert f"(planners/{name}.md)" in text_of(ROOT / "docs/planners.md")
     example = next(block for block in blocks(page) if block.language == "yaml")
     assert name in {move["planner"] for move in yaml.safe_load(example.text)["moves"]}
@@ -146,6 +146,8 @@ def table_fields(text: str) -> set[str]:
 
 
 SCHEMA = schema_of("job")
+SHARED = {"planner", "limits", "when_over_limit", "label", "approach", "retreat"}
+"""Fields of every move."""
 MOVES = {
     definition["properties"]["planner"]["const"]: set(definition["properties"])
     for definition in SCHEMA["$defs"].values()
@@ -156,9 +158,10 @@ MOVES = {
 @pytest.mark.parametrize("tag", MOVES)
 def test_every_planner_has_its_section_with_every_field(tag: str) -> None:
     shared = table_fields(section(JOB_PAGE, "## Moves"))
-    assert shared == {"planner", "limits", "when_over_limit"}
+    assert shared == SHARED - {"approach", "retreat"}
+    assert table_fields(section(JOB_PAGE, "### Approach and retreat")) == {"distance", "axis", "frame", "law"}
     own = section(JOB_PAGE, f"### {tag}")
-    assert table_fields(own) == MOVES[tag] - shared
+    assert table_fields(own) == MOVES[tag] - SHARED
     example = next(block for block in blocks(own) if block.language == "yaml")
     assert tag in {move["planner"] for move in yaml.safe_load(example.text)["moves"]}
 
@@ -189,6 +192,11 @@ def test_every_planner_has_its_section_with_every_field(tag: str) -> None:
 def test_every_field_has_its_line(heading: str, definition: str | None) -> None:
     described = SCHEMA if definition is None else SCHEMA["$defs"][definition]
     assert table_fields(section(JOB_PAGE, heading)) == set(described["properties"])
+
+
+def test_every_default_has_its_line() -> None:
+    described = SCHEMA["properties"]["defaults"]["properties"]
+    assert table_fields(section(JOB_PAGE, "### Defaults")) == set(described)
 
 
 def test_every_definition_of_the_schema_is_looked_at() -> None:

@@ -130,6 +130,7 @@ class Span:
         end: Seconds from the start of the trajectory; equals the next span's start.
         continuity: Derivatives that the planner promises to join without a jump: 1 or 2.
         payload: What the tool carries meanwhile; None for nothing.
+        label: What it is for, in the job's words; empty where it says nothing.
         round: In which round of a repeat it is, such as "slot 3 of 18"; empty outside of any.
     """
 
@@ -139,7 +140,13 @@ class Span:
     end: float
     continuity: int
     payload: Payload | None = None
+    label: str = ""
     round: str = ""
+
+    @property
+    def words(self) -> str:
+        """What it is: its planner, label and round."""
+        return ", ".join(word for word in (self.planner, self.label, self.round) if word)
 
     @property
     def duration(self) -> float:

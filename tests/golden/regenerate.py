@@ -31,7 +31,7 @@ def rows_of(plan: Plan) -> bytes:
     groups = loaded.job.output.columns
     out = io.BytesIO()
     columns = columns_of(groups, loaded.robot.joint_types, loaded.units)
-    rows = sample(plan.trajectory, grid_of(plan), groups, loaded.units, robot=loaded.robot)
+    rows = sample(plan.trajectory, grid_of(plan), groups, loaded.units, robot=loaded.robot_of_rows)
     write_csv(rows, columns, out)
     return out.getvalue()
 

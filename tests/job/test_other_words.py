@@ -41,7 +41,7 @@ def problems(text: str) -> list[tuple[int, str]]:
             5,
             "{repeat: 3, moves: [...]}",
         ),
-        ("planner: cubic, to: {joints: [1]}, duration: 1", "mark: here", 5, "the column `move`"),
+        ("planner: cubic, to: {joints: [1]}, duration: 1", "mark: here", 5, "a move has a `label`"),
         ("planner: cubic, to: {joints: [1]}, duration: 1", "gripper: 1", 5, "attach and detach"),
         ("planner: cubic, to: {joints: [1]}, duration: 1", "goto: a", 5, "{planner: jerk_limited, to: a}"),
         ("{planner: cubic, to: {joints: [1]}, duration: 1}", "wait", 5, "{planner: hold, duration: ...}"),

@@ -241,7 +241,7 @@ def _lines(explained: Explanation, count: int, *, peers: bool = False) -> Iterat
     noted = [*explained.events, *explained.remarks]
     for move in explained.moves:
         yield ""
-        named = move.planner if move.round is None else f"{move.planner}, {move.round}"
+        named = ", ".join(word for word in (move.planner, move.label, move.round) if word)
         yield f"move {move.index}: {named}, {move.duration:.10g} s, from t = {move.start:.10g} s"
         yield from _carried(move)
         if move.planner in HANDLING:

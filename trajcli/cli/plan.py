@@ -380,5 +380,8 @@ def _moves(indices: Sequence[int]) -> str:
 
 
 def _where(plan: Plan, move: int | None) -> str:
-    words = "" if move is None else plan.loaded.document.round_of(move)
-    return "" if move is None else f"move {move} ({words}): " if words else f"move {move}: "
+    if move is None:
+        return ""
+    named = (plan.loaded.job.moves[move].label, plan.loaded.document.round_of(move))
+    words = ", ".join(word for word in named if word)
+    return f"move {move} ({words}): " if words else f"move {move}: "

@@ -75,7 +75,7 @@ _ENTRIES_ELSEWHERE = {
     ),
     **dict.fromkeys(
         ("mark", "label", "comment", "marker", "id"),
-        "write it behind a `#`; rows say by the column `move` which move they belong to",
+        "a move has a `label`, which reports and pictures show",
     ),
     **dict.fromkeys(
         ("io", "output", "signal", "set", "gripper", "grip", "open", "close", "event"),

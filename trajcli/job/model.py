@@ -43,7 +43,7 @@ from trajcli.language.numbers import (
 from trajcli.language.per_joint import PerJoint
 from trajcli.language.points import NamedTarget
 from trajcli.language.poses import Pose
-from trajcli.planners import HANDLING, PLANNERS, Planner, moves_adapter
+from trajcli.planners import HANDLING, PLANNERS, Planner, defaults_of_paths, moves_adapter
 from trajcli.planners.planner import WhenOverLimit
 from trajcli.units import Quantity, Units
 
@@ -246,6 +246,25 @@ class _Moves:
         return {**moves, "items": {"anyOf": [moves["items"], *beside, *STRUCTURES]}}
 
 
+class _Defaults:
+    """Lets a job state what holds for every move along a path; who reads one has put it into the moves."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
+        return core_schema.with_info_plain_validator_function(self._read)
+
+    @staticmethod
+    def _read(value: Any, info: core_schema.ValidationInfo) -> Any:  # noqa: ANN401
+        law = value.get("law") if isinstance(value, Mapping) else None
+        if isinstance(law, Mapping):
+            value = {**value, "law": {"shape": "time_optimal", **law}}
+        return defaults_of_paths().model_validate(value, context=info.context)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        return handler(TypeAdapter(defaults_of_paths()).core_schema)
+
+
 class _OrMany:
     """Lets a grid or a list stand for a point in the schema: who reads one in a job has expanded it."""
 
@@ -330,6 +349,11 @@ class Job(Model):
     ] = Field(
         default_factory=dict, description="Frames in which poses are given, or grids and lists of them."
     )
+    defaults: Annotated[
+        Any,
+        _Defaults(),
+        Field(exclude=True, description="For every line, arc, path and screw that says no other."),
+    ] = None
     sequences: dict[Annotated[str, Name("Name of a sequence.")], Annotated[list[Planner], _Moves()]] = Field(
         default_factory=dict,
         exclude=True,

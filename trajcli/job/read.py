@@ -36,7 +36,7 @@ from trajcli.units import Units, amount_text
 if TYPE_CHECKING:
     from trajcli.language.recorded import Recorded
 
-_STRUCTURES = frozenset(("repeat", "call"))
+_STRUCTURES = frozenset(("repeat", "call", "approach", "retreat"))
 """Keys of entries among the moves that stand for other moves."""
 _UNREAD = Robot("unread", (), unlimited(0), None, np.eye(4), np.eye(4))
 """Stands for a robot whose own flaws are known, while the rest of the job is read."""
@@ -116,7 +116,8 @@ class LoadedJob:
 
     def called(self, index: int) -> str:
         """Return by what a move goes in messages: its number and planner, and in which round it is."""
-        named = (self.job.moves[index].tag, self.document.round_of(index))
+        move = self.job.moves[index]
+        named = (move.tag, move.label, self.document.round_of(index))
         return f"move {index} ({', '.join(word for word in named if word)})"
 
     def place_of_move(self, index: int) -> Place:
@@ -276,7 +277,7 @@ def _expanded(document: Document, units: Units) -> Document:
     entries = [entry.value for entry in moves] if isinstance(moves, list) else []
     values = [node.value for some in named if isinstance(some, dict) for node in some.values()]
     if not (
-        "sequences" in sections
+        not sections.keys().isdisjoint(("sequences", "defaults"))
         or any(isinstance(entry, dict) and not entry.keys().isdisjoint(_STRUCTURES) for entry in entries)
         or any(map(_is_many, values))
     ):

@@ -201,6 +201,7 @@ class MoveReport(ReportPart):
 
     index: Annotated[int, Field(description="From 0.")]
     planner: str
+    label: Annotated[str | None, Field(description="What it is for; null where the job says nothing.")] = None
     round: Annotated[
         str | None,
         Field(description="In which round of a repeat, such as slot 3 of 18; null outside of any."),

@@ -64,13 +64,22 @@ def _relative(state: dict[str, Any]) -> dict[str, Any]:
 
 
 def _described(definition: dict[str, Any]) -> dict[str, Any]:
-    """Return the definition of a move with its description at `planner`, where an editor shows it."""
+    """Return the definition of a move with its description at `planner`, where an editor shows it.
+
+    Its approach and retreat are moves of their own, which no planner knows of.
+    """
     properties = definition.get("properties", {})
     planner = properties.get("planner", {})
     if "const" not in planner:
         return definition
+    from trajcli.job.program.schemas import STRAIGHT
+
     text = " ".join(definition["description"].split("\n\n")[0].split())
-    return {**definition, "properties": {**properties, "planner": {**planner, "description": text}}}
+    words = {"retreat": "Before it, straight from where the arm stands to this far from there."}
+    if "to" in properties:
+        words = {"approach": "To a point this far from the target, then straight to it.", **words}
+    parts = {key: {**STRAIGHT, "description": description} for key, description in words.items()}
+    return {**definition, "properties": {**properties, "planner": {**planner, "description": text}, **parts}}
 
 
 def _robot() -> dict[str, Any]:
@@ -120,5 +129,7 @@ def _without_nulls(node: Any) -> Any:  # noqa: ANN401
     if schema.get("default", ...) is not None:
         return schema
     del schema["default"]
-    forms = [form for form in schema.pop("anyOf", []) if form != {"type": "null"}]
+    if "anyOf" not in schema:
+        return schema
+    forms = [form for form in schema.pop("anyOf") if form != {"type": "null"}]
     return {**forms[0], **schema} if len(forms) == 1 else {**schema, "anyOf": forms}

@@ -144,6 +144,7 @@ def _move(plan: Plan, index: int, *, reference: bool, peers: bool) -> MoveReport
     return MoveReport(
         index=span.index,
         planner=span.planner,
+        label=span.label or None,
         round=span.round or None,
         start=span.start,
         end=span.end,

@@ -13,6 +13,7 @@ from pydantic import Field, GetCoreSchemaHandler, TypeAdapter, ValidationError
 from pydantic_core import CoreSchema, core_schema
 
 from trajcli.frozen import frozen
+from trajcli.language.numbers import Model
 from trajcli.planners.planner import Planner
 
 _WHERE = {
@@ -113,6 +114,12 @@ class _ByName:
         return core_schema.tagged_union_schema(choices, discriminator="planner")
 
 
+def defaults_of_paths() -> type[Model]:
+    """Return the model of what a job states for all its moves along paths."""
+    model: type[Model] = import_module("trajcli.planners.tool_path.defaults").Defaults
+    return model
+
+
 def moves_adapter(tags: Iterable[str]) -> TypeAdapter[list[Planner]]:
     """Return what reads a list of at least one move, each planned by one of the planners named."""
     planner = _ByName(tuple(sorted(tags)))
@@ -141,4 +148,4 @@ def changed(planner: Planner, change: Mapping[str, Any]) -> Planner | None:
         return None
 
 
-__all__ = ["ALSO_CALLED", "HANDLING", "PLANNERS", "Planner", "changed", "moves_adapter"]
+__all__ = ["ALSO_CALLED", "HANDLING", "PLANNERS", "Planner", "changed", "defaults_of_paths", "moves_adapter"]

@@ -15,7 +15,7 @@ from trajcli.errors import Amount, Amounts, PlanningError, Problem, said
 from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Payload, Robot
 from trajcli.language.limits import LimitsSpec
-from trajcli.language.numbers import Model
+from trajcli.language.numbers import Model, Name
 from trajcli.trajectory import Destination, Promise, Span, State, Trajectory, ViaPoints
 
 if TYPE_CHECKING:
@@ -214,6 +214,7 @@ class Planner(Model):
         faster: Likewise changes that keep the limits where slowing the whole move costs much more time.
         limits: Tightens the job's limits for this move; applied before `plan` is called.
         when_over_limit: Overrides the job's; applied after `plan` was called.
+        label: What it is for, in the job's words.
     """
 
     continuity: ClassVar[Literal[1, 2]]
@@ -228,6 +229,7 @@ class Planner(Model):
     when_over_limit: Annotated[
         WhenOverLimit | None, Field(description="Overrides the job's for this move.")
     ] = None
+    label: Annotated[str, Name("What it is for, shown in reports and pictures.")] | None = None
 
     @property
     def tag(self) -> str:
@@ -398,7 +400,8 @@ class PlannedMove:
 
     def span(self, start: float, end: float) -> Span:
         """Return the part of a trajectory, from `start` to `end` s, that is this move."""
-        return Span(self.index, self.planner.tag, start, end, self.continuity, self.robot.payload)
+        label, payload = self.planner.label or "", self.robot.payload
+        return Span(self.index, self.planner.tag, start, end, self.continuity, payload, label)
 
     def alone(self) -> Trajectory:
         """Return the trajectory of this move alone."""

@@ -175,8 +175,7 @@ def _waypoints(plan: Plan) -> Iterator[tuple[float, Array]]:
 
 def _move(plan: Plan, index: int) -> dict[str, Any]:
     move, span = plan.moves[index], plan.trajectory.spans[index]
-    named = ", ".join(word for word in (span.planner, span.round) if word)
-    detail = f"{named}, {span.duration:.6g} s{_tightest(plan, move, index)}"
+    detail = f"{span.words}, {span.duration:.6g} s{_tightest(plan, move, index)}"
     return {**_interval(span), "index": span.index, "label": f"move {span.index}", "detail": detail}
 
 

@@ -64,7 +64,7 @@ class PlannedMotion:
         """The borders of its moves."""
         spans = self.plan.trajectory.spans
         times = [spans[0].start, *(span.end for span in spans)]
-        names = tuple(" ".join((str(span.index), span.planner, span.round)).rstrip() for span in spans)
+        names = tuple(f"{span.index} {span.words}" for span in spans)
         return MoveBorders(np.array(times) + self.offset, names)
 
     @property

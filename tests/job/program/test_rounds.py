@@ -157,7 +157,7 @@ moves: [{repeat: slot, moves: [{planner: quintic, to: slot}]}]
 
 WRONG = [
     ("  - call: plac\n", 2, "there is no sequence 'plac'", "did you mean 'place'?"),
-    ("  - {repeat: slot, moves: [{call: place}], label: x}\n", 2, "unknown key 'label'", "repeat, moves"),
+    ("  - {repeat: slot, moves: [{call: place}], lable: x}\n", 2, "unknown key 'lable'", "label"),
     ("  - {repeat: corner, moves: [{call: place}]}\n", 2, "'corner' is not many", "slot"),
     ("  - {repeat: 0, moves: [{call: place}]}\n", 2, "whole number of at least 1", None),
     ("  - {repeat: [slot, two], moves: [{call: place}]}\n", 2, "slot is 6, two is 2", None),

@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 
 from trajcli.errors import Place
 from trajcli.frozen import frozen
-from trajcli.job.program.many import MOST_ENTRIES, SECTIONS, ManyNames, Rounds
+from trajcli.job.program.many import MOST_ENTRIES, SECTIONS, ManyNames, Rounds, fields_of
+from trajcli.job.program.parts import Parts
 from trajcli.job.yaml.document import Document, Node
 from trajcli.language.numbers import ReadingContext
 from trajcli.suggest import did_you_mean, valid_names
@@ -18,11 +19,19 @@ _Path = tuple[str | int, ...]
 
 
 class _Entry(NamedTuple):
-    """A move of the expanded list, where it is written, and the rounds in which it is reached."""
+    """A move of the expanded list.
+
+    Attributes:
+        node: The move.
+        path: Where it is written.
+        rounds: In which rounds it is, such as "slot 3 of 18"; empty outside of repeats.
+        places: Where what does not stand in it is written, by its path below the move.
+    """
 
     node: Node
     path: _Path
     rounds: str
+    places: Mapping[_Path, _Path]
 
 
 @frozen
@@ -31,14 +40,12 @@ class ExpandedDocument(Document):
 
     Attributes:
         written: The document as it stands in the file.
-        paths: Where each move is written.
-        rounds: In which round each move is, such as "slot 3 of 18"; empty outside of repeats.
+        entries: The moves.
         made: Where points and frames of rounds are written, and moves of sequences that nobody calls.
     """
 
     written: Document
-    paths: Sequence[_Path]
-    rounds: Sequence[str]
+    entries: Sequence[_Entry]
     made: Mapping[_Path, _Path]
 
     def place(self, path: Sequence[str | int], *, key: bool = False) -> Place:
@@ -52,11 +59,15 @@ class ExpandedDocument(Document):
 
     def round_of(self, move: int) -> str:
         """Return in which round of a repeat a move is reached; empty outside of any."""
-        return self.rounds[move]
+        return self.entries[move].rounds
 
     def _written(self, path: _Path) -> _Path:
-        if path[:1] == ("moves",) and path[1:] and isinstance(path[1], int) and path[1] < len(self.paths):
-            return (*self.paths[path[1]], *path[2:])
+        if path[:1] == ("moves",) and path[1:] and isinstance(path[1], int) and path[1] < len(self.entries):
+            entry = self.entries[path[1]]
+            for depth in (4, 3):
+                if path[2:depth] in entry.places:
+                    return (*entry.places[path[2:depth]], *path[depth:])
+            return (*entry.path, *path[2:])
         for depth in (2, 3):
             if path[:depth] in self.made:
                 return (*self.made[path[:depth]], *path[depth:])
@@ -85,16 +96,21 @@ def expanded(document: Document, units: Units) -> ExpandedDocument:
         InputError: When a repeat, a call, a sequence or a point that is many is wrong, or the expanded list
             of moves has more than a million entries.
     """
-    names = ManyNames(document, ReadingContext(units))
+    context = ReadingContext(units)
+    names = ManyNames(document, context)
     names.check()
-    return _Expansion(document, names).document()
+    return _Expansion(document, names, Parts(names, document.node(("defaults",)), context)).document()
+
+
+def _joined(*words: str) -> str:
+    return ", ".join(word for word in words if word)
 
 
 class _Expansion:
     """The expansion of one document."""
 
-    def __init__(self, document: Document, names: ManyNames) -> None:
-        self._document, self._names = document, names
+    def __init__(self, document: Document, names: ManyNames, parts: Parts) -> None:
+        self._document, self._names, self._parts = document, names, parts
         node = document.node(("sequences",))
         if node is not None and not isinstance(node.value, dict):
             raise names.refused("expected a mapping {NAME: [move, ...]}", ("sequences",))
@@ -121,20 +137,17 @@ class _Expansion:
         }
         self._names.make_the_rest()
         root = self._root(moves, entries, rest)
-        for section, some in self._names.made.items():
-            made |= {(section, name): path for name, (_, path) in some.items()}
-        paths, rounds = [entry.path for entry in entries], [entry.rounds for entry in entries]
-        return ExpandedDocument(
-            self._document.file, self._document.lines, root, self._document, paths, rounds, made
-        )
+        made |= self._names.places()
+        written = self._document
+        return ExpandedDocument(written.file, written.lines, root, written, entries, made)
 
     def _root(self, moves: Node, entries: list[_Entry], rest: Mapping[str, list[_Entry]]) -> Node:
         sections: dict[str, Node] = dict(self._document.root.value)  # type: ignore[arg-type]
         sections["moves"] = moves._replace(value=[entry.node for entry in entries])
         for section in SECTIONS:
-            if section in sections and isinstance(sections[section].value, dict):
-                made = {name: node for name, (node, _) in self._names.made[section].items()}
-                sections[section] = sections[section]._replace(value={**self._names.single(section), **made})
+            named = self._names.named(section)
+            if named:
+                sections[section] = sections.get(section, moves)._replace(value=named)
         if "sequences" in sections:
             of_names = {
                 name: self._sequences[name]._replace(value=[entry.node for entry in some])
@@ -165,18 +178,18 @@ class _Expansion:
             raise self._names.refused("a list of moves is empty", path)
         total = 0
         for index, entry in enumerate(listed.value):
-            keys, here = entry.value if isinstance(entry.value, dict) else {}, (*path, index)
+            keys, here = fields_of(entry), (*path, index)
             if "repeat" in keys:
                 total += self._count_repeat(entry, here, bound, chain)
             elif "call" in keys:
                 total += self._count_call(entry, here, bound, chain)
             else:
                 self._check_bound(entry, here, bound)
-                total += 1
+                total += len(self._parts.of(entry, here))
         return total
 
     def _count_repeat(self, entry: Node, path: _Path, bound: frozenset[str], chain: tuple[str, ...]) -> int:
-        self._only(entry, ("repeat", "moves"), path)
+        self._names.only(entry, ("repeat", "moves", "label"), path)
         over, moves = entry.child("repeat"), entry.child("moves")
         if over is None or moves is None:
             raise self._names.refused("a repeat needs `moves`", path, "such as {repeat: 3, moves: [...]}")
@@ -214,7 +227,7 @@ class _Expansion:
         return counts[names[0]], names
 
     def _count_call(self, entry: Node, path: _Path, bound: frozenset[str], chain: tuple[str, ...]) -> int:
-        self._only(entry, ("call",), path)
+        self._names.only(entry, ("call", "label"), path)
         called, at = entry.child("call"), (*path, "call")
         name = None if called is None else called.value
         if not isinstance(name, str) or name not in self._sequences:
@@ -242,29 +255,26 @@ class _Expansion:
                 hint = f"write the move within `- {{repeat: {name}, moves: [...]}}`"
                 raise self._names.refused(message, path, hint)
 
-    def _only(self, entry: Node, keys: tuple[str, ...], path: _Path) -> None:
-        for key in entry.value if isinstance(entry.value, dict) else ():
-            if key not in keys:
-                hint = did_you_mean(key, keys) or valid_names(keys)
-                raise self._names.refused(f"unknown key '{key}'", (*path, key), hint, key=True)
-
     def _entries(self, listed: Node, path: _Path, rounds: Rounds, words: str) -> Iterator[_Entry]:
         """Yield the moves that a list stands for, in its rounds."""
         items: list[Node] = listed.value  # type: ignore[assignment]
         for index, entry in enumerate(items):
-            keys, here = entry.value if isinstance(entry.value, dict) else {}, (*path, index)
+            keys, here = fields_of(entry), (*path, index)
+            label = str(keys["label"].value) if "label" in keys else ""
             if "repeat" in keys:
                 count, names = self._rounds(keys["repeat"], (*here, "repeat"))
                 for number in range(count):
                     now = {**rounds, **dict.fromkeys(names, number)}
                     said = self._names.words(now, names) or f"round {number + 1} of {count}"
-                    both = f"{words}, {said}" if words else said
-                    yield from self._entries(keys["moves"], (*here, "moves"), now, both)
+                    said = _joined(words, label, said)
+                    yield from self._entries(keys["moves"], (*here, "moves"), now, said)
             elif "call" in keys:
                 name = str(keys["call"].value)
-                yield from self._entries(self._sequences[name], ("sequences", name), rounds, words)
+                at = ("sequences", name)
+                yield from self._entries(self._sequences[name], at, rounds, _joined(words, label))
             else:
-                yield _Entry(self._of_round(entry, rounds), here, words)
+                for part in self._parts.of(entry, here):
+                    yield _Entry(self._of_round(part.node, rounds), here, words, part.places)
 
     def _of_round(self, entry: Node, rounds: Rounds) -> Node:
         """Return a move in a round; one that is the same in several is one node."""

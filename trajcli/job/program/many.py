@@ -63,6 +63,7 @@ class ManyNames:
     def __init__(self, document: Document, context: ReadingContext) -> None:
         self._document, self._context = document, context
         self._at: dict[str, tuple[_Path, Node]] = {}
+        self._sections: dict[str, str] = {}
         self._grids: dict[str, _Grid] = {}
         self._lists: dict[str, list[Node]] = {}
         self._needs: dict[str, tuple[str, ...]] = {}
@@ -77,13 +78,27 @@ class ManyNames:
     def _add(self, name: str, value: Node, path: _Path) -> None:
         if name in self._at:
             raise self.refused(f"'{name}' is a point and a frame", path, "points and frames share names")
-        self._at[name] = path, value
+        self._at[name], self._sections[name] = (path, value), str(path[0])
         if isinstance(value.value, list):
             self._lists[name] = self._listed(value, path)
             self.counts[name] = len(value.value)
         elif isinstance(value.value, dict) and "grid" in value.value:
             self._grids[name] = self._grid(value, path)
             self.counts[name] = prod(self._grids[name].counts)
+
+    def add_target(self, node: Node, path: _Path) -> str:
+        """Return the name of a new point, which is the target of a move."""
+        name = f"target in line {node.line}"
+        while name in self._at:
+            name += "'"
+        self._at[name], self._sections[name] = (path, node), "points"
+        return name
+
+    def waits(self, name: str) -> bool:
+        """Return whether a point is relative to where the arm stands, and so differs from move to move."""
+        reached = [name, *self._reached(name)]
+        nodes = [self._at[one][1] for one in reached if one in self._at]
+        return "here" in reached or any(node.child("joints_by") is not None for node in nodes)
 
     def refused(self, message: str, path: _Path, hint: str | None = None, *, key: bool = False) -> InputError:
         """Return the error about something at a path."""
@@ -160,7 +175,7 @@ class ManyNames:
         known = words if needed == (name,) else f"{name} ({words})"
         while known in self._at:
             known += "'"
-        made = self.made[str(path[0])]
+        made = self.made[self._sections[name]]
         if known not in made:
             made[known] = (node, path)  # before what it names, which may be itself
             made[known] = (self._of_round(name, node, rounds), path)
@@ -204,13 +219,21 @@ class ManyNames:
             if self.needs(name) and path not in reached:
                 self.meant(name, first)
 
-    def single(self, section: str) -> dict[str, Node]:
-        """Return the points or frames that are one, whatever the round."""
-        return {
+    def named(self, section: str) -> dict[str, Node]:
+        """Return the points or frames by name: those that are one, and those of rounds."""
+        single = {
             name: node
-            for name, (path, node) in self._at.items()
-            if path[0] == section and not self.needs(name)
+            for name, (_, node) in self._at.items()
+            if self._sections[name] == section and not self.needs(name)
         }
+        return single | {name: node for name, (node, _) in self.made[section].items()}
+
+    def places(self) -> dict[_Path, _Path]:
+        """Return where points and frames are written that do not stand under their name."""
+        found = {(self._sections[name], name): path for name, (path, _) in self._at.items()}
+        for section, made in self.made.items():
+            found |= {(section, name): path for name, (_, path) in made.items()}
+        return {at: path for at, path in found.items() if at != path}
 
     def _one(self, name: str, path: _Path) -> None:
         """Refuse a name that is not that of one point or frame."""
@@ -231,11 +254,11 @@ class ManyNames:
         return items
 
     def _grid(self, value: Node, path: _Path) -> _Grid:
-        self._only(value, ("grid",), path)
+        self.only(value, ("grid",), path)
         grid, path = value.child("grid"), (*path, "grid")
         if grid is None or not isinstance(grid.value, dict):
             raise self.refused("expected {from: NAME, steps: [...]}", path)
-        self._only(grid, ("from", "steps", "frame"), path)
+        self.only(grid, ("from", "steps", "frame"), path)
         origin, steps, frame = (grid.value.get(key) for key in ("from", "steps", "frame"))
         for key, node in (("from", origin), ("steps", steps), ("frame", frame)):
             if node is None and key != "frame":
@@ -252,7 +275,7 @@ class ManyNames:
         return _Grid(origin, frame, counts, tuple(step for _, step in read))
 
     def _step(self, node: Node, path: _Path) -> tuple[int, tuple[float, ...]]:
-        self._only(node, ("count", "xyz"), path)
+        self.only(node, ("count", "xyz"), path)
         count, xyz = node.child("count"), node.child("xyz")
         if count is None or xyz is None:
             raise self.refused(f"`{'count' if count is None else 'xyz'}` is missing", path)
@@ -264,14 +287,23 @@ class ManyNames:
             below, message, hint = error.flaws[0]
             raise self.refused(message, (*path, "xyz", *below), hint) from None
 
-    def _only(self, node: Node, keys: tuple[str, ...], path: _Path) -> None:
-        """Refuse a node that is no mapping, or has another key."""
+    def only(self, node: Node, keys: tuple[str, ...], path: _Path) -> None:
+        """Refuse a node that is no mapping, or has another key.
+
+        Raises:
+            InputError: Names the key.
+        """
         if not isinstance(node.value, dict):
             raise self.refused(f"expected a mapping with {', '.join(keys)}", path)
         for key in node.value:
             if key not in keys:
                 hint = did_you_mean(key, keys) or valid_names(keys)
                 raise self.refused(f"unknown key '{key}'", (*path, key), hint, key=True)
+
+
+def fields_of(node: Node | None) -> dict[str, Node]:
+    """Return the fields of a mapping; none of what is none."""
+    return node.value if node is not None and isinstance(node.value, dict) else {}
 
 
 def naming_texts(node: Node, key: str | int = "to") -> Iterator[str]:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from trajcli.language.numbers import number_schema
+from trajcli.language.numbers import LONGEST_NAME, number_schema
 from trajcli.units import Quantity
 
 MOVES_DEFINITION = "a list of moves"
 """Stands in a schema for the list of moves, which such an entry stands in."""
 _NAME = {"type": "string", "minLength": 1}
+_LABEL = {**_NAME, "maxLength": LONGEST_NAME, "description": "What it is for, shown with its moves."}
 _LISTED = {"type": "array", "items": _NAME, "minItems": 1, "uniqueItems": True}
 
 
@@ -27,18 +28,42 @@ STRUCTURES = (
                 "or several such names, which go together.",
             },
             "moves": {"$comment": MOVES_DEFINITION},
+            "label": _LABEL,
         },
         "repeat",
         "moves",
         description="Moves that are done several times.",
     ),
     _mapping(
-        {"call": {**_NAME, "description": "Name of a sequence under `sequences`."}},
+        {"call": {**_NAME, "description": "Name of a sequence under `sequences`."}, "label": _LABEL},
         "call",
         description="The moves of a sequence.",
     ),
 )
 """Entries among the moves that stand for several of them."""
+
+_DISTANCE = number_schema(Quantity("length"), exclusiveMinimum=0)
+_NUMBERS = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
+STRAIGHT = {
+    "anyOf": [
+        _DISTANCE,
+        _mapping(
+            {
+                "distance": {**_DISTANCE, "description": "How far from the end of it (length unit)."},
+                "axis": {
+                    "anyOf": [{"enum": ["x", "-x", "y", "-y", "z", "-z"]}, _NUMBERS],
+                    "default": "-z",
+                    "description": "Along which axis the point before, or behind, lies.",
+                },
+                "frame": {**_NAME, "default": "tool", "description": "Whose axis: tool, world or a frame."},
+                "law": {"$ref": "#/$defs/LawSpec"},
+            },
+            "distance",
+            description="A straight part of a move.",
+        ),
+    ]
+}
+"""What stands under `approach` and `retreat`."""
 
 _STEP = _mapping(
     {

@@ -1,0 +1,189 @@
+"""Parts of a move: retreat, the move itself and its approach, with the defaults of the job."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import field
+
+import numpy as np
+
+from trajcli.frozen import frozen
+from trajcli.job.program.many import ManyNames, fields_of
+from trajcli.job.yaml.document import Node
+from trajcli.language.numbers import FlawError, Number, ReadingContext, written_number
+from trajcli.language.poses import read_axis
+from trajcli.planners import PLANNERS
+from trajcli.units import Quantity
+
+_LENGTH = Quantity("length")
+_DEFAULTS = ("law", "tolerance", "orientation")
+_STRAIGHT = ("distance", "axis", "frame", "law", "zone")
+_OF_ALL_PARTS = ("label", "limits", "when_over_limit")
+_OF_THE_TARGET = ("zone", "at")
+_FASTEST = "time_optimal"
+_ALONE = ("shape", "duration")  # a law that names one of these takes nothing from the defaults
+
+_Path = tuple[str | int, ...]
+
+
+@frozen
+class MovePart:
+    """One plain move.
+
+    Attributes:
+        node: The move.
+        places: Where what does not stand in the move itself is written, by its path below the move.
+    """
+
+    node: Node
+    places: Mapping[_Path, _Path] = field(default_factory=dict)
+
+
+class Parts:
+    """The parts of which moves consist."""
+
+    def __init__(self, names: ManyNames, defaults: Node | None, context: ReadingContext) -> None:
+        self._names, self._context = names, context
+        if defaults is not None:
+            names.only(defaults, _DEFAULTS, ("defaults",))
+        self._defaults = fields_of(defaults)
+        self._known: dict[int, list[MovePart]] = {}
+
+    def of(self, entry: Node, path: _Path) -> list[MovePart]:
+        """Return the plain moves that an entry of the moves is, in order."""
+        if id(entry) not in self._known:
+            self._known[id(entry)] = self._parts(entry, path)
+        return self._known[id(entry)]
+
+    def _parts(self, entry: Node, path: _Path) -> list[MovePart]:
+        fields = fields_of(entry)
+        rest = {key: node for key, node in fields.items() if key not in ("approach", "retreat")}
+        if rest.keys() == fields.keys():
+            return [self._with_defaults(MovePart(entry))]
+        parts = []
+        if "retreat" in fields:
+            offset, frame = self._offset(fields["retreat"], (*path, "retreat"), 1.0)
+            here = _relative(entry, "here", offset, frame)
+            parts.append(self._straight(fields, "retreat", path, here, entry))
+        if "approach" not in fields:
+            return [*parts, self._with_defaults(MovePart(_mapping(entry, rest)))]
+        target = fields.get("to")
+        if target is None or not isinstance(target.value, str | dict):
+            raise self._names.refused("an approach needs a target `to`", (*path, "approach"))
+        offset, frame = self._offset(fields["approach"], (*path, "approach"), 1.0)
+        back, _ = self._offset(fields["approach"], (*path, "approach"), -1.0)
+        name = target.value if isinstance(target.value, str) else self._target(target, (*path, "to"))
+        first = {key: node for key, node in rest.items() if key not in _OF_THE_TARGET}
+        first["to"] = _relative(target, name, offset, frame)
+        first |= _zone(fields["approach"])
+        last = _relative(target, "here", back, frame) if self._names.waits(name) else target
+        straight = self._straight(fields, "approach", path, last, entry)
+        of_target = {key: rest[key] for key in _OF_THE_TARGET if key in rest}
+        kept = {key: node for key, node in fields_of(straight.node).items() if key != "zone"}
+        ending = MovePart(_mapping(entry, {**kept, **of_target}), straight.places)
+        return [*parts, self._with_defaults(MovePart(_mapping(entry, first))), ending]
+
+    def _target(self, target: Node, path: _Path) -> str:
+        """Return the name of a point that is the target of a move without its rates."""
+        rates = ("velocity", "acceleration", "time", "blend")
+        fields = {key: node for key, node in fields_of(target).items() if key not in rates}
+        return self._names.add_target(_mapping(target, fields), path)
+
+    def _straight(
+        self, fields: Mapping[str, Node], key: str, path: _Path, target: Node, entry: Node
+    ) -> MovePart:
+        """Return the straight part of an approach or a retreat."""
+        given = fields[key]
+        law = given.child("law")
+        move = {name: fields[name] for name in _OF_ALL_PARTS if name in fields}
+        move |= {"planner": entry._replace(value="line"), "to": target, **_zone(given)}
+        places: dict[_Path, _Path] = {}
+        if law is not None:
+            move["law"], places[("law",)] = law, (*path, key, "law")
+        return self._with_defaults(MovePart(_mapping(entry, move), places), fastest=True)
+
+    def _with_defaults(self, part: MovePart, *, fastest: bool = False) -> MovePart:
+        """Return a part with the defaults of the job where it does not say otherwise.
+
+        Args:
+            part: The part.
+            fastest: Whether its law is time-optimal where nobody says which.
+        """
+        fields = fields_of(part.node)
+        planner = fields["planner"].value if "planner" in fields else None
+        if planner not in PLANNERS or not (self._defaults or fastest):
+            return part
+        fields, places = dict(fields), dict(part.places)
+        for key in (key for key in _DEFAULTS if key in PLANNERS[str(planner)].model_fields):
+            default = self._defaults.get(key)
+            if key == "law":
+                default = self._default_law(default, part.node, fastest=fastest)
+            if default is None:
+                continue
+            own = fields.get(key)
+            if own is None:
+                fields[key], places[(key,)] = default, ("defaults", key)
+            elif _is_added_to(key, own) and isinstance(default.value, dict):
+                added = {name: node for name, node in default.value.items() if name not in fields_of(own)}
+                fields[key] = _mapping(own, {**fields_of(own), **added})
+                places |= {(key, name): ("defaults", key, name) for name in added}
+        return MovePart(_mapping(part.node, fields), places)
+
+    def _default_law(self, law: Node | None, at: Node, *, fastest: bool) -> Node | None:
+        """Return the default law, which is time-optimal where it names no shape."""
+        if law is None:
+            return _mapping(at, {"shape": at._replace(value=_FASTEST)}) if fastest else None
+        if not isinstance(law.value, dict) or "shape" in law.value:
+            return law
+        return _mapping(law, {"shape": law._replace(value=_FASTEST), **law.value})
+
+    def _offset(self, given: Node, path: _Path, sign: float) -> tuple[list[float | str], Node]:
+        """Return how far from the target a straight part begins or ends, m, and along whose axes."""
+        fields = given.value if isinstance(given.value, dict) else {"distance": given}
+        if isinstance(given.value, dict):
+            self._names.only(given, _STRAIGHT, path)
+            if "distance" not in fields:
+                raise self._names.refused("`distance` is missing", path)
+        try:
+            distance = Number(_LENGTH, "", above=0.0).read(fields["distance"].plain(), self._context)
+        except FlawError as error:
+            at = (*path, "distance") if isinstance(given.value, dict) else path
+            raise self._names.refused(str(error), at, error.flaws[0][2]) from None
+        axis = self._axis(fields.get("axis"), (*path, "axis"))
+        frame = fields.get("frame", given._replace(value="tool"))
+        return [written_number(float(x), _LENGTH) for x in sign * distance * axis], frame
+
+    def _axis(self, given: Node | None, path: _Path) -> np.ndarray:
+        """Return the unit vector of an axis, (3,)."""
+        value = "-z" if given is None else given.plain()
+        negative = isinstance(value, str) and value.startswith("-")
+        try:
+            axis = read_axis(value[1:] if negative else value, self._context)
+        except FlawError as error:
+            hint = "one of x, -x, y, -y, z, -z, or three numbers"
+            raise self._names.refused(str(error), path, hint) from None
+        return -axis if negative else axis
+
+
+def _zone(given: Node) -> dict[str, Node]:
+    zone = given.child("zone")
+    return {} if zone is None else {"zone": zone}
+
+
+def _is_added_to(key: str, own: Node) -> bool:
+    """Return whether what a move says is completed from the defaults."""
+    if not isinstance(own.value, dict) or key == "orientation":
+        return False
+    return key != "law" or not any(name in own.value for name in _ALONE)
+
+
+def _mapping(like: Node, fields: Mapping[str, Node]) -> Node:
+    """Return a mapping that stands where another node does."""
+    return like._replace(value=dict(fields), keys=None)
+
+
+def _relative(like: Node, name: str, xyz: list[float | str], frame: Node) -> Node:
+    """Return a target relative to a point."""
+    numbers = like._replace(value=[like._replace(value=x, keys=None) for x in xyz], keys=None)
+    offset = _mapping(like, {"xyz": numbers})
+    return _mapping(like, {"from": like._replace(value=name, keys=None), "offset": offset, "frame": frame})
