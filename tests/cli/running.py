@@ -29,6 +29,7 @@ FAST = JOB.replace("duration: 1", "duration: 0.25")  # 225 deg/s
 SLOWED = FAST.replace("duration: 0.25", "duration: 0.25, when_over_limit: slow")
 IMPOSSIBLE = JOB.replace("quintic, to: {joints: 30}", "trapezoid, to: {joints: 30}, velocity: 20")
 ENDLESS = JOB.replace("rate: 10", "rate: 1e6")
+LONG = JOB.replace("rate: 10", "rate: 2e4")  # more than a pipe holds: who writes it waits for its reader
 
 
 class Outcome(NamedTuple):

@@ -8,7 +8,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from running import COMMAND, ENDLESS, EXAMPLES, FAST, IMPOSSIBLE, JOB, ROOT, SLOWED, call, run
+from running import COMMAND, EXAMPLES, FAST, IMPOSSIBLE, JOB, LONG, ROOT, SLOWED, call, run
 
 Capture = pytest.CaptureFixture[str]
 
@@ -64,7 +64,7 @@ def test_an_interrupt_is_130(tmp_path: Path) -> None:
     pipe = tmp_path / "rows"
     os.mkfifo(pipe)
     job = tmp_path / "job.yaml"
-    job.write_text(ENDLESS)
+    job.write_text(LONG)
     words = [*COMMAND, "plan", str(job), "-q", "-o", str(pipe)]
     process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     with pipe.open("rb") as rows:
@@ -76,7 +76,7 @@ def test_an_interrupt_is_130(tmp_path: Path) -> None:
 
 def test_a_closed_pipe_is_141_and_silent(tmp_path: Path) -> None:
     job = tmp_path / "job.yaml"
-    job.write_text(ENDLESS)
+    job.write_text(LONG)
     words = [*COMMAND, "plan", str(job), "-q"]
     process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert process.stdout is not None
@@ -104,7 +104,7 @@ def test_a_full_disk_is_4() -> None:
     if not Path("/dev/full").exists():
         pytest.skip("without /dev/full")
     with Path("/dev/full").open("w") as full:
-        words = [*COMMAND, "plan", str(EXAMPLES / "sync.yaml")]
+        words = [*COMMAND, "plan", str(EXAMPLES / "cubic.yaml")]
         done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60, check=False)
     assert done.returncode == 4
     assert "cannot write standard output: No space left on device" in done.stderr

@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 
 import pytest
-from running import COMMAND, ENDLESS, FAST, JOB, Outcome, call
+from running import COMMAND, ENDLESS, FAST, JOB, LONG, Outcome, call
 
 SIGNALS = [(signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, 130)]
 TRAJCLI = " ".join([sys.executable, "-m", "trajcli"])
@@ -117,7 +117,8 @@ def test_a_signal_leaves_no_half_file(folder: Path, number: signal.Signals, code
 def test_a_signal_ends_a_command_whose_reader_has_stopped(
     folder: Path, number: signal.Signals, code: int
 ) -> None:
-    words = [*COMMAND, "plan", "endless.yaml", "-q"]
+    (folder / "long.yaml").write_text(LONG)
+    words = [*COMMAND, "plan", "long.yaml", "-q"]
     process = subprocess.Popen(words, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert process.stdout is not None
     assert os.read(process.stdout.fileno(), 9) == b"t,q1_deg\n"
