@@ -50,6 +50,9 @@ def test_rows_of_an_earlier_plan_are_set_aside(text: str, code: int, job: Path, 
     assert "rows.csv was of an earlier plan: it is rows.csv.stale now" in failed.err
     assert Path("rows.csv.stale").read_text() == "kept"
     assert {path.name for path in Path().iterdir()} == {"job.yaml", "rows.csv.stale"}
+    Path("job.yaml").write_text(JOB, encoding="utf-8")
+    assert call(capfd, "plan", "job.yaml", "-o", "rows.csv").code == 0
+    assert {path.name for path in Path().iterdir()} == {"job.yaml", "rows.csv"}
 
 
 @pytest.mark.parametrize("words", [["--no-output"], ["-o", "rows.csv", "--set", "robot={file: none}"]])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from tiers import few
 from trajcli.cli.job_commands import PayloadCommand
 from trajcli.cli.payload import run_payload
 from trajcli.dynamics.newton_euler import InverseDynamics
-from trajcli.errors import InputError, TrajcliError
+from trajcli.errors import InputError, TrajcliError, VerificationError
 from trajcli.job.read import job_from_text
 from trajcli.planning.payload_capacity import payload_capacity
 from trajcli.planning.plan import plan_job
@@ -186,3 +187,17 @@ def test_the_command_for_people_and_programs(tmp_path, capsys) -> None:  # type:
     assert 0 < told["mass"] - shown < 1e-4 * told["mass"] or shown == pytest.approx(told["mass"], rel=1e-5)
     assert shown <= told["mass"]
     assert f"with more, {told['joint']} needs" in second
+
+
+def test_a_job_for_a_consumer_must_give_it_rows_with_any_mass(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A trapezoid's acceleration steps between rows: quintics through them pass its limit, whatever is carried."""
+    text = HEAD + "limits: {effort: {a: 90, b: [-40, 30]}}\nstart: {joints: [0, 0]}\nmoves:\n"
+    text += "  - {planner: trapezoid, to: {joints: [90, 20]}}\n"
+    (tmp_path / "alone.yaml").write_text(text, encoding="utf-8")
+    (tmp_path / "for.yaml").write_text(text + "output: {for: ros-jtc, rate: 50}\n", encoding="utf-8")
+    assert run_payload(PayloadCommand(job=str(tmp_path / "alone.yaml"))) == 0
+    assert "largest mass" in capfd.readouterr().out
+    with pytest.raises(VerificationError, match="ros-jtc"):
+        run_payload(PayloadCommand(job=str(tmp_path / "for.yaml")))

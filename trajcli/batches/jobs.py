@@ -12,7 +12,7 @@ from trajcli.batches.ledger import LEDGER_NAME, LedgerEntry, hash_of_file, read_
 from trajcli.errors import FileError, InputError, utf8
 from trajcli.frozen import comparable, frozen
 from trajcli.streams.formats import ENDINGS, FormatName
-from trajcli.streams.whole_file import identity, set_aside
+from trajcli.streams.whole_file import identity, remove_aside, set_aside
 
 _YAML = (".yaml", ".yml")
 _KEY_OF_JOBS = re.compile(rb"""(?m)(?:^|^\s*\{\s*|,\s*)["']?(?:version|start|moves)["']?\s*:""")
@@ -147,7 +147,7 @@ class Ledgers:
 
     def add(self, job: BatchJob, entry: LedgerEntry) -> None:
         """Take the entry of an output that was written, and write all there are now and then."""
-        Path(f"{job.output}.stale").unlink(missing_ok=True)
+        remove_aside(job.output)
         self._entries[job.output] = entry
         if monotonic() - self._written > _PERIOD:
             self.write()

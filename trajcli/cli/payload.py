@@ -24,8 +24,13 @@ def run_payload(options: PayloadCommand) -> int:
         TrajcliError: Of the job.
     """
     loaded = load_job(options.job, options.override)
+    planned = None
+    if loaded.job.output.consumer is not None:
+        from trajcli.output.delivery.delivered import plan_of
+
+        planned = lambda job, carried: plan_of(job, None, carried)  # noqa: E731
     with progress():
-        capacity = payload_capacity(loaded, options.at)
+        capacity = payload_capacity(loaded, options.at, planned)
     if options.as_json:
         names = ("mass", "joint", "move", "time", "effort", "limit", "cause")
         print_json({name: getattr(capacity, name) for name in names})

@@ -17,7 +17,7 @@ from trajcli.job.read import LoadedJob, files_of, load_job
 from trajcli.output.write import grid_of, write_rows, write_text
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.streams.formats import StreamFormat, format_of
-from trajcli.streams.whole_file import identity, set_aside
+from trajcli.streams.whole_file import identity, remove_aside, set_aside
 
 if TYPE_CHECKING:
     from trajcli.cli.job_commands import PlanCommand
@@ -68,6 +68,7 @@ def plan_and_write(job: str, options: PlanCommand) -> Plan:
         if refusal is None and not options.no_output:
             digits = (options.digits or "fixed") if made is None else made.digits
             write_rows(plan, grid, options.output, digits, form=form, log=log)
+            remove_aside(options.output or "-")
     if options.report is not None or options.reference:
         _report(plan, options, made, rows)  # behind the rows: where it stands, they do
     if refusal is not None:

@@ -7,7 +7,7 @@ on the mass in the planning itself, are met by halving the bracket around it, by
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 
@@ -23,9 +23,11 @@ from trajcli.limits.effort import EffortFamily
 from trajcli.limits.kinds import LimitedMove
 from trajcli.limits.tolerances import EFFORT_RELATIVE
 from trajcli.planners.planner import PlannedMove
-from trajcli.planning.plan import Plan, plan_job
+from trajcli.planning.plan import Carried, Plan, plan_job
 from trajcli.progress import report_progress
 
+PlanWith = Callable[[LoadedJob, Carried], Plan]
+"""Returns the plan of a job with what the tool carries in a move instead."""
 LARGEST = 1e6
 """What no arm carries, kg: a job that verifies with it has no largest payload."""
 _CLOSE = 1e-10  # relative: width at which a bracket is closed
@@ -60,7 +62,9 @@ class PayloadCapacity:
     cause: str | None = None
 
 
-def payload_capacity(loaded: LoadedJob, at: int | None = None) -> PayloadCapacity:
+def payload_capacity(
+    loaded: LoadedJob, at: int | None = None, planned: PlanWith | None = None
+) -> PayloadCapacity:
     """Return the largest mass with which a job verifies, each move planned anew as the job says it.
 
     Args:
@@ -68,12 +72,13 @@ def payload_capacity(loaded: LoadedJob, at: int | None = None) -> PayloadCapacit
             centre of mass and with its inertia; where it attaches none, that of a point at the tcp.
         at: Index of a move: only what is carried there is sought, or, where nothing is, a point at the tcp in
             this move alone.
+        planned: Returns the plan of the job with what the tool carries; unless given, it is for no consumer.
 
     Raises:
         InputError: When there is no such move, or no limit of effort is in force in it.
         TrajcliError: Of the job, when it does not even verify without the payload.
     """
-    search = _Search(loaded, _carriers(loaded, at))
+    search = _Search(loaded, _carriers(loaded, at), planned or _plan)
     feasible, plan = search.feasible_mass()
     search.require_limits(plan)
     low, high = search.bracket(feasible, plan)
@@ -102,11 +107,15 @@ def _carriers(loaded: LoadedJob, at: int | None) -> dict[int, Payload]:
     return held or dict.fromkeys(range(len(moves)), point_mass(0.0))
 
 
+def _plan(loaded: LoadedJob, carried: Carried) -> Plan:
+    return plan_job(loaded, carried, advise=False)
+
+
 class _Search:
     """Attempts at planning a job with different masses."""
 
-    def __init__(self, loaded: LoadedJob, carriers: dict[int, Payload]) -> None:
-        self._loaded, self._carriers = loaded, carriers
+    def __init__(self, loaded: LoadedJob, carriers: dict[int, Payload], planned: PlanWith) -> None:
+        self._loaded, self._carriers, self._planned = loaded, carriers, planned
         self.moves = tuple(sorted(carriers))
         self.template = carriers[self.moves[0]]
         self._plans: dict[float, Plan | TrajcliError] = {}
@@ -116,7 +125,7 @@ class _Search:
         if mass not in self._plans:
             report_progress(f"trying {mass:.9g} kg")
             try:
-                self._plans[mass] = plan_job(self._loaded, partial(self._carried, mass), advise=False)
+                self._plans[mass] = self._planned(self._loaded, partial(self._carried, mass))
             except TrajcliError as error:
                 self._plans[mass] = error
         return self._plans[mass]

@@ -131,6 +131,14 @@ def set_aside(path: str) -> str | None:
     return None
 
 
+def remove_aside(path: str) -> None:
+    """Remove what `set_aside` left of a file that is whole again; where there is nothing, nothing is done."""
+    aside = Path(f"{path}.stale")
+    if path != "-" and not is_special(path) and aside.is_file() and not aside.is_symlink():
+        with suppress(OSError):
+            aside.unlink()
+
+
 def is_special(path: str) -> bool:
     """Return whether a path is an open descriptor such as /dev/stdout, a device or a pipe."""
     if descriptor_of(path) is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from trajcli.job.read import LoadedJob
-from trajcli.planning.plan import Plan, plan_job
+from trajcli.planning.plan import Carried, Plan, plan_job
 
 if TYPE_CHECKING:
     from trajcli.streams.decimals import Digits
@@ -19,6 +19,7 @@ def delivered(
     *,
     rows: bool = False,
     strict: bool = False,
+    carried: Carried | None = None,
 ) -> tuple[Plan, Digits]:
     """Return the plan of a job for its consumer, where there is one, and with which digits it is written.
 
@@ -30,6 +31,7 @@ def delivered(
         form: In which the rows are written; None for a table.
         rows: Whether somebody else than the job says where they stand.
         strict: Whether events are an error, and warnings of the consumer's rules.
+        carried: What the tool carries in a move instead, as in `plan_job`.
 
     Raises:
         VerificationError: When its rows, as the consumer joins them, keep neither rules nor limits.
@@ -37,7 +39,7 @@ def delivered(
         PlanningError: When a move has no curve.
     """
     if profile is None and loaded.job.output.consumer is None:
-        plan = plan_job(loaded)
+        plan = plan_job(loaded, carried, advise=carried is None)
         if strict and plan.verdict.passed:
             from trajcli.output.delivery.joined import joined_rows, with_event
             from trajcli.output.write import grid_of
@@ -49,7 +51,7 @@ def delivered(
     from trajcli.output.delivery.for_consumer import Writing, job_for, plan_for, refusal
     from trajcli.streams.formats import DEFAULT
 
-    made = plan_for(*job_for(loaded, profile, {"rows": rows}), Writing(form or DEFAULT))
+    made = plan_for(*job_for(loaded, profile, {"rows": rows}), Writing(form or DEFAULT), carried)
     if made.plan.verdict.passed and not made.keeps:
         raise refusal(made, ())
     if strict and made.plan.verdict.passed:
@@ -69,7 +71,7 @@ def _refuse_events(plan: Plan) -> None:
         raise concession_error(plan)
 
 
-def plan_of(loaded: LoadedJob, profile: str | None = None) -> Plan:
+def plan_of(loaded: LoadedJob, profile: str | None = None, carried: Carried | None = None) -> Plan:
     """Return the plan of a job for its consumer, where there is one; see `delivered`.
 
     Raises:
@@ -77,4 +79,4 @@ def plan_of(loaded: LoadedJob, profile: str | None = None) -> Plan:
         InputError: When a move loosens a limit, or lacks one it needs; or there is no such consumer.
         PlanningError: When a move has no curve.
     """
-    return delivered(loaded, profile)[0]
+    return delivered(loaded, profile, carried=carried)[0]

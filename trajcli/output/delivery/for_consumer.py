@@ -30,7 +30,7 @@ from trajcli.output.delivery.joined_rows import JoinedRows
 from trajcli.output.write import grid_of
 from trajcli.planners.planner import Event
 from trajcli.planning.adaptation import Adaptation
-from trajcli.planning.plan import Plan, plan_job
+from trajcli.planning.plan import Carried, Plan, plan_job
 from trajcli.progress import report_progress
 from trajcli.streams.decimals import Digits
 from trajcli.streams.formats import DEFAULT, StreamFormat
@@ -191,7 +191,9 @@ def _refuse_other_rows(loaded: LoadedJob, profile: Profile, stays: Mapping[str, 
         )
 
 
-def plan_for(loaded: LoadedJob, profile: Profile, brought: str, writing: Writing) -> ForConsumer:
+def plan_for(
+    loaded: LoadedJob, profile: Profile, brought: str, writing: Writing, carried: Carried | None = None
+) -> ForConsumer:
     """Return the plan of a job for a consumer; where rows keep no limits, and the job says so, a slower one.
 
     Args:
@@ -199,6 +201,7 @@ def plan_for(loaded: LoadedJob, profile: Profile, brought: str, writing: Writing
         profile: Of the consumer.
         brought: What it brought.
         writing: How the rows are written.
+        carried: What the tool carries in a move instead, as in `plan_job`.
 
     Raises:
         VerificationError: When they do not keep them, and the job says `when_over_limit: error`; it names
@@ -206,7 +209,7 @@ def plan_for(loaded: LoadedJob, profile: Profile, brought: str, writing: Writing
         InputError: When a move loosens a limit, or lacks one it needs.
         PlanningError: When a move has no curve.
     """
-    search = _Search(loaded, profile, writing)
+    search = _Search(loaded, profile, writing, carried)
     said = (brought,) if brought else ()
     first = search.attempt(loaded, rules=True)
     if first.keeps or not first.plan.verdict.passed:
@@ -238,15 +241,17 @@ def refusal(made: ForConsumer, remedies: Iterable[str]) -> VerificationError:
 class _Search:
     """Search for the smallest remedy of rows that pass a limit as their consumer joins them."""
 
-    def __init__(self, loaded: LoadedJob, profile: Profile, writing: Writing) -> None:
-        self._loaded, self._profile, self._writing = loaded, profile, writing
+    def __init__(
+        self, loaded: LoadedJob, profile: Profile, writing: Writing, carried: Carried | None
+    ) -> None:
+        self._loaded, self._profile, self._writing, self._carried = loaded, profile, writing, carried
         self._shortest: float | None = None
 
     def attempt(
         self, loaded: LoadedJob, adapted: Adaptation | None = None, *, rules: bool = False
     ) -> ForConsumer:
         """Return a plan with what its consumer makes of it."""
-        return self._judged(plan_job(loaded, adapted=adapted), by_rules=rules)
+        return self._judged(plan_job(loaded, self._carried, adapted=adapted), by_rules=rules)
 
     def _judged(self, plan: Plan, *, by_rules: bool = False) -> ForConsumer:
         """Return what the consumer makes of a plan; by rules only where rows keep the limits, or as asked."""
@@ -360,7 +365,7 @@ class _Search:
             duration = first.plan.trajectory.duration
             yield f"`{' '.join(options)}`{instead} keeps all limits, with {duration:.6g} s as now"
         job = self._loaded.job.model_copy(update={"when_over_limit": "slow"})
-        slow = _Search(replace(self._loaded, job=job), self._profile, self._writing)
+        slow = _Search(replace(self._loaded, job=job), self._profile, self._writing, self._carried)
         slower = slow.slower(first)
         if slower.keeps:
             duration = slower.plan.trajectory.duration
