@@ -414,6 +414,14 @@ def _speed(move: ExplainedMove) -> Iterator[str]:
     if reference.duration is None:
         yield f"  no bound for the duration: {reference.joint}, {reference.reason}"
     elif reference.ratio is not None:
-        fastest = f"{reference.duration:.6g} s, {reference.joint}"
-        how = "the fastest" if move.path is None else "the fastest off the path"
+        needs = "several joints together" if reference.joint is None else reference.joint
+        fastest = f"{reference.duration:.6g} s, {needs}"
+        where = (
+            " through its points"
+            if reference.through_points
+            else ""
+            if move.path is None
+            else " off the path"
+        )
+        how = f"the fastest{where}"
         yield f"  duration: {reference.ratio:.4g} x {how} under the same limits ({fastest})"

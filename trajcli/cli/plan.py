@@ -312,7 +312,8 @@ def _compared(move: MoveReport, bound: ReferenceReport) -> str:
     if bound.ratio is None:
         speeds = [max(-peak.low, peak.high) for peak in move.peaks if peak.quantity == "velocity"]
         return "no bound: it ends where it starts" if max(speeds) > _STILL else "nothing to move"
-    how = "the fastest" if move.tool is None else "the fastest off the path"
+    where = " through its points" if bound.through_points else "" if move.tool is None else " off the path"
+    how = f"the fastest{where}"
     return f"{move.duration:.6g} s, {bound.ratio:.4g} x {how} under the same limits ({bound.duration:.6g} s)"
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.turning_bound import MonotoneStretches, durations_by_joint, turning_points
 from trajcli.errors import PlanningError
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import QUANTITIES, Limits
@@ -79,6 +80,36 @@ def fastest_duration(start: State, end: State, limits: Limits) -> LowerBound | N
             bound = LowerBound(profile.duration, joint)
         breaches += _breaches(profile.curve(), limits.position[joint], problem, joint)
     return replace(bound, breaches=tuple(breaches))
+
+
+def duration_through(points: Array, start: State, end: State, limits: Limits) -> LowerBound:
+    """Return a time that no motion through points falls short of; zero where nothing bounds it.
+
+    It is the larger one of what a joint needs from turning point to turning point, and of the sum over the
+    segments of what their slowest joint needs at its velocity limit.
+
+    Args:
+        points: Those that it passes, start and target among them, shape (m, n).
+        start: State at the start.
+        end: State at the end.
+        limits: Those that the motion was judged by.
+    """
+    steps, velocity = np.diff(points, axis=0), limits.velocity
+    at_speed = np.where(steps > 0, steps / velocity[:, 1], steps / velocity[:, 0]).max(axis=1)
+    stretches = []
+    for joint in range(points.shape[1]):
+        turns = turning_points(points[:, joint])
+        signs = np.sign(np.diff(turns)[[0, -1]]) if turns.size > 1 else np.zeros(2)
+        speeds = np.maximum(np.array([start.velocity[joint], end.velocity[joint]]) * signs, 0.0)
+        bounds = tuple(limits.of_order(order)[joint] for order in (1, 2, 3))
+        stretches.append(MonotoneStretches.between(turns, bounds, speeds, np.ones(2, dtype=bool)))
+    by_joint, together = durations_by_joint(stretches), float(at_speed.sum())
+    worst = int(by_joint.argmax())
+    return (
+        LowerBound(together, None)
+        if together > by_joint[worst]
+        else LowerBound(float(by_joint[worst]), worst)
+    )
 
 
 def _breaches(

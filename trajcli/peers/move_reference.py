@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from trajcli.errors import PlanningError
 from trajcli.findings import Finding
 from trajcli.job.reports.comparisons import (
@@ -14,7 +16,7 @@ from trajcli.job.reports.comparisons import (
     ReferenceReport,
 )
 from trajcli.kinematics.robot import QUANTITIES, Robot
-from trajcli.peers.lower_bound import LowerBound, NoBound, fastest_duration
+from trajcli.peers.lower_bound import LowerBound, NoBound, duration_through, fastest_duration
 from trajcli.peers.path_reference import (
     LimitBreach,
     LimitUse,
@@ -27,6 +29,7 @@ from trajcli.planners.planner import PlannedMove
 from trajcli.trajectory import Span
 from trajcli.units import joint_units
 
+_MISSED = 1e-12  # rad or m: points that are passed at more are not gone through
 _BELOW = 1e-9  # relative to a bound: what is below it by less is rounding
 
 
@@ -37,7 +40,15 @@ def reference_of(move: PlannedMove) -> ReferenceReport:
         return ReferenceReport(duration=None, ratio=None, joint=move.robot.joint_names[0], reason=reason)
     begins = move.planned.begins or move.start
     bound = fastest_duration(begins, move.planned.end, move.robot.limits)
-    return bound_report(bound, move.duration, move.robot)
+    found = bound_report(bound, move.duration, move.robot)
+    via = move.planned.via_points
+    if via is None or np.abs(via.missed).max() > _MISSED:
+        return found
+    through = duration_through(via.points, begins, move.planned.end, move.robot.limits)
+    if through.duration <= (found.duration or 0.0):
+        return found
+    longer = bound_report(through, move.duration, move.robot)
+    return longer.model_copy(update={"through_points": True, "violations": found.violations})
 
 
 def bound_report(bound: LowerBound | NoBound, duration: float, robot: Robot) -> ReferenceReport:

@@ -52,6 +52,10 @@ class ReferenceReport(ReportPart):
     ]
     joint: Annotated[str | None, Field(description="The joint that needs it, or for which there is none.")]
     reason: Annotated[str | None, Field(description="Why there is no bound.")] = None
+    through_points: Annotated[
+        bool,
+        Field(description="Whether it is of motions through all points of the move, not to its end alone."),
+    ] = False
     violations: list[PeerViolation] = Field(
         default_factory=list,
         description="Of ruckig's motions, each joint by itself; it does not know limits of position.",
