@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.curves.turning_bound import MonotoneStretches, durations_by_joint, turning_points
 from trajcli.errors import PlanningError
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import QUANTITIES, Limits
@@ -94,6 +93,8 @@ def duration_through(points: Array, start: State, end: State, limits: Limits) ->
         end: State at the end.
         limits: Those that the motion was judged by.
     """
+    from trajcli.curves.turning_bound import MonotoneStretches, durations_by_joint, turning_points
+
     steps, velocity = np.diff(points, axis=0), limits.velocity
     at_speed = np.where(steps > 0, steps / velocity[:, 1], steps / velocity[:, 0]).max(axis=1)
     stretches = []
