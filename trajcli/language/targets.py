@@ -32,7 +32,7 @@ from trajcli.language.numbers import (
     shown,
     written_number,
 )
-from trajcli.language.per_joint import PerJoint
+from trajcli.language.per_joint import NamedValues, PerJoint
 from trajcli.language.poses import ROTATIONS, Pose, read_numbers
 from trajcli.trajectory import State
 from trajcli.units import Quantity
@@ -334,6 +334,8 @@ class Target(PoseFields, defer_build=False):  # made once, not for each planner 
         if len(given) > 1:
             text = f"{given[0]} and {given[1]} exclude each other"
             raise refuse([((given[1],), text, "leave one of them out")])
+        if isinstance(self.joints_by, NamedValues) and not any(self.joints_by.named):
+            raise refuse([(("joints_by",), "no joint is named", "name one, or leave it out")])
         if not given and self.velocity is None:
             text = "a state needs `joints` or a pose (or `velocity` alone, for a stop)"
             raise refuse([((), text, None)])

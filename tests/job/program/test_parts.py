@@ -19,7 +19,7 @@ version: 1
 units: {angle: deg, length: mm}
 robot: ur5e
 limits: {acceleration: 800, jerk: 4000, tcp: {acceleration: 3000}}
-frames: {cell: {rpy: [0, 10, 90]}}
+frames: {cell: {rpy: [0, 10, 90]}, lane: {grid: {from: cell, steps: [{count: 2, xyz: [1, 0, 0]}]}}}
 points:
   home: {joints: [0, -90, 90, -90, -90, 0]}
   pose: {xyz: [450, 100, 300], rpy: [175, 10, 30]}
@@ -170,8 +170,11 @@ WRONG = [
     ("", "planner: quintic, to: pose, approach: {distance: 4, frame: cel}", 14, "there is no frame 'cel'"),
     ("", "planner: quintic, to: pose, approach: {distance: 4, law: {shap: cubic}}", 14, "unknown key 'shap'"),
     ("", "planner: quintic, to: pse, approach: 4", 14, "there is no point 'pse'"),
+    ("", "planner: [line], to: pose", 14, "expected a planner's name"),
+    ("defaults: {law: {speed: 1}}\n", "planner: [line], to: pose", 15, "expected a planner's name"),
     ("defaults: {law: {speed: -1}}\n", "planner: line, to: pose", 13, "above 0"),
     ("defaults: {law: {spee: 1}}\n", "planner: quintic, to: pose", 13, "unknown key 'spee'"),
+    ("defaults: {law: {speed: 1, in: lane}}\n", "planner: line, to: pose", 15, "'lane' is many (2)"),
     ("defaults: {lw: {speed: 1}}\n", "planner: quintic, to: pose", 13, "unknown key 'lw'"),
     ("defaults: 3\n", "planner: quintic, to: pose", 13, "expected a mapping"),
     ("", "planner: quintic, to: pose, label: ''", 14, "not empty"),

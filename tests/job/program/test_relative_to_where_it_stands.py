@@ -148,6 +148,7 @@ WRONG = [
     ("planner: line, to: {from: here, ofset: {}}", "unknown key 'ofset'"),
     ("planner: quintic, to: {joints_by: 5, joints: 5}", "joints and joints_by exclude each other"),
     ("planner: quintic, to: {joints_by: {elbo: 5}}", "no joint 'elbo'"),
+    ("planner: quintic, to: {joints_by: {}}", "no joint is named"),
     ("planner: quintic, to: {from: here, joints_by: 5}", "unknown key 'joints_by'"),
 ]
 

@@ -184,8 +184,10 @@ class _Expansion:
             elif "call" in keys:
                 total += self._count_call(entry, here, bound, chain)
             else:
-                self._check_bound(entry, here, bound)
-                total += len(self._parts.of(entry, here))
+                parts = self._parts.of(entry, here)
+                for part in parts:
+                    self._check_bound(part.node, here, bound)
+                total += len(parts)
         return total
 
     def _count_repeat(self, entry: Node, path: _Path, bound: frozenset[str], chain: tuple[str, ...]) -> int:

@@ -111,10 +111,10 @@ class Parts:
         """
         fields = fields_of(part.node)
         planner = fields["planner"].value if "planner" in fields else None
-        if planner not in PLANNERS or not (self._defaults or fastest):
+        if not isinstance(planner, str) or planner not in PLANNERS or not (self._defaults or fastest):
             return part
         fields, places = dict(fields), dict(part.places)
-        for key in (key for key in _DEFAULTS if key in PLANNERS[str(planner)].model_fields):
+        for key in (key for key in _DEFAULTS if key in PLANNERS[planner].model_fields):
             default = self._defaults.get(key)
             if key == "law":
                 default = self._default_law(default, part.node, fastest=fastest)
