@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -61,7 +62,7 @@ class Verdict:
         more = ["..."] if len(self.findings) > len(worst) else []
         return f"Verdict({self.text}{': ' * bool(worst)}{', '.join(worst + more)})"
 
-    @property
+    @cached_property
     def tool_peaks(self) -> tuple[Mapping[str, ToolPeak] | None, ...]:
         """For each span the largest speeds and accelerations of the tool by the keys of their limits.
 
@@ -70,7 +71,7 @@ class Verdict:
         known: list[Any] = [of_span.get("tool") for of_span in self.surveys]
         return tuple(None if each is None or each.motion is not None else each.peaks for each in known)
 
-    @property
+    @cached_property
     def by_position(self) -> tuple[tuple[ApproachUse, ...], ...]:
         """For each span where joints use most of their limits of velocity by position.
 
@@ -79,7 +80,7 @@ class Verdict:
         known: list[Any] = [of_span.get("velocity_by_position") for of_span in self.surveys]
         return tuple(() if each is None else each.uses for each in known)
 
-    @property
+    @cached_property
     def efforts(self) -> tuple[MoveEfforts | None, ...]:
         """For each span the largest efforts, times on the curve; None where no limit asks for them."""
         known: list[Any] = [of_span.get("effort") for of_span in self.surveys]
