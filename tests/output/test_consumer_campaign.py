@@ -1,0 +1,71 @@
+"""Random jobs of every planner for every consumer that fits: inside all limits as their rows are joined."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from joined_by_scipy import largest_share
+from planning.job_campaign import PLANNERS, job_of
+from tiers import few
+
+from trajcli.errors import InputError, PlanningError, VerificationError
+from trajcli.job.read import job_from_text
+from trajcli.output.delivery.for_consumer import ForConsumer, Writing, job_for, plan_for
+from trajcli.streams.formats import FORMATS
+
+FITTING = {6: ("ur-servoj", "ros-jtc", "ur-passthrough"), 7: ("franka-fr3", "ros-jtc", "franka-fer")}
+"""Consumers of arms, by their number of joints."""
+WITHIN = 1e-6
+
+
+def delivered(number: int) -> ForConsumer | None:
+    """Return the job of a number for a consumer; None where there is no plan, or it is refused."""
+    job = job_of(number) | {"when_over_limit": "slow"}
+    try:
+        with np.errstate(all="ignore"):
+            loaded = job_from_text(json.dumps(job))
+            names = FITTING.get(len(loaded.robot.joints), ("ros-jtc",))
+            profile = names[(number // len(PLANNERS)) % len(names)]
+            made = plan_for(*job_for(loaded, profile, {}), Writing(FORMATS["csv"]))
+    except (PlanningError, InputError, VerificationError):
+        return None
+    return made if made.plan.verdict.passed and made.plan.trajectory.duration > 0.05 else None
+
+
+def of_last_bits(made: ForConsumer, shortest: float) -> float:
+    """Return what the last bits of positions are of a limit of jerk: 60 / h^3 times as much, of a quintic."""
+    if made.rows.interpolation != "quintic":
+        return 0.0
+    curve, lengths = made.plan.trajectory.curve, []
+    for _, local in made.grid.blocks():
+        lengths.append(np.diff(local))
+    steps = np.concatenate(lengths)
+    largest = np.abs(curve.evaluate(np.linspace(curve.start, curve.end, 1001))).max(axis=0)
+    jerk = np.min([np.abs(move.robot.limits.jerk).min(axis=1) for move in made.plan.moves], axis=0)
+    return float((60.0 * 2.0 * np.spacing(largest) / steps[steps > shortest].min() ** 3 / jerk).max())
+
+
+def kept(numbers: Sequence[int]) -> int:
+    """Judge what consumers get of the jobs of some numbers; return how many jobs."""
+    jobs = 0
+    for number in numbers:
+        made = delivered(number)
+        if made is not None and made.keeps:
+            shortest = 1e-4 if made.rows.interpolation == "quintic" else 1e-6
+            share = largest_share(made.plan, made.grid, shortest)
+            assert share <= 1 + 10 * WITHIN + of_last_bits(made, shortest), (number, share - 1)
+            jobs += 1
+    return jobs
+
+
+def test_consumers_get_rows_inside_all_limits() -> None:
+    assert kept(few((2, 6, 8, 17, 21, 27, 32, 36), 4)) >= 4
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("block", range(20))
+def test_consumers_get_rows_inside_all_limits_at_length(block: int) -> None:
+    assert kept(range(50 * block, 50 * block + 50)) >= 10
