@@ -39,6 +39,7 @@ from trajcli.language.targets import (
     Target,
 )
 from trajcli.language.waypoints import PointsField, Waypoint
+from trajcli.language.zones import ZoneField
 from trajcli.planners import PLANNERS, Planner
 from trajcli.planners.tool_path.arc import ArcFields
 from trajcli.planners.tool_path.law import LawSpec
@@ -150,6 +151,7 @@ def _reader_form(reader: FieldType) -> str:
         Pose: "[pose](#poses)",
         RobotSource: "[robot](#robot)",
         JointDistance: f"number at least 0, {_BY_JOINT}",
+        ZoneField: "number at least 0, `stop`, or {position, orientation, joints}: [zones](zones.md)",
         BlendDurations: "number above 0, or a list of them",
         SegmentTimes: "list of numbers at least 0",
         PathParameter: "`chord` or `centripetal` or `uniform` or a list of numbers",
@@ -205,6 +207,8 @@ def _unit(field: FieldInfo) -> str:
         return "N m or N"
     if isinstance(reader, Gravity):
         return "m/s^2"
+    if isinstance(reader, ZoneField):
+        return "length unit"
     if isinstance(reader, JointDistance | BlendDurations | SegmentTimes):
         return "joint" if isinstance(reader, JointDistance) else "s"
     listed = [item for item in get_args(_bare(field.annotation)) if get_origin(item) is Annotated]

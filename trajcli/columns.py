@@ -27,8 +27,21 @@ from trajcli.units import (
     unit_name,
 )
 
-Group = Literal["t", "q", "qd", "qdd", "qddd", "pose", "twist", "twistd", "path", "tau", "move"]
-GROUPS: tuple[Group, ...] = ("t", "q", "qd", "qdd", "qddd", "pose", "twist", "twistd", "path", "tau", "move")
+Group = Literal["t", "q", "qd", "qdd", "qddd", "pose", "twist", "twistd", "path", "tau", "zone", "move"]
+GROUPS: tuple[Group, ...] = (
+    "t",
+    "q",
+    "qd",
+    "qdd",
+    "qddd",
+    "pose",
+    "twist",
+    "twistd",
+    "path",
+    "tau",
+    "zone",
+    "move",
+)
 JOINT_ORDERS = {"q": 0, "qd": 1, "qdd": 2, "qddd": 3}
 EFFORT: Group = "tau"
 """The group of torques and forces, in N m and N whatever the units."""
@@ -52,6 +65,7 @@ _COLUMNS: Mapping[str, Mapping[str, Quantity]] = {
     **TOOL_COLUMNS,
     # Arc length of the tool along its path in a move, and its derivatives; zero where there is no path.
     "path": {"s": Quantity("length"), "sd": Quantity("length", 1), "sdd": Quantity("length", 2)},
+    "zone": {"zone": Quantity("ratio")},
     "move": {"move": Quantity("ratio")},
 }
 _QUANTITIES = {kind: quantity for group in _COLUMNS.values() for kind, quantity in group.items()}
@@ -96,7 +110,7 @@ class Column:
     @property
     def whole_numbers(self) -> bool:
         """Whether the column counts, and is written without decimals."""
-        return self.kind == "move"
+        return self.kind in ("move", "zone")
 
 
 def parse_column(name: str) -> Column:

@@ -84,6 +84,8 @@ def sample(
                 parts.append(part / group_factors(group, units))
             elif group == "path":
                 parts.append(_path_law(trajectory, starts, local) / group_factors(group, units))
+            elif group == "zone":
+                parts.append(_zones(trajectory, local)[:, None])
             else:
                 parts.append((times if group == "t" else starts.moves(local))[:, None])
         yield np.concatenate(parts, axis=1)
@@ -174,6 +176,16 @@ class _Starts:
     def spans(self, local: Array) -> NDArray[np.intp]:
         """Return which span holds each time, shape (N,)."""
         return np.searchsorted(self._all, local + AT_BREAK, "right") - 1
+
+
+def _zones(trajectory: Trajectory, local: Array) -> Array:
+    """Return the number of the zone about a corner at each time, from 1, shape (N,); 0 on a path."""
+    if not trajectory.zones:
+        return np.zeros(local.size)
+    entered, left = np.array(trajectory.zones).T
+    last = np.searchsorted(entered, local + AT_BREAK, "right")
+    inside = (last > 0) & (local + AT_BREAK < left[np.maximum(last - 1, 0)])
+    return np.where(inside, last, 0).astype(np.float64)
 
 
 def _path_law(trajectory: Trajectory, starts: _Starts, local: Array) -> Array:

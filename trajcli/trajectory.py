@@ -18,6 +18,7 @@ from trajcli.kinematics.robot import JointType, Payload, Robot
 if TYPE_CHECKING:
     from trajcli.kinematics.following.motion import ToolMotion
     from trajcli.kinematics.inverse.target import IkTarget
+    from trajcli.kinematics.zone import ZoneAround
 
 _ROUNDING = 1e-9  # s: a time this far outside is at the end
 _BORDER_UNITS = (
@@ -93,6 +94,25 @@ class Destination:
 
 
 @frozen
+class MovePart:
+    """A part of a move that flies by a corner: on its path, or within a zone.
+
+    Attributes:
+        start: Seconds from the start of the move.
+        end: Likewise.
+        robot: The arm with the limits in force in it.
+        tool: The reference motion of the tool along its path, from the start of the part; None for none.
+        around: The zone; None on the path.
+    """
+
+    start: float
+    end: float
+    robot: Robot
+    tool: ToolMotion | None = None
+    around: ZoneAround | None = None
+
+
+@frozen
 class Promise:
     """What a move says of itself, for those who judge it.
 
@@ -107,6 +127,7 @@ class Promise:
         destination: Where it ends; None where the job does not say it.
         braking: How a start outside the velocity or acceleration limits is brought inside first, as fast as
             possible: by each joint, or by all on one line; None where it is not.
+        parts: Where it flies by a corner; each has limits of its own.
     """
 
     via_points: ViaPoints | None = None
@@ -117,6 +138,7 @@ class Promise:
     remedies: Mapping[str, str] = field(default_factory=dict)
     destination: Destination | None = None
     braking: Literal["each", "line"] | None = None
+    parts: tuple[MovePart, ...] = ()
 
 
 @comparable
@@ -194,6 +216,7 @@ class Trajectory:
         laws: For each span the time law s(t) of the tool along its path, m, from t = 0; None without one.
         start_time: Time at which the job lets it start, s. Calls and samples count from there, the curve and
             the spans from 0.
+        zones: When each zone about a corner is entered and left, s from the start, shape (Z, 2).
     """
 
     curve: PiecewisePolynomial
@@ -204,6 +227,7 @@ class Trajectory:
     end: State
     laws: tuple[PiecewisePolynomial | None, ...] = ()
     start_time: float = 0.0
+    zones: tuple[tuple[float, float], ...] = ()
 
     def __repr__(self) -> str:
         moves, joints = len(self.spans), len(self.joint_names)

@@ -56,7 +56,8 @@ SOLVERS: dict[str, str] = {
 }
 """Why a file above the planners needs more of them than their contract: file and module."""
 
-OPEN_PLANNERS = (PLANNERS, f"{PLANNERS}.planner")
+OPEN_PLANNERS = (PLANNERS, f"{PLANNERS}.planner", f"{PLANNERS}.flying_by")
+"""The contract of a planner, and that of chains of moves, which no single planner plans."""
 
 
 def _room(module: str) -> str:

@@ -115,15 +115,22 @@ def verify(
     """
     moves = _limited_moves(trajectory, limits_by_move, promises)
     peaks, surveys = tuple(peaks_by_move(trajectory)), tuple(map(_further_surveys, moves))
-    findings = check_limits(trajectory, limits_by_move, _judged(trajectory, limits_by_move, promises, peaks))
-    for move, of_span in zip(moves, surveys, strict=True):
-        for survey in of_span.values():
+    whole = [not promise.parts for promise in promises or [Promise()] * len(moves)]
+    findings = check_limits(
+        trajectory, limits_by_move, _judged(trajectory, limits_by_move, promises, peaks), whole
+    )
+    for move, of_span, one in zip(moves, surveys, whole, strict=True):
+        for survey in of_span.values() if one else ():
             findings += limit_findings(move, survey)
     findings += check_continuity(trajectory, limits_by_move, peaks)
     if promises is not None:
         findings += _check_via_points(trajectory, promises)
         findings += check_targets(trajectory, promises)
-        findings += _check_tools(moves)
+        findings += _check_tools([move for move, one in zip(moves, whole, strict=True) if one])
+        if not all(whole):
+            from trajcli.checks.zones import check_flown
+
+            findings += check_flown(trajectory, promises)
     return Verdict(
         findings=_in_order(trajectory, findings, promises),
         steps=acceleration_steps(trajectory, limits_by_move, peaks),
@@ -139,6 +146,7 @@ def check_limits(
     trajectory: Trajectory,
     limits_by_move: Sequence[Limits],
     peaks: Sequence[tuple[Peaks, ...]] | None = None,
+    whole: Sequence[bool] | None = None,
 ) -> list[Finding]:
     """Return where a joint breaks a limit of its position or a derivative of it.
 
@@ -149,15 +157,18 @@ def check_limits(
         trajectory: What to judge.
         limits_by_move: One for each span.
         peaks: `peaks_by_move(trajectory)`, where that is known already.
+        whole: Whether each span has the same limits from its start to its end; others are left out.
 
     Raises:
         ValueError: When there are more or fewer limits than spans.
     """
     known = peaks_by_move(trajectory) if peaks is None else peaks
     findings: list[Finding] = []
-    for span, limits, of_span in zip(trajectory.spans, limits_by_move, known, strict=True):
-        survey = JointSurvey(tuple(of_span), limits, span.duration > 0)
-        findings += limit_findings(LimitedMove(trajectory, span, limits), survey)
+    judged = [True] * len(known) if whole is None else whole
+    for span, limits, of_span, one in zip(trajectory.spans, limits_by_move, known, judged, strict=True):
+        if one:
+            survey = JointSurvey(tuple(of_span), limits, span.duration > 0)
+            findings += limit_findings(LimitedMove(trajectory, span, limits), survey)
     return findings
 
 

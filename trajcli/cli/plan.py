@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from trajcli.output.delivery.for_consumer import ForConsumer
     from trajcli.output.delivery.joined_rows import JoinedRows
     from trajcli.output.recording import LogOptions
+    from trajcli.planning.flown_job import FlyBy
 
 _FEW_STEPS = 9  # in acceleration: of more the largest says most
 _STILL = 1e-9  # rad/s or m/s, below which a joint only rounds
@@ -348,6 +349,8 @@ def summary(plan: Plan, rows: int) -> str:
     tightest = tightest_limit(plan)
     if tightest:
         lines.append(f"  tightest limit: {tightest}")
+    if plan.flyby is not None and plan.flyby.zones:
+        lines.append(f"  {_flown(plan.flyby)}")
     if plan.unchecked:
         lines.append(f"  without a limit, not checked: {plan.unchecked}")
     if plan.verdict.unchecked_of_tool:
@@ -362,6 +365,14 @@ def summary(plan: Plan, rows: int) -> str:
         for event in (*plan.events, *plan.remarks)
     ]
     return "\n".join(lines)
+
+
+def _flown(flyby: FlyBy) -> str:
+    """Return what flying by corners gained."""
+    count, saved = len(flyby.zones), 1 - flyby.duration / flyby.stopping
+    corners = f"flies by {count} corner{'s' * (count != 1)}"
+    gained = f"{100 * saved:.3g} % less than the {flyby.stopping:.6g} s of stopping there"
+    return f"{corners}: {gained}; bound: {flyby.bound:.6g} s ({flyby.method})"
 
 
 def _steps(plan: Plan) -> str:

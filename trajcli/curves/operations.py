@@ -176,6 +176,24 @@ def _crossings(path: PiecewisePolynomial, law: PiecewisePolynomial) -> Array:
     return np.asarray((law.breaks[piece] + local)[inside])
 
 
+def cut(curve: PiecewisePolynomial, time: float) -> tuple[PiecewisePolynomial, PiecewisePolynomial]:
+    """Return a curve up to a time within it, and from there on, both with the times of the curve.
+
+    A time beside a break by rounding alone is that break.
+
+    Raises:
+        ValueError: When nothing is left of one of the two.
+    """
+    finer = _split(curve, np.array([time]))
+    index = int(np.abs(finer.breaks - time).argmin())
+    if not 0 < index < finer.pieces:
+        raise ValueError(f"{time!r} is no time within [{curve.start!r}, {curve.end!r}]")
+    return (
+        PiecewisePolynomial(finer.breaks[: index + 1], finer.coefficients[:, :index]),
+        PiecewisePolynomial(finer.breaks[index:], finer.coefficients[:, index:]),
+    )
+
+
 def _split(curve: PiecewisePolynomial, times: Array) -> PiecewisePolynomial:
     """Return the same curve with further breaks, save those that only rounding sets apart from others."""
     if not times.size:

@@ -52,10 +52,13 @@ def dump_job(loaded: LoadedJob) -> str:
         "frames": {key: frame for key, frame in written["frames"].items() if key == job.output.frame},
         "points": written["points"],
         "start": written["start"],
+        "zone": written.get("zone"),
         "moves": [],
         "when_over_limit": job.when_over_limit,
         "output": written["output"],
     }
+    if ordered["zone"] is None:
+        ordered.pop("zone")
     if job.output.times is not None:
         ordered["output"].pop("rate")
     return "\n".join(_block({**_without_empty(ordered), "moves": moves})) + "\n"

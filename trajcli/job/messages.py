@@ -62,6 +62,13 @@ _KEYS_ELSEWHERE = {
     "torque": "effort",
     "tcp": "tool",
     "waypoint": "to",
+    **dict.fromkeys(
+        ("blend", "blend_radius", "radius", "rounding", "c_dis", "c_ptp", "z", "cnt", "fine", "corner", "r"),
+        "zone",
+    ),
+    **dict.fromkeys(
+        (f"z{size}" for size in (0, 1, 5, 10, 15, 20, 30, 40, 50, 60, 80, 100, 150, 200)), "zone"
+    ),
 }
 """Keys of other programs, with that of a job where such a key may stand."""
 _ENTRIES_ELSEWHERE = {

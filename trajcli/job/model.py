@@ -43,6 +43,7 @@ from trajcli.language.numbers import (
 from trajcli.language.per_joint import PerJoint
 from trajcli.language.points import NamedTarget
 from trajcli.language.poses import Pose
+from trajcli.language.zones import ZoneField
 from trajcli.planners import HANDLING, PLANNERS, Planner, defaults_of_paths, moves_adapter
 from trajcli.planners.planner import WhenOverLimit
 from trajcli.units import Quantity, Units
@@ -373,6 +374,15 @@ class Job(Model):
             description="error: exit 1; slow: the smallest stretch of the move that verifies, and an event."
         ),
     ] = "error"
+    zone: (
+        Annotated[
+            Any,
+            ZoneField(
+                "About every corner between moves that may be flown by: stop, or how near; left out: stop."
+            ),
+        ]
+        | None
+    ) = None
     output: Output = Output()
 
     @field_validator("version", mode="before")

@@ -18,6 +18,7 @@ from trajcli.job.reports.comparisons import (
     SavingReport,
 )
 from trajcli.job.reports.efforts import EffortReport, EffortsReport, PayloadReport
+from trajcli.job.reports.flyby import FlyByReport
 from trajcli.job.reports.part import JointQuantity, MeasuredIn, ReportPart, ReportSeconds, UnitName, in_units
 from trajcli.limits.kinds import ToolLimit
 
@@ -395,4 +396,7 @@ class Report(ReportPart):
     rows: Annotated[
         RowsReport | None,
         Field(description="Of the rows as written; null where a limit is broken, or nothing joins them."),
+    ] = None
+    flyby: Annotated[
+        FlyByReport | None, Field(description="Of corners that are flown by; null where no zone is named.")
     ] = None

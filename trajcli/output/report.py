@@ -36,6 +36,7 @@ from trajcli.job.report import (
     UncheckedToolReport,
     WaypointReport,
 )
+from trajcli.job.reports.flyby import FlyByReport
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.knots import Knots, has_knots, knots_of
 from trajcli.output.effort_report import effort_reports, efforts_report, most_used, payload_report
@@ -94,7 +95,17 @@ def report_of(
         efforts=efforts_report(plan),
         unchecked_of_tool=[UncheckedToolReport(quantity=name) for name in verdict.unchecked_of_tool],
         knots=None if knots is None else _knots(plan.trajectory, knots),
+        flyby=_flyby(plan),
     )
+
+
+def _flyby(plan: Plan) -> FlyByReport | None:
+    """Return what flying by corners gained; None where no zone is named."""
+    if plan.flyby is None:
+        return None
+    from trajcli.output.flyby_report import flyby_report
+
+    return flyby_report(plan.flyby, plan.trajectory.joint_types, plan.trajectory.joint_names)
 
 
 def _knots(trajectory: Trajectory, knots: Knots) -> KnotsReport:

@@ -16,12 +16,14 @@ from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Payload, Robot
 from trajcli.language.limits import LimitsSpec
 from trajcli.language.numbers import Model, Name
-from trajcli.trajectory import Destination, Promise, Span, State, Trajectory, ViaPoints
+from trajcli.language.zones import ZoneField
+from trajcli.trajectory import Destination, MovePart, Promise, Span, State, Trajectory, ViaPoints
 
 if TYPE_CHECKING:
     from trajcli.curves.time_optimal.phase_plane import PhasePlane
     from trajcli.kinematics.following.motion import ToolMotion
     from trajcli.language.targets import Target
+    from trajcli.planners.course import Course
 
 Resolve = Callable[["Target", Array], "Target"]
 WhenOverLimit = Literal["error", "slow"]
@@ -29,6 +31,7 @@ _REMARKS = (
     "refined",
     "bound",
     "fastest_found",
+    "zone_stops",
 )  # kinds of events that are about how a curve was computed, and concede nothing
 _GIVEN = ("duration", "velocity", "acceleration", "deceleration", "timed")  # where they say how long it lasts
 _WHOLE = 1e-3  # of a hundredth of a percent: what rounding may put above a proven bound
@@ -168,6 +171,7 @@ class Planned:
             joint, or by all on one line; None where it is not.
         continuity: Derivatives that join inside it, where they are fewer than its planner promises.
         certificate: Of a motion that was searched for: how near to the fastest it is.
+        parts: Where it flies by a corner: what is on its path, and what within a zone.
     """
 
     curve: PiecewisePolynomial
@@ -193,6 +197,7 @@ class Planned:
     braking: Literal["each", "line"] | None = None
     continuity: Literal[1, 2] | None = None
     certificate: Certificate | None = None
+    parts: tuple[MovePart, ...] = ()
 
 
 class Planner(Model):
@@ -215,6 +220,7 @@ class Planner(Model):
         limits: Tightens the job's limits for this move; applied before `plan` is called.
         when_over_limit: Overrides the job's; applied after `plan` was called.
         label: What it is for, in the job's words.
+        zone: About the corner in which it ends, within which the motion may fly by; None for the job's.
     """
 
     continuity: ClassVar[Literal[1, 2]]
@@ -230,6 +236,15 @@ class Planner(Model):
         WhenOverLimit | None, Field(description="Overrides the job's for this move.")
     ] = None
     label: Annotated[str, Name("What it is for, shown in reports and pictures.")] | None = None
+    zone: (
+        Annotated[
+            Any,
+            ZoneField(
+                "About the corner in which the move ends: within it the motion flies by; left out: the job's."
+            ),
+        ]
+        | None
+    ) = None
 
     @property
     def tag(self) -> str:
@@ -331,6 +346,19 @@ class Planner(Model):
         """
         raise TypeError(f"{type(self).__name__} does not say how to plan")
 
+    @property
+    def why_not_flown_by(self) -> str | None:
+        """Why no motion can fly by a corner of this move; None where it can."""
+        return f"{self.tag} stops at its ends"
+
+    def course(self, start: Array, robot: Robot) -> Course:
+        """Return the move as joints along a path, from joint values (n,).
+
+        Raises:
+            PlanningError: When the arm cannot follow.
+        """
+        raise TypeError(f"{type(self).__name__} has no course")
+
     def on_rows(self, start: State, robot: Robot, period: float, least: float) -> Planned | None:
         """Return the move with all breaks of its curve on rows; None where the method has no such motion.
 
@@ -387,6 +415,7 @@ class PlannedMove:
     def promise(self) -> Promise:
         """What the move says of itself; ends whose velocities follow from its times are none of its terms."""
         planned, follows = self.planned, self.planned.begins is not None and not self.start.velocity.any()
+        flies_on = bool(planned.parts) and planned.parts[-1].around is not None
         return Promise(
             planned.via_points,
             planned.tool,
@@ -394,8 +423,9 @@ class PlannedMove:
             None if follows else (self.start, planned.end),
             self.over_limit,
             planned.remedies,
-            self.planner.destination,
+            None if flies_on else self.planner.destination,
             planned.braking,
+            planned.parts,
         )
 
     def span(self, start: float, end: float) -> Span:

@@ -36,6 +36,7 @@ from trajcli.trajectory import State, Trajectory
 
 if TYPE_CHECKING:
     from trajcli.planning.adaptation import Adaptation
+    from trajcli.planning.flown_job import FlyBy
     from trajcli.planning.resolve_poses import ResolvedPose
 
 Carried = Callable[[int, Payload | None], Payload | None]
@@ -52,6 +53,7 @@ class Plan:
         verdict: Of the checks.
         events: Concessions, in order of the moves; the job's own first.
         remarks: How curves were computed, where that is worth a word; in the same order.
+        flyby: What flying by corners gained; None where no zone is named.
         poses: How poses are reached, by the index of the move that goes there, or None for the job's start.
     """
 
@@ -62,6 +64,7 @@ class Plan:
     events: tuple[Event, ...]
     poses: Mapping[int | None, ResolvedPose]
     remarks: tuple[Event, ...] = ()
+    flyby: FlyBy | None = None
 
     def __repr__(self) -> str:
         moves, duration = len(self.moves), self.trajectory.duration
@@ -108,7 +111,11 @@ def plan_job(
         PlanningError: When a move has no curve.
     """
     poses: dict[int | None, ResolvedPose] = {}
-    moves = _plan_moves(loaded, poses, carried, adapted)
+    moves, flyby, of_corners = _plan_moves(loaded, poses, carried, adapted), None, list[Event]()
+    if loaded.job.zone is not None or any(move.zone is not None for move in loaded.job.moves):
+        from trajcli.planning.flown_job import flown_plan
+
+        moves, flyby, of_corners = flown_plan(loaded, moves, adapted)
     events = [*loaded.events, *_events_of(poses.get(None), None)]
     for move in moves:
         events += _events_of(poses.get(move.index), move.index)
@@ -117,10 +124,11 @@ def plan_job(
         if known is not None:
             remark = known.remark(move.duration, move.robot.joint_names)
             events.append(replace(remark, move=move.index))
+    events += of_corners
     hint = _unit_hint(loaded) if loaded.has_far_angle else None
     if hint is not None:
         events.append(Event("units", hint))
-    trajectory = _joined(moves, loaded, _first_state(loaded, _first_moving(moves), events))
+    trajectory = _joined(moves, loaded, _first_state(loaded, _first_moving(moves), events), flyby)
     events += [*_ends_moving(loaded, moves), *_velocity_steps(trajectory)]
     report_progress("checking the trajectory")
     verdict = verify(trajectory, [move.robot.limits for move in moves], [move.promise for move in moves])
@@ -131,7 +139,7 @@ def plan_job(
     shown = tuple(replace(event, message=event.text(loaded.say), amounts={}) for event in events)
     conceded = tuple(event for event in shown if event.concedes)
     remarks = tuple(event for event in shown if not event.concedes)
-    return Plan(loaded, tuple(moves), trajectory, verdict, conceded, poses, remarks)
+    return Plan(loaded, tuple(moves), trajectory, verdict, conceded, poses, remarks, flyby)
 
 
 def _plan_moves(
@@ -362,9 +370,8 @@ def _first_state(loaded: LoadedJob, first: PlannedMove, events: list[Event]) -> 
     return begins
 
 
-def _joined(moves: list[PlannedMove], loaded: LoadedJob, first: State) -> Trajectory:
-    curve = concatenate([move.planned.curve for move in moves])
-    spans, end = [], 0.0
+def _joined(moves: list[PlannedMove], loaded: LoadedJob, first: State, flyby: FlyBy | None) -> Trajectory:
+    curve, spans, end = concatenate([move.planned.curve for move in moves]), [], 0.0
     for move in moves:
         start, end = end, float(move.planned.curve.breaks[-1] + end)
         spans.append(replace(move.span(start, end), round=loaded.document.round_of(move.index)))
@@ -379,6 +386,7 @@ def _joined(moves: list[PlannedMove], loaded: LoadedJob, first: State) -> Trajec
         last,
         laws,
         loaded.job.output.start_time,
+        tuple((zone.entered, zone.left) for zone in flyby.zones) if flyby else (),
     )
 
 

@@ -74,6 +74,7 @@ def jerk_limited_time_optimal(
     further: Sequence[PathConstraint] = (),
     further_jerk: Sequence[ThirdOrderConstraint] = (),
     along: tuple[float, float] = (np.inf, np.inf),
+    hopeless: float = np.inf,
 ) -> JerkLimitedMotion:
     """Return the fastest motion that is found along a path within bounds that hold for all t.
 
@@ -89,6 +90,8 @@ def jerk_limited_time_optimal(
         further: Other constraints of velocity and acceleration; kept as far as their excess tells.
         further_jerk: Other constraints of jerk.
         along: As for `time_optimal`.
+        hopeless: With velocities at the ends, how many times a limit may be passed after the first steps:
+            with more nobody waits for it to be kept.
 
     Raises:
         UnlimitedSpeedError: When nothing limits the motion somewhere.
@@ -106,8 +109,8 @@ def jerk_limited_time_optimal(
         (JointJerkConstraint(path, bounds[2]), *further_jerk),
     )
     search = _Search(limits, smoothed_law(path, second, (bounds[1], bounds[2]), ends), ends.rests)
-    lost = search.refine(most_nodes(path))
-    search.settle(most_nodes(path))
+    lost = search.refine(most_nodes(path), np.inf if ends.rests else hopeless)
+    search.settle(most_nodes(path), _SETTLING if ends.rests or np.isfinite(hopeless) else _MOST_SETTLING)
     law, stretch = search.best, search.stretch
     if stretch > 1.0 + _EXACT and not ends.rests:
         raise search.unsettled()
@@ -154,10 +157,16 @@ class _Search:
         self.best, self.stretch = law, np.inf
         self._take(law)
 
-    def refine(self, most: int) -> float:
-        """Refine the nodes while that pays; return the estimate of what is lost, in seconds."""
+    def refine(self, most: int, hopeless: float) -> float:
+        """Refine the nodes while that pays; return the estimate of what is lost, in seconds.
+
+        Raises:
+            UnsettledSpeedError: When the first steps lead to more than `hopeless` times a limit.
+        """
         self._step(_FIRST_GAP)
         self._converge(_FIRST_STEPS)
+        if self.excess.max() > hopeless:
+            raise self.unsettled()
         for _ in range(_REFINEMENTS):
             lost = time_lost(self.law, self.limits, self.excess)
             duration = self.law.duration
@@ -183,10 +192,10 @@ class _Search:
                 break
             last = change
 
-    def settle(self, most: int) -> None:
-        """Lower limits in the intervals that exceed them until little is left."""
+    def settle(self, most: int, steps: int) -> None:
+        """Lower limits in the intervals that exceed them until little is left, in so many steps at most."""
         lowered, enough = (_LOWERED, _SETTLED) if self.rests else (_LOWERED_MORE, _EXACT)
-        for _ in range(_SETTLING if self.rests else _MOST_SETTLING):
+        for _ in range(steps):
             if _stretch(self.excess) <= 1.0 + enough:
                 break
             stubborn = ((self.excess > _STUBBORN) & (self.lowered > _STUBBORN)).any(axis=0)

@@ -12,11 +12,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
 from trajcli.planners.fastest_through_points.problem import WaypointProblem
 
+_ROOM = 1 + 1e-9  # of a limit: what is outside by less is left to ruckig
 _DIFFERENCE = 1e-5  # of the scale of a state
 
 
@@ -114,20 +116,72 @@ def alone_times(problem: WaypointProblem, steps: Array, pairs: Array) -> Array:
     """
     shape = steps.shape
     count = int(np.prod(shape[:-1]))
-    joints = np.tile(np.arange(shape[-1]), count)
-    limits = problem.velocity[joints], problem.acceleration[joints], problem.jerk[joints]
-    found = np.empty(joints.size)
-    _fill(found, steps.reshape(-1), pairs.reshape(-1, 4), limits, slice(0, joints.size))
-    return found.reshape(shape)
+    jerk = problem.jerk[:, None]
+    limits = np.concatenate([problem.velocity, problem.acceleration, -jerk, jerk], axis=1)
+    rows = np.tile(limits, (count, 1))
+    return fastest_durations(steps.reshape(-1), pairs.reshape(-1, 4), rows).reshape(shape)
 
 
-def _fill(found: Array, steps: Array, pairs: Array, limits: tuple[Array, Array, Array], part: slice) -> None:
+def fastest_durations(steps: Array, pairs: Array, limits: Array) -> Array:
+    """Return the shortest durations (N,) of motions of one variable each; infinite where there is none.
+
+    Args:
+        steps: Displacements, shape (N,).
+        pairs: Velocity and acceleration before, then after, shape (N, 4).
+        limits: Lower and upper bounds of velocity, acceleration and jerk, shape (N, 6); of the jerk the upper
+            one holds both ways.
+    """
+    possible = np.flatnonzero(_reachable(pairs[:, 2:], limits))
+    found, own = np.full(steps.size, np.inf), np.empty(possible.size)
+    if possible.size:
+        _fill(own, steps[possible], pairs[possible], limits[possible], slice(0, possible.size))
+    found[possible] = own
+    return found
+
+
+def _reachable(states: Array, limits: Array) -> NDArray[np.bool_]:
+    """Return whether states (N, 2) can be reached from within limits: else ruckig refuses a whole call.
+
+    An acceleration a that was built up from zero changed the velocity by a |a| / (2 jerk).
+    """
+    velocity, acceleration = states.T
+    before = velocity - acceleration * np.abs(acceleration) / (2 * limits[:, 5])
+    low, high = limits[:, 0], limits[:, 1]
+    within = (low * _ROOM <= before) & (before <= high * _ROOM)
+    return np.asarray(within & (low * _ROOM <= velocity) & (velocity <= high * _ROOM))
+
+
+def common_duration(steps: Array, pairs: Array, limits: Array) -> float:
+    """Return the shortest duration in which all joints arrive together, s; infinite where there is none.
+
+    Args:
+        steps: Displacements, shape (n,).
+        pairs: Velocity and acceleration before, then after, shape (n, 4).
+        limits: As for `fastest_durations`, shape (n, 6).
+    """
+    import ruckig
+
+    n = steps.size
+    wanted, answer = ruckig.InputParameter(n), ruckig.Trajectory(n)
+    set_limits(wanted, limits[:, :2], limits[:, 2:4], limits[:, 5])
+    wanted.current_position, wanted.target_position = [0.0] * n, steps.tolist()
+    columns = pairs.T.tolist()
+    wanted.current_velocity, wanted.current_acceleration = columns[0], columns[1]
+    wanted.target_velocity, wanted.target_acceleration = columns[2], columns[3]
+    try:
+        result = ruckig.Ruckig(n).calculate(wanted, answer)
+    except (ruckig.RuckigError, ValueError):
+        return np.inf
+    return float(answer.duration) if result == ruckig.Result.Working else np.inf
+
+
+def _fill(found: Array, steps: Array, pairs: Array, limits: Array, part: slice) -> None:
     """Write the durations of a part; one that has no motion spoils a call, so that a part is halved."""
     import ruckig
 
     count = part.stop - part.start
     wanted, answer = ruckig.InputParameter(count), ruckig.Trajectory(count)
-    set_limits(wanted, *(limit[part] for limit in limits))
+    set_limits(wanted, limits[part, :2], limits[part, 2:4], limits[part, 5])
     wanted.synchronization = ruckig.Synchronization.No
     wanted.current_position, wanted.target_position = [0.0] * count, steps[part].tolist()
     columns = pairs[part].T.tolist()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -32,6 +32,9 @@ from trajcli.planners.ruckig import (
     together,
 )
 from trajcli.trajectory import State
+
+if TYPE_CHECKING:
+    from trajcli.planners.course import Course
 
 _ROUNDING = 1e-12
 _PARALLEL = 1e-12  # relative; what leaves the line by more is no rounding error
@@ -82,6 +85,24 @@ class JerkLimited(PointToPoint):
             brake=self.brake,
         )
         return plan_motion(request, robot)
+
+    @property
+    def why_not_flown_by(self) -> str | None:
+        """Why no motion can fly by a corner of this move; None where it can."""
+        reasons = {
+            "it leaves open where it ends": self.to.joints is None and not self.to.gives_pose,
+            "its `minimum_duration` is given": self.minimum_duration is not None,
+            "its joints arrive one by one (`synchronize: none`)": self.synchronize == "none",
+            "it brings its start inside the limits first (`brake`)": self.brake,
+            "it ends in motion": any(self.to.velocity or ()) or any(self.to.acceleration or ()),
+        }
+        return next((reason for reason, holds in reasons.items() if holds), None)
+
+    def course(self, start: Array, robot: Robot) -> Course:
+        """Return the straight line in joint space to the target."""
+        from trajcli.planners.point_to_point.joint_line import joint_line
+
+        return joint_line(start, np.array(self.to.joints), robot)
 
     def on_rows(self, start: State, robot: Robot, period: float, least: float) -> Planned | None:
         """Return the move between states of rest whose phases last whole periods."""
@@ -218,7 +239,7 @@ def _on_one_line(request: Request, boundaries: Sequence[BoundaryProblem], robot:
     displacement = np.array([boundary.displacement for boundary in boundaries])
     rates = [start.velocity, end.velocity, start.acceleration, end.acceleration]
     direction = next(values for values in (displacement, *rates) if values.any())
-    on_line = [_along(direction, values, 1 + k // 2, robot) for k, values in enumerate(rates)]
+    on_line = [rate_along(direction, values, 1 + k // 2, robot) for k, values in enumerate(rates)]
     length = 1.0 if displacement.any() else 0.0
     initial, final = (0.0, on_line[0], on_line[2]), (length, on_line[1], on_line[3])
     bounds = _bounds_along(direction, robot.limits)
@@ -262,7 +283,7 @@ def _waiting(
     raise _cannot_wait(boundary, profile.duration, duration, joint)
 
 
-def _along(direction: Array, values: Array, order: int, robot: Robot) -> float:
+def rate_along(direction: Array, values: Array, order: int, robot: Robot) -> float:
     """Return the rate of the law under which the joints have the given rates.
 
     Raises:

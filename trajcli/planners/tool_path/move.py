@@ -55,6 +55,7 @@ from trajcli.units import Quantity
 
 if TYPE_CHECKING:
     from trajcli.kinematics.following.motion import ToolMotion
+    from trajcli.planners.course import Course
 
 Orientation = Literal["axis_angle", "euler", "fixed", "tangent"]
 
@@ -153,6 +154,25 @@ class ToolPathMove(Planner):
     def joins(self) -> Literal[1, 2]:
         """Acceleration joins where the law begins and ends without any."""
         return self.law.time_law.continuity
+
+    @property
+    def why_not_flown_by(self) -> str | None:
+        """Why no motion can fly by a corner of this move; None where it can."""
+        given = (name for name in ("duration", "minimum_duration") if getattr(self.law, name) is not None)
+        name = next(given, None)
+        return None if name is None else f"its law has a `{name}`"
+
+    def course(self, start: Array, robot: Robot) -> Course:
+        """Return the joints along the path, from joint values (n,).
+
+        Raises:
+            InputError: When the fields do not make a path.
+            PlanningError: When there is no such path, or the arm cannot follow it.
+        """
+        from trajcli.planners.tool_path.course import tool_course
+
+        planned = self.path_from(forward(robot, start), robot)
+        return tool_course(followed(robot, planned.path, start), self.law, self.tolerance.tolerance)
 
     @property
     def origin(self) -> Target | None:

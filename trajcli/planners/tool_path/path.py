@@ -116,6 +116,15 @@ class PathMove(ToolPathMove):
         last = self.segments[-1]
         return last.line if last.arc is None else last.arc.to
 
+    @property
+    def why_not_flown_by(self) -> str | None:
+        """Why no motion can fly by a corner of this move; None where it can."""
+        if self.corner == "overlap":
+            return "its segments overlap in time"
+        if self.corner == "stop" and len(self.segments) > 1:
+            return "it stops at corners of its own (`corner: stop`)"
+        return super().why_not_flown_by
+
     @model_validator(mode="after")
     def _corners_fit(self) -> PathMove:
         flaws = list(self._flaws())

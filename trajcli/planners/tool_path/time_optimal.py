@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +32,6 @@ from trajcli.curves.time_optimal.time_law import LawPieces
 from trajcli.frozen import frozen
 from trajcli.kinematics.following.motion import motion_along
 from trajcli.kinematics.following.tolerance import Tolerance
-from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.limits.kinds import TOOL_KINDS, path_constraints
 from trajcli.limits.tolerances import TOOL_RELATIVE
@@ -72,7 +71,7 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
     robot, path = joints.robot, joints.path
     curve = joints.by_s(Tolerance(tolerance.position * _FINER, tolerance.angle * _FINER))
     _require_acceleration(curve, robot, planner)
-    tcp = _limits(spec, robot.limits.tcp)
+    tcp = limits_of_law(spec, robot.limits.tcp)
     limits = robot.limits
     with joints.diagnosed():
         further = (ToolConstraint(joints.executed, tcp), *path_constraints(curve, robot))
@@ -157,7 +156,8 @@ def _remaining_stretch(robot: Robot, trajectory: PiecewisePolynomial, limits: To
     return float(worst) if worst > 1 + TOOL_RELATIVE else 1.0
 
 
-def _limits(spec: LawSpec, limits: ToolLimits) -> ToolLimits:
+def limits_of_law(spec: LawSpec, limits: ToolLimits) -> ToolLimits:
+    """Return the limits of the tool with those that a law names in their place."""
     given = spec.model_dump(
         include={"speed", "acceleration", "jerk", "angular_speed", "angular_acceleration"}
     )
@@ -171,6 +171,28 @@ def _require_acceleration(curve: PiecewisePolynomial, robot: Robot, planner: str
         raise missing_limit(planner, "acceleration", lacking.tolist(), robot, why, "use another law `shape`")
 
 
+class KnownTool(Protocol):
+    """Poses of a tool by s."""
+
+    @property
+    def length(self) -> float:
+        """Last s."""
+        ...
+
+    @property
+    def poses(self) -> KnownPoses:
+        """By s."""
+        ...
+
+
+class KnownPoses(Protocol):
+    """Poses and their derivatives by s."""
+
+    def evaluate(self, s: Array, side: Side = "right") -> tuple[Array, Array, Array]:
+        """Return X (N, 4, 4), X' and X'' (N, 6) at s (N,)."""
+        ...
+
+
 @frozen
 class ToolConstraint:
     """Limits of the tool along a path.
@@ -182,7 +204,7 @@ class ToolConstraint:
 
     estimate: ClassVar[float] = 1.0
 
-    path: ToolPath
+    path: KnownTool
     limits: ToolLimits
 
     @property

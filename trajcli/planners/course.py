@@ -1,0 +1,181 @@
+"""Courses: moves as joints q(s) along a path, and the bounds that limits of joints and tool set their law.
+
+Along a path qd = q' sd, qdd = q' sdd + q'' sd^2 and qddd = q' sddd + 3 q'' sd sdd + q''' sd^3. About a speed
+and an acceleration of the law the terms of bends are known, and bounds of one variable are left.
+
+Source: Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), section 9.5.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.time_optimal.constraints import PathConstraint
+from trajcli.frozen import frozen
+from trajcli.kinematics.following.motion import ToolMotion
+from trajcli.kinematics.robot import Limits, Robot, ToolLimits
+from trajcli.limits.kinds import path_constraints
+
+_SAMPLES = 9  # of a path, its ends included
+_BEND = 0.9  # of an acceleration, or of a jerk, that a bend of the path may take
+_LEFT = 0.1  # of a jerk that is left for the law
+_TINY = 1e-12  # of the largest derivative: less is rounding
+
+
+@frozen
+class PathRates:
+    """Derivatives of joints and tool by s, at m values of s.
+
+    Attributes:
+        joints: q', q'' and q''', shape (3, m, n).
+        tool: Sizes of p', p'', w and w', shape (4, m); None where nothing limits the tool.
+    """
+
+    joints: Array
+    tool: Array | None
+
+
+class Course(ABC):
+    """A move as joints along a path.
+
+    Attributes:
+        curve: q(s) from s = 0.
+        robot: With the limits in force.
+    """
+
+    curve: PiecewisePolynomial
+    robot: Robot
+
+    @property
+    @abstractmethod
+    def tcp(self) -> ToolLimits:
+        """Limits of the tool along it, those of its own law among them."""
+
+    @property
+    def length(self) -> float:
+        """Last s."""
+        return self.curve.end
+
+    @property
+    def uniform(self) -> bool:
+        """Whether its bounds are the same everywhere."""
+        return self.curve.degree == 1 and self.tcp == ToolLimits()
+
+    @abstractmethod
+    def tool_rates(self, s: Array) -> Array:
+        """Return sizes of p', p'', w and w' at s (m,), (4, m)."""
+
+    @abstractmethod
+    def tool_constraint(self) -> PathConstraint:
+        """Return the limits of the tool along it."""
+
+    @abstractmethod
+    def reference(self, law: PiecewisePolynomial) -> ToolMotion | None:
+        """Return the reference of the tool under a law s(t), where it has one."""
+
+    def rates(self, s: Array) -> PathRates:
+        """Return derivatives at s (m,)."""
+        joints = self.curve.evaluate_orders(np.clip(s, 0.0, self.length), (1, 2, 3)).transpose(1, 0, 2)
+        return PathRates(joints, None if self.tcp == ToolLimits() else self.tool_rates(s))
+
+    def bounds(self, s: float, states: Array) -> Array:
+        """Return bounds of its law at an s about states (N, 2), (N, 6), as `law_bounds`."""
+        return law_bounds(self.rates(np.array([s])), self.robot.limits, self.tcp, states)
+
+    def typical_bounds(self, low: float, high: float) -> Array:
+        """Return the bounds of one variable that stand for those from one s to another, (6,).
+
+        They are the geometric means of those at some s, exact where they are the same everywhere.
+        """
+        some = np.linspace(low, high, 1 if self.uniform else _SAMPLES).tolist()
+        rows = np.concatenate([self.bounds(s, np.zeros((1, 2))) for s in some])
+        sizes = np.abs(rows)
+        with np.errstate(divide="ignore"):
+            means = np.exp(np.log(sizes).mean(axis=0))
+        return np.asarray(means * [-1.0, 1.0, -1.0, 1.0, -1.0, 1.0])
+
+    def constraints(self, path: PiecewisePolynomial) -> tuple[PathConstraint, ...]:
+        """Return what limits laws along a part of its path besides the rates of joints."""
+        tool = () if self.tcp == ToolLimits() else (self.tool_constraint(),)
+        return (*tool, *path_constraints(path, self.robot))
+
+
+def law_bounds(rates: PathRates, limits: Limits, tcp: ToolLimits, states: Array) -> Array:
+    """Return bounds of a law under which all limits are kept where it has given speeds.
+
+    Args:
+        rates: Of the path, at m values of s: the tightest count.
+        limits: Of the joints.
+        tcp: Of the tool.
+        states: sd and sdd, about which the terms of bends are taken, (N, 2).
+
+    Returns:
+        Lower and upper bounds of sd, sdd and sddd, (N, 6); infinite for none.
+    """
+    first, second, third = rates.joints
+    low, high = limits.acceleration.T
+    jerk = np.abs(limits.jerk).min(axis=1)
+    size = np.where(np.abs(first) > _TINY * np.abs(first).max(), np.abs(first), 0.0)
+    ahead = first > 0
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        top = _largest_speed(rates, limits, tcp, size)
+        speed, change = np.minimum(states[:, 0], top)[:, None, None], states[:, 1, None, None]
+        bent = second * speed**2
+        upper = np.where(ahead, high - bent, bent - low) / size
+        lower = np.where(ahead, bent - low, high - bent) / size
+        used = np.where(ahead, 1.0, -1.0) * (3 * second * speed * change + third * speed**3)
+        left = [
+            np.where(np.isinf(jerk), np.inf, np.maximum(jerk + sign * used, _LEFT * jerk)) / size
+            for sign in (1, -1)
+        ]
+        rows = [_least_of(each) for each in (lower, upper, *left)]
+        if rates.tool is not None:
+            rows = _with_tool(rates.tool, tcp, states, rows)
+    top_row, sizes = np.full(len(states), top), np.maximum(rows, 0.0)
+    return np.stack([-top_row, top_row, -sizes[0], sizes[1], -sizes[2], sizes[3]], axis=1)
+
+
+def _largest_speed(rates: PathRates, limits: Limits, tcp: ToolLimits, size: Array) -> float:
+    """Return the largest sd by the speeds of joints and tool, and by what bends of the path take."""
+    first, second, third = rates.joints
+    low, high = limits.acceleration.T
+    jerk = np.abs(limits.jerk).min(axis=1)
+    rows = [
+        np.where(first > 0, limits.velocity[:, 1], -limits.velocity[:, 0]) / size,
+        np.sqrt(_BEND * np.minimum(high, -low) / np.abs(second)),
+        np.cbrt(_BEND * jerk / np.abs(third)),
+    ]
+    if rates.tool is not None:
+        tool = rates.tool
+        rows += [
+            tcp.speed / tool[0],
+            tcp.angular_speed / tool[2],
+            np.sqrt(_BEND * tcp.acceleration / tool[1]),
+            np.sqrt(_BEND * tcp.angular_acceleration / tool[3]),
+        ]
+    return min(float(np.where(np.isnan(row), np.inf, row).min()) for row in rows)
+
+
+def _least_of(rows: Array) -> Array:
+    """Return the least (N,) of rows (N, m, n), those that are no numbers left out."""
+    return np.asarray(np.where(np.isnan(rows), np.inf, rows).min(axis=(1, 2)))
+
+
+def _with_tool(tool: Array, tcp: ToolLimits, states: Array, rows: list[Array]) -> list[Array]:
+    """Return bounds of -sdd, sdd, -sddd and sddd, each (N,), with those that limits of the tool set."""
+    lower, upper, *left = rows
+    speed = states[:, :1]
+    for limit, along, across in (
+        (tcp.acceleration, tool[0], tool[1]),
+        (tcp.angular_acceleration, tool[2], tool[3]),
+    ):
+        if np.isfinite(limit):
+            bent = np.minimum(across * speed**2, _BEND * limit)
+            allowed = (np.sqrt(limit**2 - bent**2) / along).min(axis=1)
+            lower, upper = np.minimum(lower, allowed), np.minimum(upper, allowed)
+    if np.isfinite(tcp.jerk):
+        left = [np.minimum(each, float((tcp.jerk / tool[0]).min())) for each in left]
+    return [lower, upper, *left]

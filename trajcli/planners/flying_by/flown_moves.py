@@ -1,0 +1,272 @@
+"""Moves of a chain that flies by, cut where the tool is nearest to each corner, and what zones came to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import reduce
+from typing import Any, Literal
+
+import numpy as np
+
+from trajcli.curves.extrema import peaks
+from trajcli.curves.operations import cut, scale_time
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
+from trajcli.errors import Amount, Amounts
+from trajcli.frozen import frozen
+from trajcli.kinematics.forward import forward
+from trajcli.kinematics.robot import QUANTITIES, Robot
+from trajcli.kinematics.zone import ZoneAround
+from trajcli.planners.boundary_states import instant
+from trajcli.planners.course import Course
+from trajcli.planners.flying_by.between_stops import with_looser_limits
+from trajcli.planners.flying_by.flown_parts import FlownPart
+from trajcli.planners.flying_by.within_limits import FlownChain, move_part, state_at
+from trajcli.planners.planner import Event, Phase, Planned, PlannedMove
+from trajcli.trajectory import MovePart
+
+_SAMPLES = 513  # of a zone, at which its distances are looked at
+_DIMENSIONS: dict[str, Literal["length", "angle"]] = {"position": "length", "orientation": "angle"}
+_OF_PATHS = ("merged", "moved_center", "shrunk", "jerk_limit_both_ways")  # events, not of a law
+_SHRUNK = 1e-6  # relative: a zone that is smaller by less is as large as was asked for
+
+
+@frozen
+class FlownZone:
+    """What a zone came to.
+
+    Attributes:
+        number: From 1.
+        move: Index of the move that ends in its corner.
+        of: What its borders are measured by: "position", "orientation" or "joints".
+        joint: Index of the joint, where it is joints.
+        asked: Its size, m, rad or as the joint.
+        used: Its size at the nearer border.
+        entered: When it is entered, s from the start of the trajectory.
+        left: When it is left.
+        passed: When the tool is nearest to the corner.
+        nearest: Smallest distance of the tool from the corner, m; None without geometry.
+        farthest: Largest distance, m; None likewise.
+        deviation: Largest distance of the tool from the programmed path, m; None likewise.
+        turn: Largest angle of the tool from how it stands in the corner, rad; None likewise.
+        binds: Which limit is used most in it.
+        tempo: What part of the speeds that limits allow it uses: below 1 where it was lowered.
+    """
+
+    number: int
+    move: int
+    of: str
+    joint: int | None
+    asked: float
+    used: float
+    entered: float
+    left: float
+    passed: float
+    nearest: float | None
+    farthest: float | None
+    deviation: float | None
+    turn: float | None
+    binds: str
+    tempo: float
+
+    def shifted(self, time: float, number: int) -> FlownZone:
+        """Return the zone `time` s later, with `number` zones before it."""
+        times = {name: getattr(self, name) + time for name in ("entered", "left", "passed")}
+        return replace(self, number=self.number + number, **times)
+
+
+def flown_zones(chain: FlownChain) -> list[FlownZone]:
+    """Return what the zones of a chain came to, times from its start."""
+    zones, begun = [], 0.0
+    for number, part in enumerate(chain.parts):
+        if number % 2:
+            k = number // 2
+            zones.append(_flown_zone(chain, k, part, begun))
+        begun += part.curve.duration
+    return zones
+
+
+def _flown_zone(chain: FlownChain, k: int, part: FlownPart, begun: float) -> FlownZone:
+    corner, curve = chain.chain.corners[k], part.curve
+    around, robot = corner.around, corner.robot
+    of, joint, asked, used = _size(around, curve)
+    time = nearest_time(around, curve)
+    tool: Any = (None, None, None, None)
+    if robot.convention is not None:
+        times = np.append(np.linspace(curve.start, curve.end, _SAMPLES), time)
+        joints = curve.evaluate(times)
+        distance, angle = around.offsets(joints)
+        off = _off_path(robot, joints, chain.chain.courses[k : k + 2], (corner.left, corner.joined))
+        tool = float(distance.min()), float(distance.max()), off, float(angle.max())
+    return FlownZone(
+        number=k + 1,
+        move=chain.moves[k],
+        of=of,
+        joint=joint,
+        asked=asked,
+        used=used,
+        entered=begun,
+        left=begun + curve.duration,
+        passed=begun + time - curve.start,
+        nearest=tool[0],
+        farthest=tool[1],
+        deviation=tool[2],
+        turn=tool[3],
+        binds=_binds(robot, curve),
+        tempo=corner.tempo,
+    )
+
+
+def _size(around: ZoneAround, curve: PiecewisePolynomial) -> tuple[str, int | None, float, float]:
+    """Return what limits a zone, the joint that does, its size, and that at the nearer border."""
+    zone, ends = around.zone, curve.evaluate(np.array([curve.start, curve.end]))
+    rows: list[tuple[str, int | None, float, Array]] = []
+    if zone.needs_geometry:
+        distance, angle = around.offsets(ends)
+        for name, size, values in (
+            ("position", zone.position, distance),
+            ("orientation", zone.orientation, angle),
+        ):
+            if size is not None:
+                rows.append((name, None, size, values))
+    for joint, size in enumerate(zone.joints or ()):
+        rows.append(("joints", joint, size, np.abs(ends[:, joint] - around.corner[joint])))
+    shares = np.max([values / size for _, _, size, values in rows], axis=0)
+    nearer = int(shares.argmin())
+    name, joint_index, size, values = max(rows, key=lambda row: float(row[3][nearer] / row[2]))
+    return name, joint_index, size, float(values[nearer])
+
+
+def nearest_time(around: ZoneAround, curve: PiecewisePolynomial) -> float:
+    """Return when a motion is nearest to the corner: the tool, or the joints of an arm without geometry."""
+
+    def distances(times: Array) -> Array:
+        joints = curve.evaluate(times)
+        if around.robot.convention is not None:
+            return around.offsets(joints)[0]
+        sizes = 1.0 if around.zone.joints is None else np.array(around.zone.joints)
+        return np.asarray(np.linalg.norm((joints - around.corner) / sizes, axis=1))
+
+    low, high = curve.start, curve.end
+    for _ in range(4):
+        times = np.linspace(low, high, 65)
+        index = int(distances(times).argmin())
+        low, high = float(times[max(index - 1, 0)]), float(times[min(index + 1, 64)])
+    inset = 1e-6 * curve.duration
+    return min(max(0.5 * (low + high), curve.start + inset), curve.end - inset)
+
+
+def _off_path(robot: Robot, joints: Array, courses: Sequence[Course], borders: tuple[float, float]) -> float:
+    """Return the largest distance of the tool from the programmed path, m."""
+    before = courses[0].curve.evaluate(np.linspace(borders[0], courses[0].length, _SAMPLES))
+    behind = courses[1].curve.evaluate(np.linspace(0.0, borders[1], _SAMPLES))
+    path = forward(robot, np.concatenate([before, behind]))[:, :3, 3]
+    here = forward(robot, joints)[:, :3, 3]
+    starts, steps = path[:-1], np.diff(path, axis=0)
+    squares = np.maximum(np.square(steps).sum(axis=1), np.finfo(np.float64).tiny)
+    worst = 0.0
+    for position in here:
+        along = np.clip(((position - starts) * steps).sum(axis=1) / squares, 0.0, 1.0)
+        feet = starts + along[:, None] * steps
+        worst = max(worst, float(np.sqrt(np.square(position - feet).sum(axis=1).min())))
+    return worst
+
+
+def _binds(robot: Robot, curve: PiecewisePolynomial) -> str:
+    """Return the limit of a joint of which a motion uses most, in words."""
+    best, words = 0.0, "nothing"
+    for order, extremes in zip((1, 2, 3), peaks(curve, (1, 2, 3)), strict=True):
+        low, high = robot.limits.of_order(order).T
+        used = np.maximum(extremes.low / low, extremes.high / high)
+        joint = int(used.argmax())
+        if used[joint] > best:
+            best, words = float(used[joint]), f"{QUANTITIES[order]} of {robot.joint_names[joint]}"
+    return words
+
+
+def moves_as_flown(moves: Sequence[PlannedMove], chain: FlownChain) -> Iterator[PlannedMove]:
+    """Yield the moves of a chain as they are flown: one of no length stays in the corner that it stands in.
+
+    Args:
+        moves: As planned with stops, those without a length among them; of two neighbours the looser limits
+            are in force behind that.
+        chain: The motion.
+    """
+    pieces, robots = list(_pieces(chain)), [move.robot for move in moves if move.index in chain.moves]
+    state, parts = state_at(pieces[0][0], pieces[0][0].start), pieces[0][1][:1]
+    for move in moves:
+        if move.index not in chain.moves:
+            part = replace(parts[-1], start=0.0, end=0.0)
+            yield replace(move, start=state, planned=Planned(instant(state), state, parts=(part,)))
+            continue
+        number = chain.moves.index(move.index)
+        curve, parts = pieces[number]
+        end = state_at(curve, curve.end)
+        phases = tuple(_phases(parts))
+        events = tuple(event for event in move.planned.events if event.kind in _OF_PATHS)
+        continuity = move.planned.continuity
+        planned = Planned(curve, end, phases=phases, events=events, parts=parts, continuity=continuity)
+        robot = reduce(with_looser_limits, robots[max(number - 1, 0) : number + 2], move.robot)
+        yield replace(move, start=state, robot=robot, planned=planned, stretch=1.0)
+        state = end
+
+
+def _pieces(chain: FlownChain) -> Iterator[tuple[PiecewisePolynomial, tuple[MovePart, ...]]]:
+    """Yield the curve of each move from t = 0, and its parts."""
+    count = len(chain.chain.courses)
+    halves = []
+    for k, corner in enumerate(chain.chain.corners):
+        curve = chain.parts[2 * k + 1].curve
+        halves.append(cut(curve, nearest_time(corner.around, curve)))
+    for k in range(count):
+        own: list[tuple[int, FlownPart]] = [(2 * k, chain.parts[2 * k])]
+        if k:
+            own.insert(0, (2 * k - 1, FlownPart(halves[k - 1][1])))
+        if k + 1 < count:
+            own.append((2 * k + 1, FlownPart(halves[k][0])))
+        parts, begun = [], 0.0
+        for number, part in own:
+            parts.append(move_part(chain.chain, number, part, begun))
+            begun = parts[-1].end
+        curve = concatenate([part.curve.shifted(-part.curve.start) for _, part in own])
+        parts[-1] = replace(parts[-1], end=curve.end)
+        yield curve, tuple(parts)
+
+
+def _phases(parts: Sequence[MovePart]) -> Iterator[Phase]:
+    for part in parts:
+        yield Phase("along the path" if part.around is None else "within the zone", part.start, part.end)
+
+
+def stretched_chain(chain: FlownChain, factor: float) -> FlownChain:
+    """Return the chain that lasts `factor` times longer."""
+    if factor == 1:
+        return chain
+    parts = tuple(
+        FlownPart(
+            scale_time(part.curve, factor),
+            part.tool and part.tool.scaled(factor),
+            part.law and scale_time(part.law, factor),
+        )
+        for part in chain.parts
+    )
+    return replace(chain, parts=parts)
+
+
+def zone_events(zones: Sequence[FlownZone], names: Sequence[str]) -> Iterator[Event]:
+    """Yield the events of zones that had to shrink, or whose pace was lowered."""
+    for zone in zones:
+        if zone.used < zone.asked * (1 - _SHRUNK):
+            share = zone.used / zone.asked
+            message = f"the zone at its end has {{used}}, {share:.3g} of the {{asked}} that was asked for"
+            dimension = _DIMENSIONS.get(zone.of)
+            amounts: Amounts = {
+                "used": Amount(zone.used, 0, zone.joint, dimension),
+                "asked": Amount(zone.asked, 0, zone.joint, dimension),
+            }
+            yield Event("shrunk", message, zone.move, amounts)
+        if zone.tempo < 1:
+            text = (
+                f"the zone at its end is flown through at {zone.tempo:.6g} of the pace that its joints allow"
+            )
+            yield Event("lowered", f"{text}: other limits ask for it", zone.move)

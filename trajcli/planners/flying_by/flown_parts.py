@@ -1,0 +1,180 @@
+"""The motion of a chain: exact laws along its paths, and all joints together through its zones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import numpy as np
+
+from trajcli.curves.hermite import hermite_coefficients
+from trajcli.curves.operations import along_line, cut, merge_breaks, scale_time
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.third_order.parameterization import jerk_limited_time_optimal
+from trajcli.curves.third_order.quartic_law import ReversingLawError
+from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion, UnsettledSpeedError, time_optimal
+from trajcli.curves.time_optimal.passes import UnreachableSpeedError
+from trajcli.errors import PlanningError
+from trajcli.frozen import frozen
+from trajcli.kinematics.following.motion import ToolMotion
+from trajcli.planners.course import Course
+from trajcli.planners.flying_by.between_stops import FlyByChain
+from trajcli.planners.flying_by.row import ChainRow, joint_bounds
+from trajcli.planners.flying_by.search import PathPart
+from trajcli.planners.ruckig import BoundaryProblem, fastest, together
+
+_NEXT_TO_NOTHING = 1e-6  # of a limit: a joint that uses no more may be moved by rounding alone
+_HOPELESS = 1.05  # times a limit after the first steps of a law between states
+_BACKWARD = 1e-9  # of the length: a law that goes back by less stands still
+
+
+@frozen
+class FlownPart:
+    """One part of the motion: a course between its borders, or a zone.
+
+    Attributes:
+        curve: q(t) from t = 0.
+        tool: The reference of the tool along its path; None in joint space and within a zone.
+        law: s(t) of a course; None within a zone.
+    """
+
+    curve: PiecewisePolynomial
+    tool: ToolMotion | None = None
+    law: PiecewisePolynomial | None = None
+
+
+class NoLawError(PlanningError):
+    """No law leads along a course from the state at its start to that at its end."""
+
+    def __init__(self, course: int, reason: str) -> None:
+        super().__init__(f"no law is found along a path between two zones: {reason}")
+        self.course = course
+
+
+def flown_parts(chain: FlyByChain, row: ChainRow, states: Array) -> list[FlownPart]:
+    """Return the parts of the motion with given states at the nodes: courses and zones in turns.
+
+    Args:
+        chain: Moves between two stops.
+        row: As its nodes and parts.
+        states: sd and sdd at the nodes, the ends included, (N, 2).
+
+    Raises:
+        NoLawError: When some course has no law between its borders.
+        PlanningError: When some zone has no motion.
+    """
+    courses = []
+    for k, course in enumerate(chain.courses):
+        ends, part = states[2 * k : 2 * k + 2], row.parts[2 * k]
+        if course.uniform and isinstance(part, PathPart):
+            courses.append(_along_line(course, part, chain.stretch(k), ends, k))
+        else:
+            with _no_law(k):
+                courses.append(along_path(course, chain.stretch(k), ends, chain.tempos[k]))
+    parts = [courses[0]]
+    for corner, before, behind in zip(chain.corners, courses, courses[1:], strict=False):
+        borders = [
+            np.stack([part.curve.piece_ends(order)[side][-side] for order in range(3)], axis=1)
+            for part, side in ((before, 1), (behind, 0))
+        ]
+        names = corner.robot.joint_names
+        parts += [_through(borders, joint_bounds(corner.robot.limits, corner.tempo), names), behind]
+    return parts
+
+
+def _along_line(
+    course: Course, part: PathPart, stretch: tuple[float, float], states: Array, index: int
+) -> FlownPart:
+    """Return the fastest motion between two states along a straight line in joint space.
+
+    Raises:
+        NoLawError: When its law is one that goes back.
+    """
+    (v0, a0), (v1, a1) = states.tolist()
+    begin, end = stretch
+    bounds = part.bounds.reshape(3, 2)
+    law = fastest(BoundaryProblem("the law", (begin, v0, a0), (end, v1, a1), bounds)).curve()
+    slowest, reached = float(law.piece_ends(1)[1].min()), law.piece_ends()[1]
+    beyond = max(float(reached.max()) - end, begin - float(reached.min()))
+    if beyond > _BACKWARD * (end - begin) or slowest < -_BACKWARD * (end - begin) / law.duration:
+        raise NoLawError(index, "it would have to go back between its borders")
+    line, start = course.curve.coefficients[:, 0]
+    return FlownPart(along_line(start, line, law), course.reference(law), law)
+
+
+def along_path(course: Course, stretch: tuple[float, float], states: Array, tempo: float) -> FlownPart:
+    """Return the fastest motion that is found between two states along a bent path.
+
+    At a slower pace it is that between faster states, in more time.
+
+    Raises:
+        UnreachableSpeedError: When the speeds at the ends are too high.
+        UnsettledSpeedError: When they leave no room to keep the limits.
+        ReversingLawError: When there is no law between the states.
+    """
+    path, limits = _between(course.curve, *stretch), course.robot.limits
+    (v0, a0), (v1, a1) = (states / [tempo, tempo**2]).tolist()
+    further, bounds = course.constraints(path), (limits.velocity, limits.acceleration)
+    moving = np.abs(path.piece_ends(1)).max(axis=(0, 1)) > 0
+    if np.isfinite(limits.jerk[moving]).any():
+        ends = {"start": (v0, a0), "end": (v1, a1)}
+        solved: TimeOptimalMotion = jerk_limited_time_optimal(
+            path, *bounds, limits.jerk, **ends, further=further, hopeless=_HOPELESS
+        )
+    else:
+        solved = time_optimal(path, *bounds, start_velocity=v0, end_velocity=v1, further=further)
+    law, curve = (scale_time(each, 1 / tempo) for each in (solved.law, solved.trajectory))
+    return FlownPart(curve, course.reference(law), law)
+
+
+def _between(curve: PiecewisePolynomial, low: float, high: float) -> PiecewisePolynomial:
+    """Return the part of a curve from one s to another."""
+    if low > curve.start:
+        curve = cut(curve, low)[1]
+    return cut(curve, high)[0] if high < curve.end else curve
+
+
+@contextmanager
+def _no_law(course: int) -> Iterator[None]:
+    """Say which course has no law."""
+    try:
+        yield
+    except (UnreachableSpeedError, UnsettledSpeedError, ReversingLawError) as error:
+        raise NoLawError(course, str(error)) from None
+
+
+def _through(ends: Sequence[Array], bounds: Array, names: Sequence[str]) -> FlownPart:
+    """Return the motion of all joints, each (n, 3) by position, velocity and acceleration, through a zone.
+
+    What hardly moves follows a quintic: its numbers are what other curves leave of rounding.
+    """
+    problems = [
+        BoundaryProblem(name, tuple(first), tuple(last), bound.reshape(3, 2))
+        for name, first, last, bound in zip(names, ends[0].tolist(), ends[1].tolist(), bounds, strict=True)
+    ]
+    rests = [_hardly_moves(problem) for problem in problems]
+    rests = [False] * len(rests) if all(rests) else rests  # the zone itself is next to nothing
+    moving = [problem for problem, rest in zip(problems, rests, strict=True) if not rest]
+    profiles = together(moving, [fastest(problem) for problem in moving])
+    duration = max(profile.duration for profile in profiles)
+    others = iter(profiles)
+    curves = [
+        _quintic(problem, duration) if rest else next(others).curve()
+        for problem, rest in zip(problems, rests, strict=True)
+    ]
+    return FlownPart(merge_breaks(curves))
+
+
+def _hardly_moves(problem: BoundaryProblem) -> bool:
+    """Return whether a joint uses next to nothing of its limits."""
+    (_, speed), (_, change), _ = problem.bounds.tolist()
+    rates = np.abs([problem.initial[1:], problem.final[1:]]).max(axis=0)
+    still = rates[0] <= _NEXT_TO_NOTHING * speed and rates[1] <= _NEXT_TO_NOTHING * change
+    return bool(still and abs(problem.displacement) <= _NEXT_TO_NOTHING * speed**2 / change)
+
+
+def _quintic(problem: BoundaryProblem, duration: float) -> PiecewisePolynomial:
+    """Return the quintic between the states of a joint."""
+    start, end = (np.array(state)[:, None, None] for state in (problem.initial, problem.final))
+    coefficients = hermite_coefficients(start, end, np.array([[duration]]))
+    return PiecewisePolynomial(np.array([0.0, duration]), coefficients)

@@ -1,0 +1,84 @@
+"""Straight lines in joint space as courses, and the tool along them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side
+from trajcli.curves.time_optimal.constraints import PathConstraint
+from trajcli.frozen import frozen
+from trajcli.kinematics.following.motion import ToolMotion
+from trajcli.kinematics.forward import forward
+from trajcli.kinematics.robot import Robot, ToolLimits
+from trajcli.kinematics.tool_derivatives import tool_derivatives
+from trajcli.planners.course import Course
+from trajcli.planners.tool_path.time_optimal import ToolConstraint
+
+
+@frozen
+class ToolOfJoints:
+    """Poses of the tool where the joints are known by s.
+
+    Attributes:
+        curve: q(s).
+        robot: The arm.
+    """
+
+    curve: PiecewisePolynomial
+    robot: Robot
+
+    @property
+    def length(self) -> float:
+        """Last s."""
+        return self.curve.end
+
+    @property
+    def poses(self) -> ToolOfJoints:
+        """Itself."""
+        return self
+
+    def evaluate(self, s: Array, side: Side = "right") -> tuple[Array, Array, Array]:
+        """Return the poses (N, 4, 4), and their first and second derivatives by s, (N, 6), at s (N,)."""
+        rows = self.curve.evaluate_orders(s, (0, 1, 2), side=side)
+        found = tool_derivatives(self.robot, [rows[:, order] for order in range(3)])
+        joined = found.reshape(len(s), 2, 6)
+        return forward(self.robot, rows[:, 0]), joined[:, 0], joined[:, 1]
+
+
+@frozen
+class JointLine(Course):
+    """A straight line in joint space, s from 0 to 1.
+
+    Attributes:
+        curve: q(s), one piece of degree 1.
+        robot: With the limits in force.
+    """
+
+    curve: PiecewisePolynomial
+    robot: Robot
+
+    @property
+    def tcp(self) -> ToolLimits:
+        """Limits of the tool."""
+        return self.robot.limits.tcp
+
+    def tool_rates(self, s: Array) -> Array:
+        """Return sizes of p', p'', w and w' at s (m,), (4, m)."""
+        _, first, second = ToolOfJoints(self.curve, self.robot).evaluate(s)
+        sizes = [np.linalg.norm(rows.reshape(-1, 2, 3), axis=2) for rows in (first, second)]
+        return np.stack([sizes[0][:, 0], sizes[1][:, 0], sizes[0][:, 1], sizes[1][:, 1]])
+
+    def tool_constraint(self) -> PathConstraint:
+        """Return the limits of the tool along it."""
+        return ToolConstraint(ToolOfJoints(self.curve, self.robot), self.robot.limits.tcp)
+
+    def reference(self, law: PiecewisePolynomial) -> ToolMotion | None:
+        """Return nothing: its tool follows the joints."""
+        del law
+        return None
+
+
+def joint_line(start: Array, end: Array, robot: Robot) -> JointLine:
+    """Return the straight line between joint values (n,)."""
+    coefficients = np.stack([end - start, start])[:, None, :]
+    return JointLine(PiecewisePolynomial(np.array([0.0, 1.0]), coefficients), robot)

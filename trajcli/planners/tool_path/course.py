@@ -1,0 +1,76 @@
+"""Paths of the tool as courses that can begin and end in motion."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.time_optimal.constraints import PathConstraint
+from trajcli.frozen import frozen
+from trajcli.kinematics.following.motion import ToolMotion, motion_along
+from trajcli.kinematics.following.tolerance import Tolerance
+from trajcli.kinematics.robot import Robot, ToolLimits
+from trajcli.planners.course import Course
+from trajcli.planners.tool_path.follow import FollowedPath
+from trajcli.planners.tool_path.law import LawSpec
+from trajcli.planners.tool_path.time_optimal import ToolConstraint, limits_of_law
+
+_FINER = 0.5  # of the tolerance, for q(s): what the law multiplies it with must still be within
+
+
+@frozen
+class ToolCourse(Course):
+    """Joints along a path of the tool.
+
+    Attributes:
+        curve: q(s).
+        robot: With the limits in force.
+        joints: Along the path.
+        law: What the move says of its law.
+        tolerance: How near the joints' curve must be.
+    """
+
+    curve: PiecewisePolynomial
+    robot: Robot
+    joints: FollowedPath
+    law: LawSpec
+    tolerance: Tolerance
+
+    @property
+    def tcp(self) -> ToolLimits:
+        """Limits of the tool along it, those of its own law among them."""
+        return limits_of_law(self.law, self.robot.limits.tcp)
+
+    def tool_rates(self, s: Array) -> Array:
+        """Return sizes of p', p'', w and w' at s (N,), (4, N)."""
+        path = self.joints.executed
+        _, first, second = path.poses.evaluate(np.clip(s, 0.0, path.length), "right")
+        sizes = [np.linalg.norm(rows.reshape(-1, 2, 3), axis=2) for rows in (first, second)]
+        return np.stack([sizes[0][:, 0], sizes[1][:, 0], sizes[0][:, 1], sizes[1][:, 1]])
+
+    def tool_constraint(self) -> PathConstraint:
+        """Return the limits of the tool along it."""
+        return ToolConstraint(self.joints.executed, self.tcp)
+
+    def bounds(self, s: float, states: Array) -> Array:
+        """Return bounds of its law at an s, (N, 5), with the deceleration that it names."""
+        bounds = super().bounds(s, states)
+        if self.law.deceleration is not None:
+            bounds[:, 2] = np.maximum(bounds[:, 2], -self.law.deceleration)
+        return bounds
+
+    def reference(self, law: PiecewisePolynomial) -> ToolMotion | None:
+        """Return the reference of the tool under a law s(t)."""
+        return motion_along(self.joints.path, law, law.breaks, self.tolerance, None)
+
+
+def tool_course(joints: FollowedPath, law: LawSpec, tolerance: Tolerance) -> ToolCourse:
+    """Return a path of the tool as joints q(s).
+
+    Raises:
+        PlanningError: When no curve follows it within the tolerance.
+    """
+    finer = replace(tolerance, position=tolerance.position * _FINER, angle=tolerance.angle * _FINER)
+    return ToolCourse(joints.by_s(finer), joints.robot, joints, law, tolerance)

@@ -1,0 +1,245 @@
+"""Jobs whose corners are flown by: the chains of all moves, what they gained, and what was conceded."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Literal
+
+from trajcli.errors import Amount, Amounts, InputError, MissingLimitError, Place, PlanningError, Problem
+from trajcli.frozen import frozen
+from trajcli.job.read import LoadedJob
+from trajcli.kinematics.robot import Robot
+from trajcli.planners.flying_by import (
+    FlownChain,
+    FlownZone,
+    flown,
+    flown_zones,
+    moves_as_flown,
+    stretched_chain,
+    zone_events,
+)
+from trajcli.planners.planner import Event, PlannedMove, Planner
+from trajcli.progress import report_progress
+
+if TYPE_CHECKING:
+    from trajcli.kinematics.zone import Zone
+    from trajcli.planning.adaptation import Adaptation
+
+BoundMethod = Literal["proven", "searched", "second_order"]
+_WHOLE = 1e-9  # of a period: what is this close to whole is whole
+_FASTER = 1e-9  # relative: a chain that gains less stops
+
+
+@frozen
+class FlyBy:
+    """What flying by gained.
+
+    Attributes:
+        duration: Of the job, s.
+        stopping: Of the job with a stop at every corner, s.
+        bound: Duration below which no motion through these zones was found, or is, s.
+        method: What the bound is.
+        zones: In order of time.
+    """
+
+    duration: float
+    stopping: float
+    bound: float
+    method: BoundMethod
+    zones: tuple[FlownZone, ...]
+
+
+def flown_plan(
+    loaded: LoadedJob, stopping: Sequence[PlannedMove], adapted: Adaptation | None
+) -> tuple[list[PlannedMove], FlyBy, list[Event]]:
+    """Return the moves of a job, those between zones as one motion, what that gained, and what is said of it.
+
+    Args:
+        loaded: The job.
+        stopping: Its moves as planned with stops.
+        adapted: By what moves are planned otherwise than their limits alone say.
+
+    Raises:
+        InputError: Where a move names a zone that cannot be.
+    """
+    corners, remarks = flown_corners(loaded)
+    moves, flyby, events = _fly(loaded, stopping, corners, adapted)
+    return moves, flyby, [*remarks, *events]
+
+
+def _fly(
+    loaded: LoadedJob,
+    moves: Sequence[PlannedMove],
+    corners: Sequence[FlownCorner],
+    adapted: Adaptation | None,
+) -> tuple[list[PlannedMove], FlyBy, list[Event]]:
+    """Return the moves of a job with its corners flown by, what that gained, and what was conceded."""
+    result = list(moves)
+    number = {move.index: k for k, move in enumerate(moves)}
+    events: list[Event] = []
+    zones: list[FlownZone] = []
+    saved = 0.0
+    for group in chains(corners):
+        first = number[group[0].move]
+        some = moves[first : first + len(group) + 1]
+        report_progress(f"flying by the corners of moves {some[0].index} to {some[-1].index}")
+        stopping = sum(move.duration for move in some)
+        chain = _chain(loaded, some, group, adapted, stopping, events)
+        if chain is None:
+            continue
+        begun = sum(move.duration for move in result[:first])
+        of_chain = [zone.shifted(begun, len(zones)) for zone in flown_zones(chain)]
+        events += zone_events(of_chain, loaded.robot.joint_names)
+        result[first : first + len(some)] = moves_as_flown(some, chain)
+        zones += of_chain
+        saved += chain.duration - chain.model
+    duration = sum(move.duration for move in result)
+    stopping = sum(move.duration for move in moves)
+    return result, FlyBy(duration, stopping, duration - max(saved, 0.0), "searched", tuple(zones)), events
+
+
+def _chain(
+    loaded: LoadedJob,
+    moves: Sequence[PlannedMove],
+    corners: Sequence[FlownCorner],
+    adapted: Adaptation | None,
+    stopping: float,
+    events: list[Event],
+) -> FlownChain | None:
+    """Return the chain of some moves; None, with an event, where it is no faster than they are with stops."""
+    robots = [_adapted(move, moves, adapted) for move in moves]
+    amounts: Amounts = {"stopping": Amount(stopping)}
+    try:
+        chain = flown(moves, [corner.zone for corner in corners], robots)
+    except MissingLimitError as error:
+        raise error.located(place=loaded.place_of_move(moves[0].index)) from None
+    except PlanningError as error:
+        problem = error.problems[0]
+        reason = problem.message
+        message = f"stops at the corners of moves {moves[0].index} to {moves[-2].index}: {reason}"
+        events.append(Event("not_faster", message, moves[0].index, {**amounts, **problem.amounts}))
+        return None
+    if adapted is not None:
+        chain = stretched_chain(chain, max(adapted.stretches.get(move.index, 1.0) for move in moves))
+    if loaded.job.output.align:
+        chain = _aligned(chain, loaded.job.output.rate)
+    if chain.duration < stopping * (1 - _FASTER):
+        return chain
+    message = "flying by its corners is no faster than stopping there, which takes {stopping}"
+    events.append(Event("not_faster", message, moves[0].index, amounts))
+    return None
+
+
+def _adapted(move: PlannedMove, chain: Sequence[PlannedMove], adapted: Adaptation | None) -> Robot:
+    """Return the robot of a move with the limits within which its chain is planned.
+
+    What is tightened in one of its moves is in all: a zone belongs to two of them.
+    """
+    robot = move.robot
+    if adapted is not None:
+        for other in chain:
+            robot = adapted.within(robot, other.index)
+    return robot
+
+
+def _aligned(chain: FlownChain, rate: float) -> FlownChain:
+    """Return the chain that lasts a whole number of periods."""
+    periods = max(1, math.ceil(chain.duration * rate - _WHOLE))
+    return stretched_chain(chain, periods / rate / chain.duration)
+
+
+@frozen
+class FlownCorner:
+    """A corner that shall be flown by.
+
+    Attributes:
+        move: Index of the move that ends in it.
+        zone: About it.
+        explicit: Whether the move itself names the zone.
+    """
+
+    move: int
+    zone: Zone
+    explicit: bool
+
+
+def flown_corners(loaded: LoadedJob) -> tuple[list[FlownCorner], list[Event]]:
+    """Return the corners of a job that shall be flown by, and remarks on those where its own zone cannot be.
+
+    Raises:
+        InputError: Where a move names a zone that cannot be, with one problem for each.
+    """
+    corners, remarks, refused = [], list[Event](), list[tuple[int, str]]()
+    moves = loaded.job.moves
+    for index, planner in enumerate(moves):
+        explicit = planner.zone is not None
+        zone = planner.zone if explicit else loaded.job.zone
+        if zone is None or zone.stops or planner.handles or (not explicit and _stands(planner)):
+            continue
+        reason = _no_geometry(loaded, zone) or _why_not(moves, index)
+        if reason is None:
+            corners.append(FlownCorner(index, zone, explicit))
+        elif explicit:
+            refused.append((index, reason))
+        else:
+            remarks.append(_remark(index, reason))
+    flown_by = {_place(loaded, corner.move) for corner in corners if corner.explicit}
+    problems = [_problem(loaded, *each) for each in refused if _place(loaded, each[0]) not in flown_by]
+    if problems:
+        raise InputError(*problems)
+    return corners, [*remarks, *(_remark(*each) for each in refused)]
+
+
+def _remark(index: int, reason: str) -> Event:
+    return Event("zone_stops", f"stops at its end: {reason}", index)
+
+
+def _place(loaded: LoadedJob, index: int) -> Place:
+    """Return where the zone of a move is written: of several rounds it is the same place."""
+    return loaded.document.place(("moves", index, "zone"))
+
+
+def _stands(planner: Planner) -> bool:
+    """Return whether a move goes nowhere: at its end nothing could be flown by."""
+    return planner.target is None and "duration" in type(planner).model_fields
+
+
+def _why_not(moves: Sequence[Planner], index: int) -> str | None:
+    """Return why the corner at the end of a move cannot be flown by; None where it can."""
+    own = moves[index].why_not_flown_by
+    if own is not None:
+        return own
+    if index + 1 == len(moves):
+        return "it is the last move"
+    following = moves[index + 1]
+    if following.handles:
+        return f"the arm stands for `{following.tag}` behind it"
+    reason = following.why_not_flown_by
+    return None if reason is None else f"of move {index + 1} ({following.tag}) behind it, {reason}"
+
+
+def _no_geometry(loaded: LoadedJob, zone: Zone) -> str | None:
+    if loaded.robot.convention is not None or not zone.needs_geometry:
+        return None
+    return f"{loaded.robot.name} has no geometry, so its tool has no place: say `zone: {{joints: ...}}`"
+
+
+def _problem(loaded: LoadedJob, index: int, reason: str) -> Problem:
+    message = f"move {index} ({loaded.job.moves[index].tag}): its corner cannot be flown by: {reason}"
+    return Problem(message, "leave `zone` out, or say `zone: stop`", _place(loaded, index), move=index)
+
+
+def chains(corners: Sequence[FlownCorner]) -> Iterator[list[FlownCorner]]:
+    """Yield the corners of each chain: those of moves that follow each other."""
+    chain: list[FlownCorner] = []
+    for corner in corners:
+        if chain and corner.move != chain[-1].move + 1:
+            yield chain
+            chain = []
+        chain.append(corner)
+    if chain:
+        yield chain
+
+
+__all__ = ["FlownZone", "FlyBy", "flown_plan"]
