@@ -217,6 +217,7 @@ _MEANINGS: dict[Group, str] = {
     "twistd": "`ax ay az ex ey ez`: time derivative of the twist",
     "path": "`s sd sdd`: arc length of the tcp along its path and two derivatives; 0 without a path",
     "tau": "effort of each joint, N m or N in any units: inverse dynamics with what the tool carries",
+    "zone": "number of the zone about a corner that the motion is in, from 1; 0 on a path",
     "move": "index of the move, from 0; at the border of two moves, that of the later one",
 }
 

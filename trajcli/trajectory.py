@@ -94,7 +94,7 @@ class Destination:
 
 
 @frozen
-class MovePart:
+class MoveInterval:
     """A part of a move that flies by a corner: on its path, or within a zone.
 
     Attributes:
@@ -138,7 +138,7 @@ class Promise:
     remedies: Mapping[str, str] = field(default_factory=dict)
     destination: Destination | None = None
     braking: Literal["each", "line"] | None = None
-    parts: tuple[MovePart, ...] = ()
+    parts: tuple[MoveInterval, ...] = ()
 
 
 @comparable

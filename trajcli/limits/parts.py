@@ -9,10 +9,10 @@ from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.findings import Finding, at_time
 from trajcli.kinematics.zone import ZONE_RELATIVE, ZoneAround
 from trajcli.limits.kinds import LimitedMove, families
-from trajcli.trajectory import MovePart, Span, Trajectory
+from trajcli.trajectory import MoveInterval, Span, Trajectory
 
 
-def limited_part(trajectory: Trajectory, span: Span, part: MovePart) -> LimitedMove:
+def limited_part(trajectory: Trajectory, span: Span, part: MoveInterval) -> LimitedMove:
     """Return a part of a move with its limits."""
     within = replace(span, start=span.start + part.start, end=min(span.start + part.end, span.end))
     return LimitedMove(trajectory, within, part.robot.limits, part.robot, part.tool)

@@ -17,7 +17,7 @@ from trajcli.kinematics.robot import Payload, Robot
 from trajcli.language.limits import LimitsSpec
 from trajcli.language.numbers import Model, Name
 from trajcli.language.zones import ZoneField
-from trajcli.trajectory import Destination, MovePart, Promise, Span, State, Trajectory, ViaPoints
+from trajcli.trajectory import Destination, MoveInterval, Promise, Span, State, Trajectory, ViaPoints
 
 if TYPE_CHECKING:
     from trajcli.curves.time_optimal.phase_plane import PhasePlane
@@ -197,7 +197,7 @@ class Planned:
     braking: Literal["each", "line"] | None = None
     continuity: Literal[1, 2] | None = None
     certificate: Certificate | None = None
-    parts: tuple[MovePart, ...] = ()
+    parts: tuple[MoveInterval, ...] = ()
 
 
 class Planner(Model):

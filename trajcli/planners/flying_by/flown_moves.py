@@ -23,7 +23,7 @@ from trajcli.planners.flying_by.between_stops import with_looser_limits
 from trajcli.planners.flying_by.flown_parts import FlownPart
 from trajcli.planners.flying_by.within_limits import FlownChain, move_part, state_at
 from trajcli.planners.planner import Event, Phase, Planned, PlannedMove
-from trajcli.trajectory import MovePart
+from trajcli.trajectory import MoveInterval
 
 _SAMPLES = 513  # of a zone, at which its distances are looked at
 _DIMENSIONS: dict[str, Literal["length", "angle"]] = {"position": "length", "orientation": "angle"}
@@ -211,7 +211,7 @@ def moves_as_flown(moves: Sequence[PlannedMove], chain: FlownChain) -> Iterator[
         state = end
 
 
-def _pieces(chain: FlownChain) -> Iterator[tuple[PiecewisePolynomial, tuple[MovePart, ...]]]:
+def _pieces(chain: FlownChain) -> Iterator[tuple[PiecewisePolynomial, tuple[MoveInterval, ...]]]:
     """Yield the curve of each move from t = 0, and its parts."""
     count = len(chain.chain.courses)
     halves = []
@@ -233,7 +233,7 @@ def _pieces(chain: FlownChain) -> Iterator[tuple[PiecewisePolynomial, tuple[Move
         yield curve, tuple(parts)
 
 
-def _phases(parts: Sequence[MovePart]) -> Iterator[Phase]:
+def _phases(parts: Sequence[MoveInterval]) -> Iterator[Phase]:
     for part in parts:
         yield Phase("along the path" if part.around is None else "within the zone", part.start, part.end)
 

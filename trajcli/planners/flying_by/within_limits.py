@@ -32,7 +32,7 @@ from trajcli.planners.flying_by.flown_parts import FlownPart, NoLawError, along_
 from trajcli.planners.flying_by.row import ChainRow, backwards, row_of
 from trajcli.planners.flying_by.search import FoundStates, PathPart, search
 from trajcli.planners.planner import PlannedMove
-from trajcli.trajectory import MovePart, Span, State, Trajectory
+from trajcli.trajectory import MoveInterval, Span, State, Trajectory
 
 _ROUNDS = 40  # of lowering the pace of parts
 _SIZES = (1.0, 0.9, 0.7, 0.5)  # of a zone, for its borders
@@ -266,13 +266,13 @@ def _findings(chain: FlyByChain, parts: Sequence[FlownPart]) -> list[list[Findin
     ]
 
 
-def move_part(chain: FlyByChain, number: int, part: FlownPart, start: float) -> MovePart:
+def move_part(chain: FlyByChain, number: int, part: FlownPart, start: float) -> MoveInterval:
     """Return a part of a motion as that of a move, `start` s behind the start of the move."""
     k, in_zone = divmod(number, 2)
     end = start + part.curve.duration
     if in_zone:
-        return MovePart(start, end, chain.corners[k].robot, None, chain.corners[k].around)
-    return MovePart(start, end, chain.courses[k].robot, part.tool)
+        return MoveInterval(start, end, chain.corners[k].robot, None, chain.corners[k].around)
+    return MoveInterval(start, end, chain.courses[k].robot, part.tool)
 
 
 def state_at(curve: PiecewisePolynomial, time: float) -> State:
