@@ -13,8 +13,13 @@ import pytest
 
 from trajcli.checks.verify import verify
 from trajcli.errors import InputError, MissingLimitError
+from trajcli.grids import UniformGrid
+from trajcli.job.dump import dump_job
 from trajcli.job.read import job_from_text
+from trajcli.job.reports.part import in_units
+from trajcli.output.report import report_of
 from trajcli.planning.plan import Plan, plan_job
+from trajcli.samples import sample
 
 FAST = {"velocity": 3, "acceleration": 8, "jerk": 60}
 START = {"joints": [0.3, 1.2]}
@@ -356,3 +361,35 @@ def test_a_job_that_lacks_a_limit_says_which():
     with pytest.raises(MissingLimitError, match="to fly by a corner") as caught:
         plan_job(job_from_text(json.dumps({**job, "start": START, "moves": lines})))
     assert "velocity" in str(caught.value)
+
+
+def test_rows_and_reports_say_where_zones_are():
+    plan = pick(20)
+    report = report_of(plan)
+    assert report.flyby is not None
+    grid = UniformGrid(plan.trajectory.duration, 500, 0.0)
+    rows = np.concatenate(list(sample(plan.trajectory, grid, ("t", "zone", "move"))))
+    for zone in report.flyby.zones:
+        times = rows[rows[:, 1] == zone.number, 0]
+        assert zone.entered <= times[0] < zone.entered + 2.1e-3
+        assert zone.left - 2.1e-3 < times[-1] < zone.left
+        changed = rows[np.searchsorted(rows[:, 2], zone.move + 1), 0]
+        assert zone.entered < changed < zone.left
+        assert zone.used == pytest.approx(zone.asked, rel=1e-6) == pytest.approx(0.02)
+        assert 0 < zone.nearest < zone.farthest <= 0.02 * (1 + 1e-6)
+        assert 0 < zone.deviation <= zone.nearest * (1 + 1e-3)
+        assert zone.binds.partition(" of ")[2] in plan.trajectory.joint_names
+    assert report.flyby.saved == pytest.approx(report.flyby.stopping - report.duration)
+    assert report.flyby.bound.duration <= report.duration
+    outside = rows[rows[:, 1] == 0]
+    assert len(outside) > 0.7 * len(rows)
+    shown = in_units(report, plan.loaded.units).flyby
+    assert shown is not None
+    assert shown.zones[0].asked == pytest.approx(20)
+    assert shown.zones[0].length_unit == "mm"
+
+
+def test_a_job_that_is_written_out_flies_the_same():
+    plan = pick(20)
+    again = plan_job(job_from_text(dump_job(plan.loaded)))
+    np.testing.assert_array_equal(plan.trajectory.curve.breaks, again.trajectory.curve.breaks)

@@ -257,6 +257,7 @@ def _lines(explained: Explanation, count: int, *, peers: bool = False) -> Iterat
         yield from _by_position(move)
         yield from _efforts(move)
         yield from _speed(move)
+        yield from _zones(explained, move.index)
         yield from _peers(move) if peers else ()
         yield from (f"  {event.kind}: {event.message}" for event in noted if event.move == move.index)
     if explained.savings is not None and len(explained.moves) > 1:
@@ -269,6 +270,20 @@ def _lines(explained: Explanation, count: int, *, peers: bool = False) -> Iterat
     if efforts is not None and efforts.inertials is not None:
         how = "judged for all t" if efforts.judged else f"not judged, {efforts.reason}"
         yield f"efforts: {how}; masses and inertias from {efforts.inertials}"
+
+
+def _zones(explained: Explanation, move: int) -> Iterator[str]:
+    """Yield a line about the zone at the end of a move."""
+    for zone in () if explained.flyby is None else explained.flyby.zones:
+        if zone.move != move:
+            continue
+        of = zone.joint or zone.of
+        text = f"  zone {zone.number}: {zone.used:.6g} of {zone.asked:.6g} {zone.unit} ({of})"
+        text += f", entered at {zone.entered:.6g} s, left at {zone.left:.6g} s of the job"
+        if zone.nearest is not None and zone.farthest is not None and zone.deviation is not None:
+            text += f"; the tool {zone.nearest:.4g} to {zone.farthest:.4g} {zone.length_unit} from the corner"
+            text += f", {zone.deviation:.4g} {zone.length_unit} off its path"
+        yield f"{text}; binding: {zone.binds}"
 
 
 def _peers(move: ExplainedMove) -> Iterator[str]:
