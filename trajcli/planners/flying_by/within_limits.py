@@ -42,7 +42,8 @@ _SLOWEST = 0.05  # a part that would be slower than this is stopped at instead
 _MOST = 16  # searches
 _SLOWER = 0.95  # the pace of a course that has no law between the states that were found
 _EASED = 0.985  # of the pace of a bent course: states on its limits leave a law no room
-_ALIKE = 0.01  # relative: a pace that changes by less is known
+_CAREFUL = 0.97  # of the pace of a law from rest to rest: a state that is too fast costs a law in vain
+_ALIKE = 0.03  # relative: a pace that changes by less is known
 
 
 @frozen
@@ -163,13 +164,14 @@ def _fastest_motion(chain: FlyByChain) -> tuple[list[FlownPart], float]:
     Raises:
         PlanningError: When none is found.
     """
-    paces = np.array([1.0 if course.uniform else _own_pace(course) for course in chain.courses])
+    paces = np.array([1.0 if course.uniform else _CAREFUL * _own_pace(course) for course in chain.courses])
     eased = np.array([1.0 if course.uniform else _EASED for course in chain.courses])
     best: list[FlownPart] | None = None
     shortest, model = math.inf, math.inf
     for _ in range(_MOST):
         row = row_of(chain, paces.tolist(), eased.tolist())
-        found = _found(row, chain.ends)
+        exact = all(course.uniform for course in chain.courses)
+        found = _found(row, chain.ends) if exact else search(row.nodes, row.parts, chain.ends)
         if not math.isfinite(found.duration):
             break
         try:
