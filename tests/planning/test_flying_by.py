@@ -393,3 +393,59 @@ def test_a_job_that_is_written_out_flies_the_same():
     plan = pick(20)
     again = plan_job(job_from_text(dump_job(plan.loaded)))
     np.testing.assert_array_equal(plan.trajectory.curve.breaks, again.trajectory.curve.breaks)
+
+
+def test_a_time_optimal_move_is_flown_by_at_its_ends_and_passes_its_points():
+    inner = [(1.0, 1.6), (0.8, 1.9)]
+    through = {
+        "planner": "time_optimal",
+        "through": [{"joints": list(point)} for point in inner],
+        "to": {"joints": [0.6, 2.2]},
+    }
+    plan = flown(to(*CORNER), through, to(0.2, 2.0))
+    assert len(plan.flyby.zones) == 2
+    assert plan.flyby.duration < 0.9 * plan.flyby.stopping
+    passed = plan.moves[1].planned.via_points
+    begun = plan.trajectory.spans[1].start
+    np.testing.assert_allclose(plan.trajectory.curve.evaluate(begun + passed.times), inner, atol=1e-9)
+    late = replace(passed, times=passed.times + 1e-3)
+    changed = replace(plan.moves[1], planned=replace(plan.moves[1].planned, via_points=late))
+    assert findings(plan, [plan.moves[0], changed, plan.moves[2]]) == {"waypoint"}
+    corners = {**through, "path": "polyline"}
+    stopped = flown(to(*CORNER), corners, to(0.2, 2.0))
+    assert any("stops at corners of its own" in remark.message for remark in stopped.remarks)
+
+
+@pytest.mark.parametrize(
+    "second",
+    [
+        {"planner": "arc", "center": [0.4, 0.2, 0.25], "axis": "z", "angle": 1.0},
+        {"planner": "screw", "to": {"xyz": [0.3, 0.3, 0.3], "rpy": [np.pi, 0, 0.5]}},
+    ],
+)
+def test_arcs_and_screws_are_flown_by(second):
+    law = {"law": {"shape": "time_optimal"}}
+    first = {"planner": "line", "to": {"xyz": [0.4, 0.3, 0.25], "rpy": [np.pi, 0, 0]}, **law}
+    branch = {"shoulder": "left", "elbow": "up", "wrist": "no_flip"}
+    start = {"xyz": [0.4, 0.1, 0.05], "rpy": [np.pi, 0, 0], "configuration": branch}
+    limits = {"velocity": 3, "acceleration": 14, "jerk": 140}
+    plan = flown(first, {**second, **law}, robot="ur5e", start=start, limits=limits, zone=0.02)
+    assert len(plan.flyby.zones) == 1
+    assert plan.flyby.duration < 0.97 * plan.flyby.stopping
+    assert plan.flyby.zones[0].farthest <= 0.02 * (1 + 1e-6)
+
+
+def test_seven_joints_and_slides_are_flown_by():
+    seven = [0.1, -0.6, 0.2, -2.0, 0.1, 1.6, 0.7]
+    limits = {"velocity": 2, "acceleration": 8, "jerk": 100}
+    moves = [to(*(value + 0.2 for value in seven)), to(*(value - 0.1 for value in seven))]
+    plan = flown(*moves, robot="panda", limits=limits, start={"joints": seven}, zone=0.03)
+    assert len(plan.flyby.zones) == 1
+    joints = [
+        {"type": "prismatic", "alpha": 1.5707963267948966},
+        {"type": "prismatic", "alpha": 1.57},
+        {"a": 0.2},
+    ]
+    arm = {"convention": "standard", "joints": joints}
+    plan = flown(to(0.2, 0.1, 0.3), to(0.3, 0.3, 0.8), robot=arm, limits=limits, start={"joints": [0, 0, 0]})
+    assert len(plan.flyby.zones) == 1

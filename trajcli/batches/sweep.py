@@ -155,6 +155,8 @@ def _planned(document: Document) -> SweepPoint:
 
 def _bound(plan: Plan) -> float | None:
     """Return a duration that no motion from stop to stop of the job is below; None where none is known."""
+    if plan.flyby is not None and plan.flyby.zones:
+        return plan.flyby.bound
     bounds = [_bound_of_move(move) for move in plan.moves if move.duration > 0]
     return None if None in bounds else sum(bound for bound in bounds if bound is not None)
 

@@ -38,16 +38,33 @@ class PathRates:
     tool: Array | None
 
 
+@frozen
+class PassedPoints:
+    """Points that a path passes between its ends.
+
+    Attributes:
+        s: Where, shape (m,).
+        points: Shape (m, n), rad or m.
+        missed: The distance at which each joint passes each point, shape (m, n).
+    """
+
+    s: Array
+    points: Array
+    missed: Array
+
+
 class Course(ABC):
     """A move as joints along a path.
 
     Attributes:
         curve: q(s) from s = 0.
         robot: With the limits in force.
+        passed: Points that it passes between its ends; None where it has none.
     """
 
     curve: PiecewisePolynomial
     robot: Robot
+    passed: PassedPoints | None = None
 
     @property
     @abstractmethod
@@ -62,7 +79,7 @@ class Course(ABC):
     @property
     def uniform(self) -> bool:
         """Whether its bounds are the same everywhere."""
-        return self.curve.degree == 1 and self.tcp == ToolLimits()
+        return self.curve.degree == 1 and self.curve.pieces == 1 and self.tcp == ToolLimits()
 
     @abstractmethod
     def tool_rates(self, s: Array) -> Array:

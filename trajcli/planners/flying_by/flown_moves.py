@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from trajcli.curves.extrema import peaks
-from trajcli.curves.operations import cut, scale_time
+from trajcli.curves.operations import cut, scale_time, times_at
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
 from trajcli.errors import Amount, Amounts
 from trajcli.frozen import frozen
@@ -23,7 +23,7 @@ from trajcli.planners.flying_by.between_stops import with_looser_limits
 from trajcli.planners.flying_by.flown_parts import FlownPart
 from trajcli.planners.flying_by.within_limits import FlownChain, move_part, state_at
 from trajcli.planners.planner import Event, Phase, Planned, PlannedMove
-from trajcli.trajectory import MoveInterval
+from trajcli.trajectory import MoveInterval, ViaPoints
 
 _SAMPLES = 513  # of a zone, at which its distances are looked at
 _DIMENSIONS: dict[str, Literal["length", "angle"]] = {"position": "length", "orientation": "angle"}
@@ -205,10 +205,23 @@ def moves_as_flown(moves: Sequence[PlannedMove], chain: FlownChain) -> Iterator[
         phases = tuple(_phases(parts))
         events = tuple(event for event in move.planned.events if event.kind in _OF_PATHS)
         continuity = move.planned.continuity
-        planned = Planned(curve, end, phases=phases, events=events, parts=parts, continuity=continuity)
+        passed = _passed(chain, number, parts)
+        planned = Planned(curve, end, None, phases, events, None, passed, parts=parts, continuity=continuity)
         robot = reduce(with_looser_limits, robots[max(number - 1, 0) : number + 2], move.robot)
         yield replace(move, start=state, robot=robot, planned=planned, stretch=1.0)
         state = end
+
+
+def _passed(chain: FlownChain, number: int, parts: Sequence[MoveInterval]) -> ViaPoints | None:
+    """Return the points that a move passes between its zones; None where it has none."""
+    points, law = chain.chain.courses[number].passed, chain.parts[2 * number].law
+    if points is None or law is None:
+        return None
+    first, last = chain.chain.stretch(number)
+    kept = (points.s > first) & (points.s < last)
+    begun = next(part.start for part in parts if part.around is None)
+    times = begun + times_at(law, points.s[kept]) - law.start
+    return ViaPoints(times, points.points[kept], points.missed[kept]) if kept.any() else None
 
 
 def _pieces(chain: FlownChain) -> Iterator[tuple[PiecewisePolynomial, tuple[MoveInterval, ...]]]:

@@ -191,7 +191,8 @@ def _fastest_motion(chain: FlyByChain) -> tuple[list[FlownPart], float]:
         paces *= change
     if best is None:
         raise PlanningError("no motion through its zones is found within the limits")
-    return best, min(model, shortest)
+    exact = all(course.uniform for course in chain.courses)
+    return best, min(model, shortest) if exact else shortest
 
 
 def _found(row: ChainRow, ends: tuple[Array, Array]) -> FoundStates:

@@ -1,4 +1,4 @@
-"""Straight lines in joint space as courses, and the tool along them."""
+"""Paths in joint space as courses, straight lines among them, and the tool along them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.kinematics.tool_derivatives import tool_derivatives
-from trajcli.planners.course import Course
+from trajcli.planners.course import Course, PassedPoints
 from trajcli.planners.tool_path.time_optimal import ToolConstraint
 
 
@@ -46,16 +46,18 @@ class ToolOfJoints:
 
 
 @frozen
-class JointLine(Course):
-    """A straight line in joint space, s from 0 to 1.
+class JointCourse(Course):
+    """A path in joint space.
 
     Attributes:
-        curve: q(s), one piece of degree 1.
+        curve: q(s): of a straight line one piece of degree 1, s from 0 to 1.
         robot: With the limits in force.
+        passed: Points that the path passes between its ends, each with its s, and by how much it misses them.
     """
 
     curve: PiecewisePolynomial
     robot: Robot
+    passed: PassedPoints | None = None
 
     @property
     def tcp(self) -> ToolLimits:
@@ -78,7 +80,7 @@ class JointLine(Course):
         return None
 
 
-def joint_line(start: Array, end: Array, robot: Robot) -> JointLine:
+def joint_line(start: Array, end: Array, robot: Robot) -> JointCourse:
     """Return the straight line between joint values (n,)."""
     coefficients = np.stack([end - start, start])[:, None, :]
-    return JointLine(PiecewisePolynomial(np.array([0.0, 1.0]), coefficients), robot)
+    return JointCourse(PiecewisePolynomial(np.array([0.0, 1.0]), coefficients), robot)

@@ -26,7 +26,8 @@ from trajcli.planners.waypoints.spline_rules import Rule
 
 _MOST_STOPS = 10  # that an event lists
 _OFF = 1e-9  # relative: an acceleration this little off the path is along it
-_BENT: tuple[Rule, ...] = ("computed", "shape_preserving")  # rules whose curvature jumps
+BENT_RULES: tuple[Rule, ...] = ("computed", "shape_preserving")
+"""Rules of splines whose curvature jumps."""
 
 
 def require_continuous_curvature(rule: Rule | None) -> None:
@@ -35,7 +36,7 @@ def require_continuous_curvature(rule: Rule | None) -> None:
     Raises:
         PlanningError: Names the rules that fit.
     """
-    if rule in _BENT:
+    if rule in BENT_RULES:
         message = f"the curvature of a spline with rule {rule} jumps, which no limit of jerk allows"
         hint = "use rule not_a_knot, natural, clamped or quintic, or `jerk: ignore`"
         raise PlanningError(message, hint=hint)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,7 @@ from trajcli.planners.boundary_states import missing_limit, same_state, standsti
 from trajcli.planners.effort_limits import effort_constraints, effort_shares, lacks_acceleration
 from trajcli.planners.planner import Phase, Planned
 from trajcli.planners.waypoints.fastest_law import (
+    BENT_RULES,
     events_of_law,
     require_continuous_curvature,
     solve_second_order,
@@ -49,8 +50,12 @@ from trajcli.planners.waypoints.fastest_law import (
 from trajcli.planners.waypoints.joint_path import JointPath, polyline_through, spline_through
 from trajcli.planners.waypoints.spline_rules import Rule
 from trajcli.planners.waypoints.through_points import REMEDIES, PointTable, ThroughPoints
-from trajcli.trajectory import State, ViaPoints
+from trajcli.trajectory import State, ViaPoints, resting
 from trajcli.units import Quantity
+
+if TYPE_CHECKING:
+    from trajcli.curves.piecewise import Array
+    from trajcli.planners.course import Course
 
 _NAMED = ("chord", "centripetal", "uniform")
 
@@ -172,6 +177,29 @@ class TimeOptimal(ThroughPoints):
                 if any(getattr(point, name) or ()) and not (last and name == "velocity"):
                     text = f"time_optimal does not impose the {name} here"
                     yield (*path, name), text, "only the target may have a `velocity`"
+
+    @property
+    def why_not_flown_by(self) -> str | None:
+        """Why no motion can fly by a corner of this move; None where it can."""
+        last = self.listed[-1] if self.listed else None
+        reasons = {
+            "its `duration` is given": self.duration is not None,
+            "it ends in motion": last is not None and any(last.velocity or ()),
+            "it stops at corners of its own (give `corner`)": self.path == "polyline"
+            and not any(self.corner or ()),
+            f"the curvature of its path jumps (rule {self.rule})": self.rule in BENT_RULES,
+        }
+        return next((reason for reason, holds in reasons.items() if holds), None)
+
+    def course(self, start: Array, robot: Robot) -> Course:
+        """Return the path through the points, from joint values (n,)."""
+        from trajcli.planners.course import PassedPoints
+        from trajcli.planners.point_to_point.joint_line import JointCourse
+
+        points = self._untimed().waypoints(resting(start), robot)
+        path = self._path(points, robot, smooth=True)
+        passed = PassedPoints(path.s[1:-1], points.positions[1:-1], path.missed[1:-1])
+        return JointCourse(path.curve, robot, passed)
 
     def plan(self, start: State, robot: Robot) -> Planned:
         """Return the fastest motion along the path.
