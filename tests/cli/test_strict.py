@@ -25,6 +25,13 @@ ARM = {
     "limits": {"acceleration": 800, "jerk": 80000},
     "start": {"joints": [0, -90, 90, 0, 90, 0]},
 }
+FLYING = {
+    "robot": "planar2r",
+    "limits": {"velocity": 3, "acceleration": 8, "jerk": 60},
+    "zone": 0.02,
+    "start": {"joints": [0.3, 1.2]},
+}
+CORNER = [{"planner": "jerk_limited", "to": {"joints": list(q)}} for q in ((0.9, 1.25), (1.0, 2.0))]
 AT = {"xyz": [400, 100, 250], "rpy": [180, 0, 0], "configuration": {"elbow": "up"}}
 
 
@@ -144,6 +151,14 @@ def job(kind: str) -> dict[str, Any]:
             {"robot": {"joints": 1}, "limits": {"velocity": 1, "acceleration": 5, "jerk": 50}, "start": {"joints": [0]}},
             [{"planner": "spline", "rule": "quintic", "through": sine(150)}],
         ),
+        "lowered": (
+            {**FLYING, "limits": {"velocity": 3, "acceleration": 8, "jerk": 60, "tcp": {"acceleration": 2}}},
+            CORNER,
+        ),
+        "not_faster": (
+            {**FLYING, "start": {"joints": [0.3, 1.2], "velocity": [0.6, -0.5]}},
+            CORNER,
+        ),
         "merged": (
             TWO,
             [{"planner": "time_optimal", "through": [{"joints": [1, 0.5]}, {"joints": [1, 0.5]}, {"joints": [0, 1]}]}],
@@ -212,7 +227,7 @@ def kinds_of_events() -> set[str]:
     return kinds
 
 
-REMARKS = {"refined", "bound", "fastest_found"}
+REMARKS = {"refined", "bound", "fastest_found", "zone_stops"}
 # moves that a limit beyond their planner's holds: the kind is put together from the name of the limit
 WITHIN = {"within_velocity_by_position", "within_tool_limits", "within_effort_limits"}
 KINDS = sorted({kind for kind in kinds_of_events() if not kind.startswith("_")} - REMARKS | WITHIN)

@@ -19,7 +19,8 @@ COLUMNS = columns_of(("t", "q", "qd", "pose", "path", "move"), ("revolute", "pri
 def random_rows(count, columns=COLUMNS):
     rng = np.random.default_rng(1)
     rows = rng.normal(size=(count, len(columns))) * 10.0 ** rng.integers(-20, 20, (count, len(columns)))
-    rows[:, -1] = np.arange(count) // 3
+    whole = [k for k, column in enumerate(columns) if column.whole_numbers]
+    rows[:, whole] = (np.arange(count) // 3)[:, None]
     return rows
 
 
