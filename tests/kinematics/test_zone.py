@@ -8,7 +8,8 @@ from oracle_robots import exponentials, random_arm, screws
 from scipy.spatial.transform import Rotation
 
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.kinematics.zone import Zone, ZoneAround
+from trajcli.kinematics.robot import Joint, Robot, unlimited
+from trajcli.kinematics.zone import Zone, ZoneAround, _Intervals
 
 SAMPLES = 200
 
@@ -109,3 +110,58 @@ def test_a_zone_of_several_measures_is_the_tightest_of_them():
 )
 def test_a_zone_of_no_size_stops(zone, stops):
     assert zone.stops == stops
+
+
+def arm(*rows):
+    """Return an arm of standard DH rows (type, a, alpha)."""
+    joints = tuple(Joint(f"j{k}", kind, a=a, alpha=alpha) for k, (kind, a, alpha) in enumerate(rows))
+    return Robot("arm", joints, unlimited(len(joints)), "standard", np.eye(4), np.eye(4))
+
+
+LEVER = ("revolute", 1.0, 0.0)
+SLIDE = ("prismatic", 0.0, 0.0)
+ACROSS = ("revolute", 0.0, np.pi / 2)
+ONE_TERM = {
+    "a lever that speeds up": (arm(LEVER), [[2.0], [0.0], [0.3]]),
+    "a lever at constant speed": (arm(LEVER), [[0.0], [2.0], [0.3]]),
+    "two levers at constant speed": (arm(LEVER, LEVER), [[0.0, 0.0], [1.0, 1.5], [0.3, 0.1]]),
+    "a short lever in front of a long one": (
+        arm(("revolute", 0.01, 0.0), LEVER),
+        [[0.0, 0.0], [2.0, 0.1], [0.3, 0.1]],
+    ),
+    "a slide that speeds up": (
+        arm(SLIDE, ("revolute", 0.001, 0.0)),
+        [[0.02, 0.0], [0.0, 0.0], [0.0, 0.2]],
+    ),
+    "a slide on a turning arm": (arm(ACROSS, SLIDE), [[0.0, 0.0], [0.5, 4.0], [0.0, 0.0]]),
+    "a slide that travels far and turns": (arm(ACROSS, SLIDE), [[0.0, 0.0], [3.0, 20.0], [0.0, 0.01]]),
+}
+
+
+@pytest.mark.parametrize("name", ONE_TERM)
+def test_each_term_of_the_bound_of_the_tools_acceleration_counts(name):
+    """Arms in which one term dominates: bound over largest value within 1 and 30, by differences of poses."""
+    robot, rows = ONE_TERM[name]
+    coefficients, length, step = np.array(rows)[:, None, :], 0.5, 1e-4
+    curve = PiecewisePolynomial(np.array([0.0, length]), coefficients)
+    times = np.linspace(step, length - step, 300)
+    before, here, after = (
+        exponentials(*screws(robot), curve.evaluate(times + shift))[:, :3, 3] for shift in (-step, 0.0, step)
+    )
+    largest = np.linalg.norm(after - 2 * here + before, axis=1).max() / step**2
+    pieces = _Intervals(curve.breaks[:-1], curve.lengths, curve.coefficients)
+    around = ZoneAround(robot, np.array(rows[-1]), Zone(position=1.0))
+    (bend,), _ = around._tool_rates(pieces.ends()[0], *pieces.rates(), pieces.lengths)
+    assert 1 - 1e-5 <= bend / largest <= 30
+
+
+@pytest.mark.parametrize(
+    ("zone", "most"), [(Zone(position=1.0), 0.25), (Zone(joints=(1.0,)), 0.25), (Zone(orientation=1.0), 0.25)]
+)
+def test_the_first_look_at_an_interval_is_no_lower_than_what_is_inside(zone, most):
+    """A joint that goes out and back within one interval, q = t - t^2: its ends show nothing of it."""
+    curve = PiecewisePolynomial(np.array([0.0, 1.0]), np.array([[[-1.0]], [[1.0]], [[0.0]]]))
+    pieces = _Intervals(curve.breaks[:-1], curve.lengths, curve.coefficients)
+    at_ends, bound = ZoneAround(arm(LEVER), np.zeros(1), zone)._bounds(pieces)
+    assert at_ends[0] == pytest.approx(0.0, abs=1e-9)
+    assert most * (1 - 1e-2) <= bound[0] <= 4 * most
