@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import sys
 import tracemalloc
 
 import numpy as np
+from counted_calls import calls_of
 
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.job.read import job_from_text
@@ -17,18 +17,7 @@ def _calls(moves: int) -> int:
     lines = [f"  - {{planner: quintic, to: {{joints: [{k % 7}, {k % 5}]}}}}" for k in range(moves)]
     head = "version: 1\nrobot: {joints: 2}\nlimits: {velocity: 2, acceleration: 15, jerk: 100}\n"
     loaded = job_from_text(head + "start: {joints: [9, 9]}\nmoves:\n" + "\n".join(lines))
-    count = 0
-
-    def counted(frame: object, event: str, arg: object) -> None:
-        nonlocal count
-        count += event in ("call", "c_call")
-
-    sys.setprofile(counted)
-    try:
-        plan_job(loaded)
-    finally:
-        sys.setprofile(None)
-    return count
+    return calls_of(lambda: plan_job(loaded))
 
 
 def test_calls_grow_as_the_number_of_moves() -> None:

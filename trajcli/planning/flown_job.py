@@ -117,7 +117,9 @@ def _chain(
     except PlanningError as error:
         problem = error.problems[0]
         reason = problem.message
-        message = f"stops at the corners of moves {moves[0].index} to {moves[-2].index}: {reason}"
+        first, last = moves[0].index, moves[-2].index
+        corners_of = f"corner of move {first}" if first == last else f"corners of moves {first} to {last}"
+        message = f"stops at the {corners_of}: {reason}"
         events.append(Event("not_faster", message, moves[0].index, {**amounts, **problem.amounts}))
         return None
     if adapted is not None:

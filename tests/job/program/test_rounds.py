@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import itertools
-import sys
 
 import numpy as np
 import pytest
+from counted_calls import calls_of
 
 from trajcli.errors import InputError
 from trajcli.job.dump import dump_job
@@ -256,18 +256,7 @@ def _calls(rows: int) -> int:
         "law: {shape: quintic, duration: 1}", "duration: 1"
     )
     text = text.replace("jerk_limited", "quintic")
-    count = 0
-
-    def counted(frame: object, event: str, arg: object) -> None:
-        nonlocal count
-        count += event in ("call", "c_call")
-
-    sys.setprofile(counted)
-    try:
-        planned(text)
-    finally:
-        sys.setprofile(None)
-    return count
+    return calls_of(lambda: planned(text))
 
 
 def test_calls_grow_as_the_places_of_a_pallet() -> None:

@@ -4,10 +4,9 @@ Along a straight line in joint space one variable has the same bounds everywhere
 Along other paths typical bounds stand for them; how much faster or slower the exact law is between the states
 that were found sets the pace of a second search.
 
-Where a part of the motion is
-over a limit, its pace alone is lowered until it is not: with time scaled by f, velocities go with f,
-accelerations with f^2, jerks with f^3. Where it leaves its zone, smaller borders are tried, then a slower
-pace.
+Where a part of the motion is over a limit, its pace alone is lowered until it is not: with time scaled by f,
+velocities go with f, accelerations with f^2, jerks with f^3. Where it leaves its zone, smaller borders are
+tried, then a slower pace.
 """
 
 from __future__ import annotations
@@ -56,14 +55,12 @@ class FlownChain:
         moves: Indices of its moves among those planned.
         chain: Its courses and zones.
         parts: Of the motion: courses and zones in turns.
-        sizes: What part of each zone its borders use.
         model: Duration of the fastest chain that was found, before the pace of any part was lowered, s.
     """
 
     moves: tuple[int, ...]
     chain: FlyByChain
     parts: tuple[FlownPart, ...]
-    sizes: tuple[float, ...]
     model: float
 
     @property
@@ -91,9 +88,9 @@ def flown(moves: Sequence[PlannedMove], corners: Sequence[Zone], robots: Sequenc
     courses = [moves[k].planner.course(moves[k].start.position, robots[k]) for k in kept]
     zones = [ZoneAround(robots[k], np.array(moves[k].planned.end.position), corners[k]) for k in kept[:-1]]
     ends = _rates_along(courses[0], moves[0].start), np.zeros(2)
-    chain, parts, sizes, model = _within_limits(courses, zones, ends)
+    chain, parts, model = _within_limits(courses, zones, ends)
     indices = tuple(moves[k].index for k in kept)
-    return FlownChain(indices, chain, tuple(parts), tuple(sizes), model)
+    return FlownChain(indices, chain, tuple(parts), model)
 
 
 def _has_length(move: PlannedMove) -> bool:
@@ -134,8 +131,8 @@ def _rates_along(course: Course, start: State) -> Array:
 
 def _within_limits(
     courses: Sequence[Course], zones: Sequence[ZoneAround], ends: tuple[Array, Array]
-) -> tuple[FlyByChain, list[FlownPart], list[float], float]:
-    """Return the fastest chain found whose parts keep all limits and zones, its parts, and their sizes."""
+) -> tuple[FlyByChain, list[FlownPart], float]:
+    """Return the fastest chain found whose parts keep all limits and zones, its parts, and its `model`."""
     from trajcli.planners.flying_by.straight import straightened
 
     count = len(zones)
@@ -154,7 +151,7 @@ def _within_limits(
         parts = straight.parts(joined)
         model = min(model, found)
         if not _lowered(chain, parts, sizes, paces, tempos):
-            return chain, parts, [_SIZES[size] for size in sizes], model
+            return chain, parts, model
         if min(paces.min(), tempos.min()) < _SLOWEST:
             break
     raise PlanningError("no motion through its zones keeps all limits")
