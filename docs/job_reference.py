@@ -91,7 +91,7 @@ leaves out keep the robot's limits, with an event. Whatever else stands under `l
 _TOOL_LIMITS = """\
 Speeds and accelerations of the tcp, in world. They hold in every move of an arm with geometry: the laws of
 [moves along a path](#along-a-path-of-the-tool) take them from here, and a move in joint space without a
-duration, times or rates of its own is stretched to them, with an event. All moves are verified. `jerk` is the
+duration, times or rates of its own keeps them, with an event. All moves are verified. `jerk` is the
 one along the path; in joint space it is not judged, and the summary says so."""
 
 _ROBOT = f"""\

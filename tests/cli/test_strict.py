@@ -58,7 +58,7 @@ def job(kind: str) -> dict[str, Any]:
         ),
         "stretched": (
             {**LINK, "limits": {"velocity": 3, "acceleration": 20, "jerk": 300, "tcp": {"speed": 0.5}}},
-            [{"planner": "jerk_limited", "to": {"joints": [1]}}],
+            [{"planner": "jerk_limited", "synchronize": "none", "to": {"joints": [1]}}],
         ),
         "within_velocity_by_position": (
             {

@@ -15,6 +15,14 @@ from trajcli.planning.plan import Plan, plan_job
 
 LEVER, TURN, SPEED = 0.5, 1.2, 0.25
 ONE_LINK = {"convention": "standard", "joints": [{"a": LEVER}]}
+UR5E_SWING = {
+    "version": 1,
+    "robot": "ur5e",
+    "units": {"angle": "deg", "length": "mm"},
+    "limits": {"acceleration": 800, "jerk": 8000, "tcp": {"speed": 250}},
+    "start": {"joints": [0, -90, 90, -90, -90, 0]},
+    "moves": [{"planner": "jerk_limited", "to": {"joints": [90, -60, 60, -90, -90, 0]}}],
+}
 PEAKS = {"cubic": 1.5, "quintic": 15 / 8, "septic": 35 / 16, "cycloidal": 2.0}  # of the speed, by textbook
 
 
@@ -50,12 +58,10 @@ def test_the_fastest_duration_of_a_law_respects_the_speed_of_the_tool(planner: s
     assert "to keep the speed limit of the tool" in event.message
 
 
-@pytest.mark.parametrize("planner", ["jerk_limited", "trapezoid", "spline", "time_optimal", "blends"])
+@pytest.mark.parametrize("planner", ["trapezoid", "spline", "blends"])
 def test_other_planners_are_stretched_and_say_so(planner: str) -> None:
     move: dict[str, Any] = {"planner": planner}
-    if planner == "jerk_limited":
-        move["limits"] = {"jerk": 300}
-    if planner in ("spline", "time_optimal", "blends"):
+    if planner in ("spline", "blends"):
         move |= {"through": [{"joints": [0.7]}]}
     plan = planned(move, {"speed": SPEED})
     assert plan.verdict.passed
@@ -63,6 +69,70 @@ def test_other_planners_are_stretched_and_say_so(planner: str) -> None:
     event = next(event for event in plan.events if event.kind == "stretched")
     assert event.concedes
     assert "a faster motion may exist" in event.message
+
+
+@pytest.mark.parametrize("planner", ["jerk_limited", "time_optimal"])
+def test_the_fastest_law_on_the_same_line_keeps_the_tool(planner: str) -> None:
+    """One link: v = L qd is a limit of the joint, and of that the fastest law is known in closed form."""
+    jerk, top = 300.0, SPEED / LEVER
+    more = {"limits": {"jerk": jerk}} if planner == "jerk_limited" else {}
+    plan = planned({"planner": planner, **more}, {"speed": SPEED})
+    assert plan.verdict.passed
+    ramps = 2 * np.sqrt(top / jerk) if more else top / 20
+    assert plan.trajectory.duration == pytest.approx(TURN / top + ramps, rel=2e-3)
+    assert fastest_sampled(plan) == pytest.approx(SPEED, rel=1e-4)
+    (event,) = [event for event in plan.events if event.kind == "within_tool_limits"]
+    assert event.concedes
+    assert "to keep the speed limit of the tool" in event.message
+    assert ("straight line" in event.message) == (planner == "jerk_limited")
+
+
+@pytest.mark.parametrize(
+    ("tcp", "most"),
+    [
+        ({"speed": 1000}, 1.18),
+        ({"speed": 250}, 3.91),
+        ({"speed": 1000, "acceleration": 5000}, 1.24),
+        ({"angular_speed": 60, "speed": 1000}, 1.69),
+        ({"jerk": 50_000}, 1.14),
+    ],
+)
+def test_a_swing_is_not_stretched_as_a_whole(tcp: dict[str, float], most: float) -> None:
+    """Stretched alike everywhere it took 1.641, 6.563, 1.641, 2.475 and 1.137 s.
+
+    No motion along the line is faster than its length at the largest speed of the tool.
+    """
+    swing = UR5E_SWING | {"limits": {"acceleration": 800, "jerk": 8000, "tcp": tcp}}
+    plan = plan_job(loaded(swing))
+    assert plan.verdict.passed
+    duration = plan.trajectory.duration
+    line = np.linspace(*np.radians([[0, -90, 90, -90, -90, 0], [90, -60, 60, -90, -90, 0]]), 4001)
+    steps = np.diff(forward(plan.loaded.robot, line)[:, :3, 3], axis=0)
+    assert np.linalg.norm(steps, axis=1).sum() / (tcp.get("speed", 1e9) / 1000) <= duration <= most
+    on_line = plan.trajectory.curve.evaluate(np.linspace(0, duration, 301)) - line[0]
+    along = (on_line @ (line[-1] - line[0])) / np.square(line[-1] - line[0]).sum()
+    if "jerk" not in tcp:  # of the tool: it is stretched to that, each joint by its own law
+        np.testing.assert_allclose(on_line, along[:, None] * (line[-1] - line[0]), atol=1e-9)
+    bounds = [event for event in plan.remarks if event.kind == "bound"]
+    assert all("at most" in event.message for event in bounds)
+
+
+@pytest.mark.parametrize("tcp", [{"speed": 0.02}, {"angular_speed": 0.04}])
+def test_the_bound_counts_the_way_and_the_turn_of_the_tool(tcp: dict[str, float]) -> None:
+    """So slow a link needs nothing but its way: L times the turn, or the turn itself, at the largest speed."""
+    plan = planned({"planner": "time_optimal"}, tcp)
+    way = TURN * LEVER / 0.02 if "speed" in tcp else TURN / 0.04
+    (bound,) = [event for event in plan.remarks if event.kind == "bound"]
+    seconds = float(bound.message.split(" ask for ")[1].split()[0])
+    assert way * (1 - 1e-5) <= seconds <= plan.trajectory.duration <= 1.01 * way
+
+
+def test_a_least_duration_is_kept() -> None:
+    plan = planned(
+        {"planner": "jerk_limited", "minimum_duration": 2.6, "limits": {"jerk": 300}}, {"speed": SPEED}
+    )
+    assert plan.trajectory.duration == pytest.approx(2.6, rel=1e-9)
+    assert fastest_sampled(plan) < SPEED
 
 
 def test_an_acceleration_counts_as_a_vector() -> None:
@@ -120,22 +190,14 @@ def test_a_boundary_speed_over_the_limit_is_past_help() -> None:
 
 def test_the_collaborative_speed_of_a_cell() -> None:
     """A swing of a UR5e at 1601 mm/s was verified under 250 mm/s."""
-    swing = {
-        "version": 1,
-        "robot": "ur5e",
-        "units": {"angle": "deg", "length": "mm"},
-        "limits": {"acceleration": 800, "jerk": 8000, "tcp": {"speed": 250}},
-        "start": {"joints": [0, -90, 90, -90, -90, 0]},
-        "moves": [{"planner": "jerk_limited", "to": {"joints": [90, -60, 60, -90, -90, 0]}}],
-    }
-    plan = plan_job(loaded(swing))
+    plan = plan_job(loaded(UR5E_SWING))
     assert plan.verdict.passed
     assert fastest_sampled(plan) == pytest.approx(0.25, rel=1e-4)
     assert fastest_sampled(plan) < 0.25 * (1 + 1e-6)
     report = report_of(plan)
     (speed,) = [peak for peak in report.moves[0].tool_peaks or [] if peak.quantity == "speed"]
     assert (speed.value, speed.limit) == (pytest.approx(0.25, rel=1e-6), 0.25)
-    assert "speed of the tool in move 0, 100 % used" in summary(plan, 0)
+    assert "in move 0, 100 % used" in summary(plan, 0)
 
 
 def test_what_cannot_be_judged_is_named() -> None:

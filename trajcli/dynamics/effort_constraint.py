@@ -136,6 +136,10 @@ class EffortConstraint:
         del side
         return np.full(s.size, np.inf)
 
+    def shortest(self, s: Array) -> Array:
+        """Return 0 for each interval between points (p,), (p - 1,): a torque alone bounds no time."""
+        return np.zeros(s.size - 1)
+
     def excess(self, law: LawPieces) -> Array:
         """Return zeros for velocity, and the shares used of what gravity leaves, at samples, (2, N)."""
         q = law.along(self.path).transpose(0, 2, 1)[:, None]

@@ -346,6 +346,19 @@ class Planner(Model):
         """
         raise TypeError(f"{type(self).__name__} does not say how to plan")
 
+    def within_tool_limits(self, start: State, robot: Robot) -> Planned | None:
+        """Return a move of joints within the limits of the tool; None where stretching is all there is.
+
+        Args:
+            start: As for `plan`.
+            robot: Likewise.
+
+        Raises:
+            PlanningError: When no such move exists.
+        """
+        del start, robot
+        return None
+
     @property
     def why_not_flown_by(self) -> str | None:
         """Why no motion can fly by a corner of this move; None where it can."""

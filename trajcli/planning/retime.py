@@ -72,10 +72,47 @@ def keep_further_limits(move: PlannedMove) -> PlannedMove:
         return move
     if factor <= 1 + LITTLE and any(KIND_OF[finding.kind].planned == "never" for finding in over):
         return _stretched(move, factor, over, "refined")
+    slower = with_duration(move, move.duration * factor)
+    faster = _within_tool_limits(move, over, slower.duration)
+    if faster is not None:
+        return faster
     if move.planner.one_shape and move.at_rest:
         worst = max(over, key=lambda finding: finding.factor or 0.0).kind
         return _stretched(move, factor, over, KIND_OF[worst].event)
     return _stretched(move, factor, over, "stretched", "; a faster motion may exist")
+
+
+def _within_tool_limits(move: PlannedMove, over: Sequence[Finding], stretched: float) -> PlannedMove | None:
+    """Return the move as fast as the limits of the tool let it be along its path, with an event.
+
+    Args:
+        move: That is over them.
+        over: Its findings.
+        stretched: Duration of the move when it is stretched, s.
+
+    Returns:
+        None where no motion is found that is faster than the move stretched.
+    """
+    if not any(KIND_OF[finding.kind].of_tool for finding in over):
+        return None
+    try:
+        planned = move.planner.within_tool_limits(move.start, move.robot)
+    except PlanningError:
+        return None
+    if planned is None:
+        return None
+    other = replace(move, planned=planned)
+    left = [finding.factor or LONGEST for finding in over_limit(other)]
+    least = getattr(move.planner, "minimum_duration", None) or 0.0
+    duration = max(other.duration * max([1.0, *left]), least)
+    if duration >= stretched:
+        return None
+    if duration > other.duration:
+        other = with_duration(other, duration)
+    path = "its path" if planned.law is None else "a straight line in joint space"
+    how = f"the fastest motion found along {path}, {other.duration / move.duration:.6g} times as long"
+    event = _event("within_tool_limits", how, move, other, over)
+    return replace(other, planned=replace(other.planned, events=(event, *other.planned.events)))
 
 
 def long_enough(
@@ -155,19 +192,24 @@ def _stretched(
 ) -> PlannedMove:
     """Return the move that lasts `factor` times longer, with an event that names the worst finding."""
     slower = with_duration(move, move.duration * factor)
+    how = f"stretched {slower.duration / move.duration:.6g} times"
+    event = _event(kind, how, move, slower, over, remark)
+    return replace(slower, planned=replace(slower.planned, events=(event, *slower.planned.events)))
+
+
+def _event(
+    kind: str, how: str, move: PlannedMove, slower: PlannedMove, over: Sequence[Finding], remark: str = ""
+) -> Event:
+    """Return the event of a move that lasts longer because of its findings."""
     worst = max(over, key=lambda finding: finding.factor or 0.0)
     limit = KIND_OF[worst.kind].words
-    message = (
-        f"stretched {slower.duration / move.duration:.6g} times, from {{before}} to {{after}}, "
-        f"to keep the {limit} limit of {{whose}}{remark}"
-    )
+    message = f"{how}, from {{before}} to {{after}}, to keep the {limit} limit of {{whose}}{remark}"
     amounts: Amounts = {
         "before": Amount(move.duration),
         "after": Amount(slower.duration),
         "whose": worst.joint or "the tool",
     }
-    event = Event(kind, message, move.index, amounts)
-    return replace(slower, planned=replace(slower.planned, events=(event, *slower.planned.events)))
+    return Event(kind, message, move.index, amounts)
 
 
 def over_limit(move: PlannedMove) -> list[Finding]:

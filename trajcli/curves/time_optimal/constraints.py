@@ -79,6 +79,10 @@ class PathConstraint(Protocol):
         """Return what sd^2 cannot pass at points (p,) of the path, whatever the motion; or infinity."""
         ...
 
+    def shortest(self, s: Array) -> Array:
+        """Return times, s, below which no motion goes from one of points (p,) to the next one, (p - 1,)."""
+        ...
+
     def excess(self, law: LawPieces) -> Array:
         """Return the largest multiples of its limits that each piece of a law reaches, shape (2, N).
 
@@ -141,6 +145,10 @@ class JointConstraint:
         """Return the caps at points (p,)."""
         return self.rows(s, side).cap
 
+    def shortest(self, s: Array) -> Array:
+        """Return 0 for each interval between points (p,), (p - 1,): what joints need is known elsewhere."""
+        return np.zeros(s.size - 1)
+
     def excess(self, law: LawPieces) -> Array:
         """Return bounds of what is used of velocity and acceleration in each piece, shape (2, N)."""
         excess = np.empty((2, law.durations.size))
@@ -191,6 +199,10 @@ class ApproachConstraint:
     def largest(self, s: Array, side: Side) -> Array:
         """Return the caps at points (p,)."""
         return self.rows(s, side).cap
+
+    def shortest(self, s: Array) -> Array:
+        """Return 0 for each interval between points (p,), (p - 1,): what joints need is known elsewhere."""
+        return np.zeros(s.size - 1)
 
     def excess(self, law: LawPieces) -> Array:
         """Return what is used of the limits in each piece, and zeros for acceleration, (2, N)."""

@@ -38,7 +38,7 @@ def lower_bound(
 
     Args:
         joints: The path and the limits of the joints.
-        caps: What else bounds sd at single places, by `largest`.
+        caps: What else bounds sd at single places, by `largest`, and times between them, by `shortest`.
         along: Limits of sd and of the size of sdd.
         points: Grid points, the denser the better, and where the motion must stop, each of shape (k,).
         ends: sd at the start and at the end; infinite for any.
@@ -54,13 +54,19 @@ def lower_bound(
         cap[:-1] = np.minimum(cap[:-1], each.largest(grid[:-1], "right"))
         cap[1:] = np.minimum(cap[1:], each.largest(grid[1:], "left"))
     rows = replace(rows, cap=cap)
+    needed = np.max([each.shortest(grid) for each in caps] or [np.zeros(grid.size - 1)], axis=0)
     if not np.isfinite(joints.acceleration).any():
-        return float(_shortest(joints, grid, cap).sum() * (1.0 - _ROUNDING))
+        return _sum(_shortest(joints, grid, cap), needed)
     try:
         x = solve(rows, *ends).x
     except (UnlimitedSpeedError, UnreachableSpeedError):
         return 0.0
-    return float(_shortest(joints, grid, x).sum() * (1.0 - _ROUNDING))
+    return _sum(_shortest(joints, grid, x), needed)
+
+
+def _sum(of_joints: Array, needed: Array) -> float:
+    """Return a duration below which no motion falls, by what joints and what else need in each interval."""
+    return float(np.maximum(of_joints, needed).sum() * (1.0 - _ROUNDING))
 
 
 def _with_parameter(joints: JointConstraint, along: tuple[float, float]) -> JointConstraint:

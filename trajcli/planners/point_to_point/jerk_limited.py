@@ -104,6 +104,25 @@ class JerkLimited(PointToPoint):
 
         return joint_line(start, np.array(self.to.joints), robot)
 
+    def within_tool_limits(self, start: State, robot: Robot) -> Planned | None:
+        """Return the fastest motion from rest to rest on a straight line in joint space.
+
+        Raises:
+            PlanningError: When there is none.
+        """
+        end = self._end(start)
+        if self.to.joints is None or self.synchronize == "none" or not (start.at_rest and end.at_rest):
+            return None
+        from trajcli.language.waypoints import Waypoint
+        from trajcli.planners.waypoints.time_optimal import TimeOptimal
+
+        found = TimeOptimal(to=Waypoint(joints=self.to.joints), path="polyline").within_tool_limits(
+            start, robot
+        )
+        law = found.phase_plane and found.phase_plane.law
+        scaled = law and replace(law, coefficients=law.coefficients / law.piece_ends()[1][-1])
+        return replace(found, law=scaled, via_points=None)
+
     def on_rows(self, start: State, robot: Robot, period: float, least: float) -> Planned | None:
         """Return the move between states of rest whose phases last whole periods."""
         end = self._end(start)

@@ -30,6 +30,7 @@ from trajcli.curves.time_optimal.phase_plane import PhasePlane
 from trajcli.curves.time_optimal.switching import switching_structure
 from trajcli.curves.time_optimal.time_law import LawPieces
 from trajcli.frozen import frozen
+from trajcli.geometry.rotation import axis_angle_from_matrix
 from trajcli.kinematics.following.motion import motion_along
 from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.kinematics.robot import Robot, ToolLimits
@@ -240,6 +241,14 @@ class ToolConstraint:
             speed = np.minimum(limits.speed / tangent, limits.angular_speed / turning)
             bend = limits.acceleration / np.linalg.norm(second[:, :3], axis=1)
         return np.asarray(np.minimum(speed**2, bend))
+
+    def shortest(self, s: Array) -> Array:
+        """Return the times, s, that straight ways and turns between points (p,) take at least, (p - 1,)."""
+        poses, _, _ = self.path.poses.evaluate(np.clip(s, 0.0, self.path.length), "right")
+        chords = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
+        turned = poses[:-1, :3, :3].transpose(0, 2, 1) @ poses[1:, :3, :3]
+        angles = axis_angle_from_matrix(turned).angle
+        return np.asarray(np.maximum(chords / self.limits.speed, angles / self.limits.angular_speed))
 
     def excess(self, law: LawPieces) -> Array:
         """Return the shares of speed and acceleration used at samples of each piece, shape (2, N)."""

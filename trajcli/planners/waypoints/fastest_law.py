@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from trajcli.curves.piecewise import Array
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.curves.third_order.end_curvature import with_end_curvature
 from trajcli.curves.third_order.parameterization import JerkLimitedMotion, jerk_limited_time_optimal
 from trajcli.curves.third_order.quartic_law import ReversingLawError
@@ -43,7 +43,7 @@ def require_continuous_curvature(rule: Rule | None) -> None:
 
 
 def solve_within_jerk(
-    path: JointPath, acceleration: Array, robot: Robot, *, bends: bool
+    path: JointPath, acceleration: Array, robot: Robot, *, bends: bool, of_tool: bool
 ) -> tuple[JointPath, TimeOptimalMotion]:
     """Return the path, bent at ends in motion where it may be, and the fastest law that is found along it.
 
@@ -52,6 +52,7 @@ def solve_within_jerk(
         acceleration: In which it starts, shape (n,).
         robot: Its limits.
         bends: Whether the path may be bent so that the acceleration lies along it.
+        of_tool: Whether limits of the tool are kept as well.
 
     Raises:
         PlanningError: When the acceleration does not lie along the path, or the limits leave no room.
@@ -67,7 +68,7 @@ def solve_within_jerk(
     if not (bends and path.speeds[0]):
         _require_along(across, acceleration, robot)
     limits = robot.limits
-    curve, speeds, further = path.curve, path.speeds, path_constraints(path.curve, robot)
+    curve, speeds, further = path.curve, path.speeds, _further(path.curve, robot, of_tool=of_tool)
 
     def solve(efforts: tuple[PathConstraint, ...]) -> TimeOptimalMotion:
         return jerk_limited_time_optimal(
@@ -105,14 +106,28 @@ def _ends_refused() -> Iterator[None]:
         raise PlanningError(message, hint="lower them a little") from None
 
 
-def solve_second_order(path: JointPath, robot: Robot) -> TimeOptimalMotion:
+def _further(curve: PiecewisePolynomial, robot: Robot, *, of_tool: bool) -> tuple[PathConstraint, ...]:
+    """Return what limits laws along a path besides the rates of joints."""
+    if not of_tool:
+        return path_constraints(curve, robot)
+    from trajcli.planners.point_to_point.joint_line import JointCourse
+
+    return JointCourse(curve, robot).constraints(curve)
+
+
+def solve_second_order(path: JointPath, robot: Robot, *, of_tool: bool) -> TimeOptimalMotion:
     """Return the fastest law without limits of jerk.
+
+    Args:
+        path: Through the points.
+        robot: Its limits.
+        of_tool: Whether limits of the tool are kept as well.
 
     Raises:
         PlanningError: When the velocities at the ends are too high.
     """
     limits = robot.limits
-    further = path_constraints(path.curve, robot)
+    further = _further(path.curve, robot, of_tool=of_tool)
 
     def solve(efforts: tuple[PathConstraint, ...]) -> TimeOptimalMotion:
         return time_optimal(

@@ -208,6 +208,17 @@ class TimeOptimal(ThroughPoints):
             MissingLimitError: When a moving joint has no limit of acceleration.
             PlanningError: When the velocities at the ends do not fit the path, or the duration is too short.
         """
+        return self._along_path(start, robot, of_tool=False)
+
+    def within_tool_limits(self, start: State, robot: Robot) -> Planned:
+        """Return the fastest motion along the path within the limits of the tool.
+
+        Raises:
+            PlanningError: When there is none.
+        """
+        return self._along_path(start, robot, of_tool=True)
+
+    def _along_path(self, start: State, robot: Robot, *, of_tool: bool) -> Planned:
         if not self._keeps_jerk(robot):  # its acceleration steps anyway
             start = State(start.position, start.velocity, np.zeros_like(start.acceleration))
         points = self._untimed().waypoints(start, robot)
@@ -220,7 +231,7 @@ class TimeOptimal(ThroughPoints):
             raise missing_limit(
                 self.tag, "acceleration", lacking.tolist(), robot, "to find the fastest motion"
             )
-        path, motion = self._solved(points, robot, moving)
+        path, motion = self._solved(points, robot, moving, of_tool=of_tool)
         jerk = robot.limits.jerk if isinstance(motion, JerkLimitedMotion) else None
         duration = motion.trajectory.duration
         factor = 1.0 if self.duration is None else self.duration / duration
@@ -247,18 +258,17 @@ class TimeOptimal(ThroughPoints):
         return self.jerk == "keep" and bool(np.isfinite(robot.limits.jerk).any())
 
     def _solved(
-        self, points: PointTable, robot: Robot, moving: NDArray[np.bool_]
+        self, points: PointTable, robot: Robot, moving: NDArray[np.bool_], *, of_tool: bool
     ) -> tuple[JointPath, TimeOptimalMotion]:
         """Return the path and the fastest motion along it."""
         if not self._keeps_jerk(robot) or not np.isfinite(robot.limits.jerk[moving]).any():
             path = self._path(points, robot, smooth=False)
-            return path, solve_second_order(path, robot)
+            return path, solve_second_order(path, robot, of_tool=of_tool)
         if self.path == "spline":
             require_continuous_curvature(self.rule)
         path = self._path(points, robot, smooth=True)
-        return solve_within_jerk(
-            path, points.rates[1, 0], robot, bends=self.path == "spline" and self.rule != "quintic"
-        )
+        bends = self.path == "spline" and self.rule != "quintic"
+        return solve_within_jerk(path, points.rates[1, 0], robot, bends=bends, of_tool=of_tool)
 
     def _phase_plane(self, path: JointPath, motion: TimeOptimalMotion, robot: Robot) -> PhasePlane:
         """Return the law with its limits; the length of chords has a unit where all joints share one."""
