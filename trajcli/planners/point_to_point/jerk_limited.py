@@ -119,9 +119,11 @@ class JerkLimited(PointToPoint):
         found = TimeOptimal(to=Waypoint(joints=self.to.joints), path="polyline").within_tool_limits(
             start, robot
         )
-        law = found.phase_plane and found.phase_plane.law
-        scaled = law and replace(law, coefficients=law.coefficients / law.piece_ends()[1][-1])
-        return replace(found, law=scaled, via_points=None)
+        if found.phase_plane is None:
+            return found  # it stands
+        law = found.phase_plane.law
+        share = replace(law, coefficients=law.coefficients / law.piece_ends()[1][-1])
+        return replace(found, law=share, via_points=None)
 
     def on_rows(self, start: State, robot: Robot, period: float, least: float) -> Planned | None:
         """Return the move between states of rest whose phases last whole periods."""
