@@ -16,7 +16,7 @@ from trajcli.frozen import frozen
 from trajcli.planners.course import Course
 from trajcli.planners.flying_by.between_stops import FlyByChain
 from trajcli.planners.flying_by.flown_parts import FlownPart
-from trajcli.planners.point_to_point.joint_line import joint_line
+from trajcli.planners.joint_course import joint_line
 
 _PARALLEL = 1e-12  # relative: a direction that differs by less is the same
 _LIMITS = ("velocity", "acceleration", "jerk")

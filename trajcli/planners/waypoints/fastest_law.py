@@ -110,7 +110,7 @@ def _further(curve: PiecewisePolynomial, robot: Robot, *, of_tool: bool) -> tupl
     """Return what limits laws along a path besides the rates of joints."""
     if not of_tool:
         return path_constraints(curve, robot)
-    from trajcli.planners.point_to_point.joint_line import JointCourse
+    from trajcli.planners.joint_course import JointCourse
 
     return JointCourse(curve, robot).constraints(curve)
 

@@ -194,7 +194,7 @@ class TimeOptimal(ThroughPoints):
     def course(self, start: Array, robot: Robot) -> Course:
         """Return the path through the points, from joint values (n,)."""
         from trajcli.planners.course import PassedPoints
-        from trajcli.planners.point_to_point.joint_line import JointCourse
+        from trajcli.planners.joint_course import JointCourse
 
         points = self._untimed().waypoints(resting(start), robot)
         path = self._path(points, robot, smooth=True)
