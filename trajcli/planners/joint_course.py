@@ -12,7 +12,7 @@ from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.kinematics.tool_derivatives import tool_derivatives
 from trajcli.planners.course import Course, PassedPoints
-from trajcli.planners.tool_path.time_optimal import ToolConstraint
+from trajcli.planners.tool_constraint import ToolConstraint
 
 
 @frozen

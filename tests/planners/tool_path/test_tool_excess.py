@@ -18,7 +18,7 @@ from trajcli.geometry.paths.pose import PoseCurve
 from trajcli.geometry.paths.position import Line
 from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.robot import ToolLimits
-from trajcli.planners.tool_path.time_optimal import ToolConstraint
+from trajcli.planners.tool_constraint import ToolConstraint
 
 
 def rounded_path() -> ToolPath:

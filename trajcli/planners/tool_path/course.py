@@ -13,9 +13,10 @@ from trajcli.kinematics.following.motion import ToolMotion, motion_along
 from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.planners.course import Course
+from trajcli.planners.tool_constraint import ToolConstraint
 from trajcli.planners.tool_path.follow import FollowedPath
 from trajcli.planners.tool_path.law import LawSpec
-from trajcli.planners.tool_path.time_optimal import ToolConstraint, limits_of_law
+from trajcli.planners.tool_path.time_optimal import limits_of_law
 
 _FINER = 0.5  # of the tolerance, for q(s): what the law multiplies it with must still be within
 

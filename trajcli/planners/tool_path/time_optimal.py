@@ -8,29 +8,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import ClassVar, Literal, Protocol
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import (
-    Array,
     PiecewisePolynomial,
-    Side,
-    derivative_coefficients,
     distinct,
-    horner,
 )
 from trajcli.curves.third_order.jerk import LawJerkConstraint
 from trajcli.curves.third_order.parameterization import JerkLimitedMotion, jerk_limited_time_optimal
-from trajcli.curves.time_optimal.constraints import ConstraintRows, JointConstraint, PathConstraint
+from trajcli.curves.time_optimal.constraints import JointConstraint, PathConstraint
 from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion, time_optimal
 from trajcli.curves.time_optimal.phase_plane import PhasePlane
 from trajcli.curves.time_optimal.switching import switching_structure
-from trajcli.curves.time_optimal.time_law import LawPieces
-from trajcli.frozen import frozen
-from trajcli.geometry.rotation import axis_angle_from_matrix
 from trajcli.kinematics.following.motion import motion_along
 from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.kinematics.robot import Robot, ToolLimits
@@ -46,14 +39,11 @@ from trajcli.planners.effort_limits import (
 )
 from trajcli.planners.law_events import distance_from_bound, solved_by_convex_steps
 from trajcli.planners.planner import LITTLE, Event, Phase, stretched
+from trajcli.planners.tool_constraint import ToolConstraint
 from trajcli.planners.tool_path.follow import FollowedPath, JointMotion
 from trajcli.planners.tool_path.law import LawSpec
 
 _FINER = 0.5  # of the tolerance, for q(s): what the law multiplies it with must still be within
-_CORNERS = 16  # of the polygon inside the circle of accelerations
-_BETWEEN = 6  # times in a piece at which the limits of the tool are looked at, its ends included
-_BESIDE = 1e-13  # of the length: so far before its end the last sample of an interval is
-_EVEN = 1e-6  # of the square of the turning: an axis that changes by less stays
 
 
 def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, planner: str) -> JointMotion:
@@ -170,136 +160,3 @@ def _require_acceleration(curve: PiecewisePolynomial, robot: Robot, planner: str
     if lacking.size:
         why = "for the fastest law"
         raise missing_limit(planner, "acceleration", lacking.tolist(), robot, why, "use another law `shape`")
-
-
-class KnownTool(Protocol):
-    """Poses of a tool by s."""
-
-    @property
-    def length(self) -> float:
-        """Last s."""
-        ...
-
-    @property
-    def poses(self) -> KnownPoses:
-        """By s."""
-        ...
-
-
-class KnownPoses(Protocol):
-    """Poses and their derivatives by s."""
-
-    def evaluate(self, s: Array, side: Side = "right") -> tuple[Array, Array, Array]:
-        """Return X (N, 4, 4), X' and X'' (N, 6) at s (N,)."""
-        ...
-
-
-@frozen
-class ToolConstraint:
-    """Limits of the tool along a path.
-
-    Attributes:
-        path: Of the tool.
-        limits: Of its speed and acceleration, linear and angular.
-    """
-
-    estimate: ClassVar[float] = 1.0
-
-    path: KnownTool
-    limits: ToolLimits
-
-    @property
-    def bounds_sdd(self) -> bool:
-        """Whether some acceleration is bounded."""
-        return bool(np.isfinite([self.limits.acceleration, self.limits.angular_acceleration]).any())
-
-    def rows(self, s: Array, side: Side) -> ConstraintRows:
-        """Return rows and caps at points (p,) of the path.
-
-        An acceleration is the sum of one along the path and one across it: the circle of those that are
-        allowed is replaced by a polygon inside it, at most 2 % smaller. Across its axis a rotation gets 0.8,
-        along 0.6.
-        """
-        limits = self.limits
-        _, first, second = self.path.poses.evaluate(np.clip(s, 0.0, self.path.length), side)
-        tangent, turning = (np.linalg.norm(first[:, part], axis=1) for part in (slice(0, 3), slice(3, 6)))
-        curvature = np.linalg.norm(second[:, :3], axis=1)
-        linear = _translation_rows(tangent, curvature, limits.acceleration)
-        angular = _rotation_rows(first[:, 3:], second[:, 3:], turning, limits.angular_acceleration)
-        with np.errstate(divide="ignore"):
-            speed = np.minimum(limits.speed / tangent, limits.angular_speed / turning)
-        cap = np.minimum(speed**2, angular[3])
-        joined = [np.concatenate(pair, axis=1) for pair in zip(linear, angular[:3], strict=True)]
-        return ConstraintRows(joined[0], joined[1], joined[2], cap)
-
-    def largest(self, s: Array, side: Side) -> Array:
-        """Return the largest sd^2 at points (p,), by speeds and by the accelerations across the path."""
-        limits = self.limits
-        _, first, second = self.path.poses.evaluate(np.clip(s, 0.0, self.path.length), side)
-        tangent, turning = (np.linalg.norm(first[:, part], axis=1) for part in (slice(0, 3), slice(3, 6)))
-        with np.errstate(divide="ignore"):
-            speed = np.minimum(limits.speed / tangent, limits.angular_speed / turning)
-            bend = limits.acceleration / np.linalg.norm(second[:, :3], axis=1)
-        return np.asarray(np.minimum(speed**2, bend))
-
-    def shortest(self, s: Array) -> Array:
-        """Return the times, s, that straight ways and turns between points (p,) take at least, (p - 1,)."""
-        poses, _, _ = self.path.poses.evaluate(np.clip(s, 0.0, self.path.length), "right")
-        chords = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
-        turned = poses[:-1, :3, :3].transpose(0, 2, 1) @ poses[1:, :3, :3]
-        angles = axis_angle_from_matrix(turned).angle
-        return np.asarray(np.maximum(chords / self.limits.speed, angles / self.limits.angular_speed))
-
-    def excess(self, law: LawPieces) -> Array:
-        """Return the shares of speed and acceleration used at samples of each piece, shape (2, N)."""
-        times = np.linspace(0.0, 1.0, _BETWEEN)[:, None] * law.durations
-        s, sd, sdd = (horner(derivative_coefficients(law.coefficients, order), times) for order in range(3))
-        length = self.path.length
-        s = np.clip(np.maximum(np.minimum(s, s[-1] - _BESIDE * length), s[0]), 0.0, length)
-        _, first, second = self.path.poses.evaluate(s.reshape(-1), "right")
-        rate, change = sd.reshape(-1, 1), sdd.reshape(-1, 1)
-        used = _used(first * rate, second * rate**2 + first * change, self.limits)
-        return np.asarray(used.reshape(2, _BETWEEN, -1).max(axis=1))
-
-
-def _used(velocity: Array, acceleration: Array, limits: ToolLimits) -> Array:
-    """Return the shares of speed and acceleration (2, N) that twists and their derivatives (N, 6) use."""
-    shares = []
-    for rows, linear, angular in (
-        (velocity, limits.speed, limits.angular_speed),
-        (acceleration, limits.acceleration, limits.angular_acceleration),
-    ):
-        lengths = np.linalg.norm(rows.reshape(-1, 2, 3), axis=2)
-        shares.append((lengths / [linear, angular]).max(axis=1))
-    return np.stack(shares)
-
-
-def _translation_rows(tangent: Array, curvature: Array, limit: float) -> tuple[Array, Array, Array]:
-    """Return a, b and c of rows a sdd + b sd^2 <= c, each (N, k), of the acceleration of the tcp."""
-    count = tangent.size
-    if not curvature.any():
-        ones = np.ones((count, 1)) * tangent[:, None]
-        return np.hstack([ones, -ones]), np.zeros((count, 2)), np.full((count, 2), limit)
-    angles = np.pi * (np.arange(_CORNERS // 2) + 0.5) / (_CORNERS // 2)
-    apothem = limit * math.cos(math.pi / _CORNERS)
-    return (
-        tangent[:, None] * np.cos(angles),
-        curvature[:, None] * np.sin(angles),
-        np.full((count, angles.size), apothem),
-    )
-
-
-def _rotation_rows(
-    first: Array, second: Array, turning: Array, limit: float
-) -> tuple[Array, Array, Array, Array]:
-    """Return the same of the angular acceleration, each (N, 2), and upper bounds (N,) of sd^2."""
-    axis = first / np.where(turning > 0, turning, 1.0)[:, None]
-    along = (second * axis).sum(axis=1)
-    across = np.linalg.norm(second - axis * along[:, None], axis=1)
-    across = np.where(across > _EVEN * turning**2, across, 0.0)
-    bent = bool(across.any())
-    a = np.stack([turning, -turning], axis=1)
-    b = np.stack([along, -along], axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        cap = np.where(across > 0, 0.8 * limit / across, np.inf)
-    return a, b, np.full((turning.size, 2), (0.6 if bent else 1.0) * limit), cap
