@@ -339,3 +339,22 @@ def test_two_files_must_agree_about_a_joint_and_something_must_be_there() -> Non
         picture_of(None, [a], quantities=["qd"])
     with pytest.raises(InputError, match="'phase' cannot be plotted: a file does not say"):
         picture_of(None, [a], quantities=["phase"])
+
+
+def test_zones_are_circles_about_their_corners(example: Example) -> None:
+    """The corners are the targets of the job; outside a ball the tool is on the programmed path."""
+    plan = example("flying_cell")
+    views = picture_of(plan, quantities=["path"]).views
+    assert views is not None
+    flown = [zone for zone in plan.flyby.zones if zone.of == "position"] if plan.flyby else []
+    assert len(views.zones) == len(flown) == len(views.programmed) > 0
+    tool = views.traces[0][1]
+    for zone, ball, line in zip(flown, views.zones, views.programmed, strict=True):
+        target = plan.loaded.job.moves[zone.move].target
+        np.testing.assert_allclose(ball[:3], np.array(target.xyz) * 1000, atol=1e-6)
+        assert ball[3] == pytest.approx(zone.used * 1000)
+        off = np.linalg.norm(line - ball[:3], axis=1)
+        assert off[len(off) // 2] < 1e-6
+        assert max(off[0], off[-1]) <= zone.asked * 1000 * (1 + 1e-9)
+        assert min(off[0], off[-1]) == pytest.approx(ball[3], rel=1e-6)
+        assert 0 < np.linalg.norm(tool - ball[:3], axis=1).min() < ball[3]

@@ -32,6 +32,8 @@ WAYPOINT: Mapping[str, Any] = {
     "zorder": 4,
 }
 VIRTUAL_POINT: Mapping[str, Any] = {**WAYPOINT, "marker": "D", "markeredgecolor": "#CC79A7"}
+ZONE: Mapping[str, Any] = {"color": "#999999", "linewidth": 0.8}
+PROGRAMMED: Mapping[str, Any] = {"color": "black", "linewidth": 0.8, "linestyle": (0, (3, 2))}
 FINDING: Mapping[str, Any] = {
     **WAYPOINT,
     "marker": "X",
@@ -93,11 +95,14 @@ def _entries(picture: Picture) -> Iterator[tuple[str, Mapping[str, Any]]]:
         yield shortened(name, NORMAL, _LONGEST), style_of(index)
     timed = any(block.over_time for block in picture.blocks)
     many = picture.borders is not None and 2 < picture.borders.times.size <= MOST_BORDERS
-    points = picture.views is not None and picture.views.waypoints.size > 0
+    views = picture.views
+    points = views is not None and views.waypoints.size > 0
     kinds: tuple[tuple[str, bool, Mapping[str, Any]], ...] = (
         ("limit", any(np.isfinite(line[:, 1]).any() for panel in panels for line in panel.limits), LIMIT),
         ("border of moves", timed and many, BORDER),
         ("waypoint", points or any(panel.waypoints.size for panel in panels), WAYPOINT),
+        ("zone", views is not None and views.zones.size > 0, ZONE),
+        ("programmed path", views is not None and len(views.programmed) > 0, PROGRAMMED),
         ("virtual point", any(panel.virtual_points.size for panel in panels), VIRTUAL_POINT),
         ("finding", any(panel.findings.size for panel in panels), FINDING),
     )

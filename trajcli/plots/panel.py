@@ -82,11 +82,15 @@ class PathViews:
         unit: Of all axes.
         traces: Index of the source, and positions (N, 3) in world.
         waypoints: Positions of the tool at the ends of moves and at points between, shape (k, 3).
+        zones: Corners and radii of the balls within which the tool flies by, shape (k, 4).
+        programmed: Positions (N, 3) along the programmed path within each zone.
     """
 
     unit: str
     traces: tuple[tuple[int, Array], ...]
     waypoints: Array
+    zones: Array = field(default_factory=lambda: np.empty((0, 4)))
+    programmed: tuple[Array, ...] = ()
 
 
 @frozen

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
+from trajcli.curves.piecewise import Array
 from trajcli.plots.axes import ticks_of
 from trajcli.plots.frame import AXIS, BELOW, NORMAL, SMALL, TITLE, PanelFrame, Sheet, left_of, panel_width
-from trajcli.plots.legend import LIMIT_COLOUR, WAYPOINT, marker_style, style_of
+from trajcli.plots.legend import LIMIT_COLOUR, PROGRAMMED, WAYPOINT, ZONE, marker_style, style_of
 from trajcli.plots.panel import PathViews
 
 _LEAST, _MOST = 2.1, 3.2  # width of a view, inches
 _VIEW_TICKS, _SPACE_TICKS = 4, 3
 _SPACE = 0.8  # of the view in space is its box: numbers and labels stand outside of it
 _SPACE_PADS = (3, 5, 6)  # of the labels, points
+_ROUND = 48  # sides of a circle
 _SHIFT = 0.3  # of that view to the left, inches
 
 
@@ -23,7 +27,9 @@ def views_height(width: float) -> float:
 
 def draw_views(sheet: Sheet, views: PathViews, top: float) -> None:
     """Draw the path in space and from three sides, to one scale."""
-    points = np.concatenate([*(trace for _, trace in views.traces), views.waypoints])
+    centres, sizes = views.zones[:, :3], views.zones[:, 3:]
+    balls = [centres - sizes, centres + sizes]
+    points = np.concatenate([*(trace for _, trace in views.traces), views.waypoints, *balls])
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     half = max(0.55 * float(np.ptp(points, axis=0).max()), 1e-6)
     ranges = [(float(value) - half, float(value) + half) for value in middle]
@@ -52,6 +58,11 @@ def _draw_side(
     frame = PanelFrame(sheet, box, ranges[first], ranges[second], f"view-{'xyz'[first]}{'xyz'[second]}")
     for source, trace in views.traces:
         frame.plot(trace[:, first], trace[:, second], f"source{source}", **style_of(source))
+    for number, line in enumerate(views.programmed, 1):
+        frame.plot(line[:, first], line[:, second], f"programmed{number}", **PROGRAMMED)
+    for number, (corner, size) in enumerate(_balls(views), 1):
+        circle = corner + size * _circle((first, second))
+        frame.plot(circle[:, first], circle[:, second], f"zone{number}", **ZONE)
     if views.waypoints.size:
         frame.plot(
             views.waypoints[:, first],
@@ -87,6 +98,11 @@ def _draw_space(
     sheet.figure.add_axes(axes)
     for source, trace in views.traces:
         axes.plot(*trace.T, gid=f"space-source{source}", **style_of(source))
+    for number, line in enumerate(views.programmed, 1):
+        axes.plot(*line.T, gid=f"space-programmed{number}", **PROGRAMMED)
+    for number, (corner, size) in enumerate(_balls(views), 1):
+        for plane in ((0, 1), (0, 2), (1, 2)):
+            axes.plot(*(corner + size * _circle(plane)).T, gid=f"space-zone{number}", **ZONE)
     if views.waypoints.size:
         axes.plot(*views.waypoints.T, gid="space-waypoints", **marker_style(WAYPOINT, len(views.waypoints)))
     axes.set(xlim=ranges[0], ylim=ranges[1], zlim=ranges[2])
@@ -98,6 +114,20 @@ def _draw_space(
         axis.set_tick_params(labelsize=SMALL, pad=0)
         axis.set_rotate_label(False)
         axis.labelpad = _SPACE_PADS[side]
+
+
+def _balls(views: PathViews) -> Iterator[tuple[Array, float]]:
+    """Yield the corner (3,) and the radius of each zone."""
+    for row in views.zones:
+        yield row[:3], float(row[3])
+
+
+def _circle(plane: tuple[int, int]) -> Array:
+    """Return points of a circle of radius 1 in the plane of two axes, (_ROUND + 1, 3)."""
+    angles = np.linspace(0.0, 2.0 * np.pi, _ROUND + 1)
+    points = np.zeros((angles.size, 3))
+    points[:, plane[0]], points[:, plane[1]] = np.cos(angles), np.sin(angles)
+    return points
 
 
 def _views_columns(width: float) -> int:

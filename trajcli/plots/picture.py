@@ -118,7 +118,7 @@ def _sensible(motion: PlannedMotion | None, records: Sequence[DrawnTable]) -> li
         names.append("qddd")  # elsewhere the acceleration steps, and says all
     if motion.has_effort_limits or any(EFFORT in record.shows() for record in records):
         names.append(EFFORT)
-    along_path = any(move.planned.tool is not None for move in motion.moves)
+    along_path = motion.plan.flyby is not None or any(move.planned.tool is not None for move in motion.moves)
     if along_path or any(kind.stated(move.robot.limits) for move in motion.moves for kind in SPEED_KINDS):
         names.append(TOOL)
     return [*names, *([PATH] if along_path else []), PHASE]
@@ -265,8 +265,10 @@ class _Maker:
             positions = record.tool_positions()
             if positions is not None:
                 traces.append((source, positions))
-        marks = np.empty((0, 3)) if motion is None else motion.tool_waypoints()
-        return PathViews(self._display.units.length, tuple(traces), marks)
+        unit, lines = self._display.units.length, tuple(traces)
+        if motion is None:
+            return PathViews(unit, lines, np.empty((0, 3)))
+        return PathViews(unit, lines, motion.tool_waypoints(), motion.zones(), motion.programmed())
 
 
 def _phase_block(motion: PlannedMotion) -> PanelBlock:

@@ -183,6 +183,28 @@ class PlannedMotion:
         positions = forward(self.plan.loaded.robot, joints)[:, :3, 3]
         return np.asarray(positions / self.display.factor("length"))
 
+    def zones(self) -> Array:
+        """Return corners of zones and the radii that are used (k, 4), in the unit of lengths."""
+        from trajcli.kinematics.forward import forward
+
+        flyby, robot = self.plan.flyby, self.plan.loaded.robot
+        balls = [zone for zone in flyby.zones if zone.of == "position"] if flyby else []
+        if not balls:
+            return np.empty((0, 4))
+        corners = forward(robot, np.array([zone.programmed[len(zone.programmed) // 2] for zone in balls]))
+        sizes = np.array([zone.used for zone in balls])
+        return np.column_stack([corners[:, :3, 3], sizes]) / self.display.factor("length")
+
+    def programmed(self) -> tuple[Array, ...]:
+        """Return the programmed path of the tool within each zone, (m, 3), in the unit of lengths."""
+        from trajcli.kinematics.forward import forward
+
+        flyby, scale = self.plan.flyby, self.display.factor("length")
+        return tuple(
+            forward(self.plan.loaded.robot, zone.programmed)[:, :3, 3] / scale
+            for zone in (flyby.zones if flyby else ())
+        )
+
     def _known_efforts(self) -> EffortSamples:
         if self._efforts is None:
             from trajcli.plots.planned_efforts import effort_samples

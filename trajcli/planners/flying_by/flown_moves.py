@@ -26,6 +26,7 @@ from trajcli.planners.planner import Event, Phase, Planned, PlannedMove
 from trajcli.trajectory import MoveInterval, ViaPoints
 
 _SAMPLES = 513  # of a zone, at which its distances are looked at
+_KEPT = 16  # intervals of the path to its corner, and from there, that pictures show
 _DIMENSIONS: dict[str, Literal["length", "angle"]] = {"position": "length", "orientation": "angle"}
 _OF_PATHS = ("merged", "moved_center", "shrunk", "jerk_limit_both_ways")  # events, not of a law
 _SHRUNK = 1e-6  # relative: a zone that is smaller by less is as large as was asked for
@@ -51,6 +52,8 @@ class FlownZone:
         turn: Largest angle of the tool from how it stands in the corner, rad; None likewise.
         binds: Which limit is used most in it.
         tempo: What part of the speeds that limits allow it uses: below 1 where it was lowered.
+        programmed: Joints along the programmed path from its border to the corner, and from there to the
+            other border, shape (m, n).
     """
 
     number: int
@@ -68,6 +71,7 @@ class FlownZone:
     turn: float | None
     binds: str
     tempo: float
+    programmed: Array
 
     def shifted(self, time: float, number: int) -> FlownZone:
         """Return the zone `time` s later, with `number` zones before it."""
@@ -92,11 +96,12 @@ def _flown_zone(chain: FlownChain, k: int, part: FlownPart, begun: float) -> Flo
     of, joint, asked, used = _size(around, curve)
     time = nearest_time(around, curve)
     tool: Any = (None, None, None, None)
+    programmed = _programmed(chain.chain.courses[k : k + 2], (corner.left, corner.joined))
     if robot.convention is not None:
         times = np.append(np.linspace(curve.start, curve.end, _SAMPLES), time)
         joints = curve.evaluate(times)
         distance, angle = around.offsets(joints)
-        off = _off_path(robot, joints, chain.chain.courses[k : k + 2], (corner.left, corner.joined))
+        off = _off_path(robot, joints, programmed)
         tool = float(distance.min()), float(distance.max()), off, float(angle.max())
     return FlownZone(
         number=k + 1,
@@ -114,6 +119,7 @@ def _flown_zone(chain: FlownChain, k: int, part: FlownPart, begun: float) -> Flo
         turn=tool[3],
         binds=_binds(robot, curve),
         tempo=corner.tempo,
+        programmed=programmed[:: _SAMPLES // _KEPT],
     )
 
 
@@ -156,11 +162,16 @@ def nearest_time(around: ZoneAround, curve: PiecewisePolynomial) -> float:
     return min(max(0.5 * (low + high), curve.start + inset), curve.end - inset)
 
 
-def _off_path(robot: Robot, joints: Array, courses: Sequence[Course], borders: tuple[float, float]) -> float:
-    """Return the largest distance of the tool from the programmed path, m."""
+def _programmed(courses: Sequence[Course], borders: tuple[float, float]) -> Array:
+    """Return joints along the programmed path within a zone, (m, n): the corner is in the middle."""
     before = courses[0].curve.evaluate(np.linspace(borders[0], courses[0].length, _SAMPLES))
     behind = courses[1].curve.evaluate(np.linspace(0.0, borders[1], _SAMPLES))
-    path = forward(robot, np.concatenate([before, behind]))[:, :3, 3]
+    return np.concatenate([before, behind[1:]])
+
+
+def _off_path(robot: Robot, joints: Array, programmed: Array) -> float:
+    """Return the largest distance of the tool from the programmed path, m."""
+    path = forward(robot, programmed)[:, :3, 3]
     here = forward(robot, joints)[:, :3, 3]
     starts, steps = path[:-1], np.diff(path, axis=0)
     squares = np.maximum(np.square(steps).sum(axis=1), np.finfo(np.float64).tiny)
