@@ -39,10 +39,14 @@ class Adaptation:
         """Return whether a limit of a move is tightened."""
         return any(index == move for index, _, _ in self.caps)
 
-    def key(self, move: int, start: State, grid: tuple[float, bool]) -> Any:  # noqa: ANN401
-        """Return all that a move depends on beside the job: its start, the grid of its rows, and this."""
+    def key(self, move: int, start: State) -> Any:  # noqa: ANN401
+        """Return what the fastest curve of a move depends on beside the job: its start, and its limits."""
         own = ((*key[1:], cap) for key, cap in self.caps.items() if key[0] == move)
-        return move, start.bits, grid, tuple(sorted(own)), self.stretches.get(move, 1.0), self.period
+        return move, start.bits, tuple(sorted(own))
+
+    def whole_key(self, move: int, start: State, grid: tuple[float, bool]) -> Any:  # noqa: ANN401
+        """Return all that a move depends on beside the job: also its rows, and how it is stretched."""
+        return *self.key(move, start), grid, self.stretches.get(move, 1.0), self.period
 
     def stretched(self, move: PlannedMove) -> PlannedMove:
         """Return a move that lasts longer, where it shall."""

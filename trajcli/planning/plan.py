@@ -287,7 +287,7 @@ def _plan_move(
     from trajcli.planning.adaptation import without_bounds
 
     output = loaded.job.output
-    key = adapted.key(index, start, (output.rate, output.align))
+    key = adapted.whole_key(index, start, (output.rate, output.align))
     move = adapted.known.get(key)
     if move is None:
         move = plan_move_within(loaded, index, planner, start, adapted.within(robot, index), adapted)

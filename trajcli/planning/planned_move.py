@@ -11,7 +11,7 @@ from trajcli.frozen import frozen
 from trajcli.job.read import LoadedJob
 from trajcli.kinematics.robot import Robot
 from trajcli.limits.kinds import has_further_limits
-from trajcli.planners.planner import PlannedMove, Planner
+from trajcli.planners.planner import PlannedMove, Planner, WhenOverLimit
 from trajcli.trajectory import State
 
 if TYPE_CHECKING:
@@ -88,17 +88,12 @@ def plan_move_within(
         PlanningError: When it has no curve.
     """
     job = loaded.job
-    over_limit = planner.when_over_limit or job.when_over_limit
-    try:
-        move = PlannedMove(index, planner, start, robot, planner.plan(start, robot), over_limit)
-    except PlanningError as error:
-        if over_limit != "slow":
-            raise
-        from trajcli.planning.retime import long_enough
-
-        move = long_enough(index, planner, start, robot, error)
-    move = _within_limits(move)
-    if adapted is not None and over_limit == "slow" and not planner.handles:
+    key = None if adapted is None else adapted.key(index, start)
+    move = None if adapted is None else adapted.known.get(key)
+    if move is None:
+        move = _fastest(index, planner, start, robot, planner.when_over_limit or job.when_over_limit)
+    if adapted is not None and move.over_limit == "slow" and not planner.handles:
+        adapted.known[key] = move
         move = adapted.stretched(move)
         if adapted.period is not None:
             move = _on_rows(move, adapted.period) or move
@@ -111,6 +106,21 @@ def plan_move_within(
 
         require_holdable(move)
     return move
+
+
+def _fastest(
+    index: int, planner: Planner, start: State, robot: Robot, over_limit: WhenOverLimit
+) -> PlannedMove:
+    """Return a move as its planner and its limits make it, before anything is known of its rows."""
+    try:
+        move = PlannedMove(index, planner, start, robot, planner.plan(start, robot), over_limit)
+    except PlanningError as error:
+        if over_limit != "slow":
+            raise
+        from trajcli.planning.retime import long_enough
+
+        move = long_enough(index, planner, start, robot, error)
+    return _within_limits(move)
 
 
 def _within_limits(move: PlannedMove) -> PlannedMove:

@@ -267,12 +267,14 @@ def align_to_period(move: PlannedMove, rate: float) -> PlannedMove:
     if move.duration == 0:
         return move
     periods = max(1, ceil(move.duration * rate - _WHOLE))
-    was_over = bool(over_limit(move))
+    # stretched from rest to rest, rates become less; of efforts nobody knows
+    less = move.at_rest and not move.robot.limits.has_effort
+    free = less or bool(over_limit(move))
     for extra in range(_TRIES):
         wanted = (periods + extra) / rate
         longer = with_duration(move, wanted) if wanted != move.duration else move
         whole = abs(longer.duration - wanted) <= _WHOLE / rate
-        if whole and (was_over or not over_limit(longer)):
+        if whole and (free or not over_limit(longer)):
             return longer
     raise PlanningError(
         f"{move.planner.tag} cannot last a whole number of periods at {rate:g} Hz within its limits",

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
+from math import ceil
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,7 +29,7 @@ from trajcli.output.consumer import judge_as_written
 from trajcli.output.delivery.joined import joined_rows, rows_that_keep, set_columns
 from trajcli.output.delivery.joined_rows import JoinedRows
 from trajcli.output.write import grid_of
-from trajcli.planners.planner import Event
+from trajcli.planners.planner import Event, PlannedMove
 from trajcli.planning.adaptation import Adaptation
 from trajcli.planning.plan import Carried, Plan, plan_job
 from trajcli.progress import report_progress
@@ -41,6 +42,8 @@ if TYPE_CHECKING:
 _ROUNDS = 16  # of tightening: a jerk that switches between rows is less than twice its limit
 _SLACK = 1e-6  # relative: what a joined curve may be above a limit
 _COARSE = 0.05  # of a limit: what decimals alone may make up between knots
+_PERIODS = 200  # periods by which a motion is stretched as a whole, one after the other
+_FEW_PERIODS = 32  # likewise, where nothing else was found
 _LONGER = 1e-9  # relative: a duration that differs by less is the same
 
 
@@ -246,6 +249,7 @@ class _Search:
     ) -> None:
         self._loaded, self._profile, self._writing, self._carried = loaded, profile, writing, carried
         self._shortest: float | None = None
+        self._known: dict[Any, PlannedMove] = {}
 
     def attempt(
         self, loaded: LoadedJob, adapted: Adaptation | None = None, *, rules: bool = False
@@ -295,6 +299,7 @@ class _Search:
         for loaded, adapted in self._candidates(first):
             with suppress(TrajcliError):
                 best = self._tightened(loaded, adapted, best) or best
+        best = self._stretched(first, best) or best
         if best is None:
             return first
         longer = best.plan.trajectory.duration / first.plan.trajectory.duration
@@ -305,7 +310,7 @@ class _Search:
 
     def _candidates(self, first: ForConsumer) -> Iterator[tuple[LoadedJob, Adaptation]]:
         """Yield jobs with rows that they may have, and how their moves are planned."""
-        yield self._loaded, Adaptation()
+        yield self._loaded, Adaptation(known=self._known)
         output, form = self._loaded.job.output, self._writing.form
         columns: list[dict[str, Any]] = [{}]
         jerk = any(np.isfinite(move.robot.limits.jerk).any() for move in first.plan.moves)
@@ -317,6 +322,27 @@ class _Search:
         if isinstance(first.grid, UniformGrid) and form.content != "knots":
             for change in columns:
                 yield self._with_output({"align": True, **change}), Adaptation(period=1 / first.grid.rate)
+
+    def _stretched(self, first: ForConsumer, best: ForConsumer | None) -> ForConsumer | None:
+        """Return the motion stretched as a whole by the fewest periods that do, where that beats the best."""
+        if not isinstance(first.grid, UniformGrid) or self._writing.form.content == "knots":
+            return None
+        duration, rate = first.plan.trajectory.duration, first.grid.rate
+        longest = np.inf if best is None else best.plan.trajectory.duration
+        most = _FEW_PERIODS if best is None else min(ceil((longest - duration) * rate), _PERIODS)
+        for periods in range(1, most):
+            factor = 1 + periods / (rate * duration)
+            stretches = {move.index: factor for move in first.plan.moves}
+            report_progress(f"planning for {self._profile.name}, {periods} periods longer")
+            with suppress(TrajcliError):
+                made = self.attempt(
+                    self._with_output({"align": True}), Adaptation(stretches=stretches, known=self._known)
+                )
+                if made.plan.trajectory.duration >= longest:
+                    return None
+                if made.clean:
+                    return made
+        return None
 
     def _with_output(self, change: Mapping[str, Any]) -> LoadedJob:
         output = self._loaded.job.output.model_copy(update=change)
