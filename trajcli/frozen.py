@@ -40,7 +40,7 @@ def __init__(self: Any, *values: Any, **named: Any) -> None:  # noqa: ANN401, N8
     names: tuple[str, ...] = self.__match_args__
     if named or len(values) != len(names):
         values = _completed(type(self), names, values, named)
-    self.__dict__.update(zip(names, values, strict=True))
+    self.__dict__.update(zip(names, values))  # noqa: B905  as many: said above
     if hasattr(self, "__post_init__"):
         self.__post_init__()
 
@@ -59,7 +59,7 @@ def _completed(
     rest = names[len(values) :]
     if len(values) > len(names) or not named.keys() <= set(rest):
         raise TypeError(f"{cls.__name__} takes {', '.join(names)}, each once")
-    return (*values, *(named[name] if name in named else _default(cls, name) for name in rest))
+    return (*values, *[named[name] if name in named else _default(cls, name) for name in rest])
 
 
 def _default(cls: Any, name: str) -> Any:  # noqa: ANN401

@@ -161,7 +161,7 @@ def test_a_move_of_no_length_has_a_position_and_a_velocity() -> None:
 
 
 def test_limits_must_be_as_many_as_moves() -> None:
-    with pytest.raises(ValueError, match="zip"):
+    with pytest.raises(ValueError, match="0 limits for 1 moves"):
         check_limits(trajectory(between([0.0], [1.0])), [])
 
 

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from trajcli.curves.braking import Braking, braking
-from trajcli.curves.extrema import Peaks, peaks_between
+from trajcli.curves.extrema import IntervalPeaks, Peaks, peaks_between
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import Limits
@@ -88,8 +88,8 @@ def judged_peaks(
     trajectory: Trajectory,
     limits_by_move: Sequence[Limits],
     promises: Sequence[Promise] | None,
-    peaks: Sequence[tuple[Peaks, ...]],
-) -> list[tuple[Peaks, ...]]:
+    peaks: IntervalPeaks,
+) -> IntervalPeaks:
     """Return for each span the extremes that count against its limits: all but those of braking intervals.
 
     Args:
@@ -98,13 +98,17 @@ def judged_peaks(
         promises: What each span says of itself; None where nobody brakes.
         peaks: Extremes of each span, all of it.
     """
-    judged = list(peaks)
-    for k, promise in enumerate(promises or ()):
-        if promise.braking is not None:
-            judged[k] = _beside_braking(
-                trajectory, trajectory.spans[k], limits_by_move[k], peaks[k], promise.braking == "line"
-            )
-    return judged
+    brake = {k: each.braking for k, each in enumerate(promises or ()) if each.braking is not None}
+    if not brake:
+        return peaks
+    names = ("low", "low_time", "high", "high_time")
+    judged = [Peaks(*(np.array(getattr(extremes, name)) for name in names)) for extremes in peaks.of_orders]
+    for k, how in brake.items():
+        own = _beside_braking(trajectory, trajectory.spans[k], limits_by_move[k], peaks[k], how == "line")
+        for extremes, of_span in zip(judged, own, strict=True):
+            for name in names:
+                getattr(extremes, name)[k] = getattr(of_span, name)
+    return IntervalPeaks(tuple(judged))
 
 
 def _beside_braking(

@@ -12,7 +12,7 @@ from typing import overload
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.curves.extrema import Peaks
+from trajcli.curves.extrema import IntervalPeaks
 from trajcli.curves.piecewise import Array
 from trajcli.findings import Finding, at_time, joint_amounts
 from trajcli.frozen import comparable, frozen
@@ -84,7 +84,7 @@ class AccelerationSteps(Sequence[AccelerationStep]):
 def check_continuity(
     trajectory: Trajectory,
     limits_by_move: Sequence[Limits],
-    peaks: Sequence[tuple[Peaks, ...]] | None = None,
+    peaks: IntervalPeaks | None = None,
 ) -> list[Finding]:
     """Return where a joint jumps and must not: for each move, joint and quantity the largest jump, if any.
 
@@ -114,7 +114,7 @@ def check_continuity(
 def acceleration_steps(
     trajectory: Trajectory,
     limits_by_move: Sequence[Limits] | None = None,
-    peaks: Sequence[tuple[Peaks, ...]] | None = None,
+    peaks: IntervalPeaks | None = None,
 ) -> AccelerationSteps:
     """Return the steps in acceleration in order of time, or only the legal ones.
 
@@ -173,13 +173,13 @@ class _Jumps:
         return np.logical_not(np.abs(self.before) <= self.allowed / 2)
 
 
-def _jumps(trajectory: Trajectory, order: int, peaks: Sequence[tuple[Peaks, ...]]) -> _Jumps:
+def _jumps(trajectory: Trajectory, order: int, peaks: IntervalPeaks) -> _Jumps:
     curve, quantity = trajectory.curve, _QUANTITIES[order]
     first, last = curve.piece_ends(order)
     slope_first, slope_last = np.abs(curve.piece_ends(order + 1))
     nothing = np.zeros((1, curve.dimension))
     slope = np.maximum(np.concatenate([nothing, slope_last]), np.concatenate([slope_first, nothing]))
-    peak = np.max([of_span[order].magnitude for of_span in peaks], axis=0)
+    peak = peaks.of_orders[order].magnitude.max(axis=0)
     return _Jumps(
         before=np.concatenate([getattr(trajectory.start, quantity)[None], last]),
         after=np.concatenate([first, getattr(trajectory.end, quantity)[None]]),

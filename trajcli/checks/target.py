@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -11,7 +11,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount
 from trajcli.findings import Finding, at_time, joint_amounts
 from trajcli.limits.tolerances import TARGET_CLOSURE, TARGET_ON_PATH, allowed_at_end, exceeds
-from trajcli.trajectory import Promise, Span, Trajectory
+from trajcli.trajectory import Destination, Promise, Span, Trajectory
 
 if TYPE_CHECKING:
     from trajcli.kinematics.inverse.target import IkTarget
@@ -28,42 +28,46 @@ def check_targets(trajectory: Trajectory, promises: Sequence[Promise]) -> list[F
     Raises:
         ValueError: When there are more or fewer promises than spans.
     """
-    findings: list[Finding] = []
-    for span, promise in zip(trajectory.spans, promises, strict=True):
-        destination = promise.destination
-        if destination is None:
-            continue
-        end = trajectory.before(np.array([span.end]))[0]
-        on_path = destination.tolerance is not None
-        if destination.joints is not None:
-            findings += _check_joints(trajectory, span, end, destination.joints, on_path=on_path)
-        elif destination.pose is not None and promise.robot is not None:
+    known = list(zip(trajectory.spans, promises, strict=True))
+    ends = trajectory.before(np.array([span.end for span in trajectory.spans]))
+    promised = {k: each.destination for k, each in enumerate(promises) if each.destination is not None}
+    to_joints = {k: destination for k, destination in promised.items() if destination.joints is not None}
+    findings = list(_check_joints(trajectory, ends, to_joints))
+    for k, destination in promised.items():
+        span, promise = known[k]
+        if destination.joints is None and destination.pose is not None and promise.robot is not None:
             within = destination.tolerance or (TARGET_CLOSURE, TARGET_CLOSURE)
-            findings += _check_pose(span, promise.robot, end, destination.pose, within)
+            findings += _check_pose(span, promise.robot, ends[k], destination.pose, within)
     return findings
 
 
 def _check_joints(
-    trajectory: Trajectory, span: Span, end: Array, target: Array, *, on_path: bool
-) -> list[Finding]:
-    off = np.abs(end - target)
-    allowed = np.full(off.shape, TARGET_ON_PATH) if on_path else allowed_at_end(trajectory, span.end, target)
+    trajectory: Trajectory, ends: Array, destinations: Mapping[int, Destination]
+) -> Iterator[Finding]:
+    """Yield the joint that is furthest from its target, of each span that ends (k, n) beside it."""
+    if not destinations:
+        return
+    spans = [trajectory.spans[k] for k in destinations]
+    targets = np.array([each.joints for each in destinations.values()])
+    on_path = [each.tolerance is not None for each in destinations.values()]
+    off = np.abs(ends[list(destinations)] - targets)
+    allowed = allowed_at_end(trajectory, np.array([span.end for span in spans]), targets)
+    allowed[on_path] = TARGET_ON_PATH
     wrong = np.logical_not(off <= allowed)
-    if not wrong.any():
-        return []
-    joint = int(np.where(wrong, np.nan_to_num(off, nan=np.inf), -1.0).argmax())
-    value, limit = float(off[joint]), float(allowed[joint])
-    finding = Finding(
-        move=span.index,
-        joint=trajectory.joint_names[joint],
-        kind="target",
-        value=value,
-        limit=limit,
-        time=span.end,
-        message=f"{{joint}} ends {{value}} beside its target {at_time(span.end)}",
-        amounts=joint_amounts(trajectory, joint, 0, value=value, limit=limit),
-    )
-    return [finding]
+    furthest = np.where(wrong, np.nan_to_num(off, nan=np.inf), -1.0).argmax(axis=1)
+    for row in np.flatnonzero(wrong.any(axis=1)).tolist():
+        span, joint = spans[row], int(furthest[row])
+        value, limit = float(off[row, joint]), float(allowed[row, joint])
+        yield Finding(
+            move=span.index,
+            joint=trajectory.joint_names[joint],
+            kind="target",
+            value=value,
+            limit=limit,
+            time=span.end,
+            message=f"{{joint}} ends {{value}} beside its target {at_time(span.end)}",
+            amounts=joint_amounts(trajectory, joint, 0, value=value, limit=limit),
+        )
 
 
 def _check_pose(

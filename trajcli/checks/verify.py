@@ -11,12 +11,12 @@ import numpy as np
 
 from trajcli.checks.continuity import AccelerationSteps, acceleration_steps, check_continuity
 from trajcli.checks.target import check_targets
-from trajcli.curves.extrema import Peaks
+from trajcli.curves.extrema import IntervalPeaks
 from trajcli.errors import at_least
 from trajcli.findings import Finding
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import QUANTITIES, Limits, ToolLimits
-from trajcli.limits.joints import JointSurvey, peaks_by_move
+from trajcli.limits.joints import JointSurvey, moves_over, peaks_by_move
 from trajcli.limits.kinds import KIND_OF, LimitedMove, LimitSurvey, families, family
 from trajcli.limits.tolerances import LIMIT_RELATIVE, TOOL_RELATIVE
 from trajcli.trajectory import Promise, Span, Trajectory
@@ -51,7 +51,7 @@ class Verdict:
 
     findings: tuple[Finding, ...]
     steps: AccelerationSteps
-    peaks: tuple[tuple[Peaks, ...], ...]
+    peaks: IntervalPeaks
     unchecked: tuple[tuple[str, str], ...]
     unchecked_of_tool: tuple[str, ...] = ()
     sampled: tuple[int, ...] = ()
@@ -114,7 +114,7 @@ def verify(
         ValueError: When there are more or fewer limits than spans.
     """
     moves = _limited_moves(trajectory, limits_by_move, promises)
-    peaks, surveys = tuple(peaks_by_move(trajectory)), tuple(map(_further_surveys, moves))
+    peaks, surveys = peaks_by_move(trajectory), tuple(map(_further_surveys, moves))
     whole = [not promise.parts for promise in promises or [Promise()] * len(moves)]
     findings = check_limits(
         trajectory, limits_by_move, _judged(trajectory, limits_by_move, promises, peaks), whole
@@ -145,7 +145,7 @@ def verify(
 def check_limits(
     trajectory: Trajectory,
     limits_by_move: Sequence[Limits],
-    peaks: Sequence[tuple[Peaks, ...]] | None = None,
+    peaks: IntervalPeaks | None = None,
     whole: Sequence[bool] | None = None,
 ) -> list[Finding]:
     """Return where a joint breaks a limit of its position or a derivative of it.
@@ -164,10 +164,10 @@ def check_limits(
     """
     known = peaks_by_move(trajectory) if peaks is None else peaks
     findings: list[Finding] = []
-    judged = [True] * len(known) if whole is None else whole
-    for span, limits, of_span, one in zip(trajectory.spans, limits_by_move, known, judged, strict=True):
-        if one:
-            survey = JointSurvey(tuple(of_span), limits, span.duration > 0)
+    for k in moves_over(known, limits_by_move):
+        if whole is None or whole[k]:
+            span, limits = trajectory.spans[k], limits_by_move[k]
+            survey = JointSurvey(known[k], limits, span.duration > 0)
             findings += limit_findings(LimitedMove(trajectory, span, limits), survey)
     return findings
 
@@ -199,8 +199,8 @@ def _judged(
     trajectory: Trajectory,
     limits_by_move: Sequence[Limits],
     promises: Sequence[Promise] | None,
-    peaks: Sequence[tuple[Peaks, ...]],
-) -> Sequence[tuple[Peaks, ...]]:
+    peaks: IntervalPeaks,
+) -> IntervalPeaks:
     """Return the extremes that count against the limits: all of them where no move brakes."""
     if promises is None or all(promise.braking is None for promise in promises):
         return peaks
@@ -271,7 +271,7 @@ def _check_tools(moves: Sequence[LimitedMove]) -> Iterator[Finding]:
             yield from check_tool(SampledTool(move.trajectory, move.span, move.robot, move.motion))
 
 
-def _unchecked_of_tool(moves: Sequence[LimitedMove], peaks: Sequence[tuple[Peaks, ...]]) -> tuple[str, ...]:
+def _unchecked_of_tool(moves: Sequence[LimitedMove], peaks: IntervalPeaks) -> tuple[str, ...]:
     """Return the limits of the tool that are stated and cannot be judged in some move where the arm moves."""
     names: set[str] = set()
     for move, of_span in zip(moves, peaks, strict=True):
@@ -283,18 +283,18 @@ def _unchecked_of_tool(moves: Sequence[LimitedMove], peaks: Sequence[tuple[Peaks
 
 
 def _unchecked(trajectory: Trajectory, limits_by_move: Sequence[Limits]) -> tuple[tuple[str, str], ...]:
-    open_ended = [
-        [np.isinf(limits.of_order(order)).any(axis=1) for limits in limits_by_move]
-        for order in range(len(QUANTITIES))
-    ]
     loaded = [
-        np.isinf(limits.effort).any(axis=1)
+        limits
         for limits, span in zip(limits_by_move, trajectory.spans, strict=True)
         if span.payload is not None and span.duration > 0
     ]
     unlimited = [
-        *np.any(open_ended, axis=1),
-        np.any(loaded or np.zeros((1, len(trajectory.joint_names))), axis=0),
+        np.any(
+            [np.isinf(getattr(limits, name)).any(axis=1) for limits in dict.fromkeys(some)]
+            or np.zeros((1, len(trajectory.joint_names))),
+            axis=0,
+        )
+        for name, some in [*((name, limits_by_move) for name in QUANTITIES), ("effort", loaded)]
     ]
     return tuple(
         (name, quantity)

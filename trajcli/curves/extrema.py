@@ -14,6 +14,7 @@ Source: Collins and Loos, Polynomial real root isolation by differentiation (SYM
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,7 +37,7 @@ _SAME = 1e-12  # of the largest value: peaks closer than this are one peak, and 
 
 @frozen
 class Peaks:
-    """Smallest and largest value of one derivative of a curve, each of shape (n,).
+    """Smallest and largest value of one derivative of a curve, each of shape (n,), or of several intervals.
 
     Attributes:
         low: Smallest value by component, both sides of every break counted.
@@ -54,6 +55,33 @@ class Peaks:
     def magnitude(self) -> Array:
         """Largest absolute value by component, shape (n,)."""
         return np.maximum(np.abs(self.low), np.abs(self.high))
+
+
+@frozen
+class IntervalPeaks(Sequence[tuple[Peaks, ...]]):
+    """Extremes on m intervals: for each one `Peaks` for each order, made when asked for.
+
+    Attributes:
+        of_orders: For each order those of all intervals, arrays of shape (m, n).
+    """
+
+    of_orders: tuple[Peaks, ...]
+
+    def __len__(self) -> int:
+        return len(self.of_orders[0].low)
+
+    @overload
+    def __getitem__(self, index: int) -> tuple[Peaks, ...]: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[tuple[Peaks, ...]]: ...
+
+    def __getitem__(self, index: int | slice) -> tuple[Peaks, ...] | list[tuple[Peaks, ...]]:
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
+        return tuple(
+            Peaks(p.low[index], p.low_time[index], p.high[index], p.high_time[index]) for p in self.of_orders
+        )
 
 
 def peaks(
@@ -79,7 +107,7 @@ def peaks(
 
 def peaks_between(
     curve: PiecewisePolynomial, intervals: ArrayLike, orders: Sequence[int] = (0, 1, 2, 3)
-) -> list[tuple[Peaks, ...]]:
+) -> IntervalPeaks:
     """Return the extremes on each of several intervals, at little more than the price of one.
 
     Args:
@@ -87,9 +115,6 @@ def peaks_between(
         intervals: Shape (m, 2): start and end of each. At a break that is one of them only the piece inside
             counts; an interval of no length belongs to the piece that begins there.
         orders: Derivative orders, 0 for the value.
-
-    Returns:
-        For each interval one `Peaks` for each order.
 
     Raises:
         ValueError: When an interval is not within the curve.
@@ -99,14 +124,14 @@ def peaks_between(
     pairs = np.nonzero(worth)
     chosen, lengths = curve.coefficients[:, windows.piece[pairs[0]], pairs[1]], windows.length[pairs[0]]
     critical = critical_points(chosen[:, :, None], lengths, orders)
-    extremes = [
-        _extremes(at_ends, _within(derivative_coefficients(chosen, order), pairs, inside, windows), windows)
-        for order, at_ends, inside in zip(orders, ends, critical, strict=True)
-    ]
-    return [
-        tuple(Peaks(*(values[k] for values in of_order)) for of_order in extremes)
-        for k in range(windows.first.size)
-    ]
+    return IntervalPeaks(
+        tuple(
+            _extremes(
+                at_ends, _within(derivative_coefficients(chosen, order), pairs, inside, windows), windows
+            )
+            for order, at_ends, inside in zip(orders, ends, critical, strict=True)
+        )
+    )
 
 
 def piece_extremes(
@@ -375,8 +400,8 @@ def _within(
     return _Within(pairs, np.minimum(local + origin, end), horner(coefficients, local))
 
 
-def _extremes(ends: Array, within: _Within, windows: _Windows) -> tuple[Array, Array, Array, Array]:
-    """Return low, its time, high, its time, each (m, n), from values at ends (2, w, n) and within."""
+def _extremes(ends: Array, within: _Within, windows: _Windows) -> Peaks:
+    """Return extremes, arrays of shape (m, n), from values at ends (2, w, n) and within."""
     pairs, least, most = within.pairs, ends.min(axis=0), ends.max(axis=0)
     least[pairs] = np.minimum(least[pairs], within.values.min(axis=0, initial=np.inf))
     most[pairs] = np.maximum(most[pairs], within.values.max(axis=0, initial=-np.inf))
@@ -385,7 +410,7 @@ def _extremes(ends: Array, within: _Within, windows: _Windows) -> tuple[Array, A
     below, above = (low + same)[windows.interval], (high - same)[windows.interval]
     low_time = _earliest(ends <= below, within.values <= below[pairs], within, windows)
     high_time = _earliest(ends >= above, within.values >= above[pairs], within, windows)
-    return low, low_time, high, high_time
+    return Peaks(low, low_time, high, high_time)
 
 
 def _earliest(

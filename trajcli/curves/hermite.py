@@ -31,7 +31,9 @@ def hermite_coefficients(start: Array, end: Array, duration: Array) -> Array:
         duration: Positive; broadcasts against the trailing shape.
     """
     k = start.shape[0]
-    powers = np.stack([np.broadcast_to(duration**i, start.shape[1:]) for i in range(2 * k)])
+    powers = np.empty((2 * k, *start.shape[1:]))
+    for i in range(2 * k):
+        powers[i] = duration**i
     factorials = np.array([factorial(i) for i in range(k)]).reshape(-1, *([1] * (start.ndim - 1)))
     low = start / factorials
     a, e = low * powers[:k], end / factorials * powers[:k]

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from trajcli.curves.extrema import Peaks, peaks_between
+from trajcli.curves.extrema import IntervalPeaks, Peaks, peaks_between
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount, Amounts
 from trajcli.findings import Finding, NamedJoints, at_time, excess_amounts
@@ -139,7 +139,23 @@ class JointFamily(LimitFamily):
 FAMILY = JointFamily()
 
 
-def peaks_by_move(trajectory: Trajectory) -> list[tuple[Peaks, ...]]:
+def moves_over(peaks: IntervalPeaks, limits_by_move: Sequence[Limits]) -> list[int]:
+    """Return which spans are over a limit; of those of no length some are no findings.
+
+    Raises:
+        ValueError: When there are more or fewer limits than spans.
+    """
+    if len(peaks) != len(limits_by_move):
+        raise ValueError(f"{len(limits_by_move)} limits for {len(peaks)} moves")
+    over = np.zeros(len(peaks), dtype=bool)
+    for order, extremes in enumerate(peaks.of_orders):
+        bounds = np.array([limits.of_order(order) for limits in limits_by_move])
+        broken = exceeds(extremes.high, bounds[:, :, 1]) | exceeds(-extremes.low, -bounds[:, :, 0])
+        over |= broken.any(axis=1)
+    return np.flatnonzero(over).tolist()
+
+
+def peaks_by_move(trajectory: Trajectory) -> IntervalPeaks:
     """Return for each span the extremes of position, velocity, acceleration and jerk, times on the curve.
 
     At the border of two moves each is asked for its own side.
@@ -147,7 +163,7 @@ def peaks_by_move(trajectory: Trajectory) -> list[tuple[Peaks, ...]]:
     return _peaks(trajectory.curve, [(span.start, span.end) for span in trajectory.spans])
 
 
-def _peaks(curve: PiecewisePolynomial, spans: Sequence[tuple[float, float]]) -> list[tuple[Peaks, ...]]:
+def _peaks(curve: PiecewisePolynomial, spans: Sequence[tuple[float, float]]) -> IntervalPeaks:
     return peaks_between(curve, _on_breaks(np.array(spans) + curve.start, curve.breaks))
 
 

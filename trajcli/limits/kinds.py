@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from importlib import import_module
 from math import isfinite
 from typing import TYPE_CHECKING, Literal
@@ -244,7 +244,7 @@ def family(name: str) -> LimitFamily:
 
 def has_further_limits(limits: Limits) -> bool:
     """Return whether a limit is stated that not every planner keeps itself."""
-    return any(kind.planned != "always" and kind.stated(limits) for kind in KINDS)
+    return any(kind.planned != "always" for kind in _stated(limits))
 
 
 def families(limits: Limits, *, further: bool = False) -> Iterator[tuple[str, LimitFamily]]:
@@ -254,8 +254,11 @@ def families(limits: Limits, *, further: bool = False) -> Iterator[tuple[str, Li
         limits: In force.
         further: Leave out those that every planner keeps itself.
     """
-    stated = [
-        kind.family for kind in KINDS if kind.stated(limits) and not (further and kind.planned == "always")
-    ]
+    stated = [kind.family for kind in _stated(limits) if not (further and kind.planned == "always")]
     for name in dict.fromkeys(stated):
         yield name, family(name)
+
+
+@lru_cache(maxsize=8)  # the moves of a job have the same limits, nearly all
+def _stated(limits: Limits) -> tuple[LimitKind, ...]:
+    return tuple(kind for kind in KINDS if kind.stated(limits))

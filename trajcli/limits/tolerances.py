@@ -84,22 +84,21 @@ def allowed_jump(peak: Array, breaks: Array, next_derivative: Array) -> Array:
     return JUMP_ABSOLUTE + JUMP_RELATIVE * peak + late
 
 
-def allowed_at_end(trajectory: Trajectory, time: float, target: Array) -> Array:
-    """Return the distance from the target of a move in joint space that rounding explains, shape (n,).
+def allowed_at_end(trajectory: Trajectory, times: Array, targets: Array) -> Array:
+    """Return the distances from targets of moves in joint space that rounding explains, shape (m, n).
 
     Args:
-        trajectory: The one that ends there.
-        time: When, s on the trajectory.
-        target: Where, shape (n,).
+        trajectory: The one whose moves end there.
+        times: When, s on the trajectory, shape (m,).
+        targets: Where, shape (m, n).
     """
-    curve, last = trajectory.curve, np.array([time])
-    speed = np.abs(trajectory.before(last, 1)[0])
-    late = JUMP_BREAK_UNITS * np.spacing(abs(time)) * speed
-    piece = max(int(np.searchsorted(curve.breaks, curve.start + time)) - 1, 0)
-    powers = (curve.breaks[piece + 1] - curve.breaks[piece]) ** np.arange(curve.degree, -1, -1)
-    summands = (np.abs(curve.coefficients[:, piece]) * powers[:, None]).sum(axis=0)
+    curve = trajectory.curve
+    late = JUMP_BREAK_UNITS * np.spacing(np.abs(times))[:, None] * np.abs(trajectory.before(times, 1))
+    piece = np.maximum(np.searchsorted(curve.breaks, curve.start + times) - 1, 0)
+    powers = curve.lengths[piece] ** np.arange(curve.degree, -1, -1)[:, None]
+    summands = (np.abs(curve.coefficients[:, piece]) * powers[:, :, None]).sum(axis=0)
     rounding = SUM_UNITS * np.spacing(summands)
-    tolerance: Array = JUMP_ABSOLUTE + JUMP_RELATIVE * np.maximum(np.abs(target), 1.0) + late + rounding
+    tolerance: Array = JUMP_ABSOLUTE + JUMP_RELATIVE * np.maximum(np.abs(targets), 1.0) + late + rounding
     return tolerance
 
 
