@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.hermite import hermite_coefficients
-from trajcli.curves.piecewise import Array, derivative_coefficients, horner
+from trajcli.curves.piecewise import Array, control_points, derivative_coefficients, horner
 from trajcli.frozen import frozen
 from trajcli.judge.reconstruction import Interpolation, piece_coefficients, stated_orders
 from trajcli.judge.rounding import PieceRows, stated_errors
@@ -76,6 +76,14 @@ class Intervals:
         q, qd, qdd = self.states
         counts = stated_orders(np.asarray(q), qd, qdd)
         return np.minimum(counts[:-1], counts[1:])
+
+    @cached_property
+    def hulls(self) -> tuple[tuple[Array, Array], ...]:
+        """Least and largest control points (N - 1, n) of each derivative that some piece determines."""
+        lengths, highest = self.lengths[:, None], int(self.highest.max(initial=0))
+        of_orders = (derivative_coefficients(self.coefficients, order) for order in range(highest + 1))
+        points = (control_points(derivative, lengths) for derivative in of_orders)
+        return tuple((of_order.min(axis=0), of_order.max(axis=0)) for of_order in points)
 
     @cached_property
     def jumps(self) -> tuple[Array, Array]:

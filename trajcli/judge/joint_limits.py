@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.extrema import critical_points
-from trajcli.curves.piecewise import Array, control_points, derivative_coefficients, horner
+from trajcli.curves.piecewise import Array, derivative_coefficients, horner
 from trajcli.findings import Certainty, Collector, Finding, FindingSeverity
 from trajcli.frozen import frozen
 from trajcli.judge.intervals import DENSE, Intervals, explained_by_law
@@ -120,15 +120,13 @@ def judge_limits(run: JudgedRun) -> None:
 def _judge_derivatives(run: JudgedRun) -> None:
     """Add where joints go beyond their limits of position, velocity, acceleration and jerk."""
     window, pieces, limits = run.window, run.pieces, run.robot.limits
-    coefficients, lengths = window.coefficients[:, pieces], window.lengths[pieces, None]
-    highest = window.highest[pieces]
+    coefficients, highest = window.coefficients[:, pieces], window.highest[pieces]
     for order in range(int(highest.max(initial=0)) + 1):
         bounds = limits.of_order(order)
         if not np.isfinite(bounds).any():
             continue
-        derivative = derivative_coefficients(coefficients, order)
-        hull = control_points(derivative, lengths)
-        turned = ((1.0, bounds[:, 1], hull.max(axis=0)), (-1.0, -bounds[:, 0], -hull.min(axis=0)))
+        least, largest = (points[pieces] for points in window.hulls[order])
+        turned = ((1.0, bounds[:, 1], largest), (-1.0, -bounds[:, 0], -least))
         for sign, bound, most in turned:
             over = exceeds(most, bound)
             if not over.any():
@@ -136,7 +134,8 @@ def _judge_derivatives(run: JudgedRun) -> None:
             for level in set(highest[over.any(axis=1)].tolist()):
                 side = _Side(window, order, sign, bound, level, pieces.start)
                 alike = over & (highest == level)[:, None]
-                offences = side.offences(sign * derivative, alike, most) if order <= level else None
+                derivative = sign * derivative_coefficients(coefficients, order)
+                offences = side.offences(derivative, alike, most) if order <= level else None
                 if offences is not None:
                     side.add(offences, run)
 
