@@ -159,3 +159,22 @@ def test_a_short_approach_is_seen_wherever_in_a_piece_it_is(middle: float, piece
     both, _ = uses_of_pieces(curve.coefficients, curve.lengths, limits, 0.0)
     assert both[piece, 0 if upper else 1] == pytest.approx(share.max(), rel=1e-6)
     assert both[piece, 1 if upper else 0] == pytest.approx(away.max(), rel=1e-6)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_piece_is_looked_at_to_its_end(side: float) -> None:
+    """From rest at an even acceleration the speed is largest where the piece ends, and its use is."""
+    rate, length, d, o = 2.0, 1.5, 3.0, 0.2
+    limits = ApproachLimits(np.array([[-4.0, 4.0]]), np.array([d]), np.array([o]))
+    coefficients = np.array([side * rate / 2, 0.0, 0.0]).reshape(3, 1, 1)
+    (use,) = approach_uses(np.array([0.0, length]), coefficients, limits)
+    allowed = np.sqrt(2 * d * (4.0 - rate * length**2 / 2)) - o
+    assert (use.time, use.velocity) == (length, pytest.approx(side * rate * length))
+    assert use.used == pytest.approx(rate * length / allowed, rel=1e-9)
+
+
+def test_each_end_of_a_range_has_its_own_distance() -> None:
+    limits = ApproachLimits(np.array([[-0.5, 1.0]]), np.array([2.0]), np.array([0.1]))
+    down, up = limits.bounds(np.array([[-0.1]]))
+    assert down[0, 0] == pytest.approx(-(np.sqrt(2 * 2.0 * 0.4) - 0.1))
+    assert up[0, 0] == pytest.approx(np.sqrt(2 * 2.0 * 1.1) - 0.1)

@@ -123,7 +123,8 @@ class Intervals:
             absolute = np.broadcast_to(rounding, values.shape[1:])[joint]
             ends.append(both)
             errors.append(stated_errors(both, absolute, self.resolution.relative).max(axis=0))
-        return PieceRows(self.lengths[piece], self.late[piece], tuple(ends), tuple(errors))
+        spline = self.interpolation == "jtc-upsampling"
+        return PieceRows(self.lengths[piece], self.late[piece], tuple(ends), tuple(errors), spline)
 
     def runs(self) -> Iterator[tuple[tuple[int, int], int, int]]:
         """Yield the moves before and after intervals, and the first and the last + 1 of neighbours alike."""

@@ -27,11 +27,7 @@ _SPACING = 4.0  # units in the last place by which a producer's own arithmetic m
 _CUBIC = {1: 1.5, 2: 6.0, 3: 12.0}
 _QUINTIC_D = {1: 1.875, 2: 10.0 / sqrt(3.0), 3: 60.0}
 _QUINTIC_E = {1: 1.0, 2: 1.5, 3: 6.0}
-_SPLINE = {
-    1: 6.0,
-    2: 24.0,
-    3: 96.0,
-}  # of rounding that alternates from row to row
+_SPLINE = {0: 2.0, 1: 6.0, 2: 24.0, 3: 96.0}  # of rounding that alternates from row to row
 
 
 @frozen
@@ -43,12 +39,14 @@ class PieceRows:
         late: By how much each length may be off by the rounding of time stamps, shape (m,).
         ends: Values of order 0, 1, 2 at both ends, as far as the pieces use them, each of shape (2, m).
         errors: By how much these may be off, one of shape (m,) for each.
+        spline: Whether the pieces are of one spline through all positions, whatever else the rows state.
     """
 
     length: Array
     late: Array
     ends: tuple[Array, ...]
     errors: tuple[Array, ...]
+    spline: bool = False
 
     @property
     def shortest(self) -> Array:
@@ -70,10 +68,12 @@ class PieceRows:
         """Return by how much a derivative of the pieces may be off anywhere on them, shape (m,)."""
         with np.errstate(divide="ignore", invalid="ignore"):
             count = len(self.ends)
-            if order == 0:
+            if self.spline:
+                error = self._spline_error(order)
+            elif order == 0:
                 return _position_error(self)
-            if count == 1:
-                error = self.difference(0)[1] if order == 1 else self._spline_error(order)
+            elif count == 1:
+                error = self.difference(0)[1]
             else:
                 error = (_cubic_error if count == 2 else _quintic_error)(self, order)
         return np.where(np.isnan(error), np.inf, error)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from trajcli.columns import group_of, parse_column
 from trajcli.errors import InputError
 from trajcli.findings import Finding
 from trajcli.job.read import job_from_text
@@ -44,8 +45,12 @@ def written(plan: Plan, file: Path) -> tuple[list[str], Rows]:
     return head.split(","), np.array([[float(cell) for cell in line.split(",")] for line in lines])
 
 
-def judged(plan: Plan, names: list[str], rows: Rows, file: Path) -> Judgement:
-    lines = [",".join(f"{value:.9f}" for value in row) for row in rows]
+def judged(
+    plan: Plan, names: list[str], rows: Rows, file: Path, coarse: Mapping[int, int] | None = None
+) -> Judgement:
+    """Judge rows of nine decimals, or of fewer in some columns."""
+    decimals = [(coarse or {}).get(k, 9) for k in range(len(names))]
+    lines = [",".join(f"{v:.{d}f}" for v, d in zip(row, decimals, strict=True)) for row in rows]
     file.write_text("\n".join([",".join(names), *lines]) + "\n", encoding="utf-8")
     return check_file(str(file), CheckOptions(), plan).judgement
 
@@ -161,6 +166,68 @@ def test_a_place_that_the_tool_is_not_at_is_found(
     rows[5, at] = 3.0  # of a move in joint space
     found = of_tool(judged(plan, names, rows, tmp_path / "rows.csv"))
     assert (found["position"].value, found["position"].move) == (pytest.approx(3e-3), 0)
+
+
+@pytest.mark.parametrize("last", [False, True], ids=["before its path", "beyond its path"])
+def test_a_distance_outside_its_path_is_found(
+    last: bool, whole: tuple[Plan, list[str], Rows], tmp_path: Path
+) -> None:
+    """The tool stands at an end of the path, which is the nearest that any distance outside leads to."""
+    plan, names, rows = whole[0], whole[1], whole[2].copy()
+    row = -1 if last else int(np.flatnonzero(rows[:, names.index("move")] == 1)[0])
+    at = names.index("s_mm")
+    rows[row, at] = rows[row, at] + 0.5 if last else -0.5
+    found = of_tool(judged(plan, names, rows, tmp_path / "rows.csv"))["position"]
+    assert found.move == 1
+    assert 0.5e-3 <= (found.value or 0.0) < 0.8e-3
+
+
+def test_a_tool_that_is_turned_on_its_path_is_found(tmp_path: Path) -> None:
+    """The last joint turns the tool where it is: its position agrees with s, its orientation does not."""
+    plan, file = planned("[t, q, path, move]"), tmp_path / "rows.csv"
+    names, rows = written(plan, file)
+    on_line = np.flatnonzero(rows[:, names.index("move")] == 1)
+    last = max(k for k, name in enumerate(names) if group_of(parse_column(name)) == "q")
+    row = int(on_line[len(on_line) // 2])
+    rows[row, last] += 1.0
+    found = of_tool(judged(plan, names, rows, file))
+    assert set(found) == {"orientation"}
+    assert (found["orientation"].row, found["orientation"].move) == (row + 1, 1)
+    assert found["orientation"].value == pytest.approx(np.radians(1.0), rel=1e-4)
+
+
+HALF_MM, HALF_DEG = 0.5e-6, np.radians(0.5e-3)  # of three decimals, m and rad
+OF_JOINTS = 6 * HALF_DEG * 1.2  # m: what they make of six joints at the reach of the arm
+OF_RATES = np.sqrt(3.0) * (HALF_MM + HALF_DEG)
+
+
+@pytest.mark.parametrize(
+    ("group", "name", "quantity", "rounding"),
+    [
+        ("q", "x_mm", "position", OF_JOINTS),
+        ("qd", "vy_mm", "velocity", OF_JOINTS),
+        ("qdd", "az_mm", "acceleration", OF_JOINTS),
+        ("pose", "x_mm", "position", np.sqrt(3.0) * HALF_MM + 2.0 * 0.5e-3),
+        ("twist", "vy_mm", "velocity", OF_RATES),
+        ("twistd", "az_mm", "acceleration", OF_RATES),
+    ],
+)
+def test_few_decimals_of_a_group_are_no_faults_and_hide_few(
+    group: str,
+    name: str,
+    quantity: str,
+    rounding: float,
+    whole: tuple[Plan, list[str], Rows],
+    tmp_path: Path,
+) -> None:
+    """Three decimals explain what they make of all columns beside, and not three times as much."""
+    plan, names, rows = whole[0], whole[1], whole[2].copy()
+    coarse = {k: 3 for k, name in enumerate(names) if group_of(parse_column(name)) == group}
+    assert len(coarse) > 5
+    assert of_tool(judged(plan, names, rows, tmp_path / "rows.csv", coarse)) == {}
+    rows[60, names.index(name)] += 30.0
+    found = of_tool(judged(plan, names, rows, tmp_path / "rows.csv", coarse))[quantity]
+    assert rounding / 2 < (found.limit or 0.0) < 3 * rounding
 
 
 @pytest.mark.parametrize(("name", "columns"), [("sd_mm", EVERYTHING), ("vz_mm", "[t, q, twist]")])

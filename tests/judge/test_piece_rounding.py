@@ -1,0 +1,82 @@
+"""What rounding may make of one piece between two rows, against scipy's Hermite curves through rows that are off."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.interpolate import BPoly, CubicSpline
+
+from trajcli.judge.rounding import PieceRows
+
+Array = NDArray[np.float64]
+U = np.linspace(0.0, 1.0, 41)
+OFF = 1e-6
+LENGTH = 0.1
+NAMES = ("q", "qd", "qdd")
+
+
+def rows_off(count: int, source: str, draw: int) -> tuple[Array, PieceRows]:
+    """Return what both rows state of one joint, shape (count, 2), and the piece, of which one source is off."""
+    ends = np.random.default_rng(draw).normal(size=(count, 2)) * 0.1 ** np.arange(count - 1, -1, -1)[:, None]
+    if draw >= 8:  # one term of the bound dominates: the last column alone says that the joint moves
+        ends[:-1] = 0.0
+    errors = tuple(np.array([OFF if name == source else 0.0]) for name in NAMES[:count])
+    late = np.array([OFF if source == "late" else 0.0])
+    stated = tuple(values[:, None] for values in ends)
+    return ends, PieceRows(np.array([LENGTH]), late, stated, errors)
+
+
+def curve(ends: Array, length: float, order: int) -> Array:
+    """Return a derivative of the Hermite curve through both ends at the same shares of its length."""
+    joined = BPoly.from_derivatives([0.0, length], ends.T.tolist())
+    return np.asarray(joined.derivative(order)(U * length) if order else joined(U * length))
+
+
+def largest_change(count: int, source: str, order: int, draw: int) -> float:
+    """Return by how much a derivative changes where the values of one column, or the length, are off."""
+    ends = rows_off(count, source, draw)[0]
+    right, length = curve(ends, LENGTH, order), LENGTH
+    if source == "late":
+        return max(float(np.abs(curve(ends, length + by, order) - right).max()) for by in (-OFF, OFF))
+    column = NAMES.index(source)
+    changes = []
+    for signs in product((-OFF, OFF), repeat=2):
+        other = ends.copy()
+        other[column] += signs
+        changes.append(float(np.abs(curve(other, length, order) - right).max()))
+    return max(changes)
+
+
+CASES = [
+    (count, source, order) for count in (2, 3) for source in (*NAMES[:count], "late") for order in range(4)
+]
+
+
+@pytest.mark.parametrize(("count", "source", "order"), CASES, ids=str)
+def test_the_error_of_a_piece_bounds_what_each_source_makes(count: int, source: str, order: int) -> None:
+    """Each source alone: the bound holds for all rows, and for some it is not far too high.
+
+    It is a sum of bounds: those of D and E of an acceleration are 24 times what both make of a velocity.
+    """
+    shares = []
+    for draw in range(12):
+        true = largest_change(count, source, order, draw)
+        bound = float(rows_off(count, source, draw)[1].error(order)[0])
+        assert true <= bound * (1 + 1e-9) + 1e-13
+        shares.append(bound / max(true, 1e-300))
+    assert min(shares) < (25.0 if (count, source, order) == (3, "qdd", 1) else 5.0)
+
+
+@pytest.mark.parametrize(("order", "most"), [(0, 1.0), (1, 3.0), (2, 12.0), (3, 24.0)])
+def test_the_error_of_a_spline_bounds_rounding_that_alternates(order: int, most: float) -> None:
+    """Positions that are off by turns up and down make the largest derivatives of all."""
+    times, signs = LENGTH * np.arange(40.0), (-1.0) ** np.arange(40)
+    spline = CubicSpline(times, OFF * signs)
+    middle = np.linspace(1.5, 2.5, 2001) + 1e-9
+    largest = float(np.abs(spline(middle, order)).max())
+    assert largest == pytest.approx(most * OFF / LENGTH**order, rel=1e-3)
+    still = PieceRows(np.array([LENGTH]), np.zeros(1), (np.zeros((2, 1)),), (np.array([OFF]),), spline=True)
+    assert largest <= still.error(order)[0] <= 4.1 * largest
