@@ -14,6 +14,8 @@ from trajcli.cli.payload import run_payload
 from trajcli.dynamics.newton_euler import InverseDynamics
 from trajcli.errors import InputError, TrajcliError, VerificationError
 from trajcli.job.read import job_from_text
+from trajcli.planning import plan as plan_module
+from trajcli.planning import planned_move
 from trajcli.planning.payload_capacity import payload_capacity
 from trajcli.planning.plan import plan_job
 
@@ -79,6 +81,39 @@ def test_masses_up_to_the_largest_verify_from_outside(job: str, at: int | None, 
     largest = float(found.mass or 0)
     assert [part for part in few((1, 0.99, 1e-3, 0.5), 2) if not verifies(outside, part * largest)] == []
     assert [part for part in few((1 + 1e-6, 1.01, 20, 2), 2) if verifies(outside, part * largest)] == []
+
+
+LIFTING = """
+version: 1
+robot: ur5e
+limits: {effort: robot}
+start: {joints: [0, -1.6, 1.6, -1.6, -1.6, 0]}
+moves:
+  - {planner: time_optimal, through: [{joints: [0.5, -1.5, 1.6, -1.6, -1.6, 0]}]}
+  - {attach: {mass: 2}}
+  - {planner: time_optimal, through: [{joints: [0.4, -1.0, 1.6, -2.2, -1.6, 0]}]}
+"""
+
+
+def test_where_each_mass_has_its_own_motion_few_are_tried(monkeypatch) -> None:  # type: ignore[no-untyped-def]
+    loaded, planned = job_from_text(LIFTING), list[int]()
+    known = planned_move.plan_move_within
+
+    def counted(job, index, *rest):  # type: ignore[no-untyped-def]
+        planned.append(index)
+        return known(job, index, *rest)
+
+    monkeypatch.setattr(plan_module, "plan_move_within", counted)
+    mass = payload_capacity(loaded).mass
+    assert mass is not None
+    assert (
+        planned.count(0) == planned.count(4) == 1
+    )  # nothing is carried there: what is planned once is known
+    assert 4 < planned.count(2) < 16  # halving to 1e-10 would take thirty
+    held = job_from_text(LIFTING.replace("mass: 2", f"mass: {mass * (1 + 2e-10)!r}"))
+    with pytest.raises(TrajcliError, match="gravity alone"):
+        plan_job(held)
+    assert verifies(LIFTING.replace("mass: 2", "mass: MASS"), mass)
 
 
 def test_what_binds_is_said_with_its_place() -> None:

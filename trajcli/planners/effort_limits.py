@@ -173,4 +173,5 @@ def _held(error: HeldOverLimitError, path: PiecewisePolynomial, robot: Robot) ->
         "{more} more than its effort limit of {limit}"
     )
     hint = "no duration helps: carry less, go another way, or raise the limit"
-    return PlanningError(Problem(message, hint, joint=name, value=error.effort, amounts=amounts))
+    problem = Problem(message, hint, joint=name, value=error.effort, limit=error.limit, amounts=amounts)
+    return PlanningError(problem)

@@ -15,7 +15,7 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.dynamics.newton_euler import InverseDynamics
-from trajcli.errors import Amount, InputError, Problem, TrajcliError, VerificationError
+from trajcli.errors import InputError, Problem, TrajcliError, VerificationError
 from trajcli.frozen import frozen
 from trajcli.job.read import LoadedJob
 from trajcli.kinematics.robot import Payload, Robot, point_mass
@@ -24,6 +24,7 @@ from trajcli.limits.kinds import LimitedMove
 from trajcli.limits.tolerances import EFFORT_RELATIVE
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Carried, Plan, plan_job
+from trajcli.planning.planned_move import KnownMoves
 from trajcli.progress import report_progress
 
 PlanWith = Callable[[LoadedJob, Carried], Plan]
@@ -78,7 +79,8 @@ def payload_capacity(
         InputError: When there is no such move, or no limit of effort is in force in it.
         TrajcliError: Of the job, when it does not even verify without the payload.
     """
-    search = _Search(loaded, _carriers(loaded, at), planned or _plan)
+    alone = partial(plan_job, advise=False, known=KnownMoves())  # most moves are the same with every mass
+    search = _Search(loaded, _carriers(loaded, at), planned or alone)
     feasible, plan = search.feasible_mass()
     search.require_limits(plan)
     low, high = search.bracket(feasible, plan)
@@ -105,10 +107,6 @@ def _carriers(loaded: LoadedJob, at: int | None) -> dict[int, Payload]:
             raise InputError(f"--at {at}: nothing is carried there", hint="name a move, or what attaches")
         return {at: point_mass(0.0)}
     return held or dict.fromkeys(range(len(moves)), point_mass(0.0))
-
-
-def _plan(loaded: LoadedJob, carried: Carried) -> Plan:
-    return plan_job(loaded, carried, advise=False)
 
 
 class _Search:
@@ -190,15 +188,42 @@ class _Search:
     def closed(self, low: float, high: float) -> tuple[float, float]:
         """Return the bracket as narrow as it gets.
 
-        Where the motion is the same at both ends it is so between them: only its efforts change.
+        Where the motion is the same at both ends it is so between them: only its efforts change. Else masses
+        are tried beside the one where the line through what two too large ones take meets the limit.
         """
         below, above = self.attempt(low), self.attempt(high)
         motion = below if _same_motion(below, above) else None
+        if motion is None and high > low * (1 + _CLOSE):
+            self.attempt(high * (1 + _GUESS))
+        beside = _CLOSE / 4
         while high - low > _CLOSE * high:
             middle = 0.5 * (low + high)
+            root = middle if motion is not None else self._mass_of_line(high)
+            lower, upper = root * (1 - beside), root * (1 + beside)
+            if low < root < high:
+                middle = lower if lower > low else upper if upper < high else middle
+                beside *= 4
             verifies = self.passes(middle) if motion is None else self._keeps_efforts(motion, middle)
             low, high = (middle, high) if verifies else (low, middle)
         return low, high
+
+    def _mass_of_line(self, high: float) -> float:
+        """Return the mass of the limit, on the line through the efforts of the two least that fail."""
+        masses = sorted(mass for mass in self._plans if mass >= high)[:2]
+        over = [self._over(mass) for mass in masses]
+        if len(over) < 2 or over[0] == over[1]:
+            return 0.0
+        (a, b), (x, y) = masses, over
+        return a - x * (b - a) / (y - x)
+
+    def _over(self, mass: float) -> float:
+        """Return by which part of an effort limit a mass that fails is over it; 0 for other limits."""
+        failed = self.attempt(mass)
+        if isinstance(failed, Plan):
+            shares = [f.excess for f in failed.verdict.findings if f.kind == "effort"]
+            return max(shares, default=1.0) - 1.0 - EFFORT_RELATIVE
+        value, limit = failed.problems[0].value, failed.problems[0].limit
+        return value / limit - 1.0 if value and limit else 0.0
 
     def _keeps_efforts(self, plan: Plan | TrajcliError, mass: float) -> bool:
         """Return whether the efforts of a plan keep their limits with another mass."""
@@ -234,7 +259,7 @@ class _Search:
             joint=problem.joint,
             time=problem.time if problem.time is not None else self._time(low, problem),
             effort=problem.value,
-            limit=problem.limit if problem.limit is not None else _amount(problem, "limit"),
+            limit=problem.limit,
         )
 
     def _time(self, mass: float, problem: Problem) -> float | None:
@@ -248,13 +273,6 @@ class _Search:
         joint = plan.trajectory.joint_names.index(problem.joint)
         peak = (efforts.highest if value > 0 else efforts.lowest)[joint]
         return peak.time - plan.trajectory.curve.start
-
-
-def _amount(problem: Problem, name: str) -> float | None:
-    """Return a number of a problem's message."""
-    amount = problem.amounts.get(name)
-    value = amount.value if isinstance(amount, Amount) else None
-    return None if isinstance(value, tuple) else value
 
 
 def _same_motion(a: Plan | TrajcliError, b: Plan | TrajcliError) -> bool:

@@ -97,6 +97,7 @@ def plan_job(
     *,
     advise: bool = True,
     adapted: Adaptation | None = None,
+    known: KnownMoves | None = None,
 ) -> Plan:
     """Return the plan of a job, with its verdict: a verdict with findings is no error here.
 
@@ -105,13 +106,18 @@ def plan_job(
         carried: What the tool carries in a move instead, by its index and what the job says.
         advise: Whether findings come with what would help, which is tried out.
         adapted: By what moves are planned otherwise than their limits alone say.
+        known: Moves of other plans of the job that need not be planned anew; those of this one are added.
 
     Raises:
         InputError: When a move loosens a limit, or lacks one it needs.
         PlanningError: When a move has no curve.
     """
     poses: dict[int | None, ResolvedPose] = {}
-    moves, flyby, of_corners = _plan_moves(loaded, poses, carried, adapted), None, list[Event]()
+    moves, flyby, of_corners = (
+        _plan_moves(loaded, poses, carried, adapted, known or KnownMoves()),
+        None,
+        list[Event](),
+    )
     if loaded.job.zone is not None or any(move.zone is not None for move in loaded.job.moves):
         from trajcli.planning.flown_job import flown_plan
 
@@ -120,9 +126,9 @@ def plan_job(
     for move in moves:
         events += _events_of(poses.get(move.index), move.index)
         events += [replace(event, move=move.index) for event in move.planned.events]
-        known = move.planned.certificate
-        if known is not None:
-            remark = known.remark(move.duration, move.robot.joint_names)
+        certificate = move.planned.certificate
+        if certificate is not None:
+            remark = certificate.remark(move.duration, move.robot.joint_names)
             events.append(replace(remark, move=move.index))
     events += of_corners
     hint = _unit_hint(loaded) if loaded.has_far_angle else None
@@ -147,6 +153,7 @@ def _plan_moves(
     poses: dict[int | None, ResolvedPose],
     carried: Carried | None,
     adapted: Adaptation | None,
+    known: KnownMoves,
 ) -> list[PlannedMove]:
     """Return the moves of a job, and note how its poses are reached.
 
@@ -163,7 +170,6 @@ def _plan_moves(
         state = resolve(origin, np.zeros(len(loaded.robot.joints)), index=None).as_state()
     before: Planner | None = None
     robot, begun, aimed = loaded.robot, 0.0, 0  # the origin is the target of the planner of this id
-    known = KnownMoves(poses)
     for index, planner in enumerate(loaded.job.moves):
         report_progress(f"planning move {index + 1} of {len(loaded.job.moves)} ({planner.tag})")
         start = _handed_over(state, before, planner)
@@ -173,12 +179,12 @@ def _plan_moves(
         try:
             with _errors_of(loaded, index, planner, begun):
                 there = placed(loaded, planner, robot, state.position, standing)
-                move = known.move(index, motion) if adapted is None else None
+                move = known.move(index, motion, poses) if adapted is None else None
                 if move is None:
                     reachable = there.with_joint_targets(partial(resolve, index=index), state.position)
                     with _points_of_errors(loaded, index):
                         move = _plan_move(loaded, used, index, reachable.coming_from(origin), start, adapted)
-                    known.moves[motion] = move
+                    known.moves[motion] = move, poses.get(index)
             moves.append(move)
             begun += float(move.planned.curve.breaks[-1])
             state = move.planned.end

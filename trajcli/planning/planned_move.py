@@ -25,24 +25,25 @@ _TRIES = 20  # durations of a move with its breaks on rows
 
 @frozen
 class KnownMoves:
-    """Moves that are planned: rounds of a repeat that are the same motion are planned once.
+    """Moves that are planned: the same motion in another round, or another plan, is planned once.
 
     Attributes:
-        poses: How poses are reached, by the index of the move.
-        moves: By all that a motion depends on beside the job.
+        moves: By all that a motion depends on beside the job, each with how its pose is reached.
     """
 
-    poses: dict[int | None, ResolvedPose]
-    moves: dict[tuple[object, ...], PlannedMove] = field(default_factory=dict)
+    moves: dict[tuple[object, ...], tuple[PlannedMove, ResolvedPose | None]] = field(default_factory=dict)
 
-    def move(self, index: int, motion: tuple[object, ...]) -> PlannedMove | None:
-        """Return a move that is the same motion as one before; None where none is."""
-        same = self.moves.get(motion)
-        if same is None:
+    def move(
+        self, index: int, motion: tuple[object, ...], poses: dict[int | None, ResolvedPose]
+    ) -> PlannedMove | None:
+        """Return a move that is the same motion as one before, its pose noted; None where none is."""
+        known = self.moves.get(motion)
+        if known is None:
             return None
-        if same.index in self.poses:
-            self.poses[index] = self.poses[same.index]
-        return replace(same, index=index)
+        same, pose = known
+        if pose is not None:
+            poses[index] = pose
+        return same if same.index == index else replace(same, index=index)
 
 
 def placed(loaded: LoadedJob, value: T, robot: Robot, joints: Array | None, standing: Target | None) -> T:
