@@ -106,9 +106,7 @@ def test_where_each_mass_has_its_own_motion_few_are_tried(monkeypatch) -> None: 
     monkeypatch.setattr(plan_module, "plan_move_within", counted)
     mass = payload_capacity(loaded).mass
     assert mass is not None
-    assert (
-        planned.count(0) == planned.count(4) == 1
-    )  # nothing is carried there: what is planned once is known
+    assert planned.count(0) == 1  # nothing is carried there: what is planned once is known
     assert 4 < planned.count(2) < 16  # halving to 1e-10 would take thirty
     held = job_from_text(LIFTING.replace("mass: 2", f"mass: {mass * (1 + 2e-10)!r}"))
     with pytest.raises(TrajcliError, match="gravity alone"):
