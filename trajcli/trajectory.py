@@ -154,6 +154,8 @@ class Span:
         payload: What the tool carries meanwhile; None for nothing.
         label: What it is for, in the job's words; empty where it says nothing.
         round: In which round of a repeat it is, such as "slot 3 of 18"; empty outside of any.
+        ends: The points between which it goes, such as "pick -> place"; empty without names.
+        handles: Whether it is no move: an entry that takes up a payload, or leaves it.
     """
 
     index: int
@@ -164,16 +166,29 @@ class Span:
     payload: Payload | None = None
     label: str = ""
     round: str = ""
+    ends: str = ""
+    handles: bool = False
 
     @property
     def words(self) -> str:
-        """What it is: its planner, label and round."""
+        """What it is where there is little room: its planner, label and round."""
         return ", ".join(word for word in (self.planner, self.label, self.round) if word)
+
+    @property
+    def title(self) -> str:
+        """What it is, such as "pick -> above_place (jerk_limited)"; without a name only its planner."""
+        return move_title(self.ends, self.label, self.planner, self.round)
 
     @property
     def duration(self) -> float:
         """Seconds."""
         return self.end - self.start
+
+
+def move_title(ends: str, label: str | None, planner: str, round_of: str) -> str:
+    """Return the title of a move, by which it goes everywhere: its label or points, planner and round."""
+    name, how = label or ends, f"{planner}, {round_of}" if round_of else planner
+    return f"{name} ({how})" if name else how
 
 
 @frozen
@@ -230,7 +245,7 @@ class Trajectory:
     zones: tuple[tuple[float, float], ...] = ()
 
     def __repr__(self) -> str:
-        moves, joints = len(self.spans), len(self.joint_names)
+        moves, joints = sum(not span.handles for span in self.spans), len(self.joint_names)
         of_moves = f"{moves} move{'s' * (moves != 1)}"
         return f"Trajectory({joints} joint{'s' * (joints != 1)}, {of_moves}, {self.duration:g} s)"
 

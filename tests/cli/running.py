@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import fcntl
 import io
+import os
+import pty
+import struct
 import subprocess
 import sys
-from contextlib import nullcontext
+import termios
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 from unittest.mock import patch
@@ -47,6 +52,21 @@ def run(*arguments: str | Path, stdin: str = "", **options: Any) -> Outcome:
         words, input=stdin, capture_output=True, text=True, timeout=60, check=False, **options
     )
     return Outcome(done.returncode, done.stdout, done.stderr)
+
+
+def on_terminal(*arguments: str | Path, columns: int = 80, **environment: str) -> tuple[int, str]:
+    """Run the command on a terminal of so many columns; return its exit code, and all that it shows there."""
+    process, ours = pty.fork()
+    if process == 0:
+        fcntl.ioctl(1, termios.TIOCSWINSZ, struct.pack("HHHH", 50, columns, 0, 0))
+        words = {"TERM": "xterm", "COLUMNS": "", "NO_COLOR": "", "FORCE_COLOR": "", **environment}
+        os.execve(sys.executable, [*COMMAND, *map(str, arguments)], {**os.environ, **words})
+    shown = b""
+    with suppress(OSError):  # the other side has closed it
+        while chunk := os.read(ours, 1 << 16):
+            shown += chunk
+    os.close(ours)
+    return os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]), shown.decode().replace("\r\n", "\n")
 
 
 def call(capfd: pytest.CaptureFixture[str], *arguments: str | Path, stdin: str | None = None) -> Outcome:

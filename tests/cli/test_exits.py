@@ -118,8 +118,9 @@ def test_the_main_example_as_it_is_typed() -> None:
 
 
 def test_no_color_where_nobody_looks() -> None:
-    for environment in ({"NO_COLOR": "1"}, {"TERM": "xterm-256color", "FORCE_COLOR": "1"}):
+    for environment in ({"NO_COLOR": "1", "FORCE_COLOR": "1"}, {"TERM": "xterm-256color"}):
         assert "\x1b" not in run("plan", "-", stdin=FAST, env={**os.environ, **environment}).err
+    assert "\x1b[1;31merror:" in run("plan", "-", stdin=FAST, env={**os.environ, "FORCE_COLOR": "1"}).err
 
 
 def test_full_digits_are_bit_exact(capfd: Capture) -> None:

@@ -244,7 +244,7 @@ def test_one_move_alone(capfd: Capture) -> None:
     assert alone["moves"] == [every["moves"][3]]
     assert alone["duration"] == every["duration"]
     whole, text = call(capfd, "explain", path).out, call(capfd, "explain", path, "--move", "3").out
-    assert "move 3 of 5 moves" in text
+    assert "move 3, one of 5 moves" in text
     assert text.count("\nmove ") == 1
     assert text[text.index("\nmove 3") :] in whole
 

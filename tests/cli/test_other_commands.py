@@ -56,7 +56,7 @@ def test_explain_for_machines(capfd: Capture) -> None:
 
 def test_explain_tells_of_each_move_and_of_a_violation(capfd: Capture) -> None:
     out = call(capfd, "explain", EXAMPLES / "ur5e_pick.yaml").out
-    assert re.findall(r"^move (\d): (\w+)", out, re.MULTILINE)[-1] == ("8", "quintic")
+    assert re.findall(r"^move (\d): (.*), 2 s", out, re.MULTILINE) == [("8", "above_place -> home (quintic)")]
     assert "binding limit: velocity of wrist_1_joint, 100 % used" in out
     Path("job.yaml").write_text(FAST)
     code, out, err = call(capfd, "explain", "job.yaml")

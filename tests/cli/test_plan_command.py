@@ -107,7 +107,7 @@ def test_a_slowed_move_is_an_event(job: Path, capfd: Capture) -> None:
     job.write_text(SLOWED)
     code, _, err = call(capfd, "plan", job, "--report", "r.json")
     assert code == 0
-    assert "slowed: move 0: stretched 2.5 times, from 0.25 s to 0.625 s" in err
+    assert "slowed: move 0 (quintic): stretched 2.5 times, from 0.25 s to 0.625 s" in err
     report = read_report(Path("r.json"))
     assert [event["kind"] for event in report["events"]] == ["slowed"]
     assert report["moves"][0]["stretch"] == pytest.approx(2.5)

@@ -265,5 +265,5 @@ def test_what_a_move_concedes_is_said_of_its_phases_in_periods_too(
     file = job(tmp_path, RAMPS + "when_over_limit: slow\n")
     code, _, err = call(capfd, "plan", file, "--for", "ur-servoj", "--no-output")
     assert code == 0
-    assert "slowed: move 0: stretched 2.0" in err
+    assert "slowed: move 0 (trapezoid): stretched 2.0" in err
     assert "slowed: for ur-servoj at 500 Hz: stretched 1.0" in err

@@ -91,6 +91,6 @@ def test_a_terminal_sees_the_rows_count_and_a_pipe_does_not() -> None:
     seen = run(*long_work, terminal=True, late=30.0)
     assert "\r\x1b[2Kwriting row " in seen
     assert " of 6853, " in seen
-    assert seen.index("verified, 9 moves") > seen.rindex("\r\x1b[2K")
+    assert seen.index("verified\x1b[0m, 9 moves") > seen.rindex("\r\x1b[2K")
     assert "writing row" not in run("plan", str(JOB), terminal=True)
     assert "\x1b" not in run(*long_work, terminal=False, late=2.0)

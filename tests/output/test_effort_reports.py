@@ -141,7 +141,7 @@ def test_bare_joints_have_no_efforts() -> None:
 
 
 def test_the_explanation_for_people(plan: Plan) -> None:
-    lines = list(_lines(explanation(plan), len(plan.moves), peers=False))
+    lines = list(_lines(explanation(plan), plan, peers=False))
     assert "  carries 1.2 kg at [60, 0, 0] mm of the tcp, a point mass" in lines
     attach = lines.index(next(line for line in lines if line.startswith("move 1: attach, 0 s")))
     assert lines[attach + 2] == ""  # nothing more about a move that does not move

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -54,7 +55,8 @@ def refused(moves: str) -> Problem:
 def test_a_named_point_is_named_at_its_line(move: str, line: int, name: str) -> None:
     problem = refused(f"  - {move}\n")
     planner = move.split()[1].rstrip(",")
-    assert problem.message.startswith(f"move 0 ({planner}): the point '{name}': UR5e does not reach the path")
+    assert re.match("move 0, -> [a-z]+ ", problem.message)
+    assert f"({planner}): the point '{name}': UR5e does not reach the path" in problem.message
     assert " mm" in problem.message
     assert problem.place is not None
     assert (problem.place.line, problem.move) == (line, 0)

@@ -66,7 +66,7 @@ def test_an_unreachable_point_is_named_where_it_stands_in_the_units_of_the_job()
         plan_job(job_from_text(text, "job.yaml"))
     (problem,) = caught.value.problems
     assert str(problem.place) == "job.yaml:5:8"
-    assert problem.message.startswith("move 0 (quintic): the point 'far': UR5e cannot reach the pose")
+    assert problem.message.startswith("move 0, -> far (quintic): the point 'far': UR5e cannot reach the pose")
     millimetres = re.search(r"within ([0-9.]+) mm and ([0-9.]+) deg", problem.message)
     assert millimetres is not None
     assert 2500 < float(millimetres[1]) < 4000  # the arm is about 0.95 m long, its shoulder at the origin

@@ -30,10 +30,10 @@ from trajcli.job.override import Setting, overridden, parse_setting
 from trajcli.job.read import files_of, job_of_document
 from trajcli.job.yaml.load import Document, parse_document
 from trajcli.output.delivery.delivered import delivered
-from trajcli.output.tightest import tightest_limit
 from trajcli.peers.move_reference import reference_of
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan
+from trajcli.planning.tightest import tightest_limit
 from trajcli.streams.whole_file import whole_file
 
 MOST_ROWS = 1_000_000

@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
-from trajcli.cli.numbers import number, table_lines
+from trajcli.cli.numbers import number
 from trajcli.cli.outcome import error_as_json, print_json, print_lines, print_remark, print_text, report_error
+from trajcli.cli.terminal import shown_table
 from trajcli.errors import Amount, InputError, Place, Problem, TrajcliError, at_least
 from trajcli.findings import Finding
 from trajcli.judge.file import CheckedFile, CheckOptions, check_file
@@ -68,7 +69,9 @@ def run_check(options: CheckCommand) -> int:
         mapping = checked.judgement.as_json() | ({} if beside is None else {"reference": _view(beside)})
         found.append(mapping if alone else {"file": file, **mapping})
         if form == "table":
-            print_lines([*_lines(checked), *([] if beside is None else _beside(beside, checked.units))])
+            print_lines(
+                [*_lines(checked), *([] if beside is None else _beside(beside, checked.units))], verdict=True
+            )
         for event in checked.judgement.events:
             print_remark(f"  event: {event}" if alone else f"{file}: event: {event}")
     if form == "json":
@@ -121,7 +124,7 @@ def _lines(checked: CheckedFile) -> Iterator[str]:
     yield f"{source}: {judgement.verdict} ({rows}{period}, {joined}{planned})"
     listed = [*_listed(judgement.findings)]
     if listed:
-        yield from table_lines([*_table(checked, listed)])
+        yield from shown_table([*_table(checked, listed)], (2, 1), ("times", "row", "t (s)", "stretch"))
         more = len(judgement.findings) - len(listed)
         if more > 0:
             yield f"  and {more} more: --format json has all of them"

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from trajcli.cli.numbers import numbers
+from trajcli.cli.outcome import print_text
 from trajcli.cli.polynomials import amount, blend_lines, knot_lines, law_lines, polynomial_lines
-from trajcli.cli.progress import progress
+from trajcli.cli.progress import is_terminal, progress
 from trajcli.errors import InputError
 from trajcli.job.read import load_job
 from trajcli.output.delivery.delivered import plan_of
 from trajcli.output.explain import explanation
 from trajcli.planners import HANDLING
-from trajcli.streams.whole_file import standard_output
 
 if TYPE_CHECKING:
     from trajcli.cli.job_commands import ExplainCommand
@@ -28,8 +29,10 @@ if TYPE_CHECKING:
     )
     from trajcli.job.report import PeakReport, ToolReport
     from trajcli.job.reports.comparisons import AtLimitReport, SavingReport
+    from trajcli.planning.plan import Plan
 
 _MOST_LIMITS = 6  # that bind, in one line
+_SCREEN = 40  # lines about single moves on a terminal
 _MOST_POINTS = 20  # points that are listed one by one
 _TIME_DECIMALS = 12
 _ZERO = 1e-9  # user units: a coordinate or an angle below that is rounding
@@ -218,10 +221,16 @@ def run_explain(options: ExplainCommand) -> int:
             sensitivity=options.sensitivity,
             reference=options.reference,
         )
-    lines = _lines(explained, count, peers=options.reference)
-    text = explained.model_dump_json(indent=2) if options.as_json else "\n".join(lines)
-    with standard_output() as out:
-        out.write((text + "\n").encode())
+    if options.as_json:
+        print_text(explained.model_dump_json(indent=2) + "\n")
+    elif is_terminal(sys.stdout):
+        from trajcli.cli.terminal import on_terminal
+
+        short = options.move is None and not (options.full or options.derivatives or options.reference)
+        lines = _overview(explained, plan) if short else _lines(explained, plan, peers=options.reference)
+        print_text(on_terminal(lines))
+    else:
+        print_text("".join(f"{line}\n" for line in _lines(explained, plan, peers=options.reference)))
     if not plan.verdict.passed:
         from trajcli.output.report import verification_error
 
@@ -229,20 +238,43 @@ def run_explain(options: ExplainCommand) -> int:
     return 0
 
 
-def _lines(explained: Explanation, count: int, *, peers: bool = False) -> Iterator[str]:
+def _overview(explained: Explanation, plan: Plan) -> Iterator[str]:
+    """Yield what fits one screen: the moves that use most of a limit, and what binds in each of them."""
+    from trajcli.cli.terminal import tightest_lines, wrapped
+
+    yield _head(explained, plan)
+    yield from tightest_lines(plan, sys.stdout)
+    shown = 0
+    for move in explained.moves:
+        if move.planner in HANDLING:
+            continue
+        lines = [*_carried(move), *_speed(move.model_copy(update={"binding": None}))]  # the table has it
+        shown += sum(wrapped(line, sys.stdout).count("\n") + 1 for line in lines) + 1
+        if lines and shown <= _SCREEN:
+            yield f"{plan.loaded.called(move.index)}:"
+            yield from lines
+    yield "formulas: --move N has those of one move, --full those of all"
+
+
+def _head(explained: Explanation, plan: Plan) -> str:
+    count = plan.loaded.move_count
+    alone = f"move {explained.moves[0].index}, one of " if len(explained.moves) < len(plan.moves) else ""
+    moves = f"{alone}{count} move{'s' * (count != 1)}"
+    return f"{explained.job} on {explained.robot}: {moves}, {explained.duration:.10g} s"
+
+
+def _lines(explained: Explanation, plan: Plan, *, peers: bool = False) -> Iterator[str]:
     units = explained.units
     joints = ", ".join(f"q{i} = {name}" for i, name in enumerate(explained.joints, 1) if name != f"j{i}")
-    alone = f"move {explained.moves[0].index} of " if len(explained.moves) < count else ""
-    moves = f"{alone}{count} move{'s' * (count != 1)}"
-    yield f"{explained.job} on {explained.robot}: {moves}, {explained.duration:.10g} s"
+    yield _head(explained, plan)
     yield f"angles in {units.angle}, lengths in {units.length}, t in s from the start of each move" + (
         f"; {joints}" if joints else ""
     )
     noted = [*explained.events, *explained.remarks]
     for move in explained.moves:
         yield ""
-        named = ", ".join(word for word in (move.planner, move.label, move.round) if word)
-        yield f"move {move.index}: {named}, {move.duration:.10g} s, from t = {move.start:.10g} s"
+        title = plan.loaded.title(move.index)
+        yield f"move {move.index}: {title}, {move.duration:.10g} s, from t = {move.start:.10g} s"
         yield from _carried(move)
         if move.planner in HANDLING:
             continue

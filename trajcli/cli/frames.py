@@ -6,6 +6,7 @@ Text of a file never reaches the terminal as control characters: they are shown 
 from __future__ import annotations
 
 import math
+import textwrap
 import unicodedata
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -37,30 +38,51 @@ class _Cell(NamedTuple):
     width: int
 
 
-def render_problem(problem: Problem, *, color: bool) -> str:
+def render_problem(problem: Problem, *, color: bool, width: int | None = None) -> str:
     """Return a problem for people: place and message, then the line with a caret, then what would fix it.
 
     Args:
         problem: Amounts that are still in its message are written in SI.
         color: Whether to use the terminal's colors.
+        width: Columns of the terminal, which no line passes; where there is none lines of the file have
+            `WIDTH`, and messages stay one line.
     """
     paint = _painted if color else _plain
     place, hint = problem.place, shown(problem.advice() or "")
     where = f"{shown(place.file)}:{place.line}:{place.column}: " if place is not None else ""
-    rows = [f"{paint(where, _BOLD) if where else ''}{paint('error:', _RED)} {shown(problem.text())}"]
+    message = folded(f"{where}error: {shown(problem.text())}", width, "  ")
+    message = message[: len(where)] + message[len(where) :].replace("error:", paint("error:", _RED), 1)
+    rows = [message.replace(where.rstrip(), paint(where.rstrip(), _BOLD), 1) if where else message]
     if place is None or not place.source.strip():
-        return "\n".join([*rows, *([f"  {paint(hint, _CYAN)}"] if hint else [])])
-    source, offset, length = _window(place)
+        return "\n".join([*rows, *([paint(folded(f"  {hint}", width, "  "), _CYAN)] if hint else [])])
     gutter = " " * max(4, len(str(place.line)))
+    room = WIDTH if width is None else width - len(gutter) - 3
+    source, offset, length = _window(place, room)
     rows.append(f"{place.line:>{len(gutter)}} | {source}")
     carets = f"{gutter} | {' ' * offset}{paint('^' * length, _RED)}"
-    fits = offset + length + 1 + sum(cell.width for cell in map(_cell, hint)) <= WIDTH
+    fits = offset + length + 1 + sum(cell.width for cell in map(_cell, hint)) <= room
     if hint and fits:
         carets += f" {paint(hint, _CYAN)}"
     rows.append(carets)
     if hint and not fits:
-        rows.append(f"{gutter} = {paint(hint, _CYAN)}")
+        rows.append(folded(f"{gutter} = {hint}", width, f"{gutter}   ").replace(hint, paint(hint, _CYAN)))
     return "\n".join(rows)
+
+
+def folded(text: str, width: int | None, indent: str) -> str:
+    """Return a text in lines of so many characters, broken between words; in one where no width is given."""
+    if width is None or len(text) <= width:
+        return text
+    first = text[: len(text) - len(text.lstrip())]
+    lines = textwrap.wrap(
+        text.lstrip(),
+        width,
+        initial_indent=first,
+        subsequent_indent=indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return "\n".join(lines)
 
 
 def problem_as_json(problem: Problem) -> dict[str, Any]:
@@ -119,24 +141,24 @@ def _cell(character: str) -> _Cell:
     return _Cell(character, 2 if unicodedata.east_asian_width(character) in ("W", "F") else 1)
 
 
-def _window(place: Place) -> tuple[str, int, int]:
+def _window(place: Place, width: int) -> tuple[str, int, int]:
     """Return the line as it is shown, the column of the first caret in it, and the number of carets.
 
-    A line that is too long is cut behind the place, and before it only where the place would not fit.
+    A line of more than `width` columns is cut behind the place, and before it only where that would not fit.
     """
     start = place.column - 1
-    first = max(0, start - WIDTH)  # no need to measure a line of a million characters
+    first = max(0, start - width)  # no need to measure a line of a million characters
     line = place.source.rstrip()
-    cells = [_cell(character) for character in line[first : start + WIDTH]]
+    cells = [_cell(character) for character in line[first : start + width]]
     at = min(start - first, len(cells))
     offset, total = sum(cell.width for cell in cells[:at]), sum(cell.width for cell in cells)
     length = sum(cell.width for cell in cells[at : at + place.length])
-    right = _CUT if len(line) > start + WIDTH else ""
-    left = _CUT if first or (total > WIDTH and offset + length + len(_CUT) > WIDTH) else ""
-    while left and offset + len(left) > WIDTH // 3 and total + len(left + right) > WIDTH:
+    right = _CUT if len(line) > start + width else ""
+    left = _CUT if first or (total > width and offset + length + len(_CUT) > width) else ""
+    while left and offset + len(left) > width // 3 and total + len(left + right) > width:
         gone = cells.pop(0)
         at, offset, total = at - 1, offset - gone.width, total - gone.width
-    while cells and total + len(left + right) > WIDTH:
+    while cells and total + len(left + right) > width:
         total, right = total - cells.pop().width, _CUT
     length = sum(cell.width for cell in cells[at : at + place.length])
     return left + "".join(cell.text for cell in cells) + right, offset + len(left), max(length, 1)

@@ -91,6 +91,9 @@ class PlanCommand(CommandLine):
     consumer: Consumer = None
     no_output: Annotated[bool, typer.Option("--no-output", help="Only judge: write no rows.")] = False
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on stderr.")] = False
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Also how curves were computed, in the summary.")
+    ] = False
     si: Annotated[
         bool, typer.Option("--si", help="Rows in rad and m, whatever units the job has: plain column names.")
     ] = False
@@ -124,6 +127,9 @@ class ExplainCommand(Command):
         typer.Option(
             "--reference", help="Compare each move along a path with toppra, and judge what peers return."
         ),
+    ] = False
+    full: Annotated[
+        bool, typer.Option("--full", help="On a terminal, too, every formula, not only what binds.")
     ] = False
     as_json: Json = False
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
 from collections.abc import Callable, Iterable
-from typing import Any, Literal
+from typing import Any, Literal, TextIO
 
+from trajcli.cli.progress import is_terminal
 from trajcli.errors import LONGEST_LINE, Problem, TrajcliError
 
 ErrorForm = Literal["text", "json", "github", "junit", "sarif"]
@@ -66,10 +66,11 @@ def report_error(error: TrajcliError, form: ErrorForm = "text", file: str | None
         print(render_annotations(annotations_of(error, file), form), end="", file=sys.stderr)  # noqa: T201
         return
     from trajcli.cli.frames import render_problem
+    from trajcli.cli.terminal import columns, is_coloured
 
-    color = wants_color()
+    color, width = is_coloured(sys.stderr), columns() if is_terminal(sys.stderr) else None
     for problem in error.problems:
-        print(render_problem(problem, color=color), file=sys.stderr)  # noqa: T201
+        print(render_problem(problem, color=color, width=width), file=sys.stderr)  # noqa: T201
 
 
 def error_as_json(error: TrajcliError) -> dict[str, Any]:
@@ -98,28 +99,40 @@ def report_bug(error: Exception, form: ErrorForm = "text") -> int:
     return BUG
 
 
-def wants_color() -> bool:
-    """Return whether standard error is a terminal that likes color."""
-    return sys.stderr.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
-
-
-def print_lines(lines: Iterable[str]) -> None:
+def print_lines(lines: Iterable[str], *, verdict: bool = False) -> None:
     """Print lines for people: what a file names cannot begin another line, or be a command of a log.
+
+    Args:
+        lines: As they stand in a file; a terminal has them broken between words.
+        verdict: Whether the first one holds a verdict, which has a colour.
 
     Raises:
         FileError: When standard output cannot be written.
         BrokenPipeError: When its reader has closed it.
     """
-    print_text("".join(f"{_line(line)}\n" for line in lines))
+    texts = [f"{_line(line, sys.stdout)}\n" for line in lines]
+    if verdict and texts:
+        texts[0] = _with_verdict(texts[0], sys.stdout)
+    print_text("".join(texts))
 
 
-def _line(text: str) -> str:
+def _with_verdict(text: str, stream: TextIO | None) -> str:
+    from trajcli.cli.terminal import with_verdict
+
+    return with_verdict(text, stream)
+
+
+def _line(text: str, stream: TextIO | None) -> str:
     """Return a line as it is shown; what is plain costs nothing."""
-    if len(text) <= LONGEST_LINE and text.isascii() and text.isprintable():
-        return text
-    from trajcli.cli.frames import shown
+    if not (len(text) <= LONGEST_LINE and text.isascii() and text.isprintable()):
+        from trajcli.cli.frames import shown
 
-    return shown(text)
+        text = shown(text)
+    if not is_terminal(stream):
+        return text
+    from trajcli.cli.terminal import wrapped
+
+    return wrapped(text, stream)
 
 
 def print_text(text: str) -> None:
@@ -135,9 +148,10 @@ def print_text(text: str) -> None:
         out.write(text.encode(errors="backslashreplace"))
 
 
-def print_remark(text: str) -> None:
-    """Print a line for people on standard error."""
-    print(_line(text), file=sys.stderr)  # noqa: T201
+def print_remark(text: str, *, verdict: bool = False) -> None:
+    """Print a line for people on standard error; one about a verdict has its colour."""
+    line = _line(text, sys.stderr)
+    print(_with_verdict(line, sys.stderr) if verdict else line, file=sys.stderr)  # noqa: T201
 
 
 def print_json(value: Any) -> None:  # noqa: ANN401

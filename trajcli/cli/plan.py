@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trajcli.cli.outcome import print_remark
-from trajcli.cli.progress import progress
+from trajcli.cli.outcome import print_remark, print_text
+from trajcli.cli.progress import is_terminal, progress
 from trajcli.errors import Amount, InputError, Problem, TrajcliError, VerificationError
 from trajcli.grids import Grid
 from trajcli.job.read import LoadedJob, files_of, load_job
@@ -52,9 +52,10 @@ def plan_and_write(job: str, options: PlanCommand) -> Plan:
         check_log_options(log, loaded.robot, loaded.job.output.start_time)
     if options.resolved is not None:
         _write_resolved(loaded, options.resolved)
+    table = _shows_table(options)
     with (
         _older_rows_aside(options),
-        progress(to_terminal=options.output in (None, "-") and not options.no_output),
+        progress(to_terminal=options.output in (None, "-") and not options.no_output and not table),
     ):
         with np.errstate(
             all="ignore"
@@ -66,7 +67,7 @@ def plan_and_write(job: str, options: PlanCommand) -> Plan:
         refusal = _refusal(plan, options, made)
         if refusal is None and options.reference:
             refusal = _contradicted(plan)
-        if refusal is None and not options.no_output:
+        if refusal is None and not options.no_output and not table:
             digits = (options.digits or "fixed") if made is None else made.digits
             write_rows(plan, grid, options.output, digits, form=form, log=log)
             remove_aside(options.output or "-")
@@ -76,12 +77,28 @@ def plan_and_write(job: str, options: PlanCommand) -> Plan:
         _set_aside(options)
         raise refusal
     if not options.quiet:
-        written = 0 if options.no_output or form.content == "knots" else grid.count
+        written = 0 if options.no_output or table or form.content == "knots" else grid.count
         missing = form.content == "log" and loaded.robot.convention is None
-        _summarise(plan, written, geometry_missing=missing)
+        _summarise(plan, written, geometry_missing=missing, details=options.verbose)
         if made is not None:
             _summarise_consumer(made)
+    if table:
+        _print_table(plan)
     return plan
+
+
+def _shows_table(options: PlanCommand) -> bool:
+    """Return whether people who asked for no rows see a table of the moves in their place."""
+    return (
+        options.output is None and options.form is None and not options.no_output and is_terminal(sys.stdout)
+    )
+
+
+def _print_table(plan: Plan) -> None:
+    from trajcli.cli.terminal import on_terminal, tightest_lines
+
+    last = "rows: -o FILE.csv writes them, -o - prints them here"
+    print_text(on_terminal([*tightest_lines(plan, sys.stdout), last]))
 
 
 @contextmanager
@@ -331,19 +348,25 @@ def _beside_toppra(move: MoveReport, other: PathReferenceReport) -> str:
     )
 
 
-def _summarise(plan: Plan, rows: int, *, geometry_missing: bool) -> None:
-    for line in summary(plan, rows).splitlines():
-        print_remark(line)
+def _summarise(plan: Plan, rows: int, *, geometry_missing: bool, details: bool) -> None:
+    for number, line in enumerate(summary(plan, rows, details=details).splitlines()):
+        print_remark(line, verdict=number == 0)
     if geometry_missing:
         text = "  the robot has no geometry: the log has no frames, no robot description and no tool path"
         print_remark(text)
 
 
-def summary(plan: Plan, rows: int) -> str:
-    """Return the verdict in a few lines: extent, tightest limit, what was not checked, concessions."""
-    from trajcli.output.tightest import tightest_limit
+def summary(plan: Plan, rows: int, *, details: bool = False) -> str:
+    """Return the verdict in a few lines: extent, tightest limit, what was not checked, concessions.
 
-    count = sum(not move.planner.handles for move in plan.moves)
+    Args:
+        plan: It verifies.
+        rows: How many were written.
+        details: Whether to say, too, how curves were computed.
+    """
+    from trajcli.planning.tightest import tightest_limit
+
+    count = plan.loaded.move_count
     head = f"{plan.loaded.name}: verified, {count} move{'s' * (count != 1)}, {plan.trajectory.duration:.6g} s"
     lines = [head + (f", {rows} row{'s' * (rows != 1)}" if rows else "")]
     tightest = tightest_limit(plan)
@@ -363,6 +386,7 @@ def summary(plan: Plan, rows: int) -> str:
     lines += [
         f"  {event.kind}: {_where(plan, event.move)}{event.message}"
         for event in (*plan.events, *plan.remarks)
+        if details or not event.is_internal
     ]
     return "\n".join(lines)
 
@@ -393,8 +417,4 @@ def _moves(indices: Sequence[int]) -> str:
 
 
 def _where(plan: Plan, move: int | None) -> str:
-    if move is None:
-        return ""
-    named = (plan.loaded.job.moves[move].label, plan.loaded.document.round_of(move))
-    words = ", ".join(word for word in named if word)
-    return f"move {move} ({words}): " if words else f"move {move}: "
+    return "" if move is None else f"{plan.loaded.called(move)}: "

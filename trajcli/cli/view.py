@@ -52,12 +52,16 @@ def _view_job(options: ViewCommand) -> int:
     _write(page, options.output)
     if plan.verdict.passed:
         print_remark(
-            f"{loaded.name}: verified, {plan.trajectory.duration:.6g} s{_where(page, options.output)}"
+            f"{loaded.name}: verified, {plan.trajectory.duration:.6g} s{_where(page, options.output)}",
+            verdict=True,
         )
         return 0
     from trajcli.output.report import verification_error
 
-    print_remark(f"{loaded.name}: not verified{_where(page, options.output)}; the page shows the findings")
+    print_remark(
+        f"{loaded.name}: not verified{_where(page, options.output)}; the page shows the findings",
+        verdict=True,
+    )
     raise verification_error(plan, every=False)
 
 
@@ -73,7 +77,9 @@ def _view_file(options: ViewCommand) -> int:
     page = page_of(scene, compress=options.compress)
     _write(page, options.output)
     state = scene["verdict"]["text"]
-    print_remark(f"{scene['title']}: {state}, {scene['subtitle']}{_where(page, options.output)}")
+    print_remark(
+        f"{scene['title']}: {state}, {scene['subtitle']}{_where(page, options.output)}", verdict=True
+    )
     if checked is None or isinstance(checked, str) or checked.judgement.passed:
         return 0
     from trajcli.cli.judged_file import problems_of

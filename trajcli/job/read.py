@@ -31,6 +31,7 @@ from trajcli.language.numbers import FieldPath, FlawError, ReadingContext
 from trajcli.language.poses import Pose
 from trajcli.language.targets import PoseFields, Target
 from trajcli.planners.planner import Event, Planner
+from trajcli.trajectory import move_title
 from trajcli.units import Units, amount_text
 
 if TYPE_CHECKING:
@@ -38,6 +39,10 @@ if TYPE_CHECKING:
 
 _STRUCTURES = frozenset(("repeat", "call", "approach", "retreat"))
 """Keys of entries among the moves that stand for other moves."""
+_GOALS = ("to", "through", "segments", "line", "arc", "point")
+"""Keys under which an entry of the moves says where it ends, the last first."""
+_STAYS = frozenset(("planner", "duration", "label", "attach", "detach", "tool", "signal", "at", "defaults"))
+"""Keys of entries that move nothing."""
 _UNREAD = Robot("unread", (), unlimited(0), None, np.eye(4), np.eye(4))
 """Stands for a robot whose own flaws are known, while the rest of the job is read."""
 
@@ -114,11 +119,47 @@ class LoadedJob:
             return f"the start, point '{point}'", self.document.place(("points", point))
         return "the start", self.document.place(("start",))
 
-    def called(self, index: int) -> str:
-        """Return by what a move goes in messages: its number and planner, and in which round it is."""
+    @property
+    def move_count(self) -> int:
+        """How many moves it has: what is attached or detached between them is none."""
+        return sum(not move.handles for move in self.job.moves)
+
+    def title(self, index: int) -> str:
+        """Return the title of a move, such as "pick -> above_place (jerk_limited)"."""
         move = self.job.moves[index]
-        named = (move.tag, move.label, self.document.round_of(index))
-        return f"move {index} ({', '.join(word for word in named if word)})"
+        return move_title(self.ends(index), move.label, move.tag, self.document.round_of(index))
+
+    def called(self, index: int) -> str:
+        """Return by what a move goes in messages: its number, and its title."""
+        title = self.title(index)
+        return f"move {index}, {title}" if title.endswith(")") else f"move {index} ({title})"
+
+    def ends(self, index: int) -> str:
+        """Return the points between which a move goes, such as "pick -> place", or nothing."""
+        goal = self._goal(("moves", index))
+        if not goal:
+            return ""
+        before = index - 1
+        while before >= 0 and self._goal(("moves", before)) is None:
+            before -= 1
+        origin = self._goal(("moves", before) if before >= 0 else ("start",))
+        return f"{origin} -> {goal}" if origin else f"-> {goal}"
+
+    def _goal(self, path: FieldPath) -> str | None:
+        """Return the name of the point in which an entry ends: empty without one, None where it stays."""
+        node: Node | None = self.document.node(path)
+        moving = path == ("start",)
+        while node is not None and not isinstance(node.value, str):
+            if isinstance(node.value, list):
+                node, moving = (node.value[-1] if node.value else None), True
+                continue
+            below = node.value if isinstance(node.value, dict) else {}
+            key = next((key for key in _GOALS if key in below), None)
+            moving = moving or key is not None or not _STAYS.issuperset(below)
+            node = None if key is None else below[key]
+        if node is not None and node.value in self.job.points:
+            return str(node.value).partition(" (")[0]  # of a point of many the round says which
+        return "" if moving else None
 
     def place_of_move(self, index: int) -> Place:
         """Return where a move stands in the file."""

@@ -39,7 +39,6 @@ from trajcli.job.report import (
 from trajcli.job.reports.flyby import FlyByReport
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.knots import Knots, has_knots, knots_of
-from trajcli.output.effort_report import effort_reports, efforts_report, most_used, payload_report
 from trajcli.output.sensitivity import at_limit_of
 from trajcli.planners.planner import Event, PlannedMove
 from trajcli.planning.plan import Plan
@@ -69,6 +68,8 @@ def report_of(
         peers: Whether all moves along a path are compared with toppra; implies `reference`.
         knots: Those of its trajectory, where they are known.
     """
+    from trajcli.output.effort_report import efforts_report
+
     verdict = plan.verdict
     if knots is None and verdict.passed and has_knots(plan.trajectory):
         knots = knots_of(plan.trajectory)
@@ -134,6 +135,8 @@ def _steps(steps: AccelerationSteps, units: Mapping[str, str]) -> list[StepRepor
 
 
 def _move(plan: Plan, index: int, *, reference: bool, peers: bool) -> MoveReport:
+    from trajcli.output.effort_report import effort_reports, most_used, payload_report
+
     move, span = plan.moves[index], plan.trajectory.spans[index]
     peaks = [
         _peak(move, joint, order, extremes)

@@ -79,6 +79,11 @@ class Event:
         """Whether anything was given up: a finer grid, or a law a thousandth longer, gives up nothing."""
         return self.kind not in _REMARKS
 
+    @property
+    def is_internal(self) -> bool:
+        """Whether it is about the computation alone, and nothing that the motion does or keeps."""
+        return self.kind in ("refined", "bound")
+
     def text(self, say: Callable[[Amount], str] = str) -> str:
         """Return the message with its amounts said by `say`."""
         return said(self.message, self.amounts, say)
@@ -444,7 +449,10 @@ class PlannedMove:
     def span(self, start: float, end: float) -> Span:
         """Return the part of a trajectory, from `start` to `end` s, that is this move."""
         label, payload = self.planner.label or "", self.robot.payload
-        return Span(self.index, self.planner.tag, start, end, self.continuity, payload, label)
+        handles = self.planner.handles
+        return Span(
+            self.index, self.planner.tag, start, end, self.continuity, payload, label, handles=handles
+        )
 
     def alone(self) -> Trajectory:
         """Return the trajectory of this move alone."""

@@ -67,7 +67,7 @@ class Plan:
     flyby: FlyBy | None = None
 
     def __repr__(self) -> str:
-        moves, duration = len(self.moves), self.trajectory.duration
+        moves, duration = self.loaded.move_count, self.trajectory.duration
         of_moves = f"{moves} move{'s' * (moves != 1)}"
         of_what = f"{self.loaded.name!r}, {self.loaded.robot.name}, {of_moves}"
         return f"{type(self).__name__}({of_what}, {duration:g} s, {self.verdict.text})"
@@ -171,7 +171,7 @@ def _plan_moves(
     before: Planner | None = None
     robot, begun, aimed = loaded.robot, 0.0, 0  # the origin is the target of the planner of this id
     for index, planner in enumerate(loaded.job.moves):
-        report_progress(f"planning move {index + 1} of {len(loaded.job.moves)} ({planner.tag})")
+        report_progress(f"planning {loaded.called(index)}")
         start = _handed_over(state, before, planner)
         robot = replace(robot, payload=planner.carried_after(robot.payload)) if planner.handles else robot
         used = robot if carried is None else replace(robot, payload=carried(index, robot.payload))
@@ -380,7 +380,8 @@ def _joined(moves: list[PlannedMove], loaded: LoadedJob, first: State, flyby: Fl
     curve, spans, end = concatenate([move.planned.curve for move in moves]), [], 0.0
     for move in moves:
         start, end = end, float(move.planned.curve.breaks[-1] + end)
-        spans.append(replace(move.span(start, end), round=loaded.document.round_of(move.index)))
+        of_round, ends = loaded.document.round_of(move.index), loaded.ends(move.index)
+        spans.append(replace(move.span(start, end), round=of_round, ends=ends))
     robot, last = loaded.robot, moves[-1].planned.end
     laws = tuple(_law_of_tool(move) for move in moves)
     return Trajectory(

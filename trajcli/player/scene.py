@@ -11,8 +11,9 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 from trajcli.findings import Finding
 from trajcli.kinematics.robot import QUANTITIES, JointType, Limits, Robot
-from trajcli.planners.planner import PlannedMove
+from trajcli.planners.planner import Event
 from trajcli.planning.plan import Plan
+from trajcli.planning.tightest import tightest_of_moves
 from trajcli.player.rows import ORDERS, DrawnRows, packed, rows_of_curve
 from trajcli.trajectory import Span
 from trajcli.units import Quantity, Units, factor, joint_quantity, unit_name
@@ -33,7 +34,7 @@ def scene_of_plan(plan: Plan) -> dict[str, Any]:
     rows = rows_of_curve(trajectory.curve, [span.start for span in spans], when)
     count = len(verdict.findings)
     state, text = ("verified", "verified") if verdict.passed else ("violated", _counted(count, "finding"))
-    moves = _counted(len(plan.moves), "move")
+    moves = _counted(loaded.move_count, "move")
     names, types = trajectory.joint_names, trajectory.joint_types
     return {
         "version": 1,
@@ -44,11 +45,11 @@ def scene_of_plan(plan: Plan) -> dict[str, Any]:
         "joints": joints_in_units(names, types, loaded.units),
         **geometry_of(loaded.robot, rows, loaded.units),
         "rows": rows.packed(),
-        "moves": [_move(plan, k) for k in range(len(plan.moves))],
+        "moves": [*_moves(plan)],
         "limits": limits_of([(s.start, s.end, plan.moves[s.index].robot.limits) for s in spans]),
         "waypoints": waypoints_of([*_waypoints(plan)]) if loaded.robot.convention else [],
         "findings": [_finding(plan, finding) for finding in verdict.findings],
-        "events": [_event(plan, event.move, event.message) for event in (*plan.events, *plan.remarks)],
+        "events": [_event(plan, event) for event in (*plan.events, *plan.remarks) if not event.is_internal],
         "steps": [_step(plan, k) for k in range(min(len(verdict.steps), _MOST_STEPS))],
         "notes": list(_notes(plan)),
     }
@@ -173,26 +174,19 @@ def _waypoints(plan: Plan) -> Iterator[tuple[float, Array]]:
         yield span.end, curve.evaluate(min(span.end, curve.end), side="left")
 
 
-def _move(plan: Plan, index: int) -> dict[str, Any]:
-    move, span = plan.moves[index], plan.trajectory.spans[index]
-    detail = f"{span.words}, {span.duration:.6g} s{_tightest(plan, move, index)}"
-    return {**_interval(span), "index": span.index, "label": f"move {span.index}", "detail": detail}
+def _moves(plan: Plan) -> Iterator[dict[str, Any]]:
+    """Yield what is shown of each move: its title, and the limit of which it uses most."""
+    tightest = {one.span.index: one for one in tightest_of_moves(plan)}
+    for span in plan.trajectory.spans:
+        if not span.handles:
+            one = tightest.get(span.index)
+            used = "" if one is None else f"; {one.name} uses {one.share} of its limit"
+            words = {"label": f"{span.index} {span.title}", "detail": f"{span.duration:.6g} s{used}"}
+            yield {**_interval(span), "index": span.index, **words}
 
 
 def _interval(span: Span) -> dict[str, float]:
     return {"start": span.start, "end": span.end}
-
-
-def _tightest(plan: Plan, move: PlannedMove, index: int) -> str:
-    """Return which limit of the joints' rates is used most, and how much of it; empty where there is none."""
-    parts = []
-    for order in range(1, len(QUANTITIES)):
-        extremes, bounds = plan.verdict.peaks[index][order], move.robot.limits.of_order(order)
-        used = np.maximum(extremes.low / bounds[:, 0], extremes.high / bounds[:, 1])
-        joint = int(used.argmax())
-        parts.append((float(used[joint]), QUANTITIES[order], move.robot.joint_names[joint]))
-    used_most, quantity, name = max(parts)
-    return f"; {quantity} of {name} uses {100 * used_most:.3g} % of its limit" if used_most > 0 else ""
 
 
 def _finding(plan: Plan, finding: Finding) -> dict[str, Any]:
@@ -203,15 +197,17 @@ def _finding(plan: Plan, finding: Finding) -> dict[str, Any]:
         "joint": names.index(finding.joint) if finding.joint in names else None,
         "order": QUANTITIES.index(finding.kind) if of_limit else None,
         "value": finding.value,
-        "label": "" if finding.move is None else f"move {finding.move}:",
+        "label": "" if finding.move is None else f"{plan.loaded.called(finding.move)}:",
         "message": finding.text(plan.loaded.say),
         "hint": finding.hint,
     }
 
 
-def _event(plan: Plan, move: int | None, message: str) -> dict[str, Any]:
-    time = 0.0 if move is None else plan.trajectory.spans[move].start
-    return {"time": time, "label": "" if move is None else f"move {move}:", "message": message}
+def _event(plan: Plan, event: Event) -> dict[str, Any]:
+    """Return an event with the title of its move."""
+    time = 0.0 if event.move is None else plan.trajectory.spans[event.move].start
+    label = "" if event.move is None else f"{plan.loaded.called(event.move)}:"
+    return {"time": time, "label": label, "message": event.message}
 
 
 def _step(plan: Plan, index: int) -> dict[str, Any]:

@@ -215,10 +215,10 @@ def test_labels_stand_in_reports_explanations_and_errors(
     job = tmp_path / "job.yaml"
     job.write_text(HEAD + LABELLED, encoding="utf-8")
     found = call(capfd, "explain", str(job)).out
-    assert "move 1: line, pick up, " in found
-    assert "move 4: quintic, up, shake, round 2 of 2, " in found
+    assert "move 1: pick up (line), " in found
+    assert "move 4: up (quintic, shake, round 2 of 2), " in found
     assert json.loads(call(capfd, "explain", str(job), "--json").out)["moves"][0]["label"] == "pick up"
-    with pytest.raises(Exception, match=r"move 1 \(line, far\): "):
+    with pytest.raises(Exception, match=r"move 1, far \(line\): "):
         planned(
             moves("planner: hold, duration: 1", f"planner: line, to: {{xyz: [4500, 0, 0]}}, label: far, {Q}")
         )

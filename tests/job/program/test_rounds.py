@@ -236,7 +236,8 @@ def test_a_flaw_in_a_move_that_is_repeated_is_said_once_and_names_the_round_when
     ]
     far = PALLET.replace("xyz: [80, 0, 5]", "xyz: [800, 0, 0]")
     with pytest.raises(
-        Exception, match=r"move 4 \(jerk_limited, slot 2 of 6\): the point 'above \(slot 2 of 6\)'"
+        Exception,
+        match=r"move 4, home -> above \(jerk_limited, slot 2 of 6\): the point 'above \(slot 2 of 6\)'",
     ):
         planned(far)
 

@@ -244,7 +244,7 @@ def test_a_finer_grid_is_no_concession_and_a_point_left_out_is(tmp_path, capfd, 
     job.write_text(job_text({"joints": [0, 0]}, fields, limits=limits, units={"angle": "deg"}))
     report = tmp_path / "report.json"
     with pytest.raises(SystemExit):
-        app(["plan", str(job), "--report", str(report), "--no-output"])
+        app(["plan", str(job), "--report", str(report), "--no-output", "-v"])
     conceded = {event["kind"] for event in json.loads(report.read_text())["events"]}
     assert conceded - {"joined_over_limit"} == merged
     told = capfd.readouterr().err

@@ -1,0 +1,132 @@
+"""What people see on a terminal of 80 columns: no wider line, no flood of rows, colours of verdicts.
+
+Oracle: a terminal of the operating system, and the maximum of the shares that the report states.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from planned_examples import planned_example
+from running import EXAMPLES, FAST, JOB, call, on_terminal
+
+from trajcli.cli.frames import render_problem
+from trajcli.cli.terminal import fitted_table, is_coloured
+from trajcli.errors import Place, Problem
+from trajcli.output.report import report_of
+from trajcli.planning.tightest import tightest_of_moves
+
+COLOUR = re.compile(r"\x1b\[[0-9;]*m|\r\x1b\[2K")
+PICK = EXAMPLES / "ur5e_pick.yaml"
+
+
+def lines_of(text: str) -> list[str]:
+    return COLOUR.sub("", text).splitlines()
+
+
+def test_plan_shows_a_table_and_no_rows() -> None:
+    code, text = on_terminal("plan", PICK)
+    lines = lines_of(text)
+    assert code == 0
+    assert "\x1b[1;32mverified" in text
+    table = lines[next(k for k, line in enumerate(lines) if line.startswith("move")) :]
+    assert len(table) <= 15
+    assert re.match(
+        r" +4  above_pick -> above_place +1\.022  velocity of shoulder_pan_joint +100 %", table[5]
+    )
+    assert table[-1].endswith("-o - prints them here")
+    assert max(map(len, lines)) <= 80
+
+
+def test_rows_stand_on_a_terminal_where_they_are_asked_for(tmp_path: Path) -> None:
+    (tmp_path / "job.yaml").write_text(JOB)
+    for words in (("-o", "-"), ("--format", "csv")):
+        code, text = on_terminal("plan", tmp_path / "job.yaml", *words, NO_COLOR="1")
+        assert code == 0
+        assert "t,q1_deg\n0.000000000,0.000000000\n" in text
+        assert "\x1b" not in text
+
+
+def test_explain_fits_a_screen_and_its_formulas_a_line() -> None:
+    _, text = on_terminal("explain", PICK)
+    assert len(lines_of(text)) <= 60
+    assert max(map(len, lines_of(text))) <= 80
+    _, text = on_terminal("explain", PICK, "--move", "8")
+    whole = " ".join(" ".join(lines_of(text)).split())
+    piped = call_explain()
+    assert " ".join(piped.split()) == whole  # broken between words only
+    assert max(map(len, lines_of(text))) <= 80
+
+
+def call_explain() -> str:
+    from running import run
+
+    return run("explain", PICK, "--move", "8").out
+
+
+def test_errors_fit_the_width_around_the_caret(tmp_path: Path) -> None:
+    (tmp_path / "job.yaml").write_text(FAST)
+    code, text = on_terminal("plan", tmp_path / "job.yaml", "--no-output")
+    assert code == 1
+    assert "\x1b[1;31merror:" in text
+    source = "moves: " + "x" * 200 + " wrong " + "y" * 200
+    problem = Problem("long " * 40, "hint " * 30, Place("f", 3, source.index("wrong") + 1, source, 5))
+    rows = COLOUR.sub("", render_problem(problem, color=True, width=80)).splitlines()
+    assert max(map(len, rows)) <= 80
+    at = next(k for k, row in enumerate(rows) if "^" in row)
+    assert rows[at - 1][rows[at].index("^") :][:5] == "wrong"
+
+
+@pytest.mark.parametrize(
+    ("environment", "coloured"),
+    [({}, False), ({"FORCE_COLOR": "1"}, True), ({"FORCE_COLOR": "1", "NO_COLOR": "1"}, False)],
+)
+def test_colours_are_asked_for(
+    environment: dict[str, str], coloured: bool, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    for name in ("FORCE_COLOR", "NO_COLOR"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    with (tmp_path / "out").open("w") as stream:
+        assert is_coloured(stream) is coloured
+
+
+def test_a_table_yields_where_it_is_told_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "60")
+    rows = [["n", "title", "what", "share"], ["1", "a" * 40, "b" * 30, "100 %"]]
+    lines = list(fitted_table(rows, (1, 2)))
+    assert max(map(len, lines)) <= 60
+    assert lines[1].endswith("100 %")
+
+
+@pytest.mark.parametrize("name", ["pick_carry_place", "ur5e_pick", "weld_seam"])
+def test_the_tightest_limit_is_the_largest_of_the_report(name: str) -> None:
+    plan = planned_example(name)
+    report = report_of(plan)
+    of_moves = {one.span.index: one for one in tightest_of_moves(plan)}
+    for move in report.moves:
+        shares = [peak.used or 0.0 for peak in move.peaks if peak.quantity != "position"]
+        shares += [effort.used or 0.0 for effort in move.efforts or ()]
+        one = of_moves.get(move.index)
+        assert (0.0 if one is None else one.used) >= max(shares) * (1 - 2e-6)
+        if move.tool is None and one is not None:
+            assert one.used == pytest.approx(max(shares), rel=2e-6)
+
+
+def test_moves_have_one_title_and_one_count(capfd: pytest.CaptureFixture[str]) -> None:
+    """What is attached and detached between the moves is no move, and takes no number from them."""
+    from trajcli.player.scene import scene_of_plan
+
+    plan = planned_example("pick_carry_place")
+    titles = {0: "home -> pick", 2: "pick -> place", 4: "place -> home"}
+    scene = scene_of_plan(plan)
+    labels = [f"{index} {title} (time_optimal)" for index, title in titles.items()]
+    assert [move["label"] for move in scene["moves"]] == labels
+    assert " 3 moves " in scene["subtitle"]
+    assert scene["moves"][0]["detail"].endswith("effort of shoulder_lift_joint uses 100 % of its limit")
+    out = call(capfd, "explain", EXAMPLES / "pick_carry_place.yaml", "--move", "2").out
+    assert out.startswith("pick_carry_place on UR5e: move 2, one of 3 moves")
+    assert "\nmove 2: pick -> place (time_optimal), " in out
