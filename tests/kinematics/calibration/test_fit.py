@@ -302,3 +302,37 @@ def test_weak_combinations_stay_where_there_is_noise():
         robot, parameters, values_of(fit.robot, robot, parameters) - values_of(robot, robot, parameters)
     )
     np.testing.assert_allclose(forward(mine, np.ones(6)), forward(fit.robot, np.ones(6)), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("loss", "length", "count", "seeds"),
+    [("linear", 1.0, 4, 12), ("linear", 20.0, 4, 12), ("cauchy", 20.0, 40, 3)],
+)
+def test_noise_is_neither_too_small_nor_too_large(loss, length, count, seeds):
+    """Nine parameters take nine of 24 numbers' freedom, most of it from what counts most; losses take theirs."""
+    robot, options = arm("puma"), Options(length, loss)
+    parameters = parse_parameters(robot, "j2,j3,j4.a")
+    shares = []
+    for seed in range(seeds):
+        rng = np.random.default_rng(seed)
+        changes = true_changes(robot, rng, parameters)
+        measurements = measured(robot, configurations(robot, count, rng), changes, rng)
+        fit = calibrate(robot, measurements, parameters, options)
+        known = uncertainty(fit, measurements, parameters, options).noise
+        shares.append(np.square([known[0] / 1e-4, known[1] / np.radians(0.01)]))
+    position, angle = np.mean(shares, axis=0)
+    assert 0.8 < position < 1.25
+    assert 0.7 < angle < 1.25
+
+
+def test_what_is_over_three_scales_is_an_outlier():
+    robot, rng = arm("puma"), np.random.default_rng(4)
+    parameters, q = parse_parameters(robot, "j2"), configurations(robot, 60, rng)
+    changes = true_changes(robot, rng, parameters)
+    poses = measured(robot, q, changes, rng).kinds[0].target.poses.copy()
+    poses[7, 0, 3] += 2.5e-3
+    measurements = Measurements(q, (MeasuredKind(np.arange(60), pose_target(poses)),))
+    fit = calibrate(robot, measurements, parameters, Options(1.0, "huber"))
+    away = np.linalg.norm(forward(fit.robot, q)[:, :3, 3] - poses[:, :3, 3], axis=1)
+    assert 3.2 < away[7] / fit.loss_scale < 5.5
+    assert fit.outliers == (7,)

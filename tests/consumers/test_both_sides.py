@@ -1,0 +1,105 @@
+"""Rules of consumers on both sides of their limits: what is found upwards is found downwards."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planted_faults import HOME, judged, motion, with_value
+
+from trajcli.consumers.rule_check import Surroundings
+from trajcli.streams.recorded_motion import RecordedMotion
+
+JTC = motion(period=0.1, rows=21)
+STILL = np.tile(HOME[7], (21, 1))
+FRANKA = replace(motion(rows=21), q=STILL, qd=np.zeros_like(STILL), qdd=np.zeros_like(STILL))
+SIDES = pytest.mark.parametrize("side", [-1.0, 1.0])
+
+
+def rules(rows: RecordedMotion, profile: str, stands: np.ndarray | None = None) -> set[str]:
+    """Return the rules that are broken; the arm stands where the rows begin, or where it is said to."""
+    around = Surroundings(rows.joints, rows.q[0] if stands is None else stands)
+    return {finding.rule for finding in judged(rows, profile, around).findings}
+
+
+@SIDES
+def test_rows_too_near_and_too_far(side: float) -> None:
+    """Half a step of the stamps' decimals is no fault, four of them are, in either direction."""
+    steps = np.zeros(FRANKA.t.size)
+    steps[10:] = side * 4.5 * FRANKA.resolution.time
+    assert "fr3-period" in rules(replace(FRANKA, t=FRANKA.t + steps), "franka-fr3")
+    assert "fr3-period" not in rules(replace(FRANKA, t=FRANKA.t + 0.2 * steps), "franka-fr3")
+
+
+@SIDES
+def test_a_first_point_on_either_side_of_where_the_arm_stands(side: float) -> None:
+    for share, broken in ((1.5, True), (0.5, False)):
+        stands = JTC.q[0].copy()
+        stands[2] += side * share * 1e-6
+        assert ("jtc-first-point" in rules(JTC, "ros-jtc", stands)) == broken
+
+
+@SIDES
+@pytest.mark.parametrize("last", [True, False])
+def test_a_last_velocity_in_either_direction(side: float, last: bool) -> None:
+    found = rules(with_value(JTC, "qd", -1 if last else -2, 1, side * 1.3e-7), "ros-jtc")
+    assert ("jtc-last-velocity" in found) == last
+
+
+def test_one_effort_among_none_is_one() -> None:
+    tau = np.full((21, 7), np.nan)
+    tau[4, 2] = 0.5
+    found = judged(replace(JTC, tau=tau), "ros-jtc", Surroundings(JTC.joints, JTC.q[0])).findings
+    assert [(finding.rule, finding.row) for finding in found] == [("jtc-effort", 5)]
+
+
+@SIDES
+@pytest.mark.parametrize("rule", ["fr3-torque", "fr3-torque-rate"])
+def test_torques_and_their_rates_in_either_direction(side: float, rule: str) -> None:
+    tau = np.zeros((21, 7))
+    tau[:, 4] = side * 12.1
+    if rule == "fr3-torque-rate":
+        tau[:9, 4], tau[9:, 4] = side * 10.0, side * 11.1
+    assert rules(replace(FRANKA, tau=tau), "franka-fr3") == {rule}
+
+
+@SIDES
+@pytest.mark.parametrize("beyond", [0.0, -1e-9])
+def test_a_position_at_either_end_of_its_range(side: float, beyond: float) -> None:
+    """The end itself is out of the range, as libfranka has it."""
+    q = STILL.copy()
+    q[:, 3] = (-0.1458 if side > 0 else -3.0481) + side * beyond
+    still = replace(FRANKA, q=q)
+    assert ("fr3-position" in rules(still, "franka-fr3")) == (beyond == 0.0)
+
+
+@SIDES
+@pytest.mark.parametrize(("name", "row", "at"), [("qd", 0, "start"), ("qdd", -1, "end")])
+def test_motion_in_either_direction_at_both_ends(side: float, name: str, row: int, at: str) -> None:
+    assert rules(with_value(FRANKA, name, row, 3, side * 0.02), "franka-fr3") >= {f"fr3-rest-{at}"}
+
+
+@SIDES
+@pytest.mark.parametrize("reverse", [False, True], ids=["end", "start"])
+def test_rest_of_positions_alone_in_either_direction(side: float, reverse: bool) -> None:
+    """A ramp of constant jerk from rest makes j h^2 / 6 and j h of its first period; what moves makes more."""
+    t = 1e-3 * np.arange(21)
+    for share, broken in ((0.98, False), (1.05, True)):
+        q = STILL.copy()
+        q[:, 3] += side * share * 5000.0 * t[::-1] ** 3 / 6
+        rows = replace(motion(rows=21, columns="q", decimals=None), q=q[::-1].copy() if reverse else q)
+        found = rules(rows, "franka-fr3")
+        assert (f"fr3-rest-{'start' if reverse else 'end'}" in found) == broken
+
+
+@SIDES
+def test_velocity_towards_either_end(side: float) -> None:
+    """0.1 rad before an end joint 1 may move with sqrt(2 6 0.1) - 0.3 - 1e-3 rad/s, at the row before."""
+    allowed = np.sqrt(2 * 6 * 0.1) - 0.3 - 1e-3
+    for share, broken in ((1.001, True), (0.999, False)):
+        q = STILL.copy()
+        q[:, 0] = side * (2.7501 - 0.1)
+        q[10:, 0] += side * share * allowed * 1e-3  # one step, from where 0.1 rad are left
+        found = rules(replace(FRANKA, q=q), "franka-fr3")
+        assert ("fr3-velocity-by-position" in found) == broken
