@@ -34,10 +34,12 @@ def test_rows_too_near_and_too_far(side: float) -> None:
 
 @SIDES
 def test_a_first_point_on_either_side_of_where_the_arm_stands(side: float) -> None:
-    for share, broken in ((1.5, True), (0.5, False)):
-        stands = JTC.q[0].copy()
-        stands[2] += side * share * 1e-6
-        assert ("jtc-first-point" in rules(JTC, "ros-jtc", stands)) == broken
+    """The tolerance is 1e-6, and six decimals round by half of it."""
+    rows = motion(period=0.1, rows=21, decimals=6)
+    for apart, broken in ((1.6e-6, True), (1.4e-6, False)):
+        stands = rows.q[0].copy()
+        stands[2] += side * apart
+        assert ("jtc-first-point" in rules(rows, "ros-jtc", stands)) == broken
 
 
 @SIDES
@@ -82,12 +84,16 @@ def test_motion_in_either_direction_at_both_ends(side: float, name: str, row: in
 
 @SIDES
 @pytest.mark.parametrize("reverse", [False, True], ids=["end", "start"])
-def test_rest_of_positions_alone_in_either_direction(side: float, reverse: bool) -> None:
-    """A ramp of constant jerk from rest makes j h^2 / 6 and j h of its first period; what moves makes more."""
-    t = 1e-3 * np.arange(21)
+@pytest.mark.parametrize("order", [1, 2])
+def test_rest_of_positions_alone_in_either_direction(side: float, reverse: bool, order: int) -> None:
+    """From rest a jerk j makes j h^2 / 6 as the first difference over h, and j h as the second; no more is rest."""
+    jerk, h = 5000.0, 1e-3
     for share, broken in ((0.98, False), (1.05, True)):
         q = STILL.copy()
-        q[:, 3] += side * share * 5000.0 * t[::-1] ** 3 / 6
+        if order == 1:  # at one speed: no second difference
+            q[:, 3] += side * share * jerk * h**2 / 6 * h * np.arange(20, -1, -1)
+        else:  # from a step before: no last first difference
+            q[:-2, 3] += side * share * jerk * h**3
         rows = replace(motion(rows=21, columns="q", decimals=None), q=q[::-1].copy() if reverse else q)
         found = rules(rows, "franka-fr3")
         assert (f"fr3-rest-{'start' if reverse else 'end'}" in found) == broken

@@ -179,3 +179,11 @@ def test_a_joint_turns_within_a_piece_too(sign):
 def test_a_joint_without_a_limit_of_acceleration_bounds_nothing(acceleration):
     bounds = limits_of([-1.0, 1.0], acceleration, 20.0)
     assert turning_bound(through(0.0, 3.0), bounds, (0.0, 0.0))[0] == 0.0
+
+
+def test_a_piece_that_turns_twice_has_three_stretches():
+    """The Chebyshev polynomial of degree 3 goes up by 2, down by 2 and up by 2, from rest to rest each."""
+    path = PiecewisePolynomial(np.array([0.0, 2.0]), np.array([4.0, -12.0, 9.0, -1.0]).reshape(4, 1, 1))
+    np.testing.assert_allclose(path.evaluate(np.array([0.0, 0.5, 1.5, 2.0]))[:, 0], [-1.0, 1.0, -1.0, 1.0])
+    bounds = tuple(np.array([[-size, size]]) for size in (1e6, 1.0, 1e12))
+    assert turning_bound(path, bounds, (0.0, 0.0))[0] == pytest.approx(3 * 2 * np.sqrt(2.0), rel=1e-5)

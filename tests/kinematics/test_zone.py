@@ -165,3 +165,17 @@ def test_the_first_look_at_an_interval_is_no_lower_than_what_is_inside(zone, mos
     at_ends, bound = ZoneAround(arm(LEVER), np.zeros(1), zone)._bounds(pieces)
     assert at_ends[0] == pytest.approx(0.0, abs=1e-9)
     assert most * (1 - 1e-2) <= bound[0] <= 4 * most
+
+
+@pytest.mark.parametrize("joints", [1, 2])
+def test_an_angle_grows_as_fast_as_all_turns_together(joints):
+    """There and back at nearly one speed: with x = 1 - 2 t the speed is (3 x - x^3) / 2, the angle 5 / 16 at x = 0.
+
+    Joints with parallel axes share it.
+    """
+    coefficients = np.array([1.0, -2.0, 0.0, 1.0, 0.0])[:, None, None] * np.full(joints, 1.0 / joints)
+    curve = PiecewisePolynomial(np.array([0.0, 1.0]), coefficients)
+    angles = curve.evaluate(np.array([0.0, 0.5, 1.0])).sum(axis=1)
+    assert angles == pytest.approx([0.0, 0.3125, 0.0])
+    around = ZoneAround(arm(*[LEVER] * joints), np.zeros(joints), Zone(orientation=0.95 * 0.3125))
+    assert around.largest_share(curve)[0] == pytest.approx(1 / 0.95, rel=1e-5)
