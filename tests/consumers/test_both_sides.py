@@ -109,3 +109,33 @@ def test_velocity_towards_either_end(side: float) -> None:
         q[10:, 0] += side * share * allowed * 1e-3  # one step, from where 0.1 rad are left
         found = rules(replace(FRANKA, q=q), "franka-fr3")
         assert ("fr3-velocity-by-position" in found) == broken
+
+
+def pushed(share: float, side: float, periods: np.ndarray) -> RecordedMotion:
+    """Return rows in which joint 4 moves at a share of 2.62 rad/s less 1e-3, some periods of 1 ms apart."""
+    q = STILL.copy()
+    q[:, 3] += side * share * (2.62 - 1e-3) * 1e-3 * np.arange(21)
+    return replace(FRANKA, t=np.append(0.0, np.cumsum(periods)) * 1e-3, q=q)
+
+
+@SIDES
+@pytest.mark.parametrize(("share", "broken"), [(1.001, True), (0.999, False)])
+def test_velocities_in_either_direction(side: float, share: float, broken: bool) -> None:
+    assert ("fr3-velocity" in rules(pushed(share, side, np.ones(20)), "franka-fr3")) == broken
+
+
+@pytest.mark.parametrize(("at_period", "judged_so"), [(11, True), (9, False)])
+def test_differences_are_judged_where_half_the_rows_stand_at_the_period(
+    at_period: int, judged_so: bool
+) -> None:
+    periods = np.where(np.arange(20) < at_period, 1.0, 2.0)
+    assert ("fr3-velocity" in rules(pushed(1.5, 1.0, periods), "franka-fr3")) == judged_so
+
+
+@pytest.mark.parametrize("joint", [0, 5])
+def test_the_coarsest_joint_is_named(joint: int) -> None:
+    half = np.full(7, 0.5e-12)
+    half[joint] = 0.5e-6
+    coarse = replace(FRANKA, resolution=replace(FRANKA.resolution, q=half))
+    found = judged(coarse, "franka-fr3", Surroundings(coarse.joints, STILL[0])).findings
+    assert [each.joint for each in found if each.rule == "fr3-decimals"] == [f"joint_{joint + 1}"]

@@ -83,6 +83,23 @@ def test_velocities_that_two_rows_state(piece, planted, certainty, side):
 @pytest.mark.parametrize("side", SIDES)
 @pytest.mark.parametrize(("planted", "certainty"), PLANTED)
 @pytest.mark.parametrize("piece", range(4))
+def test_velocities_that_positions_make_certain_where_a_column_is_coarse(piece, planted, certainty, side):
+    """The column hides ten times as much of the curve; between two rows some speed is that of their difference."""
+    q, off = moved_in(piece, 0.5 * side)
+    length = T[piece + 1] - T[piece]
+    qd = np.zeros(T.size)
+    qd[piece : piece + 2] = 0.5 * side / length
+    limits = one_limit("velocity", side, (0.5 - planted * 2 * OFF) / length)
+    motion = rows(q, qd, **off, qd=20 * OFF / length)
+    judgement = judge_motion(lambda: [motion], Requirements(bare_robot(limits), interpolate="cubic"))
+    found = [each for each in judgement.findings if each.kind == "velocity" and each.rule == "limit"]
+    assert certainty in {each.certainty for each in found}
+    assert ("exceeded" in {each.certainty for each in found}) == (certainty == "exceeded")
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize(("planted", "certainty"), PLANTED)
+@pytest.mark.parametrize("piece", range(4))
 def test_time_stamps_that_are_off(piece, planted, certainty, side):
     """Both stamps of an interval may be: it may be shorter by twice that."""
     q, _ = moved_in(piece, 0.5 * side)
