@@ -39,7 +39,7 @@ from trajcli.language.targets import (
     Target,
 )
 from trajcli.language.waypoints import PointsField, Waypoint
-from trajcli.language.zones import ZoneField
+from trajcli.language.zones import SignalsField, ZoneField
 from trajcli.planners import PLANNERS, Planner
 from trajcli.planners.tool_path.arc import ArcFields
 from trajcli.planners.tool_path.law import LawSpec
@@ -152,6 +152,7 @@ def _reader_form(reader: FieldType) -> str:
         RobotSource: "[robot](#robot)",
         JointDistance: f"number at least 0, {_BY_JOINT}",
         ZoneField: "number at least 0, `stop`, or {position, orientation, joints}: [zones](zones.md)",
+        SignalsField: "{signal, value, when, before}, or a list of these: [signals](programs.md#signals)",
         BlendDurations: "number above 0, or a list of them",
         SegmentTimes: "list of numbers at least 0",
         PathParameter: "`chord` or `centripetal` or `uniform` or a list of numbers",

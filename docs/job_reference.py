@@ -127,6 +127,10 @@ and in the column `move` is its place in the list. Each move is planned and judg
 An `inertia` that no solid has is refused: a principal moment below zero, or one above the sum of the two
 others. A point mass (all zeros, the default) and a thin rod are possible."""
 
+_SIGNAL = """\
+`- {signal: NAME, value: NUMBER}` between two moves sets a [signal](programs.md#signals) where the arm stands,
+in no time. It counts among the `moves`, too."""
+
 _DYNAMICS = """\
 Effort, friction, rotor and link are what [efforts](#efforts) are computed from. They are in SI whatever
 the units of the file, but for the centre of mass, which is a length. An inertia that no solid has is refused:
@@ -218,6 +222,7 @@ _MEANINGS: dict[Group, str] = {
     "path": "`s sd sdd`: arc length of the tcp along its path and two derivatives; 0 without a path",
     "tau": "effort of each joint, N m or N in any units: inverse dynamics with what the tool carries",
     "zone": "number of the zone about a corner that the motion is in, from 1; 0 on a path",
+    "signals": "`signal.NAME` for each signal of the job, as they come there; 0 before the first value",
     "move": "index of the move, from 0; at the border of two moves, that of the later one",
 }
 
@@ -269,7 +274,7 @@ def job_reference() -> str:
     parts += ["### Poses", _POSES]
     parts += ["## Moves", _MOVES.rstrip(), _common_fields(), "### Approach and retreat", _STRAIGHT]
     parts += ["### Defaults", _DEFAULTS, field_table(Defaults)]
-    parts += ["### Payload", _PAYLOAD, field_table(PayloadSpec)]
+    parts += ["### Payload", _PAYLOAD, field_table(PayloadSpec), "### Signal", _SIGNAL]
     parts += tool_path_sections()
     parts += ["## Planners"]
     for tag, planner in PLANNERS.items():

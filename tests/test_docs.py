@@ -146,7 +146,7 @@ def table_fields(text: str) -> set[str]:
 
 
 SCHEMA = schema_of("job")
-SHARED = {"planner", "limits", "when_over_limit", "label", "zone", "approach", "retreat"}
+SHARED = {"planner", "limits", "when_over_limit", "label", "zone", "at", "approach", "retreat"}
 """Fields of every move."""
 MOVES = {
     definition["properties"]["planner"]["const"]: set(definition["properties"])

@@ -27,7 +27,9 @@ from trajcli.units import (
     unit_name,
 )
 
-Group = Literal["t", "q", "qd", "qdd", "qddd", "pose", "twist", "twistd", "path", "tau", "zone", "move"]
+Group = Literal[
+    "t", "q", "qd", "qdd", "qddd", "pose", "twist", "twistd", "path", "tau", "zone", "signals", "move"
+]
 GROUPS: tuple[Group, ...] = (
     "t",
     "q",
@@ -40,11 +42,15 @@ GROUPS: tuple[Group, ...] = (
     "path",
     "tau",
     "zone",
+    "signals",
     "move",
 )
 JOINT_ORDERS = {"q": 0, "qd": 1, "qdd": 2, "qddd": 3}
 EFFORT: Group = "tau"
 """The group of torques and forces, in N m and N whatever the units."""
+SIGNALS: Group = "signals"
+"""The group of the signals of a job: a column `signal.NAME` for each."""
+_SIGNAL = "signal."
 JOINT_GROUPS = (*JOINT_ORDERS, EFFORT)
 """Groups with a column for each joint."""
 
@@ -115,6 +121,8 @@ class Column:
 
 def parse_column(name: str) -> Column:
     """Return what `name` says; a name that is not of this language is a kind of its own."""
+    if name.startswith(_SIGNAL):
+        return Column(name, None, None, Quantity("ratio"))
     parts = _NAME.fullmatch(name)
     stem, unit = (parts["stem"], parts["unit"]) if parts else (name, None)
     joint = _JOINT.fullmatch(stem)
@@ -129,6 +137,8 @@ def parse_column(name: str) -> Column:
 
 def group_of(column: Column) -> str:
     """Return the group that a column belongs to; one of no group is a group of its own."""
+    if column.kind.startswith(_SIGNAL):
+        return SIGNALS
     return next((group for group, kinds in _COLUMNS.items() if column.kind in kinds), column.kind)
 
 
@@ -137,7 +147,12 @@ def kinds_of(group: str) -> tuple[str, ...]:
     return tuple(_COLUMNS.get(group, ()))
 
 
-def columns_of(groups: Sequence[Group], joint_types: Sequence[JointType], units: Units) -> tuple[Column, ...]:
+def columns_of(
+    groups: Sequence[Group],
+    joint_types: Sequence[JointType],
+    units: Units,
+    signals: Sequence[str] = (),
+) -> tuple[Column, ...]:
     """Return every column of `groups`, in the order of the groups, joints from the base on.
 
     Raises:
@@ -151,6 +166,8 @@ def columns_of(groups: Sequence[Group], joint_types: Sequence[JointType], units:
                 effort = group == EFFORT
                 quantity = effort_quantity(kind) if effort else joint_quantity(kind, JOINT_ORDERS[group])
                 columns.append(Column(group, joint, _unit(quantity, units), quantity))
+        elif group == SIGNALS:
+            columns += [Column(_SIGNAL + name, None, None, Quantity("ratio")) for name in signals]
         else:
             measured = _COLUMNS[group].items()
             columns += [Column(kind, None, _unit(quantity, units), quantity) for kind, quantity in measured]

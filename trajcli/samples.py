@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from trajcli.columns import (
     EFFORT,
     JOINT_ORDERS,
+    SIGNALS,
     TOOL_COLUMNS,
     Group,
     check_groups,
@@ -84,6 +85,8 @@ def sample(
                 parts.append(part / group_factors(group, units))
             elif group == "path":
                 parts.append(_path_law(trajectory, starts, local) / group_factors(group, units))
+            elif group == SIGNALS:
+                parts += [signal.values(local)[:, None] for signal in trajectory.signals]
             elif group == "zone":
                 parts.append(_zones(trajectory, local)[:, None])
             else:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, read_only
 from trajcli.errors import InputError
 from trajcli.frozen import comparable, frozen
-from trajcli.grids import UniformGrid, onto_breaks
+from trajcli.grids import AT_BREAK, UniformGrid, onto_breaks
 from trajcli.kinematics.robot import JointType, Payload, Robot
 
 if TYPE_CHECKING:
@@ -215,6 +215,39 @@ class Rows:
         return len(self.t)
 
 
+@comparable
+class SignalChange:
+    """A value that a signal has from some time on.
+
+    Attributes:
+        time: Seconds from the start of the trajectory.
+        value: From then on.
+        move: Index of the move that sets it.
+    """
+
+    time: float
+    value: float
+    move: int
+
+
+@comparable
+class Signal:
+    """A signal: 0 before its first change.
+
+    Attributes:
+        name: Its name.
+        changes: In order of time.
+    """
+
+    name: str
+    changes: tuple[SignalChange, ...]
+
+    def values(self, times: Array) -> Array:
+        """Return its values at times (N,) from the start of the trajectory: at a change the new one."""
+        after = np.searchsorted([change.time for change in self.changes], times + AT_BREAK, "right")
+        return np.array([0.0, *(change.value for change in self.changes)])[after]
+
+
 @frozen
 class Trajectory:
     """The motion of all joints over time.
@@ -232,6 +265,7 @@ class Trajectory:
         start_time: Time at which the job lets it start, s. Calls and samples count from there, the curve and
             the spans from 0.
         zones: When each zone about a corner is entered and left, s from the start, shape (Z, 2).
+        signals: By their names, in the order in which the job names them.
     """
 
     curve: PiecewisePolynomial
@@ -243,6 +277,7 @@ class Trajectory:
     laws: tuple[PiecewisePolynomial | None, ...] = ()
     start_time: float = 0.0
     zones: tuple[tuple[float, float], ...] = ()
+    signals: tuple[Signal, ...] = ()
 
     def __repr__(self) -> str:
         moves, joints = sum(not span.handles for span in self.spans), len(self.joint_names)

@@ -104,7 +104,7 @@ extra: 1
         (13, "a move needs `planner`"),
         (14, "unknown key 'speed'"),
         (15, 'expected a frequency such as "500 Hz", got "fast"'),
-        (15, 'expected t, q, qd, qdd, qddd, pose, twist, twistd, path, tau, zone or move, got "p"'),
+        (15, 'expected t, q, qd, qdd, qddd, pose, twist, twistd, path, tau, zone, signals or move, got "p"'),
         (16, "unknown key 'extra'"),
     ]
 

@@ -276,6 +276,11 @@ def _lines(explained: Explanation, plan: Plan, *, peers: bool = False) -> Iterat
         title = plan.loaded.title(move.index)
         yield f"move {move.index}: {title}, {move.duration:.10g} s, from t = {move.start:.10g} s"
         yield from _carried(move)
+        yield from (
+            f"  signal {signal.name} = {signal.value:.10g} at {signal.time:.6g} s of the job"
+            for signal in explained.signals
+            if signal.move == move.index
+        )
         if move.planner in HANDLING:
             continue
         yield from pose_lines(move)

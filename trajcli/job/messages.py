@@ -265,7 +265,7 @@ def _meant_entry(entry: Mapping[Any, object]) -> str:
         near = did_you_mean(str(key), (*HANDLING, "planner"))
         if near:
             return near
-    return f"{_every_planner()}; between moves stand {' and '.join(HANDLING)}"
+    return f"{_every_planner()}; between moves stand {', '.join(HANDLING)}"
 
 
 def _meant_word(path: FieldPath, value: object, document: Document) -> str | None:

@@ -23,7 +23,7 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
-from trajcli.columns import Group
+from trajcli.columns import SIGNALS, Group
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import GRAVITY, Payload, Robot
 from trajcli.language.dynamics import Gravity
@@ -398,7 +398,7 @@ class Job(Model):
             raise refuse([(("start",), "the start needs `joints` or a pose", None)])
         first = next((move for move in self.moves if not move.handles), None)
         if first is None:
-            raise refuse([(("moves",), "nothing moves: a payload is attached between moves", None)])
+            raise refuse([(("moves",), f"nothing moves: {', '.join(HANDLING)} stand between moves", None)])
         if first.joins == 1 and any(self.start.acceleration or ()):
             hint = "use quintic or jerk_limited for the first move, or leave it out"
             raise refuse([(("start",), f"{first.tag} cannot start with an acceleration", hint)])
@@ -420,6 +420,19 @@ class Job(Model):
 
             hint = did_you_mean(name, known) or valid_names(known, "frames")
             raise refuse([(("output", "in"), f"there is no frame '{name}'", hint)])
+        return self
+
+    @property
+    def has_signals(self) -> bool:
+        """Whether any move sets a signal."""
+        return any(move.at or hasattr(move, "signal") for move in self.moves)
+
+    @model_validator(mode="after")
+    def _signals_are_set(self) -> Job:
+        if SIGNALS in self.output.columns and not self.has_signals:
+            hint = "a move sets one by `at: {signal: NAME, value: 1}`, or leave the columns out"
+            path = ("output", "columns", self.output.columns.index(SIGNALS))
+            raise refuse([(path, "no move of the job sets a signal", hint)])
         return self
 
     @model_validator(mode="after")

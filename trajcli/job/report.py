@@ -18,7 +18,7 @@ from trajcli.job.reports.comparisons import (
     SavingReport,
 )
 from trajcli.job.reports.efforts import EffortReport, EffortsReport, PayloadReport
-from trajcli.job.reports.flyby import FlyByReport
+from trajcli.job.reports.flyby import FlyByReport, SignalReport
 from trajcli.job.reports.part import JointQuantity, MeasuredIn, ReportPart, ReportSeconds, UnitName, in_units
 from trajcli.limits.kinds import ToolLimit
 
@@ -400,3 +400,4 @@ class Report(ReportPart):
     flyby: Annotated[
         FlyByReport | None, Field(description="Of corners that are flown by; null where no zone is named.")
     ] = None
+    signals: Annotated[list[SignalReport], Field(description="Signals as they are set, by time.")] = []

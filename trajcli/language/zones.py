@@ -1,4 +1,7 @@
-"""Zones in job files: a length, `stop`, or what the tool and the joints may leave the corner by."""
+"""Zones in job files: a length, `stop`, or what the tool and the joints may leave the corner by.
+
+Beside them the field of signals that are set about a corner: what reads these is loaded where a job has some.
+"""
 
 from __future__ import annotations
 
@@ -58,6 +61,31 @@ class ZoneField(FieldType):
         mapping = {"type": "object", "properties": parts, "additionalProperties": False, "minProperties": 1}
         forms = [_LENGTH.json_schema(), {"const": "stop"}, mapping]
         return {"anyOf": forms, "description": self.description}
+
+
+@comparable
+class SignalsField(FieldType):
+    """Signals that a move sets: one, or a list."""
+
+    description: str
+
+    def read(self, value: Any, context: ReadingContext) -> Any:  # noqa: ANN401
+        """Return them, in SI."""
+        from trajcli.language.signals import read_signals
+
+        return read_signals(value, context)
+
+    def write(self, value: Any, context: ReadingContext) -> Any:  # noqa: ANN401
+        """Return a list of mappings."""
+        from trajcli.language.signals import written_signals
+
+        return written_signals(value, context)
+
+    def json_schema(self) -> JsonSchemaValue:
+        """Return the schema of one, or a list."""
+        from trajcli.language.signals import schema_of_signals
+
+        return {**schema_of_signals(), "description": self.description}
 
 
 def _read_parts(value: Mapping[str, Any], context: ReadingContext) -> dict[str, Any]:

@@ -121,6 +121,10 @@ def recording_of(plan: Plan, options: LogOptions) -> Recording:
         metadata=_metadata(plan, job, options),
         topics=options.names,
         compression=options.compression or "zstd",
+        signals={
+            signal.name: tuple((round(c.time * _PER_SECOND), c.value) for c in signal.changes)
+            for signal in trajectory.signals
+        },
     )
 
 

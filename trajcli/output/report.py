@@ -36,7 +36,7 @@ from trajcli.job.report import (
     UncheckedToolReport,
     WaypointReport,
 )
-from trajcli.job.reports.flyby import FlyByReport
+from trajcli.job.reports.flyby import FlyByReport, SignalReport
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.knots import Knots, has_knots, knots_of
 from trajcli.output.sensitivity import at_limit_of
@@ -97,7 +97,17 @@ def report_of(
         unchecked_of_tool=[UncheckedToolReport(quantity=name) for name in verdict.unchecked_of_tool],
         knots=None if knots is None else _knots(plan.trajectory, knots),
         flyby=_flyby(plan),
+        signals=_signals(plan),
     )
+
+
+def _signals(plan: Plan) -> list[SignalReport]:
+    """Return the signals as they are set, by time."""
+    named = [(signal.name, change) for signal in plan.trajectory.signals for change in signal.changes]
+    return [
+        SignalReport(name=name, value=change.value, move=change.move, time=change.time)
+        for name, change in sorted(named, key=lambda item: item[1].time)
+    ]
 
 
 def _flyby(plan: Plan) -> FlyByReport | None:

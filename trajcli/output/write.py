@@ -79,7 +79,8 @@ def write_rows(
         asked = tuple(loaded.job.output.columns)
         groups = asked if form.content == "rows" else _groups_of_log(log, asked)
         units = Units() if form.si else loaded.output_units
-        columns = columns_of(groups, loaded.robot.joint_types, units)
+        signals = [signal.name for signal in plan.trajectory.signals]
+        columns = columns_of(groups, loaded.robot.joint_types, units, signals)
         rows = _counted(sample(plan.trajectory, grid, groups, units, robot=loaded.robot_of_rows), grid.count)
     if path is not None and path != "-":
         write_verified(path, rows, columns, options, form)

@@ -35,7 +35,7 @@ _WHERE = {
 }
 """The module and class of each planner, by its name in job files."""
 
-_PAYLOAD = {"attach": "payload.Attach", "detach": "payload.Detach"}
+_BETWEEN = {"attach": "payload.Attach", "detach": "payload.Detach", "signal": "signal.SetSignal"}
 """Likewise what stands between moves, by its key in job files."""
 
 ALSO_CALLED = {
@@ -95,8 +95,8 @@ class _Planners(Mapping[str, type[Planner]]):
 
 
 PLANNERS = _Planners(_WHERE)
-HANDLING = _Planners(_PAYLOAD)
-"""What takes up a payload or leaves it: an entry among the moves, by its key."""
+HANDLING = _Planners(_BETWEEN)
+"""What takes up a payload or leaves it, or sets a signal: an entry among the moves, by its key."""
 
 
 @frozen
@@ -109,7 +109,7 @@ class _ByName:
     tags: tuple[str, ...]
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
-        known = _Planners({**_WHERE, **_PAYLOAD})
+        known = _Planners({**_WHERE, **_BETWEEN})
         choices = {tag: handler.generate_schema(known[tag]) for tag in self.tags}
         return core_schema.tagged_union_schema(choices, discriminator="planner")
 

@@ -15,11 +15,13 @@ from trajcli.planners.planner import Planned, Planner
 from trajcli.trajectory import State
 
 
-class _Handling(Planner):
-    """A change of what the tool carries, where the arm is and as it moves there."""
+class BetweenMoves(Planner):
+    """A change where the arm is and as it moves there, such as of what the tool carries."""
 
     continuity: ClassVar[Literal[1, 2]] = 2
     handles: ClassVar[bool] = True
+    needs_geometry: ClassVar[bool] = True
+    at: ClassVar[Any] = None  # type: ignore[misc]
     # what would say how to move stands beside a planner only
     limits: ClassVar[Any] = None  # type: ignore[misc]
     when_over_limit: ClassVar[Any] = None  # type: ignore[misc]
@@ -30,7 +32,7 @@ class _Handling(Planner):
         return Planned(constant(start.position, 0.0), start, no_lower_bound="it does not move")
 
 
-class Attach(_Handling):
+class Attach(BetweenMoves):
     """From here on the tool carries a payload."""
 
     planner: SkipJsonSchema[Literal["attach"]] = Field("attach", exclude=True)
@@ -52,7 +54,7 @@ class Empty(Model):
     """No fields: what is left is what was attached."""
 
 
-class Detach(_Handling):
+class Detach(BetweenMoves):
     """From here on the tool carries nothing."""
 
     planner: SkipJsonSchema[Literal["detach"]] = Field("detach", exclude=True)

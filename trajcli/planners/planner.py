@@ -16,7 +16,7 @@ from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Payload, Robot
 from trajcli.language.limits import LimitsSpec
 from trajcli.language.numbers import Model, Name
-from trajcli.language.zones import ZoneField
+from trajcli.language.zones import SignalsField, ZoneField
 from trajcli.trajectory import Destination, MoveInterval, Promise, Span, State, Trajectory, ViaPoints
 
 if TYPE_CHECKING:
@@ -218,7 +218,8 @@ class Planner(Model):
         proportional: Whether another duration scales the times of all its parts alike, so that between given
             velocities at its ends each position is linear in the duration.
         follows_jerk: Whether it plans within the limits of jerk, and perhaps not without them.
-        handles: Whether it takes up a payload or leaves it, and moves nothing.
+        handles: Whether it stands between moves and moves nothing, such as what takes up a payload.
+        needs_geometry: Whether an arm of bare joints cannot do it.
         smoother: Changes of its fields that make a move without steps in acceleration, each by the words that
             ask for it; "planner" may be among them.
         faster: Likewise changes that keep the limits where slowing the whole move costs much more time.
@@ -226,6 +227,7 @@ class Planner(Model):
         when_over_limit: Overrides the job's; applied after `plan` was called.
         label: What it is for, in the job's words.
         zone: About the corner in which it ends, within which the motion may fly by; None for the job's.
+        at: Signals that it sets on its way.
     """
 
     continuity: ClassVar[Literal[1, 2]]
@@ -233,6 +235,7 @@ class Planner(Model):
     proportional: ClassVar[bool] = False
     follows_jerk: ClassVar[bool] = False
     handles: ClassVar[bool] = False
+    needs_geometry: ClassVar[bool] = False
     smoother: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
     faster: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
 
@@ -247,6 +250,13 @@ class Planner(Model):
             ZoneField(
                 "About the corner in which the move ends: within it the motion flies by; left out: the job's."
             ),
+        ]
+        | None
+    ) = None
+    at: (
+        Annotated[
+            Any,
+            SignalsField("Signals that it sets: about the corner in which it ends, or along its path."),
         ]
         | None
     ) = None

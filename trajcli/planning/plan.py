@@ -135,6 +135,10 @@ def plan_job(
     if hint is not None:
         events.append(Event("units", hint))
     trajectory = _joined(moves, loaded, _first_state(loaded, _first_moving(moves), events), flyby)
+    if loaded.job.has_signals:
+        from trajcli.planning.signals import signals_of
+
+        trajectory = replace(trajectory, signals=signals_of(loaded, moves, trajectory, flyby))
     events += [*_ends_moving(loaded, moves), *_velocity_steps(trajectory)]
     report_progress("checking the trajectory")
     verdict = verify(trajectory, [move.robot.limits for move in moves], [move.promise for move in moves])

@@ -12,7 +12,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from trajcli.columns import Column, group_of, require_finite
+from trajcli.columns import SIGNALS, Column, group_of, require_finite
 from trajcli.curves.piecewise import Array
 from trajcli.errors import TrajcliError
 from trajcli.frozen import frozen
@@ -103,7 +103,7 @@ def _keys(columns: Sequence[Column]) -> tuple[_Key, ...]:
     """
     keys: list[_Key] = []
     for index, column in enumerate(columns):
-        group = group_of(column)
+        group = column.kind if group_of(column) == SIGNALS else group_of(column)
         if keys and keys[-1].name == group:
             keys[-1] = _Key(group, keys[-1].first, index + 1, alone=False, whole_numbers=False)
         elif any(key.name == group for key in keys):

@@ -1,4 +1,4 @@
-"""Zones in reports: what flying by the corners of a job gained, and what each zone came to."""
+"""Zones and signals in reports: what flying by the corners of a job gained, what each zone came to."""
 
 from __future__ import annotations
 
@@ -59,6 +59,15 @@ class FlyByReport(ReportPart):
     saved: Annotated[float, Field(description="The difference, s.")]
     bound: BoundReport
     zones: list[ZoneReport]
+
+
+class SignalReport(ReportPart):
+    """A signal that is set."""
+
+    name: Annotated[str, Field(description="Of the signal.")]
+    value: Annotated[float, Field(description="From then on.")]
+    move: Annotated[int, Field(description="Index of the move that sets it.")]
+    time: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
 
 
 class BoundReport(ReportPart):

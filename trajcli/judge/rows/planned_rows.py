@@ -150,7 +150,8 @@ def _known(
         if group not in groups:
             groups.append(group)  # type: ignore[arg-type]
     try:
-        every = columns_of(groups, robot.joint_types, Units())
+        signals = [signal.name for signal in plan.trajectory.signals]
+        every = columns_of(groups, robot.joint_types, Units(), signals)
     except InputError:
         every = ()
     where = {(column.kind, column.joint): at for at, column in enumerate(every)}

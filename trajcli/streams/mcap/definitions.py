@@ -15,6 +15,7 @@ STRING = "std_msgs/msg/String"
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
 PATH = "nav_msgs/msg/Path"
 TWIST = "geometry_msgs/msg/TwistStamped"
+NUMBER = "std_msgs/msg/Float64"
 
 _PARTS = {
     "builtin_interfaces/Time": "int32 sec\nuint32 nanosec",
@@ -44,6 +45,7 @@ _MESSAGES = {
     ),
     JOINT_TRAJECTORY_POINT: _PARTS["trajectory_msgs/JointTrajectoryPoint"],
     STRING: "string data",
+    NUMBER: "float64 data",
     TRANSFORMS: "geometry_msgs/TransformStamped[] transforms",
     PATH: "std_msgs/Header header\n\ngeometry_msgs/PoseStamped[] poses",
     TWIST: "std_msgs/Header header\ngeometry_msgs/Twist twist",

@@ -36,6 +36,9 @@ BY_ROW = (JOINT_STATES, JOINT_ACCELERATIONS, TRAJECTORY_POINT, TOOL_TWIST)
 LATCHED = (JOINT_TRAJECTORY, ROBOT_DESCRIPTION, TF_STATIC, TOOL_PATH)
 OF_GEOMETRY = (ROBOT_DESCRIPTION, TF_STATIC, TF, TOOL_PATH, TOOL_TWIST)
 
+SIGNAL = "/signal/"
+"""What the topic of a signal begins with; its name follows."""
+
 _ENDLESS = "sec: 9223372036\n    nsec: 854775807"
 _PROFILE = (
     "- history: 3\n  depth: 0\n  reliability: 1\n  durability: {durability}\n  deadline:\n    {endless}\n"
@@ -48,14 +51,20 @@ def topics_of(recording: Recording) -> tuple[str, ...]:
     """Return the topics that a log holds."""
     extra = (TRAJECTORY_POINT, TOOL_TWIST)
     without = () if recording.frames is not None else OF_GEOMETRY
-    return tuple(
+    fixed = (
         topic for topic in TYPES if topic not in without and (topic not in extra or topic in recording.topics)
     )
+    return (*fixed, *(SIGNAL + name for name in recording.signals))
+
+
+def type_of(topic: str) -> str:
+    """Return what the messages of a topic are."""
+    return TYPES.get(topic, definitions.NUMBER)
 
 
 def quality_of_service(topic: str) -> dict[str, str]:
     """Return the metadata of a channel: kept for late subscribers (durability 1) or not (2)."""
-    durability = 1 if topic in LATCHED else 2
+    durability = 1 if topic in LATCHED or topic.startswith(SIGNAL) else 2
     return {"offered_qos_profiles": _PROFILE.format(durability=durability, endless=_ENDLESS)}
 
 
@@ -91,10 +100,10 @@ def record_layout(channel: int, layout: MessageLayout) -> RecordLayout:
     return RecordLayout(head.pack(records.MESSAGE, content, channel, 0, 0, 0) + data, dtype)
 
 
-def single_record(channel: int, time: int, data: bytes) -> bytes:
-    """Return the record of the one message of a channel."""
+def message_record(channel: int, time: int, data: bytes, number: int = 0) -> bytes:
+    """Return the record of a message of a channel, with its number from 0."""
     content = records.MESSAGE_HEAD.size - records.RECORD_HEAD.size + len(data)
-    return records.MESSAGE_HEAD.pack(records.MESSAGE, content, channel, 0, time, time) + data
+    return records.MESSAGE_HEAD.pack(records.MESSAGE, content, channel, number, time, time) + data
 
 
 def row_message(topic: str, joint_names: tuple[str, ...], *, efforts: bool = False) -> MessageLayout:
@@ -142,6 +151,15 @@ def latched_messages(recording: Recording) -> Iterator[tuple[str, bytes]]:
         yield TF_STATIC, _fixed(recording.frames, recording.origin)
     if recording.path is not None:
         yield TOOL_PATH, _path(recording.path, recording.origin)
+
+
+def signal_messages(recording: Recording) -> Iterator[tuple[str, int, bytes]]:
+    """Yield topic, time (ns) and message of each value of a signal: 0 at the start, then as it changes."""
+    for name, values in recording.signals.items():
+        for nanoseconds, value in ((0, 0.0), *values) if values[0][0] else values:
+            message = arranged(MessageLayout().numbers("data", 1), 1)
+            message["data"] = value
+            yield SIGNAL + name, recording.origin + nanoseconds, message.tobytes()
 
 
 def _trajectory(joint_names: tuple[str, ...], knots: Knots) -> bytes:

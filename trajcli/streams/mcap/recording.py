@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import field
 from typing import Literal
 
 import numpy as np
@@ -71,6 +72,7 @@ class Recording:
         metadata: About the motion.
         topics: What is written beside the topics that always are.
         compression: Of the messages.
+        signals: The values of signals by their names, each with its time, ns from the start of the motion.
     """
 
     joint_names: tuple[str, ...]
@@ -84,3 +86,4 @@ class Recording:
     metadata: Mapping[str, str]
     topics: tuple[str, ...] = ()
     compression: Compression = "zstd"
+    signals: Mapping[str, tuple[tuple[int, float], ...]] = field(default_factory=dict)

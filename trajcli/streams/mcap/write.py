@@ -18,11 +18,12 @@ from trajcli.streams.mcap import records
 from trajcli.streams.mcap.cdr import Bytes
 from trajcli.streams.mcap.definitions import definition_of
 from trajcli.streams.mcap.messages import (
-    TYPES,
     latched_messages,
+    message_record,
     quality_of_service,
-    single_record,
+    signal_messages,
     topics_of,
+    type_of,
 )
 from trajcli.streams.mcap.packing import NO_RECORDS, RecordGroup, RowRecords, Times, TransformRecords
 from trajcli.streams.mcap.recording import Compression, Recording
@@ -74,17 +75,20 @@ class _Log:
         self._encode = _encoder(recording.compression)
         self._chunks: list[records.ChunkEntry] = []
         self._counts = dict.fromkeys(topics.values(), 0)
-        self._latched = [
-            (topics[topic], single_record(topics[topic], recording.origin, message))
-            for topic, message in latched_messages(recording)
-        ]
+        once = [(topic, recording.origin, message) for topic, message in latched_messages(recording)]
+        counts = dict.fromkeys(topics, 0)
+        self._latched = []
+        for topic, time, message in (*once, *signal_messages(recording)):
+            record = message_record(topics[topic], time, message, counts[topic])
+            self._latched.append((topics[topic], time, record))
+            counts[topic] += 1
         self._origin = recording.origin
         self._buffer = np.empty(
             0, np.uint8
         )  # of a chunk: a new one each time would cost as much as filling it
         self._write(records.MAGIC + records.record(records.HEADER, *map(records.text, (PROFILE, LIBRARY))))
         self._about = _schemas_and_channels(topics)
-        self._schemas = len({TYPES[topic] for topic in topics})
+        self._schemas = len({type_of(topic) for topic in topics})
         self._write(b"".join(self._about))
         self._attached = self._attach(recording)
 
@@ -107,8 +111,8 @@ class _Log:
         return [*indices, (records.METADATA_INDEX, index)]
 
     def chunk(self, rows: RecordGroup, transforms: RecordGroup) -> None:
-        """Write rows and transforms in order of time; the first chunk begins with the latched messages."""
-        head = b"".join(record for _, record in self._latched)
+        """Write rows and transforms in order of time; the first chunk begins with those made once."""
+        head = b"".join(record for _, _, record in self._latched)
         size, step = rows.raw.shape[1], transforms.raw.shape[1]
         before = np.searchsorted(rows.times, transforms.times, "right")  # rows before each transform
         total = len(head) + rows.raw.size + transforms.raw.size
@@ -122,8 +126,9 @@ class _Log:
         ]
         index: dict[int, tuple[Times, Times]] = {}
         start = 0
-        for number, record in self._latched:
-            index[number] = np.array([self._origin]), np.array([start])
+        for number, time, record in self._latched:
+            times, at = index.get(number, (np.empty(0, np.int64), np.empty(0, np.int64)))
+            index[number] = np.append(times, time), np.append(at, start)
             start += len(record)
         for group, at in groups:
             if group.times.size:
@@ -200,10 +205,10 @@ def _encoder(compression: Compression) -> Encoder:
 
 
 def _schemas_and_channels(topics: Mapping[str, int]) -> tuple[bytes, bytes]:
-    names = list(dict.fromkeys(TYPES[topic] for topic in topics))
+    names = list(dict.fromkeys(type_of(topic) for topic in topics))
     schemas = [records.schema(number, name, definition_of(name)) for number, name in enumerate(names, 1)]
     channels = [
-        records.channel(number, names.index(TYPES[topic]) + 1, topic, quality_of_service(topic))
+        records.channel(number, names.index(type_of(topic)) + 1, topic, quality_of_service(topic))
         for topic, number in topics.items()
     ]
     return b"".join(schemas), b"".join(channels)
