@@ -167,6 +167,22 @@ def job(kind: str) -> dict[str, Any]:
             TWO,
             [{"planner": "time_optimal", "path": "polyline", "through": [{"joints": [1, 0]}, {"joints": [1, 1]}]}],
         ),
+        **{
+            kind: (
+                {**ARM, "start": AT},
+                [
+                    {
+                        "planner": "path",
+                        "radius": 5,
+                        "law": {"shape": "time_optimal", "speed": 100},
+                        "segments": [
+                            *({"line": {"xyz": [x, 100, 250]}} for x in corners),
+                        ],
+                    }
+                ],
+            )
+            for kind, corners in (("merged", (420, 420)), ("turns_back", (440, 420)))
+        },
         "shrunk": (
             TWO,
             [

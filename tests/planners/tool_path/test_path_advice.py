@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from trajcli.cli.plan import summary
-from trajcli.errors import PlanningError, TrajcliError
+from trajcli.errors import TrajcliError
 from trajcli.job.read import job_from_text
 from trajcli.planning.plan import Plan, plan_job
 
@@ -39,8 +39,7 @@ def planned(segment: str, *changes: tuple[str, str]) -> Plan:
 @pytest.mark.parametrize(
     ("segment", "line", "said"),
     [
-        (BACK, 9, "stop there: `radius: 0` in segment 0"),
-        ("{line: {xyz: [400, 200, 200]}}", 10, "leave it out"),
+        ("{line: {xyz: [400, 200, 200], rpy: [180, 0, 20]}}", 10, "leave it out"),
         (STRAIGHT_ARC, 10, "this arc is straight"),
         ("{line: {xyz: [2400, 200, 200]}}", 10, "does not reach"),
     ],
@@ -55,8 +54,6 @@ def test_errors_stand_at_their_segment(segment: str, line: int, said: str) -> No
 
 
 def test_a_radius_of_zero_stops_at_that_corner_alone() -> None:
-    with pytest.raises(PlanningError):
-        planned(BACK)
     third = "{line: {xyz: [450, 120, 200]}}"
     plan = planned(
         f"{BACK}\n      - {third}",
@@ -73,6 +70,42 @@ def test_a_radius_of_zero_stops_at_that_corner_alone() -> None:
     s, speed = tool.law.evaluate(times)[:, 0], tool.law.evaluate(times, 1)[:, 0]
     assert min(speed[abs(s - first.s) < 1e-4]) < 1e-3 * speed.max()
     assert min(speed[abs(s - second.s) < 1e-3]) > 0.02 * speed.max()
+
+
+def kinds_of(plan: Plan) -> list[str]:
+    return [event.kind for event in plan.events]
+
+
+def test_a_path_that_turns_back_stops_there_and_says_so() -> None:
+    third = f"{BACK}\n      - {{line: {{xyz: [450, 120, 200]}}}}"
+    ahead = "200, 200]}}\n      - {line: {xyz: [400, 120"
+    by_hand = planned(third, (ahead, ahead.replace("}}", "}, radius: 0}")))
+    plan = planned(third)
+    assert kinds_of(plan) == ["turns_back", *kinds_of(by_hand)]
+    assert "segment 0" in plan.events[0].message
+    assert np.array_equal(plan.trajectory.curve.coefficients, by_hand.trajectory.curve.coefficients)
+
+
+def test_doubled_points_are_one() -> None:
+    twice = "{line: {xyz: [400, 200, 200]}}"
+    single, doubled = planned(TURN), planned(f"{twice}\n      - {twice}\n      - {TURN}\n      - {TURN}")
+    assert kinds_of(doubled) == ["merged", *kinds_of(single)]
+    assert "3 segments, the first is 1:" in doubled.events[0].message
+    assert np.array_equal(doubled.trajectory.curve.coefficients, single.trajectory.curve.coefficients)
+    with pytest.raises(TrajcliError) as caught:
+        planned(f"{twice}\n      - {twice}\n      - {TURN}\n      - {{line: {{xyz: [4000, 0, 0]}}}}")
+    place = caught.value.problems[0].place
+    assert place is not None
+    assert place.line == 13
+
+
+def test_of_a_doubled_point_the_least_radius_counts() -> None:
+    twice = "{line: {xyz: [400, 200, 200]}, radius: 0}"
+    plan = planned(f"{twice}\n      - {TURN}")
+    tool = plan.moves[0].planned.tool
+    assert tool is not None
+    (corner,) = tool.path.poses.position.corners  # type: ignore[attr-defined]
+    assert corner.kind == "stop"
 
 
 def test_a_jerk_limited_law_about_a_rounded_corner_names_the_faster_one() -> None:

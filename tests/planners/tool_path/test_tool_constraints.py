@@ -177,15 +177,6 @@ def test_a_center_within_a_path_is_moved_with_an_event():
             "needs more than 1e-06 mm",
             "leave it out",
         ),
-        (
-            {
-                "planner": "path",
-                "radius": 10,
-                "segments": [{"line": {"xyz": [450, 100, 50]}}, {"line": {"xyz": [400, 100, 50]}}],
-            },
-            "corner 1 of the path, at [450, 100, 50] mm",
-            "`radius: 0` in segment 0",
-        ),
     ],
 )
 def test_what_is_no_path_is_said_in_the_units_of_the_job(move, said, advice):

@@ -23,10 +23,11 @@ from trajcli.curves.operations import merge_breaks
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side
 from trajcli.errors import Amount, InputError, PlanningError, Problem, TrajcliError
 from trajcli.frozen import frozen
-from trajcli.geometry.paths.chain import Chain, Corner, CornerError, join
+from trajcli.geometry.paths.chain import Chain, Corner, join
+from trajcli.geometry.paths.corner import REVERSAL, turn_between
 from trajcli.geometry.paths.orientation import turn_vectors
 from trajcli.geometry.paths.pose import PoseCurve
-from trajcli.geometry.paths.position import Line, PositionCurve
+from trajcli.geometry.paths.position import SAME_POINT, Line, PositionCurve
 from trajcli.geometry.rotation import exp
 from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.kinematics.following.tool_path import ToolPath, ToolReference
@@ -50,6 +51,7 @@ from trajcli.units import Quantity
 
 _ONE_TIME = 1e-9  # of the duration: times this close to each other are one
 _SHRUNK = 1e-9  # relative
+_SAME_TURN = 1e-9  # rad: rounding of rotations
 _SAMPLES = 257  # of a segment at which its largest curvature is looked for
 
 Radius = Annotated[
@@ -165,12 +167,10 @@ class PathMove(ToolPathMove):
 
     def path_from(self, before: Array, robot: Robot) -> PlannedPath:
         """Return the segments, joined, from the pose `before` (4, 4)."""
-        curves, targets = _segments(before, self, robot)
+        curves, targets, kept = _segments(before, self, robot)
         overlap = self.overlap is not None and len(curves) > 1
-        radii = [0.0] * (len(curves) - 1)
-        if self.corner == "round":
-            radii = [_first_given(segment.radius, self.radius) for segment in self.segments[:-1]]
-        chain = _joined(curves, radii)
+        radii, turned_back = _turning_back(curves, self._radii(kept), kept)
+        chain = join(curves, np.array(radii))
         how, start = self.orientation, before[:3, :3]
         turning = orientation_along(how, start, targets, chain, chain.progress, self.origin)
         poses = PoseCurve(chain, turning)
@@ -181,7 +181,8 @@ class PathMove(ToolPathMove):
         turns = tuple(target.turn for target in targets)
         path = ToolPath(poses, last.position, fixed, last.tool_axis, turns, chain.progress)
         to = self.segments[-1].line or (self.segments[-1].arc and self.segments[-1].arc.to)
-        events = (*center_events(curves), *(() if overlap else _radius_events(chain)))
+        merged = _merged(len(self.segments), kept)
+        events = (*merged, *turned_back, *center_events(curves), *(() if overlap else _radius_events(chain)))
         ends = [*(corner.s for corner in chain.corners), path.length]
         planned = PlannedPath(
             path,
@@ -190,7 +191,7 @@ class PathMove(ToolPathMove):
             events,
             targets=tuple(
                 (("segments", k, "line") if segment.arc is None else ("segments", k, "arc", "to"), s)
-                for k, (segment, s) in enumerate(zip(self.segments, ends, strict=True))
+                for k, segment, s in zip(kept, [self.segments[k] for k in kept], ends, strict=True)
                 if segment.arc is None or segment.arc.to is not None
             ),
         )
@@ -198,6 +199,16 @@ class PathMove(ToolPathMove):
             return planned
         motion = overlapping_motion(before, curves, targets, self, robot.limits.tcp)
         return replace(planned, overlap=replace(motion, path=path, overlaps=True))
+
+    def _radii(self, kept: Sequence[int]) -> list[float]:
+        """Return the radius of each corner between the segments that are kept, m: the least that is given."""
+        if self.corner != "round":
+            return [0.0] * (len(kept) - 1)
+        radii = []
+        for first, last in pairwise(kept):
+            given = [s.radius for s in self.segments[first:last] if s.radius is not None]
+            radii.append(min(given, default=self.radius or 0.0))
+        return radii
 
 
 def _jump(s: float) -> PlanningError:
@@ -207,13 +218,19 @@ def _jump(s: float) -> PlanningError:
     return PlanningError(Problem(message, hint, amounts={"place": Amount(s, 0, None, "length")}))
 
 
-def _segments(before: Array, move: PathMove, robot: Robot) -> tuple[list[PositionCurve], list[ToolTarget]]:
-    """Return the curve and the target of each segment."""
+def _segments(
+    before: Array, move: PathMove, robot: Robot
+) -> tuple[list[PositionCurve], list[ToolTarget], list[int]]:
+    """Return curve, target and index of each segment: a line to where the tool is already is left out."""
     curves: list[PositionCurve] = []
     targets: list[ToolTarget] = []
+    kept: list[int] = []
     pose = before
+    last = len(move.segments) - 1
     for index, segment in enumerate(move.segments):
         try:
+            if _stays(segment, pose, robot) and (kept or index < last):
+                continue
             curve, target = _segment(segment, pose, robot)
         except TrajcliError as error:
             raise type(error)(*(_in_segment(index, problem) for problem in error.problems)) from None
@@ -226,8 +243,23 @@ def _segments(before: Array, move: PathMove, robot: Robot) -> tuple[list[Positio
             raise InputError(Problem(message, hint, field=("segments", index)))
         curves.append(curve)
         targets.append(target)
+        kept.append(index)
         pose = target.pose
-    return curves, targets
+    return curves, targets, kept
+
+
+def _stays(segment: Segment, pose: Array, robot: Robot) -> bool:
+    """Return whether it is a line to the pose (4, 4) in which the tool is already."""
+    off = np.full((4, 4), 1.0) if segment.line is None else tool_target(segment.line, pose, robot).pose - pose
+    return float(np.linalg.norm(off[:3, 3])) <= SAME_POINT and float(np.abs(off[:3, :3]).max()) <= _SAME_TURN
+
+
+def _merged(count: int, kept: Sequence[int]) -> list[Event]:
+    """Return the event of segments without a length that were left out."""
+    left = sorted({*range(count)} - {*kept})
+    some = "segment {}" if len(left) == 1 else f"{len(left)} segments, the first is {{}}:"
+    message = "counts for nothing: it ends where it begins"
+    return [Event("merged", f"{some.format(left[0])} {message}")] if left else []
 
 
 def _in_segment(index: int, problem: Problem) -> Problem:
@@ -236,18 +268,17 @@ def _in_segment(index: int, problem: Problem) -> Problem:
     return replace(problem.within(f"segment {index}"), field=("segments", index, *below))
 
 
-def _joined(curves: Sequence[PositionCurve], radii: Sequence[float]) -> Chain:
-    """Return the chain of segments; what is wrong with a corner stands at the segment that ends in it.
-
-    Raises:
-        PlanningError: When a corner to be rounded turns back.
-    """
-    try:
-        return join(curves, np.array(radii))
-    except CornerError as error:
-        hint = f"stop there: `radius: 0` in segment {error.index}"
-        problems = (replace(p, hint=hint, field=("segments", error.index)) for p in error.problems)
-        raise PlanningError(*problems) from None
+def _turning_back(
+    curves: Sequence[PositionCurve], radii: Sequence[float], kept: Sequence[int]
+) -> tuple[list[float], list[Event]]:
+    """Return the radii with 0, which stops, where the path turns back, and an event for each of these."""
+    left, events = list(radii), []
+    for k, (before, after) in enumerate(pairwise(curves)):
+        if left[k] and turn_between(before, after) > np.pi - REVERSAL:
+            left[k] = 0.0
+            message = f"the path turns back behind segment {kept[k]}, and stops there"
+            events.append(Event("turns_back", message))
+    return left, events
 
 
 def _segment(segment: Segment, pose: Array, robot: Robot) -> tuple[PositionCurve, ToolTarget]:
@@ -258,11 +289,6 @@ def _segment(segment: Segment, pose: Array, robot: Robot) -> tuple[PositionCurve
         raise InputError("a segment is either a `line` or an `arc`")
     target = tool_target(segment.line, pose, robot)
     return Line(pose[:3, 3], target.pose[:3, 3]), target
-
-
-def _first_given(*radii: float | None) -> float:
-    """Return the first radius that is given, m; 0 where none is."""
-    return next((radius for radius in radii if radius is not None), 0.0)
 
 
 def _radius_events(chain: Chain) -> tuple[Event, ...]:
