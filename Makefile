@@ -53,8 +53,8 @@ mutants: $(STAMP)  ## mutants of code that proves or judges; FILES='trajcli/judg
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[$(strip $(EXTRAS)),mutants]'
 	$(BIN)/python -m tests.mutants $(foreach pattern,$(FILES),'$(pattern)') --sample $(SAMPLE) --seed $(SEED)
 
-bench: $(STAMP) $(PEERS)/.installed  ## ratios against named peers, in one run
-	$(BIN)/python -m benchmarks --peers $(PEERS)/bin/python
+bench: $(STAMP) $(PEERS)/.installed  ## ratios against named peers, in one run; GROUP='planning jerk_limited': these alone
+	$(BIN)/python -m benchmarks $(GROUP) --peers $(PEERS)/bin/python
 
 $(PEERS)/.installed: benchmarks/peers.txt
 	-$(PYTHON) -m venv $(PEERS) && $(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check -r benchmarks/peers.txt

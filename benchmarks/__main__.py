@@ -38,6 +38,7 @@ BENCHMARKS = (
     "waypoints",
     "plotting",
     "viewing",
+    "waiting",
 )
 OURS = ("trajcli", "numpy", "pydantic", "pyyaml", "typer")
 THEIRS = ("roboticstoolbox-python", "eaik", "pin", "toppra", "copp-py", "numpy", "scipy")
@@ -62,7 +63,8 @@ def main() -> int:
         except ContestError as error:
             print(f"{name} broke: {error}", file=sys.stderr)
             return 1
-    print(f"\nmedians of {REPEATS} runs in turns\n\n{table(figures)}")
+    print(f"\nCPU time, children included: medians of {REPEATS} runs in turns, spread of those of one turn")
+    print(f"\n{table(figures)}")
     if options.json:
         found = {"machine": machine, "figures": [figure.as_json() for figure in figures]}
         Path(options.json).write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")

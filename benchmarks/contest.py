@@ -11,7 +11,6 @@ import os
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
@@ -39,7 +38,7 @@ class Runs:
     """What a contestant did.
 
     Attributes:
-        seconds: Duration of each run.
+        seconds: Time of the processor in each run, children included.
         peaks: Peak memory of each run, bytes; of whole processes only.
         skipped: Why there are no runs.
     """
@@ -64,7 +63,7 @@ class Contestant(Protocol):
         """Get ready; what must be put away afterwards is left to `stack`."""
 
     def run(self) -> tuple[float, float | None]:
-        """Return the duration of one run, s, and its peak memory, bytes."""
+        """Return the time of the processor in one run, s, and its peak memory, bytes."""
 
     def numbers(self) -> list[float]:
         """Return numbers that must be the same for all contestants; none where nothing can be compared."""
@@ -90,12 +89,11 @@ class Command:
             raise PeerError(NO_PEERS)
 
     def run(self) -> tuple[float, float | None]:
-        """Return duration and peak memory of one process."""
+        """Return the time of the processor and the peak memory of one process."""
         with tempfile.TemporaryFile() as complaints:
-            start = time.perf_counter()
             child = self._start(stdout=subprocess.DEVNULL, stderr=complaints)
             _, status, usage = os.wait4(child.pid, 0)
-            seconds = time.perf_counter() - start
+            seconds = usage.ru_utime + usage.ru_stime  # those of its own children are counted in
             child.returncode = os.waitstatus_to_exitcode(status)
             complaints.seek(0)
             self._require(child.returncode, complaints.read())
@@ -158,7 +156,7 @@ class Function:
         stack.callback(self._close)
 
     def run(self) -> tuple[float, float | None]:
-        """Return the duration of one call."""
+        """Return the time of the processor in one call."""
         return float(self._ask("run")), None
 
     def numbers(self) -> list[float]:

@@ -13,7 +13,6 @@ POINTS, INTERVALS = 10, 1000
 VELOCITY, ACCELERATION = 3.14, 10.0  # of every joint, rad/s and rad/s^2
 EFFORTS = (150.0, 150.0, 150.0, 28.0, 28.0, 28.0)
 _URDF = Path(__file__).parents[1] / "tests" / "urdf" / "models" / "ur5.urdf"
-_ONE_SECOND = 1.0
 
 
 def ours():
@@ -115,15 +114,8 @@ def proof():
     return run, lambda _: [0.0]
 
 
-def second():
-    """Prepare to wait for a second."""
-    import time
-
-    return lambda: time.sleep(_ONE_SECOND), lambda _: [0.0]
-
-
 def figures(peers: str | None, *, long: bool) -> list[Figure]:
-    """Return the figures: against pinocchio and toppra, without efforts, and the proof against a second."""
+    """Return the figures: against pinocchio and toppra, without efforts, and the proof in seconds."""
     module, mine = "benchmarks.dynamics", sys.executable
     recursion = compete(
         {
@@ -137,7 +129,7 @@ def figures(peers: str | None, *, long: bool) -> list[Figure]:
             "toppra": Function(peers, module, "toppra", peer=True),
         }
     )
-    pairs = (("whole", "whole_without"), ("proof", "second"))
+    pairs = (("whole", "whole_without"), ("proof",))
     alone = {}
     for pair in pairs:
         alone |= compete({name: Function(mine, module, name) for name in pair})
@@ -165,9 +157,9 @@ def figures(peers: str | None, *, long: bool) -> list[Figure]:
             "the same within accelerations",
             alone["whole"].seconds,
             alone["whole_without"].seconds,
-            2.0,
+            1.8,
         ),
-        Figure("proof of torques, 10 s", "1 s", alone["proof"].seconds, alone["second"].seconds, 0.3),
+        Figure("proof of torques, 10 s", "seconds", alone["proof"].seconds, [], 0.3, kind="seconds"),
     ]
 
 

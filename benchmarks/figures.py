@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 MEGABYTE = 1e6  # bytes
 
-_HEAD = ("benchmark", "against", "ours", "peer", "ratio", "goal", "")
+_HEAD = ("benchmark", "against", "ours", "peer", "ratio", "goal", "spread", "")
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Figure:
         theirs: Each run of the peer, s or bytes; empty when it was skipped.
         goal: The largest quotient; for memory the largest difference, bytes.
         aim: A quotient in reach, below the goal.
-        kind: "time" is judged by the quotient of the medians, "memory" by their difference.
+        kind: "time" is judged by the quotient of the medians, "memory" by their difference, "seconds" alone.
         skipped: Why there is nothing to compare with.
     """
 
@@ -33,7 +33,7 @@ class Figure:
     theirs: Sequence[float]
     goal: float
     aim: float | None = None
-    kind: Literal["time", "memory"] = "time"
+    kind: Literal["time", "memory", "seconds"] = "time"
     skipped: str | None = None
 
     @property
@@ -41,7 +41,10 @@ class Figure:
         """The quotient, or for memory the difference in bytes; None when the peer was skipped."""
         if self.skipped is not None:
             return None
-        ours, theirs = median(self.ours), median(self.theirs)
+        ours = median(self.ours)
+        if self.kind == "seconds":
+            return ours
+        theirs = median(self.theirs)
         return ours / theirs if self.kind == "time" else ours - theirs
 
     @property
@@ -57,7 +60,7 @@ class Figure:
     def row(self) -> tuple[str, ...]:
         """Return the cells of the table."""
         ours, theirs = self._amount(self.ours), self._amount(self.theirs)
-        return (self.benchmark, self.peer, ours, theirs, *self._judged(), self.verdict)
+        return (self.benchmark, self.peer, ours, theirs, *self._judged(), self._spread(), self.verdict)
 
     def as_json(self) -> dict[str, Any]:
         """Return everything for a program: s or bytes, each run, and the smallest and largest quotient."""
@@ -78,6 +81,14 @@ class Figure:
             "runs": {"ours": list(self.ours), "theirs": list(self.theirs)},
         }
 
+    def _spread(self) -> str:
+        """Return the smallest and largest quotient of runs in one turn, or of our runs to their median."""
+        own = [ours / median(self.ours) for ours in self.ours] if self.ours else []
+        quotients = (
+            [a / b for a, b in zip(self.ours, self.theirs, strict=False) if b] if self.kind == "time" else own
+        )
+        return f"{min(quotients):.2f} to {max(quotients):.2f}" if quotients else "-"
+
     def _amount(self, runs: Sequence[float]) -> str:
         if not runs:
             return "-"
@@ -88,6 +99,8 @@ class Figure:
         if self.kind == "memory":
             value = "-" if self.value is None else f"{self.value / MEGABYTE:+.1f} MB"
             return value, f"{self.goal / MEGABYTE:+.0f} MB"
+        if self.kind == "seconds":
+            return f"{self.value:.2f} s", f"{self.goal:.2f} s"
         return "-" if self.value is None else f"{self.value:.2f}", f"{self.goal:.2f}"
 
 
@@ -97,7 +110,7 @@ def table(figures: Sequence[Figure]) -> str:
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return "\n".join(
         "  ".join(
-            cell.rjust(width) if 2 <= place <= 5 else cell.ljust(width)
+            cell.rjust(width) if 2 <= place <= 6 else cell.ljust(width)
             for place, (cell, width) in enumerate(zip(row, widths, strict=True))
         ).rstrip()
         for row in rows

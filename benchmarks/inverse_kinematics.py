@@ -124,11 +124,11 @@ def figures(peers: str | None, *, long: bool) -> list[Figure]:
         peer = Function(peers, module, f"eaik_{arm}", peer=True)
         runs = compete({"ours": Function(sys.executable, module, f"ours_{arm}"), "peer": peer})
         name = f"inverse kinematics of 10^5 poses, {arm}"
-        found.append(_figure(name, "EAIK IK_batched", runs, 0.2))
+        found.append(_figure(name, "EAIK IK_batched", runs, 0.15))
     peer = Function(peers, module, "toolbox", peer=True)
     runs = compete({"ours": Function(sys.executable, module, "ours_few"), "peer": peer})
-    found.append(_figure(f"inverse kinematics of {FEW} poses, puma", "Robotics Toolbox ik_LM", runs, 1 / 50))
-    for kind, count, goal in (("alone", ARMS_OF_SEVEN // 10, 7.0), ("together", ARMS_OF_SEVEN, 2.0)):
+    found.append(_figure(f"inverse kinematics of {FEW} poses, puma", "Robotics Toolbox ik_LM", runs, 0.015))
+    for kind, count, goal in (("alone", ARMS_OF_SEVEN // 10, 5.0), ("together", ARMS_OF_SEVEN, 2.0)):
         peer = Function(peers, module, f"toolbox_panda_{kind}", peer=True)
         runs = compete({"ours": Function(sys.executable, module, f"panda_{kind}"), "peer": peer})
         found.append(_figure(f"{count} poses of a Panda, {kind}", "Robotics Toolbox ik_LM", runs, goal))

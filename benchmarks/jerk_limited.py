@@ -78,6 +78,6 @@ def figures(peers: str | None, *, long: bool) -> list[Figure]:
         theirs = runs["ruckig"]
         name = f"{MOVES} jerk-limited moves {states}"
         result.append(
-            Figure(name, "ruckig", runs["ours"].seconds, theirs.seconds, 50, skipped=theirs.skipped)
+            Figure(name, "ruckig", runs["ours"].seconds, theirs.seconds, 120, skipped=theirs.skipped)
         )
     return result

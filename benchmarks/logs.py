@@ -156,7 +156,7 @@ def figures(peers: str | None, *, long: bool) -> list[Figure]:
         Figure(f"{what}, zstd", messages, zstd.seconds, scaled["by message"], 1 / 20),
         Figure(f"{what}, zstd", packed_peer, zstd.seconds, scaled["packed"], 1 / 5),
         Figure(f"{what}, uncompressed", packed_peer, plain.seconds, scaled["plain"], 1 / 5),
-        Figure(command, "10^6 rows as CSV", runs["log"].seconds, runs["rows"].seconds, 1.5),
+        Figure(command, "10^6 rows as CSV", runs["log"].seconds, runs["rows"].seconds, 1.3),
         Figure(
             "peak memory, 10^6 rows as MCAP",
             "import numpy, yaml, pydantic",

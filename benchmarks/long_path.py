@@ -50,4 +50,7 @@ def figures(peers: str | None, *, long: bool) -> list[Figure]:
     )
     name = f"path of {MANY} rounded segments, each segment"
     each = [s / MANY for s in whole], [s / FEW for s in short]
-    return [Figure(name, f"each segment of {FEW}", *each, 1.5)]
+    return [
+        Figure(name, f"each segment of {FEW}", *each, 1.5),
+        Figure(name, "seconds", each[0], [], 0.008, kind="seconds"),
+    ]

@@ -63,9 +63,7 @@ def figures(peers: str | None, *, long: bool) -> list[Figure]:
     name, module = "line of 10 s at 1 kHz, whole process", "benchmarks.operational"
     found = [
         Figure(name, "import numpy, yaml, pydantic", seconds, runs["imports"].seconds, 2.5),
-        Figure(
-            name, "Robotics Toolbox ctraj + ik_LM", seconds, script.seconds, 1 / 8, skipped=script.skipped
-        ),
+        Figure(name, "Robotics Toolbox ctraj + ik_LM", seconds, script.seconds, 0.11, skipped=script.skipped),
     ]
     runs = compete(
         {

@@ -28,6 +28,6 @@ def figures(peers: str | None, *, long: bool) -> list[Figure]:
     name, ours, script = "plan, whole process, 10001 x 19", runs["plan"].seconds, runs["script"]
     return [
         Figure(name, "import numpy, yaml, pydantic", ours, runs["imports"].seconds, 2.0),
-        Figure(name, "same imports and arithmetic", ours, runs["unchecked"].seconds, 1.4),
-        Figure(name, "Robotics Toolbox jtraj + savetxt", ours, script.seconds, 1 / 6, skipped=script.skipped),
+        Figure(name, "same imports and arithmetic", ours, runs["unchecked"].seconds, 1.15),
+        Figure(name, "Robotics Toolbox jtraj + savetxt", ours, script.seconds, 0.12, skipped=script.skipped),
     ]

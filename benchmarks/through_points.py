@@ -54,7 +54,7 @@ def _processes(peers: str | None) -> list[Figure]:
     name = "spline through 1000 points, whole process"
     found = [(name, "scipy CubicSpline + savetxt", smooth["ours"], smooth["scipy"], 1 / 2)]
     name = "time-optimal through 10 points, whole process"
-    found.append((name, "toppra + savetxt", quick["ours"], quick["toppra"], 1 / 4))
+    found.append((name, "toppra + savetxt", quick["ours"], quick["toppra"], 0.2))
     return [
         Figure(a, b, ours.seconds, peer.seconds, goal, skipped=peer.skipped)
         for a, b, ours, peer, goal in found

@@ -69,7 +69,7 @@ def figures(peers: str | None, *, long: bool) -> list[Figure]:
     )
     ours, theirs = runs["ours"].seconds, runs["toppra"]
     name = "time-optimal, 6 joints, 1000 grid points"
-    return [Figure(name, "toppra", ours, theirs.seconds, 0.5, skipped=theirs.skipped)]
+    return [Figure(name, "toppra", ours, theirs.seconds, 0.1, skipped=theirs.skipped)]
 
 
 def _problem():

@@ -90,6 +90,8 @@ def figures(peers: str | None, *, long: bool) -> list[Figure]:
         )
         name = f"waypoints, {count} points of {JOINTS} joints"
         ours, path, stops = (runs[who] for who in ("ours", "path", "stops"))
+        points = 0.25 if count == 5 else 0.04 * count
+        result.append(Figure(name, "seconds", ours.seconds, [], points, kind="seconds"))
         result.append(Figure(f"{name}", "time_optimal without jerk", ours.seconds, path.seconds, 50))
         result.append(
             Figure(name, "ruckig, stops", ours.seconds, stops.seconds, 20000, skipped=stops.skipped)

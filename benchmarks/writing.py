@@ -94,8 +94,8 @@ def _choices(runs: dict[str, Runs]) -> list[Figure]:
     """Return what a file read back and full digits cost beside standard output with nine decimals."""
     plain, name = runs["plan"].seconds, "plan, whole process, 10^6 x 19"
     return [
-        Figure(f"{name}, -o FILE", "to standard output", runs["file"].seconds, plain, 1.4),
-        Figure(f"{name}, --digits full", "nine decimals", runs["full"].seconds, plain, 2.0),
+        Figure(f"{name}, -o FILE", "to standard output", runs["file"].seconds, plain, 1.3),
+        Figure(f"{name}, --digits full", "nine decimals", runs["full"].seconds, plain, 1.5),
     ]
 
 
