@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import posixpath
 import re
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,14 @@ _LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\[\]]*\])*)\]\(([^)\s]+)\)")
 _ITEM = r"(?:[*-]|\d+\.) "
 _TEXT_AND_ITEM = re.compile(rf"^(?!{_ITEM})(\S.*)\n(?={_ITEM})", re.MULTILINE)
 _BELOW_NUMBER = re.compile(r"^ {3}(?=\S)", re.MULTILINE)
+
+
+def on_config(config: Any) -> Any:  # noqa: ANN401
+    """Take the address of the repository from pyproject.toml; example.org stands for none."""
+    project = tomllib.loads((Path(config.config_file_path).parent / "pyproject.toml").read_text("utf-8"))
+    address = project["tool"]["hatch"]["metadata"]["hooks"]["custom"]["address"]
+    config.repo_url = None if "://example.org/" in address else address
+    return config
 
 
 def on_files(files: Any, config: Any) -> Any:  # noqa: ANN401

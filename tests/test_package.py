@@ -1,0 +1,85 @@
+"""What an index shows of the package: its description, its links, and one address behind all of them."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import sys
+import tomllib
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import pytest
+
+from docs.markdown import ROOT, links
+from docs.site_hook import on_config
+
+ADDRESS = "https://forge.test/trajcli"
+PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def metadata(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """The metadata that the hook makes for an address; hatchling itself is there only while a package is built."""
+    interface = ModuleType("hatchling.metadata.plugin.interface")
+    interface.MetadataHookInterface = SimpleNamespace  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, interface.__name__, interface)
+    spec = importlib.util.spec_from_file_location("hatch_build", ROOT / "hatch_build.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    made: dict[str, Any] = {}
+    module.AddressHook(root=str(ROOT), config={"address": f"{ADDRESS}/"}).update(made)
+    return made
+
+
+def test_the_description_has_the_links_of_the_readme_from_anywhere(metadata: dict[str, Any]) -> None:
+    text = metadata["readme"]["text"]
+    shown, kept = links(text), links(README)
+    assert len(shown) == len(kept) > 20
+    for link, relative in zip(shown, kept, strict=True):
+        if "://" in relative or relative.startswith("#"):
+            assert link == relative
+            continue
+        assert re.fullmatch(rf"{ADDRESS}/(blob|raw)/HEAD/{re.escape(relative)}", link)
+        assert (ROOT / relative.partition("#")[0]).exists()
+    pictures = re.findall(r"!\[[^\]]*\]\((\S+)\)", text)
+    assert pictures
+    assert all(picture.startswith(f"{ADDRESS}/raw/HEAD/docs/pictures/") for picture in pictures)
+
+
+def test_what_is_no_link_stays_as_it_is(metadata: dict[str, Any]) -> None:
+    def without_links(text: str) -> str:
+        return re.sub(r"\]\([^)\s]+\)", "]", text)
+
+    assert without_links(metadata["readme"]["text"]) == without_links(README)
+
+
+def test_the_links_of_the_project_lead_to_its_address(metadata: dict[str, Any]) -> None:
+    assert {"Homepage", "Documentation", "Changelog", "Issues"} <= metadata["urls"].keys()
+    for url in metadata["urls"].values():
+        assert url.startswith(ADDRESS)
+        file = url.partition("/blob/HEAD/")[2]
+        assert not file or (ROOT / file).exists()
+
+
+def test_one_line_holds_the_address() -> None:
+    (address,) = PROJECT["tool"]["hatch"]["metadata"]["hooks"]["custom"].values()
+    pages = [*ROOT.glob("*.md"), *ROOT.glob("*.yml"), *ROOT.glob("*.toml"), *ROOT.glob("docs/**/*.md")]
+    naming = [page for page in pages for _ in range(page.read_text(encoding="utf-8").count(address))]
+    assert naming == [ROOT / "pyproject.toml"]
+    assert {"readme", "urls"} <= set(PROJECT["project"]["dynamic"])
+
+
+@pytest.mark.parametrize(
+    ("address", "led_to"), [("https://example.org/trajcli", None), (ADDRESS, ADDRESS)], ids=["none", "real"]
+)
+def test_the_site_leads_there_once_the_address_is_real(
+    address: str, led_to: str | None, tmp_path: Path
+) -> None:
+    (tmp_path / "pyproject.toml").write_text(f"[tool.hatch.metadata.hooks.custom]\naddress = '{address}'\n")
+    config = SimpleNamespace(config_file_path=str(tmp_path / "mkdocs.yml"), repo_url="")
+    assert on_config(config).repo_url == led_to
