@@ -18,7 +18,8 @@ from trajcli.errors import TrajcliError
 _INTRODUCTION = """\
 Data go to stdout, words for people to stderr. A file that is written appears whole or not at all. `-`
 is standard input where a file is read, and standard output where one is written. `NO_COLOR` is
-honoured. `trajcli --version` prints the version, `trajcli --install-completion` completes commands in
+honoured. `trajcli --version` prints the version, `trajcli --version --verbose` those of all libraries and
+what extras lack, as a report of a bug needs it. `trajcli --install-completion` completes commands in
 the shell, and every command has `--help`."""
 
 _JSON_ERRORS = """\

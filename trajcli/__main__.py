@@ -77,11 +77,8 @@ def _end(number: int, frame: object) -> NoReturn:
 
 def _run() -> int:
     try:
-        if sys.argv[1:] == ["--version"]:  # typer would import pydantic to read an option of its own
-            from trajcli.version import __version__
-
-            print(f"trajcli {__version__}")  # noqa: T201
-            return 0
+        if sys.argv[1:2] == ["--version"]:  # typer would import pydantic to read an option of its own
+            return _print_version(sys.argv[2:])
         from trajcli.cli.app import run
 
         run()
@@ -91,8 +88,26 @@ def _run() -> int:
         return leaving.code if isinstance(leaving.code, int) else int(leaving.code is not None)
     except KeyboardInterrupt:  # before a command has begun to listen for it
         return INTERRUPTED
+    except ImportError as error:  # of what reads the command line
+        from trajcli.version import library_error
+
+        of_library = library_error(error)
+        if of_library is None:
+            raise
+        print(f"error: {of_library}", file=sys.stderr)  # noqa: T201
+        return of_library.exit_code
     except OSError as error:  # the help, or the version, could not be written
         return _unwritten(error)
+    return 0
+
+
+def _print_version(words: list[str]) -> int:
+    from trajcli.version import __version__, version_lines
+
+    if words and words not in (["--verbose"], ["-v"]):
+        print("error: --version takes --verbose and nothing else", file=sys.stderr)  # noqa: T201
+        return 2
+    print("\n".join(version_lines()) if words else f"trajcli {__version__}")  # noqa: T201
     return 0
 
 

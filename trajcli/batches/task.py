@@ -24,6 +24,7 @@ from trajcli.job.yaml.source import read_bytes
 from trajcli.output.delivery.delivered import delivered
 from trajcli.output.write import grid_of, write_rows
 from trajcli.streams.formats import FormatName, format_of
+from trajcli.version import library_error
 
 if TYPE_CHECKING:
     from trajcli.job.override import Setting
@@ -165,9 +166,12 @@ def run_task(task: Task, setup: Setup) -> JobOutcome:
         hint = "a lower rate or a shorter motion needs less"
         code, problems, remains = BUG, (Problem("there is not enough memory", hint),), False
     except Exception as error:  # noqa: BLE001
+        of_library = library_error(error)
         message = f"a bug in trajcli: {type(error).__name__}: {error}"
         problem = Problem(message, f"`trajcli plan {utf8(job.job)}` says more")
         code, problems, remains = BUG, (problem,), True
+        if of_library is not None:
+            code, problems = of_library.exit_code, of_library.problems
     seconds = monotonic() - begun
     return JobOutcome(
         job, "failed", code, tuple(problems), inputs=hashed.value, seconds=seconds, remains=remains

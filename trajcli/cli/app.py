@@ -33,6 +33,7 @@ _OTHER_NAMES = {
     "report": "trajcli plan JOB --report FILE",
     "help": "trajcli --help",
     "version": "trajcli --version",
+    **dict.fromkeys(("doctor", "versions"), "trajcli --version --verbose"),
 }  # fmt: skip
 
 
@@ -81,7 +82,7 @@ def application(commands: Sequence[type[CommandLine]]) -> typer.Typer:
         name="trajcli",
         cls=Commands,
         help="Trajectory planning for serial robots: a YAML job in, a verified sample stream out. "
-        "`trajcli --version` prints the version.",
+        "`trajcli --version` prints the version, `trajcli --version --verbose` those of its libraries, too.",
         epilog="Example: trajcli init job.yaml && trajcli plan job.yaml\n\n"
         "Exit codes: 0 done and verified, 1 judged and found wrong, 2 wrong input, 3 no curve exists, "
         "4 file trouble, 70 a bug in trajcli.",

@@ -116,8 +116,12 @@ class Callback:
     def __call__(self, **given: Any) -> NoReturn:  # noqa: ANN401
         """Leave with the exit code of the command."""
         command = self._command(**given)
-        module = import_module(f"trajcli.cli.{command.module or command.word()}")
-        sys.exit(exit_code(getattr(module, f"run_{command.word()}"), command, command.errors))
+        sys.exit(exit_code(_run, command, command.errors))
+
+
+def _run(command: CommandLine) -> int:
+    module = import_module(f"trajcli.cli.{command.module or command.word()}")
+    return int(getattr(module, f"run_{command.word()}")(command))
 
 
 def register(app: typer.Typer, commands: Iterable[type[CommandLine]]) -> None:

@@ -70,8 +70,11 @@ def _annotated(jobs: Sequence[str], options: PlanCommand, form: AnnotationForm) 
         except OSError:
             raise
         except Exception as error:  # noqa: BLE001
-            found += annotations_of(TrajcliError(Problem(f"a bug in trajcli: {error}")), job)
-            code = max(code, BUG)
+            from trajcli.version import library_error
+
+            of_library = library_error(error)
+            found += annotations_of(of_library or TrajcliError(Problem(f"a bug in trajcli: {error}")), job)
+            code = max(code, of_library.exit_code if of_library else BUG)
     print(render_annotations(found, form, jobs), end="", file=sys.stderr)  # noqa: T201
     return code
 

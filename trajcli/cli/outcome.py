@@ -82,9 +82,18 @@ def error_as_json(error: TrajcliError) -> dict[str, Any]:
 
 
 def report_bug(error: Exception, form: ErrorForm = "text") -> int:
-    """Print an error that nobody raised on purpose on standard error; return its exit code."""
+    """Print an error that nobody raised on purpose on standard error; return its exit code.
+
+    It is a bug but where a library is missing or too old.
+    """
     import traceback
 
+    from trajcli.version import library_error
+
+    of_library = library_error(error)
+    if of_library is not None:
+        report_error(of_library, form)
+        return of_library.exit_code
     message = f"a bug in trajcli: {error}"
     if form == "json":
         said = {"error": type(error).__name__, "exit": BUG, "problems": [{"message": message}]}

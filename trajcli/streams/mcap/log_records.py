@@ -274,6 +274,8 @@ class LogRecords:
 
                 unpacked: bytes = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=most)
                 return unpacked
+        except ImportError:
+            raise
         except Exception as error:  # each library has classes of its own
             raise self.wrong(f"a chunk cannot be unpacked ({error})") from error
         if chunk.compression not in ("", "none"):
