@@ -11,7 +11,7 @@ PYTEST := $(STREAMS) PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n auto --
 PEERS := .venv-peers
 EXTRAS ?= dev  # dev,dask,docs,viewers: also what the tests of viewers, of the site and of clusters need
 
-.PHONY: setup demo check format lint types test soak mutants bench golden schema docs player picture site clean
+.PHONY: setup demo check format lint types test soak mutants bench golden schema docs player picture site release-check release clean
 
 setup: $(STAMP)
 
@@ -84,5 +84,23 @@ site: $(STAMP)  ## the documents as a site in site/, dead links refused
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet
 	@echo "open site/index.html"
 
+release-check: $(STAMP)  ## wheel and sdist into dist/, installed in bare environments: all commands, all examples
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[$(strip $(EXTRAS)),release]'
+	$(BIN)/python -m tests.release
+
+VERSION = $(shell $(BIN)/python -c 'from trajcli.version import __version__; print(__version__)')
+release: $(STAMP)  ## the checklist of a release, up to its tag; who owns the project uploads what is in dist/
+	@test -z "$$(git status --porcelain)" || { echo "commit your changes first"; exit 1; }
+	grep -q '^## \[$(VERSION)\] - 2' CHANGELOG.md
+	$(MAKE) check
+	$(MAKE) schema docs site
+	git diff --exit-code
+	$(MAKE) release-check
+	$(MAKE) mutants SAMPLE=$(if $(filter 0,$(SAMPLE)),5,$(SAMPLE))
+	$(MAKE) bench
+	git tag -a v$(VERSION) -m "trajcli $(VERSION)"
+	@grep -q 'address = "https://example.org/' pyproject.toml && \
+	  echo "the project has no address yet: write it into pyproject.toml before you upload" || true
+
 clean:
-	rm -rf $(VENV) $(PEERS) .mutants site .mypy_cache .ruff_cache .pytest_cache .hypothesis ur5e_pick.csv ur5e_pick.report.json
+	rm -rf $(VENV) $(PEERS) .mutants dist site .mypy_cache .ruff_cache .pytest_cache .hypothesis ur5e_pick.csv ur5e_pick.report.json

@@ -146,7 +146,7 @@ def test_a_library_that_does_not_load_is_named_with_the_reason() -> None:
     assert line is not None
     assert "the library ruckig" in line
     assert "cannot be loaded (libstdc++.so.6: cannot open)" in line
-    assert "pip install --force-reinstall 'ruckig>=0.19'" in line
+    assert "pip install --force-reinstall 'ruckig>=0.19" in line
 
 
 def test_a_module_of_our_own_is_no_library() -> None:
