@@ -20,6 +20,18 @@ def report_progress(text: str) -> None:
 
 
 @contextmanager
+def progress_of(work: str) -> Iterator[None]:
+    """Say of which work every step inside is one, as `trial 3, 4.5 kg: planning move 2 (line)`."""
+    outer = _LISTENER.get()
+    if outer is None:
+        yield
+        return
+    outer(work)
+    with listening(lambda text: outer(f"{work}: {text}")):
+        yield
+
+
+@contextmanager
 def listening(listener: Listener) -> Iterator[None]:
     """Let `listener` have every text that is said inside."""
     token = _LISTENER.set(listener)

@@ -17,6 +17,7 @@ HOOKS = {
     for reason, names in {
         "called by Python itself: attributes of the package": "__getattr__ __dir__",
         "called by pydantic: it looks for plug-ins, of models for settings": "get_plugins model_config",
+        "called by typer, where it writes help": "format_commands format_options",
         "called by notebooks": "_repr_svg_",
         "called by users of the Python interface": "fk ik",
         "called by toppra, whose paths have them": "dof path_interval",

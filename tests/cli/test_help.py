@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from running import ROOT, call
 
-from trajcli.cli.app import app
+from trajcli.cli.app import GROUPS, app
 
 Capture = pytest.CaptureFixture[str]
 NAMES = [info.callback.__name__ for info in app.registered_commands if info.callback]
@@ -62,3 +62,19 @@ def test_a_command_that_exists_under_another_name_is_named(word: str, named: str
     assert (code, out) == (2, "")
     assert f"No such command '{word}'" in err
     assert f"trajcli {named}" in err
+
+
+def test_each_command_stands_in_one_group_of_the_help(capfd: Capture) -> None:
+    listed = [word for words in GROUPS.values() for word in words]
+    assert sorted(listed) == sorted(NAMES)
+    text = call(capfd, "--help").out
+    assert [title for title in GROUPS if f"{title}:\n" in text] == list(GROUPS)
+    assert "..." not in text.split("\n", 1)[1]  # no line is cut
+    assert "Compute the pose of the tool" in text
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_help_fits_80_columns_and_speaks_no_python(name: str, capfd: Capture) -> None:
+    text = call(capfd, name, "--help").out
+    assert max(map(len, text.splitlines())) <= 80
+    assert not re.search(r"<(str|int|float|list\[str\])>|default: \(|\{JOB\}", text)

@@ -13,7 +13,7 @@ from pathlib import Path
 from threading import Event, Thread
 
 from trajcli.cli.progress import ProgressLine
-from trajcli.progress import listening, report_progress
+from trajcli.progress import listening, progress_of, report_progress
 
 JOB = Path(__file__).parents[2] / "examples/ur5e_pick.yaml"
 
@@ -57,6 +57,15 @@ def test_texts_reach_whoever_listens_and_nobody_else() -> None:
         report_progress("inside")
     report_progress("behind")
     assert texts == ["inside"]
+
+
+def test_steps_say_of_which_work_they_are() -> None:
+    texts: list[str] = []
+    with progress_of("nobody listens"):
+        report_progress("step")
+    with listening(texts.append), progress_of("trial 2, 4 kg"):
+        report_progress("checking")
+    assert texts == ["trial 2, 4 kg", "trial 2, 4 kg: checking"]
 
 
 def run(*arguments: str, terminal: bool, late: float = 0.0) -> str:

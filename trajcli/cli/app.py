@@ -37,6 +37,17 @@ _OTHER_NAMES = {
 }  # fmt: skip
 
 
+GROUPS = {
+    "Plan and judge": ("plan", "check", "explain", "payload", "batch", "sweep"),
+    "Look": ("view", "plot", "diff"),
+    "Motions": ("retime", "resample", "concat", "reverse", "slice", "convert"),
+    "Kinematics and dynamics": ("fk", "ik", "jacobian", "dynamics", "pose", "mobility"),
+    "Robots": ("robots", "urdf", "calibrate"),
+    "Files and consumers": ("init", "schema", "profiles"),
+}
+"""The commands as `--help` lists them; each stands in one group."""
+
+
 class Commands(typer.core.TyperGroup):
     """The commands, which know by what other names people call them."""
 
@@ -46,6 +57,14 @@ class Commands(typer.core.TyperGroup):
         if args[0] not in self.commands and known is not None:
             ctx.fail(f"No such command '{args[0]}': here it is `{known}`.")
         return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
+        """Write the commands by group, each with the first sentence of its help, uncut."""
+        for title, words in GROUPS.items():
+            known = [(word, self.commands[word].help or "") for word in words if word in self.commands]
+            if known:
+                with formatter.section(title):
+                    formatter.write_dl([(word, _first_sentence(text)) for word, text in known])
 
     def main(self, args: Sequence[str] | None = None, *rest: Any, **options: Any) -> Any:  # noqa: ANN401
         """Run the command; errors of usage have the form that the words ask for."""
@@ -64,6 +83,11 @@ class Commands(typer.core.TyperGroup):
             report_error(InputError(words(), hint="see --help"), form)
             sys.exit(InputError.exit_code)
         sys.exit(code or 0)
+
+
+def _first_sentence(text: str) -> str:
+    words = " ".join(text.split("\n\n", maxsplit=1)[0].split())
+    return words.split(". ")[0].rstrip(".")
 
 
 def _form_of_errors(words: Sequence[str]) -> Any:  # noqa: ANN401

@@ -108,7 +108,7 @@ class NumbersCommand(Command):
 
 
 class FkCommand(NumbersCommand):
-    """Say where the tool is: its pose for given joint values, or for each row of a CSV.
+    """Compute the pose of the tool from joint values, or from each row of a CSV.
 
     Joint values outside the robot's limits have a pose too; a line on stderr says which they are.
     """
@@ -175,7 +175,7 @@ class IkCommand(NumbersCommand):
 
 
 class JacobianCommand(NumbersCommand):
-    """Say how the tool moves with the joints: the Jacobian, manipulability, rank, what is lost.
+    """Compute the Jacobian of the tool, its manipulability and rank, and the directions that are lost.
 
     The Jacobian is the one of textbooks: angular rows in rad, columns per rad, whatever the unit of angles
     is; lengths are in the unit of lengths. Joint values and --qd are in the units of the robot's file.
@@ -204,7 +204,7 @@ class JacobianCommand(NumbersCommand):
 
 
 class DynamicsCommand(NumbersCommand):
-    """Say what drives the joints: torques (N m) and forces (N) of a motion, and what they are made of.
+    """Compute joint torques (N m) and forces (N) of a motion, and the parts they are made of.
 
     tau = M(q) qdd + C(q, qd) qd + g(q) + friction, with the rotors in M. Joint values and rates are in the
     units of the robot's file, everything else is SI. Rows of q, qd and qdd become rows of tau.

@@ -5,6 +5,7 @@ Only typer is imported here: `--help` must stay fast.
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterable
 from functools import cached_property
@@ -19,6 +20,7 @@ from trajcli.cli.options import Errors
 from trajcli.cli.outcome import ErrorForm, exit_code
 
 P = TypeVar("P")
+_ARGUMENT_TYPE = re.compile(r" <(?:str|int|float|list\[str\])>$")
 _MEANT = {
     "-j": "-j is how many processes `batch` uses; say --job, or --json",
     "--json": "rows are JSON with --format jsonl, the report of `plan` with --report FILE, "
@@ -38,6 +40,26 @@ class Words(typer.core.TyperCommand):
             if meant is None or type(error).__name__ != "NoSuchOption":
                 raise
             ctx.fail(f"{error}: {meant}")
+
+    def collect_usage_pieces(self, ctx: typer.Context) -> list[str]:  # type: ignore[override]
+        """Return the words behind the command's name, without marks of what must be given."""
+        return [re.sub(r"^\{(.*)\}$", r"\1", piece) for piece in super().collect_usage_pieces(ctx)]
+
+    def format_options(self, ctx: typer.Context, formatter: Any) -> None:  # type: ignore[override]  # noqa: ANN401
+        """Write arguments by their names alone, and defaults as they are typed."""
+        for title, kind in (("Arguments", "argument"), ("Options", "option")):
+            of_kind = [param for param in self.get_params(ctx) if param.param_type_name == kind]
+            records = [record for param in of_kind if (record := param.get_help_record(ctx)) is not None]
+            if records:
+                with formatter.section(title):
+                    formatter.write_dl(
+                        [(_ARGUMENT_TYPE.sub("", name), _default(text)) for name, text in records]
+                    )
+
+
+def _default(text: str) -> str:
+    """Return a help text whose default, given in words, stands in no parentheses of its own."""
+    return re.sub(r"\[default: \(([^()]*)\)(?=[\];])", r"[default: \1", text)
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True)

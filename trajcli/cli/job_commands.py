@@ -104,7 +104,7 @@ class PlanCommand(CommandLine):
 
 
 class ExplainCommand(Command):
-    """Say each move in words and formulas: polynomials, phases, peaks, branches, and how fast it could be."""
+    """Explain each move in words and formulas: polynomials, phases, peaks, branches, how fast it could be."""
 
     example = "trajcli explain examples/cubic.yaml"
 

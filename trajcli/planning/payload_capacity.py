@@ -25,7 +25,7 @@ from trajcli.limits.tolerances import EFFORT_RELATIVE
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Carried, Plan, plan_job
 from trajcli.planning.planned_move import KnownMoves
-from trajcli.progress import report_progress
+from trajcli.progress import progress_of
 
 PlanWith = Callable[[LoadedJob, Carried], Plan]
 """Returns the plan of a job with what the tool carries in a move instead."""
@@ -121,9 +121,9 @@ class _Search:
     def attempt(self, mass: float) -> Plan | TrajcliError:
         """Return the plan with a mass, or why there is none."""
         if mass not in self._plans:
-            report_progress(f"trying {mass:.9g} kg")
             try:
-                self._plans[mass] = self._planned(self._loaded, partial(self._carried, mass))
+                with progress_of(f"trial {len(self._plans) + 1}, {mass:.9g} kg"):
+                    self._plans[mass] = self._planned(self._loaded, partial(self._carried, mass))
             except TrajcliError as error:
                 self._plans[mass] = error
         return self._plans[mass]
