@@ -13,7 +13,7 @@ from trajcli.curves import node_bound
 from trajcli.dynamics import effort_bound
 from trajcli.dynamics.effort_bound import effort_majorants, effort_survey, needed_stretch
 from trajcli.dynamics.newton_euler import InverseDynamics
-from trajcli.kinematics.power_series import growth
+from trajcli.geometry.power_series import growth
 from trajcli.kinematics.robot import Friction, Joint, LinkInertia, Robot, point_mass, unlimited
 
 NODES = np.linspace(0.0, 1.0, 9)

@@ -15,7 +15,7 @@ from series_of_efforts import effort_series
 
 from trajcli.dynamics.effort_bound import effort_majorants
 from trajcli.dynamics.newton_euler import InverseDynamics
-from trajcli.kinematics.power_series import growth
+from trajcli.geometry.power_series import growth
 from trajcli.kinematics.robot import Friction, Joint, LinkInertia, Payload, Robot, point_mass, unlimited
 
 ORDERS = 7

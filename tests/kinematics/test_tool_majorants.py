@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numpy.polynomial import chebyshev
 
+from trajcli.geometry.power_series import growth
 from trajcli.job.robot import load_robot
 from trajcli.kinematics.forward import forward
-from trajcli.kinematics.power_series import growth
 from trajcli.kinematics.tool_majorants import majorants
 
 ORDER, LENGTH = 11, 0.3

@@ -17,6 +17,7 @@ from trajcli.grids import UniformGrid
 from trajcli.job.dump import dump_job
 from trajcli.job.read import job_from_text
 from trajcli.job.reports.part import in_units
+from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.output.report import report_of
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.samples import sample
@@ -107,6 +108,18 @@ def test_a_corner_of_two_lines_of_the_tool_is_flown_by(zone, most):
     assert plan.trajectory.duration <= most
     assert plan.flyby is not None
     assert plan.flyby.stopping == pytest.approx(1.6139, abs=1e-3)
+    assert {what for what, _ in plan.verdict.sampled} <= {"branch", "angle from its orientation"}
+    strict = [
+        replace(part, tool=replace(part.tool, tolerance=Tolerance(1e-13, 1e-6)))
+        for part in plan.moves[0].promise.parts
+        if part.tool
+    ]
+    promises = [
+        replace(plan.moves[0].promise, parts=tuple(strict)),
+        *(move.promise for move in plan.moves[1:]),
+    ]
+    found = verify(plan.trajectory, [move.robot.limits for move in plan.moves], promises).findings
+    assert {(f.kind, f.method) for f in found} == {("tool_path", "bounded")}
 
 
 @pytest.mark.parametrize(("zone", "saved"), [(1e-6, 5.31e-3), (1e-7, 2.46e-3), (1e-9, 0.528e-3)])

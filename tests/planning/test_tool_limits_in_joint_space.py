@@ -213,7 +213,7 @@ def test_what_cannot_be_judged_is_named() -> None:
 
 
 def test_what_is_only_sampled_is_said() -> None:
-    """On a path the distance from it and the branch are looked at on rows; in joint space there is no such thing."""
+    """On a path the branch is looked at on rows; in joint space there is no such thing."""
     line = {"planner": "line", "to": {"xyz": [0.4, 0.0, 0.3]}}
     lines = {
         "version": 1,
@@ -224,9 +224,28 @@ def test_what_is_only_sampled_is_said() -> None:
     }
     plan = plan_job(loaded(lines))
     assert plan.verdict.passed
-    assert plan.verdict.sampled == (0, 2)
-    assert "\n  on samples only: distance from the path and branch, moves 0, 2" in summary(plan, 0)
-    report = report_of(plan)
-    assert [move.tool.method if move.tool else None for move in report.moves] == ["sampled", None, "sampled"]
+    assert plan.verdict.sampled == (("branch", (0, 2)),)
+    assert "\n  on samples only: branch, moves 0, 2" in summary(plan, 0)
+    tools = [move.tool for move in report_of(plan).moves]
+    assert [tool and tool.method for tool in tools] == ["bounded", None, "bounded"]
+    assert all(tool.deviation <= (tool.deviation_bound or 0) <= 1e-6 for tool in tools if tool)
+    assert all(tool.turned <= (tool.turned_bound or 0) <= 1e-6 for tool in tools if tool)
     joints = planned({"planner": "quintic", "duration": 3}, {"speed": 1})
     assert "on samples only" not in summary(joints, 0)
+
+
+def test_what_of_a_path_with_overlapping_segments_is_sampled_is_said() -> None:
+    points = [{"xyz": [0.4, 0.05, 0.3]}, {"xyz": [0.45, 0.1, 0.3]}]
+    job = {
+        "version": 1,
+        "robot": "ur5e",
+        "limits": {"acceleration": 10, "tcp": {"speed": 0.2, "acceleration": 1}},
+        "start": {"xyz": [0.4, 0.0, 0.3]},
+        "moves": [{"planner": "path", "segments": [{"line": each} for each in points], "overlap": 0.05}],
+    }
+    plan = plan_job(loaded(job))
+    what = "distance from the path and angle from its orientation and branch"
+    assert plan.verdict.sampled == ((what, (0,)),)
+    (move,) = report_of(plan).moves
+    assert move.tool is not None
+    assert (move.tool.method, move.tool.deviation_bound, move.tool.turned_bound) == ("sampled", None, None)

@@ -1,16 +1,16 @@
-"""Tool along its path: deviation and branch, by forward kinematics of the trajectory."""
+"""Tool along its path: deviation, for all t where the path has majorants, and branch."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount
-from trajcli.findings import Finding, at_time
+from trajcli.findings import Finding, FindingMethod, at_time
 from trajcli.frozen import frozen
 from trajcli.kinematics.dexterity import changes_of_sign, characteristic_length
 from trajcli.kinematics.following.motion import ToolMotion
@@ -18,17 +18,21 @@ from trajcli.kinematics.inverse.target import IkTarget, determinants, residuals
 from trajcli.kinematics.jacobian import linearisation
 from trajcli.kinematics.robot import Robot
 from trajcli.limits.kinds import LimitedMove
-from trajcli.limits.tolerances import exceeds
+from trajcli.limits.path_bound import path_bounds
+from trajcli.limits.tolerances import PATH_RELATIVE, exceeds
 from trajcli.limits.tool import peaks_in
 from trajcli.limits.tool_bound import ToolPeak
 from trajcli.trajectory import Span, Trajectory
+
+if TYPE_CHECKING:
+    from trajcli.curves.node_bound import BoundedPeak
 
 _EACH = 8  # rows of a piece
 
 
 @frozen
 class SampledTool:
-    """The tool over one move, at sample times, and its reference motion.
+    """The tool over one move, or over a part of it, and its reference motion.
 
     Attributes:
         trajectory: The whole.
@@ -64,15 +68,39 @@ class SampledTool:
 
     @cached_property
     def deviation(self) -> tuple[Array, Array]:
-        """Distance of the tool from its path, m, and angle from its orientation, rad, each (N,)."""
+        """Distance of the tool from its path, m, and angle from its orientation, rad, each (N,), on rows."""
         off, split = residuals(self.target, self.linearised[0]), sum(self.target.position)
         return np.linalg.norm(off[:, :split], axis=1), np.linalg.norm(off[:, split:], axis=1)
 
     @cached_property
+    def bounds(self) -> tuple[BoundedPeak | None, BoundedPeak | None]:
+        """What distance and angle do not exceed at any time; None where only rows say it."""
+        return path_bounds(self._move)
+
+    @cached_property
+    def determinants(self) -> Array | None:
+        """Whose sign tells branches apart, (N,); None where none does."""
+        return determinants(self.target, *self.linearised, characteristic_length(self.robot))
+
+    @cached_property
     def peaks(self) -> Mapping[str, ToolPeak]:
         """Largest speeds and accelerations, from the start of the move, by the keys of their limits."""
-        robot = self.robot
-        return peaks_in(LimitedMove(self.trajectory, self.span, robot.limits, robot, self.motion), robot)
+        return peaks_in(self._move, self.robot)
+
+    @property
+    def sampled(self) -> Iterator[str]:
+        """What of it is judged on rows alone."""
+        for what, bound in zip(
+            ("distance from the path", "angle from its orientation"), self.bounds, strict=True
+        ):
+            if bound is None:
+                yield what
+        if self.determinants is not None:
+            yield "branch"
+
+    @property
+    def _move(self) -> LimitedMove:
+        return LimitedMove(self.trajectory, self.span, self.robot.limits, self.robot, self.motion)
 
     @cached_property
     def _joints(self) -> Array:
@@ -88,14 +116,19 @@ def check_tool(tool: SampledTool) -> list[Finding]:
 def _check_path(tool: SampledTool) -> list[Finding]:
     """Return by how much the tool is beside its path, or turned, where that is more than was promised."""
     tolerance, findings = tool.motion.tolerance, []
+    sampled: FindingMethod = "sampled"
+    bounded: FindingMethod = "bounded"
     kinds: tuple[tuple[str, str, Literal["length", "angle"], float], ...] = (
         ("tool_path", "is beside", "length", tolerance.position),
         ("tool_orientation", "is turned from", "angle", tolerance.angle),
     )
-    for (kind, what, dimension, limit), sizes in zip(kinds, tool.deviation, strict=True):
-        if exceeds(sizes.max(), limit):
-            worst = int(sizes.argmax())
-            value, when = float(sizes[worst]), tool.span.start + float(tool.times[worst])
+    for (kind, what, dimension, limit), sizes, bound in zip(kinds, tool.deviation, tool.bounds, strict=True):
+        worst = int(sizes.argmax())
+        value, when, method = float(sizes[worst]), float(tool.times[worst]), sampled
+        if bound is not None and bound.most > max(value, limit * (1 + PATH_RELATIVE)):
+            value, when, method = bound.most, bound.time, bounded
+        if exceeds(value, limit):
+            when += tool.span.start
             finding = Finding(
                 move=tool.span.index,
                 joint=None,
@@ -103,7 +136,7 @@ def _check_path(tool: SampledTool) -> list[Finding]:
                 value=value,
                 limit=limit,
                 time=when,
-                method="sampled",
+                method=method,
                 hint="this is a bug: report it",
                 message=f"the tool {what} its path by {{value}} {at_time(when)}, promised were {{limit}}",
                 amounts={
@@ -117,7 +150,7 @@ def _check_path(tool: SampledTool) -> list[Finding]:
 
 def _check_branch(tool: SampledTool) -> list[Finding]:
     """Return where the arm passes from one branch to another: the determinant of its rows changes sign."""
-    known = determinants(tool.target, *tool.linearised, characteristic_length(tool.robot))
+    known = tool.determinants
     changes = changes_of_sign(known) if known is not None else np.empty(0)
     if not changes.size:
         return []

@@ -22,6 +22,7 @@ from trajcli.limits.tolerances import LIMIT_RELATIVE, TOOL_RELATIVE
 from trajcli.trajectory import Promise, Span, Trajectory
 
 if TYPE_CHECKING:
+    from trajcli.checks.tool import SampledTool
     from trajcli.curves.approach import ApproachUse
     from trajcli.limits.effort import MoveEfforts
     from trajcli.limits.tool_bound import ToolPeak
@@ -44,8 +45,8 @@ class Verdict:
             where the tool carries something.
         unchecked_of_tool: Limits of the tool that are stated and cannot be judged in some move: of an arm
             without geometry.
-        sampled: Moves along a path: the distance from it and the branch are judged on rows alone, which is no
-            proof of what lies between them.
+        sampled: What of moves along a path is judged on rows alone, which is no proof of what lies between
+            them, and in which moves.
         surveys: For each span what it uses of further limits, by their family.
     """
 
@@ -54,7 +55,7 @@ class Verdict:
     peaks: IntervalPeaks
     unchecked: tuple[tuple[str, str], ...]
     unchecked_of_tool: tuple[str, ...] = ()
-    sampled: tuple[int, ...] = ()
+    sampled: tuple[tuple[str, tuple[int, ...]], ...] = ()
     surveys: tuple[Mapping[str, LimitSurvey], ...] = ()
 
     def __repr__(self) -> str:
@@ -114,6 +115,7 @@ def verify(
         ValueError: When there are more or fewer limits than spans.
     """
     moves = _limited_moves(trajectory, limits_by_move, promises)
+    tools = list(_tools(moves, promises or ()))
     peaks, surveys = peaks_by_move(trajectory), tuple(map(_further_surveys, moves))
     whole = [not promise.parts for promise in promises or [Promise()] * len(moves)]
     findings = check_limits(
@@ -126,7 +128,7 @@ def verify(
     if promises is not None:
         findings += _check_via_points(trajectory, promises)
         findings += check_targets(trajectory, promises)
-        findings += _check_tools([move for move, one in zip(moves, whole, strict=True) if one])
+        findings += _check_tools(tools)
         if not all(whole):
             from trajcli.checks.zones import check_flown
 
@@ -136,7 +138,7 @@ def verify(
         steps=acceleration_steps(trajectory, limits_by_move, peaks),
         peaks=peaks,
         unchecked=_unchecked(trajectory, limits_by_move),
-        sampled=tuple(move.span.index for move in moves if move.motion is not None),
+        sampled=_sampled(tools),
         unchecked_of_tool=_unchecked_of_tool(moves, peaks),
         surveys=surveys,
     )
@@ -262,13 +264,40 @@ def _check_via_points(trajectory: Trajectory, promises: Sequence[Promise]) -> Se
     return check_waypoints(trajectory, [promise.via_points for promise in promises])
 
 
-def _check_tools(moves: Sequence[LimitedMove]) -> Iterator[Finding]:
-    """Yield where the tool leaves its path, and where the arm changes its branch."""
-    for move in moves:
-        if move.robot is not None and move.motion is not None:
-            from trajcli.checks.tool import SampledTool, check_tool
+def _tools(moves: Sequence[LimitedMove], promises: Sequence[Promise]) -> Iterator[SampledTool]:
+    """Yield the tool of each move along a path, or of each part of it that is."""
+    for move, promise in zip(moves, promises, strict=False):
+        parts = [move]
+        if promise.parts:
+            from trajcli.limits.parts import limited_part
 
-            yield from check_tool(SampledTool(move.trajectory, move.span, move.robot, move.motion))
+            flown = (limited_part(move.trajectory, move.span, part) for part in promise.parts)
+            parts = [part for part in flown if part.span.duration > 0]
+        for part in parts:
+            if part.robot is not None and part.motion is not None:
+                from trajcli.checks.tool import SampledTool
+
+                yield SampledTool(part.trajectory, part.span, part.robot, part.motion)
+
+
+def _check_tools(tools: Sequence[SampledTool]) -> Iterator[Finding]:
+    """Yield where the tool leaves its path, and where the arm changes its branch."""
+    for tool in tools:
+        from trajcli.checks.tool import check_tool
+
+        yield from check_tool(tool)
+
+
+def _sampled(tools: Sequence[SampledTool]) -> tuple[tuple[str, tuple[int, ...]], ...]:
+    """Return what is judged on rows alone, with the moves; what is so in the same moves together."""
+    moves: dict[str, list[int]] = {}
+    for tool in tools:
+        for what in tool.sampled:
+            moves.setdefault(what, []).append(tool.span.index)
+    together: dict[tuple[int, ...], list[str]] = {}
+    for what, indices in moves.items():
+        together.setdefault(tuple(dict.fromkeys(indices)), []).append(what)
+    return tuple((" and ".join(words), indices) for indices, words in together.items())
 
 
 def _unchecked_of_tool(moves: Sequence[LimitedMove], peaks: IntervalPeaks) -> tuple[str, ...]:

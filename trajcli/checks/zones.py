@@ -1,10 +1,9 @@
-"""Moves that fly by corners: each part within its limits, on its path, or within its zone."""
+"""Moves that fly by corners: each part within its limits, and within its zone."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from trajcli.checks.tool import SampledTool, check_tool
 from trajcli.findings import Finding
 from trajcli.limits.parts import limited_part, part_findings
 from trajcli.trajectory import Promise, Trajectory
@@ -22,5 +21,3 @@ def check_flown(trajectory: Trajectory, promises: Sequence[Promise]) -> Iterator
             move = limited_part(trajectory, span, part)
             if move.span.duration > 0:
                 yield from part_findings(move, part.around)
-                if part.tool is not None:
-                    yield from check_tool(SampledTool(trajectory, move.span, part.robot, part.tool))

@@ -380,7 +380,8 @@ def summary(plan: Plan, rows: int, *, details: bool = False) -> str:
         names = ", ".join(name.replace("_", " ") for name in plan.verdict.unchecked_of_tool)
         lines.append(f"  limited, but not checked in every move: {names} of the tool")
     if plan.verdict.sampled:
-        lines.append(f"  on samples only: distance from the path and branch, {_moves(plan.verdict.sampled)}")
+        said = "; ".join(f"{what}, {_moves(indices)}" for what, indices in plan.verdict.sampled)
+        lines.append(f"  on samples only: {said}")
     if plan.verdict.steps:
         lines.append(f"  the acceleration steps{_steps(plan)}")
     lines += [

@@ -6,7 +6,7 @@ product by a product.
 
 Coulomb friction jumps where a joint turns back: pieces are cut there, and each of them has one sign.
 
-Source: as of `trajcli/curves/node_bound.py` and `trajcli/kinematics/power_series.py`.
+Source: as of `trajcli/curves/node_bound.py` and `trajcli/geometry/power_series.py`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from trajcli.curves.node_bound import NODES_DEGREE, NodeSurvey, at_nodes, hull_m
 from trajcli.curves.piecewise import Array, control_points, derivative_coefficients, distinct, taylor_shift
 from trajcli.dynamics.newton_euler import REST, InverseDynamics, direction
 from trajcli.frozen import frozen
-from trajcli.kinematics.power_series import growth, series_exponential, series_product
+from trajcli.geometry.power_series import growth, series_exponential, series_product
 
 _CLOSE = 1e-7  # relative: of the remainder, and of the hull
 _SMALL = 1e-6  # N m or N: what is smaller need not be known so well

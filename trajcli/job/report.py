@@ -182,17 +182,30 @@ class ToolReport(ReportPart):
     lowest: LowestSpeedReport | None
     peaks: list[ToolPeakReport]
     deviation: Annotated[
-        float, MeasuredIn("deviation_unit"), Field(description="Largest distance from its path, m.")
+        float, MeasuredIn("deviation_unit"), Field(description="Largest distance from its path on rows, m.")
     ]
+    deviation_bound: Annotated[
+        float | None,
+        MeasuredIn("deviation_unit"),
+        Field(description="What the distance does not exceed at any time; null where only rows say it."),
+    ] = None
     deviation_unit: UnitName = "m"
     turned: Annotated[
-        float, MeasuredIn("turned_unit"), Field(description="Largest angle from its orientation, rad.")
+        float,
+        MeasuredIn("turned_unit"),
+        Field(description="Largest angle from its orientation on rows, rad."),
     ]
+    turned_bound: Annotated[
+        float | None,
+        MeasuredIn("turned_unit"),
+        Field(description="What the angle does not exceed at any time; null where only rows say it."),
+    ] = None
     turned_unit: UnitName = "rad"
     method: Annotated[
-        Literal["sampled"],
+        Literal["bounded", "sampled"],
         Field(
-            description="How deviation, turned and the branch are judged: on rows, without a proof between."
+            description="bounded: deviation and turned are proven for all t; sampled: at least one of them "
+            "on rows alone, as the branch always is."
         ),
     ] = "sampled"
 

@@ -13,8 +13,8 @@ from __future__ import annotations
 import numpy as np
 
 from trajcli.curves.piecewise import Array
+from trajcli.geometry.power_series import series_exponential, series_product
 from trajcli.kinematics.forward import link_poses
-from trajcli.kinematics.power_series import series_exponential, series_product
 from trajcli.kinematics.robot import Robot
 
 

@@ -51,6 +51,9 @@ TARGET_ON_PATH = 2e-5
 # on top; their peaks are looked for between rows until they change by less than this.
 TOOL_RELATIVE = 1e-6
 
+# What is proven of the distance from a path is above it by at most 0.002 of what was promised.
+PATH_RELATIVE = 3e-3
+
 # What is proven of efforts between rows is off them by some 1e-7, and a planner's own proof by as much.
 EFFORT_RELATIVE = 1e-6
 

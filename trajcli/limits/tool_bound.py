@@ -8,7 +8,7 @@ import numpy as np
 
 from trajcli.curves.node_bound import NODES_DEGREE, BoundedPeak, at_nodes, node_survey
 from trajcli.curves.piecewise import Array
-from trajcli.kinematics.power_series import growth
+from trajcli.geometry.power_series import growth
 from trajcli.kinematics.robot import Robot
 from trajcli.kinematics.tool_derivatives import tool_derivatives
 from trajcli.kinematics.tool_majorants import majorants

@@ -318,6 +318,7 @@ def _tool(trajectory: Trajectory, span: Span, move: PlannedMove) -> ToolReport |
 
     tool = SampledTool(trajectory, span, move.robot, motion)
     deviation, turned = (float(sizes.max(initial=0.0)) for sizes in tool.deviation)
+    bounds = [None if bound is None else bound.most for bound in tool.bounds]
     unit = "rad" if motion.pure_rotation else "m"
     wanted = move.planned.wanted_speed
     held, lowest = (None, None) if wanted is None else _held(move, motion.law, wanted, unit)
@@ -331,7 +332,10 @@ def _tool(trajectory: Trajectory, span: Span, move: PlannedMove) -> ToolReport |
         lowest=lowest,
         peaks=_tool_peaks(tool.peaks, span, move.robot),
         deviation=deviation,
+        deviation_bound=bounds[0],
         turned=turned,
+        turned_bound=bounds[1],
+        method="sampled" if None in bounds else "bounded",
     )
 
 

@@ -226,9 +226,9 @@ def _notes(plan: Plan) -> Iterator[str]:
     if verdict.unchecked_of_tool:
         names = ", ".join(name.replace("_", " ") for name in verdict.unchecked_of_tool)
         yield f"Limited, but not checked in every move: {names} of the tool."
-    if verdict.sampled:
-        moves = ", ".join(map(str, verdict.sampled[:20])) + (", ..." if len(verdict.sampled) > 20 else "")
-        yield f"On samples only: distance from the path and branch, moves {moves}."
+    for what, indices in verdict.sampled:
+        moves = ", ".join(map(str, indices[:20])) + (", ..." if len(indices) > 20 else "")
+        yield f"On samples only: {what}, moves {moves}."
     if len(verdict.steps) > _MOST_STEPS:
         yield f"Of {len(verdict.steps)} steps in acceleration the first {_MOST_STEPS} are listed."
 

@@ -148,7 +148,7 @@ def test_a_rotation_under_a_cubic(case):
     start, end = (np.array(case["inputs"][name]) for name in ("R_i", "R_f"))
     curve, rows = AxisAngleOrientation.between(start, end), np.array(case["expected"]["samples_t_theta"])
     close(curve.length, case, "theta_f")
-    close(curve.vectors[0] / curve.angles[0], case, "axis_in_initial_frame")
+    close(curve.vectors[0] / curve.angles_turned[0], case, "axis_in_initial_frame")
     s, sd, sdd = cubic(curve.length, case["inputs"]["T"], rows[:, 0])
     _, velocity, acceleration = moved(curve, s, sd, sdd)
     axis = start @ case["expected"]["axis_in_initial_frame"]
@@ -166,7 +166,7 @@ def test_half_a_turn(case):
     curve = AxisAngleOrientation.between(start, end)
     close(curve.length, case, "theta_f")
     close(curve.vectors[0] / np.pi, case, "axis_up_to_sign")  # its first component is positive
-    np.testing.assert_allclose(curve.angles, np.pi)
+    np.testing.assert_allclose(curve.angles_turned, np.pi)
     ends = curve.evaluate(np.array([0, curve.length]))[0]
     np.testing.assert_allclose(ends, [start, end], rtol=0, atol=1e-14)
 
@@ -175,7 +175,7 @@ def test_half_a_turn(case):
 def test_equal_orientations_are_held(case):
     start, end = (np.array(case["inputs"][name]) for name in ("R_i", "R_f"))
     curve = AxisAngleOrientation.between(start, end, 2.0)
-    close(curve.angles[0], case, "theta_f")
+    close(curve.angles_turned[0], case, "theta_f")
     for rotation in curve.evaluate(np.linspace(0, 2, 7))[0]:
         close(rotation, case, "R_any_t")
 

@@ -45,7 +45,7 @@ def test_from_one_orientation_to_another_it_is_slerp(seed, length):
     turn = Rotation.from_matrix(end @ start.T).as_rotvec()
     np.testing.assert_allclose(rate, np.tile(turn / length, (11, 1)), rtol=0, atol=1e-12 / length)
     np.testing.assert_array_equal(change, 0)
-    assert curve.angles[0] == pytest.approx(np.linalg.norm(turn), abs=1e-14)
+    assert curve.angles_turned[0] == pytest.approx(np.linalg.norm(turn), abs=1e-14)
     for side in ("left", "right"):
         np.testing.assert_array_equal(curve.evaluate(s, side)[1], rate)
     assert not curve.breaks.size
@@ -87,7 +87,7 @@ def test_half_a_turn_has_one_axis_whatever_the_rounding():
             curve = AxisAngleOrientation.between(start, start @ half + 1e-15 * noise.normal(size=(3, 3)), 1.0)
             np.testing.assert_allclose(curve.vectors[0], np.pi * expected, rtol=0, atol=1e-13)
             np.testing.assert_allclose(curve.evaluate(np.ones(1))[0][0], start @ half, rtol=0, atol=1e-14)
-            np.testing.assert_allclose(curve.angles, np.pi)
+            np.testing.assert_allclose(curve.angles_turned, np.pi)
 
 
 def test_a_little_less_than_half_a_turn_is_not_turned_round():

@@ -27,6 +27,7 @@ from trajcli.geometry.paths.position import (
     shown_position,
     shown_vector,
 )
+from trajcli.geometry.power_series import series_exponential
 from trajcli.geometry.rotation import Array, exp
 
 LOOSE = 1e-3  # of radius or chord: numbers typed with three digits fit, a wrong one does not
@@ -202,6 +203,16 @@ class Arc(Smooth):
         values = inside(s, self.length)
         rate = self._rate * self.axis
         return exp(values[:, None] * rate), np.tile(rate, (values.size, 1)), np.zeros((values.size, 3))
+
+    def majorants(self, s: Array, rising: Array) -> tuple[Array, Array]:
+        """Return the bounds of p and Q as `PositionCurve` says.
+
+        In the plane p is the radius times exp(i f), whose series exp of that of f bounds; f is even in s.
+        """
+        del s
+        angle = abs(self._rate) * rising
+        turned = series_exponential(angle)
+        return self.radius * turned + abs(self.pitch) / _TURN * angle, turned
 
 
 def direction(axis: ArrayLike) -> Array:

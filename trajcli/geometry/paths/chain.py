@@ -130,6 +130,16 @@ class Chain:
 
         return self._by_part(s, side, turned)
 
+    def majorants(self, s: Array, rising: Array) -> tuple[Array, Array]:
+        """Return the bounds of p and Q as `PositionCurve` says."""
+        part = np.searchsorted(self.breaks, s, "right")
+        position, turned = np.zeros(rising.shape), np.zeros(rising.shape)
+        for k in np.flatnonzero(np.bincount(part)).tolist():
+            rows = part == k
+            bounds = self.parts[k].majorants(self._local(k, s[rows]), rising[:, rows])
+            position[:, rows], turned[:, rows] = bounds
+        return position, turned
+
     @cached_property
     def _turned_before(self) -> list[Array]:
         """The rotation with which each part begins."""

@@ -85,6 +85,12 @@ class Blend(Smooth):
         change = np.cross(slope, third) / square**2 - 3.0 * across * inner / square**3
         return self._transport.at(u), across / square**1.5, change
 
+    def majorants(self, s: Array, rising: Array) -> tuple[Array, Array]:
+        """Return the bounds of p and Q as `PositionCurve` says: none are known."""
+        del s
+        nothing = np.full(rising.shape, np.inf)
+        return nothing, nothing
+
     @cached_property
     def _slopes(self) -> tuple[Array, Array, Array]:
         first = derivative(self.coefficients)

@@ -76,6 +76,11 @@ class EulerInterpolation(OverSegments):
         distance = float(np.linalg.norm(angles[1] - angles[0]))
         return cls(angles, SegmentProgress.even(distance if length is None else length), sequence, frame)
 
+    @property
+    def angles_turned(self) -> Array:
+        """Sums (k,), rad, of what the three angles change by in each segment."""
+        return np.asarray(np.abs(np.diff(self.angles, axis=0)).sum(axis=1))
+
     def angles_at(self, s: Array, side: Side = "right") -> Triple:
         """Return the angles (N, 3), rad, and their first and second derivative by s."""
         return self.progress.between(self.angles, s, side)

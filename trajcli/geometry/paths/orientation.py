@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from trajcli.errors import InputError
 from trajcli.frozen import frozen
 from trajcli.geometry.paths.position import PositionCurve, Side, Smooth, Triple, inside
+from trajcli.geometry.power_series import series_exponential, series_product
 from trajcli.geometry.rotation import Array, Flags, axis_angle_from_matrix, check_rotation, exp
 
 _ROUNDING = 1e-12  # of the length, by which two blends that meet may be apart
@@ -68,6 +69,20 @@ class OrientationCurve(Protocol):
         """
         ...
 
+    def majorant(self, s: Array, rising: Array) -> Array:
+        """Return bounds of |R^(m)| / m!, in the operator norm, by the time of a law s(t), from m = 1 on.
+
+        They hold on whole pieces of it, none of which passes a break.
+
+        Args:
+            s: Within each piece, shape (P,).
+            rising: Bounds of |s^(m)| / m! as `growth` of power series gives them, shape (order + 1, P).
+
+        Returns:
+            The shape of `rising`; infinite where nothing is known.
+        """
+        ...
+
 
 @frozen
 class FixedOrientation(Smooth):
@@ -88,6 +103,11 @@ class FixedOrientation(Smooth):
         """Return R, w', w'' as `OrientationCurve` says; both sides are the same."""
         count = inside(s, self.length).size
         return np.tile(self.rotation, (count, 1, 1)), np.zeros((count, 3)), np.zeros((count, 3))
+
+    def majorant(self, s: Array, rising: Array) -> Array:
+        """Return the bounds as `OrientationCurve` says: nothing turns."""
+        del s
+        return np.zeros(rising.shape)
 
 
 class OverSegments(ABC):
@@ -122,9 +142,18 @@ class OverSegments(ABC):
         """None."""
         return np.empty(0)
 
+    @property
+    @abstractmethod
+    def angles_turned(self) -> Array:
+        """Sums (k,), rad, of the angles by which each segment turns about its axes."""
+
     @abstractmethod
     def evaluate(self, s: Array, side: Side = "right") -> Triple:
         """Return R, w', w'' as `OrientationCurve` says."""
+
+    def majorant(self, s: Array, rising: Array) -> Array:
+        """Return the bounds as `OrientationCurve` says: R is a product of exponentials of angles."""
+        return series_exponential(self.progress.majorant(self.angles_turned, s, rising))
 
     def require_targets(self, count: int) -> None:
         """Check that there is one target for each border of the segments.
@@ -181,8 +210,8 @@ class AxisAngleOrientation(OverSegments):
         return turn_vectors(self.rotations[:-1], self.rotations[1:])
 
     @property
-    def angles(self) -> Array:
-        """Angles (k,), rad."""
+    def angles_turned(self) -> Array:
+        """Angles (k,), rad, of the segments."""
         return np.asarray(np.linalg.norm(self.vectors, axis=-1))
 
     def evaluate(self, s: Array, side: Side = "right") -> Triple:
@@ -254,6 +283,10 @@ class TangentOrientation:
         """Return R, w', w'' as `OrientationCurve` says."""
         rotation, rate, change = self.path.transport(s, side)
         return rotation @ self.start, rate, change
+
+    def majorant(self, s: Array, rising: Array) -> Array:
+        """Return the bounds as `OrientationCurve` says: those of Q."""
+        return self.path.majorants(s, rising)[1]
 
 
 class SegmentFractions(NamedTuple):
@@ -352,6 +385,28 @@ class SegmentProgress:
             one * row[0][:, None] + other * row[1][:, None] for row in (done.value, done.slope, done.bend)
         )
         return targets[done.segment] + values, slopes, bends
+
+    def majorant(self, sizes: Array, s: Array, rising: Array) -> Array:
+        """Return bounds of derivatives of what is done of all segments together, by the time of a law s(t).
+
+        The ramp from one segment to the next one, over the length w, is w (x^3 - x^4 / 2) with x = s / w: its
+        m-th derivative by x over m! is at most 1, 3/4, 1, 1/2 for m = 1 to 4; and so is what it leaves of s.
+
+        Args:
+            sizes: Of the segments, at least 0, shape (k,).
+            s: Within each piece of the law, shape (P,).
+            rising: Bounds of |s^(m)| / m!, m = 0 to the order, shape (order + 1, P).
+        """
+        rates = np.append(sizes / np.where(np.diff(self.borders) > 0.0, np.diff(self.borders), 1.0), 0.0)
+        inner, widths = np.append(self.borders[1:-1], np.inf), np.append(self.half_widths, 0.0)
+        border = np.searchsorted((inner + widths)[:-1], s, "right")
+        fading = s > (inner - widths)[border]
+        whole = np.where(fading, 2.0 * widths[border], 1.0)
+        x = np.concatenate([np.zeros((1, s.size)), rising[1:] / whole])
+        squared = series_product(x, x)
+        ramp = x + 0.75 * squared + series_product(squared, x + 0.5 * squared)
+        total = (rates[border] + rates[np.minimum(border + 1, rates.size - 1)]) * whole
+        return np.where(fading, total * ramp, rates[border] * rising)
 
 
 def _ramp(s: Array, border: Array, width: Array, side: Side) -> tuple[Array, Array, Array]:

@@ -26,6 +26,7 @@ from trajcli.geometry.paths.position import (
     nearest,
 )
 from trajcli.geometry.pose import build, check_pose, exp_pose, invert
+from trajcli.geometry.power_series import series_exponential
 from trajcli.geometry.rotation import Array
 
 _SAME = 1e-9  # of the length: two breaks as near as this are one
@@ -79,6 +80,20 @@ class PosePath(Protocol):
         """
         ...
 
+    def majorants(self, s: Array, rising: Array) -> tuple[Array, Array]:
+        """Return bounds of |p^(m)| / m! and |R^(m)| / m! by the time of a law s(t), from m = 1 on.
+
+        They hold on whole pieces of it, none of which passes a break. Of R the operator norm is bounded.
+
+        Args:
+            s: Within each piece, shape (P,).
+            rising: Bounds of |s^(m)| / m! as `growth` of power series gives them, shape (order + 1, P).
+
+        Returns:
+            Two of the shape of `rising`; infinite where nothing is known.
+        """
+        ...
+
 
 @frozen
 class PoseCurve:
@@ -128,6 +143,10 @@ class PoseCurve:
         rotations, rate, change = self.orientation.evaluate(s, side)
         first, second = np.concatenate([velocity, rate], axis=-1), np.concatenate([bend, change], axis=-1)
         return build(rotations, positions), first, second
+
+    def majorants(self, s: Array, rising: Array) -> tuple[Array, Array]:
+        """Return the bounds of p and R as `PosePath` says."""
+        return self.position.majorants(s, rising)[0], self.orientation.majorant(s, rising)
 
     def _united(self, first: Array, second: Array) -> Array:
         """Return s of both, those of the second that are beside one of the first left out."""
@@ -186,3 +205,14 @@ class Screw(Smooth):
             np.concatenate([velocity, rate], axis=-1),
             np.concatenate([np.cross(rate, velocity), np.zeros_like(rate)], axis=-1),
         )
+
+    def majorants(self, s: Array, rising: Array) -> tuple[Array, Array]:
+        """Return the bounds of p and R as `PosePath` says.
+
+        R is an exponential of the angle w s, and p' = R v: p is bounded by v times the integral of exp(w s)
+        over s, which is (exp(w s) - 1) / w.
+        """
+        del s
+        v, w = (float(np.linalg.norm(part)) / (self.length or 1.0) for part in np.split(self.twist, 2))
+        turned = series_exponential(w * rising)
+        return v * (turned / w if w > 0.0 else rising), turned

@@ -66,6 +66,20 @@ class PositionCurve(Protocol):
         """
         ...
 
+    def majorants(self, s: Array, rising: Array) -> tuple[Array, Array]:
+        """Return bounds of |p^(m)| / m! and |Q^(m)| / m! by the time of a law s(t), from m = 1 on.
+
+        They hold on whole pieces of it, none of which passes a break. Of Q the operator norm is bounded.
+
+        Args:
+            s: Within each piece, shape (P,), m.
+            rising: Bounds of |s^(m)| / m! as `growth` of power series gives them, shape (order + 1, P).
+
+        Returns:
+            Two of the shape of `rising`; infinite where nothing is known.
+        """
+        ...
+
 
 class Smooth:
     """Curves without breaks."""
@@ -135,6 +149,11 @@ class Line(Smooth):
         count = inside(s, self.length).size
         return np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3)), np.zeros((count, 3))
 
+    def majorants(self, s: Array, rising: Array) -> tuple[Array, Array]:
+        """Return the bounds of p and Q as `PositionCurve` says: |p'| = 1."""
+        del s
+        return rising, np.zeros(rising.shape)
+
 
 @frozen
 class PartOfCurve:
@@ -174,6 +193,10 @@ class PartOfCurve:
         before, _, _ = self.curve.transport(np.array([self.first]))
         rotation, rate, change = self.curve.transport(inside(s, self.length) + self.first, side)
         return rotation @ before[0].T, rate, change
+
+    def majorants(self, s: Array, rising: Array) -> tuple[Array, Array]:
+        """Return the bounds of p and Q as `PositionCurve` says."""
+        return self.curve.majorants(s + self.first, rising)
 
     def _own(self, s: Array) -> Array:
         """Return those of s (k,) of the whole that are inside the part, by its own arc length."""
@@ -219,6 +242,12 @@ class Pivot(Smooth):
             "a rotation in place has no direction of travel that a tool could keep its attitude to",
             hint="orientation: axis_angle",
         )
+
+    def majorants(self, s: Array, rising: Array) -> tuple[Array, Array]:
+        """Return the bounds of p and Q as `PositionCurve` says; there is no Q."""
+        del s
+        rate = float(np.linalg.norm(self.end - self.start)) / (self.length or 1.0)
+        return rate * rising, np.full(rising.shape, np.inf)
 
 
 def point(values: ArrayLike, name: str) -> Array:

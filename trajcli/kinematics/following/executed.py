@@ -70,3 +70,7 @@ class ExecutedPoses:
         first[:, 3:] = moved[0][:, 3:]
         second[:, 3:] = (moved[1] + acceleration_bias(state.jacobians, rates))[:, 3:]
         return poses, first, second
+
+    def majorants(self, s: Array, rising: Array) -> tuple[Array, Array]:
+        """Return the bounds of p and R as `PosePath` says: nothing is known of R."""
+        return self.wanted.majorants(s, rising)[0], np.full(rising.shape, np.inf)

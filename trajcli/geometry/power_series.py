@@ -13,7 +13,7 @@ from math import comb
 
 import numpy as np
 
-from trajcli.curves.piecewise import Array
+from trajcli.geometry.rotation import Array
 
 
 def growth(coefficients: Array, lengths: Array, order: int) -> Array:

@@ -1,0 +1,180 @@
+"""Majorants of paths against Taylor coefficients of their formulas in complex numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import factorial
+
+import numpy as np
+import pytest
+
+from trajcli.geometry.paths.arc import Arc
+from trajcli.geometry.paths.chain import join
+from trajcli.geometry.paths.euler_interpolation import EulerInterpolation
+from trajcli.geometry.paths.orientation import (
+    AxisAngleOrientation,
+    FixedOrientation,
+    SegmentProgress,
+    TangentOrientation,
+)
+from trajcli.geometry.paths.pose import PoseCurve, Screw
+from trajcli.geometry.paths.position import Line, PartOfCurve, Pivot
+from trajcli.geometry.pose import build
+from trajcli.geometry.power_series import growth
+from trajcli.geometry.rotation import exp
+
+ORDER, DURATION = 9, 0.4
+S = [0.9, -0.4, 0.3, 0.5]  # 0.5 + 0.3 t - 0.4 t^2 + 0.9 t^3, which stays within 0.5 to 0.65
+MIDDLE = float(np.polyval(S, DURATION / 2))
+Formula = Callable[[np.ndarray], list[np.ndarray]]
+"""From the Taylor coefficients of s(t), lowest first, to those of the entries of a vector."""
+
+
+def product(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    return np.convolve(one, other)[: ORDER + 1]
+
+
+def cis(angle: np.ndarray) -> np.ndarray:
+    """Return the Taylor coefficients of exp(i f), by the sum of powers of f."""
+    rest, power = 1j * angle, np.eye(1, ORDER + 1)[0].astype(complex)
+    rest[0], result = 0, np.zeros(ORDER + 1, dtype=complex)
+    for k in range(ORDER + 1):
+        result += power / factorial(k)
+        power = product(power, rest)
+    return result * np.exp(1j * angle[0])
+
+
+def largest(formula: Formula) -> np.ndarray:
+    """Return the largest Taylor coefficients of orders 1 to 9 of a vector, over the piece."""
+    best = np.zeros(ORDER)
+    for t in np.linspace(0, DURATION, 201):
+        series = np.zeros(ORDER + 1)
+        series[: len(S)] = [np.polyval(np.polyder(S, k), t) / factorial(k) for k in range(len(S))]
+        best = np.maximum(best, np.linalg.norm(formula(series), axis=0)[1:])
+    return best
+
+
+def bounds(of: Callable[..., object]) -> np.ndarray:
+    """Return what a path says, of orders 1 to 9."""
+    coefficients = np.array(S)[:, None, None]
+    rising = growth(coefficients, np.array([DURATION]), ORDER)[:, :, 0]
+    return np.asarray(of(np.array([MIDDLE]), rising))[..., 1:, 0]
+
+
+def near(found: np.ndarray, formula: Formula, within: float = 100.0) -> None:
+    true = largest(formula)
+    assert (found >= true * (1 - 1e-9)).all()
+    assert (found <= within * true + 1e-12).all()
+
+
+def turn(rate: float) -> Formula:
+    return lambda s: [cis(rate * s)]
+
+
+Z = np.array([0.0, 0.0, 1.0])
+ARC = Arc(np.array([0.2, 0, 0]), np.zeros(3), Z, -4.0, 0.3)
+PER_RADIAN = float(np.hypot(0.2, 0.3 / (2 * np.pi)))
+
+
+def test_lines_go_as_far_as_s() -> None:
+    line = Line(np.zeros(3), np.array([0.6, 0, 0.8]))
+    for curve in (line, PartOfCurve(Line(np.zeros(3), np.array([0, 3.0, 0])), 1.0, 2.0)):
+        near(bounds(curve.majorants)[0], lambda s: [s])
+        assert not bounds(curve.majorants)[1].any()
+
+
+def test_a_pivot_moves_by_what_its_ends_are_apart() -> None:
+    found = bounds(Pivot(np.zeros(3), np.array([0, 0, 8e-10]), 1.0).majorants)
+    np.testing.assert_allclose(found[0], 8e-10 * bounds(Line(np.zeros(3), Z).majorants)[0], rtol=1e-12)
+    assert np.isinf(found[1]).all()
+
+
+def test_a_helix_turns_and_climbs() -> None:
+    angle = 1 / PER_RADIAN
+
+    def helix(s: np.ndarray) -> list[np.ndarray]:
+        return [0.2 * cis(angle * s), 0.3 / (2 * np.pi) * angle * s]
+
+    near(bounds(ARC.majorants)[0], helix)
+    near(bounds(ARC.majorants)[1], turn(angle))
+    tangent = TangentOrientation(ARC, np.eye(3))
+    np.testing.assert_array_equal(bounds(tangent.majorant), bounds(ARC.majorants)[1])
+
+
+def test_a_screw_is_a_helix_about_its_axis() -> None:
+    """1.5 rad about z through [0, -0.4, 0], and 0.5 m along it: the tool goes hypot(0.6, 0.5) m."""
+    radius, angle, climb = 0.4, 1.5, 0.5
+    center = np.array([0.0, -radius, 0.0])
+    end = build(exp(angle * Z), center + exp(angle * Z) @ -center + climb * Z)
+    screw = Screw(np.eye(4), end)
+    length = float(np.hypot(radius * angle, climb))
+    assert screw.length == pytest.approx(length)
+
+    def helix(s: np.ndarray) -> list[np.ndarray]:
+        return [radius * cis(angle / length * s), climb / length * s]
+
+    near(bounds(screw.majorants)[0], helix)
+    near(bounds(screw.majorants)[1], turn(angle / length))
+    straight = Screw(np.eye(4), build(np.eye(3), np.array([0, 0.8, 0])))
+    near(bounds(straight.majorants)[0], lambda s: [s])
+    assert not bounds(straight.majorants)[1].any()
+
+
+def test_rotations_turn_by_their_angles() -> None:
+    axis = AxisAngleOrientation.between(np.eye(3), exp(2.0 * Z), 1.25)
+    near(bounds(axis.majorant), turn(2.0 / 1.25))
+    assert not bounds(FixedOrientation(np.eye(3), 1.0).majorant).any()
+    euler = EulerInterpolation.between([0.1, 0, 0.2], [1.1, 0, -0.4], "ZYZ", length=1.0)
+    slower = EulerInterpolation.between([0.1, 0, 0.2], [1.1, 0, 1.2], "ZYZ", length=1.0)
+    near(bounds(slower.majorant), turn(2.0))  # both turn about the same axis while the second one rests
+    assert (bounds(euler.majorant) >= largest(turn(0.4))).all()
+
+
+@pytest.mark.parametrize(
+    ("border", "half"), [(0.55, 0.2), (0.5, 0.3), (0.9, 0.1), (0.9, 0.0), (0.3, 0.1), (0.3, 0.0)]
+)
+def test_one_rotation_fades_into_the_next_one(border: float, half: float) -> None:
+    """Both about z, by 1.2 rad over the first segment and by 0.7 rad over the second one."""
+    progress = SegmentProgress(np.array([0.0, border, 1.3]), np.array([half]))
+    rotations = np.stack([exp(angle * Z) for angle in (0.0, 1.2, 1.9)])
+
+    def faded(s: np.ndarray) -> list[np.ndarray]:
+        x, one = s / (2 * half or 1.0), np.eye(1, ORDER + 1)[0]
+        x[0] -= (border - half) / (2 * half or 1.0)
+        cubic = product(product(x, x), x)
+        ramp = 2 * half * (cubic - product(cubic, x) / 2)
+        if abs(MIDDLE - border) >= half:
+            ramp = (s - border * one) * (border < MIDDLE)
+        return [cis(1.2 / border * (s - ramp) + 0.7 / (1.3 - border) * ramp)]
+
+    near(
+        bounds(AxisAngleOrientation(rotations, progress).majorant),
+        faded,
+        within=1e5 if abs(MIDDLE - border) < half else 100.0,
+    )
+
+
+def test_a_ramp_is_bounded_by_its_largest_derivatives() -> None:
+    """w (x^3 - x^4 / 2) with x = s / w, s = t: the bounds of all four are reached."""
+    w, x = 0.4, np.linspace(0, 1, 1001)
+    progress = SegmentProgress(np.array([0.0, 0.5, 1.5]), np.array([w / 2]))
+    ramp = [w * np.polyval(np.polyder([-0.5, 1, 0, 0, 0], k), x) / w**k / factorial(k) for k in range(1, 5)]
+    rising = np.eye(1, 5, 1)[0][:, None]
+    found = progress.majorant(np.array([0.0, 3.0]), np.array([0.6]), rising)
+    np.testing.assert_allclose(found[1:, 0], [3 * np.abs(row).max() for row in ramp], rtol=1e-12)
+    behind = progress.majorant(np.array([2.0, 0.0]), np.array([0.6]), rising)
+    np.testing.assert_allclose(behind, 4 / 3 * found, rtol=1e-12)  # 2 rad over 0.5 m, not 3 rad over 1 m
+
+
+def test_a_chain_says_what_the_part_says_that_is_gone_through() -> None:
+    first, last = Line(np.zeros(3), np.array([0.3, 0, 0])), Line(np.array([0.3, 0, 0]), np.array([0.3, 1, 0]))
+    sharp = join([first, last])
+    np.testing.assert_array_equal(bounds(sharp.majorants), bounds(last.majorants))
+    circle = Arc(np.array([0.3, 0, 0]), np.array([0.3, 0.5, 0]), Z, 2.0)
+    turning = join([first, circle])
+    np.testing.assert_allclose(bounds(turning.majorants), bounds(circle.majorants), rtol=1e-12)
+    fixed = FixedOrientation(np.eye(3), turning.length)
+    pose = bounds(PoseCurve(turning, fixed).majorants)
+    np.testing.assert_array_equal(pose, [bounds(turning.majorants)[0], np.zeros(ORDER)])
+    longer = [Line(np.zeros(3), np.array([0.8, 0, 0])), Line(np.array([0.8, 0, 0]), np.array([0.8, 1, 0]))]
+    assert np.isinf(bounds(join(longer, 0.35).majorants)).all()

@@ -1,0 +1,168 @@
+"""Distance and angle from the path for all t: bumps between the nodes of pieces, whose size is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from trajcli.checks.tool import SampledTool, check_tool
+from trajcli.curves.piecewise import PiecewisePolynomial, concatenate, constant
+from trajcli.geometry.paths.chain import join
+from trajcli.geometry.paths.orientation import AxisAngleOrientation, FixedOrientation
+from trajcli.geometry.paths.pose import PoseCurve, PosePath
+from trajcli.geometry.paths.position import Line, Pivot
+from trajcli.geometry.rotation import exp
+from trajcli.job.robot import load_robot
+from trajcli.kinematics.following.motion import motion_along
+from trajcli.kinematics.following.tolerance import Tolerance
+from trajcli.kinematics.following.tool_path import ToolPath
+from trajcli.kinematics.forward import forward
+from trajcli.trajectory import Span, Trajectory, resting
+
+ROBOT, Q = load_robot("ur5e"), np.array([0.3, -1.2, 1.4, -0.9, -1.3, 0.4])
+POSE = forward(ROBOT, Q)
+TOLERANCE, REST, WHOLE = 1e-6, 0.1, (True, True, True)
+BUMP = np.poly(np.arange(9) / 8)  # zero at nine nodes of [0, 1], largest between the outer ones
+BUMP /= np.abs(np.polyval(BUMP, np.linspace(0, 1, 100_001))).max()
+
+
+def standing(joint: int = 0, size: float = 0.0, pieces: int = 3) -> PiecewisePolynomial:
+    """Return joints at rest for a second a piece, one of which has a bump of a size in the second piece."""
+    coefficients = np.zeros((10, pieces, 6))
+    coefficients[-1] = Q
+    if size:
+        coefficients[:, 1, joint] += size * BUMP
+    return PiecewisePolynomial(np.arange(pieces + 1.0), coefficients)
+
+
+def law(size: float = 0.0, pieces: int = 3) -> PiecewisePolynomial:
+    """Return a law that rests at a place, with a bump of a size in its second piece."""
+    coefficients = np.zeros((10, pieces, 1))
+    coefficients[-1] = REST
+    coefficients[:, 1, 0] += size * BUMP
+    return PiecewisePolynomial(np.arange(pieces + 1.0), coefficients)
+
+
+def line() -> PoseCurve:
+    """Return a path that is where the joints stand after a tenth of a metre."""
+    along = np.array([0.6, 0.0, 0.8])
+    curve = Line(POSE[:3, 3] - REST * along, POSE[:3, 3] + along)
+    return PoseCurve(curve, FixedOrientation(POSE[:3, :3], curve.length))
+
+
+def turning() -> PoseCurve:
+    """Return a rotation about y in world that is where the joints stand after a tenth of a radian."""
+    first, last = (exp(angle * np.array([0.0, 1.0, 0.0])) @ POSE[:3, :3] for angle in (-REST, 0.9))
+    curve = AxisAngleOrientation.between(first, last)
+    return PoseCurve(Pivot(POSE[:3, 3], POSE[:3, 3], curve.length), curve)
+
+
+def tool(
+    joints: PiecewisePolynomial,
+    law: PiecewisePolynomial,
+    poses: PosePath | None = None,
+    orientation: str = "all",
+    position: tuple[bool, bool, bool] = WHOLE,
+    start: float = 0.0,
+) -> SampledTool:
+    path = ToolPath(poses or line(), position, orientation)  # type: ignore[arg-type]
+    motion = motion_along(path, law, law.breaks, Tolerance(TOLERANCE, TOLERANCE))
+    span = Span(4, "line", start, start + law.duration, 2)
+    ends = resting(Q), resting(Q)
+    curve = concatenate([constant(Q, start), joints]) if start else joints
+    trajectory = Trajectory(curve, ROBOT.joint_names, ROBOT.joint_types, (span,), *ends)
+    return SampledTool(trajectory, span, ROBOT, motion)
+
+
+def most(each: SampledTool) -> list[float | None]:
+    return [None if bound is None else bound.most for bound in each.bounds]
+
+
+@pytest.mark.parametrize("times", [1.5, 0.9])
+def test_a_bump_of_a_joint_between_rows_is_found(times: float) -> None:
+    """The first joint turns about z in world: the tool moves by its distance from the axis, and turns."""
+    lever = float(np.hypot(*POSE[:2, 3]))
+    each = tool(standing(0, times * TOLERANCE / lever), law())
+    assert max(sizes.max() for sizes in each.deviation) < 1e-3 * TOLERANCE  # rows see nothing
+    distance, angle = most(each)
+    assert distance == pytest.approx(times * TOLERANCE, rel=4e-3)
+    assert angle == pytest.approx(times * TOLERANCE / lever, rel=4e-3)
+    found = check_tool(tool(standing(0, times * TOLERANCE / lever), law(), orientation="none"))
+    assert [finding.kind for finding in found] == ["tool_path"] * (times > 1)
+    if not found:
+        return
+    (beside,) = found
+    assert (beside.move, beside.method, beside.limit) == (4, "bounded", TOLERANCE)
+    assert beside.value == pytest.approx(1.5 * TOLERANCE, rel=4e-3)
+    assert beside.time is not None
+    assert min(abs(beside.time - 1.05), abs(beside.time - 1.95)) < 0.05
+
+
+@pytest.mark.parametrize("times", [1.5, 0.9])
+def test_a_bump_of_the_last_joint_turns_the_tool(times: float) -> None:
+    each = tool(standing(5, times * TOLERANCE), law())
+    assert each.deviation[1].max() < 1e-3 * TOLERANCE
+    distance, angle = most(each)
+    assert distance is not None
+    assert distance < 2e-3 * TOLERANCE
+    assert angle == pytest.approx(times * TOLERANCE, rel=4e-3)
+    assert [finding.kind for finding in check_tool(each)] == ["tool_orientation"] * (times > 1)
+
+
+@pytest.mark.parametrize("pieces", [1, 3])
+@pytest.mark.parametrize("which", [0, 1])
+def test_a_bump_of_the_law_between_rows_is_found(which: int, pieces: int) -> None:
+    """The joints rest: it is the path that goes, or turns; of joints in one piece the law's breaks count, too."""
+    joints = standing() if pieces == 3 else PiecewisePolynomial(np.array([0.0, 3.0]), Q[None, None])
+    each = tool(joints, law(1.5 * TOLERANCE), (line, turning)[which]())
+    sizes = most(each)
+    assert sizes[which] == pytest.approx(1.5 * TOLERANCE, rel=4e-3)
+    assert [finding.kind for finding in check_tool(each)] == [("tool_path", "tool_orientation")[which]]
+    assert not check_tool(tool(joints, law(0.9 * TOLERANCE), (line, turning)[which]()))
+
+
+def test_times_count_from_the_start_of_the_whole() -> None:
+    bump = standing(0, 1.5 * TOLERANCE / float(np.hypot(*POSE[:2, 3])))
+    early, late = (check_tool(tool(bump, law(), start=start))[0].time for start in (0.0, 7.0))
+    assert late == pytest.approx((early or 0.0) + 7.0, abs=1e-9)
+
+
+def test_what_is_free_does_not_count() -> None:
+    """A line of which x and y are fixed, and the direction of the tool, about which the last joint turns."""
+    lifted = standing(1, 2e-6)
+    whole, flat = (tool(lifted, law(), position=(True, True, z)) for z in (True, False))
+    joints = Q + np.array([0.0, 2e-6, 0, 0, 0, 0])
+    moved = forward(ROBOT, joints)[:3, 3] - POSE[:3, 3]
+    assert most(whole)[0] == pytest.approx(np.linalg.norm(moved), rel=4e-3)
+    assert most(flat)[0] == pytest.approx(np.linalg.norm(moved[:2]), rel=1e-2, abs=2e-9)
+    rolled = standing(5, 1.5 * TOLERANCE)
+    assert (most(tool(rolled, law(), orientation="direction"))[1] or 1.0) < 2e-3 * TOLERANCE
+    assert most(tool(rolled, law(), orientation="none"))[1] == 0.0
+    bent = tool(standing(4, 1.5 * TOLERANCE), law(), orientation="direction")
+    assert most(bent)[1] == pytest.approx(1.5 * TOLERANCE, rel=4e-3)
+
+
+def test_what_has_no_bound_is_left_to_rows_and_said() -> None:
+    right = tool(standing(), law())
+    assert list(right.sampled) == ["branch"]
+    assert most(tool(standing(), law(), orientation="yaw"))[1] is None
+    along = np.array([0.6, 0.0, 0.8])
+    corner = POSE[:3, 3] + 0.1 * along
+    segments = [Line(POSE[:3, 3] - REST * along, corner), Line(corner, corner + np.array([0, 0.5, 0]))]
+    rounded = join(segments, 0.05)
+    coefficients = law().coefficients.copy()
+    coefficients[-2, 2] = 0.15  # into the corner
+    moving = PiecewisePolynomial(np.arange(4.0), coefficients)
+    poses = PoseCurve(rounded, FixedOrientation(POSE[:3, :3], rounded.length))
+    each = tool(standing(), moving, poses)
+    assert each.bounds[0] is None
+    assert list(each.sampled) == ["distance from the path", "branch"]
+    (beside,) = check_tool(each)
+    assert (beside.kind, beside.method) == ("tool_path", "sampled")
+    cut = replace(right, motion=replace(right.motion, overlaps=True))
+    assert cut.bounds == (None, None)
+    assert list(cut.sampled) == ["distance from the path", "angle from its orientation", "branch"]
+    longer = replace(right, span=replace(right.span, end=2.9))  # the law does not say when it is where
+    assert longer.bounds == (None, None)
