@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from planned_examples import planned_example
 
 from trajcli.checks.verify import verify
 from trajcli.errors import InputError, MissingLimitError
@@ -108,18 +109,21 @@ def test_a_corner_of_two_lines_of_the_tool_is_flown_by(zone, most):
     assert plan.trajectory.duration <= most
     assert plan.flyby is not None
     assert plan.flyby.stopping == pytest.approx(1.6139, abs=1e-3)
-    assert {what for what, _ in plan.verdict.sampled} <= {"branch", "angle from its orientation"}
-    strict = [
-        replace(part, tool=replace(part.tool, tolerance=Tolerance(1e-13, 1e-6)))
-        for part in plan.moves[0].promise.parts
-        if part.tool
-    ]
-    promises = [
-        replace(plan.moves[0].promise, parts=tuple(strict)),
-        *(move.promise for move in plan.moves[1:]),
-    ]
-    found = verify(plan.trajectory, [move.robot.limits for move in plan.moves], promises).findings
-    assert {(f.kind, f.method) for f in found} == {("tool_path", "bounded")}
+
+
+def test_parts_of_paths_beside_zones_are_proven_to_be_on_their_paths():
+    plan = planned_example("flying_cell")
+    promises = [move.promise for move in plan.moves]
+    limits = [move.robot.limits for move in plan.moves]
+    assert plan.verdict.sampled == (("branch", (1, 3, 5, 7)),)
+
+    def stricter(promise):
+        tools = [part.tool and replace(part.tool, tolerance=Tolerance(1e-12, 1e-6)) for part in promise.parts]
+        parts = zip(promise.parts, tools, strict=True)
+        return replace(promise, parts=tuple(replace(part, tool=tool) for part, tool in parts))
+
+    found = verify(plan.trajectory, limits, [stricter(promise) for promise in promises]).findings
+    assert [(f.move, f.kind) for f in found] == [(move, "tool_path") for move in (1, 3, 5, 7)]
 
 
 @pytest.mark.parametrize(("zone", "saved"), [(1e-6, 5.31e-3), (1e-7, 2.46e-3), (1e-9, 0.528e-3)])

@@ -241,7 +241,14 @@ def test_what_of_a_path_with_overlapping_segments_is_sampled_is_said() -> None:
         "robot": "ur5e",
         "limits": {"acceleration": 10, "tcp": {"speed": 0.2, "acceleration": 1}},
         "start": {"xyz": [0.4, 0.0, 0.3]},
-        "moves": [{"planner": "path", "segments": [{"line": each} for each in points], "overlap": 0.05}],
+        "moves": [
+            {
+                "planner": "path",
+                "segments": [{"line": each} for each in points],
+                "corner": "overlap",
+                "overlap": 0.05,
+            }
+        ],
     }
     plan = plan_job(loaded(job))
     what = "distance from the path and angle from its orientation and branch"

@@ -102,8 +102,10 @@ def _speeds(tool: ToolReport, start: float) -> Iterator[str]:
     yield from _held(tool)
     if tool.ruled_by:
         yield f"    the limits of {tool.ruled_by} say how fast"
-    turned = f"turned by {_clean(tool.turned):.3g} {tool.turned_unit}"
-    yield f"    off the path by at most {_clean(tool.deviation):.3g} {tool.deviation_unit}, {turned}"
+    off = tool.deviation if tool.deviation_bound is None else tool.deviation_bound
+    turned = tool.turned if tool.turned_bound is None else tool.turned_bound
+    text = f"    off the path by at most {_clean(off):.3g} {tool.deviation_unit}"
+    yield f"{text}, turned by {_clean(turned):.3g} {tool.turned_unit}"
 
 
 def _held(tool: ToolReport) -> Iterator[str]:
