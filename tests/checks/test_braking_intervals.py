@@ -123,3 +123,27 @@ def test_on_a_line_all_brake_as_the_tightest_joint_can():
     limits = Limits(_FREE, limits.velocity, limits.acceleration, np.array([[-4.0, 4.0], [-0.2, 0.2]]))
     assert _findings(trajectory, limits, "line") == []
     assert _findings(trajectory, limits, "each") == [("a", "velocity")]
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_joint_that_is_faster_first_is_found_though_it_is_inside_in_time(side):
+    """With twice the jerk it has 0.1 s to gain speed in, on either side of zero."""
+    phases = [(0.1, 4.0 * side), (0.4, -8.0 * side), (0.55, 0.0), (0.35, 8.0 * side)]
+    assert ("a", "velocity") in _findings(_motion(3.0 * side, 0.0, phases), _limits())
+    brakes = [(0.5, -4.0 * side), (0.75, 0.0), (0.5, 4.0 * side)]
+    assert _findings(_motion(3.0 * side, 0.0, brakes), _limits()) == []
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_the_smaller_of_two_jerks_says_how_long_braking_lasts(side):
+    limits = _limits()
+    jerk = np.array([[-8.0, 4.0] if side > 0 else [-4.0, 8.0]] * 2)
+    unequal = Limits(_FREE, limits.velocity, limits.acceleration, jerk)
+    brakes = [(0.5, -4.0 * side), (0.75, 0.0), (0.5, 4.0 * side)]
+    assert _findings(_motion(3.0 * side, 0.0, brakes), unequal) == []
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_an_acceleration_alone_is_a_direction_to_brake_along(side):
+    falls = _motion(0.0, 3.0 * side, [(0.75, -4.0 * side)])
+    assert _findings(falls, _limits(velocity=9.0), "line") == []

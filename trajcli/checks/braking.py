@@ -59,6 +59,8 @@ def braking_intervals(
         law = _common_braking(velocity, acceleration, direction, bounds)
     intervals = []
     for joint, (rate, bound) in enumerate(zip(rates, bounds, strict=True)):
+        if not any(rate):  # it rests, and a line along which others brake leaves it no jerk
+            continue
         own = braking(*rate, bound)
         slowest = own if law is None else law
         for order, outside, duration, reached in (
