@@ -179,3 +179,33 @@ def test_an_angle_grows_as_fast_as_all_turns_together(joints):
     assert angles == pytest.approx([0.0, 0.3125, 0.0])
     around = ZoneAround(arm(*[LEVER] * joints), np.zeros(joints), Zone(orientation=0.95 * 0.3125))
     assert around.largest_share(curve)[0] == pytest.approx(1 / 0.95, rel=1e-5)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("mover", [0, 1])
+@pytest.mark.parametrize("late", [False, True])
+def test_each_joint_is_looked_at_on_both_sides_and_in_both_halves_of_a_piece(side, mover, late):
+    """Up and back within one piece, t^4 (1 - t), at most 4^4 / 5^5 at t = 0.8; or backward in time."""
+    up = np.poly1d([-1.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+    row = up if late else up(np.poly1d([-1.0, 1.0]))
+    coefficients, top = np.zeros((6, 1, 2)), 4**4 / 5**5
+    coefficients[:, 0, mover] = side * row.coeffs
+    curve = PiecewisePolynomial(np.array([0.0, 1.0]), coefficients)
+    around = [
+        ZoneAround(arm(LEVER, LEVER), np.zeros(2), Zone(joints=(part * top,) * 2)) for part in (0.9, 2.0)
+    ]
+    share, when = around[0].largest_share(curve)
+    assert share == pytest.approx(1 / 0.9, rel=1e-5)
+    assert when == pytest.approx(0.8 if late else 0.2, abs=1e-2)
+    assert 0.5 <= around[1].largest_share(curve)[0] <= 1.0
+    at_top = np.zeros((1, 2))
+    at_top[0, mover] = side * top
+    assert around[1].shares(at_top) == pytest.approx([0.5])
+
+
+def test_what_takes_too_many_parts_is_not_proven(monkeypatch):
+    monkeypatch.setattr("trajcli.kinematics.zone._AT_ONCE", 0)
+    curve = PiecewisePolynomial(np.array([0.0, 1.0]), np.array([-1.0, 1.0, 0.0]).reshape(3, 1, 1))
+    around = ZoneAround(arm(LEVER), np.zeros(1), Zone(joints=(0.26,)))
+    assert around.largest_share(curve)[0] in (pytest.approx(0.25 / 0.26, rel=0.05), np.inf)
+    assert ZoneAround(arm(LEVER), np.zeros(1), Zone(joints=(0.2,))).largest_share(curve)[0] == np.inf
