@@ -397,7 +397,7 @@ def _flown(flyby: FlyBy) -> str:
     count, saved = len(flyby.zones), 1 - flyby.duration / flyby.stopping
     corners = f"flies by {count} corner{'s' * (count != 1)}"
     gained = f"{100 * saved:.3g} % less than the {flyby.stopping:.6g} s of stopping there"
-    return f"{corners}: {gained}; bound: {flyby.bound:.6g} s ({flyby.method})"
+    return f"{corners}: {gained}; bound: {flyby.bound:.6g} s (searched)"
 
 
 def _steps(plan: Plan) -> str:

@@ -18,11 +18,12 @@ def flyby_report(flyby: FlyBy, types: Sequence[JointType], names: Sequence[str])
         types: Of the joints.
         names: Of the joints.
     """
+    bound, method = flyby.best_bound
     return FlyByReport(
         duration=flyby.duration,
         stopping=flyby.stopping,
         saved=flyby.stopping - flyby.duration,
-        bound=BoundReport(duration=flyby.bound, method=flyby.method),
+        bound=BoundReport(duration=bound, method=method),
         zones=[_zone(zone, types, names) for zone in flyby.zones],
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 from trajcli.errors import Amount, Amounts, InputError, MissingLimitError, Place, PlanningError, Problem
@@ -16,6 +17,7 @@ from trajcli.planners.flying_by import (
     flown,
     flown_zones,
     moves_as_flown,
+    proven_bounds,
     stretched_chain,
     zone_events,
 )
@@ -38,16 +40,29 @@ class FlyBy:
     Attributes:
         duration: Of the job, s.
         stopping: Of the job with a stop at every corner, s.
-        bound: Duration below which no motion through these zones was found, or is, s.
-        method: What the bound is.
+        bound: Duration below which no motion through these zones was found, s.
         zones: In order of time.
+        chains: Those that fly; None where one stops although zones are named.
     """
 
     duration: float
     stopping: float
     bound: float
-    method: BoundMethod
     zones: tuple[FlownZone, ...]
+    chains: tuple[FlownChain, ...] | None
+
+    @cached_property
+    def best_bound(self) -> tuple[float, BoundMethod]:
+        """Duration below which no motion through these zones is, s, and how that is known.
+
+        It is proven where each chain is two straight moves in joint space, which takes some seconds for each;
+        else it is the one that the search found.
+        """
+        proven = proven_bounds(self.chains) if self.chains else None
+        if not self.chains or proven is None:
+            return self.bound, "searched"
+        saved = sum(chain.duration - least for chain, least in zip(self.chains, proven, strict=True))
+        return self.duration - saved, "proven"
 
 
 def flown_plan(
@@ -79,8 +94,8 @@ def _fly(
     number = {move.index: k for k, move in enumerate(moves)}
     events: list[Event] = []
     zones: list[FlownZone] = []
-    saved = 0.0
-    for group in chains(corners):
+    saved, flown_by, groups = 0.0, list[FlownChain](), list(chains(corners))
+    for group in groups:
         first = number[group[0].move]
         some = moves[first : first + len(group) + 1]
         report_progress(f"flying by the corners of moves {some[0].index} to {some[-1].index}")
@@ -94,9 +109,12 @@ def _fly(
         result[first : first + len(some)] = moves_as_flown(some, chain)
         zones += of_chain
         saved += chain.duration - chain.model
+        flown_by.append(chain)
     duration = sum(move.duration for move in result)
     stopping = sum(move.duration for move in moves)
-    return result, FlyBy(duration, stopping, duration - max(saved, 0.0), "searched", tuple(zones)), events
+    known = tuple(flown_by) if len(flown_by) == len(groups) else None
+    flyby = FlyBy(duration, stopping, duration - max(saved, 0.0), tuple(zones), known)
+    return result, flyby, events
 
 
 def _chain(

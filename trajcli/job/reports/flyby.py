@@ -76,5 +76,7 @@ class BoundReport(ReportPart):
     duration: Annotated[float, Field(description="Of the whole job, holds included, s.")]
     method: Annotated[
         Literal["proven", "searched", "second_order"],
-        Field(description="searched: the fastest that a search without balls found, which proves nothing."),
+        Field(
+            description="proven: no motion is faster; searched: what a search found, which proves nothing."
+        ),
     ]

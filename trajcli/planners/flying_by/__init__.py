@@ -7,7 +7,7 @@ from trajcli.planners.flying_by.flown_moves import (
     stretched_chain,
     zone_events,
 )
-from trajcli.planners.flying_by.within_limits import FlownChain, flown
+from trajcli.planners.flying_by.within_limits import FlownChain, flown, proven_bounds
 
 __all__ = [
     "FlownChain",
@@ -15,6 +15,7 @@ __all__ = [
     "flown",
     "flown_zones",
     "moves_as_flown",
+    "proven_bounds",
     "stretched_chain",
     "zone_events",
 ]

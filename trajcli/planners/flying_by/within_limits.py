@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from importlib.util import find_spec
 
 import numpy as np
 
@@ -67,6 +68,17 @@ class FlownChain:
     def duration(self) -> float:
         """Seconds."""
         return sum(part.curve.duration for part in self.parts)
+
+
+def proven_bounds(chains: Sequence[FlownChain]) -> list[float] | None:
+    """Return durations, s, below which no motions of chains are; None without a proof of each, or scipy."""
+    if find_spec("scipy") is None:
+        return None
+    from trajcli.planners.flying_by.proven_bound import is_provable, least_duration
+
+    if not all(is_provable(each.chain) for each in chains):
+        return None
+    return [least_duration(each.chain, each.duration) for each in chains]
 
 
 def flown(moves: Sequence[PlannedMove], corners: Sequence[Zone], robots: Sequence[Robot]) -> FlownChain:

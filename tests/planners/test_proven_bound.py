@@ -1,0 +1,221 @@
+"""The proven bound of two straight moves with a zone: its rows hold for every motion, and it is near."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from tiers import QUICK, few
+
+from trajcli.job.read import job_from_text
+from trajcli.output.report import report_of
+from trajcli.planners.flying_by import proven_bound
+from trajcli.planners.flying_by.proven_bound import (
+    ShareBox,
+    ShareProgramme,
+    is_provable,
+    least_duration,
+    moment_rows,
+)
+from trajcli.planners.flying_by.within_limits import FlownChain
+from trajcli.planning.plan import Plan, plan_job
+
+INTERVALS, FINE = 3, 16  # of a part; fine steps of each interval, which meet the switches at quarters
+
+
+@pytest.fixture
+def few_programmes(monkeypatch: pytest.MonkeyPatch) -> None:
+    if QUICK:
+        monkeypatch.setattr(proven_bound, "_PROGRAMMES", 40)
+
+
+def planned(*targets: list[float], robot: str = "planar2r", zone: object = 0.02, **fields: object) -> Plan:
+    limits = fields.pop("limits", {"velocity": 3, "acceleration": 8, "jerk": 60})
+    moves = [{"planner": "jerk_limited", "to": {"joints": joints}} for joints in targets]
+    for move in moves[:-1] if fields.pop("more_zones", False) else moves[:1]:
+        move["zone"] = zone
+    start = fields.pop("start", [0.3, 1.2])
+    job = {"version": 1, "robot": robot, "limits": limits, "start": {"joints": start}, "moves": moves}
+    return _planned(json.dumps({**job, **fields}))
+
+
+@cache
+def _planned(text: str) -> Plan:
+    return plan_job(job_from_text(text))
+
+
+def chain_of_plan(plan: Plan) -> FlownChain:
+    assert plan.flyby is not None
+    assert plan.flyby.chains is not None
+    (chain,) = plan.flyby.chains
+    return chain
+
+
+def responses(order: int) -> np.ndarray:
+    """Return states at nodes (3 (N + 1), fine steps) of a jerk (3) or an acceleration (2) of 1 in each step."""
+    count = INTERVALS * FINE
+    step = 1.0 / count
+    found = np.zeros((3 * (INTERVALS + 1), count))
+    for number in range(count):
+        state = np.zeros(4)
+        for k in range(count):
+            state[3 if order == 3 else 2] = float(k == number)
+            if order == 3:
+                x, v, a, j = state
+                state = np.array([x + step * v + step**2 / 2 * a + step**3 / 6 * j, 0, 0, 0])
+                state[1:3] = v + step * a + step**2 / 2 * j, a + step * j
+            else:
+                x, v, a, _ = state
+                state = np.array([x + step * v + step**2 / 2 * a, v + step * a, 0.0, 0.0])
+            if (k + 1) % FINE == 0:
+                found[3 * (k + 1) // FINE : 3 * (k + 1) // FINE + 3, number] = state[:3]
+    return found
+
+
+@pytest.mark.parametrize("order", [2, 3])
+@pytest.mark.parametrize(("low", "high"), [(-1.0, 1.0), (-0.5, 2.0)])
+def test_each_row_of_moments_is_the_largest_that_any_motion_has(order: int, low: float, high: float) -> None:
+    """Rows are linear in the jerk: the largest value has the one bound or the other in each fine step."""
+    bounds = np.array([[-np.inf, np.inf]] * 3)
+    bounds[order - 1] = low, high
+    rows, orders, sizes = moment_rows(bounds, INTERVALS)
+    assert set(orders) == {order}
+    assert len(rows) == INTERVALS * 2 * (5 if order == 3 else 4)
+    gains = rows @ responses(order)
+    np.testing.assert_allclose(np.maximum(gains * low, gains * high).sum(axis=1), sizes, rtol=1e-9)
+
+
+def test_velocities_bound_the_way_of_an_interval() -> None:
+    rows, orders, sizes = moment_rows(
+        np.array([[-1.0, 2.0], [-np.inf, np.inf], [-np.inf, np.inf]]), INTERVALS
+    )
+    assert set(orders) == {1}
+    np.testing.assert_allclose(sizes, [2 / INTERVALS, 1 / INTERVALS] * INTERVALS)
+    states = np.zeros(rows.shape[1])
+    states[0::3] = np.linspace(0.0, 2.0, INTERVALS + 1)
+    assert (rows @ states - sizes).max() == pytest.approx(0.0, abs=1e-12)
+
+
+def states_of(chain: FlownChain, programme: ShareProgramme) -> tuple[np.ndarray, np.ndarray]:
+    """Return the columns of the programme for a motion, and the shares of its parts."""
+    found = np.zeros(programme.columns)
+    durations = np.array([part.curve.duration for part in chain.parts])
+    courses = chain.chain.courses
+    for number, variable in enumerate(programme.variables):
+        part = chain.parts[variable.part]
+        length = part.curve.duration
+        times = part.curve.start + np.linspace(0.0, length, variable.intervals + 1)
+        for order in range(3):
+            rows = part.curve.evaluate(times, order)
+            if variable.part == 1:
+                values = rows[:, number - 1]
+            else:
+                line = courses[variable.part // 2].curve.coefficients[0, 0]
+                values = rows @ line / (line @ line)
+            values = values - values[0] if order == 0 else values * length**order
+            found[variable.start + order : variable.start + variable.width : 3] = values
+    for border in (0, 1):
+        line = courses[border].curve.coefficients[0, 0]
+        curve = chain.parts[2 * border].curve
+        time = curve.end if border == 0 else curve.start
+        for order in (1, 2):
+            rate = float(curve.evaluate(time, order) @ line / (line @ line))
+            found[programme.states + 2 * border + order - 1] = rate * durations.sum() ** order
+    found[-1] = 1.0
+    return found, durations / durations.sum()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_motion_obeys_every_row_in_every_box_around_it(seed: int) -> None:
+    """Secants, products and orders: a motion that exists is in no box refuted."""
+    rng = np.random.default_rng(seed)
+    fast = [2.1, 1.2], [2.1, 2.9]  # joints that reach their velocity
+    plan = planned(*fast) if seed % 2 else planned([0.9, 0.8], [0.2, 1.5], zone=0.05)
+    chain = chain_of_plan(plan)
+    programme = ShareProgramme(chain.chain, 5, 4)
+    found, shares = states_of(chain, programme)
+    duration = chain.duration
+    outer = shares[[0, 2]]
+    room = 0.3 * rng.uniform(0.01, 1.0, (2, 2))
+    low, high = np.maximum(outer - room[0], 0.0), np.minimum(outer + room[1], 1.0)
+    box = ShareBox((float(low[0]), float(low[1])), (float(high[0]), float(high[1])))
+    A, orders, sides = programme.rows(box)
+    allowed = duration**orders * (sides @ np.array([1.0, *outer]))
+    scale = np.abs(A).max(axis=1).toarray()[:, 0]
+    assert ((A @ found - allowed) / scale).max() <= 1e-9
+    least, largest, own = programme.ranges(box)
+    assert (found >= least * duration**own - 1e-9).all()
+    assert (found <= largest * duration**own + 1e-9).all()
+    for half in box.halves():
+        inside = all(half.low[k] <= outer[k] <= half.high[k] for k in range(2))
+        assert not inside or programme.least_duration(half, duration, 2 * duration) <= duration * (1 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("targets", "zone"), [(([0.9, 1.25], [1.0, 2.0]), 0.02), (([1.0, 1.2], [2.3, 1.2]), 0.05)]
+)
+def test_next_to_the_fastest_motion_the_bound_is_next_to_it(
+    targets: tuple[list[float], list[float]], zone: float
+) -> None:
+    """A box of a ten thousandth: what is left is the grid, 1.7 %; a term 10 % off would go beyond the motion."""
+    chain = chain_of_plan(planned(*targets, zone=zone))
+    programme = ShareProgramme(chain.chain, 8, 6)
+    _, shares = states_of(chain, programme)
+    first, last = float(shares[0]), float(shares[2])
+    box = ShareBox((first * (1 - 1e-4), last * (1 - 1e-4)), (first * (1 + 1e-4), last * (1 + 1e-4)))
+    for guess in (0.95, 0.98, 1.0):
+        least = programme.least_duration(box, guess * chain.duration, 2 * chain.duration)
+        assert 0.975 * chain.duration <= least <= chain.duration
+
+
+def test_collinear_moves_are_bounded_by_one_move_of_the_whole_way(few_programmes: None) -> None:
+    """Over D = 2 with v = 3, a = 8 and j = 60 it is D / v + v / a + a / j."""
+    plan = planned([1.0, 1.2], [2.3, 1.2], zone=0.05)
+    exact = 2 / 3 + 3 / 8 + 8 / 60
+    assert plan.trajectory.duration == pytest.approx(exact, rel=1e-9)
+    least = least_duration(chain_of_plan(plan).chain, exact)
+    assert 0.93 * exact <= least <= exact
+
+
+def test_the_report_says_what_kind_of_bound_it_has(few_programmes: None) -> None:
+    plan = planned([0.9, 1.25], [1.0, 2.0])
+    report = report_of(plan).flyby
+    assert report is not None
+    assert report.bound.method == "proven"
+    assert 0.9 * report.duration <= report.bound.duration <= report.duration
+    longer = report_of(planned([0.9, 1.25], [1.0, 2.0], [0.2, 1.0], more_zones=True)).flyby
+    assert longer is not None
+    assert longer.bound.method == "searched"
+    assert longer.bound.duration <= longer.duration
+
+
+def test_a_start_in_motion_and_bent_paths_have_no_proof() -> None:
+    two = chain_of_plan(planned([0.9, 1.25], [1.0, 2.0])).chain
+    assert is_provable(two)
+    assert not is_provable(replace(two, ends=(np.array([0.1, 0.0]), np.zeros(2))))
+    assert not is_provable(replace(two, ends=(np.zeros(2), np.array([0.0, 0.1]))))
+    three = chain_of_plan(planned([0.9, 1.25], [1.0, 2.0], [0.2, 1.0], zone=0.02, more_zones=True)).chain
+    assert not is_provable(three)
+
+
+@pytest.mark.parametrize("seed", few(range(20), 1))
+def test_of_random_arms_it_is_never_above_the_motion_and_near(seed: int, few_programmes: None) -> None:
+    rng = np.random.default_rng(seed)
+    start = np.array([0, -90, 90, -90, -90, 0]) + rng.uniform(-40, 40, 6)
+    points = start + np.cumsum(rng.uniform(-60, 60, (2, 6)), axis=0)
+    plan = planned(
+        *points.tolist(),
+        robot="ur5e",
+        units={"angle": "deg", "length": "mm"},
+        limits={"velocity": 180, "acceleration": 800, "jerk": float(np.exp(rng.uniform(7.6, 10.3)))},
+        start=start.tolist(),
+        zone=float(rng.uniform(10, 80)),
+    )
+    if plan.flyby is None or plan.flyby.chains is None:
+        pytest.skip("no faster than stopping")
+    chain = chain_of_plan(plan)
+    least = least_duration(chain.chain, chain.duration)
+    assert (0.8 if QUICK else 0.96) * chain.duration <= least <= chain.duration
