@@ -30,7 +30,8 @@ def rows_of(plan: Plan) -> bytes:
         raise SystemExit(f"{loaded.name} does not verify: {plan.verdict.findings}")
     groups = loaded.job.output.columns
     out = io.BytesIO()
-    columns = columns_of(groups, loaded.robot.joint_types, loaded.units)
+    signals = [signal.name for signal in plan.trajectory.signals]
+    columns = columns_of(groups, loaded.robot.joint_types, loaded.units, signals)
     rows = sample(plan.trajectory, grid_of(plan), groups, loaded.units, robot=loaded.robot_of_rows)
     write_csv(rows, columns, out)
     return out.getvalue()

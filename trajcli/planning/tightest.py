@@ -46,7 +46,7 @@ def tightest_limit(plan: Plan) -> str:
     """Return the limit of which a plan uses most, where, and how much; nothing where none is known."""
     best: Tightest | None = None
     for one in tightest_of_moves(plan):
-        if best is None or one.used > best.used * (1 + _SAME):  # of those that use the same the first
+        if best is None or one.used > best.used * (1 + 2 * _UNSURE):  # of those that use the same the first
             best = one
     return "" if best is None else f"{best.name} in move {best.span.index}, {best.share} used"
 
