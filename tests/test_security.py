@@ -76,7 +76,7 @@ def test_commands_ask_the_system_for_no_connection_and_no_process(planted: bool,
     [
         ("a: !!python/object/apply:os.system [touch pwned]\n", "tags are not read"),
         ("a: &a [x, x]\nb: &b [*a, *a]\nc: [*b, *b]\n", "anchors are not read"),
-        ("a: " + "[" * 10_000 + "]" * 10_000 + "\n", "deep"),
+        ("a: " + "[" * 10_000 + "]" * 10_000 + "\n", "nest"),
         ("a: " + "x" * 5_000_001 + "\n", "at most 5 MB"),
         (
             JOB.replace("moves:", "moves:\n  - {repeat: 1000000000, moves: [{planner: hold, duration: 1}]}"),

@@ -53,9 +53,10 @@ def test_one_joint_is_a_list_too():
 
 
 def test_every_group_has_its_key():
-    columns = columns_of(GROUPS, ("revolute",) * 3, Units())
+    columns = columns_of(GROUPS, ("revolute",) * 3, Units(), ["grip"])
     out, blocks = written(random_rows(5, columns), columns)
-    assert list(json.loads(out.getvalue().splitlines()[0])) == list(GROUPS)
+    expected = ["signal.grip" if group == "signals" else group for group in GROUPS]
+    assert list(json.loads(out.getvalue().splitlines()[0])) == expected
     verify_jsonl(out, blocks, columns)
 
 
