@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 from tiers import QUICK, few
 
+from trajcli.cli.explain import _lines
 from trajcli.job.read import job_from_text
+from trajcli.output.explain import explanation
 from trajcli.output.report import report_of
 from trajcli.planners.flying_by import proven_bound
 from trajcli.planners.flying_by.proven_bound import (
@@ -45,6 +47,10 @@ def planned(*targets: list[float], robot: str = "planar2r", zone: object = 0.02,
 @cache
 def _planned(text: str) -> Plan:
     return plan_job(job_from_text(text))
+
+
+def explained(plan: Plan) -> list[str]:
+    return list(_lines(explanation(plan), plan))
 
 
 def chain_of_plan(plan: Plan) -> FlownChain:
@@ -186,6 +192,8 @@ def test_the_report_says_what_kind_of_bound_it_has(few_programmes: None) -> None
     assert report is not None
     assert report.bound.method == "proven"
     assert 0.9 * report.duration <= report.bound.duration <= report.duration
+    (line,) = [each for each in explained(plan) if each.startswith("flying by")]
+    assert line.endswith(f"bound: {report.bound.duration:.6g} s (proven)")
     longer = report_of(planned([0.9, 1.25], [1.0, 2.0], [0.2, 1.0], more_zones=True)).flyby
     assert longer is not None
     assert longer.bound.method == "searched"

@@ -304,11 +304,20 @@ def _lines(explained: Explanation, plan: Plan, *, peers: bool = False) -> Iterat
         yield "all moves together:"
         yield from _savings(explained.savings, "  ")
     general = [event for event in noted if event.move is None]
+    yield from _flown_by(explained)
     yield from (f"{event.kind}: {event.message}" for event in general)
     efforts = explained.efforts
     if efforts is not None and efforts.inertials is not None:
         how = "judged for all t" if efforts.judged else f"not judged, {efforts.reason}"
         yield f"efforts: {how}; masses and inertias from {efforts.inertials}"
+
+
+def _flown_by(explained: Explanation) -> Iterator[str]:
+    """Yield the line about what flying by corners gained, and its bound."""
+    flyby = explained.flyby
+    if flyby is not None and flyby.zones:
+        bound = f"bound: {flyby.bound.duration:.6g} s ({flyby.bound.method})"
+        yield f"flying by its corners: {flyby.duration:.6g} s, stopping there {flyby.stopping:.6g} s; {bound}"
 
 
 def _zones(explained: Explanation, move: int) -> Iterator[str]:
