@@ -9,9 +9,9 @@ SchemaKind = Literal["job", "robot", "report", "explanation"]
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _TITLES = {
     "job": "trajcli job, version 1",
-    "robot": "trajcli robot",
-    "report": "trajcli verification report",
-    "explanation": "trajcli explanation: what explain --json prints",
+    "robot": "trajcli robot, version 1",
+    "report": "trajcli verification report, version 1",
+    "explanation": "trajcli explanation, version 1: what explain --json prints",
 }
 
 
