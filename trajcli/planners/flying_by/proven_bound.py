@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 from typing import Any
@@ -175,7 +175,7 @@ class ShareProgramme:
                 -variable.distance,
             )
         self._rows, self._distances = (
-            scipy.sparse.csr_matrix(each) for each in (np.concatenate(rows), np.hstack([distances]))
+            scipy.sparse.csr_matrix(each) for each in (np.concatenate(rows), distances)
         )
         self._orders, self._sizes = np.concatenate(orders), np.concatenate(sizes)
         self._parts = np.concatenate(parts)
@@ -369,7 +369,7 @@ def _in_shares(part: int, constant: float, slope: float) -> Array:
     return np.array(outer[part])
 
 
-def _largest_refuted(weights: Sequence[Array] | Array, most: float) -> float:
+def _largest_refuted(weights: Array, most: float) -> float:
     """Return a duration, up to `most`, at which all of several cubic polynomials of it are below 1."""
 
     def refuted(duration: float) -> bool:
