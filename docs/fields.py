@@ -44,7 +44,7 @@ from trajcli.planners import PLANNERS, Planner
 from trajcli.planners.tool_path.arc import ArcFields
 from trajcli.planners.tool_path.law import LawSpec
 from trajcli.planners.tool_path.move import ToleranceSpec
-from trajcli.planners.tool_path.path import Segment
+from trajcli.planners.tool_path.segments import Segment
 from trajcli.planners.waypoints.blends import BlendDurations
 from trajcli.planners.waypoints.time_optimal import PathParameter
 from trajcli.planners.waypoints.waypoints import SegmentTimes

@@ -6,7 +6,7 @@ from docs.fields import field_table
 from trajcli.planners.tool_path.arc import ArcFields
 from trajcli.planners.tool_path.law import LawSpec
 from trajcli.planners.tool_path.move import ToleranceSpec
-from trajcli.planners.tool_path.path import Segment
+from trajcli.planners.tool_path.segments import Segment
 
 _PATHS = """\
 `line`, `arc`, `path` and `screw` lead the tcp along a path in space; the joints follow. They start and end

@@ -1,0 +1,154 @@
+"""Segments of composite paths: their fields, and the curves and targets that these mean.
+
+What people record has segments without length, and places where the path turns back: the former count for
+nothing, and the latter are stopped at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from trajcli.curves.piecewise import Array
+from trajcli.errors import InputError, Problem, TrajcliError
+from trajcli.geometry.paths.corner import REVERSAL, turn_between
+from trajcli.geometry.paths.position import SAME_POINT, Line, PositionCurve
+from trajcli.kinematics.robot import Robot
+from trajcli.language.numbers import Model, Number, refuse
+from trajcli.language.points import NamedTarget
+from trajcli.planners.planner import Event
+from trajcli.planners.tool_path.arc import ArcFields, arc_of, arc_target
+from trajcli.planners.tool_path.move import ToolTarget, flaws_of_target, tool_target
+from trajcli.units import Quantity
+
+_SAME_TURN = 1e-9  # rad: rounding of rotations
+
+
+class Segment(Model):
+    """A line or an arc of a path, from where the one before ends."""
+
+    line: Annotated[NamedTarget | None, Field(description="Where a straight segment ends.")] = None
+    arc: ArcFields | None = None
+    radius: (
+        Annotated[
+            float,
+            Number(
+                Quantity("length"),
+                "That of the corner after this segment, instead of the move's; 0 stops there (length unit).",
+                at_least=0.0,
+            ),
+        ]
+        | None
+    ) = None
+
+    @model_validator(mode="after")
+    def _is_one(self) -> Segment:
+        if (self.line is None) == (self.arc is None):
+            raise refuse([((), "a segment is either a `line` or an `arc`", None)])
+        flaws = [] if self.line is None else list(flaws_of_target(self.line, ("line",), "a segment"))
+        if flaws:
+            raise refuse(flaws)
+        return self
+
+
+def curves_of(
+    before: Array, segments: Sequence[Segment], robot: Robot
+) -> tuple[list[PositionCurve], list[ToolTarget], list[int]]:
+    """Return curve, target and index of each segment: a line to where the tool is already is left out.
+
+    Args:
+        before: Pose at the start, (4, 4).
+        segments: In order.
+        robot: For targets by its joints.
+
+    Raises:
+        InputError: When one fixes another part of the orientation than the one before.
+        TrajcliError: When an arc cannot be; with the place of its segment.
+    """
+    curves: list[PositionCurve] = []
+    targets: list[ToolTarget] = []
+    kept: list[int] = []
+    pose = before
+    last = len(segments) - 1
+    for index, segment in enumerate(segments):
+        try:
+            if _stays(segment, pose, robot) and (kept or index < last):
+                continue
+            curve, target = _segment(segment, pose, robot)
+        except TrajcliError as error:
+            raise type(error)(*(_in_segment(index, problem) for problem in error.problems)) from None
+        if targets and (target.orientation, target.tool_axis) != (
+            targets[-1].orientation,
+            targets[-1].tool_axis,
+        ):
+            message = f"segment {index} fixes another part of the orientation than the one before"
+            hint = "give the targets of all segments the same kind of orientation"
+            raise InputError(Problem(message, hint, field=("segments", index)))
+        curves.append(curve)
+        targets.append(target)
+        kept.append(index)
+        pose = target.pose
+    return curves, targets, kept
+
+
+def _stays(segment: Segment, pose: Array, robot: Robot) -> bool:
+    """Return whether it is a line to the pose (4, 4) in which the tool is already."""
+    off = np.full((4, 4), 1.0) if segment.line is None else tool_target(segment.line, pose, robot).pose - pose
+    return float(np.linalg.norm(off[:3, 3])) <= SAME_POINT and float(np.abs(off[:3, :3]).max()) <= _SAME_TURN
+
+
+def merged_events(count: int, kept: Sequence[int]) -> list[Event]:
+    """Return the event of segments without a length that were left out."""
+    left = sorted({*range(count)} - {*kept})
+    some = "segment {}" if len(left) == 1 else f"{len(left)} segments, the first is {{}}:"
+    message = "counts for nothing: it ends where it begins"
+    return [Event("merged", f"{some.format(left[0])} {message}")] if left else []
+
+
+def _in_segment(index: int, problem: Problem) -> Problem:
+    """Return a problem that stands in a segment, with the place of that."""
+    below = problem.field or ()
+    return replace(problem.within(f"segment {index}"), field=("segments", index, *below))
+
+
+def corner_radii(segments: Sequence[Segment], kept: Sequence[int], radius: float) -> list[float]:
+    """Return the radius of each corner between the segments that are kept, m: the least that is given.
+
+    Args:
+        segments: All of them.
+        kept: Indices of those with a length, k.
+        radius: Where none of those between gives one, m.
+    """
+    radii = []
+    for first, last in pairwise(kept):
+        given = [s.radius for s in segments[first:last] if s.radius is not None]
+        radii.append(min(given, default=radius))
+    return radii
+
+
+def turning_back(
+    curves: Sequence[PositionCurve], radii: Sequence[float], kept: Sequence[int]
+) -> tuple[list[float], list[Event]]:
+    """Return the radii with 0, which stops, where the path turns back, and an event for each of these."""
+    left, events = list(radii), []
+    for k, (before, after) in enumerate(pairwise(curves)):
+        if left[k] and turn_between(before, after) > np.pi - REVERSAL:
+            left[k] = 0.0
+            message = f"the path turns back behind segment {kept[k]}, and stops there"
+            events.append(Event("turns_back", message))
+    return left, events
+
+
+def _segment(segment: Segment, pose: Array, robot: Robot) -> tuple[PositionCurve, ToolTarget]:
+    if segment.arc is not None:
+        target = arc_target(segment.arc, pose, robot)
+        return arc_of(segment.arc, pose, target, robot), target
+    if segment.line is None:
+        raise InputError("a segment is either a `line` or an `arc`")
+    target = tool_target(segment.line, pose, robot)
+    return Line(pose[:3, 3], target.pose[:3, 3]), target
