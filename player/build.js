@@ -5,25 +5,18 @@ import { mkdirSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'nod
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import * as esbuild from 'esbuild';
+import { lean } from './lean.js';
 
 const here = dirname(fileURLToPath(import.meta.url));
 const target = join(here, '..', 'trajcli', 'player', 'bundle');
-const sources = ['build.js', 'package.json', 'package-lock.json', ...readdirSync(join(here, 'src')).map((name) => `src/${name}`)].sort();
+const sources = ['build.js', 'lean.js', 'package.json', 'package-lock.json', ...readdirSync(join(here, 'src')).map((name) => `src/${name}`)].sort();
 const sha256 = (bytes) => createHash('sha256').update(bytes).digest('hex');
-
-// The shaders of three are texts, which no minifier touches: their indentation goes.
-const shaders = {
-  name: 'shaders',
-  setup(build) {
-    build.onLoad({ filter: /three\.module\.js$/ }, ({ path }) => ({ contents: readFileSync(path, 'utf-8').replace(/(\\n)(?:\\t)+/g, '$1'), loader: 'js' }));
-  },
-};
 
 const { outputFiles } = await esbuild.build({
   entryPoints: { player: join(here, 'src', 'main.js'), loader: join(here, 'src', 'loader.js'), style: join(here, 'src', 'style.css') },
   bundle: true,
   minify: true,
-  plugins: [shaders],
+  plugins: [lean],
   format: 'iife',
   target: ['chrome113', 'firefox113', 'safari16.4'],
   legalComments: 'eof',

@@ -119,6 +119,7 @@ def test_the_bundle_was_built_from_the_sources() -> None:
     manifest = json.loads((BUNDLE / "manifest.json").read_text())
     names = [
         "build.js",
+        "lean.js",
         "package.json",
         "package-lock.json",
         *(f"src/{path.name}" for path in (SOURCES / "src").iterdir()),
