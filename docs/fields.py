@@ -13,7 +13,8 @@ from pydantic.fields import FieldInfo
 from docs.markdown import first_sentence, table
 from trajcli.job.model import Output, OutputUnits, RobotSource, UnitsSpec
 from trajcli.job.robot import JointModel
-from trajcli.language.dynamics import FrictionSpec, Gravity, LinkSpec, PayloadSpec
+from trajcli.kinematics.robot import MountedTool
+from trajcli.language.dynamics import FrictionSpec, Gravity, LinkSpec, NamedTool, PayloadSpec
 from trajcli.language.efforts import EffortBound, Efforts
 from trajcli.language.limits import (
     UNLIMITED,
@@ -149,6 +150,7 @@ def _reader_form(reader: FieldType) -> str:
         Efforts: f"[bound](#bounds), {_BY_JOINT}, or `robot`",
         Gravity: "list of 3 numbers",
         Pose: "[pose](#poses)",
+        NamedTool: "name of a tool, or a [tool](programs.md#tools)",
         RobotSource: "[robot](#robot)",
         JointDistance: f"number at least 0, {_BY_JOINT}",
         ZoneField: "number at least 0, `stop`, or {position, orientation, joints}: [zones](zones.md)",
@@ -189,6 +191,7 @@ def _type_form(annotation: Any) -> str:  # noqa: ANN401
         return "[move](#moves)"
     plain = {
         np.ndarray: "[pose](#poses)",
+        MountedTool: "[tool](programs.md#tools)",
         Any: "[defaults](#defaults)",
         bool: "`true` or `false`",
         str: "text",

@@ -221,7 +221,7 @@ def test_every_definition_of_the_schema_is_looked_at() -> None:
         "Waypoint",
     }
     known |= {"RelativeTarget", "RelativeWaypoint"}  # described in words
-    known |= {"Attach", "Detach", "Empty", "PayloadSpec"}
+    known |= {"Attach", "Detach", "Empty", "PayloadSpec", "ChangeTool"}
     known |= {"ToolLimitsSpec", "LawSpec", "ToleranceSpec", "Segment", "ArcFields"}
     others = {name for name, definition in SCHEMA["$defs"].items() if "properties" in definition} - known
     assert {SCHEMA["$defs"][name]["properties"]["planner"]["const"] for name in others} == set(MOVES)

@@ -6,7 +6,6 @@ Rows are evaluated in blocks of bounded size, so that memory does not grow with 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,7 +79,7 @@ def sample(
             elif group == EFFORT:
                 parts.append(_efforts(trajectory, robot, starts.spans(local), motion * factors))
             elif group in TOOL_COLUMNS:
-                part = _of_tool(group, robot, motion * factors, last)
+                part = _of_tool(group, trajectory, local, robot, motion * factors, last)
                 last = part[-1, 3:] if group == "pose" else last
                 parts.append(part / group_factors(group, units))
             elif group == "path":
@@ -102,11 +101,15 @@ def _orders(groups: Sequence[Group]) -> list[int]:
     return sorted(orders) or [0]
 
 
-def _of_tool(group: Group, robot: Robot | None, motion: Array, last: Array | None) -> Array:
+def _of_tool(
+    group: Group, trajectory: Trajectory, local: Array, robot: Robot | None, motion: Array, last: Array | None
+) -> Array:
     """Return a group of `TOOL_COLUMNS`, shape (N, columns), in SI.
 
     Args:
         group: Which.
+        trajectory: Whose spans know which tool is on the flange.
+        local: Times from its start, s, shape (N,).
         robot: Whose tool.
         motion: q and as many of its derivatives as the group needs, SI, shape (N, orders, n).
         last: Quaternion of the row before, (4,); None before the first.
@@ -121,10 +124,12 @@ def _of_tool(group: Group, robot: Robot | None, motion: Array, last: Array | Non
             f"the columns '{group}' are about a tool, and there is no robot", hint="give the robot"
         )
     if group == "twist":
-        return tcp_twist(robot, motion[:, 0], motion[:, 1])
+        return trajectory.of_tools(robot, local, lambda arm, k: tcp_twist(arm, motion[k, 0], motion[k, 1]))
     if group == "twistd":
-        return tcp_acceleration(robot, motion[:, 0], motion[:, 1], motion[:, 2])
-    poses = forward(robot, motion[:, 0])
+        return trajectory.of_tools(
+            robot, local, lambda arm, k: tcp_acceleration(arm, motion[k, 0], motion[k, 1], motion[k, 2])
+        )
+    poses = trajectory.of_tools(robot, local, lambda arm, k: forward(arm, motion[k, 0]))
     quaternions = without_jumps(quaternion_from_matrix(poses[:, :3, :3]), last)
     return np.concatenate([poses[:, :3, 3], quaternions], axis=1)
 
@@ -147,7 +152,7 @@ def _efforts(trajectory: Trajectory, robot: Robot | None, owner: NDArray[np.intp
     efforts = np.empty((motion.shape[0], motion.shape[2]))
     for index in np.unique(owner).tolist():
         rows = owner == index
-        dynamics = InverseDynamics(replace(robot, payload=trajectory.spans[index].payload))
+        dynamics = InverseDynamics(trajectory.spans[index].arm(robot))
         efforts[rows] = dynamics.effort(*(motion[rows, order] for order in range(3)))
     return efforts
 

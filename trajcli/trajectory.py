@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import field
+from collections.abc import Callable, Mapping
+from dataclasses import field, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, read_only
 from trajcli.errors import InputError
 from trajcli.frozen import comparable, frozen
 from trajcli.grids import AT_BREAK, UniformGrid, onto_breaks
-from trajcli.kinematics.robot import JointType, Payload, Robot
+from trajcli.kinematics.robot import JointType, MountedTool, Payload, Robot
 
 if TYPE_CHECKING:
     from trajcli.kinematics.following.motion import ToolMotion
@@ -156,6 +156,7 @@ class Span:
         round: In which round of a repeat it is, such as "slot 3 of 18"; empty outside of any.
         ends: The points between which it goes, such as "pick -> place"; empty without names.
         handles: Whether it is no move: an entry that takes up a payload, or leaves it.
+        tool: What is on the flange, where that is another tool than the robot's; None where it is not.
     """
 
     index: int
@@ -168,6 +169,13 @@ class Span:
     round: str = ""
     ends: str = ""
     handles: bool = False
+    tool: MountedTool | None = None
+
+    def arm(self, robot: Robot) -> Robot:
+        """Return the robot with the tool and the payload that it has meanwhile."""
+        if self.tool is not None:
+            robot = robot.with_tool(self.tool)
+        return robot if self.payload is robot.payload else replace(robot, payload=self.payload)
 
     @property
     def words(self) -> str:
@@ -307,6 +315,34 @@ class Trajectory:
             )
         local = onto_breaks(np.clip(local, 0.0, self.duration), self.curve.breaks)
         return self.curve.evaluate(local, order).reshape(*times.shape, self.curve.dimension)
+
+    def of_tools(
+        self, robot: Robot, times: Array, values: Callable[[Robot, NDArray[np.intp]], Array]
+    ) -> Array:
+        """Return values at times (N,), s from the start, each of the arm with the tool that it has then.
+
+        At a change the new tool counts.
+
+        Args:
+            robot: The arm with its own tool.
+            times: In any order.
+            values: Of an arm, and of the indices of some of the times, shape (k, ...).
+        """
+        moving = [span for span in self.spans if span.duration > 0] or list(self.spans[:1])
+        if all(span.tool is None for span in moving):
+            return values(robot, np.arange(times.size))
+        owner = np.searchsorted([span.start for span in moving], times + AT_BREAK, "right") - 1
+        found: Array | None = None
+        by_tool: dict[int, list[int]] = {}
+        for number in np.unique(np.maximum(owner, 0)).tolist():
+            by_tool.setdefault(id(moving[number].tool), []).append(number)
+        for numbers in by_tool.values():
+            rows = np.flatnonzero(np.isin(np.maximum(owner, 0), numbers))
+            part = values(replace(moving[numbers[0]].arm(robot), payload=None), rows)
+            if found is None:
+                found = np.empty((times.size, *part.shape[1:]))
+            found[rows] = part
+        return np.empty(0) if found is None else found
 
     def sample(self, rate: float) -> Rows:
         """Return states at a rate, Hz, and one exactly at the end: the rows of `trajcli plan`, in SI.

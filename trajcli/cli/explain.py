@@ -388,7 +388,11 @@ def _by_position(move: ExplainedMove) -> Iterator[str]:
 
 
 def _carried(move: ExplainedMove) -> Iterator[str]:
-    payload = move.payload
+    payload, tool = move.payload, move.mounted
+    if tool is not None:
+        name = f"tool {tool.name}" if tool.name else "tool"
+        weight = "" if tool.load is None else f", {tool.load.mass:.9g} kg"
+        yield f"  {name}: tcp at {_point(tool.xyz)} {tool.xyz_unit} of the flange{weight}"
     if payload is None:
         return
     point = "" if any(payload.inertia) else ", a point mass"

@@ -268,13 +268,13 @@ def direction(rates: Array) -> Array:
 
 
 def dynamic_links(robot: Robot) -> tuple[DynamicLink, ...]:
-    """Return the chain with the masses that it carries, the robot's payload as part of the last link.
+    """Return the chain with the masses that it carries, tool and payload as parts of the last link.
 
     Raises:
         InputError: When the robot has no geometry, or a link no inertia.
     """
     links = links_of(robot)
-    lacking, payload = robot.without_inertia, robot.payload
+    lacking = robot.without_inertia
     if lacking:
         whose = f"joint{'s' * (len(lacking) > 1)} {', '.join(lacking)}"
         raise InputError(
@@ -288,8 +288,9 @@ def dynamic_links(robot: Robot) -> tuple[DynamicLink, ...]:
         xx, yy, zz, xy, xz, yz = solid.inertia
         tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         solids = [(solid.mass, np.array(solid.com), tensor, behind)]
-        if payload is not None and index == len(links) - 1:
-            solids.append((payload.mass, payload.com, payload.inertia, behind @ robot.tool))
+        if index == len(links) - 1:
+            loads = (load for load in (robot.tool_load, robot.payload) if load is not None)
+            solids += [(load.mass, load.com, load.inertia, behind @ robot.tool) for load in loads]
         screw = before if robot.convention == "standard" else link.before
         result.append(DynamicLink(link.prismatic, link.sign, link.theta, link.d, screw, _joined(solids)))
         before = link.after

@@ -76,9 +76,14 @@ def retime(
         as_read: Returns a motion as a reader of what is written of it finds it.
 
     Raises:
-        InputError: When there are no moves, or nothing bounds how fast it may be.
+        InputError: When there are no moves, or nothing bounds how fast it may be, or nothing says which tool
+            of several a row is of.
         VerificationError: When something is wrong with it that no time mends.
     """
+    tools = {robot.tool.tobytes() for robot in requirements.by_move.values()}
+    if len(tools) > 1 and requirements.tool is not None and motion.rows.move is None:
+        what = f"{motion.rows.source} has no column `move`, and the job changes its tool, whose limits count"
+        raise InputError(what, hint="plan with `columns: [t, q, qd, qdd, move]`")
     judge, strictly = (_judge_of(requirements, strict=strict) for strict in (False, True))
     ranges = _ranges(motion) if per_move else [(slice(0, motion.rows.t.size), None)]
     stretches = []

@@ -21,7 +21,7 @@ from trajcli.errors import InputError
 from trajcli.job.read import LoadedJob
 from trajcli.job.robot import DH_ROW, RobotSheet
 from trajcli.kinematics.robot import GRAVITY, QUANTITIES, Robot
-from trajcli.language.dynamics import written_dynamics
+from trajcli.language.dynamics import NamedTool, written_dynamics
 from trajcli.language.limits import ToolLimitsSpec
 from trajcli.language.numbers import ReadingContext, written_number
 from trajcli.language.per_joint import UNLIMITED
@@ -47,6 +47,7 @@ def dump_job(loaded: LoadedJob) -> str:
         "name": loaded.name,
         "units": written["units"],
         "robot": robot_as_mapping(robot),
+        **_tools(loaded, written, context),
         **({} if job.gravity == GRAVITY else {"gravity": written["gravity"]}),
         "limits": {**_tool_limits(robot, context), **_efforts(robot)},
         "frames": {key: frame for key, frame in written["frames"].items() if key == job.output.frame},
@@ -62,6 +63,15 @@ def dump_job(loaded: LoadedJob) -> str:
     if job.output.times is not None:
         ordered["output"].pop("rate")
     return "\n".join(_block({**_without_empty(ordered), "moves": moves})) + "\n"
+
+
+def _tools(loaded: LoadedJob, written: Mapping[str, Any], context: ReadingContext) -> dict[str, Any]:
+    """Return the tools that moves put on, and the first one where the robot does not say all of it."""
+    job, first = loaded.job, loaded.job.tool
+    tools = {"tools": written["tools"]} if job.tools else {}
+    if first is None or not (first.name or first.load):
+        return tools
+    return {**tools, "tool": NamedTool("").write(first, context)}
 
 
 def _move(written: dict[str, Any]) -> dict[str, Any]:

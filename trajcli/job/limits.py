@@ -218,7 +218,7 @@ def flaws_of_dynamics(job: Job, robot: Robot, document: Document) -> Iterator[Pr
             yield from _lacking(robot, f"the columns '{EFFORT}'", document, ("output", "columns", index))
     for index, move in enumerate(job.moves):
         if move.needs_geometry and robot.convention is None:
-            message = f"a payload needs a robot with geometry, {robot.name} has bare joints"
+            message = f"{move.needs_geometry} needs a robot with geometry, {robot.name} has bare joints"
             yield Problem(message, _GEOMETRY, document.place(("moves", index)), move=index)
 
 

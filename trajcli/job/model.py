@@ -25,8 +25,8 @@ from pydantic_core import CoreSchema, core_schema
 
 from trajcli.columns import SIGNALS, Group
 from trajcli.frozen import comparable
-from trajcli.kinematics.robot import GRAVITY, Payload, Robot
-from trajcli.language.dynamics import Gravity
+from trajcli.kinematics.robot import GRAVITY, MountedTool, Payload, Robot
+from trajcli.language.dynamics import Gravity, NamedTool, ToolField
 from trajcli.language.limits import JobLimitsSpec
 from trajcli.language.numbers import (
     AT_KEY,
@@ -329,7 +329,13 @@ class Job(Model):
     name: Annotated[str, Name("For reports; the file's stem when left out.")] | None = None
     units: UnitsSpec = UnitsSpec()
     robot: Annotated[Robot, RobotSource()]
-    tool: Annotated[np.ndarray, Pose("T_flange_tcp, instead of the robot's own.")] | None = None
+    tool: (
+        Annotated[
+            MountedTool,
+            NamedTool("T_flange_tcp, instead of the robot's own: a name under `tools`, or a pose."),
+        ]
+        | None
+    ) = None
     base: (
         Annotated[
             np.ndarray, Pose("T_world_base, instead of the robot's own: a pedestal, a ceiling, a table.")
@@ -350,6 +356,10 @@ class Job(Model):
     ] = Field(
         default_factory=dict, description="Frames in which poses are given, or grids and lists of them."
     )
+    tools: dict[
+        Annotated[str, PointName("Name of a tool.")],
+        Annotated[MountedTool, ToolField("A tool: the pose of its tcp on the flange, and perhaps its mass.")],
+    ] = Field(default_factory=dict, description="Tools by name, for `tool: NAME` and `- tool: NAME`.")
     defaults: Annotated[
         Any,
         _Defaults(),
@@ -421,6 +431,11 @@ class Job(Model):
             hint = did_you_mean(name, known) or valid_names(known, "frames")
             raise refuse([(("output", "in"), f"there is no frame '{name}'", hint)])
         return self
+
+    @property
+    def changes_tool(self) -> bool:
+        """Whether the tool is changed between moves."""
+        return any(move.changes_tool for move in self.moves)
 
     @property
     def has_signals(self) -> bool:

@@ -127,7 +127,7 @@ class LoadedJob:
     def title(self, index: int) -> str:
         """Return the title of a move, such as "pick -> above_place (jerk_limited)"."""
         move = self.job.moves[index]
-        return move_title(self.ends(index), move.label, move.tag, self.document.round_of(index))
+        return move_title(self.ends(index), move.caption, move.tag, self.document.round_of(index))
 
     def called(self, index: int) -> str:
         """Return by what a move goes in messages: its number, and its title."""
@@ -262,7 +262,7 @@ def _load(document: Document) -> LoadedJob:
     robot = None if sheet is None else sheet.robot
     given = {"robot": robot or _UNREAD} if "robot" in plain else {}
     context = ReadingContext(units, points=_points(plain.get("points")))
-    context.frames = _points(plain.get("frames"))
+    context.frames, context.tools = _points(plain.get("frames")), _points(plain.get("tools"))
     if robot is not None:
         context.base = _base(plain.get("base"), context, robot)
         context.joint_names, context.joint_types = robot.joint_names, robot.joint_types
@@ -275,10 +275,12 @@ def _load(document: Document) -> LoadedJob:
         problems += problems_of(error, Job, document)
     if problems or robot is None:
         raise InputError(*sorted(problems, key=_position))
-    mounted = {key: pose for key in ("base", "tool") if (pose := getattr(job, key)) is not None}
     limits, noted = _with_limits_file(job.limits, document, robot)
     try:
-        placed = replace(robot, gravity=np.array(job.gravity), **mounted)
+        placed = replace(
+            robot, gravity=np.array(job.gravity), base=robot.base if job.base is None else job.base
+        )
+        placed = placed if job.tool is None else placed.with_tool(job.tool)
         effective, events = with_job_limits(placed, limits)
     except InputError as error:
         raise error.said_by(str).located(place=document.place(("limits", "position"))) from None

@@ -17,7 +17,7 @@ from trajcli.job.reports.comparisons import (
     ReferenceReport,
     SavingReport,
 )
-from trajcli.job.reports.efforts import EffortReport, EffortsReport, PayloadReport
+from trajcli.job.reports.efforts import EffortReport, EffortsReport, MountedToolReport, PayloadReport
 from trajcli.job.reports.flyby import FlyByReport, SignalReport
 from trajcli.job.reports.part import JointQuantity, MeasuredIn, ReportPart, ReportSeconds, UnitName, in_units
 from trajcli.limits.kinds import ToolLimit
@@ -236,6 +236,10 @@ class MoveReport(ReportPart):
     ] = None
     payload: Annotated[
         PayloadReport | None, Field(description="What the tool carries; null for nothing.")
+    ] = None
+    mounted: Annotated[
+        MountedToolReport | None,
+        Field(description="The tool on the flange, where the job has `tools` or changes it; else null."),
     ] = None
     binding: BindingReport | None
     at_limit: list[AtLimitReport] = Field(

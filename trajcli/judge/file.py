@@ -234,6 +234,7 @@ def _of_tool_columns(
     """
     if given.loaded is None or given.robot.convention is None or motion.format not in _NAMED:
         return [], set()
+    from trajcli.judge.rows.arms_of_moves import ArmsOfMoves
     from trajcli.judge.tool_columns import judge_tool_columns, open_tool_table
 
     joints = len(given.robot.joints)
@@ -244,14 +245,16 @@ def _of_tool_columns(
     read = {column.name for column in table.columns}
     if planned:
         return [], read
-    paths = None if given.plan is None else {move.index: move.planned.tool for move in given.plan.moves}
+    moves = () if given.plan is None else given.plan.moves
+    paths = None if given.plan is None else {move.index: move.planned.tool for move in moves}
     blocks = motion.blocks(JUDGED_ROWS)
+    seen = given.loaded.robot_of_rows
     return judge_tool_columns(
         blocks if by_time is None else map(by_time, blocks),
         table,
-        given.robot,
+        ArmsOfMoves(given.robot, moves),
         paths,
-        given.loaded.robot_of_rows,
+        ArmsOfMoves(seen, moves),
     ), read
 
 
@@ -415,10 +418,10 @@ def _tool_of(given: _Given) -> Callable[[], ToolJudge] | None:
     from trajcli.judge.recorded_tool import ToolJudge
 
     paths: Mapping[int, ToolMotion | None] | None = None
+    moves = () if given.plan is None else given.plan.moves
     if given.loaded is not None:
-        moves = () if given.plan is None else given.plan.moves
         paths = {move.index: move.planned.tool for move in moves}
-    return lambda: ToolJudge(given.robot, paths)
+    return lambda: ToolJudge(given.robot, paths, {move.index: move.robot for move in moves})
 
 
 def _consumer_of(profile: str | None, given: _Given) -> Callable[[], ConsumerJudge] | None:

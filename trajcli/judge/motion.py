@@ -72,7 +72,7 @@ class Requirements:
     def carries_one(self, before: int, after: int) -> bool:
         """Return whether the tool carries the same in two moves: else no row says when it changed."""
         first, second = self.by_move.get(before, self.robot), self.by_move.get(after, self.robot)
-        return first.payload is second.payload
+        return first.payload is second.payload and first.tool_load is second.tool_load
 
 
 def judge_motion(blocks: Callable[[], Iterable[RecordedMotion]], requirements: Requirements) -> Judgement:

@@ -40,12 +40,18 @@ class ToolJudge:
         notes: What could not be judged.
     """
 
-    def __init__(self, robot: Robot, paths: Mapping[int, ToolMotion | None] | None = None) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        paths: Mapping[int, ToolMotion | None] | None = None,
+        arms: Mapping[int, Robot] | None = None,
+    ) -> None:
         """Begin with no rows.
 
         Args:
             robot: An arm with geometry.
             paths: By move, where its tool shall go; None for a move in joint space. None without a job.
+            arms: By move, the arm with the tool that is then on its flange; the first one where left out.
         """
         self._robot, self._paths = robot, paths
         self._length = characteristic_length(robot)
@@ -57,7 +63,8 @@ class ToolJudge:
             if motion is not None and (motion.path is None or motion.overlaps):
                 self.notes.append(f"move {move}: its segments overlap, the distance from them is not judged")
             elif motion is not None:
-                self._recorded[move] = RecordedPath(robot, motion, move, self._worst)
+                arm = robot if arms is None else arms[move]
+                self._recorded[move] = RecordedPath(arm, motion, move, self._worst)
 
     def see(
         self,
@@ -90,7 +97,7 @@ class ToolJudge:
         elif path is not None:
             path.see(window, pieces)
         if since is None and (self._paths is None or path is not None):
-            self._judge_singularity(window, pieces, move)
+            self._judge_singularity(window, pieces, robot, move)
 
     def findings(self) -> Iterator[Finding]:
         """Return what was found."""
@@ -120,26 +127,27 @@ class ToolJudge:
             limit, order = float(getattr(robot.limits.tcp, kind.key)), kind.order or 1
             if order > int(window.highest[pieces].max()) or peak.most <= limit * (1 + TOOL_RELATIVE):
                 continue
-            warned = not asked and self._only_between(window, pieces, kind, peak, limit)
-            self._add_peak(window, pieces, kind, peak, limit, move, warned=warned)
+            warned = not asked and self._only_between(window, pieces, robot, kind, peak)
+            self._add_peak(window, pieces, robot, kind, peak, move, warned=warned)
 
     def _add_peak(
         self,
         window: Intervals,
         pieces: slice,
+        robot: Robot,
         kind: LimitKind,
         peak: ToolPeak,
-        limit: float,
         move: int,
         *,
         warned: bool,
     ) -> None:
+        limit = float(getattr(robot.limits.tcp, kind.key))
         piece = self._piece_at(window, pieces, peak.time)
         rounding = self._rounding(window, piece, kind.order or 1)
         row = window.row_at(piece, peak.time - float(window.t[piece]))
         finding = replace(tool_excess(kind, peak.most, limit, peak.time), row=row, rounding=rounding)
         certain = peak.most - limit > rounding
-        count = max(self._over(window, pieces, kind, limit), 1)
+        count = max(self._over(window, pieces, robot, kind), 1)
         self._worst.add(
             kind.name,
             move,
@@ -155,9 +163,10 @@ class ToolJudge:
         return int(np.clip(np.searchsorted(window.t, time, "right") - 1, pieces.start, pieces.stop - 1))
 
     def _only_between(
-        self, window: Intervals, pieces: slice, kind: LimitKind, peak: ToolPeak, limit: float
+        self, window: Intervals, pieces: slice, robot: Robot, kind: LimitKind, peak: ToolPeak
     ) -> bool:
         """Return whether rows that stand dense keep a limit, as far as their differences make it certain."""
+        limit = float(getattr(robot.limits.tcp, kind.key))
         order, angular = kind.order or 1, kind.dimension == "angle"
         lengths = window.lengths[pieces, None]
         if lengths.max() > DENSE or peak.most > _TWICE * limit:
@@ -167,7 +176,7 @@ class ToolJudge:
         states = tuple(None if values is None else values[rows] for values in window.states)
         q = np.asarray(states[0])
         if order == 1:
-            poses = forward(self._robot, q)
+            poses = forward(robot, q)
             turns = np.swapaxes(poses[:-1, :3, :3], 1, 2) @ poses[1:, :3, :3]
             traces = np.clip((np.trace(turns, axis1=1, axis2=2) - 1.0) / 2.0, -1.0, 1.0)
             moved = np.arccos(traces)[:, None] if angular else np.diff(poses[:, :3, 3], axis=0)
@@ -175,20 +184,21 @@ class ToolJudge:
         if any(values is None for values in states[:order]):
             return True
         rates = [np.asarray(values) for values in states[1:order]]
-        below = (jacobian(self._robot, q) @ rates[-1][..., None])[..., 0]
+        below = (jacobian(robot, q) @ rates[-1][..., None])[..., 0]
         if order == 3:
-            below = below + jacobian_dot_qd(self._robot, q, rates[0])
+            below = below + jacobian_dot_qd(robot, q, rates[0])
         part = below[:, 3:] if angular else below[:, :3]
         changes = np.linalg.norm(np.diff(part, axis=0) / lengths, axis=1)
         return bool((changes <= room).all())
 
-    def _over(self, window: Intervals, pieces: slice, kind: LimitKind, limit: float) -> int:
+    def _over(self, window: Intervals, pieces: slice, robot: Robot, kind: LimitKind) -> int:
         """Return at how many rows a speed of the tool is over its limit; 0 for accelerations."""
+        limit = float(getattr(robot.limits.tcp, kind.key))
         if kind.order != 1:
             return 0
         coefficients = window.coefficients[:, pieces]
         q, qd = coefficients[-1], derivative_coefficients(coefficients, 1)[-1]
-        twist = (jacobian(self._robot, q) @ qd[..., None])[..., 0]
+        twist = (jacobian(robot, q) @ qd[..., None])[..., 0]
         part = twist[:, 3:] if kind.dimension == "angle" else twist[:, :3]
         return int((np.linalg.norm(part, axis=1) > limit).sum())
 
@@ -212,13 +222,13 @@ class ToolJudge:
             total += arm * q * rates[1] * (3.0 * rates[2] + rates[1] ** 2)
         return float(total)
 
-    def _judge_singularity(self, window: Intervals, pieces: slice, move: int) -> None:
+    def _judge_singularity(self, window: Intervals, pieces: slice, robot: Robot, move: int) -> None:
         """Warn where the smallest singular value of the scaled Jacobian is a small part of the largest."""
         rows = self._sparse_rows(window, pieces)
         if not rows.size:
             return
         q = np.asarray(window.states[0])[rows]
-        scaled = jacobian(self._robot, q)
+        scaled = jacobian(robot, q)
         scaled[:, :3] /= self._length
         values = np.linalg.svd(scaled, compute_uv=False)
         share = values[:, -1] / values[:, 0]

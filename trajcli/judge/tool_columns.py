@@ -22,6 +22,7 @@ from trajcli.frozen import frozen
 from trajcli.geometry.rotation import matrix_from_quaternion
 from trajcli.judge.motion import MotionJudge, Requirements
 from trajcli.judge.rounding import stated_errors
+from trajcli.judge.rows.arms_of_moves import ArmsOfMoves
 from trajcli.judge.rows.planned_rows import halves_of
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.following.motion import ToolMotion
@@ -97,20 +98,20 @@ def open_tool_table(rows: RowSource, size: int) -> ToolTable | None:
 def judge_tool_columns(
     blocks: Iterable[RecordedMotion],
     table: ToolTable,
-    robot: Robot,
+    arms: ArmsOfMoves,
     paths: Mapping[int, ToolMotion | None] | None,
-    seen: Robot,
+    seen: ArmsOfMoves,
 ) -> list[Finding]:
     """Return where columns about the tool are not what the joints beside them make of it.
 
     Args:
         blocks: Rows of the joints.
         table: The columns.
-        robot: The arm.
+        arms: The arm.
         paths: Of the moves, where a job has a plan.
         seen: The arm as it stands in the frame of the columns.
     """
-    judge = _Judge(table, robot, paths, seen)
+    judge = _Judge(table, arms, paths, seen)
     for motion, values in zip(blocks, table.blocks(), strict=True):
         judge.see(motion, values)
     return judge.findings()
@@ -120,10 +121,14 @@ class _Judge:
     """A comparison in the making."""
 
     def __init__(
-        self, table: ToolTable, robot: Robot, paths: Mapping[int, ToolMotion | None] | None, seen: Robot
+        self,
+        table: ToolTable,
+        arms: ArmsOfMoves,
+        paths: Mapping[int, ToolMotion | None] | None,
+        seen: ArmsOfMoves,
     ) -> None:
-        self._table, self._in_world, self._paths, self._robot = table, robot, paths, seen
-        self._arm = _REACH * max(characteristic_length(robot), 1.0)
+        self._table, self._in_world, self._paths, self._seen = table, arms, paths, seen
+        self._arm = _REACH * max(characteristic_length(arms.own), 1.0)
         self._worst = Collector()
         self._rates: MotionJudge | None = None
         self._laws: list[tuple[int, MotionJudge]] = []
@@ -132,7 +137,7 @@ class _Judge:
 
     def see(self, motion: RecordedMotion, values: Array) -> None:
         """Compare more rows of joints, and those of the tool beside them, (N, m)."""
-        poses = forward(self._robot, motion.q)
+        poses = self._seen.values(motion.t.size, motion.move, lambda arm, k: forward(arm, motion.q[k]))
         off = motion.resolution
         errors = [
             stated_errors(rows, rounding, off.relative).sum(axis=1)
@@ -147,7 +152,10 @@ class _Judge:
         elif twists:
             self._see_rates(motion, values, poses)
         if self._table.index("path") and self._paths is not None and motion.move is not None:
-            poses = poses if self._robot is self._in_world else forward(self._in_world, motion.q)
+            if self._seen.own is not self._in_world.own:
+                poses = self._in_world.values(
+                    motion.t.size, motion.move, lambda arm, k: forward(arm, motion.q[k])
+                )
             self._compare_along_paths(motion, values[:, self._table.index("path")], poses, errors[0])
 
     def findings(self) -> list[Finding]:
@@ -178,16 +186,22 @@ class _Judge:
         assert motion.qd is not None  # noqa: S101
         speed, text = np.abs(motion.qd).sum(axis=1), "is {value} from what the joints make"
         room = self._arm * (errors[1] + errors[0] * speed) + self._table.half("twist") + _EXACT
-        away = values[:, self._table.index("twist")] - tcp_twist(self._robot, motion.q, motion.qd)
+        qd, move = motion.qd, motion.move
+        made = self._seen.values(motion.t.size, move, lambda arm, k: tcp_twist(arm, motion.q[k], qd[k]))
+        away = values[:, self._table.index("twist")] - made
         self._add("velocity", np.linalg.norm(away[:, :3], axis=1), room, motion, text)
         self._add("angular velocity", np.linalg.norm(away[:, 3:], axis=1), room, motion, text)
         if not self._table.index("twistd") or motion.qdd is None:
             return
-        change = np.abs(motion.qdd).sum(axis=1)
+        qdd = motion.qdd
+        change = np.abs(qdd).sum(axis=1)
         room = errors[2] + 2.0 * speed * errors[1] + errors[0] * (change + speed**2)
         room = self._arm * room + self._table.half("twistd") + _EXACT
-        away = values[:, self._table.index("twistd")] - tcp_twist(self._robot, motion.q, motion.qdd)
-        away = away - jacobian_dot_qd(self._robot, motion.q, motion.qd)
+        made = self._seen.values(motion.t.size, move, lambda arm, k: tcp_twist(arm, motion.q[k], qdd[k]))
+        made = made + self._seen.values(
+            motion.t.size, move, lambda arm, k: jacobian_dot_qd(arm, motion.q[k], qd[k])
+        )
+        away = values[:, self._table.index("twistd")] - made
         self._add("acceleration", np.linalg.norm(away[:, :3], axis=1), room, motion, text)
         self._add("angular acceleration", np.linalg.norm(away[:, 3:], axis=1), room, motion, text)
 

@@ -131,6 +131,11 @@ class Payload:
         """All of it, as a key."""
         return self.mass, self.com.tobytes(), self.inertia.tobytes()
 
+    def seen_from(self, frame: Array) -> Payload:
+        """Return the same solid as a frame (4, 4) has it that is given in the frame of the tcp."""
+        axes = frame[:3, :3].T
+        return Payload(self.mass, axes @ (self.com - frame[:3, 3]), axes @ self.inertia @ axes.T)
+
     def __repr__(self) -> str:
         com = ", ".join(f"{x:g}" for x in self.com.tolist())
         return f"{type(self).__name__}({self.mass:g} kg at [{com}] m)"
@@ -147,6 +152,24 @@ def point_mass(mass: float, com: ArrayLike = (0.0, 0.0, 0.0)) -> Payload:
         InputError: When the mass is negative.
     """
     return Payload(mass, np.asarray(com, dtype=np.float64), np.zeros((3, 3)))
+
+
+@frozen
+class MountedTool:
+    """A tool on the flange.
+
+    Attributes:
+        pose: T_flange_tcp, shape (4, 4), m.
+        load: Its own mass, in the frame of its tcp; None where nobody says.
+        name: By which the job calls it; empty without one.
+    """
+
+    pose: Array
+    load: Payload | None = None
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pose", read_only(self.pose))
 
 
 @comparable
@@ -331,6 +354,8 @@ class Robot:
         tool: T_flange_tcp, shape (4, 4).
         gravity: Acceleration of a body that falls, in world, shape (3,), m/s^2.
         payload: What the tool carries; None for nothing.
+        tool_load: The tool's own mass, in the frame of the tcp like the payload; None where nobody says.
+        tool_name: By which a job calls the tool; empty without one.
     """
 
     name: str
@@ -341,6 +366,8 @@ class Robot:
     tool: Array
     gravity: Array = field(default_factory=lambda: np.array(GRAVITY))
     payload: Payload | None = None
+    tool_load: Payload | None = None
+    tool_name: str = ""
 
     def __post_init__(self) -> None:
         for name in ("base", "tool", "gravity"):
@@ -350,6 +377,19 @@ class Robot:
         joints = f"{len(self.joints)} joint{'s' * (len(self.joints) != 1)}"
         table = "bare joints" if self.convention is None else f"{self.convention} DH rows"
         return f"{type(self).__name__}({self.name!r}, {joints}, {table})"
+
+    def with_tool(self, tool: MountedTool) -> Robot:
+        """Return the robot with another tool; a payload keeps its place on the flange."""
+        payload = self.payload
+        if payload is not None and not np.array_equal(tool.pose, self.tool):
+            payload = payload.seen_from(np.asarray(np.linalg.inv(self.tool) @ tool.pose))
+        return replace(self, tool=tool.pose, tool_load=tool.load, tool_name=tool.name, payload=payload)
+
+    @property
+    def equipment(self) -> tuple[object, ...]:
+        """All that is on the flange, as a key."""
+        loads = (None if load is None else load.bits for load in (self.payload, self.tool_load))
+        return (self.tool.tobytes(), *loads)
 
     def seen_from(self, frame: Array) -> Robot:
         """Return the robot as it stands in a frame T_world_frame (4, 4), in which its tool is then said."""

@@ -71,6 +71,7 @@ class ReadingContext:
         points: The file's named points, as plain mappings.
         shifted: Relative points that were resolved, by name: their fields as in a file.
         frames: The file's frames, as plain mappings.
+        tools: The file's tools, as plain mappings.
         placed: Frames that were resolved, by name: T_world_frame, (4, 4), m.
         base: Where the arm stands, T_world_base, (4, 4), m.
         waits: Whether a target is given relative to what only the plan knows.
@@ -84,6 +85,7 @@ class ReadingContext:
     points: Mapping[str, Any] = field(default_factory=dict)
     shifted: dict[str, dict[str, Any]] = field(default_factory=dict)
     frames: Mapping[str, Any] = field(default_factory=dict)
+    tools: Mapping[str, Any] = field(default_factory=dict)
     placed: dict[str, np.ndarray] = field(default_factory=dict)
     base: np.ndarray = field(default_factory=lambda: np.eye(4))
     waits: bool = False
@@ -385,14 +387,16 @@ _DECIMAL = "[-+]?([.][0-9]+|[0-9]+([.][0-9]*)?)([eE][-+]?[0-9]+)?"
 
 
 class PointName(Name):
-    """A name of a point or a frame, which no other word can be taken for."""
+    """A name of a point, a frame or a tool, which no other word can be taken for."""
 
     def read(self, value: Any, context: ReadingContext) -> str:  # noqa: ANN401
         """Return the name."""
         name = super().read(value, context)
         if name in NO_NAMES or re.fullmatch(_DECIMAL, name):
             words = f"{', '.join(NO_NAMES)} and numbers have a meaning of their own"
-            raise FlawError(f"'{name}' is no name of a point or a frame", hint=f"choose another: {words}")
+            raise FlawError(
+                f"'{name}' is no name of a point, a frame or a tool", hint=f"choose another: {words}"
+            )
         return name
 
     def json_schema(self) -> JsonSchemaValue:

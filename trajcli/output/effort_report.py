@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Literal
 
-from trajcli.job.reports.efforts import EffortReport, EffortsReport, PayloadReport
+from trajcli.job.reports.efforts import EffortReport, EffortsReport, MountedToolReport, PayloadReport
 from trajcli.kinematics.robot import Payload, Robot
 from trajcli.language.efforts import OF_ROBOT
 from trajcli.planning.plan import Plan
@@ -17,12 +17,26 @@ if TYPE_CHECKING:
 
 
 def payload_report(payload: Payload | None) -> PayloadReport | None:
-    """Return what the tool carries, in SI; None where it is nothing."""
+    """Return a payload, or a tool's own mass, in SI; None where it is nothing."""
     if payload is None:
         return None
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = payload.inertia.tolist()
     inertia = [xx, yy, zz, xy, xz, yz]
     return PayloadReport(mass=payload.mass, com=payload.com.tolist(), inertia=inertia)
+
+
+def mounted_report(plan: Plan, index: int) -> MountedToolReport | None:
+    """Return the tool of a move, in SI; None where the job has one tool without a name."""
+    job, robot = plan.loaded.job, plan.moves[index].robot
+    if not job.tools and not job.changes_tool:
+        return None
+    pose = robot.tool
+    return MountedToolReport(
+        name=robot.tool_name or None,
+        xyz=pose[:3, 3].tolist(),
+        matrix=pose[:3, :3].tolist(),
+        load=payload_report(robot.tool_load),
+    )
 
 
 def effort_reports(plan: Plan, index: int) -> list[EffortReport] | None:

@@ -29,6 +29,7 @@ from trajcli.job.explanation import (
 )
 from trajcli.job.report import MoveReport, WaypointReport
 from trajcli.job.reports.part import in_units
+from trajcli.kinematics.robot import Robot
 from trajcli.output.polynomials import blends_of, knots_of, polynomial_intervals, polynomials_of
 from trajcli.output.report import report_of
 from trajcli.output.sensitivity import with_savings
@@ -158,15 +159,16 @@ def _closed_form(move: PlannedMove, units: Units, *, derivatives: bool) -> dict[
 def _pose(plan: Plan, index: int | None) -> PoseReport | None:
     """Return how the pose was reached that a move goes to, or the job starts at; None where there is none."""
     pose = plan.poses.get(index)
-    return None if pose is None else in_units(_resolved(pose, plan), plan.loaded.units)
+    robot = plan.loaded.robot if index is None else plan.moves[index].robot
+    return None if pose is None else in_units(_resolved(pose, plan, robot), plan.loaded.units)
 
 
-def _resolved(pose: ResolvedPose, plan: Plan) -> PoseReport:
-    """Return how a pose was reached, in SI."""
+def _resolved(pose: ResolvedPose, plan: Plan, robot: Robot) -> PoseReport:
+    """Return how a pose of the tool of an arm was reached, in SI."""
     from trajcli.kinematics.inverse.target import ranks
     from trajcli.planning.resolve_poses import asked_names
 
-    solutions, joints, robot = pose.solutions, pose.joints, plan.loaded.robot
+    solutions, joints = pose.solutions, pose.joints
     asked, units = asked_names(pose.target.configuration), joint_units(robot.joint_types)
     here, nearby = ranks(robot, joints[None], pose.ik_target)
     free = None

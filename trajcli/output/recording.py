@@ -197,7 +197,7 @@ def _metadata(plan: Plan, job: bytes, options: LogOptions) -> Mapping[str, str]:
 
 
 def _frames(robot: Robot, trajectory: Trajectory) -> LinkFrames:
-    """Return the frames of the arm along the motion; base and tool do not move."""
+    """Return the frames of the arm along the motion; the base does not move, nor does a tool that stays."""
     from trajcli.geometry.rotation import quaternion_from_matrix
     from trajcli.urdf.chain import FIRST_LINK, TOOL, WORLD, chain_of
     from trajcli.urdf.write import urdf_of
@@ -211,8 +211,19 @@ def _frames(robot: Robot, trajectory: Trajectory) -> LinkFrames:
         translations, quaternions = chain.transforms(curve.evaluate(_within(trajectory, nanoseconds)))
         return np.concatenate([translations, np.roll(quaternions, -1, axis=-1)], axis=-1)
 
-    fixed = ((WORLD, FIRST_LINK, pose(chain.base)), (chain.links[-1], TOOL, pose(chain.tool)))
-    return LinkFrames(urdf_of(robot), fixed, chain.links, poses)
+    standing = (WORLD, FIRST_LINK, pose(chain.base))
+    if all(span.tool is None for span in trajectory.spans):
+        fixed = (standing, (chain.links[-1], TOOL, pose(chain.tool)))
+        return LinkFrames(urdf_of(robot), fixed, chain.links, poses)
+
+    def with_tool(nanoseconds: NDArray[np.int64]) -> Array:
+        times = np.minimum(nanoseconds / _PER_SECOND, trajectory.duration)
+        tools = trajectory.of_tools(
+            robot, times, lambda arm, k: np.tile(pose(chain_of(arm).tool), (k.size, 1))
+        )
+        return np.concatenate([poses(nanoseconds), tools[:, None]], axis=1)
+
+    return LinkFrames(urdf_of(robot), (standing,), (*chain.links, TOOL), with_tool)
 
 
 def _within(trajectory: Trajectory, nanoseconds: NDArray[np.int64]) -> Array:
@@ -227,7 +238,9 @@ def _path(robot: Robot, trajectory: Trajectory) -> LoggedPath:
 
     count = min(_MOST_POSES, 2 + int(trajectory.duration * _POSES_RATE)) if trajectory.duration else 1
     nanoseconds = np.rint(np.linspace(0.0, trajectory.duration, count) * _PER_SECOND).astype(np.int64)
-    poses = forward(robot, trajectory.curve.evaluate(_within(trajectory, nanoseconds)))
+    q = trajectory.curve.evaluate(_within(trajectory, nanoseconds))
+    times = np.minimum(nanoseconds / _PER_SECOND, trajectory.duration)
+    poses = trajectory.of_tools(robot, times, lambda arm, k: forward(arm, q[k]))
     quaternions = without_jumps(quaternion_from_matrix(poses[:, :3, :3]), None)
     return LoggedPath(
         nanoseconds, np.concatenate([poses[:, :3, 3], np.roll(quaternions, -1, axis=-1)], axis=-1)

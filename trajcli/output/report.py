@@ -145,7 +145,7 @@ def _steps(steps: AccelerationSteps, units: Mapping[str, str]) -> list[StepRepor
 
 
 def _move(plan: Plan, index: int, *, reference: bool, peers: bool) -> MoveReport:
-    from trajcli.output.effort_report import effort_reports, most_used, payload_report
+    from trajcli.output.effort_report import effort_reports, most_used, mounted_report, payload_report
 
     move, span = plan.moves[index], plan.trajectory.spans[index]
     peaks = [
@@ -179,6 +179,7 @@ def _move(plan: Plan, index: int, *, reference: bool, peers: bool) -> MoveReport
         velocity_by_position=near or None,
         efforts=effort_reports(plan, index),
         payload=payload_report(span.payload),
+        mounted=mounted_report(plan, index),
         binding=binding,
         at_limit=at_limit_of(move, plan.verdict.peaks[index], plan.verdict.by_position[index]),
         waypoints=_waypoints(move, span),

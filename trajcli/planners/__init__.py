@@ -35,7 +35,12 @@ _WHERE = {
 }
 """The module and class of each planner, by its name in job files."""
 
-_BETWEEN = {"attach": "payload.Attach", "detach": "payload.Detach", "signal": "signal.SetSignal"}
+_BETWEEN = {
+    "attach": "payload.Attach",
+    "detach": "payload.Detach",
+    "tool": "tool_change.ChangeTool",
+    "signal": "signal.SetSignal",
+}
 """Likewise what stands between moves, by its key in job files."""
 
 ALSO_CALLED = {
@@ -96,7 +101,8 @@ class _Planners(Mapping[str, type[Planner]]):
 
 PLANNERS = _Planners(_WHERE)
 HANDLING = _Planners(_BETWEEN)
-"""What takes up a payload or leaves it, or sets a signal: an entry among the moves, by its key."""
+"""What takes up a payload or leaves it, changes the tool, or sets a signal: an entry among the moves, by its
+key."""
 
 
 @frozen

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
@@ -20,11 +21,19 @@ class BetweenMoves(Planner):
 
     continuity: ClassVar[Literal[1, 2]] = 2
     handles: ClassVar[bool] = True
-    needs_geometry: ClassVar[bool] = True
+    needs_geometry: ClassVar[str] = "a payload"
     at: ClassVar[Any] = None  # type: ignore[misc]
     # what would say how to move stands beside a planner only
     limits: ClassVar[Any] = None  # type: ignore[misc]
     when_over_limit: ClassVar[Any] = None  # type: ignore[misc]
+
+    def equipped(self, robot: Robot) -> Robot:
+        """Return the robot with what its tool carries from here on.
+
+        Raises:
+            FlawError: When it takes up a second payload, or leaves what is not there.
+        """
+        return replace(robot, payload=self.carried_after(robot.payload))
 
     def plan(self, start: State, robot: Robot) -> Planned:
         """Return the curve of no length."""

@@ -219,7 +219,8 @@ class Planner(Model):
             velocities at its ends each position is linear in the duration.
         follows_jerk: Whether it plans within the limits of jerk, and perhaps not without them.
         handles: Whether it stands between moves and moves nothing, such as what takes up a payload.
-        needs_geometry: Whether an arm of bare joints cannot do it.
+        changes_tool: Whether poses are of another tool behind it.
+        needs_geometry: What it does that an arm of bare joints cannot; empty for nothing.
         smoother: Changes of its fields that make a move without steps in acceleration, each by the words that
             ask for it; "planner" may be among them.
         faster: Likewise changes that keep the limits where slowing the whole move costs much more time.
@@ -235,7 +236,8 @@ class Planner(Model):
     proportional: ClassVar[bool] = False
     follows_jerk: ClassVar[bool] = False
     handles: ClassVar[bool] = False
-    needs_geometry: ClassVar[bool] = False
+    changes_tool: ClassVar[bool] = False
+    needs_geometry: ClassVar[str] = ""
     smoother: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
     faster: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
 
@@ -265,6 +267,11 @@ class Planner(Model):
     def tag(self) -> str:
         """The planner's name in job files."""
         return str(type(self).model_fields["planner"].default)
+
+    @property
+    def caption(self) -> str:
+        """What it is for, in few words of the job; empty where that says nothing."""
+        return self.label or ""
 
     @property
     def joins(self) -> Literal[1, 2]:
@@ -320,6 +327,14 @@ class Planner(Model):
             FlawError: When it takes up a second one, or leaves what is not there.
         """
         return payload
+
+    def equipped(self, robot: Robot) -> Robot:
+        """Return the robot with what is on its flange from this move on.
+
+        Raises:
+            FlawError: When what is taken up or left does not fit.
+        """
+        return robot
 
     def with_duration(self, duration: float) -> Self:
         """Return the planner of the same move over `duration` seconds.
@@ -458,7 +473,7 @@ class PlannedMove:
 
     def span(self, start: float, end: float) -> Span:
         """Return the part of a trajectory, from `start` to `end` s, that is this move."""
-        label, payload = self.planner.label or "", self.robot.payload
+        label, payload = self.planner.caption, self.robot.payload
         handles = self.planner.handles
         return Span(
             self.index, self.planner.tag, start, end, self.continuity, payload, label, handles=handles

@@ -16,7 +16,7 @@ from trajcli.units import Quantity
 class SetSignal(BetweenMoves):
     """A signal has a value from here on."""
 
-    needs_geometry: ClassVar[bool] = False
+    needs_geometry: ClassVar[str] = ""
 
     planner: SkipJsonSchema[Literal["signal"]] = Field("signal", exclude=True)
     signal: Annotated[str, SignalName("Name of the signal."), Field(description="Name of the signal.")]

@@ -30,7 +30,7 @@ from trajcli.kinematics.robot import QUANTITIES, Payload, Robot
 from trajcli.language.targets import Target
 from trajcli.limits.tolerances import JUMP_ABSOLUTE
 from trajcli.planners.planner import Event, PlannedMove, Planner, Resolve
-from trajcli.planning.planned_move import KnownMoves, placed, plan_move_within
+from trajcli.planning.planned_move import KnownMoves, placed, plan_move_within, with_tools
 from trajcli.progress import report_progress
 from trajcli.trajectory import State, Trajectory
 
@@ -165,21 +165,22 @@ def _plan_moves(
         MissingLimitError: With the limits that any of the moves lack: who adds them need not come again.
         TrajcliError: Of the first move that has no curve.
     """
-    moves: list[PlannedMove] = []
-    lacking: list[Problem] = []
-    resolve = partial(_resolved, loaded=loaded, poses=poses)
+    moves, lacking = list[PlannedMove](), list[Problem]()
+    resolve = partial(_resolved, loaded=loaded, poses=poses, robot=loaded.robot)
+    origin: Target | None
     standing: Target | None
     with _errors_at(loaded, loaded.document.place(("start",))):
-        origin = standing = placed(loaded, loaded.job.start, loaded.robot, None, None)
-        state = resolve(origin, np.zeros(len(loaded.robot.joints)), index=None).as_state()
-    before: Planner | None = None
+        begin = origin = standing = placed(loaded, loaded.job.start, loaded.robot, None, None)
+        state = resolve(begin, np.zeros(len(loaded.robot.joints)), index=None).as_state()
     robot, begun, aimed = loaded.robot, 0.0, 0  # the origin is the target of the planner of this id
     for index, planner in enumerate(loaded.job.moves):
         report_progress(f"planning {loaded.called(index)}")
-        start = _handed_over(state, before, planner)
-        robot = replace(robot, payload=planner.carried_after(robot.payload)) if planner.handles else robot
+        start = _handed_over(state, loaded.job.moves[index - 1] if index else None, planner)
+        robot = planner.equipped(robot)
+        if planner.changes_tool:
+            resolve, origin, standing = partial(resolve, robot=robot), None, None
         used = robot if carried is None else replace(robot, payload=carried(index, robot.payload))
-        motion = (id(planner), aimed, start.bits, None if used.payload is None else used.payload.bits)
+        motion = (id(planner), aimed, start.bits, used.equipment)
         try:
             with _errors_of(loaded, index, planner, begun):
                 there = placed(loaded, planner, robot, state.position, standing)
@@ -202,8 +203,8 @@ def _plan_moves(
             if not lacking:
                 raise
             break
-        before, origin = planner, there.target or origin
-        aimed = aimed if planner.target is None else id(planner)
+        origin = there.target or origin
+        aimed = id(planner) if planner.target is not None or planner.changes_tool else aimed
         standing = there.target or (standing if np.array_equal(state.position, start.position) else None)
     if lacking:
         raise MissingLimitError(*_without_repeats(lacking))
@@ -254,6 +255,7 @@ def _resolved(
     loaded: LoadedJob,
     index: int | None,
     poses: dict[int | None, ResolvedPose],
+    robot: Robot,
 ) -> Target:
     """Return the target with joints instead of a pose, and note how that is reached."""
     if not target.gives_pose:
@@ -263,7 +265,7 @@ def _resolved(
 
     try:
         near = near if target.near is None else np.array(target.near)
-        resolved, poses[index] = resolve_pose(target, loaded.robot, near)
+        resolved, poses[index] = resolve_pose(target, robot, near)
     except TrajcliError as error:
         name = loaded.point_meant(target, ("start",) if index is None else ("moves", index))
         if name is None:
@@ -386,6 +388,8 @@ def _joined(moves: list[PlannedMove], loaded: LoadedJob, first: State, flyby: Fl
         start, end = end, float(move.planned.curve.breaks[-1] + end)
         of_round, ends = loaded.document.round_of(move.index), loaded.ends(move.index)
         spans.append(replace(move.span(start, end), round=of_round, ends=ends))
+    if loaded.job.changes_tool:
+        spans = [*with_tools(spans, moves, loaded.robot)]
     robot, last = loaded.robot, moves[-1].planned.end
     laws = tuple(_law_of_tool(move) for move in moves)
     return Trajectory(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import field, replace
 from typing import TYPE_CHECKING, TypeVar
 
@@ -9,10 +10,10 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import PlanningError
 from trajcli.frozen import frozen
 from trajcli.job.read import LoadedJob
-from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.robot import MountedTool, Robot
 from trajcli.limits.kinds import has_further_limits
 from trajcli.planners.planner import PlannedMove, Planner, WhenOverLimit
-from trajcli.trajectory import State
+from trajcli.trajectory import Span, State
 
 if TYPE_CHECKING:
     from trajcli.language.targets import Target
@@ -44,6 +45,18 @@ class KnownMoves:
         if pose is not None:
             poses[index] = pose
         return same if same.index == index else replace(same, index=index)
+
+
+def with_tools(spans: Iterable[Span], moves: Iterable[PlannedMove], own: Robot) -> Iterator[Span]:
+    """Yield the spans of moves with the tool that is on the flange then, where it is not the first one."""
+    known: dict[tuple[bytes, object], MountedTool] = {}
+    first = (own.tool.tobytes(), own.tool_load)
+    for span, move in zip(spans, moves, strict=True):
+        robot = move.robot
+        key = (robot.tool.tobytes(), robot.tool_load)
+        if key != first and key not in known:
+            known[key] = MountedTool(robot.tool, robot.tool_load, robot.tool_name)
+        yield replace(span, tool=known.get(key))
 
 
 def placed(loaded: LoadedJob, value: T, robot: Robot, joints: Array | None, standing: Target | None) -> T:

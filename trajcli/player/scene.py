@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.findings import Finding
+from trajcli.grids import AT_BREAK
 from trajcli.kinematics.robot import QUANTITIES, JointType, Limits, Robot
 from trajcli.planners.planner import Event
 from trajcli.planning.plan import Plan
 from trajcli.planning.tightest import tightest_of_moves
 from trajcli.player.rows import ORDERS, DrawnRows, packed, rows_of_curve
-from trajcli.trajectory import Span
+from trajcli.trajectory import Span, Trajectory
 from trajcli.units import Quantity, Units, factor, joint_quantity, unit_name
 from trajcli.version import __version__
 
@@ -43,7 +46,7 @@ def scene_of_plan(plan: Plan) -> dict[str, Any]:
         "verdict": {"state": state, "text": text},
         "made_by": _MADE_BY,
         "joints": joints_in_units(names, types, loaded.units),
-        **geometry_of(loaded.robot, rows, loaded.units),
+        **geometry_of(loaded.robot, rows, loaded.units, trajectory=trajectory),
         "rows": rows.packed(),
         "moves": [*_moves(plan)],
         "limits": limits_of([(s.start, s.end, plan.moves[s.index].robot.limits) for s in spans]),
@@ -70,7 +73,14 @@ def joints_in_units(names: Sequence[str], types: Sequence[JointType], units: Uni
     ]
 
 
-def geometry_of(robot: Robot | None, rows: DrawnRows, units: Units, reason: str = "") -> dict[str, Any]:
+def geometry_of(
+    robot: Robot | None,
+    rows: DrawnRows,
+    units: Units,
+    reason: str = "",
+    *,
+    trajectory: Trajectory | None = None,
+) -> dict[str, Any]:
     """Return what is drawn in space: the arm's table and the path of its tool; or why nothing is.
 
     Args:
@@ -78,6 +88,7 @@ def geometry_of(robot: Robot | None, rows: DrawnRows, units: Units, reason: str 
         rows: Its motion.
         units: To be shown.
         reason: Why there is no arm.
+        trajectory: Whose spans know which tool is on the flange; None where that is one.
     """
     if robot is None or robot.convention is None:
         if robot is not None:
@@ -96,32 +107,50 @@ def geometry_of(robot: Robot | None, rows: DrawnRows, units: Units, reason: str 
         }
         for joint, between in zip(robot.joints, ranges, strict=True)
     ]
+    arm: dict[str, Any] = {"rows": table, "base": robot.base.tolist(), "tool": robot.tool.tolist()}
+    if trajectory is not None:
+        changes = [
+            {"time": span.start, "tool": span.arm(robot).tool.tolist()}
+            for before, span in pairwise(span for span in trajectory.spans if span.duration > 0)
+            if span.tool is not before.tool
+        ]
+        arm |= {"changes": changes} if changes else {}
     return {
-        "robot": {"rows": table, "base": robot.base.tolist(), "tool": robot.tool.tolist()},
+        "robot": arm,
         "length": {"unit": unit_name(length, units), "scale": 1 / factor(length, units)},
-        "tool": _tool(robot, rows, units),
+        "tool": _tool(robot, rows, units, trajectory),
     }
 
 
-def _tool(robot: Robot, rows: DrawnRows, units: Units) -> dict[str, Any]:
+def _tool(robot: Robot, rows: DrawnRows, units: Units, trajectory: Trajectory | None) -> dict[str, Any]:
     from trajcli.kinematics.forward import forward
 
-    positions = forward(robot, rows.values["q"])[:, :3, 3]
+    q, times = rows.values["q"], rows.times.copy()
+    times[:-1][np.diff(times) == 0] -= 2 * AT_BREAK  # of two rows at one time the first belongs to what ends
+
+    def of_tools(values: Callable[[Robot, NDArray[np.intp]], Array]) -> Array:
+        everything = np.arange(times.size)
+        return values(robot, everything) if trajectory is None else trajectory.of_tools(robot, times, values)
+
+    positions = of_tools(lambda arm, k: forward(arm, q[k])[:, :3, 3])
     speed = Quantity("length", 1)
     return {
         "positions": packed(positions.T),
-        "speeds": packed(_speeds(robot, rows, positions)[None]),
+        "speeds": packed(_speeds(rows, positions, of_tools)[None]),
         "unit": unit_name(speed, units),
         "scale": 1 / factor(speed, units),
     }
 
 
-def _speeds(robot: Robot, rows: DrawnRows, positions: Array) -> Array:
+def _speeds(
+    rows: DrawnRows, positions: Array, of_tools: Callable[[Callable[[Robot, NDArray[np.intp]], Array]], Array]
+) -> Array:
     """Return the speed of the tcp on each row, (N,), m/s; from its positions where no rates are known."""
     from trajcli.kinematics.jacobian import tcp_twist
 
     if "qd" in rows.values:
-        twist = tcp_twist(robot, rows.values["q"], rows.values["qd"])
+        q, qd = rows.values["q"], rows.values["qd"]
+        twist = of_tools(lambda arm, k: tcp_twist(arm, q[k], qd[k]))
         return np.asarray(np.linalg.norm(twist[:, :3], axis=1))
     if rows.times.size < 2:
         return np.zeros(rows.times.size)

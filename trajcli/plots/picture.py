@@ -101,7 +101,11 @@ def _records(
             require_joints(table.file, of_table, motion.display)
         robot, display = motion.plan.loaded.robot, motion.display
         judged = judgements or [None] * len(tables)
-        return [DrawnTable(t, c, display, robot, j) for t, c, j in zip(tables, columns, judged, strict=True)]
+        known = display, robot
+        return [
+            DrawnTable(t, c, *known, j, motion.plan.trajectory)
+            for t, c, j in zip(tables, columns, judged, strict=True)
+        ]
     named = [(t.file, column) for t, c in zip(tables, columns, strict=True) for column in c]
     display = units_of_files(named)
     return [DrawnTable(t, c, display) for t, c in zip(tables, columns, strict=True)]

@@ -178,22 +178,25 @@ class PlannedMotion:
         """Return where the tool is (k, 3), in the unit of lengths, at waypoints and ends of moves."""
         from trajcli.kinematics.forward import forward
 
-        points = [passed.points for move in self.moves if (passed := _passed(move)) is not None]
-        joints = np.concatenate([self.plan.trajectory.curve.evaluate([0.0]), *points])
-        positions = forward(self.plan.loaded.robot, joints)[:, :3, 3]
-        return np.asarray(positions / self.display.factor("length"))
+        curve, first = self.plan.trajectory.curve, self.moves[0].robot
+        points = [(move.robot, passed.points) for move in self.moves if (passed := _passed(move))]
+        points = [(first, curve.evaluate([0.0])), *points]
+        positions = [forward(robot, joints)[:, :3, 3] for robot, joints in points]
+        return np.asarray(np.concatenate(positions) / self.display.factor("length"))
 
     def zones(self) -> Array:
         """Return corners of zones and the radii that are used (k, 4), in the unit of lengths."""
         from trajcli.kinematics.forward import forward
 
-        flyby, robot = self.plan.flyby, self.plan.loaded.robot
+        flyby = self.plan.flyby
         balls = [zone for zone in flyby.zones if zone.of == "position"] if flyby else []
         if not balls:
             return np.empty((0, 4))
-        corners = forward(robot, np.array([zone.programmed[len(zone.programmed) // 2] for zone in balls]))
+        corners = [
+            forward(self.moves[zone.move].robot, zone.programmed[len(zone.programmed) // 2]) for zone in balls
+        ]
         sizes = np.array([zone.used for zone in balls])
-        return np.column_stack([corners[:, :3, 3], sizes]) / self.display.factor("length")
+        return np.column_stack([np.array(corners)[:, :3, 3], sizes]) / self.display.factor("length")
 
     def programmed(self) -> tuple[Array, ...]:
         """Return the programmed path of the tool within each zone, (m, 3), in the unit of lengths."""
@@ -201,7 +204,7 @@ class PlannedMotion:
 
         flyby, scale = self.plan.flyby, self.display.factor("length")
         return tuple(
-            forward(self.plan.loaded.robot, zone.programmed)[:, :3, 3] / scale
+            forward(self.moves[zone.move].robot, zone.programmed)[:, :3, 3] / scale
             for zone in (flyby.zones if flyby else ())
         )
 
@@ -216,7 +219,8 @@ class PlannedMotion:
         from trajcli.kinematics.forward import forward
         from trajcli.kinematics.jacobian import tcp_twist
 
-        curve, robot = self.plan.trajectory.curve, self.plan.loaded.robot
+        trajectory, robot = self.plan.trajectory, self.plan.loaded.robot
+        curve = trajectory.curve
         piece, local = local_times(curve)
         peaks = self._tool_peaks()
         owner = np.clip(np.searchsorted(curve.breaks, peaks, "right") - 1, 0, curve.pieces - 1)
@@ -227,10 +231,12 @@ class PlannedMotion:
             horner(derivative_coefficients(curve.coefficients, order)[:, piece], local[:, None])
             for order in (0, 1)
         )
-        twist = tcp_twist(robot, q, qd)
+        middles = 0.5 * (curve.breaks[piece] + curve.breaks[piece + 1])
+        twist = trajectory.of_tools(robot, middles, lambda arm, k: tcp_twist(arm, q[k], qd[k]))
+        positions = trajectory.of_tools(robot, middles, lambda arm, k: forward(arm, q[k])[:, :3, 3])
         speeds = [np.linalg.norm(twist[:, part], axis=1) for part in (slice(3), slice(3, 6))]
         times = np.minimum(curve.breaks[piece] + local, curve.breaks[piece + 1])
-        return ToolSamples(times + self.offset, forward(robot, q)[:, :3, 3], np.stack(speeds, axis=1))
+        return ToolSamples(times + self.offset, positions, np.stack(speeds, axis=1))
 
     def _tool_peaks(self) -> Array:
         """Return when the checks saw the tool fastest, move by move, shape (k,)."""

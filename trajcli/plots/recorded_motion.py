@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajcli.columns import EFFORT, Column, parse_column
 from trajcli.curves.piecewise import Array
@@ -18,6 +19,7 @@ from trajcli.plots.choice import JOINT_QUANTITIES
 from trajcli.plots.display_units import DisplayUnits
 from trajcli.plots.panel import NO_POINTS
 from trajcli.streams.table import Table
+from trajcli.trajectory import Trajectory
 
 _SPEEDS = (("vx", "vy", "vz"), ("wx", "wy", "wz"))
 _POSITION = ("x", "y", "z")
@@ -49,6 +51,7 @@ class DrawnTable:
         display: Units and joints of the picture.
         robot: Whose tool it is where the file does not say where that is; None without a job.
         judgement: What is wrong with its motion; None where it was not judged.
+        trajectory: Of the job, whose spans know which tool is on the flange.
     """
 
     table: Table
@@ -56,6 +59,15 @@ class DrawnTable:
     display: DisplayUnits
     robot: Robot | None = None
     judgement: Judgement | None = None
+    trajectory: Trajectory | None = None
+
+    def _of_tools(self, values: Callable[[Robot, NDArray[np.intp]], Array]) -> Array:
+        """Return values of all rows, each of the arm with the tool that it has then."""
+        assert self.robot is not None  # noqa: S101
+        since = self.times - self.times[0]
+        if self.trajectory is None:
+            return values(self.robot, np.arange(since.size))
+        return self.trajectory.of_tools(self.robot, since, values)
 
     @property
     def times(self) -> Array:
@@ -80,7 +92,8 @@ class DrawnTable:
                 return None
             from trajcli.kinematics.jacobian import tcp_twist
 
-            twist = tcp_twist(self.robot, motion[0], motion[1])
+            q, qd = motion
+            twist = self._of_tools(lambda arm, k: tcp_twist(arm, q[k], qd[k]))
             linear, angular = (np.linalg.norm(twist[:, part], axis=1) for part in (slice(3), slice(3, 6)))
         return linear / self.display.factor("length"), angular / self.display.factor("angle")
 
@@ -94,7 +107,8 @@ class DrawnTable:
                 return None
             from trajcli.kinematics.forward import forward
 
-            positions = forward(self.robot, motion[0])[:, :3, 3]
+            q = motion[0]
+            positions = self._of_tools(lambda arm, k: forward(arm, q[k])[:, :3, 3])
         return np.asarray(positions / self.display.factor("length"))
 
     def joint_findings(self, kind: str, joint: int) -> Array:

@@ -54,6 +54,18 @@ class PayloadReport(ReportPart):
     inertia_unit: Literal["kg m^2"] = "kg m^2"
 
 
+class MountedToolReport(ReportPart):
+    """The tool on the flange."""
+
+    name: Annotated[str | None, Field(description="By which the job calls it; null without one.")] = None
+    xyz: Annotated[list[float], MeasuredIn("xyz_unit"), Field(description="Its tcp in the flange, m.")]
+    xyz_unit: UnitName = "m"
+    matrix: Annotated[list[list[float]], Field(description="Orientation of its tcp in the flange.")]
+    load: Annotated[PayloadReport | None, Field(description="Its own mass; null where nobody says it.")] = (
+        None
+    )
+
+
 class EffortsReport(ReportPart):
     """Whether torques and forces were judged, and by which numbers."""
 

@@ -10,12 +10,16 @@ file has distances s along the paths of the job alone, the joints follow these p
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajcli.columns import Column, kinds_of, parse_column
 from trajcli.curves.operations import times_at
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import frozen
+from trajcli.geometry.rotation import matrix_from_quaternion, quaternion_from_matrix
+from trajcli.grids import AT_BREAK
+from trajcli.judge.rows.arms_of_moves import ArmsOfMoves
 from trajcli.kinematics.jacobian import jacobian, jacobian_dot_qd
 from trajcli.kinematics.robot import Robot
 from trajcli.planning.plan import Plan
@@ -31,6 +35,9 @@ _REGULAR = 1e3  # largest over smallest singular value: beyond it rates of the t
 _LOST = 1  # decimals of a pose, or of s, that its joints do not have
 _RATES_LOST = 3  # likewise of rates of the tool
 _SAME_DURATION = 1e-6  # s: a file that lasts as long as the plan, within that, has its moves
+
+Moves = NDArray[np.int64] | None
+"""Index of the move of each row, (N,), where the tool changes; None where it does not."""
 
 
 @frozen
@@ -106,11 +113,12 @@ def joints_found_back(source: ByteSource, robot: Robot, plan: Plan) -> ArrayRows
     if any(column.joint is not None for column in columns) or "t" not in kinds or not (groups or placed):
         return None
     of_tool = _ToolRows(rows, columns, np.concatenate(list(rows.blocks(range(len(columns)), ()))))
-    start = plan.trajectory.start.position
+    start, arms = plan.trajectory.start.position, ArmsOfMoves(robot, plan.moves)
+    moves = _moves_of(of_tool, plan).astype(np.int64) if arms.changes else None
     if placed:
-        found = _of_poses(of_tool, robot, start)
+        found = _of_poses(of_tool, arms, moves, start)
     elif "twist" in groups:
-        found = _of_twists(of_tool, robot, start)
+        found = _of_twists(of_tool, arms, moves, start)
     else:
         found = _along_paths(of_tool, plan)
     return _as_rows(of_tool, found)
@@ -142,42 +150,78 @@ def _as_rows(of_tool: _ToolRows, found: _Found) -> ArrayRows:
     )
 
 
-def _of_poses(of_tool: _ToolRows, robot: Robot, start: Array) -> _Found:
+def _of_poses(of_tool: _ToolRows, arms: ArmsOfMoves, moves: Moves, start: Array) -> _Found:
     """Return the joints by inverse kinematics, row by row from a start."""
     from trajcli.queries.arm import ArmInUnits
     from trajcli.queries.inverse_stream import joints_of
 
     named = of_tool.rows.named
-    poses = TableBlocks(named.names, iter([of_tool.values]), named.file)
-    stream = joints_of(ArmInUnits(robot, Units()), poses, start, _TOLERANCE)
+    values = of_tool.values if moves is None else _with_first_tool(of_tool, arms, moves)
+    poses = TableBlocks(named.names, iter([values]), named.file)
+    stream = joints_of(ArmInUnits(arms.own, Units()), poses, start, _TOLERANCE)
     q = np.concatenate(list(stream.blocks))[:, 1:]
-    states = (q, *_rates(robot, q, of_tool))
+    states = (q, *_rates(arms, moves, q, of_tool))
     written = of_tool.decimals("x")
     lost = (_LOST, _RATES_LOST, _RATES_LOST)
     decimals = tuple(EXACT if written == EXACT else max(written - less, 0) for less in lost)
     return _Found(states, decimals, "the joints are found back from the poses, from the job's start on")
 
 
-def _rates(robot: Robot, q: Array, of_tool: _ToolRows) -> list[Array]:
+def _with_first_tool(of_tool: _ToolRows, arms: ArmsOfMoves, moves: NDArray[np.int64]) -> Array:
+    """Return the rows of a file, (N, m), with the poses that the first tool has there.
+
+    Raises:
+        InputError: When the file says no orientation: then nothing is known of another tool.
+    """
+    if not of_tool.has("pose"):
+        raise InputError(
+            f"{of_tool.rows.named.file} has positions of several tools, and no orientation",
+            hint="write the columns `pose`, or joints",
+        )
+    pose, values = of_tool.group("pose"), of_tool.values.copy()
+    turned = matrix_from_quaternion(pose[:, 3:] / np.linalg.norm(pose[:, 3:], axis=1)[:, None])
+    inverse = np.linalg.inv([arms.of(move).tool for move in moves.tolist()])
+    change = inverse @ arms.own.tool
+    pose[:, :3] += (turned @ change[:, :3, 3:])[..., 0]
+    pose[:, 3:] = quaternion_from_matrix(turned @ change[:, :3, :3])
+    for k, kind in enumerate(kinds_of("pose")):
+        at = of_tool.index(kind)
+        assert at is not None  # noqa: S101
+        values[:, at] = pose[:, k] / of_tool.columns[at].factor
+    return values
+
+
+def _rates(arms: ArmsOfMoves, moves: Moves, q: Array, of_tool: _ToolRows) -> list[Array]:
     """Return the rates of the joints (N, n) that the file's rates of the tool say, velocities first."""
     if not of_tool.has("twist") or q.shape[1] > 6:
         return []
-    slopes = jacobian(robot, q)
+    slopes = arms.values(len(q), moves, lambda arm, k: jacobian(arm, q[k]))
     if np.linalg.cond(slopes).max() > _REGULAR:
         return []
     inverse = np.linalg.pinv(slopes)
     qd = np.asarray((inverse @ of_tool.group("twist")[..., None])[..., 0])
     if not of_tool.has("twistd"):
         return [qd]
-    rest = of_tool.group("twistd") - jacobian_dot_qd(robot, q, qd)
+    rest = of_tool.group("twistd") - arms.values(
+        len(q), moves, lambda arm, k: jacobian_dot_qd(arm, q[k], qd[k])
+    )
     return [qd, np.asarray((inverse @ rest[..., None])[..., 0])]
 
 
-def _of_twists(of_tool: _ToolRows, robot: Robot, start: Array) -> _Found:
+def _of_twists(of_tool: _ToolRows, arms: ArmsOfMoves, moves: Moves, start: Array) -> _Found:
     """Return the joints by integration of their velocities from a start, by the method of Runge and Kutta.
 
     Between two rows the velocity of the tool changes linearly, or as its derivative says at both.
+
+    Raises:
+        InputError: When the tool changes: a step of its velocity between two rows is then none of the joints.
     """
+    if moves is not None:
+        raise InputError(
+            f"{of_tool.rows.named.file} has velocities of several tools, and no poses",
+            hint="write the columns `pose`, or joints",
+        )
+    robot = arms.own
     twist, t = of_tool.group("twist"), of_tool.values[:, of_tool.index("t")]
     twistd = of_tool.group("twistd") if of_tool.has("twistd") else None
 
@@ -284,6 +328,7 @@ def _moves_of(of_tool: _ToolRows, plan: Plan) -> Array:
             "which moves its distances s are of is not known",
             hint="write the column `move`, too, or the pose",
         )
-    starts = np.array([span.start for span in trajectory.spans])
-    later = np.clip(np.searchsorted(starts, since, "right") - 1, 0, None)
-    return np.asarray(np.array([float(span.index) for span in trajectory.spans])[later])
+    spans = [span for span in trajectory.spans if span.duration > 0] or list(trajectory.spans[:1])
+    starts = np.array([span.start for span in spans])
+    later = np.clip(np.searchsorted(starts, since + AT_BREAK, "right") - 1, 0, None)
+    return np.asarray(np.array([float(span.index) for span in spans])[later])

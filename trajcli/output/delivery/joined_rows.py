@@ -338,4 +338,4 @@ def _tool_of(plan: Plan) -> ToolJudge | None:
         return None
     from trajcli.judge.recorded_tool import ToolJudge
 
-    return ToolJudge(plan.loaded.robot, paths)
+    return ToolJudge(plan.loaded.robot, paths, {move.index: move.robot for move in plan.moves})
