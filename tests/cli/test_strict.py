@@ -8,8 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from planned_examples import share_plans
 from running import EXAMPLES, ROOT, call
 from tiers import few
+
+@pytest.fixture(autouse=True)
+def _plans_are_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    share_plans(monkeypatch)
+
 
 ONE = {
     "robot": {"joints": 1},
@@ -152,7 +158,7 @@ def job(kind: str) -> dict[str, Any]:
             [{"planner": "spline", "rule": "quintic", "through": sine(150)}],
         ),
         "lowered": (
-            {**FLYING, "limits": {"velocity": 3, "acceleration": 8, "jerk": 60, "tcp": {"acceleration": 2}}},
+            {**FLYING, "limits": {"velocity": 3, "acceleration": 8, "jerk": 60, "tcp": {"acceleration": 3}}},
             CORNER,
         ),
         "not_faster": (

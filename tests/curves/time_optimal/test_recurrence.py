@@ -77,3 +77,17 @@ def test_what_is_felt_far_away_is_not_found_locally(bounds, place):
     before = solve(rows, 0.0, 0.0)
     lowered = rows.tightened(factors[0], factors[1:])
     assert locally(lowered, before, (lowered.C != rows.C).any(axis=0)) is None
+
+
+@pytest.mark.parametrize("sweeps", [1, 3, 50])
+def test_what_chunks_abreast_leave_open_is_the_recurrence(monkeypatch, sweeps):
+    """Sums from the first value on: no chunk is right before the one in front of it is."""
+    monkeypatch.setattr(recurrence_module, "_MANY", 0)
+    monkeypatch.setattr(recurrence_module, "_SWEEPS", sweeps)
+    rng = np.random.default_rng(8)
+    C, limits = rng.uniform(-0.02, 0.02, (1, 400)), np.full(401, np.inf)
+    limits[0] = 5.0
+    steps = -np.ones((1, 400)), np.ones((1, 400)), C, np.ones((1, 400), dtype=bool)
+    found = recurrence_module.solve_recurrence(*steps, limits)
+    np.testing.assert_array_equal(found, recurrence(*steps, limits))
+    np.testing.assert_allclose(found[1:], 5.0 + np.cumsum(C), rtol=1e-12)

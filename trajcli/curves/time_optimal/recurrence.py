@@ -2,7 +2,8 @@
 
 Few intervals are followed one by one, with the lines that may be lowest. Many are cut into chunks that
 advance abreast, each from a guess of its first z; where a guess was wrong they advance once more, until they
-meet the values of the time before. Both do the same arithmetic, and agree to the last bit.
+meet the values of the time before. What a few times leave open is followed one by one: there each chunk waits
+for the one before it. Both do the same arithmetic, and agree to the last bit.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from trajcli.curves.piecewise import Array
 HUGE = 1e100  # stands for an unlimited z: beyond it only the slopes of lines matter
 _BLOCK = 8192  # intervals whose lines are held at a time
 _MANY = 1000  # intervals from which on chunks abreast are faster
+_SWEEPS = 5  # of chunks abreast: most guesses are right by then, or few are
 
 
 def solve_recurrence(P: Array, R: Array, C: Array, chosen: NDArray[np.bool_], limits: Array) -> Array:
@@ -85,15 +87,22 @@ def _abreast(slopes: Array, offsets: Array, limits: Array, z: float) -> Array:
     """Return the same, shape (N,), of chunks that advance side by side."""
     count = limits.size - 1
     length = int(np.ceil(np.sqrt(count)))
-    slopes, offsets = _side_by_side(slopes, length, 0.0), _side_by_side(offsets, length, np.inf)
+    lines = _side_by_side(slopes, length, 0.0), _side_by_side(offsets, length, np.inf)
     tops = _side_by_side(limits[None, 1:], length, np.inf)[:, 0]
     begins = np.append(z, tops[-1, :-1])
     values = np.full_like(tops, np.nan)
-    while True:
-        _advance(slopes, offsets, tops, values, begins)
-        if np.array_equal(begins[1:], values[-1, :-1]):
-            return values.T.reshape(-1)[:count]
+    for _ in range(_SWEEPS):
+        _advance(*lines, tops, values, begins)
+        wrong = begins[1:] != values[-1, :-1]
         begins[1:] = values[-1, :-1]
+        if not wrong.any():
+            break
+    found = values.T.reshape(-1)[:count]
+    if wrong.any():
+        known = length * (int(wrong.argmax()) + 1)
+        rest = slopes[:, known:], offsets[:, known:], limits[known:]
+        found[known:] = _one_by_one(*rest, float(found[known - 1]))
+    return found
 
 
 def _side_by_side(values: Array, length: int, filling: float) -> Array:
