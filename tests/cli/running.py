@@ -1,4 +1,8 @@
-"""Run the command line, in a process of its own or in this one."""
+"""Run the command line, in a process of its own or in this one.
+
+A process of its own is a fresh one where a test is about its start, its signals or streams that are closed (`COMMAND`),
+and a copy of one that has imported everything elsewhere, which costs a tenth: `tests/test_docs.py` compares the two.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +20,8 @@ from typing import Any, NamedTuple
 from unittest.mock import patch
 
 import pytest
+
+from docs.warm import warm_commands
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
@@ -45,9 +51,14 @@ class Outcome(NamedTuple):
     err: str
 
 
-def run(*arguments: str | Path, stdin: str = "", **options: Any) -> Outcome:
+def warm() -> list[str]:
+    """Return the words of the command that is a copy of a process which waits."""
+    return [str(warm_commands() / "trajcli")]
+
+
+def run(*arguments: str | Path, stdin: str = "", fresh: bool = False, **options: Any) -> Outcome:
     """Run the command in a process of its own."""
-    words = [*COMMAND, *map(str, arguments)]
+    words = [*(COMMAND if fresh else warm()), *map(str, arguments)]
     done = subprocess.run(
         words, input=stdin, capture_output=True, text=True, timeout=60, check=False, **options
     )
@@ -56,11 +67,12 @@ def run(*arguments: str | Path, stdin: str = "", **options: Any) -> Outcome:
 
 def on_terminal(*arguments: str | Path, columns: int = 80, **environment: str) -> tuple[int, str]:
     """Run the command on a terminal of so many columns; return its exit code, and all that it shows there."""
+    command = warm()
     process, ours = pty.fork()
     if process == 0:
         fcntl.ioctl(1, termios.TIOCSWINSZ, struct.pack("HHHH", 50, columns, 0, 0))
         words = {"TERM": "xterm", "COLUMNS": "", "NO_COLOR": "", "FORCE_COLOR": "", **environment}
-        os.execve(sys.executable, [*COMMAND, *map(str, arguments)], {**os.environ, **words})
+        os.execve(command[0], [*command, *map(str, arguments)], {**os.environ, **words})
     shown = b""
     with suppress(OSError):  # the other side has closed it
         while chunk := os.read(ours, 1 << 16):

@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from running import warm
 
 from trajcli.job.robot import catalogue_names
 
@@ -22,8 +23,7 @@ def completed(*words: str) -> list[str]:
         "COMP_WORDS": " ".join(words),
         "COMP_CWORD": str(len(words) - 1),
     }
-    command = [str(Path(sys.executable).with_name("trajcli"))]
-    done = subprocess.run(command, env=os.environ | asked, capture_output=True, text=True, check=True)
+    done = subprocess.run(warm(), env=os.environ | asked, capture_output=True, text=True, check=True)
     assert done.stderr == ""
     return done.stdout.split()
 
@@ -55,7 +55,7 @@ def test_commands_complete() -> None:
 
 
 def test_completion_is_installed(tmp_path: Path) -> None:
-    command = [str(Path(sys.executable).with_name("trajcli")), "--install-completion", "bash"]
+    command = [*warm(), "--install-completion", "bash"]
     # a test has no shell around it that typer could find by itself
     asked = {"HOME": str(tmp_path), "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}
     done = subprocess.run(command, env=os.environ | asked, capture_output=True, text=True, check=True)

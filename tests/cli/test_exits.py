@@ -8,7 +8,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from running import COMMAND, EXAMPLES, FAST, IMPOSSIBLE, JOB, LONG, ROOT, SLOWED, call, run
+from running import COMMAND, EXAMPLES, FAST, IMPOSSIBLE, JOB, LONG, ROOT, SLOWED, call, run, warm
 
 Capture = pytest.CaptureFixture[str]
 
@@ -16,7 +16,7 @@ HEADER = "t,q1_deg\n"
 
 
 def test_a_job_from_standard_input_to_standard_output() -> None:
-    code, out, err = run("plan", "-", stdin=JOB)
+    code, out, err = run("plan", "-", stdin=JOB, fresh=True)
     assert code == 0
     assert out.splitlines()[0] == HEADER.strip()
     assert out.splitlines()[-1] == "1.000000000,30.000000000"
@@ -92,7 +92,7 @@ def test_a_closed_pipe_is_141_and_silent(tmp_path: Path) -> None:
 def test_errors_that_nobody_reads_are_141(job: str) -> None:
     read, write = os.pipe()
     os.close(read)
-    words = [*COMMAND, "plan", "-", "--no-output"]
+    words = [*warm(), "plan", "-", "--no-output"]
     done = subprocess.run(
         words, input=job.encode(), stderr=write, stdout=subprocess.PIPE, timeout=60, check=False
     )
@@ -104,7 +104,7 @@ def test_a_full_disk_is_4() -> None:
     if not Path("/dev/full").exists():
         pytest.skip("without /dev/full")
     with Path("/dev/full").open("w") as full:
-        words = [*COMMAND, "plan", str(EXAMPLES / "cubic.yaml")]
+        words = [*warm(), "plan", str(EXAMPLES / "cubic.yaml")]
         done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60, check=False)
     assert done.returncode == 4
     assert "cannot write standard output: No space left on device" in done.stderr
@@ -112,7 +112,7 @@ def test_a_full_disk_is_4() -> None:
 
 
 def test_the_main_example_as_it_is_typed() -> None:
-    outcome = run("plan", "examples/ur5e_pick.yaml", cwd=ROOT)
+    outcome = run("plan", "examples/ur5e_pick.yaml", cwd=ROOT, fresh=True)
     assert outcome.code == 0
     assert outcome.out == (ROOT / "tests/golden/ur5e_pick.csv").read_text()
 

@@ -11,7 +11,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from running import COMMAND, JOB, call
+from running import JOB, call, warm
 
 UR5E = """\
 version: 1
@@ -125,12 +125,12 @@ def test_names_of_files_need_not_be_text(tmp_path: Path) -> None:
     Path(os.fsdecode(job)).write_text(JOB)
     words = [job, b"-o", rows, b"--report", report, b"--resolved", folder + b"/s\xff.yaml"]
     for line in ([b"plan", *words], [b"diff", rows, rows], [b"explain", job, b"--json"], [b"explain", job]):
-        done = subprocess.run([*COMMAND, *line], capture_output=True, timeout=60, check=False)
+        done = subprocess.run([*warm(), *line], capture_output=True, timeout=60, check=False)
         assert done.returncode == 0, done.stderr
         done.stdout.decode()
     assert json.loads(Path(os.fsdecode(report)).read_text())["job"] == "j\\udcff"
     missing = subprocess.run(
-        [*COMMAND, b"plan", b"\xfe.yaml", b"--errors", b"json"], capture_output=True, timeout=60, check=False
+        [*warm(), b"plan", b"\xfe.yaml", b"--errors", b"json"], capture_output=True, timeout=60, check=False
     )
     assert missing.returncode == 4
     assert json.loads(missing.stderr)["problems"][0]["message"] == "there is no file '\udcfe.yaml'"

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from running import COMMAND, EXAMPLES, JOB, call
+from running import EXAMPLES, JOB, call, warm
 from streams.mcap.conftest import read_mcap
 
 Capture = pytest.CaptureFixture[str]
@@ -27,7 +27,7 @@ def test_a_pipe_gets_what_a_file_holds(job: Path, capfd: Capture) -> None:
     outcome = call(capfd, "plan", job, "-o", "a.mcap", "--compression", "none")
     assert (outcome.code, outcome.out) == (0, "")
     assert "no geometry: the log has no frames, no robot description and no tool path" in outcome.err
-    command = [*COMMAND, "plan", str(job), "--format", "mcap", "--compression", "none"]
+    command = [*warm(), "plan", str(job), "--format", "mcap", "--compression", "none"]
     for words in ([], ["-o", "-"], ["-o", "/dev/stdout"]):
         piped = subprocess.run([*command, *words], capture_output=True, check=True)
         assert piped.stdout == Path("a.mcap").read_bytes()
@@ -37,7 +37,7 @@ def test_a_pipe_gets_what_a_file_holds(job: Path, capfd: Capture) -> None:
 def test_a_terminal_gets_nothing(job: Path) -> None:
     terminal, side = pty.openpty()
     try:
-        command = [*COMMAND, "plan", str(job), "--format", "mcap"]
+        command = [*warm(), "plan", str(job), "--format", "mcap"]
         run = subprocess.run(command, stdout=side, stderr=subprocess.PIPE, text=True, check=False)
         os.set_blocking(terminal, False)
         with pytest.raises(BlockingIOError):

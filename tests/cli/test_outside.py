@@ -13,15 +13,15 @@ import time
 from pathlib import Path
 
 import pytest
-from running import COMMAND, ENDLESS, FAST, JOB, LONG, Outcome, call
+from running import COMMAND, ENDLESS, FAST, JOB, LONG, Outcome, call, warm
 
 SIGNALS = [(signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, 130)]
 TRAJCLI = " ".join([sys.executable, "-m", "trajcli"])
 
 
 def shell(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Run a line of a shell, in which `trajcli` is the command."""
-    line = command.replace("trajcli", TRAJCLI)
+    """Run a line of a shell, in which `trajcli` is the command: a fresh process where streams are closed or signals come."""
+    line = command.replace("trajcli", TRAJCLI if "&-" in command or "kill" in command else warm()[0])
     return subprocess.run(
         ["sh", "-c", line], capture_output=True, text=True, cwd=folder, timeout=60, check=False
     )
@@ -85,7 +85,7 @@ def test_a_full_standard_error_changes_nothing_but_the_code(folder: Path, rows: 
 def test_help_that_nobody_reads_is_141(words: str) -> None:
     read, write = os.pipe()
     os.close(read)
-    done = subprocess.run([*COMMAND, *words.split()], stdout=write, stderr=subprocess.PIPE, check=False)
+    done = subprocess.run([*warm(), *words.split()], stdout=write, stderr=subprocess.PIPE, check=False)
     os.close(write)
     assert (done.returncode, done.stderr) == (141, b"")
 

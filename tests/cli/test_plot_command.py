@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from running import COMMAND, EXAMPLES, FAST, JOB, call, run
+from running import EXAMPLES, FAST, JOB, call, run, warm
 
 Capture = pytest.CaptureFixture[str]
 
@@ -146,7 +146,7 @@ def test_a_file_without_a_known_ending_is_told_by_its_first_line(here: Path, cap
 def test_no_binary_goes_to_a_terminal(here: Path) -> None:
     leader, follower = os.openpty()
     done = subprocess.run(
-        [*COMMAND, "plot", "job.yaml", "-o", "-", "--format", "png"],
+        [*warm(), "plot", "job.yaml", "-o", "-", "--format", "png"],
         check=False,
         stdout=follower,
         stderr=subprocess.PIPE,

@@ -6,11 +6,12 @@ import io
 import os
 import pty
 import subprocess
-import sys
 import time
 from contextlib import suppress
 from pathlib import Path
 from threading import Event, Thread
+
+from running import warm
 
 from trajcli.cli.progress import ProgressLine
 from trajcli.progress import listening, progress_of, report_progress
@@ -73,7 +74,7 @@ def run(*arguments: str, terminal: bool, late: float = 0.0) -> str:
 
     Its rows are read when there is progress, or after `late` seconds.
     """
-    command = [sys.executable, "-m", "trajcli", *arguments]
+    command = [*warm(), *arguments]
     ours, theirs = pty.openpty() if terminal else os.pipe()
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=theirs, env={**os.environ, "TERM": "xterm"}

@@ -12,6 +12,7 @@ from planned_examples import share_plans
 from running import EXAMPLES, ROOT, call
 from tiers import few
 
+
 @pytest.fixture(autouse=True)
 def _plans_are_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
     share_plans(monkeypatch)

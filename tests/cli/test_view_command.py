@@ -8,7 +8,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from running import COMMAND, FAST, JOB, call, run
+from running import FAST, JOB, call, run, warm
 
 CSV = "t,q1_deg,q2_deg\n0,0,0\n0.5,10,20\n1,20,10\n"
 TWO = """\
@@ -173,7 +173,7 @@ def test_a_terminal_gets_a_hint_and_no_page(folder: Path) -> None:
     leader, follower = pty.openpty()
     try:
         done = subprocess.run(
-            [*COMMAND, "view", "two.yaml"],
+            [*warm(), "view", "two.yaml"],
             stdout=follower,
             stderr=subprocess.PIPE,
             text=True,
