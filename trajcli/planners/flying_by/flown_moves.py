@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import reduce
@@ -26,6 +27,7 @@ from trajcli.planners.planner import Event, Phase, Planned, PlannedMove
 from trajcli.trajectory import MoveInterval, ViaPoints
 
 _SAMPLES = 513  # of a zone, at which its distances are looked at
+_AT_ONCE = 16  # of them whose distances from the path are computed together
 _KEPT = 16  # intervals of the path to its corner, and from there, that pictures show
 _DIMENSIONS: dict[str, Literal["length", "angle"]] = {"position": "length", "orientation": "angle"}
 _OF_PATHS = ("merged", "moved_center", "shrunk", "jerk_limit_both_ways")  # events, not of a law
@@ -175,12 +177,18 @@ def _off_path(robot: Robot, joints: Array, programmed: Array) -> float:
     here = forward(robot, joints)[:, :3, 3]
     starts, steps = path[:-1], np.diff(path, axis=0)
     squares = np.maximum(np.square(steps).sum(axis=1), np.finfo(np.float64).tiny)
-    worst = 0.0
-    for position in here:
-        along = np.clip(((position - starts) * steps).sum(axis=1) / squares, 0.0, 1.0)
-        feet = starts + along[:, None] * steps
-        worst = max(worst, float(np.sqrt(np.square(position - feet).sum(axis=1).min())))
-    return worst
+    nearest = [
+        _squares_to(here[low : low + _AT_ONCE, None], starts, steps, squares)
+        for low in range(0, len(here), _AT_ONCE)
+    ]
+    return math.sqrt(max(float(each.max()) for each in nearest))
+
+
+def _squares_to(positions: Array, starts: Array, steps: Array, squares: Array) -> Array:
+    """Return the squared distances (N,) of positions (N, 1, 3) from the nearest of segments (m, 3)."""
+    along = np.clip(((positions - starts) * steps).sum(axis=2) / squares, 0.0, 1.0)
+    off = positions - starts - along[:, :, None] * steps
+    return np.asarray(np.square(off).sum(axis=2).min(axis=1))
 
 
 def _binds(robot: Robot, curve: PiecewisePolynomial) -> str:

@@ -98,7 +98,17 @@ def _border(chain: FlyByChain, number: int, course: Course, eased: float, *, lea
         inside = slowed(law_bounds(rates, limits, limits.tcp, states / [pace, pace**2]), pace)
         return _tighter(on_path, inside)
 
-    return BorderNode(bounds, leads=leads, goes_on=not leads)
+    return BorderNode(_same_everywhere(bounds) if course.uniform else bounds, leads=leads, goes_on=not leads)
+
+
+def _same_everywhere(bounds: BoundsAbout) -> BoundsAbout:
+    """Return bounds that do not depend on the state, evaluated once."""
+    row = bounds(np.zeros((1, 2)))
+
+    def about(states: Array) -> Array:
+        return np.repeat(row, len(states), axis=0)
+
+    return about
 
 
 def _zone_part(corner: CornerZone, before: Course, behind: Course) -> ZonePart:

@@ -34,6 +34,7 @@ _GOLDEN = math.pi * (3 - math.sqrt(5))  # by which grids are turned
 _GAIN = 1e-3  # of the grid's size, relative: what is less does not keep a grid from being halved
 _GRID = 2.0**-22  # of the bounds, to which states are rounded: last bits of processors do not show
 _LOOKED_UP = 2000  # zones of one row of grids
+_SUMMED = 1 + 1e-12  # durations are added up in another order
 _SHORT = 0.4  # of a grid's size: its inner states
 
 
@@ -165,16 +166,16 @@ class ZonePart:
     before: Array
     after: Array
 
-    def durations(self, first: Array, last: Array) -> Array:
-        """Return the durations (p, q) that the slowest joint needs between states (p, 2) and (q, 2)."""
-        before, after = _pairs(first, last)
+    def durations(self, before: Array, after: Array, joints: Array) -> Array:
+        """Return what some joints need by themselves between states (N, 2), one to one, (N, k)."""
         count = len(before)
-        states = np.concatenate(
-            [joint_rates(before, self.before), joint_rates(after, self.after)], axis=2
-        ).reshape(-1, 4)
-        steps, limits = np.tile(self.steps, count), np.tile(self.bounds, (count, 1))
-        alone = fastest_durations(steps, states, limits).reshape(count, -1)
-        return np.asarray(alone.max(axis=1).reshape(len(first), len(last)))
+        rates = [
+            joint_rates(states, path[:, joints])
+            for states, path in ((before, self.before), (after, self.after))
+        ]
+        steps, limits = np.tile(self.steps[joints], count), np.tile(self.bounds[joints], (count, 1))
+        alone = fastest_durations(steps, np.concatenate(rates, axis=2).reshape(-1, 4), limits)
+        return np.asarray(alone.reshape(count, len(joints)))
 
     def carried(self, states: Array, *, back: bool = False) -> Array:
         """Return the states (N, 2) behind a zone to which constant accelerations lead, or before it, back."""
@@ -221,8 +222,53 @@ class FoundStates:
     duration: float
 
 
-def search(nodes: Sequence[BorderNode], parts: Sequence[ChainPart], ends: tuple[Array, Array]) -> FoundStates:
-    """Return the states at nodes for which a chain lasts least.
+@frozen
+class ChainSearch:
+    """A search that is under way.
+
+    Attributes:
+        nodes: The inner ones of the chain, k of them.
+        parts: What lies between, before and behind them, k + 1.
+        best: What is found so far.
+        size: Of the next grids around it, of the bounds of the speed.
+        number: Of the next round.
+    """
+
+    nodes: tuple[BorderNode, ...]
+    parts: tuple[ChainPart, ...]
+    best: FoundStates
+    size: float = _FIRST
+    number: int = 0
+
+    def until(self, size: float = _FINEST) -> ChainSearch:
+        """Return the search after as many rounds as make grids smaller than a size."""
+        best, own, number = self.best, self.size, self.number
+        if not self.nodes or not math.isfinite(best.duration):
+            return self
+        first, last = best.states[:1], best.states[-1:]
+        while own >= size and number < _ROUNDS:
+            inner = [
+                node.around(state, own, number * _GOLDEN)
+                for node, state in zip(self.nodes, best.states[1:-1], strict=True)
+            ]
+            grids = _completed([first, *inner, last], self.nodes, self.parts, back=bool(number % 2))
+            other = _fastest(grids, self.parts, best.duration)
+            if best.duration - other.duration < _GAIN * own * best.duration:
+                own *= _SMALLER
+            if other.duration < best.duration:
+                best = other
+            number += 1
+        return ChainSearch(self.nodes, self.parts, best, own, number)
+
+    def found(self) -> FoundStates:
+        """Return the best states, rounded where their chain still has a motion."""
+        return _rounded(self.nodes, self.parts, self.best)
+
+
+def begin_search(
+    nodes: Sequence[BorderNode], parts: Sequence[ChainPart], ends: tuple[Array, Array]
+) -> ChainSearch:
+    """Return the search of the states at nodes for which a chain lasts least, with its first grid done.
 
     Args:
         nodes: The inner ones, k of them.
@@ -230,24 +276,8 @@ def search(nodes: Sequence[BorderNode], parts: Sequence[ChainPart], ends: tuple[
         ends: The states (2,) at the start and at the end.
     """
     first, last = ends[0][None], ends[1][None]
-    best = _fastest(_completed([first, *(node.grid() for node in nodes), last], nodes, parts), parts)
-    if not nodes or not math.isfinite(best.duration):
-        return best
-    size = _FIRST
-    for number in range(_ROUNDS):
-        if size < _FINEST:
-            break
-        inner = [
-            node.around(state, size, number * _GOLDEN)
-            for node, state in zip(nodes, best.states[1:-1], strict=True)
-        ]
-        grids = _completed([first, *inner, last], nodes, parts, back=bool(number % 2))
-        other = _fastest(grids, parts)
-        if best.duration - other.duration < _GAIN * size * best.duration:
-            size *= _SMALLER
-        if other.duration < best.duration:
-            best = other
-    return _rounded(nodes, parts, best)
+    grids = _completed([first, *(node.grid() for node in nodes), last], nodes, parts)
+    return ChainSearch(tuple(nodes), tuple(parts), _fastest(grids, parts))
 
 
 def _completed(
@@ -263,14 +293,14 @@ def _completed(
     return completed
 
 
-def _fastest(grids: Sequence[Array], parts: Sequence[ChainPart]) -> FoundStates:
-    """Return the fastest chain whose nodes have states of their grids.
+def _fastest(grids: Sequence[Array], parts: Sequence[ChainPart], known: float = math.inf) -> FoundStates:
+    """Return the fastest chain whose nodes have states of their grids, if it lasts less than is `known`.
 
     What the slowest joint needs in a zone bounds what all need together from below. That is looked up for the
     zones of the best chain alone, until the best chain has no zone left for which it is not known.
     """
     pairs = list(zip(grids[:-1], grids[1:], parts, strict=True))
-    costs = [part.durations(before, after) for before, after, part in pairs]
+    costs = _costs(pairs, known)
     looked_up: set[tuple[int, int, int]] = set()
     for _ in range(_LOOKED_UP):
         total, chosen = _cheapest(costs)
@@ -289,6 +319,60 @@ def _fastest(grids: Sequence[Array], parts: Sequence[ChainPart]) -> FoundStates:
         total = math.inf
     states = np.array([grid[k] for grid, k in zip(grids, chosen, strict=True)])
     return FoundStates(states, total)
+
+
+def _costs(pairs: Sequence[tuple[Array, Array, ChainPart]], known: float) -> list[Array]:
+    """Return durations of parts between states of grids, (p, q) each, those of zones from below.
+
+    They are what the slowest joint needs by itself. The joints of a zone come one after another, those first
+    that are slow between the first states; pairs of states through which no chain is faster than is `known`
+    are left out.
+    """
+    orders = [_slowest_first(*pair) for pair in pairs]
+    costs = [
+        part.durations(before, after) if isinstance(part, PathPart) else np.zeros((len(before), len(after)))
+        for before, after, part in pairs
+    ]
+    first = not math.isfinite(known)
+    for turn in range(max(map(len, orders))):
+        reached, left = _sums(costs)
+        for k, ((before, after, part), order) in enumerate(zip(pairs, orders, strict=True)):
+            if isinstance(part, ZonePart) and turn < len(order):
+                least = reached[k][:, None] + costs[k] + left[k + 1]
+                i, j = np.nonzero(least <= known * _SUMMED)
+                slower = part.durations(before[i], after[j], order[turn : turn + 1])[:, 0]
+                costs[k][i, j] = np.maximum(costs[k][i, j], slower)
+        if first:
+            known = min(known, _lasts(pairs, _cheapest(costs)[1]))
+    return costs
+
+
+def _slowest_first(before: Array, after: Array, part: ChainPart) -> Array:
+    """Return the joints of a zone, the slowest between the first states of grids first; none of a path."""
+    if isinstance(part, PathPart):
+        return np.zeros(0, dtype=int)
+    return np.argsort(-part.durations(before[:1], after[:1], np.arange(part.steps.size))[0], kind="stable")
+
+
+def _lasts(pairs: Sequence[tuple[Array, Array, ChainPart]], chosen: Sequence[int]) -> float:
+    """Return the duration of the chain of chosen states."""
+    total = 0.0
+    for (before, after, part), i, j in zip(pairs, chosen, chosen[1:], strict=False):
+        if isinstance(part, PathPart):
+            total += float(part.durations(before[i : i + 1], after[j : j + 1])[0, 0])
+        else:
+            total += part.together(before[i], after[j])
+    return total
+
+
+def _sums(costs: Sequence[Array]) -> tuple[list[Array], list[Array]]:
+    """Return the least sums along a row of matrices up to each node, and from there on."""
+    reached, left = [np.zeros(1)], [np.zeros(1)]
+    for cost in costs:
+        reached.append((reached[-1][:, None] + cost).min(axis=0))
+    for cost in reversed(costs):
+        left.append((cost + left[-1]).min(axis=1))
+    return reached, left[::-1]
 
 
 def _cheapest(costs: Sequence[Array]) -> tuple[float, list[int]]:

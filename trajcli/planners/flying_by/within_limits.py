@@ -30,7 +30,7 @@ from trajcli.planners.course import Course
 from trajcli.planners.flying_by.between_stops import FlyByChain, chain_of
 from trajcli.planners.flying_by.flown_parts import FlownPart, NoLawError, along_path, flown_parts
 from trajcli.planners.flying_by.row import ChainRow, backwards, row_of
-from trajcli.planners.flying_by.search import FoundStates, PathPart, search
+from trajcli.planners.flying_by.search import FoundStates, PathPart, begin_search
 from trajcli.planners.planner import PlannedMove
 from trajcli.trajectory import MoveInterval, Span, State, Trajectory
 
@@ -45,6 +45,7 @@ _EASED = 0.985  # of the pace of a bent course: states on its limits leave a law
 _TRIES, _FASTER, _STEEPER = 6, 1.01, 1.06  # bolder states: times their speeds, times their accelerations
 _ENOUGH = 1e-4  # relative: a gain that is worth another law
 _CAREFUL = 0.97  # of the pace of a law from rest to rest: a state that is too fast costs a law in vain
+_BASIN = 0.02  # size of grids at which the better of two searches is known
 _ALIKE = 0.03  # relative: a pace that changes by less is known
 
 
@@ -182,7 +183,11 @@ def _fastest_motion(chain: FlyByChain) -> tuple[list[FlownPart], float]:
     exact = all(course.uniform for course in chain.courses)
     for _ in range(_MOST):
         row = row_of(chain, paces.tolist(), eased.tolist())
-        found = _found(row, chain.ends) if exact else search(row.nodes, row.parts, chain.ends)
+        found = (
+            _found(row, chain.ends)
+            if exact
+            else begin_search(row.nodes, row.parts, chain.ends).until().found()
+        )
         if not math.isfinite(found.duration):
             break
         try:
@@ -232,11 +237,13 @@ def _bolder(chain: FlyByChain, row: ChainRow, states: Array, parts: list[FlownPa
 def _found(row: ChainRow, ends: tuple[Array, Array]) -> FoundStates:
     """Return the better of what is found from the start and from the end: the way back takes as long."""
     mirror = np.array([1.0, -1.0])
-    forward, back = search(row.nodes, row.parts, ends), backwards(row)
-    other = search(back.nodes, back.parts, (ends[1] * mirror, ends[0] * mirror))
-    if forward.duration <= other.duration:
-        return forward
-    return FoundStates(other.states[::-1] * mirror, other.duration)
+    back = backwards(row)
+    forward = begin_search(row.nodes, row.parts, ends).until(_BASIN)
+    other = begin_search(back.nodes, back.parts, (ends[1] * mirror, ends[0] * mirror)).until(_BASIN)
+    if forward.best.duration <= other.best.duration:
+        return forward.until().found()
+    found = other.until().found()
+    return FoundStates(found.states[::-1] * mirror, found.duration)
 
 
 def _own_pace(course: Course) -> float:
