@@ -98,9 +98,9 @@ class Course(ABC):
         joints = self.curve.evaluate_orders(np.clip(s, 0.0, self.length), (1, 2, 3)).transpose(1, 0, 2)
         return PathRates(joints, None if self.tcp == ToolLimits() else self.tool_rates(s))
 
-    def bounds(self, s: float, states: Array) -> Array:
-        """Return bounds of its law at an s about states (N, 2), (N, 6), as `law_bounds`."""
-        return law_bounds(self.rates(np.array([s])), self.robot.limits, self.tcp, states)
+    def bounds(self, rates: PathRates, states: Array) -> Array:
+        """Return bounds of its law where it has such rates, about states (N, 2), (N, 6), as `law_bounds`."""
+        return law_bounds(rates, self.robot.limits, self.tcp, states)
 
     def typical_bounds(self, low: float, high: float) -> Array:
         """Return the bounds of one variable that stand for those from one s to another, (6,).
@@ -108,7 +108,7 @@ class Course(ABC):
         They are the geometric means of those at some s, exact where they are the same everywhere.
         """
         some = np.linspace(low, high, 1 if self.uniform else _SAMPLES).tolist()
-        rows = np.concatenate([self.bounds(s, np.zeros((1, 2))) for s in some])
+        rows = np.concatenate([self.bounds(self.rates(np.array([s])), np.zeros((1, 2))) for s in some])
         sizes = np.abs(rows)
         with np.errstate(divide="ignore"):
             means = np.exp(np.log(sizes).mean(axis=0))

@@ -17,7 +17,7 @@ from trajcli.planners.course import Course
 _NEXT_TO_STOP = 0.95  # of a move, the largest part that a zone takes where its other end is a stop
 _LEFT = 0.05  # of a move that stays between two zones
 _SAMPLES = 257  # of a move, at which its distance from the corner is looked at
-_HALVINGS = 60
+_SECTIONS, _PER_SECTION = 8, 63  # by which the place on its border is found: 64^8 parts of an interval
 
 Shares = Callable[[Array], Array]
 """How much of a zone is used at values of s (N,), (N,)."""
@@ -135,14 +135,12 @@ def border(shares: Shares, length: float, *, before: bool) -> float:
         return 0.0 if before else length
     index = int(outside[-1] if before else outside[0])
     out, inside = s[index], s[index + 1 if before else index - 1]
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (out + inside)
-        if middle in (out, inside):
-            break
-        if shares(np.array([middle]))[0] > 1.0:
-            out = middle
-        else:
-            inside = middle
+    for _ in range(_SECTIONS):
+        between = np.linspace(out, inside, _PER_SECTION + 2)[1:-1]
+        left = np.flatnonzero(shares(between) > 1.0)
+        last = int(left[-1]) if left.size else -1
+        ends = np.concatenate([[out], between, [inside]])
+        out, inside = ends[last + 1], ends[last + 2]
     return float(inside)
 
 

@@ -21,8 +21,8 @@ from trajcli.kinematics.zone import ZoneAround
 from trajcli.planners.boundary_states import instant
 from trajcli.planners.course import Course
 from trajcli.planners.flying_by.between_stops import with_looser_limits
-from trajcli.planners.flying_by.flown_parts import FlownPart
-from trajcli.planners.flying_by.within_limits import FlownChain, move_part, state_at
+from trajcli.planners.flying_by.flown_parts import FlownPart, move_part, state_at
+from trajcli.planners.flying_by.within_limits import FlownChain
 from trajcli.planners.planner import Event, Phase, Planned, PlannedMove
 from trajcli.trajectory import MoveInterval, ViaPoints
 

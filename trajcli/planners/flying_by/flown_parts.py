@@ -15,13 +15,16 @@ from trajcli.curves.third_order.quartic_law import ReversingLawError
 from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion, UnsettledSpeedError, time_optimal
 from trajcli.curves.time_optimal.passes import UnreachableSpeedError
 from trajcli.errors import PlanningError
+from trajcli.findings import Finding
 from trajcli.frozen import frozen
 from trajcli.kinematics.following.motion import ToolMotion
+from trajcli.limits.parts import limited_part, part_findings
 from trajcli.planners.course import Course
 from trajcli.planners.flying_by.between_stops import FlyByChain
 from trajcli.planners.flying_by.row import ChainRow, joint_bounds
-from trajcli.planners.flying_by.search import PathPart
+from trajcli.planners.flying_by.search import PathPart, joint_rates
 from trajcli.planners.ruckig import BoundaryProblem, fastest, together
+from trajcli.trajectory import MoveInterval, Span, State, Trajectory
 
 _NEXT_TO_NOTHING = 1e-6  # of a limit: a joint that uses no more may be moved by rounding alone
 _HOPELESS = 1.05  # times a limit after the first steps of a law between states
@@ -178,3 +181,53 @@ def _quintic(problem: BoundaryProblem, duration: float) -> PiecewisePolynomial:
     start, end = (np.array(state)[:, None, None] for state in (problem.initial, problem.final))
     coefficients = hermite_coefficients(start, end, np.array([[duration]]))
     return PiecewisePolynomial(np.array([0.0, duration]), coefficients)
+
+
+def zone_motions(chain: FlyByChain, states: Array) -> list[FlownPart]:
+    """Return the motions through the zones of a chain, without those along its paths.
+
+    Args:
+        chain: Moves between two stops.
+        states: sd and sdd at the nodes, the ends included, (N, 2).
+
+    Raises:
+        PlanningError: When some zone has no motion.
+    """
+    parts = []
+    for k, corner in enumerate(chain.corners):
+        sides = ((chain.courses[k], corner.left), (chain.courses[k + 1], corner.joined))
+        borders = []
+        for (course, s), state in zip(sides, states[2 * k + 1 : 2 * k + 3], strict=True):
+            position, first, second = course.curve.evaluate_orders(np.array([s]), (0, 1, 2))[0]
+            rates = joint_rates(state[None], np.stack([first, second]))[0]
+            borders.append(np.column_stack([position, rates]))
+        parts.append(
+            _through(borders, joint_bounds(corner.robot.limits, corner.tempo), corner.robot.joint_names)
+        )
+    return parts
+
+
+def findings_of(chain: FlyByChain, number: int, part: FlownPart) -> list[Finding]:
+    """Return what is wrong with a part: courses and zones are counted in turns."""
+    robot, curve = chain.courses[0].robot, part.curve
+    span = Span(number, "zone" if number % 2 else "course", curve.start, curve.end, 2, robot.payload)
+    ends = state_at(curve, curve.start), state_at(curve, curve.end)
+    trajectory = Trajectory(curve, robot.joint_names, robot.joint_types, (span,), *ends)
+    one = move_part(chain, number, part, 0.0)
+    return list(part_findings(limited_part(trajectory, span, one), one.around))
+
+
+def move_part(chain: FlyByChain, number: int, part: FlownPart, start: float) -> MoveInterval:
+    """Return a part of a motion as that of a move, `start` s behind the start of the move."""
+    k, in_zone = divmod(number, 2)
+    end = start + part.curve.duration
+    if in_zone:
+        return MoveInterval(start, end, chain.corners[k].robot, None, chain.corners[k].around)
+    return MoveInterval(start, end, chain.courses[k].robot, part.tool)
+
+
+def state_at(curve: PiecewisePolynomial, time: float) -> State:
+    """Return the state of a curve at a time."""
+    side = "left" if time == curve.end else "right"
+    rows = curve.evaluate_orders(np.array([time]), (0, 1, 2), side=side)[0]  # type: ignore[arg-type]
+    return State(rows[0], rows[1], rows[2])

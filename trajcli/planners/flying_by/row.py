@@ -93,7 +93,7 @@ def _border(chain: FlyByChain, number: int, course: Course, eased: float, *, lea
     rates, limits = course.rates(np.array([s])), corner.robot.limits
 
     def bounds(states: Array) -> Array:
-        on_path = slowed(course.bounds(s, states / [tempo, tempo**2]), tempo)
+        on_path = slowed(course.bounds(rates, states / [tempo, tempo**2]), tempo)
         pace = corner.tempo
         inside = slowed(law_bounds(rates, limits, limits.tcp, states / [pace, pace**2]), pace)
         return _tighter(on_path, inside)

@@ -16,6 +16,7 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
@@ -25,6 +26,7 @@ _INSIDE = 0.999999  # of the bounds: states on the edge have no motion at all fo
 _SPEEDS, _ACCELERATIONS = 9, 5  # of the first grid
 _ROUNDS = 120
 _FIRST, _SMALLER, _FINEST = 0.2, 0.6, 3e-5  # sizes of grids around a chain, of the bounds of the speed
+_NEARBY = 0.05  # size of the first grids around the states of a chain that is much the same
 _LONGER = 3.0  # times as large they are in accelerations, which matter less
 _SLOW = (1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.03)  # speeds of the first grid between rest and the next one
 _NEAR = 4.0  # times its speed: as far a slow state may be changed
@@ -166,7 +168,7 @@ class ZonePart:
     before: Array
     after: Array
 
-    def durations(self, before: Array, after: Array, joints: Array) -> Array:
+    def durations(self, before: Array, after: Array, joints: NDArray[np.int_]) -> Array:
         """Return what some joints need by themselves between states (N, 2), one to one, (N, k)."""
         count = len(before)
         rates = [
@@ -262,11 +264,16 @@ class ChainSearch:
 
     def found(self) -> FoundStates:
         """Return the best states, rounded where their chain still has a motion."""
+        if not self.nodes or not math.isfinite(self.best.duration):
+            return self.best
         return _rounded(self.nodes, self.parts, self.best)
 
 
 def begin_search(
-    nodes: Sequence[BorderNode], parts: Sequence[ChainPart], ends: tuple[Array, Array]
+    nodes: Sequence[BorderNode],
+    parts: Sequence[ChainPart],
+    ends: tuple[Array, Array],
+    near: Array | None = None,
 ) -> ChainSearch:
     """Return the search of the states at nodes for which a chain lasts least, with its first grid done.
 
@@ -274,8 +281,14 @@ def begin_search(
         nodes: The inner ones, k of them.
         parts: What lies between, before and behind them, k + 1.
         ends: The states (2,) at the start and at the end.
+        near: States at all nodes of a chain that is much the same, (N, 2): the search begins there.
     """
     first, last = ends[0][None], ends[1][None]
+    if near is not None:
+        inner = [node.inside(state[None]) for node, state in zip(nodes, near[1:-1], strict=True)]
+        found = _fastest([first, *inner, last], parts)
+        if math.isfinite(found.duration):
+            return ChainSearch(tuple(nodes), tuple(parts), found, _NEARBY)
     grids = _completed([first, *(node.grid() for node in nodes), last], nodes, parts)
     return ChainSearch(tuple(nodes), tuple(parts), _fastest(grids, parts))
 
@@ -347,7 +360,7 @@ def _costs(pairs: Sequence[tuple[Array, Array, ChainPart]], known: float) -> lis
     return costs
 
 
-def _slowest_first(before: Array, after: Array, part: ChainPart) -> Array:
+def _slowest_first(before: Array, after: Array, part: ChainPart) -> NDArray[np.int_]:
     """Return the joints of a zone, the slowest between the first states of grids first; none of a path."""
     if isinstance(part, PathPart):
         return np.zeros(0, dtype=int)

@@ -36,6 +36,11 @@ class StraightenedChain:
     joined: FlyByChain
     groups: tuple[tuple[int, int], ...]
 
+    @property
+    def corners(self) -> list[int]:
+        """Indices of the corners that are left among those of the given chain."""
+        return [end for _, end in self.groups[:-1]]
+
     def parts(self, joined: Sequence[FlownPart]) -> list[FlownPart]:
         """Return the parts of the given chain: a line is cut where it is on borders of zones."""
         parts: list[FlownPart] = []

@@ -12,7 +12,7 @@ from trajcli.frozen import frozen
 from trajcli.kinematics.following.motion import ToolMotion, motion_along
 from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.kinematics.robot import Robot, ToolLimits
-from trajcli.planners.course import Course
+from trajcli.planners.course import Course, PathRates
 from trajcli.planners.tool_constraint import ToolConstraint
 from trajcli.planners.tool_path.follow import FollowedPath
 from trajcli.planners.tool_path.law import LawSpec
@@ -55,9 +55,9 @@ class ToolCourse(Course):
         """Return the limits of the tool along it."""
         return ToolConstraint(self.joints.executed, self.tcp)
 
-    def bounds(self, s: float, states: Array) -> Array:
-        """Return bounds of its law at an s, (N, 5), with the deceleration that it names."""
-        bounds = super().bounds(s, states)
+    def bounds(self, rates: PathRates, states: Array) -> Array:
+        """Return bounds of its law where it has such rates, (N, 6), with the deceleration that it names."""
+        bounds = super().bounds(rates, states)
         if self.law.deceleration is not None:
             bounds[:, 2] = np.maximum(bounds[:, 2], -self.law.deceleration)
         return bounds

@@ -1,0 +1,242 @@
+"""The fastest motions that are found of chains that differ in paces and borders, one after another.
+
+Along a straight line in joint space one variable has the same bounds everywhere, and the search is exact.
+Along other paths typical bounds stand for them; how much faster or slower the exact law is between the states
+that were found sets the pace of a second search. Zones cost little where laws are dear: their pace is lowered
+to what limits allow before any law is looked for.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from trajcli.curves.piecewise import Array
+from trajcli.errors import PlanningError
+from trajcli.findings import Finding
+from trajcli.frozen import frozen
+from trajcli.planners.course import Course
+from trajcli.planners.flying_by.between_stops import FlyByChain
+from trajcli.planners.flying_by.flown_parts import (
+    FlownPart,
+    NoLawError,
+    along_path,
+    findings_of,
+    flown_parts,
+    zone_motions,
+)
+from trajcli.planners.flying_by.row import ChainRow, backwards, row_of
+from trajcli.planners.flying_by.search import FoundStates, PathPart, begin_search
+
+_MOST = 16  # searches
+_LOWERINGS = 8  # of zones, before laws are looked for
+_MORE = 1e-6  # by which a pace is lowered beyond what is needed
+_SLOWER = 0.95  # the pace of a course that has no law between the states that were found
+_EASED = 0.985  # of the pace of a bent course: states on its limits leave a law no room
+_TRIES, _FASTER, _STEEPER = 6, 1.01, 1.06  # bolder states: times their speeds, times their accelerations
+_ENOUGH = 1e-4  # relative: a gain that is worth another law
+_CAREFUL = 0.97  # of the pace of a law from rest to rest: a state that is too fast costs a law in vain
+_BASIN = 0.02  # size of grids at which the better of two searches is known
+_ALIKE = 0.03  # relative: a pace that changes by less is known
+
+
+@frozen
+class _Found:
+    """The last motion: its row of nodes and parts, and the states at the nodes."""
+
+    row: ChainRow
+    states: Array
+
+
+class MotionSearch:
+    """Searches of chains that are much the same: each begins where the last one ended.
+
+    Attributes:
+        chain: The last one, its zones lowered to the pace that limits allow.
+        model: Duration of the fastest that was found, before the pace of any part was lowered, s.
+    """
+
+    def __init__(self) -> None:
+        self.chain: FlyByChain
+        self.model = math.inf
+        self._paces: dict[int, float] = {}
+        self._found: _Found | None = None
+        self._last: _Found
+
+    def fastest(self, chain: FlyByChain) -> list[FlownPart]:
+        """Return the parts of the fastest motion that is found: courses and zones in turns.
+
+        Raises:
+            PlanningError: When none is found.
+        """
+        self.chain = chain
+        eased = np.array([1.0 if course.uniform else _EASED for course in chain.courses])
+        best: list[FlownPart] | None = None
+        for _ in range(_MOST):
+            paces = np.array([self._pace(course) for course in chain.courses])
+            found, row = self._searched(paces, eased)
+            if not math.isfinite(found.duration):
+                break
+            try:
+                parts = flown_parts(self.chain, row, found.states)
+            except NoLawError as error:
+                if best is not None:
+                    break
+                self._paces[id(chain.courses[error.course])] *= _SLOWER
+                eased[error.course] *= _EASED
+                continue
+            second = best is not None
+            if best is None or duration_of(parts) < duration_of(best):
+                best, self._last = parts, _Found(row, found.states)
+            if self.exact:
+                break
+            if self._adapted(_changes(chain, row, found, parts)) <= _ALIKE or second:
+                break
+        if best is None:
+            raise PlanningError("no motion through its zones is found within the limits")
+        self.model = min(self.model, duration_of(best))
+        return best
+
+    @property
+    def exact(self) -> bool:
+        """Whether all courses are straight lines in joint space."""
+        return all(course.uniform for course in self.chain.courses)
+
+    def bolder(self, parts: list[FlownPart]) -> list[FlownPart]:
+        """Return the parts of a faster motion, as long as bolder states at borders of bent paths have one.
+
+        What bends of a path take of the jerk is known at its borders alone: the search is careful there.
+
+        Args:
+            parts: What `fastest` has returned, within all limits.
+        """
+        if self.exact:
+            return parts
+        bent = np.repeat([not course.uniform for course in self.chain.courses], 2)
+        bent[[0, -1]] = False
+        states = self._last.states
+        for _ in range(_TRIES):
+            states = np.where(bent[:, None], states * [_FASTER, _STEEPER], states)
+            try:
+                if any(self._over(states)):
+                    break
+                other = flown_parts(self.chain, self._last.row, states)
+            except PlanningError:
+                break
+            if duration_of(other) > duration_of(parts) * (1 - _ENOUGH):
+                break
+            if any(findings_of(self.chain, k, part) for k, part in enumerate(other)):
+                break
+            parts = other
+        self.model = min(self.model, duration_of(parts))
+        return parts
+
+    def _adapted(self, changes: Array) -> float:
+        """Change the paces of bent courses by factors (k,); return the largest change, relative."""
+        for course, factor in zip(self.chain.courses, changes.tolist(), strict=True):
+            if not course.uniform:
+                self._paces[id(course)] *= factor
+        return float(np.abs(changes - 1).max())
+
+    def _searched(self, paces: Array, eased: Array) -> tuple[FoundStates, ChainRow]:
+        """Return the states found, and their row, once zones are as slow as limits ask for."""
+        for turn in range(_LOWERINGS):
+            row = row_of(self.chain, paces.tolist(), eased.tolist())
+            near = None if self._found is None else self._found.states
+            found = _found(row, self.chain.ends, near, twice=self.exact)
+            if not math.isfinite(found.duration):
+                break
+            if self.exact:
+                self.model = min(self.model, found.duration)
+            self._found = _Found(row, found.states)
+            if turn + 1 == _LOWERINGS or not self._lowered(found.states):
+                break
+        return found, row
+
+    def _lowered(self, states: Array) -> bool:
+        """Lower the pace of zones that are over a limit; return whether there was any."""
+        if not self.chain.corners:
+            return False
+        factors = [
+            max((finding.factor or 1.0 for finding in findings), default=1.0)
+            for findings in self._over(states)
+        ]
+        if max(factors) <= 1.0:
+            return False
+        slower = [1.0 if factor <= 1.0 else 1 / (factor * (1 + _MORE)) for factor in factors]
+        tempos = np.array([corner.tempo for corner in self.chain.corners])
+        self.chain = with_paces(self.chain, tempos * slower)
+        return True
+
+    def _over(self, states: Array) -> list[list[Finding]]:
+        """Return what is wrong with the motion through each zone."""
+        return [
+            findings_of(self.chain, 2 * k + 1, part)
+            for k, part in enumerate(zone_motions(self.chain, states))
+        ]
+
+    def _pace(self, course: Course) -> float:
+        """Return by what the law of a course is taken to be faster than its typical bounds let it be."""
+        if course.uniform:
+            return 1.0
+        if id(course) not in self._paces:
+            self._paces[id(course)] = _CAREFUL * _own_pace(course)
+        return self._paces[id(course)]
+
+
+def with_paces(chain: FlyByChain, paces: Sequence[float] | Array) -> FlyByChain:
+    """Return a chain whose zones are flown through at other paces."""
+    corners = zip(chain.corners, map(float, paces), strict=True)
+    return replace(chain, corners=tuple(replace(corner, tempo=pace) for corner, pace in corners))
+
+
+def duration_of(parts: Sequence[FlownPart]) -> float:
+    """Return the duration of a motion, s."""
+    return sum(part.curve.duration for part in parts)
+
+
+def _found(row: ChainRow, ends: tuple[Array, Array], near: Array | None, *, twice: bool) -> FoundStates:
+    """Return the states that are found for a row of nodes and parts.
+
+    Args:
+        row: Nodes and parts.
+        ends: States at the start and at the end.
+        near: States of a row that is much the same, where there is one.
+        twice: Whether to search from the end, too, whose way back takes as long, and to take the better.
+    """
+    forward = begin_search(row.nodes, row.parts, ends, near)
+    if not twice:
+        return forward.until().found()
+    mirror = np.array([1.0, -1.0])
+    back, back_near = backwards(row), None if near is None else near[::-1] * mirror
+    other = begin_search(back.nodes, back.parts, (ends[1] * mirror, ends[0] * mirror), back_near).until(
+        _BASIN
+    )
+    forward = forward.until(_BASIN)
+    if forward.best.duration <= other.best.duration:
+        return forward.until().found()
+    found = other.until().found()
+    return FoundStates(found.states[::-1] * mirror, found.duration)
+
+
+def _own_pace(course: Course) -> float:
+    """Return by what the fastest law from rest to rest along a course is faster than by typical bounds."""
+    ends, stretch = np.zeros((2, 2)), (0.0, course.length)
+    part = PathPart(course.typical_bounds(*stretch), course.length)
+    expected = float(part.durations(ends[:1], ends[1:])[0, 0])
+    return expected / along_path(course, stretch, ends, 1.0).curve.duration
+
+
+def _changes(chain: FlyByChain, row: ChainRow, found: FoundStates, parts: Sequence[FlownPart]) -> Array:
+    """Return by what the law of each course is faster than the search took it for."""
+    changes = np.ones(len(chain.courses))
+    for k, course in enumerate(chain.courses):
+        part = row.parts[2 * k]
+        if not course.uniform and isinstance(part, PathPart):
+            first, last = found.states[2 * k : 2 * k + 1], found.states[2 * k + 1 : 2 * k + 2]
+            expected = float(part.durations(first, last)[0, 0])
+            changes[k] = expected / parts[2 * k].curve.duration
+    return changes
