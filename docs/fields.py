@@ -45,7 +45,7 @@ from trajcli.planners import PLANNERS, Planner
 from trajcli.planners.tool_path.arc import ArcFields
 from trajcli.planners.tool_path.law import LawSpec
 from trajcli.planners.tool_path.move import ToleranceSpec
-from trajcli.planners.tool_path.segments import Segment
+from trajcli.planners.tool_path.segments import Segment, SegmentLaw
 from trajcli.planners.waypoints.blends import BlendDurations
 from trajcli.planners.waypoints.time_optimal import PathParameter
 from trajcli.planners.waypoints.waypoints import SegmentTimes
@@ -72,6 +72,7 @@ SECTIONS: dict[type, str] = {
     LawSpec: "[law](#law)",
     ToleranceSpec: "[tolerance](#tolerance)",
     Segment: "[segments](#segments)",
+    SegmentLaw: "[law of a segment](#laws-of-segments)",
     ArcFields: "[arc](#arcs)",
 }
 """Where a model that stands inside another one is described."""

@@ -6,7 +6,7 @@ from docs.fields import field_table
 from trajcli.planners.tool_path.arc import ArcFields
 from trajcli.planners.tool_path.law import LawSpec
 from trajcli.planners.tool_path.move import ToleranceSpec
-from trajcli.planners.tool_path.segments import Segment
+from trajcli.planners.tool_path.segments import Segment, SegmentLaw
 
 _PATHS = """\
 `line`, `arc`, `path` and `screw` lead the tcp along a path in space; the joints follow. They start and end
@@ -55,7 +55,14 @@ for each place where path or law change."""
 
 _SEGMENTS = """\
 A segment begins where the one before it ends. `radius` is the length before and after the corner at its end
-over which the path is rounded; it stands here for one corner or in the move for all."""
+over which the path is rounded; it stands here for one corner or in the move for all. `radius: 0` stops at
+that corner alone."""
+
+_SEGMENT_LAWS = """\
+Speeds of the tool on one segment, in the place of those of the move's law (or of
+[`limits.tcp`](#limits-of-the-tool)). The move's law has the shape `time_optimal`, which steps from one speed
+to the next within all limits. Of a rounded corner each of its two segments has its half. The speeds are
+verified for all t on each segment; reports, `explain` and pictures show them."""
 
 _ARCS = """\
 Three ways to say which one: through `via` to `to`; about `center` to `to`, the shorter way round, or
@@ -63,6 +70,7 @@ right-handed about `axis`; about `center` and `axis` by a signed `angle`, also s
 helix. A center may be off by 0.001 of the radius: it is moved, with an event. Half a turn to a target needs
 `axis`."""
 
+_OF_MOVE = dict.fromkeys(("speed", "angular_speed"), "from the move's `law`")
 _SI = {"position": "`1e-6` m", "angle": "`1e-6` rad"}
 _TAKEN = ("speed", "acceleration", "jerk", "angular_speed", "angular_acceleration")
 _FROM_LIMITS = dict.fromkeys(_TAKEN, "from `limits.tcp`") | {
@@ -76,5 +84,6 @@ def tool_path_sections() -> list[str]:
     parts = ["## Along a path of the tool", _PATHS, "### Law", _LAW, field_table(LawSpec, _FROM_LIMITS)]
     parts += ["### Tolerance", _TOLERANCE, field_table(ToleranceSpec, _SI)]
     parts += ["### Segments", _SEGMENTS, field_table(Segment)]
+    parts += ["### Laws of segments", _SEGMENT_LAWS, field_table(SegmentLaw, _OF_MOVE)]
     parts += ["### Arcs", _ARCS, field_table(ArcFields)]
     return parts

@@ -45,8 +45,8 @@ HEAVY = ("scipy", "ruckig", "toppra", "matplotlib", "mpl_toolkits", "mcap", "mca
 NUMPY_ONLY = ("curves", "geometry", "kinematics", "dynamics")
 PLANNERS = f"{HOUSE}.planners"
 SAME_WORDS = {
-    "cli/explain.py line": "a kind of segment of the tool's path",
-    "cli/explain.py screw": "a kind of segment of the tool's path",
+    "cli/tool_text.py line": "a kind of segment of the tool's path",
+    "cli/tool_text.py screw": "a kind of segment of the tool's path",
     "queries/pose.py screw": "a kind of interpolation between two poses",
 }
 """Literals that are compared with, and are the name of a planner by chance: file and literal."""

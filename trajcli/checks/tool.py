@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from trajcli.curves.piecewise import Array
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount
 from trajcli.findings import Finding, FindingMethod, at_time
 from trajcli.frozen import frozen
@@ -17,11 +18,11 @@ from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.kinematics.inverse.target import IkTarget, determinants, residuals
 from trajcli.kinematics.jacobian import linearisation
 from trajcli.kinematics.robot import Robot
-from trajcli.limits.kinds import LimitedMove
+from trajcli.limits.kinds import SPEED_KINDS, LimitedMove
 from trajcli.limits.path_bound import path_bounds
-from trajcli.limits.tolerances import PATH_RELATIVE, exceeds
-from trajcli.limits.tool import peaks_in
-from trajcli.limits.tool_bound import ToolPeak
+from trajcli.limits.tolerances import PATH_RELATIVE, TOOL_RELATIVE, exceeds
+from trajcli.limits.tool import peaks_in, tool_excess
+from trajcli.limits.tool_bound import SpeedRun, ToolPeak, speed_runs
 from trajcli.trajectory import Span, Trajectory
 
 if TYPE_CHECKING:
@@ -87,6 +88,16 @@ class SampledTool:
         """Largest speeds and accelerations, from the start of the move, by the keys of their limits."""
         return peaks_in(self._move, self.robot)
 
+    @cached_property
+    def speed_runs(self) -> tuple[SpeedRun, ...]:
+        """Largest speeds where limits of them step along the path, from the start of the move; else none."""
+        path = self.motion.path
+        if path is None or path.speeds is None:
+            return ()
+        breaks, coefficients = self._move.pieces
+        curve = PiecewisePolynomial(breaks - self.span.start, coefficients)
+        return tuple(speed_runs(self.robot, path.speeds, self.motion.law, curve))
+
     @property
     def sampled(self) -> Iterator[str]:
         """What of it is judged on rows alone."""
@@ -109,8 +120,8 @@ class SampledTool:
 
 
 def check_tool(tool: SampledTool) -> list[Finding]:
-    """Return where the tool leaves its path, and where the arm changes its branch."""
-    return [*_check_path(tool), *_check_branch(tool)]
+    """Return where the tool leaves its path or is too fast on it, and where the arm changes its branch."""
+    return [*_check_path(tool), *_check_speeds(tool), *_check_branch(tool)]
 
 
 def _check_path(tool: SampledTool) -> list[Finding]:
@@ -146,6 +157,18 @@ def _check_path(tool: SampledTool) -> list[Finding]:
             )
             findings.append(finding)
     return findings
+
+
+def _check_speeds(tool: SampledTool) -> Iterator[Finding]:
+    """Yield the segments of the path on which the tool is faster than they allow."""
+    promised = (tool.motion.tolerance.position, tool.motion.tolerance.angle)
+    for run in tool.speed_runs:
+        for kind, limit, peak, off in zip(SPEED_KINDS, run.limits, run.peaks, promised, strict=True):
+            if not peak.most <= limit * (1 + TOOL_RELATIVE + 2 * off):
+                found = tool_excess(kind, peak.most, limit, tool.span.start + peak.time)
+                where = "segment {}" if run.segments[0] == run.segments[1] else "segments {} to {}"
+                message = f"{where.format(*run.segments)}: {found.message}"
+                yield replace(found, move=tool.span.index, message=message)
 
 
 def _check_branch(tool: SampledTool) -> list[Finding]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from trajcli.cli.numbers import numbers
 from trajcli.cli.outcome import print_text
-from trajcli.cli.polynomials import amount, blend_lines, knot_lines, law_lines, polynomial_lines
+from trajcli.cli.polynomials import amount, blend_lines, knot_lines, polynomial_lines
 from trajcli.cli.progress import is_terminal, progress
+from trajcli.cli.tool_text import clean, point_text, pose_lines, tool_lines
 from trajcli.errors import InputError
 from trajcli.job.read import load_job
 from trajcli.output.delivery.delivered import plan_of
@@ -19,15 +19,11 @@ from trajcli.planners import HANDLING
 if TYPE_CHECKING:
     from trajcli.cli.job_commands import ExplainCommand
     from trajcli.job.explanation import (
-        ChoiceReport,
-        CornerReport,
         ExplainedMove,
         ExplainedWaypoint,
         Explanation,
-        PoseReport,
-        SegmentReport,
     )
-    from trajcli.job.report import PeakReport, ToolReport
+    from trajcli.job.report import PeakReport
     from trajcli.job.reports.comparisons import AtLimitReport, SavingReport
     from trajcli.planning.plan import Plan
 
@@ -35,102 +31,10 @@ _MOST_LIMITS = 6  # that bind, in one line
 _SCREEN = 40  # lines about single moves on a terminal
 _MOST_POINTS = 20  # points that are listed one by one
 _TIME_DECIMALS = 12
-_ZERO = 1e-9  # user units: a coordinate or an angle below that is rounding
 _ROUNDING = 1e-12  # in units of the job: what is missed by less is met
 _FITTED = 1e-9  # of the largest: rates of a joint that rests, where the arm follows its tool
-_REACHED = 0.999  # of the wanted speed
 _SYMBOLS = {"position": "q", "velocity": "qd", "acceleration": "qdd", "jerk": "qddd"}
 _SLOWER = {"position": "position", "velocity": "velocity", "acceleration": "velocity", "jerk": "acceleration"}
-_CORNERS = {
-    "stop": "stops there",
-    "overlap": "cut by overlapping in time",
-    "smooth": "goes on smoothly",
-    "bend": "the curvature jumps",
-}
-
-
-def tool_lines(move: ExplainedMove) -> Iterator[str]:
-    """Yield the segments of the path, its law, and how the tool moved along it."""
-    path, tool = move.path, move.tool
-    if path is None or tool is None:
-        return
-    yield f"  path: {path.length:.9g} {path.unit}"
-    yield from (f"    {_segment(segment)}" for segment in path.segments)
-    yield from (f"    corner {n}: {_corner(corner)}" for n, corner in enumerate(path.corners, 1))
-    yield from law_lines(path.law)
-    yield from _speeds(tool, move.start)
-
-
-def _segment(segment: SegmentReport) -> str:
-    if segment.kind == "screw":
-        where = "" if segment.point is None else f" through {_point(segment.point)} {segment.unit}"
-        turned = f"{segment.angle:.9g} {segment.angle_unit} about it"
-        along = f"{_clean(segment.advance):.9g} {segment.unit} along it"
-        return f"screw about the axis {_point(segment.axis)}{where}: {turned}, {along}"
-    if segment.kind == "rotation":
-        where = f"{_point(segment.place)} {segment.unit}"
-        return f"rotation by {segment.angle:.9g} {segment.angle_unit} at {where}"
-    ends = f"{_point(segment.start)} to {_point(segment.end)} {segment.unit}, length {segment.length:.9g}"
-    if segment.kind == "line":
-        return f"line from {ends}"
-    around = f"center {_point(segment.center)}, axis {_point(segment.axis)}"
-    size = f"radius {segment.radius:.9g}, angle {segment.angle:.9g} {segment.angle_unit}"
-    pitch = f", pitch {segment.pitch:.9g}" if segment.kind == "helix" else ""
-    return f"{segment.kind} from {ends}: {around}, {size}{pitch}"
-
-
-def _corner(corner: CornerReport) -> str:
-    turn = f"turn {_clean(corner.turn):.6g} {corner.turn_unit}"
-    where = f"at s = {corner.place:.9g} {corner.unit}, {turn}"
-    if corner.kind != "rounded":
-        return f"{where}: {_CORNERS[corner.kind]}"
-    size = f"radius {corner.radius:.6g}, passes at {corner.deviation:.6g} {corner.unit}"
-    return f"{where}: rounded, {size}"
-
-
-def _speeds(tool: ToolReport, start: float) -> Iterator[str]:
-    yield "  tool:"
-    for peak in tool.peaks:
-        if peak.negligible:
-            continue
-        limit = "no limit"
-        if peak.limit is not None:
-            limit = f"limit {peak.limit:.9g}, {100 * (peak.value / peak.limit):.4g} % used"
-        name = peak.quantity.replace("_", " ")
-        value = f"{peak.value:.6g} {peak.unit} (t = {peak.time - start:.6g})"
-        yield f"    {name}: at most {value}; {limit}"
-    yield from _held(tool)
-    if tool.ruled_by:
-        yield f"    the limits of {tool.ruled_by} say how fast"
-    off = tool.deviation if tool.deviation_bound is None else tool.deviation_bound
-    turned = tool.turned if tool.turned_bound is None else tool.turned_bound
-    text = f"    off the path by at most {_clean(off):.3g} {tool.deviation_unit}"
-    yield f"{text}, turned by {_clean(turned):.3g} {tool.turned_unit}"
-
-
-def _held(tool: ToolReport) -> Iterator[str]:
-    if tool.held is None or tool.wanted_speed is None:
-        return
-    wanted = f"{tool.wanted_speed:.6g} {tool.speed_unit}"
-    if tool.held == 0:
-        top = next(peak.value for peak in tool.peaks if peak.unit == tool.speed_unit)
-        reached = "reached, but not held" if top >= _REACHED * tool.wanted_speed else "not reached"
-        yield f"    tool speed of {wanted} {reached}"
-        return
-    text = f"    tool speed of {wanted} held on {100 * tool.held:.4g} % of the path"
-    lowest = tool.lowest
-    if lowest is not None:
-        text += f", lowest {lowest.speed:.4g} {lowest.unit} at s = {lowest.place:.4g} {lowest.place_unit}"
-        text += f" because of {lowest.joint}" if lowest.joint else ""
-    yield text
-
-
-def _point(values: list[float]) -> str:
-    return "[" + ", ".join(f"{_clean(value):.9g}" for value in values) + "]"
-
-
-def _clean(value: float) -> float:
-    return value if abs(value) > _ZERO else 0.0
 
 
 def waypoint_lines(move: ExplainedMove) -> Iterator[str]:
@@ -159,47 +63,6 @@ def _points(points: Sequence[ExplainedWaypoint], joints: Sequence[str], origin: 
             listed = ", ".join(amount(value, unit, 6) for value in missed[:_MOST_POINTS])
             more = f", ... at most {amount(max(missed), unit, 6)}" if len(points) > _MOST_POINTS else ""
             yield f"  {name} passes them at a distance of ({unit}): {listed}{more}"
-
-
-def pose_lines(move: ExplainedMove) -> Iterator[str]:
-    """Yield what `explain` says of the poses from which a move comes and to which it goes."""
-    for pose, head, origin in (
-        (move.from_pose, "starts at a pose", "zero"),
-        (move.to_pose, "goes to a pose", "where the arm comes from"),
-    ):
-        if pose is not None:
-            units = ", ".join(dict.fromkeys(pose.units))
-            yield f"  {head}: joints {numbers(pose.joints)} ({units})"
-            yield f"    branch: {_branch(pose)}; {_singular(pose)}"
-            yield f"    chosen: {_choice(pose.chosen, origin)}"
-            if pose.free_direction is not None:
-                along = numbers(pose.free_direction)
-                yield f"    the arm can move without leaving the pose: joints along {along}"
-
-
-def _branch(pose: PoseReport) -> str:
-    return _named(pose.branch) if pose.branch else f"without a name ({pose.method})"
-
-
-def _named(names: Mapping[str, str]) -> str:
-    return ", ".join(f"{choice} {name}" for choice, name in names.items())
-
-
-def _singular(pose: PoseReport) -> str:
-    rank = f"rank {pose.rank['here']}, nearby {pose.rank['nearby']}"
-    return f"singular ({rank})" if pose.singular else "not singular"
-
-
-def _choice(chosen: ChoiceReport, origin: str) -> str:
-    if chosen.within_limits == 1:
-        return "the only answer within the limits"
-    answers = f"of {chosen.within_limits} answers found within the limits, "
-    nearest = f"the nearest to {origin}"
-    if not chosen.configuration:
-        return answers + nearest
-    named = f"{_named(chosen.configuration)} as the configuration says"
-    count = chosen.candidates
-    return answers + (f"{count} have {named}; of these {nearest}" if count > 1 else f"1 has {named}")
 
 
 def run_explain(options: ExplainCommand) -> int:
@@ -392,11 +255,11 @@ def _carried(move: ExplainedMove) -> Iterator[str]:
     if tool is not None:
         name = f"tool {tool.name}" if tool.name else "tool"
         weight = "" if tool.load is None else f", {tool.load.mass:.9g} kg"
-        yield f"  {name}: tcp at {_point(tool.xyz)} {tool.xyz_unit} of the flange{weight}"
+        yield f"  {name}: tcp at {point_text(tool.xyz)} {tool.xyz_unit} of the flange{weight}"
     if payload is None:
         return
     point = "" if any(payload.inertia) else ", a point mass"
-    where = f"{_point(payload.com)} {payload.com_unit} of the tcp"
+    where = f"{point_text(payload.com)} {payload.com_unit} of the tcp"
     yield f"  carries {payload.mass:.9g} kg at {where}{point}"
 
 
@@ -405,14 +268,14 @@ def _efforts(move: ExplainedMove) -> Iterator[str]:
     for effort in move.efforts or ():
         ends = ((effort.low, effort.low_time), (effort.high, effort.high_time))
         extent = " .. ".join(
-            f"{_clean(end):.6g} (t = {round(time - move.start, _TIME_DECIMALS):.6g})" for end, time in ends
+            f"{clean(end):.6g} (t = {round(time - move.start, _TIME_DECIMALS):.6g})" for end, time in ends
         )
         limits = "no limit"
         if effort.used is not None:
             low, high = ("unlimited" if bound is None else f"{bound:.9g}" for bound in effort.limit)
-            left = f"{_clean(effort.head_room or 0.0):.6g} {effort.unit} left"
+            left = f"{clean(effort.head_room or 0.0):.6g} {effort.unit} left"
             limits = f"limits {low} .. {high}, {100 * effort.used:.4g} % used, {left}"
-        gravity = f"{_clean(effort.gravity):.6g} {effort.unit} of it against gravity"
+        gravity = f"{clean(effort.gravity):.6g} {effort.unit} of it against gravity"
         yield f"    {effort.joint} tau: {extent} {effort.unit}; {limits}, {gravity}"
 
 

@@ -159,6 +159,25 @@ class LowestSpeedReport(ReportPart):
     place_unit: UnitName
 
 
+class SegmentSpeedsReport(ReportPart):
+    """Neighbouring segments of a path with the same limits of speed, which other segments do not have."""
+
+    first: Annotated[int, Field(description="Index of the first of these segments, from 0.")]
+    last: Annotated[int, Field(description="Index of the last one.")]
+    begins: Annotated[
+        float,
+        MeasuredIn("place_unit"),
+        Field(description="s on the path, m; in a rounded corner its middle."),
+    ]
+    ends: Annotated[float, MeasuredIn("place_unit"), Field(description="Likewise.")]
+    place_unit: UnitName = "m"
+    start: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
+    end: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
+    peaks: Annotated[
+        list[ToolPeakReport], Field(description="Of the speeds that are limited here, for all t.")
+    ]
+
+
 class ToolReport(ReportPart):
     """The tool on its path."""
 
@@ -180,6 +199,10 @@ class ToolReport(ReportPart):
         float | None, Field(description="Part of the path over which the wanted speed is held, 0 to 1.")
     ]
     lowest: LowestSpeedReport | None
+    segments: Annotated[
+        list[SegmentSpeedsReport] | None,
+        Field(description="Where limits of speed step from segment to segment; null where they do not."),
+    ] = None
     peaks: list[ToolPeakReport]
     deviation: Annotated[
         float, MeasuredIn("deviation_unit"), Field(description="Largest distance from its path on rows, m.")

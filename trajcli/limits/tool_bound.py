@@ -1,14 +1,21 @@
-"""Bounds of the derivatives of the tool's motion for all t, from nine nodes of each piece of it."""
+"""Bounds of the derivatives of the tool's motion for all t, from nine nodes of each piece of it.
+
+Where limits of speed step along a path, each interval of it is bounded by itself.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import perm
 
 import numpy as np
 
 from trajcli.curves.node_bound import NODES_DEGREE, BoundedPeak, at_nodes, node_survey
-from trajcli.curves.piecewise import Array
+from trajcli.curves.operations import times_at
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.frozen import frozen
 from trajcli.geometry.power_series import growth
+from trajcli.kinematics.following.tool_path import SpeedLimits
 from trajcli.kinematics.robot import Robot
 from trajcli.kinematics.tool_derivatives import tool_derivatives
 from trajcli.kinematics.tool_majorants import majorants
@@ -50,6 +57,51 @@ def tool_bounds(robot: Robot, breaks: Array, coefficients: Array, order: int = 2
     pieces = starts[long], lengths[long], coefficients[:, long]
     survey = node_survey(known, pieces, slack, _HALVINGS)
     return tuple(survey.largest(function, _norm, hull_slack, least=0.0) for function in range(2 * order))
+
+
+@frozen
+class SpeedRun:
+    """The tool's largest speeds over an interval of its path in which their limits are the same.
+
+    Attributes:
+        segments: The first and the last segment of the path.
+        s: Where it begins and ends, m.
+        times: Likewise, s.
+        limits: Of speed and angular speed, m/s and rad/s; infinite for none.
+        peaks: Of both, for all t.
+    """
+
+    segments: tuple[int, int]
+    s: tuple[float, float]
+    times: tuple[float, float]
+    limits: tuple[float, float]
+    peaks: tuple[ToolPeak, ToolPeak]
+
+
+def speed_runs(
+    robot: Robot, speeds: SpeedLimits, law: PiecewisePolynomial, curve: PiecewisePolynomial
+) -> Iterator[SpeedRun]:
+    """Yield the intervals of a path that a motion passes, with its largest speeds in each.
+
+    Args:
+        robot: The arm.
+        speeds: Limits that step along the path.
+        law: s(t), which need not go over the whole path.
+        curve: The joints q(t), over the same times, with breaks where the limits step.
+    """
+    times = times_at(law, speeds.borders) + (curve.start - law.start)
+    middles = curve.breaks[:-1] + 0.5 * curve.lengths
+    edges = np.searchsorted(middles, times)
+    for k in np.flatnonzero(np.diff(edges) > 0).tolist():
+        low, high = edges[k : k + 2].tolist()
+        peaks = tool_bounds(robot, curve.breaks[low : high + 1], curve.coefficients[:, low:high], 1)
+        yield SpeedRun(
+            (speeds.segments[k], speeds.segments[k + 1] - 1),
+            (float(speeds.borders[k]), float(speeds.borders[k + 1])),
+            (float(curve.breaks[low]), float(curve.breaks[high])),
+            (float(speeds.speed[k]), float(speeds.angular_speed[k])),
+            (peaks[0], peaks[1]),
+        )
 
 
 def _norm(vectors: Array) -> Array:

@@ -29,6 +29,7 @@ from trajcli.job.report import (
     OutsideReport,
     PeakReport,
     Report,
+    SegmentSpeedsReport,
     StepReport,
     ToolPeakReport,
     ToolReport,
@@ -47,7 +48,8 @@ from trajcli.units import joint_units
 from trajcli.version import __version__
 
 if TYPE_CHECKING:
-    from trajcli.limits.tool_bound import ToolPeak
+    from trajcli.limits.kinds import LimitKind
+    from trajcli.limits.tool_bound import SpeedRun, ToolPeak
 
 _ROUNDING = 1e-12  # rad or m: what leaves the range by less does not leave it
 _HELD = 0.999  # of the wanted speed: that much counts as holding it
@@ -331,6 +333,7 @@ def _tool(trajectory: Trajectory, span: Span, move: PlannedMove) -> ToolReport |
         speed_unit=f"{unit}/s",
         held=held,
         lowest=lowest,
+        segments=[_segments(run, span) for run in tool.speed_runs] or None,
         peaks=_tool_peaks(tool.peaks, span, move.robot),
         deviation=deviation,
         deviation_bound=bounds[0],
@@ -340,25 +343,42 @@ def _tool(trajectory: Trajectory, span: Span, move: PlannedMove) -> ToolReport |
     )
 
 
+def _segments(run: SpeedRun, span: Span) -> SegmentSpeedsReport:
+    """Return the report of segments with the same limits of speed."""
+    from trajcli.limits.kinds import SPEED_KINDS
+
+    peaks = [
+        _tool_peak(kind, peak, limit, span)
+        for kind, peak, limit in zip(SPEED_KINDS, run.peaks, run.limits, strict=True)
+        if math.isfinite(limit)
+    ]
+    (first, last), (begins, ends) = run.segments, run.s
+    start, end = (span.start + time for time in run.times)
+    return SegmentSpeedsReport(
+        first=first, last=last, begins=begins, ends=ends, start=start, end=end, peaks=peaks
+    )
+
+
 def _tool_peaks(peaks: Mapping[str, ToolPeak], span: Span, robot: Robot) -> list[ToolPeakReport]:
     from trajcli.limits.kinds import TOOL_KINDS
 
-    reports = []
-    for kind in TOOL_KINDS:
-        if kind.key not in peaks:
-            continue
-        peak, limit = peaks[kind.key], float(getattr(robot.limits.tcp, kind.key))
-        report = ToolPeakReport(
-            quantity=kind.key,
-            value=peak.value,
-            bound=peak.most,
-            time=span.start + peak.time,
-            limit=None if math.isinf(limit) else limit,
-            unit=kind.unit,
-            negligible=peak.value <= _AT_REST,
-        )
-        reports.append(report)
-    return reports
+    return [
+        _tool_peak(kind, peaks[kind.key], float(getattr(robot.limits.tcp, kind.key)), span)
+        for kind in TOOL_KINDS
+        if kind.key in peaks
+    ]
+
+
+def _tool_peak(kind: LimitKind, peak: ToolPeak, limit: float, span: Span) -> ToolPeakReport:
+    return ToolPeakReport(
+        quantity=kind.key,
+        value=peak.value,
+        bound=peak.most,
+        time=span.start + peak.time,
+        limit=None if math.isinf(limit) else limit,
+        unit=kind.unit,
+        negligible=peak.value <= _AT_REST,
+    )
 
 
 def _held(

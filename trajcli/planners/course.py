@@ -32,10 +32,12 @@ class PathRates:
     Attributes:
         joints: q', q'' and q''', shape (3, m, n).
         tool: Sizes of p', p'', w and w', shape (4, m); None where nothing limits the tool.
+        speeds: Limits of the tool's two speeds there; None where they do not step along the path.
     """
 
     joints: Array
     tool: Array | None
+    speeds: tuple[float, float] | None = None
 
 
 @frozen
@@ -72,6 +74,11 @@ class Course(ABC):
         """Limits of the tool along it, those of its own law among them."""
 
     @property
+    def limits_tool(self) -> bool:
+        """Whether something limits the tool along it."""
+        return self.tcp != ToolLimits()
+
+    @property
     def length(self) -> float:
         """Last s."""
         return self.curve.end
@@ -79,7 +86,7 @@ class Course(ABC):
     @property
     def uniform(self) -> bool:
         """Whether its bounds are the same everywhere."""
-        return self.curve.degree == 1 and self.curve.pieces == 1 and self.tcp == ToolLimits()
+        return self.curve.degree == 1 and self.curve.pieces == 1 and not self.limits_tool
 
     @abstractmethod
     def tool_rates(self, s: Array) -> Array:
@@ -96,7 +103,7 @@ class Course(ABC):
     def rates(self, s: Array) -> PathRates:
         """Return derivatives at s (m,)."""
         joints = self.curve.evaluate_orders(np.clip(s, 0.0, self.length), (1, 2, 3)).transpose(1, 0, 2)
-        return PathRates(joints, None if self.tcp == ToolLimits() else self.tool_rates(s))
+        return PathRates(joints, self.tool_rates(s) if self.limits_tool else None)
 
     def bounds(self, rates: PathRates, states: Array) -> Array:
         """Return bounds of its law where it has such rates, about states (N, 2), (N, 6), as `law_bounds`."""
@@ -116,7 +123,7 @@ class Course(ABC):
 
     def constraints(self, path: PiecewisePolynomial) -> tuple[PathConstraint, ...]:
         """Return what limits laws along a part of its path besides the rates of joints."""
-        tool = () if self.tcp == ToolLimits() else (self.tool_constraint(),)
+        tool = (self.tool_constraint(),) if self.limits_tool else ()
         return (*tool, *path_constraints(path, self.robot))
 
 

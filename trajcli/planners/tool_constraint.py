@@ -34,6 +34,18 @@ class KnownTool(Protocol):
         ...
 
 
+class SteppingSpeeds(Protocol):
+    """Limits of speed and angular speed that step along a path."""
+
+    def at(self, s: Array, side: Side = "right") -> tuple[Array, Array]:
+        """Return both at s (N,), m/s and rad/s, each (N,)."""
+        ...
+
+    def most_between(self, s: Array) -> tuple[Array, Array]:
+        """Return the largest of both between neighbours of s (N,), increasing, each (N - 1,)."""
+        ...
+
+
 class KnownPoses(Protocol):
     """Poses and their derivatives by s."""
 
@@ -49,12 +61,14 @@ class ToolConstraint:
     Attributes:
         path: Of the tool.
         limits: Of its speed and acceleration, linear and angular.
+        speeds: Limits of both speeds that step along the path, in their place; None where they do not.
     """
 
     estimate: ClassVar[float] = 1.0
 
     path: KnownTool
     limits: ToolLimits
+    speeds: SteppingSpeeds | None = None
 
     @property
     def bounds_sdd(self) -> bool:
@@ -74,8 +88,9 @@ class ToolConstraint:
         curvature = np.linalg.norm(second[:, :3], axis=1)
         linear = _translation_rows(tangent, curvature, limits.acceleration)
         angular = _rotation_rows(first[:, 3:], second[:, 3:], turning, limits.angular_acceleration)
+        most, most_angular = self._speeds(s, side)
         with np.errstate(divide="ignore"):
-            speed = np.minimum(limits.speed / tangent, limits.angular_speed / turning)
+            speed = np.minimum(most / tangent, most_angular / turning)
         cap = np.minimum(speed**2, angular[3])
         joined = [np.concatenate(pair, axis=1) for pair in zip(linear, angular[:3], strict=True)]
         return ConstraintRows(joined[0], joined[1], joined[2], cap)
@@ -85,8 +100,9 @@ class ToolConstraint:
         limits = self.limits
         _, first, second = self.path.poses.evaluate(np.clip(s, 0.0, self.path.length), side)
         tangent, turning = (np.linalg.norm(first[:, part], axis=1) for part in (slice(0, 3), slice(3, 6)))
+        most, most_angular = self._speeds(s, side)
         with np.errstate(divide="ignore"):
-            speed = np.minimum(limits.speed / tangent, limits.angular_speed / turning)
+            speed = np.minimum(most / tangent, most_angular / turning)
             bend = limits.acceleration / np.linalg.norm(second[:, :3], axis=1)
         return np.asarray(np.minimum(speed**2, bend))
 
@@ -96,29 +112,39 @@ class ToolConstraint:
         chords = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
         turned = poses[:-1, :3, :3].transpose(0, 2, 1) @ poses[1:, :3, :3]
         angles = axis_angle_from_matrix(turned).angle
-        return np.asarray(np.maximum(chords / self.limits.speed, angles / self.limits.angular_speed))
+        speed, angular = (
+            (self.limits.speed, self.limits.angular_speed)
+            if self.speeds is None
+            else self.speeds.most_between(s)
+        )
+        return np.asarray(np.maximum(chords / speed, angles / angular))
 
     def excess(self, law: LawPieces) -> Array:
         """Return the shares of speed and acceleration used at samples of each piece, shape (2, N)."""
         times = np.linspace(0.0, 1.0, _BETWEEN)[:, None] * law.durations
         s, sd, sdd = (horner(derivative_coefficients(law.coefficients, order), times) for order in range(3))
         length = self.path.length
-        s = np.clip(np.maximum(np.minimum(s, s[-1] - _BESIDE * length), s[0]), 0.0, length)
-        _, first, second = self.path.poses.evaluate(s.reshape(-1), "right")
+        s = np.clip(np.maximum(np.minimum(s, s[-1] - _BESIDE * length), s[0]), 0.0, length).reshape(-1)
+        _, first, second = self.path.poses.evaluate(s, "right")
         rate, change = sd.reshape(-1, 1), sdd.reshape(-1, 1)
-        used = _used(first * rate, second * rate**2 + first * change, self.limits)
+        acceleration = second * rate**2 + first * change
+        used = _used(first * rate, acceleration, self._speeds(s, "right"), self.limits)
         return np.asarray(used.reshape(2, _BETWEEN, -1).max(axis=1))
 
+    def _speeds(self, s: Array, side: Side) -> tuple[Array, Array]:
+        """Return the limits of both speeds at s (N,), each (N,)."""
+        if self.speeds is not None:
+            return self.speeds.at(s, side)
+        return np.full(s.size, self.limits.speed), np.full(s.size, self.limits.angular_speed)
 
-def _used(velocity: Array, acceleration: Array, limits: ToolLimits) -> Array:
+
+def _used(velocity: Array, acceleration: Array, speeds: tuple[Array, Array], limits: ToolLimits) -> Array:
     """Return the shares of speed and acceleration (2, N) that twists and their derivatives (N, 6) use."""
     shares = []
-    for rows, linear, angular in (
-        (velocity, limits.speed, limits.angular_speed),
-        (acceleration, limits.acceleration, limits.angular_acceleration),
-    ):
+    most = np.array([limits.acceleration, limits.angular_acceleration])
+    for rows, bounds in ((velocity, np.stack(speeds, axis=1)), (acceleration, most)):
         lengths = np.linalg.norm(rows.reshape(-1, 2, 3), axis=2)
-        shares.append((lengths / [linear, angular]).max(axis=1))
+        shares.append((lengths / bounds).max(axis=1))
     return np.stack(shares)
 
 

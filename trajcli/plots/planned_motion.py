@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +21,7 @@ from trajcli.plots.sampling import component_points, local_times, thinned, witho
 from trajcli.trajectory import ViaPoints
 
 if TYPE_CHECKING:
+    from trajcli.limits.tool_bound import SpeedRun
     from trajcli.plots.planned_efforts import EffortSamples
 
 _JUMPS = {"position_jump": "q", "velocity_jump": "qd", "acceleration_jump": "qdd"}
@@ -128,7 +130,36 @@ class PlannedMotion:
         """Return the line (m, 2) of the limit of the tool's speed."""
         scale = self.display.factor("angle" if angular else "length")
         limits = [getattr(move.robot.limits.tcp, SPEED_KINDS[angular].key) for move in self.moves]
-        return self._steps(np.array(limits) / scale)
+        line = self._steps(np.array(limits) / scale)
+        for index in range(len(self.moves) - 1, -1, -1):
+            runs = self._speed_runs(index)
+            rows = [(time + self.offset, run.limits[angular] / scale) for run in runs for time in run.times]
+            if rows:
+                own = np.where(np.isinf(rows), np.nan, rows)
+                line = np.concatenate([line[: 2 * index], own, line[2 * index + 2 :]])
+        return line
+
+    def _speed_runs(self, index: int) -> Sequence[SpeedRun]:
+        """Return the intervals of a move in which limits of the tool's speed step along its path."""
+        move, span = self.moves[index], self.plan.trajectory.spans[index]
+        motions = [(span, move.planned.tool)] + [
+            (
+                replace(span, start=span.start + part.start, end=min(span.start + part.end, span.end)),
+                part.tool,
+            )
+            for part in move.planned.parts
+        ]
+        runs: list[SpeedRun] = []
+        for within, motion in motions:
+            if motion is not None and motion.path is not None and motion.path.speeds is not None:
+                from trajcli.checks.tool import SampledTool
+
+                known = SampledTool(self.plan.trajectory, within, move.robot, motion).speed_runs
+                runs += [
+                    replace(run, times=(run.times[0] + within.start, run.times[1] + within.start))
+                    for run in known
+                ]
+        return runs
 
     def waypoints(self, joint: int) -> Array:
         """Return when a joint passes the points that it is to pass, and where they are, shape (k, 2)."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from trajcli.curves.operations import times_at
-from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, distinct
 from trajcli.frozen import frozen
 from trajcli.geometry.paths.orientation import SegmentProgress
 from trajcli.geometry.paths.pose import PosePath
@@ -103,6 +103,41 @@ class ToolReference:
 
 
 @frozen
+class SpeedLimits:
+    """Limits of the tool's speeds that step along a path, over k intervals of it.
+
+    Attributes:
+        borders: s (k + 1,), from 0 to the length of the path, increasing.
+        segments: Index of the first segment of each interval, and one behind the last of all, (k + 1,).
+        speed: m/s, (k,); infinite for none.
+        angular_speed: rad/s, (k,); infinite for none.
+    """
+
+    borders: Array
+    segments: tuple[int, ...]
+    speed: Array
+    angular_speed: Array
+
+    def at(self, s: Array, side: Side = "right") -> tuple[Array, Array]:
+        """Return both at s (N,), each (N,)."""
+        interval = np.searchsorted(self.borders[1:-1], s, side)
+        return self.speed[interval], self.angular_speed[interval]
+
+    def most_between(self, s: Array) -> tuple[Array, Array]:
+        """Return the largest of both between neighbours of s (N,), increasing, each (N - 1,)."""
+        first = np.searchsorted(self.borders[1:-1], s[:-1], "right")
+        last = np.maximum(np.searchsorted(self.borders[1:-1], s[1:], "left"), first)
+        speed, angular = self.speed[first].copy(), self.angular_speed[first].copy()
+        for k in range(int((last - first).max(initial=0))):
+            interval = np.minimum(first + k + 1, last)
+            speed, angular = (
+                np.maximum(most, each[interval])
+                for most, each in ((speed, self.speed), (angular, self.angular_speed))
+            )
+        return speed, angular
+
+
+@frozen
 class ToolPath:
     """Poses along a path, and which of their coordinates count.
 
@@ -113,6 +148,7 @@ class ToolPath:
         tool_axis: Which axis of the tcp is meant by direction, yaw and pitch.
         angle_changes: Of yaw or pitch over the segments of the path, rad; empty for other kinds.
         progress: How far each of these segments is done; None for a single one.
+        speeds: Limits of speeds that step along it; None where they do not.
     """
 
     poses: PosePath
@@ -121,6 +157,7 @@ class ToolPath:
     tool_axis: AxisName = "z"
     angle_changes: tuple[float, ...] = ()
     progress: SegmentProgress | None = None
+    speeds: SpeedLimits | None = None
 
     @property
     def length(self) -> float:
@@ -129,8 +166,11 @@ class ToolPath:
 
     @property
     def breaks(self) -> Array:
-        """Values of s where a second derivative may jump, the ends included."""
-        return np.concatenate([[0.0], self.poses.breaks, [self.length]])
+        """Values of s where a second derivative may jump, or a limit of speed, the ends included."""
+        inner = self.poses.breaks
+        if self.speeds is not None:
+            inner = distinct(np.concatenate([inner, self.speeds.borders[1:-1]]))
+        return np.concatenate([[0.0], inner, [self.length]])
 
     def at_s(self, s: Array, side: Side) -> ToolReference:
         """Return the reference at s (N,), derivatives by s."""

@@ -12,7 +12,7 @@ from trajcli.frozen import frozen
 from trajcli.kinematics.following.motion import ToolMotion, motion_along
 from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.kinematics.robot import Robot, ToolLimits
-from trajcli.planners.course import Course, PathRates
+from trajcli.planners.course import Course, PathRates, law_bounds
 from trajcli.planners.tool_constraint import ToolConstraint
 from trajcli.planners.tool_path.follow import FollowedPath
 from trajcli.planners.tool_path.law import LawSpec
@@ -41,8 +41,13 @@ class ToolCourse(Course):
 
     @property
     def tcp(self) -> ToolLimits:
-        """Limits of the tool along it, those of its own law among them."""
-        return limits_of_law(self.law, self.robot.limits.tcp)
+        """Limits of the tool along it, those of its own law among them; the highest where they step."""
+        return limits_of_law(self.law, self.robot.limits.tcp, self.joints.path.speeds)
+
+    @property
+    def limits_tool(self) -> bool:
+        """Whether something limits the tool along it."""
+        return self.joints.path.speeds is not None or super().limits_tool
 
     def tool_rates(self, s: Array) -> Array:
         """Return sizes of p', p'', w and w' at s (N,), (4, N)."""
@@ -53,11 +58,23 @@ class ToolCourse(Course):
 
     def tool_constraint(self) -> PathConstraint:
         """Return the limits of the tool along it."""
-        return ToolConstraint(self.joints.executed, self.tcp)
+        return ToolConstraint(self.joints.executed, self.tcp, self.joints.path.speeds)
+
+    def rates(self, s: Array) -> PathRates:
+        """Return derivatives at s (m,), with the lowest limits of speed there, where these step."""
+        rates, speeds = super().rates(s), self.joints.path.speeds
+        if speeds is None:
+            return rates
+        sides = [np.stack(speeds.at(s, side)) for side in ("left", "right")]
+        speed, angular_speed = np.min(sides, axis=(0, 2)).tolist()
+        return replace(rates, speeds=(speed, angular_speed))
 
     def bounds(self, rates: PathRates, states: Array) -> Array:
         """Return bounds of its law where it has such rates, (N, 6), with the deceleration that it names."""
-        bounds = super().bounds(rates, states)
+        tcp = self.tcp
+        if rates.speeds is not None:
+            tcp = replace(tcp, speed=rates.speeds[0], angular_speed=rates.speeds[1])
+        bounds = law_bounds(rates, self.robot.limits, tcp, states)
         if self.law.deceleration is not None:
             bounds[:, 2] = np.maximum(bounds[:, 2], -self.law.deceleration)
         return bounds

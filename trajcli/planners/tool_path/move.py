@@ -222,7 +222,7 @@ class ToolPathMove(Planner):
             resting(end),
             phases=joints.phases,
             tool=joints.motion,
-            wanted_speed=_wanted_speed(self.law, robot.limits.tcp, angular=joints.motion.pure_rotation),
+            wanted_speed=_wanted_speed(self.law, robot.limits.tcp, planned.path),
             remedies=REMEDIES,
             events=(*planned.events, *joints.events),
             phase_plane=joints.phase_plane,
@@ -258,8 +258,14 @@ def _about_target(error: PlanningError, planned: PlannedPath, robot: Robot) -> P
     return PlanningError(*(replace(problem, field=field) for problem in error.problems))
 
 
-def _wanted_speed(law: LawSpec, limits: ToolLimits, *, angular: bool) -> float | None:
-    """Return the speed along the path that is asked for, m/s, or rad/s of a rotation; None where none is."""
+def _wanted_speed(law: LawSpec, limits: ToolLimits, path: ToolPath) -> float | None:
+    """Return the speed along the path that is asked for, m/s, or rad/s of a rotation; None where none is.
+
+    Where limits step along the path, no one is.
+    """
+    if path.speeds is not None:
+        return None
+    angular = path.poses.pure_rotation
     given, limit = (law.angular_speed, limits.angular_speed) if angular else (law.speed, limits.speed)
     speed = limit if given is None else given
     return None if math.isinf(speed) or law.duration is not None else speed

@@ -20,7 +20,14 @@ from trajcli.language.targets import Target
 from trajcli.planners.planner import Event
 from trajcli.planners.tool_path.arc import center_events
 from trajcli.planners.tool_path.move import PlannedPath, ToolPathMove, orientation_along
-from trajcli.planners.tool_path.segments import Segment, corner_radii, curves_of, merged_events, turning_back
+from trajcli.planners.tool_path.segments import (
+    Segment,
+    corner_radii,
+    curves_of,
+    merged_events,
+    stepping_speeds,
+    turning_back,
+)
 from trajcli.units import Quantity
 
 _SHRUNK = 1e-9  # relative
@@ -80,6 +87,7 @@ class PathMove(ToolPathMove):
 
     def _flaws(self) -> Iterator[Flaw]:
         yield from self._flaws_of_radii()
+        yield from self._flaws_of_laws()
         if self.corner == "overlap":
             yield from self._flaws_of_overlap()
         elif self.overlap is not None:
@@ -98,6 +106,12 @@ class PathMove(ToolPathMove):
         for k, segment in enumerate(self.segments):
             if segment.radius is not None:
                 yield ("segments", k, "radius"), text, hint
+
+    def _flaws_of_laws(self) -> Iterator[Flaw]:
+        for k, segment in enumerate(self.segments):
+            if segment.law is not None and not self.law.time_law.uses_joint_limits:
+                text = f"a segment has a law of its own, and a {self.law.shape} law is one for the whole path"
+                yield ("segments", k, "law"), text, "say law: {shape: time_optimal} in the move"
 
     def _flaws_of_overlap(self) -> Iterator[Flaw]:
         if self.overlap is None:
@@ -125,7 +139,8 @@ class PathMove(ToolPathMove):
         last = targets[-1]
         fixed = "all" if self.orientation == "tangent" else last.orientation
         turns = tuple(target.turn for target in targets)
-        path = ToolPath(poses, last.position, fixed, last.tool_axis, turns, chain.progress)
+        speeds = stepping_speeds(self.segments, kept, chain.borders, self.law, robot.limits.tcp)
+        path = ToolPath(poses, last.position, fixed, last.tool_axis, turns, chain.progress, speeds)
         to = self.segments[-1].line or (self.segments[-1].arc and self.segments[-1].arc.to)
         merged = merged_events(len(self.segments), kept)
         events = (*merged, *turned_back, *center_events(curves), *(() if overlap else _radius_events(chain)))

@@ -18,15 +18,32 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Problem, TrajcliError
 from trajcli.geometry.paths.corner import REVERSAL, turn_between
 from trajcli.geometry.paths.position import SAME_POINT, Line, PositionCurve
-from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.following.tool_path import SpeedLimits
+from trajcli.kinematics.robot import Robot, ToolLimits
+from trajcli.language.limits import AngularSpeed, ToolSpeed
 from trajcli.language.numbers import Model, Number, refuse
 from trajcli.language.points import NamedTarget
 from trajcli.planners.planner import Event
 from trajcli.planners.tool_path.arc import ArcFields, arc_of, arc_target
+from trajcli.planners.tool_path.law import LawSpec
 from trajcli.planners.tool_path.move import ToolTarget, flaws_of_target, tool_target
 from trajcli.units import Quantity
 
 _SAME_TURN = 1e-9  # rad: rounding of rotations
+
+
+class SegmentLaw(Model):
+    """Speeds of the tool on one segment, instead of those of the move's law."""
+
+    speed: ToolSpeed | None = None
+    angular_speed: AngularSpeed | None = None
+
+    @model_validator(mode="after")
+    def _says_something(self) -> SegmentLaw:
+        if self.speed is None and self.angular_speed is None:
+            hint = "leave it out, or say law: {speed: ...}"
+            raise refuse([((), "the law of a segment gives `speed`, `angular_speed` or both", hint)])
+        return self
 
 
 class Segment(Model):
@@ -45,6 +62,11 @@ class Segment(Model):
         ]
         | None
     ) = None
+
+    law: Annotated[
+        SegmentLaw | None,
+        Field(description="Of this segment, instead of the move's; the move's has the shape time_optimal."),
+    ] = None
 
     @model_validator(mode="after")
     def _is_one(self) -> Segment:
@@ -129,6 +151,32 @@ def corner_radii(segments: Sequence[Segment], kept: Sequence[int], radius: float
         given = [s.radius for s in segments[first:last] if s.radius is not None]
         radii.append(min(given, default=radius))
     return radii
+
+
+def stepping_speeds(
+    segments: Sequence[Segment], kept: Sequence[int], borders: Array, law: LawSpec, limits: ToolLimits
+) -> SpeedLimits | None:
+    """Return the limits of speed that step from segment to segment; None where no segment has a law.
+
+    Args:
+        segments: All of them.
+        kept: Indices of those with a length, k.
+        borders: Where these begin, and the end, m, (k + 1,).
+        law: Of the move, for segments that do not say otherwise.
+        limits: Of the tool, where the law does not.
+    """
+    if all(segments[k].law is None for k in kept):
+        return None
+    own = [segments[k].law or SegmentLaw.model_construct() for k in kept]
+    speed, angular = (
+        np.array([getattr(each, name) or getattr(law, name) or getattr(limits, name) for each in own])
+        for name in ("speed", "angular_speed")
+    )
+    steps = (speed[1:] != speed[:-1]) | (angular[1:] != angular[:-1])
+    first = np.append(True, steps)
+    ends = np.append(borders[:-1][first], borders[-1])
+    begins = [0, *np.array(kept)[1:][steps].tolist(), len(segments)]
+    return SpeedLimits(ends, tuple(begins), speed[first], angular[first])
 
 
 def turning_back(

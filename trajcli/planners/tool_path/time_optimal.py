@@ -26,6 +26,7 @@ from trajcli.curves.time_optimal.phase_plane import PhasePlane
 from trajcli.curves.time_optimal.switching import switching_structure
 from trajcli.kinematics.following.motion import motion_along
 from trajcli.kinematics.following.tolerance import Tolerance
+from trajcli.kinematics.following.tool_path import SpeedLimits
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.limits.kinds import TOOL_KINDS, path_constraints
 from trajcli.limits.tolerances import TOOL_RELATIVE
@@ -62,10 +63,9 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
     robot, path = joints.robot, joints.path
     curve = joints.by_s(Tolerance(tolerance.position * _FINER, tolerance.angle * _FINER))
     _require_acceleration(curve, robot, planner)
-    tcp = limits_of_law(spec, robot.limits.tcp)
-    limits = robot.limits
+    limits, tcp = robot.limits, limits_of_law(spec, robot.limits.tcp, path.speeds)
     with joints.diagnosed():
-        further = (ToolConstraint(joints.executed, tcp), *path_constraints(curve, robot))
+        further = (ToolConstraint(joints.executed, tcp, path.speeds), *path_constraints(curve, robot))
 
         turns = path.poses.pure_rotation
         along = (tcp.angular_speed, tcp.angular_acceleration) if turns else (tcp.speed, tcp.acceleration)
@@ -81,7 +81,7 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
             )
 
         solved = solved_within_efforts(curve, robot, solve)
-        remaining = _remaining_stretch(robot, solved.trajectory, tcp)
+        remaining = _remaining_stretch(robot, solved, tcp, path.speeds)
     least = spec.minimum_duration or 0.0
     factor = max(remaining, least / solved.trajectory.duration)
     law, trajectory = (
@@ -134,8 +134,16 @@ def _events(solved: TimeOptimalMotion, robot: Robot, remaining: float, *, fastes
     return tuple(events)
 
 
-def _remaining_stretch(robot: Robot, trajectory: PiecewisePolynomial, limits: ToolLimits) -> float:
+def _remaining_stretch(
+    robot: Robot, solved: TimeOptimalMotion, limits: ToolLimits, speeds: SpeedLimits | None
+) -> float:
     """Return how many times longer the motion must last to keep the tool's limits, as checks judge them."""
+    whole = _stretch_of_whole(robot, solved.trajectory, limits)
+    return whole if speeds is None else max(whole, _stretch_by_segment(robot, solved, speeds))
+
+
+def _stretch_of_whole(robot: Robot, trajectory: PiecewisePolynomial, limits: ToolLimits) -> float:
+    """Return that by the limits that hold along the whole path."""
     tcp = replace(limits, jerk=np.inf, angular_jerk=np.inf)
     limited = replace(robot, limits=replace(robot.limits, tcp=tcp))
     if not limits_tool(limited):
@@ -147,12 +155,33 @@ def _remaining_stretch(robot: Robot, trajectory: PiecewisePolynomial, limits: To
     return float(worst) if worst > 1 + TOOL_RELATIVE else 1.0
 
 
-def limits_of_law(spec: LawSpec, limits: ToolLimits) -> ToolLimits:
-    """Return the limits of the tool with those that a law names in their place."""
+def _stretch_by_segment(robot: Robot, solved: TimeOptimalMotion, speeds: SpeedLimits) -> float:
+    """Return that by limits of speed that step along the path."""
+    from trajcli.limits.tool_bound import speed_runs
+
+    worst = max(
+        peak.most / limit
+        for run in speed_runs(robot, speeds, solved.law, solved.trajectory)
+        for peak, limit in zip(run.peaks, run.limits, strict=True)
+    )
+    return worst if worst > 1 + TOOL_RELATIVE else 1.0
+
+
+def limits_of_law(spec: LawSpec, limits: ToolLimits, speeds: SpeedLimits | None = None) -> ToolLimits:
+    """Return the limits of the tool with those that a law names in their place.
+
+    Args:
+        spec: The law.
+        limits: Of the tool.
+        speeds: Where they step along the path; the highest count.
+    """
     given = spec.model_dump(
         include={"speed", "acceleration", "jerk", "angular_speed", "angular_acceleration"}
     )
-    return ToolLimits(**{**vars(limits), **{name: v for name, v in given.items() if v is not None}})
+    tcp = ToolLimits(**{**vars(limits), **{name: v for name, v in given.items() if v is not None}})
+    if speeds is None:
+        return tcp
+    return replace(tcp, speed=float(speeds.speed.max()), angular_speed=float(speeds.angular_speed.max()))
 
 
 def _require_acceleration(curve: PiecewisePolynomial, robot: Robot, planner: str) -> None:
