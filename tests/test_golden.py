@@ -12,6 +12,7 @@ from planned_examples import planned_example
 
 from trajcli.comparison.difference import compare
 from trajcli.curves import piecewise
+from trajcli.output.report import report_of
 from trajcli.streams.table import read_csv
 
 PATHS = sorted(EXAMPLES.glob("*.yaml"))
@@ -30,6 +31,11 @@ def test_rows_are_the_golden_ones(example: Path, tmp_path: Path) -> None:
     difference = compare(read_csv(str(now)), read_csv(str(golden_file(example))), {}, {})
     assert difference.equal, difference.first
     assert now.read_bytes() == golden_file(example).read_bytes()
+
+
+@pytest.mark.parametrize("example", PATHS, ids=IDS)
+def test_every_example_verifies_and_reports(example: Path) -> None:
+    assert report_of(planned_example(example.stem)).verdict == "verified"
 
 
 def _by_horner(

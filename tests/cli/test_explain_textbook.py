@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
 from numpy.polynomial import Polynomial
+from planned_examples import share_plans
 from running import EXAMPLES, ROOT, call
 from tiers import few
 from yaml_files import read_yaml
@@ -161,7 +162,10 @@ def test_derivatives_of_example_1(capfd: Capture, job: Path, q: str, q_rate: str
 
 
 @pytest.mark.parametrize("name", ["septic", "spline_rules", "sync", "line", "cycloidal"])
-def test_derivatives_are_those_of_the_polynomials(name: str, capfd: Capture) -> None:
+def test_derivatives_are_those_of_the_polynomials(
+    name: str, capfd: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    share_plans(monkeypatch)
     path = EXAMPLES / f"{name}.yaml"
     compared = 0
     for move in json.loads(call(capfd, "explain", path, "--json", "--derivatives").out)["moves"]:

@@ -11,7 +11,7 @@ import pytest
 import random_jobs
 from recorded_rows import part
 from tally import Tally
-from tiers import few
+from tiers import QUICK
 
 from trajcli.errors import TrajcliError
 from trajcli.judge.file import CheckOptions, check_file
@@ -83,8 +83,11 @@ def check_plan(plan: Plan, seed: int) -> bool:
     return True
 
 
+DRAWN, WRITTEN = (3, 25, 46, 70), (509, 520, 531, 553)  # of which there is a motion: most draws have none
+
+
 def test_rows_give_no_false_alarm() -> None:
-    seeds = few(range(80), 8)
+    seeds = DRAWN if QUICK else range(80)
     assert sum(check_rows(seed) for seed in seeds) >= len(seeds) / 16
 
 
@@ -106,7 +109,7 @@ def test_rows_give_no_false_alarm_at_length(block: int, tally: Tally) -> None:
 
 @pytest.mark.parametrize("ending", ["csv", "mcap", "jsonl", "yaml"])
 def test_our_own_files_give_no_false_alarm(ending: str, tmp_path: Path) -> None:
-    seeds, checked = few(range(500, 560), 12), 0
+    seeds, checked = WRITTEN if QUICK else range(500, 560), 0
     for seed in seeds:
         plan = verified_plan(seed)
         if plan is None or plan.trajectory.duration > 2.0:

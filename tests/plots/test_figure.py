@@ -237,7 +237,7 @@ from trajcli.job.read import load_job
 from trajcli.planning.plan import plan_job
 from trajcli.plots.picture import picture_of
 from trajcli.plots.write import rendered
-picture = picture_of(plan_job(load_job("examples/line.yaml")))
+picture = picture_of(plan_job(load_job("examples/cubic.yaml")))
 print(*(hashlib.sha256(rendered(picture, kind)).hexdigest() for kind in ("svg", "png", "pdf")))
 print("matplotlib.pyplot" in sys.modules)
 """
@@ -257,7 +257,7 @@ def test_bytes_are_the_same_in_every_process_and_whatever_settings_the_user_has(
         text=True,
         check=True,
     )
-    picture = picture_of(example("line"))
+    picture = picture_of(example("cubic"))
     ours = [hashlib.sha256(rendered(picture, kind)).hexdigest() for kind in ("svg", "png", "pdf")]
     assert done.stdout.split() == [*ours, "False"]
 

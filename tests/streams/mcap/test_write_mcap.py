@@ -389,7 +389,7 @@ def test_uncompressed_files_are_reproducible(pick: Plan, pick_log: Path, tmp_pat
 
 def test_few_rows_do_not_make_long_chunks(tmp_path: Path) -> None:
     """Two rows an hour apart: the frames between them fill several chunks."""
-    plan = plan_of("ur5e_poses", "moves.0.minimum_duration=200", "output.rate=0.001")
+    plan = plan_of("ur5e_poses", "moves.0.minimum_duration=100", "output.rate=0.001")
     found = read(write_log(plan, tmp_path / "slow.mcap"))
     assert len(found["/joint_states"]) == 2
     assert len(found["/tf"]) == int(plan.trajectory.duration * 60) + 1
