@@ -7,6 +7,9 @@ import numpy as np
 from trajcli.curves.piecewise import Array, read_only
 from trajcli.frozen import frozen
 
+SAME_POSITION = 1e-9
+"""rad or m: points no joint of which is further from the one before are one, as rounding leaves them."""
+
 
 @frozen
 class Recorded:
@@ -68,7 +71,7 @@ class Recorded:
             times = (times - times[0] if first else times)[first:]
         if times is None or any(self.merge):
             ends = positions if target is None else np.vstack([positions, target])
-            rows = _moved(start, ends, self._merge_distance)
+            rows = _moved(start, ends, np.maximum(self._merge_distance, SAME_POSITION))
             rows = rows if target is None else rows[:-1]
             positions, times = positions[rows], None if times is None else times[rows]
         return Recorded(positions, times, self.file, self.merge)

@@ -320,3 +320,65 @@ def test_aligned_moves_end_on_whole_periods(tmp_path):
             curve_of(made).evaluate(np.clip(passage.times, 0, made.trajectory.duration)) - passage.points
         )
         np.testing.assert_allclose(missed, passage.missed, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"planner": "spline"},
+        {"planner": "blends"},
+        {"planner": "waypoints"},
+        {"planner": "time_optimal"},
+        {"planner": "time_optimal", "path": "polyline", "corner": 0.05},
+    ],
+    ids=lambda fields: fields.get("path", fields["planner"]),
+)
+def test_points_that_rounding_keeps_apart_are_one(fields):
+    """As robots record them, with a turn-back: the motion is that of the points without doubles."""
+    rows = [[0.1, 0.2], [0.2, 0.4], [0.2 + 1e-12, 0.4], [0.1, 0.2], [0.1, 0.2 - 9e-10], [0.3, 0.1]]
+    limits = {"velocity": 2.0, "acceleration": 8.0, "jerk": None if fields["planner"] == "blends" else 80.0}
+    start = {"joints": [0.0, 0.0]}
+    moves = [
+        {**fields, "through": [{"joints": row} for row in some]}
+        for some in (rows, [rows[k] for k in (0, 1, 3, 5)])
+    ]
+    doubled, single = (plan(start, move, limits=limits) for move in moves)
+    assert [event.kind for event in doubled.moves[0].planned.events].count("merged") == 1
+    assert doubled.trajectory.duration == pytest.approx(single.trajectory.duration, rel=2e-4)
+    times = np.linspace(0, single.trajectory.duration, 50)
+    apart = doubled.trajectory.curve.evaluate(
+        times * doubled.trajectory.duration / single.trajectory.duration
+    )
+    assert np.abs(apart - single.trajectory.curve.evaluate(times)).max() < 5e-3
+
+
+@pytest.mark.parametrize("jerk", [None, 80.0])
+@pytest.mark.parametrize("off", [0.0, 1e-9, 1e-3])
+def test_a_polyline_that_turns_back_stops_there(jerk, off):
+    """By half a turn, or nearly: a corner with a radius would be a spike."""
+    rows, start = [[0.3, 0.6], [0.1, 0.2 + off]], {"joints": [0.0, 0.0]}
+    move = {"planner": "time_optimal", "path": "polyline", "corner": 0.05}
+    limits = {"velocity": 2.0, "acceleration": 8.0, "jerk": jerk}
+    made = plan(start, {**move, "through": [{"joints": row} for row in rows]}, limits=limits)
+    (event,) = (event for event in made.moves[0].planned.events if event.kind == "turns_back")
+    assert event.message == "the path turns back at point 1, and stops there"
+    ways = zip((start["joints"], rows[0]), rows, strict=True)
+    single = [plan({"joints": a}, {**move, "to": {"joints": b}}, limits=limits) for a, b in ways]
+    assert made.trajectory.duration == pytest.approx(sum(one.trajectory.duration for one in single), rel=2e-3)
+
+
+def test_a_straight_line_of_points_has_no_corner_that_is_shrunk():
+    """Slopes of thirds differ by rounding, which is no corner."""
+    rows = [[0.1 * k, 0.2 * k, -0.7 * k] for k in (1, 3, 4.7, 5)]
+    move = {"planner": "time_optimal", "path": "polyline", "corner": 0.05}
+    move["through"] = [{"joints": row} for row in rows]
+    made = plan(
+        {"joints": [0.0, 0.0, 0.0]}, move, limits={"velocity": 2.0, "acceleration": 8.0, "jerk": None}
+    )
+    assert not [event for event in made.moves[0].planned.events if event.kind == "shrunk"]
+    straight = plan(
+        {"joints": [0.0, 0.0, 0.0]},
+        {"planner": "time_optimal", "through": [], "to": {"joints": rows[-1]}},
+        limits={"velocity": 2.0, "acceleration": 8.0, "jerk": None},
+    )
+    assert made.trajectory.duration == pytest.approx(straight.trajectory.duration, rel=1e-6)

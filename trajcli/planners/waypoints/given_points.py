@@ -16,6 +16,7 @@ from trajcli.errors import Amount, Amounts, PlanningError, Problem, inward
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.language.per_joint import NamedValues
+from trajcli.language.recorded import SAME_POSITION
 from trajcli.language.waypoints import Waypoint
 from trajcli.planners.planner import Event
 from trajcli.trajectory import State
@@ -94,7 +95,7 @@ def without_repeats(points: GivenPoints, robot: Robot) -> GivenPoints:
     Raises:
         PlanningError: When two points in one place are given different velocities or accelerations.
     """
-    same = (np.diff(points.positions, axis=0) == 0).all(axis=1)
+    same = np.asarray((np.abs(np.diff(points.positions, axis=0)) <= SAME_POSITION).all(axis=1))
     if not same.any() or len(same) == 1:
         return points
     if same.all():

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajcli.curves.parabolic_blends.blends import blended
-from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
 from trajcli.curves.splines.hermite import parabola_velocities
 from trajcli.curves.splines.shape_preserving import ShapeError
 from trajcli.curves.third_order.rounded_polyline import BESIDE, rounded_polyline
@@ -21,6 +24,8 @@ from trajcli.planners.waypoints.through_points import PointTable
 
 Parameter = Literal["chord", "centripetal", "uniform"] | tuple[float, ...]
 
+_REVERSAL = np.radians(1.0)  # from half a turn, nearer to which a rounded corner would be a spike
+_STRAIGHT = 1e-12  # of the largest slope: segments whose slopes differ by less go straight on
 _OFF = 1e-9  # relative: a velocity this little off the path is on it
 _PARABOLA_BESIDE = 1.0 / 8.0  # of the change of slope over the length of a blend
 _ROOM = 0.999  # of a segment that two blends may share: each keeps a straight piece between
@@ -127,12 +132,14 @@ def polyline_through(points: PointTable, corner: Array, robot: Robot, *, smooth:
         for slope, velocity in zip(slopes[[0, -1]], points.rates[0, [0, -1]], strict=True)
     )
     turn = np.abs(np.diff(slopes, axis=0))
+    turn[turn <= _STRAIGHT * np.abs(slopes).max()] = 0.0  # rounding bends no straight line
     if not corner.any() or not turn.any():
         curve = PiecewisePolynomial(s, np.stack([slopes, q[:-1]]))
         return JointPath(curve, s, np.zeros_like(q), (speeds[0], speeds[1]))
     wanted, beside = np.zeros(points.count), BESIDE if smooth else _PARABOLA_BESIDE
     sharpest = (turn / corner).max(axis=1)
-    wanted[1:-1] = 1.0 / beside / np.where(sharpest > 0, sharpest, np.inf)
+    back = _turns_back(slopes)
+    wanted[1:-1] = np.where(back, 0.0, 1.0 / beside / np.where(sharpest > 0, sharpest, np.inf))
     room = np.diff(s)
     limit = np.full(points.count, np.inf)
     limit[1:-1] = _ROOM * np.minimum(room[:-1], room[1:])
@@ -140,9 +147,44 @@ def polyline_through(points: PointTable, corner: Array, robot: Robot, *, smooth:
     if smooth:
         curve, missed = rounded_polyline(s, q, used)
     else:
-        motion = blended(s, q, used, ends="inside", start_velocity=slopes[0], end_velocity=slopes[-1])
-        curve, missed = motion.curve, motion.missed
-    return JointPath(curve, s, missed, (speeds[0], speeds[1]), _shrunk(wanted, used))
+        curve, missed = _with_parabolas(s, q, used, [0, *(np.flatnonzero(back) + 1).tolist(), len(s) - 1])
+    events = (*_stops(back), *_shrunk(wanted, used))
+    return JointPath(curve, s, missed, (speeds[0], speeds[1]), events)
+
+
+def _with_parabolas(
+    s: Array, points: Array, blends: Array, stops: Sequence[int]
+) -> tuple[PiecewisePolynomial, Array]:
+    """Return segments with parabolas of lengths (m,) at points (m, n), and how far these are missed, (m, n).
+
+    Args:
+        s: Parameter at each point, shape (m,).
+        points: To pass.
+        blends: Zero at the stops.
+        stops: Points at which the path is sharp, the ends among them.
+    """
+    slopes = np.diff(points, axis=0) / np.diff(s)[:, None]
+    curves, missed = [], np.zeros_like(points)
+    for low, high in pairwise(stops):
+        part = slice(low, high + 1)
+        speeds = {"start_velocity": slopes[low], "end_velocity": slopes[high - 1]}
+        motion = blended(s[part], points[part], blends[part], ends="inside", **speeds)
+        curves.append(motion.curve)
+        missed[part] = np.maximum(missed[part], motion.missed)
+    return concatenate(curves), missed
+
+
+def _turns_back(slopes: Array) -> NDArray[np.bool_]:
+    """Return at which of the points between segments of slopes (m, n) the path turns back, (m - 1,)."""
+    along = slopes / np.linalg.norm(slopes, axis=1)[:, None]
+    sums, apart = (np.linalg.norm(along[1:] + sign * along[:-1], axis=1) for sign in (1.0, -1.0))
+    return np.asarray(2.0 * np.arctan2(sums, apart) < _REVERSAL)
+
+
+def _stops(back: NDArray[np.bool_]) -> Iterator[Event]:
+    """Yield the event of each point at which the path turns back."""
+    for k in np.flatnonzero(back).tolist():
+        yield Event("turns_back", f"the path turns back at point {k + 1}, and stops there")
 
 
 def _along(slope: Array, velocity: Array, robot: Robot) -> float:

@@ -16,7 +16,7 @@ from trajcli.errors import Amount, Amounts, PlanningError, Problem, TrajcliError
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import Flaw, refuse
-from trajcli.language.recorded import Recorded
+from trajcli.language.recorded import SAME_POSITION, Recorded
 from trajcli.language.targets import Duration, Target
 from trajcli.language.waypoints import NamedWaypoint, Through, Waypoint
 from trajcli.planners.planner import Event, Planner, Resolve
@@ -324,7 +324,7 @@ def _merged(count: int, recorded: Recorded) -> tuple[Event, ...]:
 
 def _without_repeats(points: PointTable) -> PointTable:
     """Return the points without those that stand where the one before stands, the start and target apart."""
-    same = (np.diff(points.positions, axis=0) == 0).all(axis=1)
+    same = (np.abs(np.diff(points.positions, axis=0)) <= SAME_POSITION).all(axis=1)
     if not same.any() or points.count == 2:
         return points
     keep = np.append(True, ~same)
