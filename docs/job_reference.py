@@ -100,6 +100,8 @@ Under `robot` stands the name of a robot of the [catalogue](robots.md), `{{file:
 `tip`, the links between which the chain is taken, and `exact: true`, which keeps angles near right ones as
 they are: see [Bring your arm in](urdf.md).
 
+`{{rail: {{axis: x, ...}}, arm: ur5e}}` is an arm on a [rail](programs.md#an-arm-on-a-rail).
+
 `joints: 6` means six bare revolute joints `j1` to `j6`: no geometry, no limits, and enough for every move on
 this page. A robot has 1 to {MAX_JOINTS} joints. A robot file holds the same mapping, with its own `units`."""
 

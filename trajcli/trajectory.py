@@ -86,11 +86,13 @@ class Destination:
         joints: Joint values (n,), rad or m; None where a pose is given.
         pose: The coordinates of the tcp's pose that the job fixes; None where joints are given.
         tolerance: How near the tool comes, m and rad, where it follows a path; None in joint space.
+        pins: Values of joints that the job fixes beside the pose, by index, rad or m.
     """
 
     joints: Array | None = None
     pose: IkTarget | None = None
     tolerance: tuple[float, float] | None = None
+    pins: Mapping[int, float] = field(default_factory=dict)
 
 
 @frozen

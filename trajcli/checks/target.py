@@ -38,7 +38,32 @@ def check_targets(trajectory: Trajectory, promises: Sequence[Promise]) -> list[F
         if destination.joints is None and destination.pose is not None and promise.robot is not None:
             within = destination.tolerance or (TARGET_CLOSURE, TARGET_CLOSURE)
             findings += _check_pose(span, promise.robot, ends[k], destination.pose, within)
+            findings += _check_pins(trajectory, span, ends[k], destination.pins)
     return findings
+
+
+def _check_pins(
+    trajectory: Trajectory, span: Span, end: Array, pins: Mapping[int, float]
+) -> Iterator[Finding]:
+    """Yield the joints that a target pins, and that end beside their values."""
+    for joint, wanted in pins.items():
+        off = float(abs(end[joint] - wanted))
+        if not off <= TARGET_ON_PATH:
+            yield _beside(trajectory, span, joint, off, TARGET_ON_PATH)
+
+
+def _beside(trajectory: Trajectory, span: Span, joint: int, value: float, limit: float) -> Finding:
+    """Return the finding of a joint that ends beside its target."""
+    return Finding(
+        move=span.index,
+        joint=trajectory.joint_names[joint],
+        kind="target",
+        value=value,
+        limit=limit,
+        time=span.end,
+        message=f"{{joint}} ends {{value}} beside its target {at_time(span.end)}",
+        amounts=joint_amounts(trajectory, joint, 0, value=value, limit=limit),
+    )
 
 
 def _check_joints(
@@ -58,16 +83,7 @@ def _check_joints(
     for row in np.flatnonzero(wrong.any(axis=1)).tolist():
         span, joint = spans[row], int(furthest[row])
         value, limit = float(off[row, joint]), float(allowed[row, joint])
-        yield Finding(
-            move=span.index,
-            joint=trajectory.joint_names[joint],
-            kind="target",
-            value=value,
-            limit=limit,
-            time=span.end,
-            message=f"{{joint}} ends {{value}} beside its target {at_time(span.end)}",
-            amounts=joint_amounts(trajectory, joint, 0, value=value, limit=limit),
-        )
+        yield _beside(trajectory, span, joint, value, limit)
 
 
 def _check_pose(

@@ -25,10 +25,12 @@ from trajcli.language.dynamics import NamedTool, written_dynamics
 from trajcli.language.limits import ToolLimitsSpec
 from trajcli.language.numbers import ReadingContext, written_number
 from trajcli.language.per_joint import UNLIMITED
+from trajcli.language.poses import Pose
 from trajcli.units import Quantity, joint_quantity
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _YAML_WORDS = {"null", "true", "false"}
+_STAND = "base of the rail"  # the base of a resolved robot is the frame of its first row
 _INVISIBLE = ("Cc", "Cf", "Zl", "Zp", "Cn", "Co")
 
 
@@ -58,6 +60,9 @@ def dump_job(loaded: LoadedJob) -> str:
         "when_over_limit": job.when_over_limit,
         "output": written["output"],
     }
+    if robot.foot is not None and job.output.frame == "base":
+        ordered["frames"] = {_STAND: Pose("").write(robot.stand, context)}
+        ordered["output"]["in"] = _STAND
     if ordered["zone"] is None:
         ordered.pop("zone")
     if job.output.times is not None:

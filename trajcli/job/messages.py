@@ -262,7 +262,7 @@ def _meant_entry(entry: Mapping[Any, object]) -> str:
             )
         if word in PLANNERS or word in ALSO_CALLED:
             return f"write `- {{planner: {ALSO_CALLED.get(word, word)}, ...}}`"
-        near = did_you_mean(str(key), (*HANDLING, "planner"))
+        near = None if word == "to" else did_you_mean(str(key), (*HANDLING, "planner"))
         if near:
             return near
     return f"{_every_planner()}; between moves stand {', '.join(HANDLING)}"
@@ -326,3 +326,23 @@ def _model_in(annotation: Any) -> Any:  # noqa: ANN401
         if model is not None:
             return model
     return None
+
+
+def named_with_more(value: Mapping[str, Any], document: Document) -> Problem:
+    """Return the problem of a robot of the catalogue that is given as if it stood in the job."""
+    name, others = value["name"], [key for key in value if key != "name"]
+    beside = [key for key in others if key in ("base", "tool", "limits", "gravity")]
+    hint = f"write `robot: {name}`"
+    if beside:
+        hint += f", and {' and '.join(f'`{key}`' for key in beside)} beside `robot` in the job"
+    message = f"{name} is a robot of the catalogue, and stands here without its joints"
+    return Problem(message, hint, document.place(("robot", "name")))
+
+
+def no_robot(value: object, document: Document) -> Problem:
+    """Return the problem of something under `robot` that is none."""
+    hint = "such as ur5e: `trajcli robots` lists the names of the catalogue"
+    if isinstance(value, int) and not isinstance(value, bool):
+        hint = f"for {value} bare joints write {{joints: {value}}}"
+    message = f"expected a robot's name, {{file: PATH}}, {{urdf: PATH}} or a robot, got {shown(value)}"
+    return Problem(message, hint, document.place(("robot",)))

@@ -50,6 +50,8 @@ from trajcli.units import Quantity, Units
 
 ROBOT_DEFINITION = "a robot"
 """Stands in a schema for the definition of a robot, which comes from another model."""
+RAIL_DEFINITION = "an arm on a rail"
+"""Stands in a schema for the definition of an arm on a rail, which comes from another model."""
 CATALOGUE_NAME = "a name of the catalogue"
 """Stands in a schema for the names of the robots that come with trajcli."""
 
@@ -69,7 +71,9 @@ class UnitsSpec(Model):
 class RobotSource(FieldType):
     """A robot, with which the loader has replaced what names it."""
 
-    description: str = "Name of a catalogue robot, {file: PATH}, {urdf: PATH}, or the robot itself."
+    description: str = (
+        "Name of a catalogue robot, {file: PATH}, {urdf: PATH}, the robot itself, or {rail: ..., arm: ...}."
+    )
 
     def read(self, value: Any, context: ReadingContext) -> Robot:  # noqa: ANN401
         """Return the robot."""
@@ -87,7 +91,9 @@ class RobotSource(FieldType):
             "exact": {"type": "boolean", "description": "Keep angles near right ones as they are."},
         }
         inline = {"$comment": ROBOT_DEFINITION}
-        return {"anyOf": [{"$comment": CATALOGUE_NAME}, _keys(file, "file"), _keys(urdf, "urdf"), inline]}
+        on_rail = {"$comment": RAIL_DEFINITION}
+        forms = [{"$comment": CATALOGUE_NAME}, _keys(file, "file"), _keys(urdf, "urdf"), inline, on_rail]
+        return {"anyOf": forms}
 
 
 def _keys(properties: JsonSchemaValue, needed: str) -> JsonSchemaValue:

@@ -172,7 +172,8 @@ def _pose_of_robot(document: Document, key: str) -> dict[str, Any]:
     from trajcli.language.numbers import written_number
     from trajcli.units import Quantity
 
-    pose = getattr(_robot(document), key)
+    robot = _robot(document)
+    pose = robot.stand if key == "base" else robot.tool
     angles = rpy_from_matrix(pose[:3, :3]).angles.tolist()
     return {
         "xyz": [written_number(length, Quantity("length")) for length in pose[:3, 3].tolist()],

@@ -92,7 +92,7 @@ class LoadedJob:
         name = self.job.output.frame
         if name in (None, "world"):
             return self.robot
-        return self.robot.seen_from(self.robot.base if name == "base" else self.job.frames[name])
+        return self.robot.seen_from(self.robot.stand if name == "base" else self.job.frames[name])
 
     def say(self, amount: Amount) -> str:
         """Return a number of a message in the job's units."""
@@ -277,9 +277,8 @@ def _load(document: Document) -> LoadedJob:
         raise InputError(*sorted(problems, key=_position))
     limits, noted = _with_limits_file(job.limits, document, robot)
     try:
-        placed = replace(
-            robot, gravity=np.array(job.gravity), base=robot.base if job.base is None else job.base
-        )
+        placed = replace(robot, gravity=np.array(job.gravity))
+        placed = placed if job.base is None else placed.standing_at(job.base)
         placed = placed if job.tool is None else placed.with_tool(job.tool)
         effective, events = with_job_limits(placed, limits)
     except InputError as error:
@@ -436,9 +435,9 @@ def _units(value: Any) -> Units:  # noqa: ANN401
 def _base(value: Any, context: ReadingContext, robot: Robot) -> np.ndarray:  # noqa: ANN401
     """Return where the arm stands, as far as that is right; what is wrong is reported with the rest."""
     try:
-        return robot.base if value is None else Pose("").read(value, context)
+        return robot.stand if value is None else Pose("").read(value, context)
     except FlawError:
-        return robot.base
+        return robot.stand
 
 
 def _points(value: Any) -> Mapping[str, Any]:  # noqa: ANN401

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 import numpy as np
 from pydantic import (
@@ -45,6 +45,7 @@ from trajcli.units import Quantity, Units
 if TYPE_CHECKING:
     from trajcli.urdf.serial_robot import UrdfRobot
 
+M = TypeVar("M", bound=Model)
 CATALOGUE = Path(__file__).parent.parent / "catalogue"
 
 _URDF_ENDINGS = (".urdf", ".xacro", ".xml")
@@ -268,14 +269,16 @@ def find_sheet(value: Any, document: Document, units: Units) -> RobotSheet:  # n
     """
     if isinstance(value, str):
         return _from_catalogue(value, document)
-    if isinstance(value, Mapping) and "urdf" in value and "file" not in value:
-        return _from_urdf_entry(value, document)
-    if isinstance(value, Mapping) and "file" in value:
-        return _from_file_entry(value, document)
+    if isinstance(value, Mapping) and not value.keys().isdisjoint(("file", "urdf", "rail", "arm")):
+        return _from_entry(value, document, units)
     if not isinstance(value, Mapping):
-        raise InputError(_no_robot(value, document))
+        from trajcli.job.messages import no_robot
+
+        raise InputError(no_robot(value, document))
     if "joints" not in value and value.get("name") in catalogue_names():
-        raise InputError(_named_with_more(value, document))
+        from trajcli.job.messages import named_with_more
+
+        raise InputError(named_with_more(value, document))
     for key in value:
         place = document.place(("robot", key), key=True)
         if key == "units":
@@ -288,19 +291,22 @@ def find_sheet(value: Any, document: Document, units: Units) -> RobotSheet:  # n
             near = nearest(key, ["file", "urdf", *RobotModel.model_fields])
             if near in ("file", "urdf"):
                 raise InputError(Problem(f"unknown key '{key}'", f"did you mean '{near}'?", place))
-    robot = _validated(value, document, ("robot",), units).as_robot()
+    robot = _validated(value, document, ("robot",), units, RobotModel).as_robot()
     return RobotSheet(robot, units, None, None, None, None)
 
 
-def _named_with_more(value: Mapping[str, Any], document: Document) -> Problem:
-    """Return the problem of a robot of the catalogue that is given as if it stood in the job."""
-    name, others = value["name"], [key for key in value if key != "name"]
-    beside = [key for key in others if key in ("base", "tool", "limits", "gravity")]
-    hint = f"write `robot: {name}`"
-    if beside:
-        hint += f", and {' and '.join(f'`{key}`' for key in beside)} beside `robot` in the job"
-    message = f"{name} is a robot of the catalogue, and stands here without its joints"
-    return Problem(message, hint, document.place(("robot", "name")))
+def _from_entry(value: Mapping[str, Any], document: Document, units: Units) -> RobotSheet:
+    """Return the sheet of a robot that stands in a file, or on a rail."""
+    if "file" in value or "urdf" in value:
+        return (_from_file_entry if "file" in value else _from_urdf_entry)(value, document)
+    from trajcli.job.files.rail import RobotOnRail, arm_on_rail, document_of_arm
+
+    model = _validated(value, document, ("robot",), units, RobotOnRail)
+    sheet = find_sheet(model.arm, document_of_arm(document), units)
+    try:
+        return replace(sheet, robot=arm_on_rail(model, sheet.robot), text=None)
+    except InputError as error:
+        raise error.located(place=document.place(("robot", "rail"))) from None
 
 
 def load_robot(name: str | Path) -> Robot:
@@ -398,7 +404,7 @@ def _sheet_of(content: bytes, path: str) -> RobotSheet:
         "deg" if spec.get("angle") == "deg" else "rad",
         "mm" if spec.get("length") == "mm" else "m",
     )
-    model = _validated({"name": utf8(Path(path).stem), **plain}, document, (), units)
+    model = _validated({"name": utf8(Path(path).stem), **plain}, document, (), units, RobotModel)
     text = "\n".join(document.lines)
     said = (model.source, model.licence, model.note, text, model.maker, model.origin, model.date)
     # numbers that nobody has looked at count where a job asks for them
@@ -432,14 +438,6 @@ def _from_urdf_entry(value: Mapping[str, Any], document: Document) -> RobotSheet
     except InputError as error:
         fields = [problem.field for problem in error.problems if problem.field is not None]
         raise error.located(place=document.place(("robot", *(fields[0] if fields else ("urdf",))))) from None
-
-
-def _no_robot(value: object, document: Document) -> Problem:
-    hint = "such as ur5e: `trajcli robots` lists the names of the catalogue"
-    if isinstance(value, int) and not isinstance(value, bool):
-        hint = f"for {value} bare joints write {{joints: {value}}}"
-    message = f"expected a robot's name, {{file: PATH}}, {{urdf: PATH}} or a robot, got {shown(value)}"
-    return Problem(message, hint, document.place(("robot",)))
 
 
 def _from_catalogue(name: str, document: Document) -> RobotSheet:
@@ -483,10 +481,16 @@ def _from_file_entry(value: Mapping[str, Any], document: Document) -> RobotSheet
         raise error.located(place=document.place(("robot", "file"))) from None
 
 
-def _validated(value: Mapping[str, Any], document: Document, at: tuple[str, ...], units: Units) -> RobotModel:
+def _validated(
+    value: Mapping[str, Any],
+    document: Document,
+    at: tuple[str, ...],
+    units: Units,
+    kind: type[M],
+) -> M:
     try:
-        return RobotModel.model_validate(value, context=ReadingContext(units))
+        return kind.model_validate(value, context=ReadingContext(units))
     except ValidationError as error:
         from trajcli.job.messages import problems_of
 
-        raise InputError(*problems_of(error, RobotModel, document, at)) from None
+        raise InputError(*problems_of(error, kind, document, at)) from None

@@ -27,16 +27,20 @@ def schema_of(kind: SchemaKind) -> dict[str, Any]:
 
 
 def _job() -> dict[str, Any]:
-    from trajcli.job.model import CATALOGUE_NAME, ROBOT_DEFINITION, Job
+    from trajcli.job.files.rail import RobotOnRail
+    from trajcli.job.model import CATALOGUE_NAME, RAIL_DEFINITION, ROBOT_DEFINITION, Job
     from trajcli.job.program.schemas import MOVES_DEFINITION
     from trajcli.job.robot import catalogue_names
     from trajcli.language.points import RELATIVE_DEFINITION
 
     schema: dict[str, Any] = _without_nulls(Job.model_json_schema())
-    robot = _robot()
-    definitions = {**schema["$defs"], **robot.pop("$defs", {}), "RobotModel": robot}
+    robot, on_rail = _robot(), _without_nulls(RobotOnRail.model_json_schema())
+    definitions = {**schema["$defs"], **robot.pop("$defs", {}), **on_rail.pop("$defs"), "RobotModel": robot}
+    on_rail["properties"]["arm"] |= schema["properties"]["robot"]
+    definitions["RobotOnRail"] = on_rail
     stand_ins: dict[str, dict[str, Any]] = {
         ROBOT_DEFINITION: {"$ref": "#/$defs/RobotModel"},
+        RAIL_DEFINITION: {"$ref": "#/$defs/RobotOnRail"},
         MOVES_DEFINITION: {"$ref": "#/properties/moves"},
         CATALOGUE_NAME: {"enum": catalogue_names(), "description": "A robot of the catalogue."},
     }

@@ -171,6 +171,19 @@ class MountedTool:
     def __post_init__(self) -> None:
         object.__setattr__(self, "pose", read_only(self.pose))
 
+    @property
+    def bits(self) -> tuple[object, ...]:
+        """All of it, as a key."""
+        return self.name, self.pose.tobytes(), None if self.load is None else self.load.bits
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether another tool is the same, bit by bit."""
+        return isinstance(other, MountedTool) and self.bits == other.bits
+
+    def __hash__(self) -> int:
+        """Return the hash of all of it."""
+        return hash(self.bits)
+
 
 @comparable
 class Joint:
@@ -356,6 +369,8 @@ class Robot:
         payload: What the tool carries; None for nothing.
         tool_load: The tool's own mass, in the frame of the tcp like the payload; None where nobody says.
         tool_name: By which a job calls the tool; empty without one.
+        foot: Where the first row stands in the frame of the base, (4, 4), which `base` then contains: that of
+            a rail, whose axis need not be vertical; None for the frame of the base itself.
     """
 
     name: str
@@ -368,6 +383,7 @@ class Robot:
     payload: Payload | None = None
     tool_load: Payload | None = None
     tool_name: str = ""
+    foot: Array | None = None
 
     def __post_init__(self) -> None:
         for name in ("base", "tool", "gravity"):
@@ -377,6 +393,15 @@ class Robot:
         joints = f"{len(self.joints)} joint{'s' * (len(self.joints) != 1)}"
         table = "bare joints" if self.convention is None else f"{self.convention} DH rows"
         return f"{type(self).__name__}({self.name!r}, {joints}, {table})"
+
+    @property
+    def stand(self) -> Array:
+        """The frame of the base in world, (4, 4): what a job calls `base`."""
+        return self.base if self.foot is None else np.asarray(self.base @ np.linalg.inv(self.foot))
+
+    def standing_at(self, base: Array) -> Robot:
+        """Return the robot with its base elsewhere, T_world_base (4, 4)."""
+        return replace(self, base=base if self.foot is None else base @ self.foot)
 
     def with_tool(self, tool: MountedTool) -> Robot:
         """Return the robot with another tool; a payload keeps its place on the flange."""

@@ -135,6 +135,11 @@ class NamedValues(tuple[float, ...]):
         row.named = tuple(named)
         return row
 
+    @property
+    def by_index(self) -> dict[int, float]:
+        """The values that are named, by the index of the joint."""
+        return {k: value for k, (value, named) in enumerate(zip(self, self.named, strict=True)) if named}
+
     def __getnewargs__(self) -> tuple[tuple[float, ...], tuple[bool, ...]]:
         """Return what copies are made of."""
         return tuple(self), self.named
@@ -149,12 +154,14 @@ class PerJoint(FieldType):
         description: For the JSON schema.
         zero_missing: Whether joints that a mapping leaves out are zero.
         above: Each value must be above this, SI.
+        some: Whether a mapping may leave joints out, and whoever has the values says what that means.
     """
 
     order: int
     description: str
     zero_missing: bool = False
     above: float | None = None
+    some: bool = False
 
     def read(self, value: Any, context: ReadingContext) -> tuple[float, ...]:  # noqa: ANN401
         """Return one number for each joint, in SI; `NamedValues` where a mapping leaves some out."""
@@ -165,7 +172,8 @@ class PerJoint(FieldType):
 
         if isinstance(value, NamedValues):
             return value
-        values = read_per_joint(value, context, read_one, 0.0 if self.zero_missing else ...)
+        left_out = self.zero_missing or (self.some and isinstance(value, Mapping) and bool(value))
+        values = read_per_joint(value, context, read_one, 0.0 if left_out else ...)
         names = context.joint_names
         if isinstance(value, Mapping) and names is not None and len(value) < len(names):
             return NamedValues(values, (name in value for name in names))

@@ -32,7 +32,7 @@ RELATIVE_FIELDS: dict[str, JsonSchemaValue] = {
 }
 """Schema of what makes a state relative to a point."""
 
-BESIDE = ("configuration", "velocity", "acceleration", "time", "blend")
+BESIDE = ("configuration", "velocity", "acceleration", "joints", "time", "blend")
 """Fields of a state that may stand beside `from`."""
 HERE = "here"
 _LONGEST_CHAIN = 100  # points, each relative to the next
@@ -218,7 +218,8 @@ def _moved(value: Mapping[str, Any], name: str, point: _Fields | None, context: 
     """
     offset, axes = _offset(value, context), _axes(value.get("frame", "tool"), context)
     for key in value:
-        if (key in PoseFields.model_fields and key not in BESIDE) or key in ("joints", "in"):
+        every = key == "joints" and not isinstance(value[key], Mapping)
+        if (key in PoseFields.model_fields and key not in BESIDE) or every or key == "in":
             text = f"from and {key} exclude each other"
             hint = f"say how far from the point: offset: {{{key}: ...}}"
             if key == "in":
@@ -227,12 +228,15 @@ def _moved(value: Mapping[str, Any], name: str, point: _Fields | None, context: 
         if key not in (*RELATIVE_FIELDS, *BESIDE):
             from trajcli.suggest import did_you_mean, valid_names
 
-            known = (*RELATIVE_FIELDS, *BESIDE[:3])
+            known = (*RELATIVE_FIELDS, *BESIDE[:4])
             raise FlawError(
                 f"unknown key '{key}'", key, AT_KEY, hint=did_you_mean(key, known) or valid_names(known)
             )
     beside = {key: value[key] for key in value if key in BESIDE}
-    if point is None or "joints" in point or "joints_by" in point or RELATIVE in point:
+    pinned = point is not None and not PoseFields.model_fields.keys().isdisjoint(point)
+    if pinned and point is not None and "joints" in point:
+        beside = {"joints": point["joints"], **beside}
+    if point is None or ("joints" in point and not pinned) or "joints_by" in point or RELATIVE in point:
         if axes is not None:
             turned = np.eye(4)
             turned[:3, :3], turned[:3, 3] = axes @ offset[:3, :3] @ axes.T, axes @ offset[:3, 3]

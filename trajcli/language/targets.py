@@ -12,6 +12,7 @@ from pydantic import (
     InstanceOf,
     SerializationInfo,
     SerializerFunctionWrapHandler,
+    ValidationInfo,
     model_serializer,
     model_validator,
 )
@@ -254,7 +255,12 @@ MinimumDuration = Annotated[
 ]
 JointPositions = Annotated[
     tuple[float, ...],
-    PerJoint(0, "Position of each joint (angle or length unit): one for all, a list, or by joint name."),
+    PerJoint(
+        0,
+        "Position of each joint (angle or length unit): one for all, a list, or by joint name. Beside a "
+        "pose, some by name: these are pinned, and the others are solved.",
+        some=True,
+    ),
 ]
 JointVelocities = Annotated[
     tuple[float, ...],
@@ -297,7 +303,7 @@ class Relative:
         return result
 
 
-RELATIVE, NEAR = "\0relative", "\0near"
+RELATIVE, NEAR, PINNED = "\0relative", "\0near", "\0pinned"
 """Keys of what a target holds beside what a file gives: none can write them."""
 
 
@@ -324,6 +330,19 @@ class Target(PoseFields, defer_build=False):  # made once, not for each planner 
     ] = None
     relative: SkipJsonSchema[InstanceOf[Relative] | None] = Field(None, alias=RELATIVE, exclude=True)
     near: SkipJsonSchema[tuple[float, ...] | None] = Field(None, alias=NEAR, exclude=True)
+    pinned: SkipJsonSchema[InstanceOf[NamedValues] | None] = Field(None, alias=PINNED, exclude=True)
+
+    @model_validator(mode="after")
+    def _joints_are_pinned_or_all(self, info: ValidationInfo) -> Target:
+        if not isinstance(self.joints, NamedValues):
+            return self
+        if not self.gives_pose and self.relative is None:
+            names = info.context.joint_names if info.context is not None else ()
+            lacking = [name for name, named in zip(names, self.joints.named, strict=True) if not named]
+            text, hint = f"no value for {', '.join(lacking)}", "name every joint, or give a list"
+            raise refuse([(("joints",), text, hint)])
+        self.__dict__["pinned"], self.__dict__["joints"] = self.joints, None
+        return self
 
     @model_validator(mode="after")
     def _says_something(self) -> Target:
@@ -344,6 +363,8 @@ class Target(PoseFields, defer_build=False):  # made once, not for each planner 
     @model_serializer(mode="wrap")
     def _written(self, serialize: SerializerFunctionWrapHandler, info: SerializationInfo) -> dict[str, Any]:
         written: dict[str, Any] = serialize(self)
+        if self.pinned is not None and info.context is not None:
+            written["joints"] = PerJoint(0, "").write(self.pinned, info.context)
         if self.relative is None or info.context is None:
             return written
         offset = Pose("").write(np.array(self.relative.offset), info.context)

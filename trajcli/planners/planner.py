@@ -300,7 +300,9 @@ class Planner(Model):
             return Destination(np.array(target.joints), None, within)
         from trajcli.language.targets import ik_target
 
-        return Destination(None, ik_target(target), within)
+        return Destination(
+            None, ik_target(target), within, {} if target.pinned is None else target.pinned.by_index
+        )
 
     def with_joint_targets(self, resolve: Resolve, near: Array) -> Self:
         """Return the planner with joints instead of the poses that it goes to in joint space.

@@ -192,10 +192,9 @@ def open_arm(
         from trajcli.job.inline import inline_pose
 
         own = robot.tool if tool is None else inline_pose(tool, "--tool", shown)
-        robot = replace(
-            robot, tool=own, base=robot.base if base is None else inline_pose(base, "--base", shown)
-        )
-    return ArmInUnits(replace(robot, base=np.eye(4)) if frame == "base" else robot, shown)
+        robot = replace(robot, tool=own)
+        robot = robot if base is None else robot.standing_at(inline_pose(base, "--base", shown))
+    return ArmInUnits(robot.standing_at(np.eye(4)) if frame == "base" else robot, shown)
 
 
 def parse_units(text: str, default: Units = Units()) -> Units:  # noqa: B008

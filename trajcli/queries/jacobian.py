@@ -56,7 +56,7 @@ def jacobian_report(
 
 
 def _directions(arm: ArmInUnits, q: Array, frame: ReferenceFrame, blocked: Array, length: float) -> Array:
-    axes = {"world": np.eye(3), "base": arm.robot.base[:3, :3]}.get(frame)
+    axes = {"world": np.eye(3), "base": arm.robot.stand[:3, :3]}.get(frame)
     turn = forward(arm.robot, q)[:3, :3] if axes is None else axes
     return simplest(np.hstack([blocked[:, :3] / length @ turn, blocked[:, 3:] @ turn]))
 

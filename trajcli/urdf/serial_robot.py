@@ -15,8 +15,8 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Place, Problem
 from trajcli.frozen import comparable, frozen
+from trajcli.kinematics.dh_rows import AxisInChain, DhTable, dh_table
 from trajcli.kinematics.robot import Joint, Limits, LinkInertia, Robot
-from trajcli.urdf.dh import AxisInChain, DhTable, dh_table
 from trajcli.urdf.joint_properties import (
     JointProperties,
     joint_properties,

@@ -141,25 +141,30 @@ class Follower:
         """
         reference = self.reference_at(s, side)
         target = reference.target()
-        q, poses, jacobians, slopes = self._solve_target(target, guess, s)
+        q, poses, jacobians, slopes = self._solve_target(reference, target, guess, s)
         left = self.aspect.changed(reference, poses, slopes)
         if left.any():
             first_left = int(np.flatnonzero(left)[np.argmin(s[left])])
             raise LostError(np.sort(s[left]), q[first_left], (0.0, 0.0))
-        first = self._solve_rows(slopes, self._scaled(reference.rates(), target))
+        pins = (None, None) if reference.pins is None else reference.pins[1:]
+        first = self._solve_rows(slopes, self._scaled(reference.rates(), target, pins=pins[0]))
         bias = acceleration_bias(jacobians, first)
         twist = (jacobians @ first[..., None])[..., 0]
-        second = self._solve_rows(slopes, self._scaled(reference.accelerations(poses, bias, twist), target))
+        wanted = reference.accelerations(poses, bias, twist)
+        second = self._solve_rows(slopes, self._scaled(wanted, target, pins=pins[1]))
         return JointState(np.stack([q, first, second]), reference, target, jacobians)
 
-    def _solve_target(self, target: IkTarget, guess: Array, s: Array) -> tuple[Array, Array, Array, Array]:
+    def _solve_target(
+        self, reference: ToolReference, target: IkTarget, guess: Array, s: Array
+    ) -> tuple[Array, Array, Array, Array]:
         """Return joint values (N, n) that meet the target, and there poses, Jacobians and scaled rows."""
         q, short = guess, False
         for iteration in range(_ITERATIONS + 1):
             poses, jacobians = linearisation(self.robot, q)
-            slopes = self._rows(target, poses, jacobians)
+            slopes = self._rows(target, poses, jacobians, reference.pinned)
             differences = residuals(target, poses)
-            errors = self._scaled(differences, target, (self.start - q) @ self.held.T)
+            pins = None if reference.pins is None else reference.pins[0] - q[:, list(reference.pinned)]
+            errors = self._scaled(differences, target, (self.start - q) @ self.held.T, pins=pins)
             if short or iteration == _ITERATIONS:
                 break
             step = self._solve_rows(slopes, errors)
@@ -176,22 +181,27 @@ class Follower:
         return q, poses, jacobians, slopes
 
     def rows(self, reference: ToolReference, poses: Array, jacobians: Array) -> Array:
-        """Return the scaled rows (N, m + f, n) of tcp poses (N, 4, 4) and Jacobians (N, 6, n) in world."""
-        return self._rows(reference.target(), poses, jacobians)
+        """Return the scaled rows (N, m + f + p, n) of tcp poses (N, 4, 4) and Jacobians (N, 6, n) in world.
 
-    def _rows(self, target: IkTarget, poses: Array, jacobians: Array) -> Array:
+        They are those of the target, of directions that are held, and of joints that are pinned.
+        """
+        return self._rows(reference.target(), poses, jacobians, reference.pinned)
+
+    def _rows(self, target: IkTarget, poses: Array, jacobians: Array, pinned: tuple[int, ...]) -> Array:
         rows = residual_jacobian(target, poses, jacobians)
         rows[:, : sum(target.position)] /= self.length
-        if not len(self.held):
+        if not len(self.held) and not pinned:
             return rows
-        kept = np.broadcast_to(self.held, (len(poses), *self.held.shape))
-        return np.concatenate([rows, kept], axis=1)
+        kept = np.concatenate([self.held, np.eye(self.start.size)[list(pinned)]])
+        return np.concatenate([rows, np.broadcast_to(kept, (len(poses), *kept.shape))], axis=1)
 
-    def _scaled(self, rates: Array, target: IkTarget, kept: Array | None = None) -> Array:
-        """Return rates of the target's rows, those of the position by length, with those that are kept."""
+    def _scaled(
+        self, rates: Array, target: IkTarget, kept: Array | None = None, pins: Array | None = None
+    ) -> Array:
+        """Return rates of the target's rows, those of the position by length, with those kept and pinned."""
         if kept is None:
             kept = np.zeros((len(rates), len(self.held)))
-        scaled = np.concatenate([rates, kept], axis=1)
+        scaled = np.concatenate([rates, kept] if pins is None else [rates, kept, pins], axis=1)
         scaled[:, : sum(target.position)] /= self.length
         return scaled
 

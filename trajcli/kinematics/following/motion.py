@@ -52,9 +52,11 @@ class ToolMotion:
             if aims.shape[1]:
                 aims[:, 1] /= factor
                 aims[:, 2] /= factor**2
-            return replace(
-                reference, first=reference.first / factor, second=reference.second / factor**2, aims=aims
-            )
+            pins = reference.pins
+            if pins is not None:
+                pins = pins / np.array([1.0, factor, factor**2])[:, None, None]
+            first, second = reference.first / factor, reference.second / factor**2
+            return replace(reference, first=first, second=second, aims=aims, pins=pins)
 
         law = scale_time(self.law, factor)
         return replace(self, law=law, reference_at=slower, breaks=self.breaks * factor)

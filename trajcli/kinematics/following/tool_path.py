@@ -6,7 +6,7 @@ import numpy as np
 
 from trajcli.curves.operations import times_at
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, distinct
-from trajcli.frozen import frozen
+from trajcli.frozen import comparable, frozen
 from trajcli.geometry.paths.orientation import SegmentProgress
 from trajcli.geometry.paths.pose import PosePath
 from trajcli.geometry.paths.position import nearest
@@ -18,6 +18,21 @@ _BESIDE = 1e-13  # of the length: how far before or after a break the tool is th
 _SAME_TIME = 1e-12  # of the duration: a time this close to a break's is that time
 _MERGED = 1e-9  # of the duration: breaks this close to each other are one
 _LEVEL = 1e-12  # of a unit vector, squared: the heading of a vertical axis is not defined
+
+
+@comparable
+class PinnedJoint:
+    """A joint that goes evenly with s.
+
+    Attributes:
+        joint: Its index.
+        first: Its value where the path begins, rad or m.
+        last: Its value where the path ends.
+    """
+
+    joint: int
+    first: float
+    last: float
 
 
 @frozen
@@ -32,6 +47,8 @@ class ToolReference:
         orientation: What is fixed of the orientation, as in `IkTarget`.
         tool_axis: Which axis of the tcp is meant by direction, yaw and pitch.
         aims: Yaw or pitch with two derivatives, shape (N, 3), rad; (N, 0) otherwise.
+        pinned: Joints whose values are given, too.
+        pins: These values with two derivatives, shape (3, N, pinned); None for no such joint.
     """
 
     poses: Array
@@ -41,6 +58,8 @@ class ToolReference:
     orientation: OrientationConstraint
     tool_axis: AxisName
     aims: Array
+    pinned: tuple[int, ...] = ()
+    pins: Array | None = None
 
     def target(self) -> IkTarget:
         """Return the targets, a flat batch of N."""
@@ -149,6 +168,7 @@ class ToolPath:
         angle_changes: Of yaw or pitch over the segments of the path, rad; empty for other kinds.
         progress: How far each of these segments is done; None for a single one.
         speeds: Limits of speeds that step along it; None where they do not.
+        pinned: Joints that go evenly with s.
     """
 
     poses: PosePath
@@ -158,6 +178,7 @@ class ToolPath:
     angle_changes: tuple[float, ...] = ()
     progress: SegmentProgress | None = None
     speeds: SpeedLimits | None = None
+    pinned: tuple[PinnedJoint, ...] = ()
 
     @property
     def length(self) -> float:
@@ -239,7 +260,15 @@ class ToolPath:
             self.orientation,
             self.tool_axis,
             self._aims(s, side, speed, acceleration),
+            tuple(pin.joint for pin in self.pinned),
+            self._pins(s, speed, acceleration) if self.pinned else None,
         )
+
+    def _pins(self, s: Array, speed: Array, acceleration: Array) -> Array:
+        """Return the values of pinned joints with two derivatives, shape (3, N, pinned)."""
+        first = np.array([pin.first for pin in self.pinned])
+        slope = (np.array([pin.last for pin in self.pinned]) - first) / self.length
+        return np.stack([first + s[:, None] * slope, speed[:, None] * slope, acceleration[:, None] * slope])
 
     def _aims(self, s: Array, side: Side, speed: Array, acceleration: Array) -> Array:
         if self.orientation not in ("yaw", "pitch"):

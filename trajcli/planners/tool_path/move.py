@@ -171,7 +171,7 @@ class ToolPathMove(Planner):
         """
         from trajcli.planners.tool_path.course import tool_course
 
-        planned = self.path_from(forward(robot, start), robot)
+        planned = self._pinned_path(start, robot)
         return tool_course(followed(robot, planned.path, start), self.law, self.tolerance.tolerance)
 
     @property
@@ -188,6 +188,25 @@ class ToolPathMove(Planner):
         """
         raise TypeError(f"{type(self).__name__} does not say where to go")
 
+    def _pinned_path(self, start: Array, robot: Robot) -> PlannedPath:
+        """Return the path from joint values (n,), with the joints that its target pins."""
+        planned, target = self.path_from(forward(robot, start), robot), self.target
+        for index, segment in enumerate(getattr(self, "segments", ())[:-1]):
+            inner = segment.line if segment.arc is None else segment.arc.to
+            if inner is not None and inner.pinned is not None:
+                key, hint = "line" if segment.arc is None else "arc", "pin it in the last segment"
+                message = f"a joint is pinned in segment {index}, and goes evenly along the whole path"
+                raise InputError(Problem(message, hint, field=("segments", index, key)))
+        if target is None or target.pinned is None:
+            return planned
+        from trajcli.kinematics.following.pinning import with_pinned
+
+        if planned.overlap is not None:
+            hint = "leave `corner: overlap` out, or the joints"
+            raise InputError("no joint is pinned where segments overlap in time", hint=hint)
+        path = with_pinned(planned.path, target.pinned.by_index, start, robot)
+        return replace(planned, path=path)
+
     def plan(self, start: State, robot: Robot) -> Planned:
         """Return the move along the path.
 
@@ -203,7 +222,7 @@ class ToolPathMove(Planner):
             from trajcli.planners.boundary_states import start_in_motion
 
             raise start_in_motion(self.tag, start, robot)
-        planned = self.path_from(forward(robot, start.position), robot)
+        planned = self._pinned_path(start.position, robot)
         if planned.path.length == 0:
             from trajcli.planners.boundary_states import standstill
 
@@ -291,10 +310,16 @@ def check_arrival(planned: PlannedPath, end: Array, robot: Robot) -> None:
     wanted = {} if planned.configuration is None else planned.configuration.model_dump(exclude_none=True)
     if not wanted:
         return
-    from trajcli.kinematics.inverse.solve import solve
-
     target = planned.path.at_s(np.array([planned.path.length]), "left").target()
-    answers = solve(robot, target, end[None])
+    if planned.path.pinned:
+        from trajcli.kinematics.inverse.pinned_joints import solve_pinned
+
+        pins = {pin.joint: pin.last for pin in planned.path.pinned}
+        answers = solve_pinned(robot, target, pins, end[None])
+    else:
+        from trajcli.kinematics.inverse.solve import solve
+
+        answers = solve(robot, target, end[None])
     apart = np.where(answers.valid[0], np.abs(answers.joints[0] - end).max(axis=-1), np.inf)
     names = answers.names[int(apart.argmin())]
     if any(getattr(names, choice) != word for choice, word in wanted.items()):

@@ -1,0 +1,125 @@
+"""Robot of a job that is an arm on a rail or a lift."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field, ValidationInfo, model_validator
+
+from trajcli.errors import InputError
+from trajcli.job.yaml.document import Document
+from trajcli.kinematics.carriage import on_carriage
+from trajcli.kinematics.robot import Joint, Limits, LinkInertia, Robot
+from trajcli.language.dynamics import FrictionSpec
+from trajcli.language.efforts import EffortBound
+from trajcli.language.limits import JointBound
+from trajcli.language.numbers import MAX_JOINTS, Model, Name, Number, ReadingContext
+from trajcli.language.per_joint import UNLIMITED, LowerUpper
+from trajcli.language.poses import Pose
+from trajcli.language.targets import Direction
+from trajcli.units import Quantity
+
+_MASS = Quantity("mass")
+
+
+class RailSpec(Model):
+    """A slide under an arm: a rail, a lift."""
+
+    axis: Annotated[
+        tuple[float, ...], Direction("Along which it counts, in the frame of the base: x, y, z or a vector.")
+    ]
+    name: Annotated[str, Name("Of the joint.")] = "rail"
+    position: Annotated[LowerUpper, JointBound(0, "Range [lower, upper] (length unit).")] = UNLIMITED
+    velocity: Annotated[LowerUpper, JointBound(1, "Velocity limit, or [lower, upper], per s.")] = UNLIMITED
+    acceleration: Annotated[LowerUpper, JointBound(2, "Acceleration limit, or [lower, upper], per s^2.")] = (
+        UNLIMITED
+    )
+    jerk: Annotated[LowerUpper, JointBound(3, "Jerk limit, or [lower, upper], per s^3.")] = UNLIMITED
+    effort: Annotated[LowerUpper, EffortBound("Force limit, or [lower, upper], N.")] = UNLIMITED
+    friction: Annotated[FrictionSpec, Field(description="Friction of the slide.")] = FrictionSpec()
+    rotor: Annotated[float, Number(_MASS, "Motor's inertia as the slide feels it, kg.", at_least=0.0)] = 0.0
+    mass: Annotated[
+        float | None,
+        Number(_MASS, "Mass of the carriage without the arm, kg; torques need it.", above=0.0),
+    ] = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _announce_type(cls, data: Any, info: ValidationInfo) -> Any:  # noqa: ANN401
+        if isinstance(info.context, ReadingContext):
+            info.context.joint_types = ("prismatic",)  # of which the units of its limits are
+        return data
+
+
+class RobotOnRail(Model):
+    """An arm on a rail or a lift."""
+
+    rail: Annotated[RailSpec, Field(description="The slide under the arm.")]
+    arm: Annotated[Any, Field(description="The arm: as a robot without a rail is given.")]
+    mount: Annotated[
+        np.ndarray | None,
+        Pose("Where the arm stands when the rail is at zero, in the base; left out: the arm's own base."),
+    ] = None
+
+
+def document_of_arm(document: Document) -> Document:
+    """Return a job's document with the arm of its rail in the place of its robot."""
+    arm, root = document.node(("robot", "arm")), document.root
+    if arm is not None and isinstance(root.value, dict):
+        root = root._replace(value={**root.value, "robot": arm})
+    return Document(document.file, document.lines, root)
+
+
+def arm_on_rail(model: RobotOnRail, arm: Robot) -> Robot:
+    """Return an arm on a rail.
+
+    Args:
+        model: As the job gives it.
+        arm: The arm that it names.
+
+    Raises:
+        InputError: When the arm has no geometry, too many joints, or one of the rail's name.
+    """
+    problem = _unfit(arm, model.rail)
+    if problem is not None:
+        raise InputError(problem[0], hint=problem[1])
+    mount = arm.base
+    if model.mount is not None:
+        mount = model.mount if arm.foot is None else model.mount @ arm.foot
+    slide, bounds = _slide(model.rail, efforts=arm.limits.has_effort)
+    robot = on_carriage(arm, np.array(model.rail.axis), slide, bounds, mount)
+    return replace(robot, name=f"{arm.name} on {model.rail.name}")
+
+
+def _unfit(arm: Robot, rail: RailSpec) -> tuple[str, str] | None:
+    """Return why an arm cannot stand on a rail, and what helps; None where it can."""
+    if arm.convention is None:
+        return f"{arm.name} has bare joints and no geometry to stand on a rail", "give its joints DH rows"
+    if len(arm.joints) == MAX_JOINTS:
+        return f"a robot has at most {MAX_JOINTS} joints, {arm.name} has as many without the rail", "no rail"
+    if rail.name in arm.joint_names:
+        return f"joint names must be unique, '{rail.name}' is a joint of {arm.name}", "give the rail a `name`"
+    return None
+
+
+def _slide(rail: RailSpec, *, efforts: bool) -> tuple[Joint, Limits]:
+    """Return the slide as a joint, with its limits.
+
+    Args:
+        rail: As the job gives it.
+        efforts: Whether those of the arm are in force without being asked for.
+    """
+    link = None if rail.mass is None else LinkInertia(rail.mass, (0.0, 0.0, 0.0), (0.0,) * 6)
+    joint = Joint(
+        rail.name,
+        "prismatic",
+        effort=rail.effort,
+        friction=rail.friction.as_friction(),
+        rotor=rail.rotor,
+        link=link,
+    )
+    bounds = [np.array([bound]) for bound in (rail.position, rail.velocity, rail.acceleration, rail.jerk)]
+    effort = np.array([rail.effort if efforts and link is not None else UNLIMITED])
+    return joint, Limits(bounds[0], bounds[1], bounds[2], bounds[3], effort=effort)
