@@ -37,6 +37,8 @@ def solve_pinned(robot: Robot, target: IkTarget, pins: Mapping[int, float], near
     Raises:
         PlanningError: When every joint is pinned.
     """
+    if not pins:
+        return solve(robot, target, near)
     others = [joint for joint in range(len(robot.joints)) if joint not in pins]
     if not others:
         raise PlanningError(Problem("every joint is pinned: nothing is left to be solved", "leave one out"))

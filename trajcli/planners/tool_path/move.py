@@ -310,16 +310,10 @@ def check_arrival(planned: PlannedPath, end: Array, robot: Robot) -> None:
     wanted = {} if planned.configuration is None else planned.configuration.model_dump(exclude_none=True)
     if not wanted:
         return
+    from trajcli.kinematics.inverse.pinned_joints import solve_pinned
+
     target = planned.path.at_s(np.array([planned.path.length]), "left").target()
-    if planned.path.pinned:
-        from trajcli.kinematics.inverse.pinned_joints import solve_pinned
-
-        pins = {pin.joint: pin.last for pin in planned.path.pinned}
-        answers = solve_pinned(robot, target, pins, end[None])
-    else:
-        from trajcli.kinematics.inverse.solve import solve
-
-        answers = solve(robot, target, end[None])
+    answers = solve_pinned(robot, target, {pin.joint: pin.last for pin in planned.path.pinned}, end[None])
     apart = np.where(answers.valid[0], np.abs(answers.joints[0] - end).max(axis=-1), np.inf)
     names = answers.names[int(apart.argmin())]
     if any(getattr(names, choice) != word for choice, word in wanted.items()):
