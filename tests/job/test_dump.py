@@ -15,12 +15,20 @@ from tiers import few
 
 from trajcli.job.dump import dump_job
 from trajcli.job.read import LoadedJob, job_from_text, load_job
+from trajcli.planners.planner import Planner
 from trajcli.planning.plan import plan_job
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.yaml"))
 PLANNED = few(
     [path for path in EXAMPLES if "zone: " not in path.read_text()], 12
 )  # corners take seconds each
+
+
+def fields_of(move: Planner) -> tuple[Any, ...]:
+    """Return what a move consists of, bit for bit."""
+    tool = getattr(move, "tool", None)
+    parts = () if tool is None else (tool.name, tool.pose.tobytes(), tool.load and tool.load.bits)
+    return type(move), *parts, *((name, value) for name, value in move if name != "tool")
 
 
 def assert_same(a: LoadedJob, b: LoadedJob) -> None:
@@ -32,8 +40,9 @@ def assert_same(a: LoadedJob, b: LoadedJob) -> None:
         assert np.array_equal(getattr(a.robot, key), getattr(b.robot, key))
     for order in range(4):
         assert np.array_equal(a.robot.limits.of_order(order), b.robot.limits.of_order(order))
-    for key in ("points", "start", "moves", "when_over_limit", "output"):
+    for key in ("points", "start", "when_over_limit", "output"):
         assert getattr(a.job, key) == getattr(b.job, key), key
+    assert list(map(fields_of, a.job.moves)) == list(map(fields_of, b.job.moves))
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
