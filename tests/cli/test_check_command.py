@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from planned_examples import share_plans
 from running import EXAMPLES, ROOT, call
 
 import trajcli
@@ -85,9 +86,11 @@ def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with a job and its rows in all formats."""
     folder = tmp_path_factory.mktemp("planned")
     (folder / "job.yaml").write_text(JOB)
-    for name in ("rows.csv", "rows.jsonl", "rows.mcap", "rows.yaml"):
-        plan_quietly(str(folder / "job.yaml"), "-o", str(folder / name))
-    plan_quietly(str(folder / "job.yaml"), "--si", "-o", str(folder / "si.csv"))
+    with pytest.MonkeyPatch.context() as patch:
+        share_plans(patch)
+        for name in ("rows.csv", "rows.jsonl", "rows.mcap", "rows.yaml"):
+            plan_quietly(str(folder / "job.yaml"), "-o", str(folder / name))
+        plan_quietly(str(folder / "job.yaml"), "--si", "-o", str(folder / "si.csv"))
     return folder
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import random_jobs
+from planned_examples import planned_once
 
 from trajcli.job.read import load_job
 from trajcli.judge.file import CheckOptions, check_file
@@ -19,7 +20,7 @@ EXAMPLES = Path(__file__).parents[3] / "examples"
 
 def planned(path: Path, *sets: str) -> Plan:
     with np.errstate(all="ignore"):
-        return plan_job(load_job(str(path), sets))
+        return planned_once(load_job(str(path), sets))
 
 
 def judged(plan: Plan, file: Path) -> Judgement:
