@@ -196,6 +196,30 @@ def test_a_first_look_knows_of_a_peak_that_no_row_shows(sign):
     assert found == [(0, sign, limit)]
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_first_look_doubts_no_limit_that_is_a_few_remainders_away(sign):
+    """The remainder is at most 2.2 times what hides between nine rows: a looser look would ask for each motion anew."""
+    survey = effort_survey(lift(gravity=0.0), np.array([0.0, 1.0]), sign * hidden_motion(1e-8, 1.0))
+    limit = 5.0 * (1.0 + 1e-7)
+    assert not list(survey.doubtful(np.array([[-limit, limit]]), 1e-10))
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_peak_is_as_near_as_the_smaller_of_two_limits_asks(sign):
+    """Some 250 N one way, and 1e-6 below 1 N the other way, between rows: by hand 1000 (t - 0.4317)^2 - (1 - 1e-6)."""
+    at, free = 0.4317, 1.0 - 1e-6
+    joint = np.polyint(np.polyint([1000.0, -2000.0 * at, 1000.0 * at**2 - free])) / 5.0
+    survey = effort_survey(
+        lift(gravity=0.0),
+        np.array([0.0, 1.0]),
+        sign * joint[:, None, None],
+        np.array([[-1.0, 1e3] if sign > 0 else [-1e3, 1.0]]),
+    )
+    found = survey.peak(0, -sign)
+    assert free * (1 - 1e-9) <= found.most <= free * (1 + 2e-7)
+    assert found.time == pytest.approx(at, abs=1e-3)
+
+
 def test_coulomb_friction_jumps_where_a_joint_turns_back():
     dynamics = lift(2.0, Friction(coulomb=3.0))
     coefficients = np.array([1.0, -1.0, 0.0])[:, None, None]  # qd = 2 t - 1, qdd = 2

@@ -1,0 +1,83 @@
+"""What a verdict says beside its findings: limits that nobody could judge, uses by position, and what would help."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from motions import between, limits, state, trajectory
+
+from trajcli.checks.verify import verify
+from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.kinematics.robot import Joint, Limits, Robot, ToolLimits, unlimited
+from trajcli.trajectory import Promise, Trajectory
+
+OF_THE_TOOL = replace(limits(), tcp=ToolLimits(speed=1.0, angular_acceleration=2.0))
+NEAR = replace(limits(position=3.0), velocity_by_position=np.array([[6.0, 0.3]]))
+
+
+def arm() -> Robot:
+    return Robot("arm", (Joint("j1", a=0.5),), unlimited(1), "standard", np.eye(4), np.eye(4))
+
+
+def resting(duration: float = 2.0) -> PiecewisePolynomial:
+    return between([1.0], [1.0], duration=duration)
+
+
+def test_limits_of_a_tool_that_nobody_knows_are_named_where_the_arm_moves() -> None:
+    moving, still = trajectory(between([0.0], [1.0])), trajectory(resting())
+    assert verify(moving, [OF_THE_TOOL]).unchecked_of_tool == ("speed", "angular_acceleration")
+    assert verify(moving, [limits()]).unchecked_of_tool == ()
+    assert verify(still, [OF_THE_TOOL]).unchecked_of_tool == ()  # it does not move at all
+    both = trajectory(between([0.0], [1.0]), resting())
+    assert verify(both, [limits(), OF_THE_TOOL]).unchecked_of_tool == ()
+    assert verify(both, [OF_THE_TOOL, limits()]).unchecked_of_tool == ("speed", "angular_acceleration")
+    known = replace(arm(), limits=OF_THE_TOOL)
+    assert verify(moving, [OF_THE_TOOL], [Promise(robot=known)]).unchecked_of_tool == ()
+
+
+def test_a_move_of_joints_is_along_no_path() -> None:
+    """An arm that is known and a move without a path of its tool: nothing is judged on rows alone."""
+    moving = trajectory(between([0.0], [1.0]))
+    verdict = verify(moving, [limits()], [Promise(robot=arm())])
+    assert (verdict.passed, verdict.sampled) == (True, ())
+
+
+def test_each_move_says_what_it_uses_of_its_limits_by_position() -> None:
+    """At 0.75 rad the bound is sqrt(2 d x) - o with x = 3 - q; where no such limit is, nothing is used."""
+    whole = trajectory(between([0.0], [1.5], duration=1.0), between([1.5], [0.0], duration=9.0))
+    verdict = verify(whole, [NEAR, limits()])
+    (used,), nothing = verdict.by_position
+    assert nothing == ()
+    t = np.linspace(0, 1, 100_001)
+    q, v = whole.curve.evaluate(t)[:, 0], whole.curve.evaluate(t, 1)[:, 0]
+    assert used.used == pytest.approx((v / (np.sqrt(12.0 * (3.0 - q)) - 0.3)).max(), rel=1e-8)
+
+
+def advice(whole: Trajectory, of: Limits, **promised: object) -> dict[str, str]:
+    promise = Promise(**promised)  # type: ignore[arg-type]
+    return {f.kind: f.hint or "" for f in verify(whole, [of], [promise]).findings}
+
+
+def test_what_no_duration_helps_against_is_not_answered_with_one() -> None:
+    """The joint ends outside its range, and is too fast on the way: only the speed asks for more time."""
+    hints = advice(trajectory(between([0.0], [2.0], duration=1.0)), limits(position=1.0, velocity=1.0))
+    assert hints["velocity"].startswith("it must last 3.75")  # 1.875 times 2 rad/s
+    assert "longer" not in hints["position"]
+    assert "change the target" in hints["position"]
+    alone = advice(trajectory(between([0.0], [2.0], duration=9.0)), limits(position=1.0))
+    assert alone == {"position": hints["position"]}
+
+
+@pytest.mark.parametrize("kind", ["velocity", "jerk"])
+def test_what_joins_the_acceleration_is_advised_against_jerk_alone(kind: str) -> None:
+    """A cubic steps in acceleration, and is over another limit: the step has an answer, which is none for speed."""
+    whole = trajectory(between([0.0], [1.0], duration=1.0, conditions=2), start=state([0.0]))
+    bound = {"jerk": 1.0, kind: 0.5}  # jerk 12 rad/s^3, velocity 1.5 rad/s
+    hints = advice(whole, limits(**bound))
+    assert hints["acceleration_jump"]
+    assert hints["jerk"] == hints["acceleration_jump"]
+    if kind == "velocity":
+        assert hints["velocity"] != hints["acceleration_jump"]
+        assert "longer" in hints["velocity"]
