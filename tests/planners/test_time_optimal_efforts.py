@@ -19,7 +19,7 @@ from trajcli.curves.time_optimal.time_law import LawPieces
 from trajcli.dynamics.effort_constraint import EffortConstraint, HeldOverLimitError
 from trajcli.dynamics.newton_euler import InverseDynamics
 from trajcli.errors import MissingLimitError, PlanningError
-from trajcli.kinematics.robot import Friction, Robot, point_mass
+from trajcli.kinematics.robot import Friction, Joint, LinkInertia, Robot, point_mass, unlimited
 from trajcli.planners.effort_limits import solved_within_efforts
 from trajcli.urdf.serial_robot import robot_of_urdf
 
@@ -344,3 +344,23 @@ def test_phases_name_the_efforts_that_bind():
     assert (first.name, second.name) == ("effort +", "effort -")
     assert first.end == pytest.approx(switch, rel=1e-3)
     assert second.start == pytest.approx(switch, rel=1e-3)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(("excess", "kept"), [(2e-7, True), (2e-6, False), (3e-5, False)])
+def test_a_motion_over_its_efforts_by_more_than_half_of_what_checks_allow_is_made_longer(excess, kept, sign):
+    """A solution that comes out above the limit of a slide, by so much: the force falls with the square of the time."""
+    mass, limit = 5.0, 40.0
+    joint = Joint("lift", "prismatic", link=LinkInertia(mass, (0.0, 0.0, 0.0), (0.0,) * 6))
+    bounds = np.array([[-limit, np.inf] if sign < 0 else [-np.inf, limit]])
+    robot = Robot("lift", (joint,), replace(unlimited(1), effort=bounds), "standard", np.eye(4), np.eye(4))
+    robot = replace(robot, gravity=np.zeros(3))
+    path = PiecewisePolynomial(np.array([0.0, 1.0]), np.array([1.0, 0.0])[:, None, None])
+    fastest = limit / mass * (1.0 + excess)
+    motion = time_optimal(path, [[-np.inf, np.inf]], [[-fastest, fastest]])
+    made = solved_within_efforts(path, robot, lambda _: motion)
+    longer = made.trajectory.duration / motion.trajectory.duration
+    used = sign * mass * made.trajectory.evaluate(np.linspace(0, made.trajectory.end, 4001), 2)
+    assert used.max() / limit == pytest.approx(1.0 + (excess if kept else 0.0), abs=6e-7)
+    assert (longer == 1.0) == kept
+    assert longer == pytest.approx(1.0 if kept else (1.0 + excess) ** 0.5, abs=4e-7)
