@@ -36,6 +36,7 @@ BENCHMARKS = (
     "long_path",
     "jerk_limited",
     "waypoints",
+    "flyby",
     "plotting",
     "viewing",
     "waiting",

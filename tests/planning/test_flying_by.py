@@ -111,6 +111,26 @@ def test_a_corner_of_two_lines_of_the_tool_is_flown_by(zone, most):
     assert plan.flyby.stopping == pytest.approx(1.6139, abs=1e-3)
 
 
+def test_ramps_of_rounding_are_no_steps_in_velocity():
+    """A joint changes its velocity by 3e-8 deg/s in 6e-11 s, within its acceleration: rows show nothing of it."""
+    corners = [(400, 300, 250), (600, 300, 250), (600, 100, 250)]
+    turned = {"rpy": [180, 0, 0]}
+    lines = [
+        {"planner": "line", "to": {"xyz": list(corner), **turned}, "law": {"shape": "time_optimal"}}
+        for corner in corners
+    ]
+    plan = flown(
+        *lines,
+        robot="ur5e",
+        units={"angle": "deg", "length": "mm"},
+        limits={"acceleration": 800, "jerk": 8000, "tcp": {"speed": 1000}},
+        start={"xyz": [400, 100, 250], **turned, "configuration": {"elbow": "up"}},
+        zone=20,
+    )
+    assert (plan.trajectory.curve.lengths < 1e-9).any()
+    assert "velocity_step" not in {event.kind for event in plan.events}
+
+
 def test_parts_of_paths_beside_zones_are_proven_to_be_on_their_paths():
     plan = planned_example("flying_cell")
     promises = [move.promise for move in plan.moves]

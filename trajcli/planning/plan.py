@@ -336,12 +336,15 @@ def _ends_moving(loaded: LoadedJob, moves: Sequence[PlannedMove]) -> Iterator[Ev
     yield Event("ends_moving", message, last.index, amounts)
 
 
+_SEEN = 1e-6  # of a joint's largest velocity: a smaller change in a short ramp is none that rows show
+
+
 def _velocity_steps(trajectory: Trajectory) -> Iterator[Event]:
     """Yield the event of ramps that are over before the next time that stamps can tell."""
     curve = trajectory.curve
     first, last = curve.piece_ends(1)
     steps = np.where((curve.lengths <= NANOSECOND)[:, None], np.abs(last - first), 0.0)
-    if not (steps > JUMP_ABSOLUTE).any():
+    if not (steps > JUMP_ABSOLUTE + _SEEN * np.maximum(np.abs(first), np.abs(last)).max(axis=0)).any():
         return
     piece, joint = np.unravel_index(steps.argmax(), steps.shape)
     time, length = curve.breaks[piece] - curve.start, curve.lengths[piece]
