@@ -164,7 +164,7 @@ class _Search:
             UnsettledSpeedError: When the first steps lead to more than `hopeless` times a limit.
         """
         self._step(_FIRST_GAP)
-        self._converge(_FIRST_STEPS)
+        self._converge(_FIRST_STEPS, hopeless)
         if self.excess.max() > hopeless:
             raise self.unsettled()
         for _ in range(_REFINEMENTS):
@@ -180,12 +180,17 @@ class _Search:
         self._converge(_MORE_STEPS)
         return float(time_lost(self.law, self.limits, self.excess).sum())
 
-    def _converge(self, most: int) -> None:
-        """Make steps until the duration settles or oscillates, and limits are nearly kept."""
+    def _converge(self, most: int, hopeless: float = np.inf) -> None:
+        """Make steps until the duration settles or oscillates, and limits are nearly kept.
+
+        What is hopeless is left where a step does not halve the excess.
+        """
         last = np.inf
         for _ in range(most):
-            before = self.law.duration
+            before, passed = self.law.duration, float(self.excess.max())
             self._step(_GAP)
+            if float(self.excess.max()) > max(hopeless, 0.5 * passed):
+                break
             change = abs(self.law.duration - before) / before
             settled = change <= _CHANGED or change > _STEADY * last
             if settled and (self.rests or self.excess.max() <= _NEARLY):
