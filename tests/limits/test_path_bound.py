@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +20,7 @@ from trajcli.kinematics.following.motion import motion_along
 from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.forward import forward
+from trajcli.limits import path_bound
 from trajcli.trajectory import Span, Trajectory, resting
 
 ROBOT, Q = load_robot("ur5e"), np.array([0.3, -1.2, 1.4, -0.9, -1.3, 0.4])
@@ -166,3 +168,18 @@ def test_what_has_no_bound_is_left_to_rows_and_said() -> None:
     assert list(cut.sampled) == ["distance from the path", "angle from its orientation", "branch"]
     longer = replace(right, span=replace(right.span, end=2.9))  # the law does not say when it is where
     assert longer.bounds == (None, None)
+
+
+@pytest.mark.parametrize("orientation", ["all", "direction"])
+def test_what_hides_between_nodes_is_bounded_by_no_less_than_it_is(orientation: str) -> None:
+    """A joint that turns steadily: of a matrix, and of an axis square to that joint, the ninth derivative is rate^9."""
+    rate, joint = 2.0, 5 if orientation == "all" else 4  # the axis of the tool is that of the last joint
+    coefficients = np.zeros((2, 1, 7))
+    coefficients[0, 0, joint], coefficients[1, 0, :6] = rate, Q
+    path = ToolPath(line(), WHOLE, orientation)  # type: ignore[arg-type]
+    _, ((_, highest),) = path_bound._known(ROBOT, path, coefficients, np.array([1e-6]))
+    assert 1.0 <= highest * math.factorial(9) / rate**9 <= 100.0
+    t = np.arange(9) * 0.2
+    values, _ = path_bound._known(ROBOT, path, coefficients, np.array([t[-1]]))
+    apart = np.linalg.norm(np.diff(values[0, :, 1], axis=0), axis=-1)
+    np.testing.assert_allclose(apart, 2 * np.sin(rate * 0.2 / 2), rtol=1e-9)  # a chord, as of the angle

@@ -6,7 +6,9 @@ A link of length L that turns by q has |p'''|^2 = L^2 ((q''' - q'^3)^2 + (3 q' q
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,6 +19,10 @@ from tiers import few
 
 from trajcli.job.report import Report
 from trajcli.judge.file import CheckOptions, check_file
+from trajcli.kinematics.following.tolerance import Tolerance
+from trajcli.kinematics.robot import Joint, Robot, ToolLimits, unlimited
+from trajcli.limits.tool import ToolSurvey
+from trajcli.limits.tool_bound import ToolPeak
 from trajcli.output.report import report_of
 from trajcli.output.write import write_plan
 from trajcli.planning.plan import Plan, plan_job
@@ -94,6 +100,41 @@ def test_a_step_belongs_to_the_move_with_the_acceleration() -> None:
     job["moves"] = [still, *job["moves"], still]
     plan = plan_job(loaded(job))
     assert {finding.move for finding in plan.verdict.findings} == {1}
+
+
+def test_a_step_is_found_when_it_is() -> None:
+    """A trapezoid that brakes harder than it speeds up, alone and after a rest of half a second."""
+    job = link({"jerk": 500.0}, {"planner": "trapezoid"})
+    job["limits"]["acceleration"] = [[-99, 40]]
+    alone = plan_job(loaded(job)).verdict.findings
+    job["moves"] = [{"planner": "hold", "duration": 0.5}, *job["moves"]]
+    plan = plan_job(loaded(job))
+    (before,), (found,) = alone, plan.verdict.findings
+    assert before.time is not None
+    assert before.time > 0.1
+    assert found.time == pytest.approx(before.time + 0.5, abs=1e-9)
+    curve, time = plan.trajectory.curve, float(found.time or 0.0)
+    steps = [curve.evaluate(time, 2, side=side)[0] for side in ("left", "right")]
+    assert abs(steps[1] - steps[0]) > 90
+
+
+def test_what_a_tolerance_lets_a_tool_be_off_is_no_excess_of_its_jerk() -> None:
+    """Off by e x^3 (1 - x)^3 of pieces of a length h, third over second derivative are 16 / h: by polynomials."""
+    hump = -np.poly([0.0] * 3 + [1.0] * 3)
+    x = np.linspace(0, 1, 100_001)
+    second, third = (np.abs(np.polyval(np.polyder(hump, k), x)).max() for k in (2, 3))
+    spacing, tolerance, acceleration, limit = 0.02, 1e-4, 3.0, 40.0
+    tcp = ToolLimits(acceleration=5.0, jerk=limit)
+    path: Any = SimpleNamespace(tolerance=Tolerance(tolerance, tolerance))
+    arm = Robot("arm", (Joint("a"),), replace(unlimited(1), tcp=tcp), None, np.eye(4), np.eye(4))
+    allowed = 2 * (third / second) / spacing * tolerance * acceleration / limit
+    for share, count in ((0.98, 0), (1.03, 1)):
+        peaks = {
+            "acceleration": ToolPeak(acceleration, 0.1, acceleration, np.zeros(3)),
+            "jerk": ToolPeak(limit, 0.1, limit * (1 + share * allowed), np.zeros(3)),
+        }
+        survey = ToolSurvey(arm.limits, peaks, motion=path, spacing=spacing)
+        assert len(list(survey.over(arm))) == count
 
 
 def test_speeds_are_reported_where_no_limit_is_stated() -> None:
