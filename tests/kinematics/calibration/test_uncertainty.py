@@ -1,0 +1,101 @@
+"""Correlations of parameters by hand, and when released parameters explain more than noise lets them."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from trajcli.kinematics.calibration import uncertainty
+from trajcli.kinematics.calibration.fit import Fit, _Problem
+
+Pairs = list[tuple[int, int, float]]
+
+
+def pairs(covariance: np.ndarray, known: list[bool]) -> Pairs:
+    """Return the correlations that are reported, by the numbers of the parameters."""
+    deviations, numbers = np.sqrt(np.diag(covariance)), cast("Any", range(len(known)))
+    found = uncertainty._correlations(covariance, deviations, known, numbers)
+    return [(cast("Any", each.first), cast("Any", each.second), each.value) for each in found]
+
+
+def covariance(values: dict[tuple[int, int], float], deviations: list[float]) -> np.ndarray:
+    correlations = np.eye(len(deviations))
+    for (i, j), value in values.items():
+        correlations[i, j] = correlations[j, i] = value
+    return correlations * np.outer(deviations, deviations)
+
+
+def test_correlations_are_those_of_the_covariance_the_largest_first() -> None:
+    """Of either sign, whatever the deviations; from 0.9 on."""
+    of = covariance({(0, 1): 0.95, (1, 3): -0.97, (0, 2): 0.89, (2, 3): -0.9}, [2.0, 1e-3, 5.0, 0.1])
+    assert pairs(of, [True] * 4) == [
+        (1, 3, pytest.approx(-0.97)),
+        (0, 1, pytest.approx(0.95)),
+        (2, 3, pytest.approx(-0.9)),
+    ]
+
+
+def test_parameters_that_are_not_determined_have_no_correlation() -> None:
+    of = covariance({(0, 1): 0.95, (1, 2): -0.97, (0, 2): 0.93}, [2.0, 1e-3, 5.0])
+    assert pairs(of, [True, False, True]) == [(0, 2, pytest.approx(0.93))]
+    of[1] = of[:, 1] = 0.0  # exactly known: nothing goes together with it
+    with np.errstate(all="raise"):
+        assert pairs(of, [True] * 3) == [(0, 2, pytest.approx(0.93))]
+
+
+def test_the_ten_largest_correlations_are_reported() -> None:
+    values = {(i, j): 0.9 + 0.005 * (i + j) for i in range(6) for j in range(i + 1, 6)}
+    found = pairs(covariance(values, [1.0] * 6), [True] * 6)
+    assert [value for *_, value in found] == pytest.approx(sorted(values.values(), reverse=True)[:10])
+
+
+def problem(counts: tuple[int, int], deviations: object = None) -> _Problem:
+    """Return a problem whose robots are their residuals."""
+    made = _Problem.__new__(_Problem)
+    made.measurements = cast("Any", SimpleNamespace(counts=counts, deviations=deviations))
+    made.rows = lambda robot: (cast("Any", robot), np.empty(0))  # type: ignore[method-assign]
+    return made
+
+
+def fitted(squares: float, released: int, count: int = 20, weight: float = 1.0) -> Fit:
+    """Return a fit of so many parameters, with residuals of a weighted sum of squares."""
+    residuals = np.zeros((count, 6))
+    residuals[:, 2] = np.sqrt(squares / count / weight)
+    parts = {"robot": residuals, "span": np.eye(9)[:, :released], "weights": np.full(count, weight)}
+    return cast("Any", SimpleNamespace(**parts))
+
+
+@pytest.mark.parametrize("weight", [1.0, 0.25])
+@pytest.mark.parametrize("added", [1, 3])
+def test_released_parameters_must_explain_more_than_noise(added: int, weight: float) -> None:
+    """60 coordinates, 4 + `added` parameters, a variance of 1: by the F-test that the module names, in its numbers."""
+    from trajcli.kinematics.calibration.fit import _BEYOND_CHANCE
+
+    freedom = 60 - 4 - added
+    after, needed = float(freedom), added * _BEYOND_CHANCE
+    for share, beyond in ((0.99, False), (1.01, True)):
+        before = fitted(after + share * needed, 4, weight=weight)
+        assert problem((60, 0)).beyond_chance(before, fitted(after, 4 + added, weight=weight)) is beyond
+
+
+def test_stated_deviations_are_the_noise_and_no_freedom_tells_nothing() -> None:
+    from trajcli.kinematics.calibration.fit import _BEYOND_CHANCE
+
+    for share, beyond in (
+        (0.99, False),
+        (1.01, True),
+    ):  # residuals in units of the deviations: a variance of 1
+        before, after = fitted(5.0 + share * _BEYOND_CHANCE, 4), fitted(5.0, 5)
+        assert problem((60, 0), (1e-3, None)).beyond_chance(before, after) is beyond
+    assert problem((30, 30)).beyond_chance(fitted(60.0, 4), fitted(20.0, 5))
+    assert not problem((3, 2)).beyond_chance(fitted(1e3, 4), fitted(1.0, 5))
+    assert not problem((2, 0)).beyond_chance(fitted(1e3, 4), fitted(1.0, 5))
+
+
+def test_exact_data_have_no_variance() -> None:
+    """Rounding that is left after a fit, of less than a picometre in each coordinate, is explained by nothing."""
+    for off, beyond in ((0.9e-12, False), (1.1e-12, True), (1e-3, True)):
+        assert problem((60, 0)).beyond_chance(fitted(60 * off**2, 4), fitted(0.0, 5)) is beyond
