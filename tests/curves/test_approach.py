@@ -8,9 +8,9 @@ from hermite_curves import hermite_pieces
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from trajcli.curves.approach import ROOM, ApproachLimits, approach_uses, uses_of_pieces
+from trajcli.curves.approach import ROOM, ApproachLimits, approach_uses, durations_at_limit, uses_of_pieces
 from trajcli.curves.operations import scale_time
-from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.curves.piecewise import PiecewisePolynomial, taylor_shift
 
 BREAKS = np.array([0.0, 1.0, 2.2, 3.0])
 
@@ -178,3 +178,34 @@ def test_each_end_of_a_range_has_its_own_distance() -> None:
     down, up = limits.bounds(np.array([[-0.1]]))
     assert down[0, 0] == pytest.approx(-(np.sqrt(2 * 2.0 * 0.4) - 0.1))
     assert up[0, 0] == pytest.approx(np.sqrt(2 * 2.0 * 1.1) - 0.1)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.5, 0.98])
+def test_how_long_components_are_at_their_limits(share: float) -> None:
+    """Two that brake with the deceleration of their limits, to either side, and one that uses a share of it.
+
+    With o = 0, x = d (T - t)^2 / 2 has v = sqrt(2 d x); a way k^2 times as far in the same time uses k times the limit.
+    """
+    d, breaks = 3.0, np.array([0.0, 0.5, 2.0])
+    full = 0.5 * d * np.array([1.0, -4.0, 4.0])
+    columns = np.stack([-full, full, -full * share**2], axis=1)
+    columns[-1] += 2.0, -2.0, 2.0
+    later = taylor_shift(columns, np.full(3, 0.5))
+    coefficients = np.stack([columns, later], axis=1)
+    limits = ApproachLimits(np.tile([-2.0, 2.0], (3, 1)), np.full(3, d), np.zeros(3))
+    found = durations_at_limit(coefficients, np.diff(breaks), limits, 0.01)
+    np.testing.assert_allclose(found, [2.0, 2.0, 2.0 if share > 0.99 else 0.0], atol=1e-6)
+    found = durations_at_limit(coefficients, np.diff(breaks), limits, 0.03)
+    np.testing.assert_allclose(found, [2.0, 2.0, 2.0 if share > 0.97 else 0.0], atol=1e-6)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_component_is_at_its_limit_where_it_goes_at_that_speed(sign: float) -> None:
+    """A joint at 0.5 rad/s towards 1 rad: sqrt(2 d x) - o falls to that where x = (0.5 + o)^2 / (2 d)."""
+    limits = ApproachLimits(np.array([[-1.0, 1.0]]), np.array([2.0]), np.array([0.1]))
+    line = sign * np.array([0.5, 0.2])[:, None, None]
+    found = durations_at_limit(line, np.array([1.5]), limits, 1e-9)
+    nearest = (0.5 + 0.1) ** 2 / 4.0
+    np.testing.assert_allclose(found, [1.5 - (0.8 - nearest) / 0.5], rtol=1e-6)
+    away = durations_at_limit(-line, np.array([0.1]), limits, 1e-9)
+    assert away == [0.0]

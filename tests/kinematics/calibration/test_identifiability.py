@@ -11,7 +11,12 @@ from tiers import few
 from trajcli.errors import InputError
 from trajcli.kinematics.calibration.identifiability import identifiability
 from trajcli.kinematics.calibration.identification_jacobian import identification_jacobian
-from trajcli.kinematics.calibration.parameters import all_parameters, parallel_rows, parse_parameters
+from trajcli.kinematics.calibration.parameters import (
+    ArmParameter,
+    all_parameters,
+    parallel_rows,
+    parse_parameters,
+)
 
 FREE = {
     "all": "all",
@@ -123,3 +128,32 @@ def test_the_nearest_name_is_proposed():
     with pytest.raises(InputError) as caught:
         parse_parameters(arm("puma"), "j1.tetha")
     assert "j1.theta" in str(caught.value.problems[0].hint)
+
+
+THETA, D = ArmParameter("j1", "theta", 0), ArmParameter("j1", "d", 0)
+
+
+@pytest.mark.parametrize(("column", "rank"), [(1.4e-7, 2), (0.7e-7, 1), (5e-9, 1)])
+def test_a_parameter_that_does_next_to_nothing_is_not_seen(column, rank):
+    """A metre counts like so many radians: 1e-10 of the longest column is what rounding leaves of none."""
+    told = identifiability(np.diag([1.0, column]), (THETA, D), 1e-3)
+    assert told.rank == rank
+    assert [[share.parameter for share in shares] for shares in told.combinations] == [[D]] * (2 - rank)
+
+
+@pytest.mark.parametrize("scale", [1e-15, 1.0, 1e12])
+def test_what_all_rows_are_multiplied_by_does_not_matter(scale):
+    told = identifiability(scale * np.array([[1.0, 0.0], [1.0, 3.0]]), (THETA, D), 1e-3)
+    assert (told.rank, told.combinations) == (2, ())
+    assert identifiability(np.zeros((3, 2)), (THETA, D), 1.0).rank == 0
+
+
+@pytest.mark.parametrize(("ratio", "both"), [(1e-8, True), (2e-9, True), (5e-10, False)])
+def test_a_small_part_of_a_combination_is_one_by_its_unit(ratio, both):
+    """An angle does alike with so many metres for each radian: a millionth of what counts like a radian is none."""
+    told = identifiability(np.array([[1.0 / ratio, 1.0]]), (D, THETA), 1e-3)
+    (shares,) = told.combinations
+    weights = {share.parameter: share.weight for share in shares}
+    assert (told.rank, D in weights) == (1, both)
+    assert abs(weights[THETA]) == pytest.approx(1.0)
+    assert weights.get(D, 0.0) / weights[THETA] == pytest.approx(-ratio if both else 0.0)

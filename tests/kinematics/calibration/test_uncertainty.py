@@ -99,3 +99,20 @@ def test_exact_data_have_no_variance() -> None:
     """Rounding that is left after a fit, of less than a picometre in each coordinate, is explained by nothing."""
     for off, beyond in ((0.9e-12, False), (1.1e-12, True), (1e-3, True)):
         assert problem((60, 0)).beyond_chance(fitted(60 * off**2, 4), fitted(0.0, 5)) is beyond
+
+
+def test_variances_are_by_kind_or_of_both_where_one_has_no_freedom() -> None:
+    """Squares of 2 and of 0.5 over freedoms by hand: coordinates times the mean weight, less what the fit took."""
+    rows = np.zeros((10, 6))
+    rows[:, 1], rows[:, 4] = np.sqrt(0.2), np.sqrt(0.05)  # sums of squares: 2 and 0.5
+    fit = cast("Any", SimpleNamespace(weights=np.full(10, 0.8)))
+
+    def found(counts: tuple[int, int], leverage: list[float], stated: object = None) -> Any:
+        measured = cast("Any", SimpleNamespace(counts=counts, deviations=stated))
+        return uncertainty._variances(rows, np.array(leverage), fit, measured)
+
+    np.testing.assert_allclose(found((30, 30), [4.0, 2.0]), [2.0 / 20, 0.5 / 22])
+    np.testing.assert_allclose(found((30, 5), [4.0, 3.6]), [2.0 / 20, 2.5 / 20.4])  # 0.4 left: taken together
+    np.testing.assert_allclose(found((5, 30), [4.2, 4.0]), [2.5 / 19.8, 0.5 / 20])
+    assert found((5, 5), [3.8, 3.9]) is None
+    np.testing.assert_allclose(found((5, 5), [3.8, 3.9], (1e-3, 1e-3)), [1.0, 1.0])
