@@ -21,6 +21,8 @@ _SIDES: tuple[Side, Side] = ("left", "right")
 _WHOLE = 0.7  # of what is left of an interval: a longer step takes all of it
 _JUMPED = 0.15  # rad or m: a prediction that is off by more may have led to another branch
 _BULGE = 10.0  # how many times nearer a curve through both ends of a step shall be than a prediction
+_MANY = 32  # breaks of which neighbours may be taken together
+_NEAR = 0.02  # lengths of the arm and rad: so little all of them together
 _AIM = 0.05  # rad or m by which predictions may be off
 _SHORTEST = 1e-6  # of the path: where so short a step fails, the joints race
 _ORDER = 3  # of the error of the prediction, in the step
@@ -55,7 +57,8 @@ def track_branch(follower: Follower, breaks: Array) -> PiecewisePolynomial:
         StuckError: When the joints cannot be followed to the end.
     """
     shortest = _SHORTEST * float(breaks[-1] - breaks[0])
-    nodes, pieces, speeds = [float(breaks[0])], [], _speeds(follower, breaks)
+    breaks, speeds = _together(breaks, _speeds(follower, breaks))
+    nodes, pieces = [float(breaks[0])], list[Array]()
     travel = float(breaks[1] - breaks[0]) * _FIRST * float(speeds[0])
     state = _exact(follower, breaks[:1], "right", follower.start[None])[:, 0]
     jumps = _jumps(follower, breaks)
@@ -95,6 +98,25 @@ def _speeds(follower: Follower, breaks: Array) -> Array:
     rates = follower.reference_at(inner, "right").first / np.repeat([follower.length, 1.0], 3)
     speeds = np.abs(rates).sum(axis=1).reshape(-1, _PROBES.size).max(axis=1)
     return np.asarray(np.maximum(speeds, _STILL / np.diff(breaks)))
+
+
+def _together(breaks: Array, speeds: Array) -> tuple[Array, Array]:
+    """Return breaks (k,) and speeds (k - 1,) with many neighbours in which the tool goes next to nowhere as one.
+
+    Whatever it does between them it stays so near that one curve is a guess for all.
+    """
+    travels = speeds * np.diff(breaks)
+    if breaks.size < _MANY:
+        return breaks, speeds
+    kept, gone = [0], 0.0
+    for k, travel in enumerate(travels.tolist()):
+        if k > kept[-1] and gone + travel > _NEAR:
+            kept.append(k)
+            gone = 0.0
+        gone += travel
+    firsts = np.array(kept)
+    merged = np.append(breaks[firsts], breaks[-1])
+    return merged, np.add.reduceat(travels, firsts) / np.diff(merged)
 
 
 def _jumps(follower: Follower, breaks: Array) -> Flags:
