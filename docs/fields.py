@@ -45,7 +45,7 @@ from trajcli.planners import PLANNERS, Planner
 from trajcli.planners.tool_path.arc import ArcFields
 from trajcli.planners.tool_path.law import LawSpec
 from trajcli.planners.tool_path.move import ToleranceSpec
-from trajcli.planners.tool_path.segments import Segment, SegmentLaw
+from trajcli.planners.tool_path.segments import Segment, SegmentLaw, SegmentsField
 from trajcli.planners.waypoints.blends import BlendDurations
 from trajcli.planners.waypoints.time_optimal import PathParameter
 from trajcli.planners.waypoints.waypoints import SegmentTimes
@@ -124,6 +124,8 @@ def _annotations(field: FieldInfo) -> list[Any]:
 
 
 def _form(field: FieldInfo) -> str:
+    if any(isinstance(item, SegmentsField) for item in field.metadata):
+        return "list of [segments](#segments), or `{csv, in, merge}`"
     if any(isinstance(item, PointsField) for item in field.metadata):
         return _POINTS
     reader = field_type(field)

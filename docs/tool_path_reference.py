@@ -56,7 +56,12 @@ for each place where path or law change."""
 _SEGMENTS = """\
 A segment begins where the one before it ends. `radius` is the length before and after the corner at its end
 over which the path is rounded; it stands here for one corner or in the move for all. `radius: 0` stops at
-that corner alone."""
+that corner alone.
+
+In the place of the list `{csv: FILE}` names a file of poses, to which lines lead: columns `x`, `y`, `z` (m,
+or `x_mm` ...), and `qw`, `qx`, `qy`, `qz`, as the columns `pose` are written; without these the orientation
+is kept. A first row where the tool stands is the start. `in` is the [frame](programs.md#frames) in which they
+are given, and poses no further than `merge` from the one before are left out (the event `merged`)."""
 
 _SEGMENT_LAWS = """\
 Speeds of the tool on one segment, in the place of those of the move's law (or of

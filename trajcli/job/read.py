@@ -35,7 +35,7 @@ from trajcli.trajectory import move_title
 from trajcli.units import Units, amount_text
 
 if TYPE_CHECKING:
-    from trajcli.language.recorded import Recorded
+    from trajcli.language.recorded import Recorded, RecordedPoses
 
 _STRUCTURES = frozenset(("repeat", "call", "approach", "retreat"))
 """Keys of entries among the moves that stand for other moves."""
@@ -267,6 +267,7 @@ def _load(document: Document) -> LoadedJob:
         context.base = _base(plain.get("base"), context, robot)
         context.joint_names, context.joint_types = robot.joint_names, robot.joint_types
         context.read_points = partial(_recorded, document, robot)
+        context.read_poses = partial(_recorded_poses, document)
     try:
         job = Job.model_validate({**plain, **given}, context=context)
     except ValidationError as error:
@@ -371,6 +372,13 @@ def _recorded(document: Document, robot: Robot, path: str) -> Recorded:
     from trajcli.job.files.recorded_values import read_recording
 
     return read_recording(path, document, robot)
+
+
+def _recorded_poses(document: Document, path: str) -> RecordedPoses:
+    """Return the recorded poses of a path."""
+    from trajcli.job.files.recorded_poses import read_poses
+
+    return read_poses(path, document)
 
 
 def _once(moves: Sequence[Planner]) -> Iterator[tuple[int, Planner]]:

@@ -36,7 +36,7 @@ from trajcli.units import (
 )
 
 if TYPE_CHECKING:
-    from trajcli.language.recorded import Recorded
+    from trajcli.language.recorded import Recorded, RecordedPoses
 
 MAX_JOINTS = 12
 LONGEST_NAME = 200
@@ -77,6 +77,7 @@ class ReadingContext:
         waits: Whether a target is given relative to what only the plan knows.
         has_far_angle: Whether a pose has a plain angle of more than two turns, which is a slip of the unit.
         read_points: Reads a file of recorded joint values, its path relative to the job; raises FlawError.
+        read_poses: Likewise one of poses of the tool.
     """
 
     units: Units = field(default_factory=Units)
@@ -91,6 +92,7 @@ class ReadingContext:
     waits: bool = False
     has_far_angle: bool = False
     read_points: Callable[[str], Recorded] | None = None
+    read_poses: Callable[[str], RecordedPoses] | None = None
 
     def joint_quantity(self, joint: int, order: int) -> Quantity:
         """Return the quantity of a joint's value or of its time derivative."""

@@ -1,4 +1,4 @@
-"""Recorded waypoints."""
+"""Recorded waypoints, and recorded poses of the tool."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from trajcli.frozen import frozen
 
 SAME_POSITION = 1e-9
 """rad or m: points no joint of which is further from the one before are one, as rounding leaves them."""
+
+_SAME_POSITION_OF_TOOL = 1e-8  # m: what nine decimals leave of a position
 
 
 @frozen
@@ -75,6 +77,68 @@ class Recorded:
             rows = rows if target is None else rows[:-1]
             positions, times = positions[rows], None if times is None else times[rows]
         return Recorded(positions, times, self.file, self.merge)
+
+
+@frozen
+class RecordedPoses:
+    """Poses of the tool recorded one by one.
+
+    Attributes:
+        positions: Shape (m, 3), m, in world, m >= 1.
+        quaternions: Unit quaternions (m, 4), w first; None where the file has none.
+        file: Its name, for messages.
+        merge: Poses that are no further than this from the one before are left out, m.
+    """
+
+    positions: Array
+    quaternions: Array | None = None
+    file: str = "recorded poses"
+    merge: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "positions", read_only(self.positions))
+        if self.quaternions is not None:
+            object.__setattr__(self, "quaternions", read_only(self.quaternions))
+
+    def __eq__(self, other: object) -> bool:
+        """Compare poses and tolerance; the same poses from another file are the same."""
+        return isinstance(other, RecordedPoses) and self._content == other._content
+
+    def __hash__(self) -> int:
+        return hash(self._content)
+
+    @property
+    def _content(self) -> tuple[object, ...]:
+        turned = b"" if self.quaternions is None else self.quaternions.tobytes()
+        return self.positions.shape, self.positions.tobytes(), turned, self.merge
+
+    def begins_at(self, start: Array) -> bool:
+        """Return whether the first of several poses is where the tool is, (3,), m."""
+        near = float(np.linalg.norm(self.positions[0] - start)) <= max(self.merge, _SAME_POSITION_OF_TOOL)
+        return near and len(self.positions) > 1
+
+    def after(self, start: Array) -> RecordedPoses:
+        """Return the poses that come after a position (3,), m, none within `merge` of the one before.
+
+        A first pose that is where the tool stands is the start itself. The last one is kept.
+        """
+        first = int(self.begins_at(start))
+        rows = np.arange(first, len(self.positions))
+        if self.merge > 0:
+            rows = first + _moved_by(start, self.positions[first:], self.merge)
+        turned = None if self.quaternions is None else self.quaternions[rows]
+        return RecordedPoses(self.positions[rows], turned, self.file, self.merge)
+
+
+def _moved_by(start: Array, positions: Array, distance: float) -> np.ndarray:
+    """Return the rows that are further than a distance from the last one that was kept, and the last."""
+    kept, before = [], start
+    for row, position in enumerate(positions):
+        if np.linalg.norm(position - before) > distance:
+            kept.append(row)
+            before = position
+    end = len(positions) - 1
+    return np.array(kept if kept[-1:] == [end] else [*kept[:-1], end], dtype=np.intp)
 
 
 def _moved(start: Array, positions: Array, merge: Array) -> np.ndarray:

@@ -31,30 +31,35 @@ def read_recording(path: str, document: Document, robot: Robot) -> Recorded:
         FileError: When it cannot be read; with the place of its name in the job.
         FlawError: When it is not as it should be.
     """
-    folder = Path() if document.file.startswith(("<", "-")) else Path(document.file).parent
     try:
-        return _recorded(read_csv(folder / path), robot)
+        return _recorded(read_csv(folder_of(document) / path), robot)
     except FileError as error:
-        raise error.located(place=document.place(_named_at(document, path))) from None
+        raise error.located(place=document.place(named_at(document, path, "through"))) from None
     except InputError as error:
-        flaws = "; ".join(map(_placed, error.problems))
+        flaws = "; ".join(map(placed_text, error.problems))
         raise FlawError(flaws, "csv", hint=error.problems[0].hint) from None
 
 
-def _named_at(document: Document, path: str) -> tuple[str | int, ...]:
-    """Return where the job names a recording."""
+def folder_of(document: Document) -> Path:
+    """Return the folder that paths in a job are relative to."""
+    return Path() if document.file.startswith(("<", "-")) else Path(document.file).parent
+
+
+def named_at(document: Document, path: str, field: str) -> tuple[str | int, ...]:
+    """Return where a move of the job names a recording in a field, or its start does."""
     moves = document.node(("moves",))
     listed = moves.value if moves is not None and isinstance(moves.value, list) else []
     for index, move in enumerate(listed):
-        through = move.child("through")
-        node = through and through.child("csv")
+        recorded = move.child(field)
+        node = recorded and recorded.child("csv")
         if node is not None and node.value == path:
-            return ("moves", index, "through", "csv")
+            return ("moves", index, field, "csv")
     start = document.node(("start", "csv"))
     return ("start", "csv") if start is not None and start.value == path else ("moves",)
 
 
-def _placed(problem: Problem) -> str:
+def placed_text(problem: Problem) -> str:
+    """Return a problem of a file as a text, with its place there."""
     return f"{problem.place}: {problem.text()}" if problem.place else problem.text()
 
 

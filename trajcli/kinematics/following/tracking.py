@@ -101,9 +101,9 @@ def _speeds(follower: Follower, breaks: Array) -> Array:
 
 
 def _together(breaks: Array, speeds: Array) -> tuple[Array, Array]:
-    """Return breaks (k,) and speeds (k - 1,) with many neighbours in which the tool goes next to nowhere as one.
+    """Return breaks (k,) and speeds (k - 1,), short neighbouring intervals taken together.
 
-    Whatever it does between them it stays so near that one curve is a guess for all.
+    Whatever the tool does in them it stays so near that one curve is a guess for all.
     """
     travels = speeds * np.diff(breaks)
     if breaks.size < _MANY:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Annotated, Literal
 
@@ -16,21 +16,26 @@ from trajcli.geometry.paths.pose import PoseCurve
 from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import Flaw, Number, refuse
+from trajcli.language.recorded import RecordedPoses
 from trajcli.language.targets import Target
 from trajcli.planners.planner import Event
 from trajcli.planners.tool_path.arc import center_events
 from trajcli.planners.tool_path.move import PlannedPath, ToolPathMove, orientation_along
 from trajcli.planners.tool_path.segments import (
     Segment,
+    SegmentsField,
     corner_radii,
     curves_of,
+    line_to,
     merged_events,
+    segments_from,
     stepping_speeds,
     turning_back,
 )
 from trajcli.units import Quantity
 
 _SHRUNK = 1e-9  # relative
+_MOST_EVENTS = 8  # corners that are shrunk: of more the worst is told
 
 Radius = Annotated[
     float,
@@ -47,7 +52,11 @@ class PathMove(ToolPathMove):
     """
 
     planner: Literal["path"] = "path"
-    segments: Annotated[list[Segment], Field(min_length=1, description="Lines and arcs, in order.")]
+    segments: Annotated[
+        list[Segment] | RecordedPoses,
+        SegmentsField(),
+        Field(description="Lines and arcs, in order, or a file of poses to which lines lead."),
+    ]
     corner: Annotated[
         Literal["stop", "round", "overlap"],
         Field(
@@ -66,15 +75,27 @@ class PathMove(ToolPathMove):
     @property
     def target(self) -> Target | None:
         """Where the last segment ends; None where an arc ends after an angle."""
-        last = self.segments[-1]
+        last = self._listed[-1]
         return last.line if last.arc is None else last.arc.to
+
+    @property
+    def _listed(self) -> Sequence[Segment]:
+        """The segments; of recorded poses a line to the last one."""
+        given = self.segments
+        return [line_to(given, -1)] if isinstance(given, RecordedPoses) else given
+
+    @property
+    def _count(self) -> int:
+        """How many segments there are."""
+        given = self.segments
+        return len(given.positions) if isinstance(given, RecordedPoses) else len(given)
 
     @property
     def why_not_flown_by(self) -> str | None:
         """Why no motion can fly by a corner of this move; None where it can."""
         if self.corner == "overlap":
             return "its segments overlap in time"
-        if self.corner == "stop" and len(self.segments) > 1:
+        if self.corner == "stop" and self._count > 1:
             return "it stops at corners of its own (`corner: stop`)"
         return super().why_not_flown_by
 
@@ -95,7 +116,13 @@ class PathMove(ToolPathMove):
 
     def _flaws_of_radii(self) -> Iterator[Flaw]:
         if self.corner == "round":
-            for k, segment in enumerate(self.segments[:-1]):
+            if isinstance(self.segments, RecordedPoses) and self.radius is None and self._count > 1:
+                yield (
+                    ("segments",),
+                    "the corners between recorded poses have no radius",
+                    "give the move a `radius`",
+                )
+            for k, segment in enumerate(self._listed[:-1]):
                 if segment.radius is None and self.radius is None:
                     hint = "give the move, or each segment, a `radius`"
                     yield ("segments", k), "the corner after this segment has no radius", hint
@@ -103,12 +130,12 @@ class PathMove(ToolPathMove):
         text, hint = f"corner: {self.corner} has no radius", "say `corner: round`"
         if self.radius is not None:
             yield ("radius",), text, hint
-        for k, segment in enumerate(self.segments):
+        for k, segment in enumerate(self._listed):
             if segment.radius is not None:
                 yield ("segments", k, "radius"), text, hint
 
     def _flaws_of_laws(self) -> Iterator[Flaw]:
-        for k, segment in enumerate(self.segments):
+        for k, segment in enumerate(self._listed):
             if segment.law is not None and not self.law.time_law.uses_joint_limits:
                 text = f"a segment has a law of its own, and a {self.law.shape} law is one for the whole path"
                 yield ("segments", k, "law"), text, "say law: {shape: time_optimal} in the move"
@@ -125,10 +152,11 @@ class PathMove(ToolPathMove):
 
     def path_from(self, before: Array, robot: Robot) -> PlannedPath:
         """Return the segments, joined, from the pose `before` (4, 4)."""
-        curves, targets, kept = curves_of(before, self.segments, robot)
+        segments, left_out = segments_from(self.segments, before)
+        curves, targets, kept = curves_of(before, segments, robot)
         overlap = self.overlap is not None and len(curves) > 1
         radius = self.radius or 0.0 if self.corner == "round" else 0.0
-        radii = corner_radii(self.segments, kept, radius)
+        radii = corner_radii(segments, kept, radius)
         radii, turned_back = turning_back(curves, radii, kept)
         chain = join(curves, np.array(radii))
         how, start = self.orientation, before[:3, :3]
@@ -139,11 +167,17 @@ class PathMove(ToolPathMove):
         last = targets[-1]
         fixed = "all" if self.orientation == "tangent" else last.orientation
         turns = tuple(target.turn for target in targets)
-        speeds = stepping_speeds(self.segments, kept, chain.borders, self.law, robot.limits.tcp)
+        speeds = stepping_speeds(segments, kept, chain.borders, self.law, robot.limits.tcp)
         path = ToolPath(poses, last.position, fixed, last.tool_axis, turns, chain.progress, speeds)
-        to = self.segments[-1].line or (self.segments[-1].arc and self.segments[-1].arc.to)
-        merged = merged_events(len(self.segments), kept)
-        events = (*merged, *turned_back, *center_events(curves), *(() if overlap else _radius_events(chain)))
+        to = segments[-1].line or (segments[-1].arc and segments[-1].arc.to)
+        merged = merged_events(len(segments), kept)
+        events = (
+            *left_out,
+            *merged,
+            *turned_back,
+            *center_events(curves),
+            *(() if overlap else _radius_events(chain)),
+        )
         ends = [*(corner.s for corner in chain.corners), path.length]
         planned = PlannedPath(
             path,
@@ -152,7 +186,7 @@ class PathMove(ToolPathMove):
             events,
             targets=tuple(
                 (("segments", k, "line") if segment.arc is None else ("segments", k, "arc", "to"), s)
-                for k, segment, s in zip(kept, [self.segments[k] for k in kept], ends, strict=True)
+                for k, segment, s in zip(kept, [segments[k] for k in kept], ends, strict=True)
                 if segment.arc is None or segment.arc.to is not None
             ),
         )
@@ -173,11 +207,15 @@ def _jump(s: float) -> PlanningError:
 
 def _radius_events(chain: Chain) -> tuple[Event, ...]:
     """Return an event for each corner whose radius was shrunk."""
-    return tuple(
-        _shrunk(number, corner)
+    shrunk = [
+        (number, corner)
         for number, corner in enumerate(chain.corners, 1)
         if corner.kind != "smooth" and corner.used < corner.asked * (1 - _SHRUNK)
-    )
+    ]
+    if len(shrunk) <= _MOST_EVENTS:
+        return tuple(_shrunk(*each) for each in shrunk)
+    worst = _shrunk(*min(shrunk, key=lambda each: each[1].used / each[1].asked))
+    return (replace(worst, message=f"{worst.message}; {len(shrunk) - 1} more corners likewise, by less"),)
 
 
 def _shrunk(number: int, corner: Corner) -> Event:

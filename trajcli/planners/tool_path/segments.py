@@ -6,23 +6,28 @@ nothing, and the latter are stopped at.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, core_schema
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Problem, TrajcliError
 from trajcli.geometry.paths.corner import REVERSAL, turn_between
 from trajcli.geometry.paths.position import SAME_POINT, Line, PositionCurve
+from trajcli.geometry.rotation import matrix_from_quaternion, quaternion_from_matrix
 from trajcli.kinematics.following.tool_path import SpeedLimits
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.language.limits import AngularSpeed, ToolSpeed
-from trajcli.language.numbers import Model, Number, refuse
+from trajcli.language.numbers import AT_KEY, SI, FlawError, Model, Number, ReadingContext, refuse, shown
 from trajcli.language.points import NamedTarget
+from trajcli.language.recorded import RecordedPoses
+from trajcli.language.targets import Target
 from trajcli.planners.planner import Event
 from trajcli.planners.tool_path.arc import ArcFields, arc_of, arc_target
 from trajcli.planners.tool_path.law import LawSpec
@@ -30,6 +35,13 @@ from trajcli.planners.tool_path.move import ToolTarget, flaws_of_target, tool_ta
 from trajcli.units import Quantity
 
 _SAME_TURN = 1e-9  # rad: rounding of rotations
+_MERGE = Number(
+    Quantity("length"),
+    "Poses that are no further than this from the one before are left out (length unit).",
+    at_least=0.0,
+)
+
+T = TypeVar("T")
 
 
 class SegmentLaw(Model):
@@ -76,6 +88,142 @@ class Segment(Model):
         if flaws:
             raise refuse(flaws)
         return self
+
+
+_SCHEMA_OF_FILE: dict[str, Any] = {
+    "type": "object",
+    "properties": {
+        "csv": {
+            "type": "string",
+            "description": "A file of poses, relative to the job's folder: columns x, y, z (m, or x_mm ...) "
+            "and qw, qx, qy, qz as `pose` writes them; without these the orientation is kept.",
+        },
+        "in": {"type": "string", "description": "The frame in which they are given; world if left out."},
+        "merge": {
+            **_MERGE.json_schema(),
+            "default": 0,
+            "description": _MERGE.description,
+        },
+    },
+    "required": ["csv"],
+    "additionalProperties": False,
+}
+
+
+class SegmentsField:
+    """Lets {csv: PATH} stand for lines to the poses of a file."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
+        listed = handler.generate_schema(list[Segment])
+        return core_schema.with_info_wrap_validator_function(
+            self._read,
+            listed,
+            serialization=core_schema.wrap_serializer_function_ser_schema(
+                self._write, info_arg=True, schema=listed
+            ),
+        )
+
+    @staticmethod
+    def _read(
+        value: Any,  # noqa: ANN401
+        validate: core_schema.ValidatorFunctionWrapHandler,
+        info: core_schema.ValidationInfo,
+    ) -> Any:  # noqa: ANN401
+        if isinstance(value, RecordedPoses):
+            return value
+        try:
+            if isinstance(value, Mapping):
+                return _from_file(value, info.context or SI)
+        except FlawError as error:
+            raise refuse(error.flaws) from None
+        if isinstance(value, list | tuple) and not value:
+            raise refuse([((), "the list is too short: expected at least 1", None)])
+        return validate(value)
+
+    @staticmethod
+    def _write(
+        value: Any,  # noqa: ANN401
+        serialize: core_schema.SerializerFunctionWrapHandler,
+        info: core_schema.SerializationInfo,
+    ) -> Any:  # noqa: ANN401
+        if not isinstance(value, RecordedPoses):
+            return serialize(value)
+        return value if info.context is None else serialize(_lines_to(value))
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        return {"anyOf": [{**handler(schema), "minItems": 1}, _SCHEMA_OF_FILE]}
+
+
+def _from_file(value: Mapping[str, Any], context: ReadingContext) -> RecordedPoses:
+    """Return the poses of a file, in world, m."""
+    known = ("csv", "in", "merge")
+    unknown = [str(key) for key in value if key not in known]
+    if unknown:
+        from trajcli.suggest import did_you_mean, valid_names
+
+        hint = did_you_mean(unknown[0], known) or valid_names(known)
+        raise FlawError(f"unknown key '{unknown[0]}'", unknown[0], AT_KEY, hint=hint)
+    path = value.get("csv")
+    if not isinstance(path, str):
+        raise FlawError(
+            f"expected the path of a file, got {shown(path)}", *(["csv"] if "csv" in value else [])
+        )
+    if context.read_poses is None:
+        raise FlawError("only a job can read a file of poses", "csv", hint="list the segments")
+    merge = _within("merge", lambda: _MERGE.read(value.get("merge", 0.0), context))
+    poses = replace(context.read_poses(path), merge=merge)
+    if "in" not in value:
+        return poses
+    from trajcli.language.frames import frame_named
+
+    return _in_frame(poses, _within("in", lambda: frame_named(value["in"], context)))
+
+
+def _within(key: str, read: Callable[[], T]) -> T:
+    """Return what is read below a key.
+
+    Raises:
+        FlawError: With the key.
+    """
+    try:
+        return read()
+    except FlawError as error:
+        error.flaws = [((key, *at), text, hint) for at, text, hint in error.flaws]
+        raise
+
+
+def _in_frame(poses: RecordedPoses, frame: Array) -> RecordedPoses:
+    """Return poses that are given in a frame T_world_frame (4, 4), in world."""
+    positions, turned = poses.positions @ frame[:3, :3].T + frame[:3, 3], poses.quaternions
+    if turned is not None:
+        turned = np.asarray(quaternion_from_matrix(frame[:3, :3] @ matrix_from_quaternion(turned)))
+    return RecordedPoses(positions, turned, poses.file, poses.merge)
+
+
+def line_to(poses: RecordedPoses, index: int) -> Segment:
+    """Return the line to one of some poses."""
+    position, turned = tuple(poses.positions[index].tolist()), poses.quaternions
+    rotation = None if turned is None else tuple(turned[index].tolist())
+    return Segment.model_construct(line=Target.model_construct(xyz=position, quat_wxyz=rotation))
+
+
+def _lines_to(poses: RecordedPoses) -> list[Segment]:
+    """Return a line to each of some poses."""
+    return [line_to(poses, index) for index in range(len(poses.positions))]
+
+
+def segments_from(
+    given: Sequence[Segment] | RecordedPoses, before: Array
+) -> tuple[Sequence[Segment], list[Event]]:
+    """Return the segments of a path from a pose (4, 4), and the event of recorded poses that are left out."""
+    if not isinstance(given, RecordedPoses):
+        return given, []
+    poses = given.after(before[:3, 3])
+    count = len(given.positions) - int(given.begins_at(before[:3, 3])) - len(poses.positions)
+    text = f"left out {count} of {len(given.positions)} poses of {given.file}: too near to the one before"
+    return _lines_to(poses), [Event("merged", text)] if count else []
 
 
 def curves_of(
