@@ -29,7 +29,7 @@ from trajcli.language.limits import (
 )
 from trajcli.language.numbers import FieldType, Name, Number
 from trajcli.language.per_joint import JointDistance, PerJoint
-from trajcli.language.poses import Pose
+from trajcli.language.poses import Bits, KukaStatus, Pose
 from trajcli.language.targets import (
     AxisAngleSpec,
     Configuration,
@@ -153,6 +153,7 @@ def _reader_form(reader: FieldType) -> str:
         Efforts: f"[bound](#bounds), {_BY_JOINT}, or `robot`",
         Gravity: "list of 3 numbers",
         Pose: "[pose](#poses)",
+        Bits: "whole number, or bits such as `'B010'`",
         NamedTool: "name of a tool, or a [tool](programs.md#tools)",
         RobotSource: "[robot](#robot)",
         JointDistance: f"number at least 0, {_BY_JOINT}",
@@ -199,6 +200,8 @@ def _type_form(annotation: Any) -> str:  # noqa: ANN401
         bool: "`true` or `false`",
         str: "text",
         float: "number",
+        int: "whole number",
+        KukaStatus: "`{s, t}`",
         Planner: "[move](#moves)",
     }
     return plain[bare] if bare in plain else SECTIONS[bare]

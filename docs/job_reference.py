@@ -18,8 +18,8 @@ from trajcli.job.yaml.load import read_document
 from trajcli.language.dynamics import FrictionSpec, LinkSpec, PayloadSpec
 from trajcli.language.limits import JobLimitsSpec, Scale, ToolLimitsSpec, VelocityByPosition
 from trajcli.language.numbers import MAX_JOINTS
-from trajcli.language.poses import SEQUENCES
-from trajcli.language.targets import AxisAngleSpec, Configuration, EulerSpec, Target
+from trajcli.language.poses import SEQUENCES, Configuration
+from trajcli.language.targets import AxisAngleSpec, EulerSpec, Target
 from trajcli.language.waypoints import Waypoint
 from trajcli.planners import PLANNERS
 from trajcli.planners.planner import Planner
@@ -169,11 +169,13 @@ zero. Poses of points, targets, `tool` and `base` are read alike.
 The sequences of Euler angles are {", ".join(SEQUENCES)}."""
 
 _POSE_TARGETS = """\
-A state is given by its `joints` or by a pose of the tcp in world, not by both. What a pose leaves out is
+A state is given by all its `joints` or by a pose of the tcp in world, not by both. What a pose leaves out is
 free: with `xyz` alone the orientation, with an orientation alone the position; `yaw`, `pitch` and
 `direction` fix a part of the orientation. The joints are found by inverse kinematics: the branch that
 `configuration` names, or else the one nearest to where the arm comes from (for the `start`: nearest to
-where all joints are zero). A rotation matrix may be off by 1e-4: the nearest rotation is taken, and an
+where all joints are zero; of several a remark says which). Some `joints` by name beside a pose are
+[pinned](programs.md#pinned-joints). A rotation matrix may be off by 1e-4: the nearest rotation is taken,
+and an
 event tells so."""
 
 _CONFIGURATION = """\
@@ -181,7 +183,27 @@ Which branch is meant, whatever the signs and zeros of the joints. `left` reache
 stands beside axis 1 (along the x axis of the first link where they meet), `right` over the shoulder; `up` has
 the elbow higher in world (for planar arms: left of the line to the tcp, against the z axis of the table);
 `no_flip` bends joint 5 positively about its z axis in the table. `trajcli ik` lists the branches of a pose by
-these names."""
+these names.
+
+Programs of ABB, KUKA and FANUC name it by flags of their own, which six-axis elbow arms with a spherical
+wrist
+understand, on a rail, too:
+
+| flags | mean |
+|---|---|
+| `abb: [cf1, cf4, cf6, cfx]` | quadrants of joints 1, 4 and 6 (0: from 0 to 90 deg, -1: from -90 deg to \
+0), and cfx: + 4 with the wrist behind joint 1, + 2 behind the lower arm, + 1 with joint 5 below zero |
+| `kuka: {s: 2, t: 35}` | status, a number or `'B010'`: bit 0 with the wrist behind joint 1, bit 1 with \
+joint 3 on the side of 90 deg from the stretched arm, bit 2 with joint 5 above zero; turn, which may be \
+left out: bit 0 with joint 1 below zero, and so on |
+| `fanuc: 'N U T, 0, 0, 0'` | F with joint 5 above zero, else N; U with the elbow bent as at zero, else \
+D; T with the wrist ahead of joint 1, else B; turns of joints 1, 4 and 6, which may be left out: 0 \
+within 180 deg from zero |
+
+The branch is read from where the axes are, the turns from the joint values, which are those of the
+controller. Turns that the range of the joints does not allow on that branch are the event `turns_not_met`.
+On a
+path only the branch counts, and where it is another one the move is refused."""
 
 _WAYPOINTS = """\
 A point that a move passes: the name of a point, or a state with a position and, if it is said when, a

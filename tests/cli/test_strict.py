@@ -67,6 +67,23 @@ def job(kind: str) -> dict[str, Any]:
             {**LINK, "limits": {"velocity": 3, "acceleration": 20, "jerk": 300, "tcp": {"speed": 0.5}}},
             [{"planner": "jerk_limited", "synchronize": "none", "to": {"joints": [1]}}],
         ),
+        "turns_not_met": (
+            {
+                "robot": "irb4600",
+                "limits": {"acceleration": 5, "jerk": 50},
+                "start": {"joints": [0, 0, 0, 0, 0.5, 0]},
+            },
+            [
+                {
+                    "planner": "jerk_limited",
+                    "to": {
+                        "xyz": [1.3, 0.1, 1.2],
+                        "rpy": [0, 2, 0],
+                        "configuration": {"abb": [2, 0, 0, 0]},
+                    },
+                }
+            ],
+        ),
         "within_velocity_by_position": (
             {
                 "robot": {
@@ -250,7 +267,7 @@ def kinds_of_events() -> set[str]:
     return kinds
 
 
-REMARKS = {"refined", "bound", "fastest_found", "zone_stops"}
+REMARKS = {"refined", "bound", "fastest_found", "zone_stops", "branch_taken"}
 # moves that a limit beyond their planner's holds: the kind is put together from the name of the limit
 WITHIN = {"within_velocity_by_position", "within_tool_limits", "within_effort_limits"}
 KINDS = sorted({kind for kind in kinds_of_events() if not kind.startswith("_")} - REMARKS | WITHIN)

@@ -1,11 +1,13 @@
-"""Poses in job files: a position, and one of several forms of orientation."""
+"""Poses in job files: a position, one of several forms of orientation, and the branch that reaches them."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
+from pydantic import Field, model_validator
 from pydantic.json_schema import JsonSchemaValue
 
 from trajcli.curves.piecewise import Array
@@ -16,14 +18,21 @@ from trajcli.language.numbers import (
     TWO_TURNS,
     FieldType,
     FlawError,
+    Model,
     ReadingContext,
     number_schema,
     read_number,
+    refuse,
     shown,
     written_number,
 )
 from trajcli.units import Quantity
 
+if TYPE_CHECKING:
+    from trajcli.kinematics.inverse.vendor_flags import VendorFlags
+
+MAKERS = ("abb", "kuka", "fanuc")
+"""Makers whose flags of a configuration are known."""
 SEQUENCES = ("XYX", "XYZ", "XZX", "XZY", "YXY", "YXZ", "YZX", "YZY", "ZXY", "ZXZ", "ZYX", "ZYZ")
 ROTATIONS = ("rpy", "quat_wxyz", "quat_xyzw", "rotvec", "matrix", "axis_angle", "euler")
 """The forms of a full orientation."""
@@ -284,3 +293,93 @@ _READERS = {
     "axis_angle": _axis_angle,
     "euler": _euler,
 }
+
+
+@comparable
+class Bits(FieldType):
+    """A whole number of bits, or a text of them such as 'B010'."""
+
+    most: int
+    description: str
+
+    def read(self, value: Any, context: ReadingContext) -> int:  # noqa: ANN401
+        """Return the number."""
+        given = value
+        if isinstance(value, str):
+            text = value.strip().strip("'").upper()
+            given = int(text[1:], 2) if re.fullmatch("B[01]{1,8}", text) else value
+        if type(given) is not int or not 0 <= given <= self.most:
+            message = f"expected a whole number from 0 to {self.most} or bits such as 'B010'"
+            raise FlawError(f"{message}, got {shown(value)}")
+        return given
+
+    def json_schema(self) -> JsonSchemaValue:
+        """Return the schema of a number or a text of bits."""
+        number = {"type": "integer", "minimum": 0, "maximum": self.most}
+        return {"anyOf": [number, {"type": "string", "pattern": "^'?[Bb][01]{1,8}'?$"}]}
+
+
+class KukaStatus(Model):
+    """Status and turn of a KUKA position."""
+
+    s: Annotated[int, Bits(31, "Status: bit 0 overhead, bit 1 elbow, bit 2 joint 5 above zero.")]
+    t: Annotated[int, Bits(63, "Turn: a bit for each joint that is below zero.")] | None = None
+
+
+class Configuration(Model):
+    """Which branch of the inverse kinematics is meant; what is left out does not matter."""
+
+    shoulder: Annotated[Literal["left", "right"] | None, Field(description="Side of the arm.")] = None
+    elbow: Annotated[Literal["up", "down"] | None, Field(description="Side of the elbow.")] = None
+    wrist: Annotated[Literal["flip", "no_flip"] | None, Field(description="Side of the wrist.")] = None
+    abb: Annotated[
+        tuple[int, int, int, int] | None,
+        Field(strict=True, description="ABB: quadrants of joints 1, 4 and 6, and the branch 0 to 7."),
+    ] = None
+    kuka: KukaStatus | None = None
+    fanuc: Annotated[
+        str | None,
+        Field(description="FANUC: as in the program, such as 'N U T, 0, 0, 0', with turns or not."),
+    ] = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _list_of_four(cls, data: Any) -> Any:  # noqa: ANN401
+        if not isinstance(data, Mapping) or not isinstance(data.get("abb"), list):
+            return data
+        abb = data["abb"]
+        if len(abb) != 4 or any(type(number) is not int for number in abb) or not 0 <= abb[3] <= 7:
+            hint = "[cf1, cf4, cf6, cfx]: quadrants of joints 1, 4 and 6, and a branch from 0 to 7"
+            raise refuse([(("abb",), "expected four whole numbers, the last from 0 to 7", hint)])
+        return {**data, "abb": tuple(abb)}
+
+    @model_validator(mode="after")
+    def _is_of_one_maker(self) -> Configuration:
+        given = [key for key in ("shoulder", "elbow", "wrist", *MAKERS) if getattr(self, key) is not None]
+        makers = [key for key in given if key in MAKERS]
+        if makers and len(given) > 1:
+            other = next(key for key in given if key != makers[0])
+            raise refuse(
+                [((makers[0],), f"{makers[0]} and {other} exclude each other", "leave one of them out")]
+            )
+        if self.fanuc is not None and self.flags is None:
+            hint = "N or F, U or D, T or B, and perhaps the turns of joints 1, 4 and 6: 'N U T, 0, 0, 0'"
+            raise refuse([(("fanuc",), f"expected a FANUC configuration, got {shown(self.fanuc)}", hint)])
+        return self
+
+    @property
+    def flags(self) -> VendorFlags | None:
+        """What the flags of a maker say; None where none are given."""
+        if self.abb is None and self.kuka is None and self.fanuc is None:
+            return None
+        from trajcli.kinematics.inverse.vendor_flags import abb_flags, fanuc_flags, kuka_flags
+
+        if self.abb is not None:
+            return abb_flags(self.abb)
+        return fanuc_flags(self.fanuc or "") if self.kuka is None else kuka_flags(self.kuka.s, self.kuka.t)
+
+    @property
+    def branch_names(self) -> dict[str, str]:
+        """What is named of the branch itself, such as {"elbow": "up"}."""
+        given = {key: getattr(self, key) for key in ("shoulder", "elbow", "wrist")}
+        return {key: name for key, name in given.items() if name is not None}

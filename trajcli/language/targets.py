@@ -34,7 +34,7 @@ from trajcli.language.numbers import (
     written_number,
 )
 from trajcli.language.per_joint import NamedValues, PerJoint
-from trajcli.language.poses import ROTATIONS, Pose, read_numbers
+from trajcli.language.poses import ROTATIONS, Configuration, Pose, read_numbers
 from trajcli.trajectory import State
 from trajcli.units import Quantity
 
@@ -160,14 +160,6 @@ class EulerSpec(Model):
     angles: Annotated[Row, Numbers(3, _ANGLE, "The three angles (angle unit).")]
 
 
-class Configuration(Model):
-    """Which branch of the inverse kinematics is meant; what is left out does not matter."""
-
-    shoulder: Annotated[Literal["left", "right"] | None, Field(description="Side of the arm.")] = None
-    elbow: Annotated[Literal["up", "down"] | None, Field(description="Side of the elbow.")] = None
-    wrist: Annotated[Literal["flip", "no_flip"] | None, Field(description="Side of the wrist.")] = None
-
-
 class PoseFields(Model):
     """A pose of the tcp in world: a position, an orientation or a part of one, or both."""
 
@@ -212,7 +204,8 @@ class PoseFields(Model):
                 self.full_pose()
             except FlawError as error:
                 raise refuse(error.flaws) from None
-        if not self.gives_pose and (self.configuration is not None or self.tool_axis is not None):
+        somewhere = self.gives_pose or getattr(self, "relative", None) is not None
+        if not somewhere and (self.configuration is not None or self.tool_axis is not None):
             key = "configuration" if self.configuration is not None else "tool_axis"
             raise refuse([((key,), f"{key} says something about a pose, and there is none", "leave it out")])
         return self

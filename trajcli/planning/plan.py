@@ -279,9 +279,10 @@ def _events_of(pose: ResolvedPose | None, index: int | None) -> list[Event]:
     """Return what was conceded to reach a pose."""
     if pose is None:
         return []
-    from trajcli.planning.resolve_poses import nearest_rotation_events
+    from trajcli.planning.resolve_poses import branch_events, nearest_rotation_events
 
-    return [replace(event, move=index) for event in nearest_rotation_events(pose)]
+    events = [*nearest_rotation_events(pose), *pose.events, *(branch_events(pose) if index is None else ())]
+    return [replace(event, move=index) for event in events]
 
 
 def _plan_move(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,15 +12,16 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, PlanningError, Problem
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Robot
-from trajcli.language.targets import Configuration, Target
+from trajcli.language.poses import Configuration
+from trajcli.language.targets import Target
 from trajcli.planners.planner import Event
 
 if TYPE_CHECKING:
     from trajcli.kinematics.inverse.solutions import Solutions
     from trajcli.kinematics.inverse.target import IkTarget
+    from trajcli.kinematics.inverse.vendor_flags import VendorFlags
 
 _NOTED = 1e-12  # a smaller defect of a rotation matrix is rounding
-_CHOICES = ("shoulder", "elbow", "wrist")
 
 
 @frozen
@@ -33,6 +35,7 @@ class ResolvedPose:
         solutions: All of inverse kinematics.
         usable: Those within the limits that have the names the job asks for, shape (branches,).
         branch: Index of the usable one that is nearest to `near`.
+        events: What was conceded to reach it.
     """
 
     target: Target
@@ -41,6 +44,7 @@ class ResolvedPose:
     solutions: Solutions
     usable: NDArray[np.bool_]
     branch: int
+    events: tuple[Event, ...] = ()
 
     @property
     def joints(self) -> Array:
@@ -88,13 +92,56 @@ def _on_nearest_branch(target: Target, robot: Robot, near: Array) -> ResolvedPos
     usable = solutions.within_limits & _of_configuration(
         target.configuration, names, robot, solutions.method.name
     )
+    flags = None if target.configuration is None else target.configuration.flags
+    if flags is not None:
+        usable &= flags.met(robot, solutions.joints)
     if not usable.any():
         words = " ".join(asked_names(target.configuration).values())
         others = sorted({names[k] for k in np.flatnonzero(solutions.within_limits)})
         message = f"{robot.name} does not reach the pose within its limits in the configuration {words}"
         raise PlanningError(Problem(message, f"it does in: {', '.join(others)}"))
+    if flags is not None and flags.turns:
+        return _in_turns(ResolvedPose(target, wanted, near, solutions, usable, 0), flags, robot)
     distance = np.where(usable, np.abs(solutions.joints - near).max(axis=-1), np.inf)
     return ResolvedPose(target, wanted, near, solutions, usable, int(distance.argmin()))
+
+
+def _in_turns(pose: ResolvedPose, flags: VendorFlags, robot: Robot) -> ResolvedPose:
+    """Return the pose on the branch and in the turns that flags say; in the nearest where none are so."""
+    from trajcli.kinematics.inverse.joint_turns import all_turns
+    from trajcli.kinematics.inverse.vendor_flags import first_of_six
+
+    choices = [(k, all_turns(robot, pose.solutions.joints[k])) for k in np.flatnonzero(pose.usable).tolist()]
+    branches = np.concatenate([np.full(len(turned), k) for k, turned in choices])
+    joints = np.concatenate([turned for _, turned in choices])
+    missed = flags.missed_turns(robot, joints)
+    counts = missed.sum(axis=1)
+    far = np.where(counts == counts.min(), np.abs(joints - pose.near).max(axis=1), np.inf)
+    best = int(far.argmin())
+    branch, events = int(branches[best]), tuple[Event, ...]()
+    if missed[best].any():
+        first = first_of_six(robot)
+        wrong = [turn[0] for turn, off in zip(flags.turns, missed[best], strict=True) if off]
+        names = ", ".join(robot.joint_names[first + joint] for joint in wrong)
+        message = f"{flags.text} says turns of {names} that are not on this branch within the limits: "
+        events = (Event("turns_not_met", message + "the nearest are taken"),)
+    values = pose.solutions.joints.copy()
+    values[branch] = joints[best]
+    solutions = replace(pose.solutions, joints=values)
+    return replace(pose, solutions=solutions, branch=branch, events=events)
+
+
+def branch_events(pose: ResolvedPose) -> list[Event]:
+    """Return the remark on which of several branches a start was taken to mean."""
+    configuration, count = pose.target.configuration, int(np.count_nonzero(pose.usable))
+    if count < 2 or (configuration is not None and configuration.flags is not None):
+        return []
+    name = str(pose.solutions.names[pose.branch])
+    which = "the one nearest to zero" if name == "only" else name
+    message = f"{count} branches reach the start: {which} is taken, nearest to zero"
+    if name == "only":
+        message = f"{count} configurations reach the start: {which} is taken"
+    return [Event("branch_taken", f"{message}; `configuration` says another")]
 
 
 def _of_configuration(
@@ -102,7 +149,7 @@ def _of_configuration(
 ) -> NDArray[np.bool_]:
     """Return which branches have the wanted names."""
     chosen = np.ones(len(names), dtype=bool)
-    for word in asked_names(wanted).values():
+    for word in ({} if wanted is None else wanted.branch_names).values():
         has = np.array([word in name.split() for name in names])
         if not has.any():
             known = sorted({part for name in names for part in name.split()} - {"only"})
@@ -113,8 +160,11 @@ def _of_configuration(
 
 
 def asked_names(wanted: Configuration | None) -> dict[str, str]:
-    """Return what a configuration names, such as {"elbow": "up"}."""
-    return {choice: word for choice in _CHOICES if (word := getattr(wanted, choice, None)) is not None}
+    """Return what a configuration names, such as {"elbow": "up"}, or its maker's flags."""
+    if wanted is None:
+        return {}
+    flags = wanted.flags
+    return wanted.branch_names if flags is None else dict([flags.text.split(" ", 1)])
 
 
 def nearest_rotation_events(pose: ResolvedPose) -> list[Event]:

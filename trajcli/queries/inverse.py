@@ -15,7 +15,7 @@ from trajcli.kinematics.inverse.joint_turns import all_turns
 from trajcli.kinematics.inverse.solutions import Solutions, check_reachable
 from trajcli.kinematics.inverse.solve import reached_if_turned, solve
 from trajcli.kinematics.inverse.target import IkTarget, held_jacobian, rank_of, ranks
-from trajcli.language.targets import Configuration
+from trajcli.language.poses import Configuration
 
 if TYPE_CHECKING:
     from trajcli.queries.arm import ArmInUnits
@@ -48,13 +48,14 @@ def find_answers(
                 f"{arm.robot.name} has no choice of {choice} for this target: {solutions.method.reason}",
                 hint=f"leave {choice} out of `configuration`",
             )
-    return solutions, solutions.valid & solutions.named(**wanted)
+    chosen = solutions.valid & solutions.named(**wanted)
+    flags = None if configuration is None else configuration.flags
+    return solutions, chosen if flags is None else chosen & flags.met(arm.robot, solutions.joints)
 
 
 def _named(configuration: Configuration | None) -> dict[str, str]:
     """Return the choices that are named."""
-    given = {} if configuration is None else configuration.model_dump()
-    return {choice: name for choice, name in given.items() if name is not None}
+    return {} if configuration is None else configuration.branch_names
 
 
 def answer_reports(

@@ -40,7 +40,8 @@ from trajcli.kinematics.inverse.target import (
 )
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.language.numbers import FieldPath, Flaw, Model, Number
-from trajcli.language.targets import Configuration, Target, ik_target
+from trajcli.language.poses import Configuration
+from trajcli.language.targets import Target, ik_target
 from trajcli.planners.planner import Event, Planned, Planner
 from trajcli.planners.tool_path.follow import (
     JointMotion,
@@ -307,7 +308,10 @@ def check_arrival(planned: PlannedPath, end: Array, robot: Robot) -> None:
             "wanted": Amount(float(planned.arrival[joint]), 0, joint),
         }
         raise PlanningError(Problem(message, hint, joint=name, amounts=amounts))
-    wanted = {} if planned.configuration is None else planned.configuration.model_dump(exclude_none=True)
+    configuration = planned.configuration
+    wanted = {} if configuration is None else configuration.branch_names
+    if configuration is not None and configuration.flags is not None:
+        configuration.flags.require(robot, end)
     if not wanted:
         return
     from trajcli.kinematics.inverse.pinned_joints import solve_pinned
