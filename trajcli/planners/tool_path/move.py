@@ -195,9 +195,8 @@ class ToolPathMove(Planner):
         for index, segment in enumerate(getattr(self, "segments", ())[:-1]):
             inner = segment.line if segment.arc is None else segment.arc.to
             if inner is not None and inner.pinned is not None:
-                key, hint = "line" if segment.arc is None else "arc", "pin it in the last segment"
                 message = f"a joint is pinned in segment {index}, and goes evenly along the whole path"
-                raise InputError(Problem(message, hint, field=("segments", index, key)))
+                raise InputError(Problem(message, "pin it in the last one", field=("segments", index)))
         if target is None or target.pinned is None:
             return planned
         from trajcli.kinematics.following.pinning import with_pinned
@@ -205,8 +204,7 @@ class ToolPathMove(Planner):
         if planned.overlap is not None:
             hint = "leave `corner: overlap` out, or the joints"
             raise InputError("no joint is pinned where segments overlap in time", hint=hint)
-        path = with_pinned(planned.path, target.pinned.by_index, start, robot)
-        return replace(planned, path=path)
+        return replace(planned, path=with_pinned(planned.path, target.pinned.by_index, start, robot))
 
     def plan(self, start: State, robot: Robot) -> Planned:
         """Return the move along the path.
