@@ -70,6 +70,40 @@ def test_the_error_of_a_piece_bounds_what_each_source_makes(count: int, source: 
     assert min(shares) < (25.0 if (count, source, order) == (3, "qdd", 1) else 5.0)
 
 
+def worst_together(ends: Array, errors: Array, late: float, order: int) -> float:
+    """Return by how much a derivative changes at most where all columns, and the length, are off at once.
+
+    Changes of the columns add up: each value is off to the side that adds to the others, at each place.
+    """
+    worst, right = 0.0, curve(ends, LENGTH, order)
+    for length in (LENGTH - late, LENGTH + late):
+        by_length = curve(ends, length, order) - right
+        parts = np.zeros(U.size)
+        for column, end in product(range(len(ends)), range(2)):
+            unit = np.zeros_like(ends)
+            unit[column, end] = errors[column]
+            parts += np.abs(curve(unit, length, order))
+        worst = max(worst, float((np.abs(by_length) + parts).max()))
+    return worst
+
+
+@pytest.mark.parametrize(("count", "order"), list(product((2, 3), (1, 2, 3))))
+def test_the_error_of_a_piece_bounds_what_all_sources_make_together(count: int, order: int) -> None:
+    """Of any sizes beside each other, of rows that agree and of rows that state far more than they go."""
+    rng, shares = np.random.default_rng([count, order]), []
+    for _ in range(30):
+        powers = LENGTH ** -np.arange(float(count))
+        errors, late = OFF * powers * 10.0 ** rng.uniform(-4, 0, count), LENGTH * 10.0 ** rng.uniform(-8, -5)
+        ends = rng.normal(size=(count, 2)) * powers[:, None] * 10.0 ** rng.uniform(-3, 0, (count, 1))
+        stated = tuple(values[:, None] for values in ends)
+        off = tuple(np.array([error]) for error in errors)
+        bound = float(PieceRows(np.array([LENGTH]), np.array([late]), stated, off).error(order)[0])
+        true = worst_together(ends, errors, late, order)
+        assert true <= bound * (1 + 1e-9)
+        shares.append(bound / true)
+    assert min(shares) < 2.5
+
+
 @pytest.mark.parametrize(("order", "most"), [(0, 1.0), (1, 3.0), (2, 12.0), (3, 24.0)])
 def test_the_error_of_a_spline_bounds_rounding_that_alternates(order: int, most: float) -> None:
     """Positions that are off by turns up and down make the largest derivatives of all."""
