@@ -19,6 +19,9 @@ export function aligned(value, largest) {
   return (value < 0 && !zero ? '\u2212' : '') + text;
 }
 
+/** Return how many units of a quantity of a joint make one in SI: efforts are shown in SI. */
+export const scaleOf = (joint, quantity) => (quantity === 'tau' ? 1 : joint.scale);
+
 /** Return a time in s, with three decimals. */
 export function seconds(time) {
   return `${Math.abs(time) < 5e-4 ? '0.000' : time.toFixed(3)}`;

@@ -1,7 +1,8 @@
 // What is known of the motion: findings, events, moves, and the joints now.
 import { element } from './dom.js';
-import { aligned, seconds } from './numbers.js';
+import { aligned, scaleOf, seconds } from './numbers.js';
 
+const ORDERS = ['q', 'qd', 'qdd', 'qddd', 'tau'];
 const FEW = 60; // lines of a list that are made at once
 
 /** Return a list whose lines seek to their time. */
@@ -50,13 +51,13 @@ export class JointTable {
     const quantities = motion.quantities.filter((name) => name !== 'qddd');
     this.largest = Object.fromEntries(quantities.map((name) => [name, motion.values[name].map((_, joint) => {
       const alike = motion.values[name].filter((_, other) => scene.joints[other].units[0] === scene.joints[joint].units[0]);
-      const { scale } = scene.joints[joint];
+      const scale = scaleOf(scene.joints[joint], name);
       return Math.max(...alike.map((values) => values.reduce((most, value) => Math.max(most, Math.abs(value * scale)), 0)));
     })]));
-    const symbols = { q: 'q', qd: 'q\u0307', qdd: 'q\u0308' };
+    const symbols = { q: 'q', qd: 'q\u0307', qdd: 'q\u0308', tau: '\u03c4' };
     const mixed = new Set(scene.joints.map((joint) => joint.units[0])).size > 1;
-    const head = element('tr', {}, element('th', { scope: 'col', text: 'joint' }), ...quantities.map((name, order) =>
-      element('th', { scope: 'col' }, element('span.symbol', { text: symbols[name] }), mixed ? '' : ` ${scene.joints[0].units[order]}`)));
+    const head = element('tr', {}, element('th', { scope: 'col', text: 'joint' }), ...quantities.map((name) =>
+      element('th', { scope: 'col' }, element('span.symbol', { text: symbols[name] }), mixed ? '' : ` ${scene.joints[0].units[ORDERS.indexOf(name)]}`)));
     this.cells = [];
     const rows = scene.joints.map((joint, index) => {
       const swatch = element('span.swatch');
@@ -85,7 +86,7 @@ export class JointTable {
 
   update() {
     for (const { name, index, node } of this.cells) {
-      const { scale } = this.scene.joints[index];
+      const scale = scaleOf(this.scene.joints[index], name);
       node.textContent = aligned(this.motion.value(name, index, this.clock.time) * scale, this.largest[name][index]);
     }
   }

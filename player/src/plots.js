@@ -1,11 +1,11 @@
 // Plots of the joints over time: linked to each other and to the clock, with limits, moves and findings.
 import uPlot from 'uplot';
 import { element } from './dom.js';
-import { seconds, significant } from './numbers.js';
+import { scaleOf, seconds, significant } from './numbers.js';
 
-const NAMES = { q: 'Position', qd: 'Velocity', qdd: 'Acceleration', qddd: 'Jerk' };
-const SYMBOLS = { q: 'q', qd: 'q\u0307', qdd: 'q\u0308', qddd: 'q\u20db' };
-const ORDERS = ['q', 'qd', 'qdd', 'qddd'];
+const NAMES = { q: 'Position', qd: 'Velocity', qdd: 'Acceleration', qddd: 'Jerk', tau: 'Effort' };
+const SYMBOLS = { q: 'q', qd: 'q\u0307', qdd: 'q\u0308', qddd: 'q\u20db', tau: '\u03c4' };
+const ORDERS = ['q', 'qd', 'qdd', 'qddd', 'tau'];
 const NEAR = 1.6; // times the range of the curves: a limit that is nearer is always in view
 const HEIGHT = { beside: 168, alone: 240 }; // of a plot, px: beside the view in space, or without one
 
@@ -31,10 +31,10 @@ export class Plots {
 
   card(quantity) {
     const room = element('div.plot-room');
-    const limit = this.scene.limits.some(({ bounds }) => bounds[ORDERS.indexOf(quantity)].flat().some((bound) => bound !== null));
+    const limit = this.scene.limits.some(({ bounds }) => (bounds[ORDERS.indexOf(quantity)] ?? []).flat().some((bound) => bound !== null));
     const key = limit ? [element('span.limit-key', { text: 'limit' })] : [];
     const heading = element('h3', {}, element('span', {}, `${NAMES[quantity]} `, element('span.symbol', { text: SYMBOLS[quantity] })), ...key);
-    const card = element('section.plot', { 'aria-label': `${NAMES[quantity]} of the joints over time` }, heading, room);
+    const card = element('section.plot', { 'aria-label': `${NAMES[quantity]} of the joints over time`, 'data-quantity': quantity }, heading, room);
     this.holder.append(card);
     return { quantity, card, room, order: ORDERS.indexOf(quantity) };
   }
@@ -78,7 +78,7 @@ export class Plots {
     const { joints } = this.scene;
     const units = this.unitsOf(order);
     const width = Math.max(room.clientWidth, 120);
-    const data = [this.motion.times, ...joints.map(({ scale }, joint) => Array.from(this.motion.values[quantity][joint], (value) => value * scale))];
+    const data = [this.motion.times, ...joints.map((joint, index) => Array.from(this.motion.values[quantity][index], (value) => value * scaleOf(joint, quantity)))];
     const series = joints.map((joint, index) => {
       const { color, dash } = this.theme.joint(index);
       return { label: joint.name, scale: joint.units[order], stroke: color, dash, width: 1.7, pxAlign: 0, points: { show: false }, show: !this.hidden.has(index) };
@@ -183,9 +183,10 @@ export class Plots {
     const lines = new Map();
     for (const { start, end, bounds } of this.scene.limits) {
       for (const joint of joints) {
-        for (const bound of bounds[order][joint]) {
+        for (const bound of bounds[order]?.[joint] ?? []) {
           if (bound === null) continue;
-          const { scale, units } = this.scene.joints[joint];
+          const { units } = this.scene.joints[joint];
+          const scale = scaleOf(this.scene.joints[joint], ORDERS[order]);
           const key = [start, bound * scale, units[order]].join();
           if (!lines.has(key)) lines.set(key, { value: bound * scale, start, end, unit: units[order], joints: [] });
           lines.get(key).joints.push(joint);
@@ -238,7 +239,8 @@ export class Plots {
     ctx.fillStyle = this.theme.css('--bad');
     for (const { time, order: of, joint, value } of this.scene.findings) {
       if (of !== order || joint === null || this.hidden.has(joint)) continue;
-      const { scale, units } = this.scene.joints[joint];
+      const { units } = this.scene.joints[joint];
+      const scale = scaleOf(this.scene.joints[joint], ORDERS[order]);
       const [x, y] = [plot.valToPos(time, 'x', true), plot.valToPos(value * scale, units[order], true)];
       ctx.beginPath();
       ctx.arc(x, y, size, 0, 2 * Math.PI);

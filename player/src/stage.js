@@ -5,6 +5,8 @@ import {
 } from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { Arm, axesOf } from './arm.js';
+import { Labels } from './labels.js';
+import { Loads } from './load.js';
 import { SCENE } from './theme.js';
 import { Trace } from './trace.js';
 
@@ -43,6 +45,8 @@ export class Stage {
     this.trace = new Trace(scene.tool, motion.count, 0.0027 * this.arm.size, theme);
     this.scene.add(this.trace.line);
     this.addWaypoints(scene.waypoints);
+    this.labels = new Labels(holder);
+    this.loads = new Loads(scene.loads, this.arm, this.labels, motion.end);
     this.bounds = this.boundsOf();
     this.addLights();
     this.addFloor();
@@ -153,6 +157,7 @@ export class Stage {
     this.ghostMaterial.color.set(colors.ghost);
     this.ghostMaterial.emissive.set(colors.ghost).multiplyScalar(0.35);
     this.dotMaterial.color.set(colors.waypoint);
+    this.loads.material.color.set(colors.load);
     this.shade.material.opacity = colors.shadow;
     Object.assign(this.sky, { color: new Color(colors.sky), groundColor: new Color(colors.ground), intensity: colors.fill });
     this.sun.intensity = colors.sun;
@@ -227,6 +232,7 @@ export class Stage {
 
   seek(time) {
     this.arm.move(this.motion.joints(time));
+    this.loads.seek(time);
     this.draw();
   }
 
@@ -237,6 +243,7 @@ export class Stage {
     requestAnimationFrame(() => {
       this.wanted = false;
       this.renderer.render(this.scene, this.camera);
+      this.labels.place(this.camera, this.holder.clientWidth, this.holder.clientHeight);
     });
   }
 }

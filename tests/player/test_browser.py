@@ -215,6 +215,31 @@ def test_a_joint_at_rest_has_no_velocity(view: Callable[..., Any], pick: Path) -
     assert view(pick).page.evaluate(values, (hold.start + hold.end) / 2) == [0] * 12
 
 
+def test_a_load_is_drawn_while_it_is_carried(view: Callable[..., Any], tmp_path: Path) -> None:
+    plan = planned(ROOT / "examples/pick_carry_place.yaml")
+    page = view(written(tmp_path, plan)).page
+    assert page.locator(".joints thead th").all_inner_texts()[-1] == "τ N m"
+    assert page.locator("[data-quantity=tau] canvas").count() == 1
+    assert page.locator("[data-quantity=tau] .limit-key").count() == 1
+    span, robot = plan.trajectory.spans[2], plan.moves[2].robot
+    ball = """time => { trajcli.seek(time); const { mesh } = trajcli.stage.loads.all[0]; const { elements } = mesh.matrixWorld;
+        return [mesh.visible, elements[12], elements[13], elements[14]]; }"""
+    for time, carried in (
+        (0.0, False),
+        (span.start - 1e-6, False),
+        (span.start, True),
+        (0.3 * span.start + 0.7 * span.end, True),
+        (span.end, False),
+        (plan.trajectory.duration, False),
+    ):
+        visible, *place = page.evaluate(ball, time)
+        assert visible == carried
+        pose = forward(robot, plan.trajectory.curve.evaluate(time))
+        assert place == pytest.approx((pose @ [0, 0, 0.08, 1])[:3].tolist(), abs=3e-6)
+        shown = "visible" if carried else "hidden"  # with the next frame
+        wait_until(page, f"document.querySelector('.label.load').style.visibility === '{shown}'", 10)
+
+
 def test_the_values_under_the_pointer_are_shown(view: Callable[..., Any], pick: Path) -> None:
     page = view(pick).page
     plot = page.locator(".u-over").nth(1)

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.columns import Column, parse_column
+from trajcli.columns import EFFORT, Column, parse_column
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Place, Problem, utf8
 from trajcli.findings import Finding
 from trajcli.judge.file import CheckedFile
-from trajcli.kinematics.robot import QUANTITIES, JointType, Robot
+from trajcli.kinematics.robot import JointType, Robot
 from trajcli.player.rows import ORDERS, DrawnRows, rows_of_samples
-from trajcli.player.scene import geometry_of, joints_in_units, limits_of, waypoints_of
+from trajcli.player.scene import geometry_of, joints_in_units, limits_of, order_of, waypoints_of
 from trajcli.queries.arm import open_sheet
 from trajcli.queries.forward import refuse_far
 from trajcli.streams.byte_source import ByteSource
@@ -26,7 +26,7 @@ from trajcli.units import AngleUnit, LengthUnit, Units, amount_text, joint_quant
 from trajcli.version import __version__
 
 _NO_ROBOT = "A file of joint values says nothing of the arm: name it with --robot to see it move."
-_PLAIN_UNITS = ["rad or m", "rad/s or m/s", "rad/s² or m/s²", "rad/s³ or m/s³"]
+_PLAIN_UNITS = ["rad or m", "rad/s or m/s", "rad/s² or m/s²", "rad/s³ or m/s³", "N m or N"]
 _SUFFIXES: dict[str | None, JointType] = {"deg": "revolute", "mm": "prismatic"}
 
 
@@ -67,7 +67,7 @@ def scene_of_file(
         "moves": [_move(label, times[low], times[high]) for label, low, high in moves],
         "limits": limits_of(limits),
         "waypoints": waypoints_of(waypoints) if robot is not None and robot.convention else [],
-        **{key: [] for key in ("events", "steps")},
+        **{key: [] for key in ("events", "steps", "loads")},
         "notes": [*_judgement_notes(checked), *_notes(rows, kept, times)],
     }
 
@@ -85,11 +85,10 @@ def _judgement(checked: CheckedFile | str | None, units: Units, start: float) ->
 
 
 def _finding(finding: Finding, robot: Robot, units: Units, start: float) -> dict[str, Any]:
-    of_limit = finding.kind in QUANTITIES and finding.value is not None
     return {
         "time": start if finding.time is None else finding.time,
         "joint": robot.joint_names.index(finding.joint) if finding.joint in robot.joint_names else None,
-        "order": QUANTITIES.index(finding.kind) if of_limit else None,
+        "order": None if finding.value is None else order_of(finding.kind),
         "value": finding.value,
         "label": "" if finding.move is None else f"move {finding.move}:",
         "message": finding.text(lambda amount: amount_text(amount, robot.joint_types, units)),
@@ -131,10 +130,10 @@ def _joint_values(table: Table, columns: Sequence[Column], robot: Robot | None) 
     """Return the positions, and what derivatives the file has of all joints, each (N, n), SI."""
     joints = _joint_count(table, columns, robot)
     values = {}
-    for name in ORDERS:
+    for name in (*ORDERS, EFFORT):
         found = _of_kind(columns, name)
         if [column.joint for column in found] == list(range(joints)):
-            if robot is not None:
+            if robot is not None and name != EFFORT:
                 _check_units(table, found, robot)
             each = np.stack([table.column(column.name) * column.factor for column in found], axis=1)
             values[name] = each

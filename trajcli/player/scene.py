@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trajcli.columns import EFFORT
 from trajcli.curves.piecewise import Array
 from trajcli.findings import Finding
 from trajcli.grids import AT_BREAK
@@ -19,7 +20,7 @@ from trajcli.planning.plan import Plan
 from trajcli.planning.tightest import tightest_of_moves
 from trajcli.player.rows import ORDERS, DrawnRows, packed, rows_of_curve
 from trajcli.trajectory import Span, Trajectory
-from trajcli.units import Quantity, Units, factor, joint_quantity, unit_name
+from trajcli.units import Quantity, Units, effort_unit, factor, joint_quantity, unit_name
 from trajcli.version import __version__
 
 _SUPERSCRIPTS = str.maketrans({"2": "²", "3": "³"})
@@ -34,7 +35,7 @@ def scene_of_plan(plan: Plan) -> dict[str, Any]:
     loaded, trajectory, verdict = plan.loaded, plan.trajectory, plan.verdict
     spans = [span for span in trajectory.spans if span.duration > 0]
     when = [finding.time for finding in verdict.findings if finding.time is not None]
-    rows = rows_of_curve(trajectory.curve, [span.start for span in spans], when)
+    rows, loads = _rows_and_loads(plan, [span.start for span in spans], when)
     count = len(verdict.findings)
     state, text = ("verified", "verified") if verdict.passed else ("violated", _counted(count, "finding"))
     moves = _counted(loaded.move_count, "move")
@@ -50,6 +51,7 @@ def scene_of_plan(plan: Plan) -> dict[str, Any]:
         "rows": rows.packed(),
         "moves": [*_moves(plan)],
         "limits": limits_of([(s.start, s.end, plan.moves[s.index].robot.limits) for s in spans]),
+        "loads": loads,
         "waypoints": waypoints_of([*_waypoints(plan)]) if loaded.robot.convention else [],
         "findings": [_finding(plan, finding) for finding in verdict.findings],
         "events": [_event(plan, event) for event in (*plan.events, *plan.remarks) if not event.is_internal],
@@ -58,14 +60,34 @@ def scene_of_plan(plan: Plan) -> dict[str, Any]:
     }
 
 
+def _rows_and_loads(
+    plan: Plan, borders: Sequence[float], when: Sequence[float]
+) -> tuple[DrawnRows, list[dict[str, Any]]]:
+    """Return the rows of a plan, with efforts where some are limited or a load is carried, and the loads."""
+    rows = rows_of_curve(plan.trajectory.curve, borders, when)
+    if plan.loaded.robot.convention is None:
+        return rows, []
+    from trajcli.player.loads import efforts_of_rows, loads_of, shows_efforts
+
+    if shows_efforts(plan):
+        rows = DrawnRows(rows.times, {**rows.values, EFFORT: efforts_of_rows(plan, rows)})
+    return rows, loads_of(plan)
+
+
 def joints_in_units(names: Sequence[str], types: Sequence[JointType], units: Units) -> list[dict[str, Any]]:
-    """Return the name of each joint, its units by order of the derivative, and how many make one in SI."""
+    """Return the name of each joint, its units by order of the derivative, and how many make one in SI.
+
+    The last unit is that of efforts, which are in SI.
+    """
     return [
         {
             "name": name,
             "units": [
-                unit_name(joint_quantity(kind, order), units).translate(_SUPERSCRIPTS).replace("^", "")
-                for order in range(len(ORDERS))
+                *(
+                    unit_name(joint_quantity(kind, order), units).translate(_SUPERSCRIPTS).replace("^", "")
+                    for order in range(len(ORDERS))
+                ),
+                effort_unit(kind),
             ],
             "scale": 1 / factor(joint_quantity(kind), units),
         }
@@ -166,6 +188,7 @@ def limits_of(parts: Sequence[tuple[float, float, Limits]]) -> list[dict[str, An
     intervals: list[dict[str, Any]] = []
     for start, end, limits in parts:
         bounds = [_finite(limits.of_order(order)) for order in range(len(QUANTITIES))]
+        bounds += [_finite(limits.effort)] if limits.has_effort else []
         if intervals and intervals[-1]["bounds"] == bounds:
             intervals[-1]["end"] = end
         else:
@@ -220,16 +243,21 @@ def _interval(span: Span) -> dict[str, float]:
 
 def _finding(plan: Plan, finding: Finding) -> dict[str, Any]:
     names = plan.trajectory.joint_names
-    of_limit = finding.kind in QUANTITIES
     return {
         "time": finding.time,
         "joint": names.index(finding.joint) if finding.joint in names else None,
-        "order": QUANTITIES.index(finding.kind) if of_limit else None,
+        "order": order_of(finding.kind),
         "value": finding.value,
         "label": "" if finding.move is None else f"{plan.loaded.called(finding.move)}:",
         "message": finding.text(plan.loaded.say),
         "hint": finding.hint,
     }
+
+
+def order_of(kind: str) -> int | None:
+    """Return the number of the plot that a kind of limit stands in; None where it stands in none."""
+    plots = (*QUANTITIES, "effort")
+    return plots.index(kind) if kind in plots else None
 
 
 def _event(plan: Plan, event: Event) -> dict[str, Any]:

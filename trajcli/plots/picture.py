@@ -120,7 +120,7 @@ def _sensible(motion: PlannedMotion | None, records: Sequence[DrawnTable]) -> li
     limited = any(np.isfinite(move.robot.limits.jerk).any() for move in motion.moves)
     if limited or all(move.continuity > 1 for move in motion.moves):
         names.append("qddd")  # elsewhere the acceleration steps, and says all
-    if motion.has_effort_limits or any(EFFORT in record.shows() for record in records):
+    if motion.has_effort_limits or motion.carries or any(EFFORT in record.shows() for record in records):
         names.append(EFFORT)
     along_path = motion.plan.flyby is not None or any(move.planned.tool is not None for move in motion.moves)
     if along_path or any(kind.stated(move.robot.limits) for move in motion.moves for kind in SPEED_KINDS):

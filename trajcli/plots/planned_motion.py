@@ -84,6 +84,12 @@ class PlannedMotion:
         """Whether an effort is limited in some move."""
         return any(move.robot.limits.has_effort for move in self.moves)
 
+    @property
+    def carries(self) -> bool:
+        """Whether the tool carries a load in some move."""
+        loads = (move.robot.payload for move in self.moves)
+        return any(load is not None and load.mass > 0 for load in loads)
+
     def joint_trace(self, joint: int, quantity: str) -> tuple[Array, Array]:
         """Return times (N,) and values (N,) of a quantity of a joint, steps and extremes included."""
         if quantity == EFFORT:
