@@ -9,7 +9,7 @@ const HELP = [
   ['+  \u2212', 'faster, slower'],
   ['l', 'repeat'],
   ['0  1  2  3', 'view from the corner, front, side, top'],
-  ['g  f  t  r', 'ghosts, frames, tool path, grid'],
+  ['g  f  t  r  z', 'ghosts, frames, tool path, grid, zones'],
   ['j', 'jerk'],
   ['d', 'dark or light'],
   ['?', 'this page'],

@@ -6,10 +6,11 @@ import { Motion } from './motion.js';
 import { JointTable, findingPanels, reportPanels } from './panels.js';
 import { Plots } from './plots.js';
 import { Stage } from './stage.js';
+import { Status } from './status.js';
 import { Theme } from './theme.js';
 import { Transport } from './timeline.js';
 
-const PARTS = [['ghosts', 'Ghosts', 'Ghosts of the arm at waypoints (g)'], ['frames', 'Frames', 'Frames of the links (f)'], ['trace', 'Path', 'Path of the tool (t)'], ['grid', 'Grid', 'Grid (r)']];
+const PARTS = [['ghosts', 'Ghosts', 'Ghosts of the arm at waypoints (g)'], ['frames', 'Frames', 'Frames of the links (f)'], ['trace', 'Path', 'Path of the tool (t)'], ['zones', 'Zones', 'Zones about corners, and the programmed path in them (z)'], ['grid', 'Grid', 'Grid (r)']];
 const VIEWS = [['corner', '0'], ['front', '1'], ['side', '2'], ['top', '3']];
 
 function toggle(label, title, pressed, onchange) {
@@ -42,7 +43,7 @@ function viewport(scene, motion, theme) {
   if (!scene.robot) return without(scene.no_geometry);
   try {
     const stage = new Stage(holder, scene, motion, theme);
-    const chips = PARTS.map(([part, label, title]) => [part, toggle(label, title, part !== 'frames', (on) => stage.show(part, on))]);
+    const chips = PARTS.filter(([part]) => part !== 'zones' || scene.zones.length).map(([part, label, title]) => [part, toggle(label, title, part !== 'frames', (on) => stage.show(part, on))]);
     const reset = element('button.chip.reset', { type: 'button', title: 'See everything (0)', 'aria-label': 'See everything', onclick: () => stage.look('corner') }, icon(...ICONS.reset));
     const cell = element('span.cell', { text: `grid ${Number((stage.cell * scene.length.scale).toPrecision(3))} ${scene.length.unit}` });
     holder.append(element('div.chips', {}, ...chips.map(([, chip]) => chip), reset), element('div.legend', {}, stage.trace.legend, cell));
@@ -79,7 +80,7 @@ function keysOf(clock, scene, { stage, chips }, theme, dialog, jerk) {
   };
   if (stage) {
     for (const [view, key] of VIEWS) actions[key] = () => stage.look(view);
-    for (const [key, part] of [['g', 'ghosts'], ['f', 'frames'], ['t', 'trace'], ['r', 'grid']]) actions[key] = () => chips[part].click();
+    for (const [key, part] of [['g', 'ghosts'], ['f', 'frames'], ['t', 'trace'], ['r', 'grid'], ['z', 'zones']]) actions[key] = () => chips[part]?.click();
   }
   return actions;
 }
@@ -90,6 +91,7 @@ function start(scene) {
   const clock = new Clock(motion.start, motion.end);
   const dialog = helpDialog();
   const view = viewport(scene, motion, theme);
+  const status = new Status(scene, clock, view.stage);
   const plots = new Plots(scene, motion, clock, theme);
   const table = new JointTable(scene, motion, plots, clock, theme);
   const limits = toggle('All limits', 'Zoom out until every limit can be seen', false, (on) => plots.setAllLimits(on));
@@ -97,13 +99,14 @@ function start(scene) {
   const bar = element('div.bar', {}, element('h2', { text: 'Joints' }), element('div.chips', {}, limits, ...(jerk ? [jerk] : [])));
   const side = element('aside', {}, ...findingPanels(scene, clock), bar, table.element, plots.holder, ...reportPanels(scene, clock), element('footer', { text: scene.made_by }));
   document.body.classList.toggle('flat', !view.stage);
-  document.body.append(header(scene, theme, dialog), element('main', {}, view.holder, new Transport(scene, clock).element), side, dialog);
+  document.body.append(header(scene, theme, dialog), element('main', {}, view.holder, status.element, new Transport(scene, clock).element), side, dialog);
   plots.rebuild();
   if (view.stage) {
     clock.listen(() => view.stage.seek(clock.time));
     view.stage.resize();
     view.stage.look('corner');
   }
+  clock.listen(() => status.update());
   listenToKeys(keysOf(clock, scene, view, theme, dialog, jerk));
   clock.seek(clock.start);
   globalThis.trajcli = {

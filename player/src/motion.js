@@ -64,11 +64,15 @@ export class Motion {
   /** Return a quantity of a joint at a time, SI, straight between rows; positions as they are drawn. */
   value(name, joint, time) {
     if (name === 'q') return this.joints(time)[joint];
+    return this.between(this.values[name][joint], time);
+  }
+
+  /** Return a column at a time, straight between rows. */
+  between(column, time) {
     const row = this.rowAt(time);
     const next = Math.min(row + 1, this.count - 1);
     const length = this.times[next] - this.times[row];
     const s = length > 0 ? (time - this.times[row]) / length : 0;
-    const column = this.values[name][joint];
     return column[row] + s * (column[next] - column[row]);
   }
 }

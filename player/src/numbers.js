@@ -14,9 +14,13 @@ export function significant(value, digits = 4) {
 export function aligned(value, largest) {
   const whole = Math.max(0, Math.floor(Math.log10(Math.max(largest, 1e-9))));
   const decimals = Math.min(Math.max(3 - whole, 0), 6);
+  return fixed(value, decimals);
+}
+
+/** Return a value with so many decimals; what is rounded to zero has no sign. */
+export function fixed(value, decimals) {
   const text = Math.abs(value).toFixed(decimals);
-  const zero = Number(text) === 0;
-  return (value < 0 && !zero ? '\u2212' : '') + text;
+  return (value < 0 && Number(text) !== 0 ? '\u2212' : '') + text;
 }
 
 /** Return how many units of a quantity of a joint make one in SI: efforts are shown in SI. */

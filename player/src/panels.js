@@ -35,11 +35,12 @@ export function findingPanels({ findings }, clock) {
 /** Return the sections of events, notes, moves and steps; those without lines are left out. */
 export function reportPanels(scene, clock) {
   const panels = [];
-  const { events, steps, moves, notes } = scene;
+  const { events, steps, moves, notes, zones } = scene;
   if (events.length) panels.push(section('Events', events.length, list(events, clock, 'event')));
   if (notes.length) panels.push(section('Notes', notes.length, element('ul.notes', {}, ...notes.map((text) => element('li', { text })))));
   const lines = moves.map(({ start, label, detail }) => ({ time: start, label, message: detail }));
   if (lines.length) panels.push(section('Moves', lines.length, list(lines, clock, 'move-line')));
+  if (zones.length) panels.push(section('Zones', zones.length, list(zones, clock, 'zone-line'), zones.length <= 12));
   if (steps.length) panels.push(section('Steps in acceleration', steps.length, list(steps, clock, 'step'), false));
   return panels;
 }

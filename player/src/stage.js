@@ -5,10 +5,11 @@ import {
 } from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { Arm, axesOf } from './arm.js';
-import { Labels } from './labels.js';
+import { Labels, worldPlace } from './labels.js';
 import { Loads } from './load.js';
 import { SCENE } from './theme.js';
 import { Trace } from './trace.js';
+import { Zones } from './zones.js';
 
 const MOST_GHOSTS = 10;
 const VIEWS = { corner: [1, -1.45, 0.75], front: [1, 0, 0.0001], side: [0, -1, 0.0001], top: [0.0001, 0, 1] };
@@ -42,11 +43,13 @@ export class Stage {
     };
     this.arm = new Arm(scene.robot, this.materials, true);
     this.scene.add(this.arm.root);
-    this.trace = new Trace(scene.tool, motion.count, 0.0027 * this.arm.size, theme);
+    this.trace = new Trace(scene.tool, motion, 0.0027 * this.arm.size, theme);
     this.scene.add(this.trace.line);
-    this.addWaypoints(scene.waypoints);
     this.labels = new Labels(holder);
     this.loads = new Loads(scene.loads, this.arm, this.labels, motion.end);
+    this.addWaypoints(scene.waypoints);
+    this.zones = new Zones(scene.zones, this.arm.size);
+    this.scene.add(this.zones.group);
     this.bounds = this.boundsOf();
     this.addLights();
     this.addFloor();
@@ -74,12 +77,14 @@ export class Stage {
     const ball = new SphereGeometry(0.0085 * this.arm.size, 20, 14);
     const stride = Math.max(1, Math.ceil(waypoints.length / MOST_GHOSTS));
     const one = this.ghostMaterial;
-    waypoints.forEach(({ joints }, index) => {
+    this.names = [];
+    waypoints.forEach(({ joints, name }, index) => {
       const ghost = new Arm(this.arm.robot, { link: one, joint: one, prismatic: one, dark: one });
       ghost.move(joints);
       const dot = new Mesh(ball, this.dotMaterial);
       dot.position.copy(ghost.toolPosition());
       this.dots.add(dot);
+      if (name) this.names.push(this.labels.add(name, worldPlace(dot), 'point'));
       if (index % stride === 0) this.ghosts.add(ghost.root);
     });
     const parts = [];
@@ -158,6 +163,7 @@ export class Stage {
     this.ghostMaterial.emissive.set(colors.ghost).multiplyScalar(0.35);
     this.dotMaterial.color.set(colors.waypoint);
     this.loads.material.color.set(colors.load);
+    this.zones.paint(colors);
     this.shade.material.opacity = colors.shadow;
     Object.assign(this.sky, { color: new Color(colors.sky), groundColor: new Color(colors.ground), intensity: colors.fill });
     this.sun.intensity = colors.sun;
@@ -220,13 +226,14 @@ export class Stage {
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
     if (this.untouched) this.look(this.view);
-    this.draw();
+    this.render(); // at once: a canvas of a new size is empty
   }
 
-  /** Show or hide a part: 'ghosts', 'frames', 'trace' or 'grid'. */
+  /** Show or hide a part: 'ghosts', 'frames', 'trace', 'zones' or 'grid'. */
   show(part, visible) {
-    const parts = { ghosts: [this.ghosts], frames: this.arm.axes, trace: [this.trace.line, this.dots], grid: [this.grid, this.world] };
+    const parts = { ghosts: [this.ghosts], frames: this.arm.axes, trace: [this.trace.line, this.dots], grid: [this.grid, this.world], zones: [this.zones.group] };
     for (const object of parts[part]) object.visible = visible;
+    if (part === 'trace') for (const name of this.names) name.hidden = !visible;
     this.draw();
   }
 
@@ -242,8 +249,12 @@ export class Stage {
     this.wanted = true;
     requestAnimationFrame(() => {
       this.wanted = false;
-      this.renderer.render(this.scene, this.camera);
-      this.labels.place(this.camera, this.holder.clientWidth, this.holder.clientHeight);
+      this.render();
     });
+  }
+
+  render() {
+    this.renderer.render(this.scene, this.camera);
+    this.labels.place(this.camera, this.holder.clientWidth, this.holder.clientHeight);
   }
 }

@@ -10,11 +10,13 @@ const STILL = 1e-7; // m: a tool that moves less between two rows does not move
 export class Trace {
   /**
    * @param {object} tool Positions and speeds on the rows of the motion.
-   * @param {number} count The number of rows.
+   * @param {Motion} motion The rows.
    * @param {number} thickness Radius of the line, m.
    * @param {Theme} theme The colours.
    */
-  constructor(tool, count, thickness, theme) {
+  constructor(tool, motion, thickness, theme) {
+    const { count } = motion;
+    this.motion = motion;
     this.theme = theme;
     const [x, y, z] = unpack(tool.positions, count);
     [this.speeds] = unpack(tool.speeds, count);
@@ -27,6 +29,11 @@ export class Trace {
     this.lay(thickness);
     this.legend = this.makeLegend(tool);
     this.paint();
+  }
+
+  /** Return the speed of the tool at a time, m/s. */
+  speedAt(time) {
+    return this.motion.between(this.speeds, time);
   }
 
   /** Lay a cylinder from each row to the next. */

@@ -240,6 +240,47 @@ def test_a_load_is_drawn_while_it_is_carried(view: Callable[..., Any], tmp_path:
         wait_until(page, f"document.querySelector('.label.load').style.visibility === '{shown}'", 10)
 
 
+def test_zones_signals_and_the_move_of_now(view: Callable[..., Any], tmp_path: Path) -> None:
+    plan = planned(ROOT / "examples/signals.yaml")
+    viewed = view(written(tmp_path, plan))
+    page = viewed.page
+    (zone,) = plan.flyby.zones if plan.flyby is not None else ()
+    balls = "trajcli.stage.zones.group.children.filter(one => one.geometry.type === 'SphereGeometry').map(one => [...one.position.toArray(), one.scale.x])"
+    corner = forward(plan.loaded.robot, zone.programmed[len(zone.programmed) // 2])[:3, 3]
+    assert page.evaluate(balls)[0] == pytest.approx([*corner, 0.015], abs=1e-6)
+    assert page.evaluate("trajcli.stage.zones.dashes.count") > 10
+    page.keyboard.press("z")
+    assert not page.evaluate("trajcli.stage.zones.group.visible")
+    assert page.locator(".lane-name").all_inner_texts() == ["pressure", "glue"]
+    lit = "[...document.querySelectorAll('.move')].findIndex(one => one.classList.contains('current'))"
+    for index, span in enumerate(span for span in plan.trajectory.spans if not span.handles):
+        page.evaluate("t => trajcli.seek(t)", (span.start + span.end) / 2)
+        assert page.locator(".status-move").inner_text() == f"{span.index} {span.title}"
+        assert page.evaluate(lit) == index
+    time = 0.4
+    page.evaluate(f"trajcli.seek({time})")
+    position, angles, speed = page.locator(".status-tool > span").all_inner_texts()
+    pose = forward(plan.loaded.robot, plan.trajectory.curve.evaluate(time))
+    numbers = [float(word.replace("\N{MINUS SIGN}", "-")) for word in position.split()[1:4]]
+    assert numbers == pytest.approx(1e3 * pose[:3, 3], abs=0.051)
+    roll, pitch, yaw = (
+        np.deg2rad(float(word.replace("\N{MINUS SIGN}", "-"))) for word in angles.split()[1:4]
+    )
+    turned = np.eye(3)
+    for axis, angle in ((0, roll), (1, pitch), (2, yaw)):  # about the fixed axes x, y, z, in this order
+        i, j = [(1, 2), (2, 0), (0, 1)][axis]
+        about = np.eye(3)
+        about[i, i] = about[j, j] = np.cos(angle)
+        about[i, j], about[j, i] = -np.sin(angle), np.sin(angle)
+        turned = about @ turned
+    assert np.abs(turned - pose[:3, :3]).max() < 2e-3
+    nearby = forward(plan.loaded.robot, plan.trajectory.curve.evaluate([time - 1e-4, time + 1e-4]))
+    assert float(speed.split()[0]) == pytest.approx(
+        1e3 * np.linalg.norm(np.diff(nearby[:, :3, 3], axis=0)) / 2e-4, rel=0.02
+    )
+    assert viewed.messages == []
+
+
 def test_the_values_under_the_pointer_are_shown(view: Callable[..., Any], pick: Path) -> None:
     page = view(pick).page
     plot = page.locator(".u-over").nth(1)

@@ -53,7 +53,7 @@ def scene_of_file(
     rows, kept = rows_of_samples(times, values)
     units, moves = _units_of(columns), _moves(table)
     facts = [f"{times.size} row{'s' * (times.size != 1)}", f"{times[-1] - times[0]:.6g} s"]
-    waypoints = [(float(times[row]), values["q"][row]) for row in _ends(moves, times.size)]
+    waypoints = [(float(times[row]), values["q"][row], "") for row in _ends(moves, times.size)]
     limits = [] if robot is None else [(float(times[0]), float(times[-1]), robot.limits)]
     return {
         "version": 1,
@@ -67,7 +67,7 @@ def scene_of_file(
         "moves": [_move(label, times[low], times[high]) for label, low, high in moves],
         "limits": limits_of(limits),
         "waypoints": waypoints_of(waypoints) if robot is not None and robot.convention else [],
-        **{key: [] for key in ("events", "steps", "loads")},
+        **{key: [] for key in ("events", "steps", "loads", "marks", "zones", "signals")},
         "notes": [*_judgement_notes(checked), *_notes(rows, kept, times)],
     }
 

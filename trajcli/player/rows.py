@@ -17,10 +17,8 @@ FRAMES = 60.0  # Hz: what screens show
 MOST_ROWS = 24_000  # of a page: a longer motion has fewer frames a second
 ORDERS = ("q", "qd", "qdd", "qddd")
 
-_BYTES = {
-    "q": 3,
-    EFFORT: 3,
-}  # of a packed number, else 2: an arm is drawn to a tenth of a micrometre, a plot to a pixel
+_BYTES: dict[str, int] = {"q": 3, EFFORT: 3}
+"""Of a packed number, else 2: an arm is drawn to a tenth of a micrometre, a plot to a pixel."""
 _SEEN = 1e-3  # of the largest magnitude of a derivative: a smaller jump cannot be seen in a plot
 _BYTES_A_FRAME = 140.0  # what a frame may take, so that ten seconds of any arm fit into 0.8 MB
 _JUMPS = (0.05, 0.5)  # jumps a frame, at most, of an arm of many joints and of few: the largest are kept

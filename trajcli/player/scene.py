@@ -52,6 +52,7 @@ def scene_of_plan(plan: Plan) -> dict[str, Any]:
         "moves": [*_moves(plan)],
         "limits": limits_of([(s.start, s.end, plan.moves[s.index].robot.limits) for s in spans]),
         "loads": loads,
+        **_marks(plan),
         "waypoints": waypoints_of([*_waypoints(plan)]) if loaded.robot.convention else [],
         "findings": [_finding(plan, finding) for finding in verdict.findings],
         "events": [_event(plan, event) for event in (*plan.events, *plan.remarks) if not event.is_internal],
@@ -72,6 +73,14 @@ def _rows_and_loads(
     if shows_efforts(plan):
         rows = DrawnRows(rows.times, {**rows.values, EFFORT: efforts_of_rows(plan, rows)})
     return rows, loads_of(plan)
+
+
+def _marks(plan: Plan) -> dict[str, Any]:
+    """Return what is taken up and left, zones and signals."""
+    from trajcli.player.marks import marks_of, signals_of_plan, zones_of
+
+    zones = zones_of(plan) if plan.loaded.robot.convention else []
+    return {"marks": marks_of(plan), "zones": zones, "signals": signals_of_plan(plan)}
 
 
 def joints_in_units(names: Sequence[str], types: Sequence[JointType], units: Units) -> list[dict[str, Any]]:
@@ -118,7 +127,7 @@ def geometry_of(
                 f"{robot.name} has bare joints: without Denavit-Hartenberg rows there is nothing to draw."
             )
         return {"robot": None, "no_geometry": f"{reason} The plots show its motion."}
-    length = Quantity("length")
+    length, angle = Quantity("length"), Quantity("angle")
     ranges = np.array([rows.values["q"].min(axis=0), rows.values["q"].max(axis=0)]).T.tolist()
     table = [
         {
@@ -140,6 +149,7 @@ def geometry_of(
     return {
         "robot": arm,
         "length": {"unit": unit_name(length, units), "scale": 1 / factor(length, units)},
+        "angle": {"unit": unit_name(angle, units), "scale": 1 / factor(angle, units)},
         "tool": _tool(robot, rows, units, trajectory),
     }
 
@@ -200,30 +210,34 @@ def _finite(bounds: Array) -> list[list[float | None]]:
     return [[value if math.isfinite(value) else None for value in pair] for pair in bounds.tolist()]
 
 
-def waypoints_of(points: Sequence[tuple[float, Array]]) -> list[dict[str, Any]]:
+def waypoints_of(points: Sequence[tuple[float, Array, str]]) -> list[dict[str, Any]]:
     """Return points of a motion, those that are equal once; of very many every so manyth.
 
     Args:
-        points: Time, s, and joint values (n,), SI, of each.
+        points: Time, s, joint values (n,), SI, and name of each; the name is empty where it has none.
     """
     distinct: dict[tuple[float, ...], dict[str, Any]] = {}
-    for time, joints in points:
+    for time, joints, name in points:
         key = tuple(np.rint(joints / _SAME).tolist())
-        distinct.setdefault(key, {"time": time, "joints": joints.tolist()})
+        point = distinct.setdefault(key, {"time": time, "joints": joints.tolist(), "name": name})
+        point["name"] = point["name"] or name
     kept = list(distinct.values())
     return kept[:: math.ceil(len(kept) / _MOST_WAYPOINTS) or 1]
 
 
-def _waypoints(plan: Plan) -> Iterator[tuple[float, Array]]:
+def _waypoints(plan: Plan) -> Iterator[tuple[float, Array, str]]:
     """Yield the start, the points that moves pass, and their ends."""
+    from trajcli.player.marks import names_of_ends
+
     curve = plan.trajectory.curve
-    yield 0.0, curve.evaluate(0.0)
-    for move, span in zip(plan.moves, plan.trajectory.spans, strict=True):
+    start, names = names_of_ends(plan.trajectory.spans)
+    yield 0.0, curve.evaluate(0.0), start
+    for move, span, name in zip(plan.moves, plan.trajectory.spans, names, strict=True):
         points = move.planned.via_points
         for time in [] if points is None else points.times.tolist():
             at = min(max(span.start + time, span.start), span.end)
-            yield at, curve.evaluate(min(at, curve.end))
-        yield span.end, curve.evaluate(min(span.end, curve.end), side="left")
+            yield at, curve.evaluate(min(at, curve.end)), ""
+        yield span.end, curve.evaluate(min(span.end, curve.end), side="left"), name
 
 
 def _moves(plan: Plan) -> Iterator[dict[str, Any]]:
@@ -233,7 +247,11 @@ def _moves(plan: Plan) -> Iterator[dict[str, Any]]:
         if not span.handles:
             one = tightest.get(span.index)
             used = "" if one is None else f"; {one.name} uses {one.share} of its limit"
-            words = {"label": f"{span.index} {span.title}", "detail": f"{span.duration:.6g} s{used}"}
+            words = {
+                "title": span.title,
+                "label": f"{span.index} {span.title}",
+                "detail": f"{span.duration:.6g} s{used}",
+            }
             yield {**_interval(span), "index": span.index, **words}
 
 

@@ -223,27 +223,15 @@ class PlannedMotion:
 
     def zones(self) -> Array:
         """Return corners of zones and the radii that are used (k, 4), in the unit of lengths."""
-        from trajcli.kinematics.forward import forward
-
-        flyby = self.plan.flyby
-        balls = [zone for zone in flyby.zones if zone.of == "position"] if flyby else []
-        if not balls:
-            return np.empty((0, 4))
-        corners = [
-            forward(self.moves[zone.move].robot, zone.programmed[len(zone.programmed) // 2]) for zone in balls
-        ]
-        sizes = np.array([zone.used for zone in balls])
-        return np.column_stack([np.array(corners)[:, :3, 3], sizes]) / self.display.factor("length")
+        zones = () if self.plan.flyby is None else self.plan.flyby.zones
+        balls = [ball for zone in zones if (ball := zone.ball(self.moves[zone.move].robot)) is not None]
+        return np.array(balls).reshape(-1, 4) / self.display.factor("length")
 
     def programmed(self) -> tuple[Array, ...]:
         """Return the programmed path of the tool within each zone, (m, 3), in the unit of lengths."""
-        from trajcli.kinematics.forward import forward
-
         flyby, scale = self.plan.flyby, self.display.factor("length")
-        return tuple(
-            forward(self.moves[zone.move].robot, zone.programmed)[:, :3, 3] / scale
-            for zone in (flyby.zones if flyby else ())
-        )
+        zones = flyby.zones if flyby else ()
+        return tuple(zone.tool_path(self.moves[zone.move].robot) / scale for zone in zones)
 
     def _known_efforts(self) -> EffortSamples:
         if self._efforts is None:

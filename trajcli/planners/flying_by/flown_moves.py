@@ -80,6 +80,17 @@ class FlownZone:
         times = {name: getattr(self, name) + time for name in ("entered", "left", "passed")}
         return replace(self, number=self.number + number, **times)
 
+    def tool_path(self, robot: Robot) -> Array:
+        """Return the programmed positions of the tool from border to border, m, shape (m, 3)."""
+        return np.asarray(forward(robot, self.programmed)[:, :3, 3])
+
+    def ball(self, robot: Robot) -> Array | None:
+        """Return the corner and the radius that is used, m, shape (4,); None of a zone that is no ball."""
+        if self.of != "position":
+            return None
+        corner = forward(robot, self.programmed[len(self.programmed) // 2])[:3, 3]
+        return np.append(corner, self.used)
+
 
 def flown_zones(chain: FlownChain) -> list[FlownZone]:
     """Return what the zones of a chain came to, times from its start."""

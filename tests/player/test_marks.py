@@ -1,0 +1,57 @@
+"""Marks of a page: zones against the kinematics of the programmed corners, signals, what is taken up and left."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from planned_examples import planned_example
+
+from trajcli.kinematics.forward import forward
+from trajcli.player.scene import scene_of_plan
+
+
+@pytest.fixture(scope="module")
+def cell() -> dict[str, Any]:
+    return scene_of_plan(planned_example("flying_cell"))
+
+
+def test_a_zone_is_a_ball_about_its_corner(cell: dict[str, Any]) -> None:
+    plan = planned_example("flying_cell")
+    assert len(cell["zones"]) == 4
+    robot, curve = plan.loaded.robot, plan.trajectory.curve
+    for zone in cell["zones"]:
+        *corner, radius = zone["ball"]
+        programmed = np.array(zone["programmed"])
+        assert np.linalg.norm(programmed - corner, axis=1).min() < 1e-6
+        ends = forward(robot, curve.evaluate(np.array([zone["start"], zone["end"]])))[:, :3, 3]
+        # Flown and programmed path meet at the borders, at most the radius from the corner.
+        assert programmed[[0, -1]] == pytest.approx(ends, abs=2e-6)
+        assert np.linalg.norm(ends - corner, axis=1).max() <= radius * (1 + 1e-5)
+        assert np.linalg.norm(ends - corner, axis=1).max() == pytest.approx(radius, rel=1e-4)
+
+
+def test_points_have_their_names(cell: dict[str, Any]) -> None:
+    names = [point["name"] for point in cell["waypoints"]]
+    assert names[:3] == ["home", "above_pick", "pick"]
+    assert set(names) == {"home", "above_pick", "pick", "above_place", "place"}
+
+
+def test_signals_and_the_entries_that_set_them() -> None:
+    scene = scene_of_plan(planned_example("signals"))
+    pressure, glue = scene["signals"]
+    assert [change["value"] for change in pressure["changes"]] == [2.5, 0]
+    assert [change["value"] for change in glue["changes"]] == [1, 0.6, 1, 0]
+    (mark,) = scene["marks"]
+    assert mark["label"] == "signal: pressure = 0"
+    assert mark["time"] == pressure["changes"][1]["time"]
+    assert 3 not in [move["index"] for move in scene["moves"]]
+
+
+def test_attach_and_detach_are_marks_and_no_moves() -> None:
+    plan = planned_example("pick_carry_place")
+    scene = scene_of_plan(plan)
+    assert [(mark["index"], mark["label"]) for mark in scene["marks"]] == [(1, "attach: 5 kg"), (3, "detach")]
+    assert [mark["time"] for mark in scene["marks"]] == [plan.trajectory.spans[i].start for i in (1, 3)]
+    assert [move["index"] for move in scene["moves"]] == [0, 2, 4]
