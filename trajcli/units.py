@@ -147,6 +147,11 @@ def effort_unit(joint_type: str) -> str:
     return _FIXED[effort_quantity(joint_type).dimension]
 
 
+def typeset(unit: str) -> str:
+    """Return a unit as pictures show it, such as "deg/s²" for "deg/s^2"."""
+    return unit.replace("^2", "²").replace("^3", "³")
+
+
 def to_user(si: float, quantity: Quantity, units: Units) -> float:
     """Return an SI number in user units."""
     return si / factor(quantity, units)

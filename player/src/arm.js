@@ -75,8 +75,9 @@ export class Arm {
       parent = this.link(parent, row, index);
     });
     this.tool = this.fixed(parent, matrix(robot.tool));
-    const tip = new Vector3().setFromMatrixPosition(this.tool.matrix);
-    parent.add(rod(materials.dark, [0, 0, 0], tip.toArray(), 0.3 * this.radius(robot.rows.length)));
+    this.tip = mesh(CYLINDER, materials.dark);
+    parent.add(this.tip);
+    this.mount(matrix(robot.tool));
     const dot = mesh(SPHERE, materials.dark);
     dot.scale.setScalar(0.42 * this.radius(robot.rows.length));
     this.tool.add(dot);
@@ -86,6 +87,18 @@ export class Arm {
   /** Return the radius of the parts of a row: thinner towards the tool. */
   radius(index) {
     return this.size * (0.036 - (0.018 * index) / Math.max(this.robot.rows.length, 1));
+  }
+
+  /** Put a tool on the flange: a rod to its tcp. */
+  mount(pose) {
+    this.tool.matrix.copy(pose);
+    span(this.tip, new Vector3(), new Vector3().setFromMatrixPosition(pose), 0.3 * this.radius(this.robot.rows.length));
+  }
+
+  /** Put the tool on the flange that is there at a time, or, just before it, at a change. */
+  mountAt(time, before = false) {
+    const change = this.robot.changes?.findLast((one) => (before ? one.time < time - 1e-9 : one.time <= time));
+    if (this.robot.changes) this.mount(matrix((change ?? this.robot).tool));
   }
 
   fixed(parent, pose) {

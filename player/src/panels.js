@@ -1,6 +1,7 @@
 // What is known of the motion: findings, events, moves, and the joints now.
 import { element } from './dom.js';
 import { aligned, scaleOf, seconds } from './numbers.js';
+import { UseBar, hasUses } from './use.js';
 
 const ORDERS = ['q', 'qd', 'qdd', 'qddd', 'tau'];
 const FEW = 60; // lines of a list that are made at once
@@ -59,7 +60,9 @@ export class JointTable {
     const mixed = new Set(scene.joints.map((joint) => joint.units[0])).size > 1;
     const head = element('tr', {}, element('th', { scope: 'col', text: 'joint' }), ...quantities.map((name) =>
       element('th', { scope: 'col' }, element('span.symbol', { text: symbols[name] }), mixed ? '' : ` ${scene.joints[0].units[ORDERS.indexOf(name)]}`)));
+    if (hasUses(scene, motion)) head.append(element('th.use', { scope: 'col', title: 'The largest part of any limit that is used now', text: 'use' }));
     this.cells = [];
+    this.bars = hasUses(scene, motion) ? scene.joints.map((_, index) => new UseBar(scene, motion, index)) : [];
     const rows = scene.joints.map((joint, index) => {
       const swatch = element('span.swatch');
       const button = element('button.joint', { type: 'button', 'aria-pressed': true, title: 'Show or hide its curves', onclick: () => {
@@ -68,10 +71,10 @@ export class JointTable {
       } }, swatch, element('span', { text: joint.name }), mixed ? element('span.unit', { text: joint.units[0] }) : '');
       const cells = quantities.map((name) => ({ name, index, node: element('td') }));
       this.cells.push(...cells);
-      return { swatch, row: element('tr', {}, element('th', { scope: 'row' }, button), ...cells.map(({ node }) => node)) };
+      return { swatch, row: element('tr', {}, element('th', { scope: 'row' }, button), ...cells.map(({ node }) => node), ...(this.bars.length ? [element('td.use', {}, this.bars[index].element)] : [])) };
     });
     this.swatches = rows.map(({ swatch }) => swatch);
-    this.element = element('div.joints', {}, element('table', {}, element('thead', {}, head), element('tbody', {}, ...rows.map(({ row }) => row))));
+    this.element = element(`div.joints${quantities.length + (this.bars.length ? 1 : 0) > 3 ? '.many' : ''}`, {}, element('table', {}, element('thead', {}, head), element('tbody', {}, ...rows.map(({ row }) => row))));
     theme.listen(() => this.paint());
     clock.listen(() => this.update());
     this.paint();
@@ -86,6 +89,7 @@ export class JointTable {
   }
 
   update() {
+    for (const bar of this.bars) bar.update(this.clock.time);
     for (const { name, index, node } of this.cells) {
       const scale = scaleOf(this.scene.joints[index], name);
       node.textContent = aligned(this.motion.value(name, index, this.clock.time) * scale, this.largest[name][index]);

@@ -78,8 +78,9 @@ export class Stage {
     const stride = Math.max(1, Math.ceil(waypoints.length / MOST_GHOSTS));
     const one = this.ghostMaterial;
     this.names = [];
-    waypoints.forEach(({ joints, name }, index) => {
+    waypoints.forEach(({ time, joints, name }, index) => {
       const ghost = new Arm(this.arm.robot, { link: one, joint: one, prismatic: one, dark: one });
+      ghost.mountAt(time, true);
       ghost.move(joints);
       const dot = new Mesh(ball, this.dotMaterial);
       dot.position.copy(ghost.toolPosition());
@@ -238,6 +239,7 @@ export class Stage {
   }
 
   seek(time) {
+    this.arm.mountAt(time);
     this.arm.move(this.motion.joints(time));
     this.loads.seek(time);
     this.draw();

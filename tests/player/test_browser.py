@@ -81,10 +81,11 @@ def refused(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Plan]:
         ROOT / "examples/scara_pick.yaml",
         ROOT / "examples/gantry.yaml",
         ROOT / "examples/helix.yaml",
+        ROOT / "examples/two_tools.yaml",
         PANDA,
         SIGNS,
     ],
-    ids=["ur5e", "scara", "gantry", "helix", "panda", "signs"],
+    ids=["ur5e", "scara", "gantry", "helix", "two_tools", "panda", "signs"],
 )
 def test_the_tool_is_drawn_where_kinematics_says(
     view: Callable[..., Any], tmp_path: Path, source: Path | str
@@ -94,7 +95,9 @@ def test_the_tool_is_drawn_where_kinematics_says(
     times = np.append(
         np.random.default_rng(3).uniform(0, plan.trajectory.duration, 8), [0.0, plan.trajectory.duration]
     )
-    expected = forward(plan.loaded.robot, plan.trajectory.curve.evaluate(times))[:, :3, 3]
+    q, spans = plan.trajectory.curve.evaluate(times), plan.trajectory.spans
+    owners = [max(k for k, span in enumerate(spans) if span.start <= time) for time in times]
+    expected = np.array([forward(plan.moves[k].robot, row)[:3, 3] for k, row in zip(owners, q, strict=True)])
     drawn = np.array(
         [viewed.page.evaluate("time => trajcli.toolPosition(time)", time) for time in times.tolist()]
     )
@@ -218,7 +221,7 @@ def test_a_joint_at_rest_has_no_velocity(view: Callable[..., Any], pick: Path) -
 def test_a_load_is_drawn_while_it_is_carried(view: Callable[..., Any], tmp_path: Path) -> None:
     plan = planned(ROOT / "examples/pick_carry_place.yaml")
     page = view(written(tmp_path, plan)).page
-    assert page.locator(".joints thead th").all_inner_texts()[-1] == "τ N m"
+    assert page.locator(".joints thead th").all_inner_texts()[-2:] == ["τ N m", "use"]
     assert page.locator("[data-quantity=tau] canvas").count() == 1
     assert page.locator("[data-quantity=tau] .limit-key").count() == 1
     span, robot = plan.trajectory.spans[2], plan.moves[2].robot
@@ -279,6 +282,32 @@ def test_zones_signals_and_the_move_of_now(view: Callable[..., Any], tmp_path: P
         1e3 * np.linalg.norm(np.diff(nearby[:, :3, 3], axis=0)) / 2e-4, rel=0.02
     )
     assert viewed.messages == []
+
+
+def test_bars_of_use_name_the_limit_of_which_a_joint_uses_most(
+    view: Callable[..., Any], tmp_path: Path
+) -> None:
+    job = """\
+version: 1
+units: {angle: deg}
+robot: {joints: [{velocity: [-80, 50], acceleration: 100}, {}]}
+start: {joints: [0, 0]}
+moves:
+  - {planner: trapezoid, to: {joints: [40, 0]}, velocity: 40, acceleration: 100}
+  - {planner: trapezoid, to: {joints: [0, 0]}, velocity: 40, acceleration: 50}
+"""
+    plan = planned(job)
+    page = view(written(tmp_path, plan)).page
+    bar = "time => { trajcli.seek(time); const [one, other] = document.querySelectorAll('.use-bar'); return [one.title, one.innerText, other.hidden]; }"
+    # 40 deg/s at 100 deg/s^2: 0.4 s to speed, 1 s to the end of the cruise; back at 50 deg/s^2: 0.8 s to speed.
+    turned = plan.trajectory.spans[1].start
+    for time, words, percent in (
+        (0.1, "acceleration: 100.0 of 100.0 deg/s²", 100),
+        (0.7, "velocity: 40.00 of 50.00 deg/s", 80),
+        (turned + 0.01, "acceleration: −50.00 of −100.0 deg/s²", 50),
+        (turned + 0.9, "velocity: −40.00 of −80.00 deg/s", 50),
+    ):
+        assert page.evaluate(bar, time) == [f"{words}, {percent} % used", f"{percent} %", True]
 
 
 def test_the_values_under_the_pointer_are_shown(view: Callable[..., Any], pick: Path) -> None:

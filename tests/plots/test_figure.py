@@ -26,10 +26,10 @@ from tiers import few
 from trajcli.errors import InputError
 from trajcli.job.read import job_from_text
 from trajcli.planning.plan import Plan, plan_job
-from trajcli.plots.axes import shortened, text_width, ticks_of, upright_labels
+from trajcli.plots.axes import labels_with_room, shortened, text_width, ticks_of
 from trajcli.plots.figure import figure_of
-from trajcli.plots.legend import COLOURS, LIMIT_COLOUR, style_of
-from trajcli.plots.panel import Picture
+from trajcli.plots.legend import COLOURS, LIMIT_COLOUR, _title_lines, style_of
+from trajcli.plots.panel import MoveBorders, Picture
 from trajcli.plots.picture import picture_of
 from trajcli.plots.write import format_of_picture, rendered, settings, svg_of
 from trajcli.streams.table import Table
@@ -215,20 +215,43 @@ def test_ticks_are_round_numbers_that_differ(view: tuple[float, float], most: in
     np.testing.assert_allclose(values, [float(name) for name in names], atol=1e-9 * (view[1] - view[0]))
 
 
-def test_names_are_shortened_to_their_room_and_stand_upright_where_they_must() -> None:
+def test_names_are_shortened_to_their_room() -> None:
     assert shortened("short", 8.0, 3.0) == "short"
     cut = shortened("a very long name indeed", 8.0, 0.6)
     assert cut.endswith("\N{HORIZONTAL ELLIPSIS}")
     assert text_width(cut, 8.0) <= 0.6
     assert shortened("name", 8.0, 0.0) == ""
+
+
+def test_indices_of_moves_stand_where_there_is_room() -> None:
     wide = np.array([2.0, 2.0])
-    assert upright_labels(["a", "b"], np.array([1.0, 3.0]), wide, 7.0) == (False, [(0, 1.0), (1, 3.0)])
+    assert labels_with_room(["a", "b"], np.array([1.0, 3.0]), wide, 7.0) == [(0, 1.0), (1, 3.0)]
     narrow, middles = np.full(40, 0.05), 0.05 * np.arange(40)
-    upright, kept = upright_labels(["3 jerk_limited"] * 40, middles, narrow, 7.0)
-    assert upright
-    assert np.diff([at for _, at in kept]).min() >= 7.0 / 72
-    assert [at for _, at in kept][-1] <= 2.0
-    assert 10 < len(kept) < 40
+    kept = labels_with_room(["31"] * 40, middles, narrow, 7.0)
+    assert np.diff([at for _, at in kept]).min() >= text_width("31", 7.0)
+    assert 5 < len(kept) < 40
+    assert labels_with_room(["a", "b", "c"], np.array([1.0, 1.0, 3.0]), np.array([2.0, 0.0, 2.0]), 7.0) == [
+        (0, 1.0),
+        (2, 3.0),
+    ]
+
+
+def test_titles_of_moves_stand_once_and_what_takes_no_time_is_marked(example: Example) -> None:
+    figure, _ = drawn(picture_of(example("pick_carry_place"), quantities=["q", "tau"]))
+    texts = [text.get_text() for text in figure.findobj(Text)]
+    for title in ("0 home -> pick (time_optimal)", "2 pick -> place (time_optimal)"):
+        assert texts.count(title) == 1
+    assert [text for text in texts if text.startswith("\u25be1 attach, 0.39")]
+    assert texts.count("4") == 2
+    marks = [line for line in figure.findobj(Line2D) if str(line.get_gid()).endswith("-marks")]
+    assert [len(line.get_xdata()) for line in marks] == [2, 2]  # attach and detach, in the top row
+    assert {text.get_rotation() for text in figure.findobj(Text) if text.get_text().isdigit()} == {0.0}
+
+
+def test_of_very_many_moves_the_first_titles_stand_there() -> None:
+    borders = MoveBorders(np.arange(101.0), tuple(range(100)), ("hold",) * 100)
+    lines = list(_title_lines(borders))
+    assert (lines[0], lines[-1]) == ("0 hold", "and 65 more")
 
 
 SCRIPT = """
@@ -266,7 +289,13 @@ def test_an_svg_is_well_formed_with_its_words_as_text(example: Example) -> None:
     root = ET.fromstring(svg_of(example("ur5e_pick")))
     assert root.tag == "{http://www.w3.org/2000/svg}svg"
     words = {text.text for text in root.iter("{http://www.w3.org/2000/svg}text")}
-    assert {"shoulder_pan_joint", "qd [deg/s]", "4 jerk_limited", "t [s]", "limit"} <= words
+    assert {
+        "shoulder_pan_joint",
+        "q\u0307 [deg/s]",
+        "4 above_pick -> above_place (jerk_limited)",
+        "t [s]",
+        "limit",
+    } <= words
     ids = [element.get("id") for element in root.iter() if element.get("id")]
     assert len(ids) == len(set(ids)) or all(name.endswith("limit") for name in ids if ids.count(name) > 1)
     date = root.findall(".//{http://purl.org/dc/elements/1.1/}date")

@@ -37,7 +37,7 @@ def cubic(t: np.ndarray) -> dict[str, np.ndarray]:
 def test_the_textbook_cubic_in_degrees(example: Example) -> None:
     picture = picture_of(example("cubic"), quantities=["q", "qd", "qdd", "qddd"])
     shown = panels(picture)
-    units = ("q [deg]", "qd [deg/s]", "qdd [deg/s^2]", "qddd [deg/s^3]")
+    units = ("q [deg]", "q\u0307 [deg/s]", "q\u0308 [deg/s²]", "q\u20db [deg/s³]")
     assert [panel.y_label for panel in shown.values()] == list(units)
     assert {panel.x_label for panel in shown.values()} == {"t [s]"}
     for name in ("position", "velocity", "acceleration", "jerk"):
@@ -57,7 +57,7 @@ def test_limits_step_from_move_to_move_in_the_units_of_their_joints(two: Plan) -
     low, high = shown["lift: velocity"].limits
     np.testing.assert_allclose(low[:, 1], [-150, -150, -300, -300])
     np.testing.assert_allclose(high[:, 1], [150, 150, 200, 200])
-    assert shown["lift: velocity"].y_label == "qd [mm/s]"
+    assert shown["lift: velocity"].y_label == "q̇ [mm/s]"
     np.testing.assert_allclose(shown["turn: position"].limits[1][:, 1], 100.0)
     assert np.isnan(shown["lift: acceleration"].limits[0][:, 1]).all()
     assert shown["lift: acceleration"].unlimited
@@ -74,7 +74,7 @@ def test_a_trapezoid_steps_upright_and_time_counts_from_its_start_time(two: Plan
     np.testing.assert_allclose(steps[:2], [10.25, 11.5])
     borders = picture_of(two).borders
     assert borders is not None
-    assert borders.names == ("0 trapezoid", "1 quintic")
+    assert (borders.indices, borders.titles) == ((0, 1), ("trapezoid", "quintic"))
     np.testing.assert_allclose(borders.times, [10.0, 11.75, 13.75])
 
 
@@ -130,7 +130,7 @@ def test_the_path_of_the_tool_goes_through_the_poses_of_the_job(example: Example
 
 def test_the_phase_plane_of_a_move_along_a_path_has_its_speed_as_limit(example: Example) -> None:
     (panel,) = panels(picture_of(example("dispense"), quantities=["phase"])).values()
-    assert (panel.x_label, panel.y_label) == ("s [m]", "sd [m/s]")
+    assert (panel.x_label, panel.y_label) == ("s [m]", "s\u0307 [m/s]")
     (trace,), (limit,) = panel.traces, panel.limits
     assert limit[:, 1].max() == pytest.approx(0.25)  # law: {speed: 0.25}
     assert trace.y.max() <= 0.25 * (1 + 1e-6)
@@ -200,10 +200,18 @@ def test_findings_are_marked_at_their_time_and_value() -> None:
     assert "NOT VERIFIED, 1 finding" in picture.title
 
 
+NAMED = {"q\u0307": "qd", "q\u0308": "qdd", "q\u20db": "qddd", "\u03c4": "tau", "s\u0307": "sd"}
+
+
 def test_what_suits_a_job(example: Example) -> None:
     def kinds(name: str) -> set[str]:
         picture = picture_of(example(name))
-        first = [panel.y_label.split(" [")[0] for block in picture.blocks for panel in block.panels]
+        first = [
+            NAMED.get(label, label)
+            for block in picture.blocks
+            for panel in block.panels
+            for label in [panel.y_label.split(" [")[0]]
+        ]
         return {*first, *(["path"] if picture.views else [])}
 
     assert kinds("cubic") == {"q", "qd", "qdd"}  # its acceleration steps, and no jerk is limited

@@ -67,7 +67,7 @@ def steps_of(panel: Panel) -> dict[float, float]:
 
 def test_values_are_those_of_the_equation_of_motion_with_what_each_move_carries(plan: Plan) -> None:
     panel = panel_of(picture_of(plan, quantities=["tau"]))
-    assert (panel.title, panel.y_label) == ("swivel: effort", "tau [N m]")
+    assert (panel.title, panel.y_label) == ("swivel: effort", "τ [N m]")
     trace, border = panel.traces[0], 10 + plan.trajectory.spans[0].end
     assert trace.x[0] == 10.0
     assert trace.x[-1] == pytest.approx(10 + plan.trajectory.duration)
@@ -142,7 +142,7 @@ start: {{joints: [0]}}
 moves: [{{planner: trapezoid, to: {{joints: [400]}}}}]
 """
     panel = panel_of(picture_of(plan_job(job_from_text(text)), quantities=["tau"]))
-    assert panel.y_label == "tau [N]"
+    assert panel.y_label == "τ [N]"
     np.testing.assert_allclose([line[:, 1] for line in panel.limits], [[-100, -100], [100, 100]])
     expected = [MASS * (G + a) for a in (-2.0, 0.0, 2.0)]
     assert sorted({*np.round(panel.traces[0].y, 9).tolist()}) == pytest.approx(expected)
@@ -158,10 +158,10 @@ def test_columns_of_a_file_are_drawn_over_the_plan_and_alone(plan: Plan, tmp_pat
     off = np.abs(np.interp(theirs.x, ours.x, ours.y) - theirs.y)[inside]
     assert np.median(off) < 1e-3
     alone = panel_of(picture_of(None, [table], quantities=["tau"]))
-    assert alone.y_label == "tau [N m]"
+    assert alone.y_label == "τ [N m]"
     assert alone.traces[0].y.tolist() == written.tolist()
     bare = Table(("t", "tau1"), np.array([[0.0, 3.0], [1.0, 4.0]]), np.zeros(2, dtype=np.int64), "a.csv")
-    assert panel_of(picture_of(None, [bare])).y_label == "tau [N m or N]"
+    assert panel_of(picture_of(None, [bare])).y_label == "τ [N m or N]"
 
 
 @pytest.mark.parametrize(

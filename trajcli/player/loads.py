@@ -73,5 +73,5 @@ def _owners(plan: Plan, times: Array) -> NDArray[np.intp]:
     spans = [span for span in plan.trajectory.spans if span.duration > 0] or list(plan.trajectory.spans)
     starts = np.array([span.start for span in spans[1:]])
     before = np.append(times[1:] == times[:-1], False)
-    place = np.where(before, np.searchsorted(starts, times, "left"), np.searchsorted(starts, times, "right"))
-    return np.array([span.index for span in spans], dtype=np.intp)[place]
+    number = np.where(before, np.searchsorted(starts, times, "left"), np.searchsorted(starts, times, "right"))
+    return np.array([span.index for span in spans], dtype=np.intp)[number]

@@ -20,10 +20,9 @@ from trajcli.planning.plan import Plan
 from trajcli.planning.tightest import tightest_of_moves
 from trajcli.player.rows import ORDERS, DrawnRows, packed, rows_of_curve
 from trajcli.trajectory import Span, Trajectory
-from trajcli.units import Quantity, Units, effort_unit, factor, joint_quantity, unit_name
+from trajcli.units import Quantity, Units, effort_unit, factor, joint_quantity, typeset, unit_name
 from trajcli.version import __version__
 
-_SUPERSCRIPTS = str.maketrans({"2": "²", "3": "³"})
 _MOST_WAYPOINTS = 40
 _MOST_STEPS = 100
 _SAME = 1e-4  # rad or m: waypoints that are nearer than this are one
@@ -92,10 +91,7 @@ def joints_in_units(names: Sequence[str], types: Sequence[JointType], units: Uni
         {
             "name": name,
             "units": [
-                *(
-                    unit_name(joint_quantity(kind, order), units).translate(_SUPERSCRIPTS).replace("^", "")
-                    for order in range(len(ORDERS))
-                ),
+                *(typeset(unit_name(joint_quantity(kind, order), units)) for order in range(len(ORDERS))),
                 effort_unit(kind),
             ],
             "scale": 1 / factor(joint_quantity(kind), units),
@@ -289,7 +285,7 @@ def _step(plan: Plan, index: int) -> dict[str, Any]:
     step, trajectory = plan.verdict.steps[index], plan.trajectory
     quantity = joint_quantity(trajectory.joint_types[trajectory.joint_names.index(step.joint)], 2)
     size = step.size / factor(quantity, plan.loaded.units)
-    unit = unit_name(quantity, plan.loaded.units).translate(_SUPERSCRIPTS).replace("^", "")
+    unit = typeset(unit_name(quantity, plan.loaded.units))
     return {"time": step.time, "label": f"{step.joint}:", "message": f"by {size:.4g} {unit}"}
 
 

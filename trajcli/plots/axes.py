@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import cache
 from math import ceil, floor, log10
@@ -116,30 +117,22 @@ def shortened(text: str, size: float, width: float) -> str:
     return text[:longest] + _CUT if longest else ""
 
 
-def upright_labels(
+def labels_with_room(
     names: Sequence[str], middles: Array, widths: Array, size: float
-) -> tuple[bool, list[tuple[int, float]]]:
-    """Return whether names must stand upright above their intervals, and index and middle of those with room.
-
-    Where upright names would stand on each other, they are moved apart; of too many some are left out.
+) -> list[tuple[int, float]]:
+    """Return index and middle of the names of intervals that have room beside the ones before, inches.
 
     Args:
         names: Of the intervals.
         middles: Where each is, inches, shape (m,).
-        widths: Of each, inches, shape (m,).
+        widths: Of each, inches, shape (m,); one without extent has no name.
         size: Of the text, points.
     """
-    level = all(
-        text_width(name, size) + size / 72 <= width for name, width in zip(names, widths, strict=True)
-    )
-    if level:
-        return False, list(enumerate(middles.tolist()))
-    line, end = 1.5 * size / 72, float(middles[-1] + 0.5 * widths[-1])
-    shown = np.flatnonzero(widths > 0)
-    most = max(int((end - float(middles[0] - 0.5 * widths[0])) / line), 1)
-    if shown.size > most:
-        shown = shown[np.linspace(0, shown.size - 1, most).astype(np.intp)]
-    steps = line * np.arange(shown.size)
-    at = np.maximum.accumulate(middles[shown] - steps)  # no nearer than a line to the one before
-    at = np.minimum(at, end - 0.5 * line - steps[-1]) + steps
-    return True, list(zip(shown.tolist(), at.tolist(), strict=True))
+    kept: list[tuple[int, float]] = []
+    gap, end = 0.5 * size / 72, -math.inf
+    for index, (name, middle, width) in enumerate(zip(names, middles.tolist(), widths.tolist(), strict=True)):
+        half = 0.5 * text_width(name, size)
+        if width > 0 and middle - half >= end + gap:
+            kept.append((index, middle))
+            end = middle + half
+    return kept

@@ -9,15 +9,17 @@ from trajcli.columns import EFFORT, JOINT_ORDERS, Column
 from trajcli.errors import InputError
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import JointType
-from trajcli.units import Quantity, Units, effort_unit, factor, joint_quantity, unit_name
+from trajcli.units import Quantity, Units, effort_unit, factor, joint_quantity, typeset, unit_name
 
 _EITHER = {
     "q": "rad or m",
     "qd": "rad/s or m/s",
-    "qdd": "rad/s^2 or m/s^2",
-    "qddd": "rad/s^3 or m/s^3",
+    "qdd": "rad/s² or m/s²",
+    "qddd": "rad/s³ or m/s³",
     EFFORT: "N m or N",
 }
+_SYMBOLS = {"qd": "q\u0307", "qdd": "q\u0308", "qddd": "q\u20db", EFFORT: "\u03c4", "sd": "s\u0307"}
+"""How quantities are written whose names in columns are letters."""
 _TYPES: dict[str | None, JointType] = {"deg": "revolute", "mm": "prismatic"}
 
 
@@ -41,7 +43,7 @@ class DisplayUnits:
         return 1.0 if kind is None else factor(joint_quantity(kind), self.units)
 
     def joint_label(self, quantity: str, joint: int) -> str:
-        """Return the label of the axis of a joint: "q", "qd", "qdd", "qddd" or "tau", and its unit."""
+        """Return the label of a joint's axis: symbol of "q", "qd", "qdd", "qddd" or "tau", and unit."""
         kind = self.joint_types[joint]
         if kind is None:
             unit = _EITHER[quantity]
@@ -49,7 +51,7 @@ class DisplayUnits:
             unit = effort_unit(kind)
         else:
             unit = unit_name(joint_quantity(kind, JOINT_ORDERS[quantity]), self.units)
-        return f"{quantity} [{unit}]"
+        return f"{_SYMBOLS.get(quantity, quantity)} [{typeset(unit)}]"
 
     def factor(self, dimension: Literal["length", "angle", "ratio"]) -> float:
         """Return SI per unit of an axis."""
@@ -57,9 +59,10 @@ class DisplayUnits:
 
     def label(self, symbol: str, dimension: Literal["length", "angle", "ratio"], order: int = 0) -> str:
         """Return the label of an axis; of what has no unit only that of time remains."""
+        written = _SYMBOLS.get(symbol, symbol)
         if dimension == "ratio":
-            return f"{symbol} [{('-', '1/s', '1/s^2')[order]}]"
-        return f"{symbol} [{unit_name(Quantity(dimension, order), self.units)}]"
+            return f"{written} [{('-', '1/s', '1/s²')[order]}]"
+        return f"{written} [{typeset(unit_name(Quantity(dimension, order), self.units))}]"
 
 
 def units_of_files(columns: Iterable[tuple[str, Column]]) -> DisplayUnits:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from trajcli.plots.axes import note_of, shortened, text_width, ticks_of, upright_labels, view_of
+from trajcli.plots.axes import labels_with_room, note_of, shortened, text_width, ticks_of, view_of
 from trajcli.plots.frame import (
     AXIS,
     BELOW,
@@ -28,21 +28,24 @@ from trajcli.plots.legend import (
     FINDING,
     LIMIT,
     LIMIT_COLOUR,
+    MARKED,
     MOST_BORDERS,
     VIRTUAL_POINT,
     WAYPOINT,
     Legend,
+    MoveTitles,
     marker_style,
     style_of,
 )
 from trajcli.plots.panel import MoveBorders, Panel, PanelBlock, Picture
 
-_PANEL_WIDTHS = {1: 6.2, 2: 4.3, 3: 3.2, 4: 2.8}  # by the number of columns of joints, inches
+_PANEL_WIDTHS = {1: 6.2, 2: 4.3, 3: 3.2, 4: 2.8, 5: 2.5}  # by the number of columns of joints, inches
 _WIDE = 11.0  # of the panels of a figure without joints
 _HEAD, _LINE = 0.4, 0.2
 _FLAT, _TALL, _PLANE = 1.1, 1.5, 2.6
 _FEW_ROWS = 4
 _X_TICKS, _Y_TICKS = 5, 5
+_MARKS = 0.96  # of the height of a panel: where marks stand
 _BOLD = 0.8  # of the width of a bold text is that of a plain one, at least
 
 
@@ -56,7 +59,8 @@ def figure_of(picture: Picture) -> Any:  # noqa: ANN401
     title = shortened(picture.title, LARGE, _BOLD * (layout.width - 0.4))
     sheet.text(0.2, 0.12, title, LARGE, va="top", weight="bold")
     layout.legend.draw(sheet, _HEAD)
-    top, number = _HEAD + layout.legend.height, 0
+    layout.titles.draw(sheet, _HEAD + layout.legend.height)
+    top, number = _HEAD + layout.legend.height + layout.titles.height, 0
     for block, height in zip(picture.blocks, layout.heights, strict=True):
         _draw_block(sheet, block, picture.borders, top, number)
         top, number = top + height, number + len(block.panels)
@@ -76,8 +80,9 @@ class _Layout:
         panels = _WIDE if widths is None or first is None else first.columns * (widths + BESIDE) - BESIDE
         self.width = LEFT + panels + RIGHT
         self.legend = Legend(picture, self.width)
+        self.titles = MoveTitles(picture, self.width)
         self.heights = [_height(block, picture.borders, self.width) for block in picture.blocks]
-        self.height = _HEAD + self.legend.height + sum(self.heights)
+        self.height = _HEAD + self.legend.height + self.titles.height + sum(self.heights)
         if picture.views is not None:
             from trajcli.plots.path_views import views_height
 
@@ -101,25 +106,13 @@ def _row_height(block: PanelBlock) -> float:
 
 def _height(block: PanelBlock, borders: MoveBorders | None, width: float) -> float:
     """Return the height of a block with all its text."""
-    head = _LINE * bool(block.headings) + _strip(block, borders, panel_width(block.columns, width))
+    head = _LINE * bool(block.headings) + _strip(block, borders)
     return head + _rows(block) * _row_height(block) + AXIS * block.over_time + BELOW
 
 
-def _strip(block: PanelBlock, borders: MoveBorders | None, width: float) -> float:
-    """Return the height of the strip with the names of moves."""
-    if borders is None or not block.over_time:
-        return 0.0
-    upright, kept = _named(block, borders, width)
-    if not upright:
-        return _LINE
-    return max((text_width(borders.names[index], SMALL) for index, _ in kept), default=0.0) + 0.12
-
-
-def _named(block: PanelBlock, borders: MoveBorders, width: float) -> tuple[bool, list[tuple[int, float]]]:
-    """Return whether the names of moves stand upright, and which have room."""
-    low, high = _time_range(block, borders)
-    edges = (borders.times - low) * (width / (high - low))
-    return upright_labels(borders.names, 0.5 * (edges[:-1] + edges[1:]), np.diff(edges), SMALL)
+def _strip(block: PanelBlock, borders: MoveBorders | None) -> float:
+    """Return the height of the strip with the indices of moves."""
+    return 0.0 if borders is None or not block.over_time else _LINE
 
 
 def _time_range(block: PanelBlock, borders: MoveBorders | None) -> tuple[float, float]:
@@ -138,7 +131,7 @@ def _draw_block(
     width, height = panel_width(block.columns, sheet.width), _panel_height(block)
     for column, heading in enumerate(block.headings):
         sheet.text(left_of(column, width), top + 0.04, heading, NORMAL, va="top", weight="bold")
-    top += _LINE * bool(block.headings) + _strip(block, borders, width)
+    top += _LINE * bool(block.headings) + _strip(block, borders)
     times = _time_range(block, borders) if block.over_time else None
     for index, panel in enumerate(block.panels):
         row, column = divmod(index, block.columns)
@@ -148,7 +141,7 @@ def _draw_block(
         if times is not None and borders is not None:
             _draw_borders(frame, borders)
             if row == 0:
-                _draw_names(frame, borders, _named(block, borders, width))
+                _draw_indices(frame, borders)
         lowest = index + block.columns >= len(block.panels)
         note = "" if times is None else note_of(panel, view)
         _draw_panel(frame, panel, note, numbered=times is None or lowest)
@@ -159,12 +152,18 @@ def _draw_borders(frame: PanelFrame, borders: MoveBorders) -> None:
         frame.uprights(borders.times[1:-1], "borders", **BORDER)
 
 
-def _draw_names(frame: PanelFrame, borders: MoveBorders, named: tuple[bool, list[tuple[int, float]]]) -> None:
-    """Write the names of moves above a frame, each over the middle of its interval."""
-    upright, kept = named
-    for index, middle in kept:
-        options = {"rotation": 90 if upright else 0, "ha": "center", "va": "bottom", "color": GREY}
-        frame.sheet.text(frame.left + middle, frame.top - 0.9 * TITLE, borders.names[index], SMALL, **options)
+def _draw_indices(frame: PanelFrame, borders: MoveBorders) -> None:
+    """Write the indices of moves above a frame, where there is room, and mark what takes no time."""
+    edges = np.array([frame.across(time) for time in borders.times])
+    names = [str(index) for index in borders.indices]
+    if borders.marks and borders.times.size <= MOST_BORDERS:
+        times = np.array([time for time, _, _ in borders.marks])
+        frame.plot(
+            times, np.full(times.size, _MARKS * frame.y[1] + (1 - _MARKS) * frame.y[0]), "marks", **MARKED
+        )
+    for number, middle in labels_with_room(names, 0.5 * (edges[:-1] + edges[1:]), np.diff(edges), SMALL):
+        options = {"ha": "center", "va": "bottom", "color": GREY}
+        frame.sheet.text(middle, frame.top - 0.9 * TITLE, names[number], SMALL, **options)
 
 
 def _draw_panel(frame: PanelFrame, panel: Panel, note: str, *, numbered: bool) -> None:

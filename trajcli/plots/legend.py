@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from trajcli.plots.axes import shortened, text_width
-from trajcli.plots.frame import NORMAL, Sheet
-from trajcli.plots.panel import Picture
+from trajcli.plots.frame import GREY, NORMAL, SMALL, Sheet
+from trajcli.plots.panel import MoveBorders, Picture
 
 COLOURS = ("#0072B2", "#009E73", "#CC79A7", "#000000", "#56B4E9", "#E69F00")
 """Of the sources, which all kinds of colour vision tell apart; vermilion is left for limits.
@@ -42,6 +42,11 @@ FINDING: Mapping[str, Any] = {
     "markeredgecolor": "white",
 }
 
+MARK = "\u25be"
+"""Before the titles of entries where something is taken up, left or set."""
+MARKED: Mapping[str, Any] = {"linestyle": "none", "marker": "v", "markersize": 4.0, "color": "black"}
+"""Of those entries, in panels."""
+
 MOST_BORDERS = 80
 """Of moves in a panel that are drawn; more of them would hide everything else."""
 
@@ -49,6 +54,9 @@ _MOST_LARGE, _SMALL_MARKER = 60, 1.5  # so many markers of a panel are large; of
 _SAMPLE, _GAP, _INDENT = 0.32, 0.65, 0.2  # of the legend, inches
 _LONGEST = 3.0  # of a name, inches
 _LINE = 0.2  # height of a row, inches
+_TITLE_LINE = 0.155  # of titles of moves, inches
+_LONGEST_TITLE = 3.6  # inches
+_MOST_TITLES = 36
 
 
 def style_of(source: int) -> dict[str, Any]:
@@ -86,6 +94,41 @@ class Legend:
             ends = [left, left + 0.5 * _SAMPLE, left + _SAMPLE]
             sheet.line(ends, [middle] * 3, markevery=[1], **style)
             sheet.text(left + _SAMPLE + 0.08, middle, name, NORMAL, va="center_baseline")
+
+
+class MoveTitles:
+    """Indices and titles of the moves, in rows: once for all panels.
+
+    Attributes:
+        height: Inches.
+    """
+
+    def __init__(self, picture: Picture, width: float) -> None:
+        timed = any(block.over_time for block in picture.blocks)
+        self._lines = list(_title_lines(picture.borders)) if timed and picture.borders is not None else []
+        self._step = max((text_width(line, SMALL) for line in self._lines), default=0.0) + 2 * _INDENT
+        self._columns = max(1, int((width - _INDENT) / self._step))
+        rows = -(-len(self._lines) // self._columns)
+        self.height = _TITLE_LINE * rows + 0.08 if rows else 0.0
+
+    def draw(self, sheet: Sheet, top: float) -> None:
+        """Draw them on a sheet from `top` on, row by row."""
+        for number, line in enumerate(self._lines):
+            row, column = divmod(number, self._columns)
+            left, middle = _INDENT + column * self._step, top + (row + 0.5) * _TITLE_LINE
+            sheet.text(left, middle, line, SMALL, va="center_baseline", color=GREY)
+
+
+def _title_lines(borders: MoveBorders) -> Iterator[str]:
+    """Yield index and title of each move, of very many those of the first."""
+    entries = [(index, "", title) for index, title in zip(borders.indices, borders.titles, strict=True)]
+    entries += [(index, MARK, f"{title}, {time:.6g} s") for time, index, title in borders.marks]
+    count = len(entries)
+    shown = count if count <= _MOST_TITLES else _MOST_TITLES - 1
+    for index, mark, title in sorted(entries)[:shown]:
+        yield shortened(f"{mark}{index} {title}", SMALL, _LONGEST_TITLE)
+    if shown < count:
+        yield f"and {count - shown} more"
 
 
 def _entries(picture: Picture) -> Iterator[tuple[str, Mapping[str, Any]]]:

@@ -99,11 +99,15 @@ class MoveBorders:
 
     Attributes:
         times: As written in the rows, shape (m + 1,), s.
-        names: Index and planner of each, m of them.
+        indices: Of each in its job, m of them.
+        titles: Of each.
+        marks: Time, index and title of what takes no time, such as attach and detach.
     """
 
     times: Array
-    names: tuple[str, ...]
+    indices: tuple[int, ...]
+    titles: tuple[str, ...]
+    marks: tuple[tuple[float, int, str], ...] = ()
 
 
 @frozen

@@ -63,11 +63,17 @@ class PlannedMotion:
 
     @property
     def borders(self) -> MoveBorders:
-        """The borders of its moves."""
+        """The borders of its moves; what takes no time, such as attach and detach, is none."""
+        every = self.plan.trajectory.spans
+        spans = [span for span in every if not span.handles]
+        times = np.array([spans[0].start, *(span.end for span in spans)]) + self.offset
+        marks = tuple((span.start + self.offset, span.index, span.title) for span in every if span.handles)
+        return MoveBorders(times, tuple(s.index for s in spans), tuple(s.title for s in spans), marks)
+
+    def _edges(self) -> Array:
+        """Return the borders of all entries of the job (m + 1,), s."""
         spans = self.plan.trajectory.spans
-        times = [spans[0].start, *(span.end for span in spans)]
-        names = tuple(f"{span.index} {span.words}" for span in spans)
-        return MoveBorders(np.array(times) + self.offset, names)
+        return np.array([spans[0].start, *(span.end for span in spans)]) + self.offset
 
     @property
     def has_tool(self) -> bool:
@@ -277,13 +283,13 @@ class PlannedMotion:
 
     def _steps(self, values: Array) -> Array:
         """Return the line (m, 2) that has one value (moves,) from border to border; NaN for infinite ones."""
-        borders = self.borders.times
+        borders = self._edges()
         x = np.stack([borders[:-1], borders[1:]], axis=1).reshape(-1)
         finite = np.where(np.isfinite(values), values, np.nan)
         return np.stack([x, np.repeat(finite, 2)], axis=1)
 
     def _marks(self, points: Sequence[ViaPoints | None], joint: int) -> Array:
-        scale, starts = self.display.joint_factor(joint), self.borders.times
+        scale, starts = self.display.joint_factor(joint), self._edges()
         rows = [
             np.stack([start + each.times, each.points[:, joint] / scale], axis=1)
             for start, each in zip(starts, points, strict=False)

@@ -1,0 +1,46 @@
+"""One count and one title of each move in `plan`, `explain`, `plot` and `view`, of all examples."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from planned_examples import planned_example
+from tiers import few
+
+from trajcli.cli.explain import _head, _lines
+from trajcli.job.read import load_job
+from trajcli.output.explain import explanation
+from trajcli.player.scene import scene_of_plan
+from trajcli.plots.picture import picture_of
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+QUICK = ("pick_carry_place", "signals", "two_tools", "scara_pick", "trapezoid")
+ALL = sorted(path.stem for path in EXAMPLES.glob("*.yaml"))
+
+
+@pytest.mark.parametrize("name", dict.fromkeys([*QUICK, *few(ALL, 3)]))
+def test_moves_have_one_count_and_one_title(name: str) -> None:
+    plan = planned_example(name)
+    loaded = load_job(EXAMPLES / f"{name}.yaml")
+    entries = range(len(loaded.job.moves))
+    titles = {k: loaded.title(k) for k in entries if not loaded.job.moves[k].handles}
+    count = f"{len(titles)} move{'s' * (len(titles) != 1)}"
+
+    explained = explanation(plan)
+    told = [
+        re.fullmatch(r"move (\d+): (.*), \S+ s, from t = \S+ s", line) for line in _lines(explained, plan)
+    ]
+    said = {int(match[1]): match[2] for match in told if match}
+    assert {k: said[k] for k in titles} == titles
+    assert f": {count}, " in _head(explained, plan)
+
+    borders = picture_of(plan, quantities=["q"]).borders
+    assert borders is not None
+    assert dict(zip(borders.indices, borders.titles, strict=True)) == titles
+
+    scene = scene_of_plan(plan)
+    assert {move["index"]: move["title"] for move in scene["moves"]} == titles
+    assert f" · {count} · " in scene["subtitle"]
+    assert sorted([*titles, *(mark["index"] for mark in scene["marks"])]) == list(entries)
