@@ -169,9 +169,12 @@ export class Arm {
     return new Vector3().setFromMatrixPosition(this.tool.matrixWorld);
   }
 
-  /** Return where the joints and the tcp stand in the world, m. */
-  corners() {
+  /** Return points around the joints, the tcp and its axes in the world, m: nothing of the arm is outside of them. */
+  extremes() {
+    const size = 1.5 * this.radius(0);
+    const around = ({ x, y, z }) => [-size, size].flatMap((step) => [new Vector3(x + step, y, z), new Vector3(x, y + step, z), new Vector3(x, y, z + step)]);
     const nodes = [...this.joints.flatMap(({ turning, carried }) => [turning, carried]), this.tool];
-    return nodes.map((node) => new Vector3().setFromMatrixPosition(node.matrixWorld));
+    const ends = [0, 1, 2].map((axis) => new Vector3().setComponent(axis, 0.1 * this.size).applyMatrix4(this.tool.matrixWorld));
+    return [...nodes.flatMap((node) => around(new Vector3().setFromMatrixPosition(node.matrixWorld))), ...ends];
   }
 }

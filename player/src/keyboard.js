@@ -11,6 +11,7 @@ const HELP = [
   ['0  1  2  3', 'view from the corner, front, side, top'],
   ['g  f  t  r  z', 'ghosts, frames, tool path, grid, zones'],
   ['j', 'jerk'],
+  ['p', 'a plot for each joint'],
   ['d', 'dark or light'],
   ['?', 'this page'],
 ];

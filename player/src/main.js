@@ -53,7 +53,7 @@ function viewport(scene, motion, theme) {
   }
 }
 
-function keysOf(clock, scene, { stage, chips }, theme, dialog, jerk) {
+function keysOf(clock, scene, { stage, chips }, theme, dialog, { jerk, apart }) {
   const move = (step) => {
     const starts = scene.moves.map(({ start }) => start);
     const next = step > 0 ? starts.find((start) => start > clock.time + 1e-9) : starts.findLast((start) => start < clock.time - 1e-9);
@@ -76,6 +76,7 @@ function keysOf(clock, scene, { stage, chips }, theme, dialog, jerk) {
     },
     d: () => theme.toggle(),
     j: () => jerk?.click(),
+    p: () => apart.click(),
     '?': () => dialog.showModal(),
   };
   if (stage) {
@@ -95,8 +96,9 @@ function start(scene) {
   const plots = new Plots(scene, motion, clock, theme);
   const table = new JointTable(scene, motion, plots, clock, theme);
   const limits = toggle('All limits', 'Zoom out until every limit can be seen', false, (on) => plots.setAllLimits(on));
+  const apart = toggle('Joints apart', 'A plot for each joint (p)', plots.apart, (on) => plots.setApart(on));
   const jerk = plots.hasJerk ? toggle('Jerk', 'Plot of the jerk (j)', false, (on) => plots.showJerk(on)) : undefined;
-  const bar = element('div.bar', {}, element('h2', { text: 'Joints' }), element('div.chips', {}, limits, ...(jerk ? [jerk] : [])));
+  const bar = element('div.bar', {}, element('h2', { text: 'Joints' }), element('div.chips', {}, ...(scene.joints.length > 1 ? [apart] : []), limits, ...(jerk ? [jerk] : [])));
   const side = element('aside', {}, ...findingPanels(scene, clock), bar, table.element, plots.holder, ...reportPanels(scene, clock), element('footer', { text: scene.made_by }));
   document.body.classList.toggle('flat', !view.stage);
   document.body.append(header(scene, theme, dialog), element('main', {}, view.holder, status.element, new Transport(scene, clock).element), side, dialog);
@@ -107,7 +109,7 @@ function start(scene) {
     view.stage.look('corner');
   }
   clock.listen(() => status.update());
-  listenToKeys(keysOf(clock, scene, view, theme, dialog, jerk));
+  listenToKeys(keysOf(clock, scene, view, theme, dialog, { jerk, apart }));
   clock.seek(clock.start);
   globalThis.trajcli = {
     clock,

@@ -7,7 +7,8 @@ const NAMES = { q: 'Position', qd: 'Velocity', qdd: 'Acceleration', qddd: 'Jerk'
 const SYMBOLS = { q: 'q', qd: 'q\u0307', qdd: 'q\u0308', qddd: 'q\u20db', tau: '\u03c4' };
 const ORDERS = ['q', 'qd', 'qdd', 'qddd', 'tau'];
 const NEAR = 1.6; // times the range of the curves: a limit that is nearer is always in view
-const HEIGHT = { beside: 168, alone: 240 }; // of a plot, px: beside the view in space, or without one
+const HEIGHT = { beside: 168, alone: 240, apart: 104 }; // of a plot, px: beside the view in space, without one, of one joint
+const LONG = 60; // s: of a longer motion each joint has plots of its own at first
 
 export class Plots {
   /**
@@ -22,21 +23,39 @@ export class Plots {
     this.allLimits = false;
     this.height = HEIGHT[scene.robot ? 'beside' : 'alone'];
     this.holder = element('div.plots');
-    this.cards = motion.quantities.map((quantity) => this.card(quantity));
-    this.showJerk(false);
+    this.jerk = false;
+    this.apart = motion.end - motion.start > LONG && scene.joints.length > 1;
+    this.layOut();
     theme.listen(() => this.rebuild());
     clock.listen(() => this.moveCursors());
     new ResizeObserver(() => this.resize()).observe(this.holder);
   }
 
-  card(quantity) {
+  /** Make the cards anew: one for each quantity, or one for each joint. */
+  layOut() {
+    for (const { plot } of this.cards ?? []) plot?.destroy();
+    this.holder.replaceChildren();
+    this.holder.classList.toggle('apart', this.apart);
+    const all = this.scene.joints.map((_, index) => index);
+    this.cards = this.motion.quantities.flatMap((quantity) => (this.apart ? all.map((joint) => this.card(quantity, [joint])) : [this.card(quantity, all)]));
+    this.showJerk(this.jerk);
+  }
+
+  /** Give each joint plots of its own, or not. */
+  setApart(apart) {
+    this.apart = apart;
+    this.layOut();
+  }
+
+  card(quantity, joints) {
     const room = element('div.plot-room');
     const limit = this.scene.limits.some(({ bounds }) => (bounds[ORDERS.indexOf(quantity)] ?? []).flat().some((bound) => bound !== null));
     const key = limit ? [element('span.limit-key', { text: 'limit' })] : [];
-    const heading = element('h3', {}, element('span', {}, `${NAMES[quantity]} `, element('span.symbol', { text: SYMBOLS[quantity] })), ...key);
-    const card = element('section.plot', { 'aria-label': `${NAMES[quantity]} of the joints over time`, 'data-quantity': quantity }, heading, room);
+    const name = this.apart ? `${this.scene.joints[joints[0]].name} ` : `${NAMES[quantity]} `;
+    const heading = element('h3', {}, element('span', {}, name, element('span.symbol', { text: SYMBOLS[quantity] })), ...key);
+    const card = element('section.plot', { 'aria-label': `${NAMES[quantity]} of ${this.apart ? this.scene.joints[joints[0]].name : 'the joints'} over time`, 'data-quantity': quantity }, heading, room);
     this.holder.append(card);
-    return { quantity, card, room, order: ORDERS.indexOf(quantity) };
+    return { quantity, joints, card, room, order: ORDERS.indexOf(quantity) };
   }
 
   /** Draw all plots anew: colours, ranges or joints have changed. */
@@ -50,7 +69,8 @@ export class Plots {
   }
 
   showJerk(visible) {
-    for (const card of this.cards) if (card.quantity === 'qddd') card.card.hidden = !visible;
+    this.jerk = visible;
+    for (const card of this.cards) card.card.hidden = (card.quantity === 'qddd' && !visible) || (this.apart && this.hidden.has(card.joints[0]));
     this.rebuild();
   }
 
@@ -60,7 +80,7 @@ export class Plots {
 
   toggleJoint(index) {
     if (!this.hidden.delete(index)) this.hidden.add(index);
-    this.rebuild();
+    this.showJerk(this.jerk);
   }
 
   setAllLimits(all) {
@@ -68,29 +88,35 @@ export class Plots {
     this.rebuild();
   }
 
-  /** Return the index of the unit: joints of another unit have an axis of their own, at the right. */
-  unitsOf(order) {
-    return [...new Set(this.scene.joints.map((joint) => joint.units[order]))];
+  /** Return the units of a plot: joints of another unit have an axis of their own, at the right. */
+  unitsOf({ joints, order }) {
+    return [...new Set(joints.map((joint) => this.scene.joints[joint].units[order]))];
+  }
+
+  /** Return the times and the values of all joints in their units; made once, for all cards. */
+  dataOf(quantity) {
+    this.data ??= {};
+    this.data[quantity] ??= [this.motion.times, ...this.scene.joints.map((joint, index) => Array.from(this.motion.values[quantity][index], (value) => value * scaleOf(joint, quantity)))];
+    return this.data[quantity];
   }
 
   draw(card) {
     const { quantity, room, order } = card;
     const { joints } = this.scene;
-    const units = this.unitsOf(order);
+    const units = this.unitsOf(card);
     const width = Math.max(room.clientWidth, 120);
-    const data = [this.motion.times, ...joints.map((joint, index) => Array.from(this.motion.values[quantity][index], (value) => value * scaleOf(joint, quantity)))];
+    const data = this.dataOf(quantity);
     const series = joints.map((joint, index) => {
       const { color, dash } = this.theme.joint(index);
-      return { label: joint.name, scale: joint.units[order], stroke: color, dash, width: 1.7, pxAlign: 0, points: { show: false }, show: !this.hidden.has(index) };
+      return { label: joint.name, scale: joint.units[order], stroke: color, dash, width: 1.7, pxAlign: 0, points: { show: false }, show: card.joints.includes(index) && !this.hidden.has(index) };
     });
-    const scales = Object.fromEntries(units.map((unit) => [unit, { range: () => this.range(data, order, unit) }]));
+    const scales = Object.fromEntries(units.map((unit) => [unit, { range: () => this.range(data, card, unit) }]));
     const axis = { stroke: this.theme.css('--muted'), font: '11px system-ui, sans-serif', labelFont: '11px system-ui, sans-serif', grid: { stroke: this.theme.css('--rule'), width: 1 }, ticks: { show: false } };
     const axes = units.map((unit, k) => ({ ...axis, scale: unit, side: k ? 1 : 3, size: 52, label: unit, labelSize: 14, labelGap: 0, grid: { ...axis.grid, show: k === 0 }, values: ticksOf('') }));
-    const last = this.cards.filter((other) => !other.card.hidden).at(-1) === card;
     card.plot = new uPlot(
       {
         width,
-        height: this.height,
+        height: this.apart ? HEIGHT.apart : this.height,
         padding: [8, units.length > 1 ? 0 : 20, 0, 0],
         legend: { show: false },
         cursor: { sync: { key: 'trajcli' }, y: false, points: { size: 6 }, drag: { x: true, y: false, dist: 6 }, dataIdx: nearest },
@@ -99,7 +125,7 @@ export class Plots {
         series: [{}, ...series],
         hooks: {
           drawAxes: [(plot) => this.drawBorders(plot)],
-          draw: [(plot) => this.drawLimits(plot, order), (plot) => this.drawFindings(plot, order)],
+          draw: [(plot) => this.drawLimits(plot, card), (plot) => this.drawFindings(plot, card)],
           setCursor: [(plot) => this.showValues(card, plot)],
           setSelect: [(plot) => (this.zoomed = plot.select.width > 0)],
           setScale: [(plot, key) => key === 'x' && this.followZoom(plot)],
@@ -108,7 +134,6 @@ export class Plots {
       data,
       room,
     );
-    card.last = last;
     card.cursor = element('div.playhead');
     card.values = element('div.values', { hidden: true });
     card.plot.over.append(card.cursor, card.values);
@@ -116,18 +141,19 @@ export class Plots {
   }
 
   /** Show the values under the pointer, beside it; in the plot that it is over. */
-  showValues({ values, order }, plot) {
+  showValues(card, plot) {
+    const { values } = card;
     const { left, idx } = plot.cursor;
     values.hidden = !(left >= 0 && idx !== null && idx !== undefined && plot.over.matches(':hover'));
     if (values.hidden) return;
-    const lines = this.shown(order).map((joint) => {
+    const lines = this.shown(card).map((joint) => {
       const name = element('span.value-name', { text: this.scene.joints[joint].name });
       const mark = element('span.swatch');
       mark.style.background = this.theme.joint(joint).color;
       return element('div', {}, mark, name, element('b', { text: significant(plot.data[joint + 1][idx], 4) }));
     });
     const row = plot.data[0][idx];
-    values.replaceChildren(element('div.value-time', { text: `${seconds(row)} s, ${this.unitsOf(order).join(' and ')}` }), ...lines);
+    values.replaceChildren(element('div.value-time', { text: `${seconds(row)} s, ${this.unitsOf(card).join(' and ')}` }), ...lines);
     const beyond = left > plot.over.clientWidth / 2;
     values.style.left = beyond ? 'auto' : `${left + 12}px`;
     values.style.right = beyond ? `${plot.over.clientWidth - left + 12}px` : 'auto';
@@ -160,9 +186,10 @@ export class Plots {
   }
 
   /** Return the range of an axis: of the curves in view, and of the limits that are near, or of all limits. */
-  range(data, order, unit) {
+  range(data, card, unit) {
+    const { order } = card;
     let [low, high] = [Infinity, -Infinity];
-    const shown = this.shown(order, unit);
+    const shown = this.shown(card, unit);
     for (const joint of shown) for (const value of data[joint + 1]) [low, high] = [Math.min(low, value), Math.max(high, value)];
     if (low > high) return [-1, 1];
     const room = Math.max(high - low, Math.max(Math.abs(low), Math.abs(high)) * (order ? 1 : 0.1), 1e-6);
@@ -174,8 +201,8 @@ export class Plots {
     return [low - margin, high + margin];
   }
 
-  shown(order, unit) {
-    return this.scene.joints.flatMap((joint, index) => (this.hidden.has(index) || (unit && joint.units[order] !== unit) ? [] : [index]));
+  shown({ joints, order }, unit) {
+    return joints.filter((index) => !this.hidden.has(index) && (!unit || this.scene.joints[index].units[order] === unit));
   }
 
   /** Return the limits of joints: value, interval of time, joints that have it. */
@@ -196,7 +223,8 @@ export class Plots {
     return [...lines.values()];
   }
 
-  drawLimits(plot, order) {
+  drawLimits(plot, card) {
+    const { order } = card;
     const { ctx, bbox } = plot;
     ctx.save();
     ctx.beginPath();
@@ -204,7 +232,7 @@ export class Plots {
     ctx.clip();
     ctx.lineWidth = 1.25 * devicePixelRatio;
     ctx.setLineDash([5 * devicePixelRatio, 4 * devicePixelRatio]);
-    for (const { value, start, end, unit, joints } of this.limits(order, this.shown(order))) {
+    for (const { value, start, end, unit, joints } of this.limits(order, this.shown(card))) {
       ctx.strokeStyle = joints.length > 1 ? this.theme.css('--limit') : this.theme.joint(joints[0]).color;
       const y = plot.valToPos(value, unit, true);
       ctx.beginPath();
@@ -232,13 +260,13 @@ export class Plots {
   }
 
   /** Mark where a limit is broken by a triangle on the curve. */
-  drawFindings(plot, order) {
+  drawFindings(plot, { order, joints }) {
     const { ctx } = plot;
     const size = 5 * devicePixelRatio;
     ctx.save();
     ctx.fillStyle = this.theme.css('--bad');
     for (const { time, order: of, joint, value } of this.scene.findings) {
-      if (of !== order || joint === null || this.hidden.has(joint)) continue;
+      if (of !== order || !joints.includes(joint) || this.hidden.has(joint)) continue;
       const { units } = this.scene.joints[joint];
       const scale = scaleOf(this.scene.joints[joint], ORDERS[order]);
       const [x, y] = [plot.valToPos(time, 'x', true), plot.valToPos(value * scale, units[order], true)];
@@ -262,7 +290,7 @@ export class Plots {
   resize() {
     for (const { plot, room } of this.cards) {
       const width = room.clientWidth;
-      if (plot && width > 0 && width !== plot.width) plot.setSize({ width, height: this.height });
+      if (plot && width > 0 && width !== plot.width) plot.setSize({ width, height: plot.height });
     }
     this.moveCursors();
   }

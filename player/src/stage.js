@@ -104,7 +104,7 @@ export class Stage {
     const points = [];
     for (let k = 0; k <= 24; k += 1) {
       this.arm.move(this.motion.joints(this.motion.start + ((this.motion.end - this.motion.start) * k) / 24));
-      points.push(...this.arm.corners());
+      points.push(...this.arm.extremes());
     }
     points.push(...this.trace.points);
     const base = new Vector3().setFromMatrixPosition(this.arm.root.children[0].matrixWorld);

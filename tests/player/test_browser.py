@@ -45,6 +45,7 @@ start: {joints: [0, 0, 0, 0]}
 moves: [{planner: cycloidal, to: {joints: [0.4, 2, -0.3, -1]}, duration: 2}]
 """
 SIZES = {
+    "small": (700, 500),
     "phone": (390, 844),
     "landscape": (844, 390),
     "tablet": (820, 1180),
@@ -347,6 +348,44 @@ def test_the_jerk_is_shown_when_asked_for(view: Callable[..., Any], pick: Path) 
     page.get_by_text("Jerk", exact=True).first.click()
     assert page.locator(".plot:visible").count() == 4
     assert page.locator(".plot:visible canvas").count() == 4
+
+
+def test_joints_have_plots_of_their_own(view: Callable[..., Any], pick: Path) -> None:
+    viewed = view(pick)
+    page = viewed.page
+    page.keyboard.press("p")
+    assert page.locator(".plot:visible canvas").count() == 18  # 6 joints: q, qd, qdd
+    page.locator(".joint").nth(2).click()
+    assert page.locator(".plot:visible").count() == 15
+    page.keyboard.press("j")
+    assert page.locator(".plot:visible").count() == 20
+    shown = "trajcli.plots.cards.map(card => card.plot?.series.slice(1).filter(one => one.show).length ?? 0)"
+    assert set(page.evaluate(shown)) == {0, 1}
+    page.keyboard.press("p")
+    assert page.locator(".plot:visible").count() == 4
+    assert viewed.messages == []
+
+
+@pytest.mark.parametrize("source", ["scara_pick", "gantry", "ur5e_pick"])
+def test_the_first_view_has_the_whole_arm_and_tool(
+    view: Callable[..., Any], tmp_path: Path, source: str
+) -> None:
+    plan = planned(ROOT / f"examples/{source}.yaml")
+    page = view(written(tmp_path, plan), 900, 700).page
+    seen = """time => { trajcli.seek(time); const { arm, camera } = trajcli.stage;
+        const inside = [];
+        arm.root.traverse((part) => {
+          if (!part.isMesh || !part.visible || !part.parent.visible) return;
+          const place = part.geometry.getAttribute('position');
+          for (let k = 0; k < place.count; k += 1) {
+            const point = part.position.clone().set(place.getX(k), place.getY(k), place.getZ(k));
+            const { x, y, z } = point.applyMatrix4(part.matrixWorld).project(camera);
+            inside.push(Math.max(Math.abs(x), Math.abs(y), z));
+          }
+        });
+        return Math.max(...inside); }"""
+    for time in np.linspace(0, plan.trajectory.duration, 9).tolist():
+        assert page.evaluate(seen, time) < 1
 
 
 def test_joints_can_be_hidden(view: Callable[..., Any], pick: Path) -> None:
