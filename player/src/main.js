@@ -110,7 +110,7 @@ function start(scene) {
   }
   clock.listen(() => status.update());
   listenToKeys(keysOf(clock, scene, view, theme, dialog, { jerk, apart }));
-  clock.seek(clock.start);
+  clock.seek(scene.opens_at ?? clock.start);
   globalThis.trajcli = {
     clock,
     motion,

@@ -23,14 +23,25 @@ function list(items, clock, kind) {
   return made;
 }
 
+/** Return a list of findings, one line for each cause: the worst of it, and the others where they are asked for. */
+function causeList({ findings, causes }, clock) {
+  return element('div', {}, ...causes.map(([worst, ...others]) => {
+    const line = list([findings[worst]], clock, 'bad');
+    if (!others.length) return line;
+    const more = element('details.alike', {}, element('summary', { text: `and ${others.length} more of this cause` }));
+    more.addEventListener('toggle', () => more.children.length < 2 && more.append(list(others.map((index) => ({ ...findings[index], hint: null })), clock, 'bad')), { once: true });
+    return element('div', {}, line, more);
+  }));
+}
+
 function section(title, count, content, open = true) {
   const heading = element('summary', {}, element('h2', { text: title }), element('span.count', { text: count }));
   return element('details.panel', { open }, heading, content);
 }
 
 /** Return the section of the findings: what comes first; nothing where there are none. */
-export function findingPanels({ findings }, clock) {
-  return findings.length ? [section('Findings', findings.length, list(findings, clock, 'bad'))] : [];
+export function findingPanels(scene, clock) {
+  return scene.causes.length ? [section('Findings', scene.causes.length, causeList(scene, clock))] : [];
 }
 
 /** Return the sections of events, notes, moves and steps; those without lines are left out. */

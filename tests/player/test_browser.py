@@ -327,15 +327,28 @@ def test_the_values_under_the_pointer_are_shown(view: Callable[..., Any], pick: 
     )
 
 
-def test_findings_seek_to_their_time(view: Callable[..., Any], refused: tuple[Path, Plan]) -> None:
+def test_findings_of_one_cause_are_one_and_the_page_opens_there(
+    view: Callable[..., Any], refused: tuple[Path, Plan]
+) -> None:
     file, plan = refused
+    findings = plan.verdict.findings
+    assert len(findings) == 7  # a move that is too short: velocity, acceleration and jerk of several joints
     viewed = view(file)
-    lines = viewed.page.locator(".line.bad")
-    assert lines.count() == len(plan.verdict.findings)
-    lines.nth(2).click()
-    assert viewed.time() == pytest.approx(plan.verdict.findings[2].time)
-    assert viewed.page.locator(".verdict.violated").inner_text() == f"{lines.count()} findings"
-    assert viewed.page.locator(".mark").count() == lines.count()
+    page = viewed.page
+    assert page.locator(".verdict.violated").inner_text() == "1 finding"
+    assert page.locator(".line.bad").count() == page.locator(".hint").count() == 1
+    worst = max(findings, key=lambda finding: abs((finding.value or 0) / (finding.limit or 1)))
+    assert viewed.time() == pytest.approx(worst.time)
+    page.keyboard.press("Home")
+    page.locator(".line.bad").first.click()
+    assert viewed.time() == pytest.approx(worst.time)
+    page.locator(".alike summary").click()
+    assert page.locator(".line.bad").count() == 7
+    page.locator(".line.bad").nth(3).click()
+    others = [finding for finding in findings if finding is not worst]
+    assert viewed.time() == pytest.approx(others[2].time)
+    assert page.locator(".mark").count() == 7
+    assert viewed.messages == []
 
 
 def test_the_jerk_is_shown_when_asked_for(view: Callable[..., Any], pick: Path) -> None:

@@ -152,7 +152,10 @@ def test_limits_by_move_and_findings_are_in_the_scene() -> None:
     loaded = load_job(ROOT / "examples/ur5e_pick.yaml", ["moves.8.duration=0.5"])
     plan = plan_job(loaded)
     scene = scene_of_plan(plan)
-    assert scene["verdict"] == {"state": "violated", "text": f"{len(plan.verdict.findings)} findings"}
+    assert scene["verdict"] == {"state": "violated", "text": "1 finding"}  # the move is too short
+    assert sorted(index for cause in scene["causes"] for index in cause) == list(
+        range(len(scene["findings"]))
+    )
     assert [finding["time"] for finding in scene["findings"]] == [f.time for f in plan.verdict.findings]
     rad = 3.141592653589793 / 180
     slow = next(

@@ -42,6 +42,7 @@ from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.knots import Knots, has_knots, knots_of
 from trajcli.output.sensitivity import at_limit_of
 from trajcli.planners.planner import Event, PlannedMove
+from trajcli.planning.causes import Cause, causes_of, problem_of
 from trajcli.planning.plan import Plan
 from trajcli.trajectory import Span, Trajectory
 from trajcli.units import joint_units
@@ -425,19 +426,19 @@ def verification_error(plan: Plan, *, every: bool = True) -> VerificationError:
 
     Args:
         plan: A plan that fails.
-        every: Whether each finding is said; otherwise the worst of each move and kind, which tells how many
-            more there are, and one for all that has the same cause.
+        every: Whether each finding is said; otherwise the worst of each cause, which tells how many more
+            there are.
     """
-    findings = plan.verdict.findings
     if every:
-        return VerificationError(*(_problem(plan, finding) for finding in findings))
-    from trajcli.job.unit_hints import unit_hint
+        return VerificationError(*(problem_of(plan, finding) for finding in plan.verdict.findings))
+    return VerificationError(*(_said(plan, cause) for cause in causes_of(plan)))
 
-    alike: dict[tuple[int | str | None, ...], list[Finding]] = {}
-    units = unit_hint(plan.loaded)
-    for finding in findings:
-        alike.setdefault(_cause(finding, units), []).append(finding)
-    return VerificationError(*(_worst(plan, group) for group in alike.values()))
+
+def _said(plan: Plan, cause: Cause) -> Problem:
+    """Return the problem of the worst of findings of one cause."""
+    problem, others = problem_of(plan, cause.worst), len(cause.findings) - 1
+    more = f" (and {others} more like it: --all)" if others else ""
+    return replace(problem, message=problem.message + more)
 
 
 def concession_error(plan: Plan) -> VerificationError:
@@ -449,42 +450,3 @@ def concession_error(plan: Plan) -> VerificationError:
         return Problem(f"{event.kind}: {event.message}", hint, where, event.move, kind=event.kind)
 
     return VerificationError(*map(problem, plan.events))
-
-
-def _cause(finding: Finding, units: str | None) -> tuple[int | str | None, ...]:
-    """Return what findings of one cause share: the move and kind, or numbers in other units than were meant.
-
-    Where the acceleration steps, its derivative has no bound: the limit of jerk is broken for one reason.
-    """
-    if finding.kind in QUANTITIES and finding.hint is not None and finding.hint == units:
-        return (finding.hint,)
-    if finding.kind in ("jerk", "acceleration_jump"):
-        return finding.move, finding.hint
-    return finding.move, finding.kind
-
-
-def _worst(plan: Plan, alike: Sequence[Finding]) -> Problem:
-    """Return the problem of the worst of findings of one move and kind."""
-    problem = _problem(plan, max(alike, key=_excess))
-    more = f" (and {len(alike) - 1} more like it: --all)" if len(alike) > 1 else ""
-    return replace(problem, message=problem.message + more)
-
-
-def _excess(finding: Finding) -> tuple[float, float]:
-    """Return how far a finding is beyond its limit: of positions the distance, else the part of the limit.
-
-    Of findings of one cause those about the position, or about steps, come first.
-    """
-    first = math.inf if finding.kind in ("position", "acceleration_jump") else 0.0
-    if finding.kind == "position" or not finding.limit:
-        return first, abs((finding.value or 0.0) - (finding.limit or 0.0))
-    return first, finding.excess
-
-
-def _problem(plan: Plan, finding: Finding) -> Problem:
-    index, said = finding.move or 0, finding.text(plan.loaded.say)
-    if finding.kind == "position" and finding.time == plan.trajectory.curve.start:
-        whose, position = plan.loaded.start_meant()
-        return replace(finding, move=index).problem(f"{whose}: {said}", position)
-    text = f"{plan.loaded.called(index)}: {said}"
-    return replace(finding, move=index).problem(text, plan.loaded.place_of_move(index))

@@ -16,7 +16,7 @@ from trajcli.findings import Finding
 from trajcli.judge.file import CheckedFile
 from trajcli.kinematics.robot import JointType, Robot
 from trajcli.player.rows import ORDERS, DrawnRows, rows_of_samples
-from trajcli.player.scene import geometry_of, joints_in_units, limits_of, order_of, waypoints_of
+from trajcli.player.scene import geometry_of, joints_in_units, limits_of, opening, order_of, waypoints_of
 from trajcli.queries.arm import open_sheet
 from trajcli.queries.forward import refuse_far
 from trajcli.streams.byte_source import ByteSource
@@ -75,13 +75,20 @@ def scene_of_file(
 def _judgement(checked: CheckedFile | str | None, units: Units, start: float) -> dict[str, Any]:
     """Return the verdict and the errors of a file; what has no time stands at its start, s."""
     if checked is None or isinstance(checked, str):
-        return {"verdict": {"state": "unjudged", "text": "not judged"}, "findings": []}
+        unjudged = {"state": "unjudged", "text": "not judged"}
+        return {"verdict": unjudged, "findings": [], "causes": [], "opens_at": None}
     judgement, count = checked.judgement, len(checked.judgement.errors)
     state, text = "verified", str(judgement.verdict)
     if not judgement.passed:
         state, text = "violated", f"{count} finding{'s' * (count != 1)}"
     findings = [_finding(found, checked.robot, units, start) for found in judgement.errors]
-    return {"verdict": {"state": state, "text": text}, "findings": findings}
+    causes = [[index] for index in range(count)]
+    return {
+        "verdict": {"state": state, "text": text},
+        "findings": findings,
+        "causes": causes,
+        "opens_at": opening(judgement.errors, causes),
+    }
 
 
 def _finding(finding: Finding, robot: Robot, units: Units, start: float) -> dict[str, Any]:

@@ -35,8 +35,10 @@ def scene_of_plan(plan: Plan) -> dict[str, Any]:
     spans = [span for span in trajectory.spans if span.duration > 0]
     when = [finding.time for finding in verdict.findings if finding.time is not None]
     rows, loads = _rows_and_loads(plan, [span.start for span in spans], when)
-    count = len(verdict.findings)
-    state, text = ("verified", "verified") if verdict.passed else ("violated", _counted(count, "finding"))
+    causes = _causes(plan)
+    state, text = (
+        ("verified", "verified") if verdict.passed else ("violated", _counted(len(causes), "finding"))
+    )
     moves = _counted(loaded.move_count, "move")
     names, types = trajectory.joint_names, trajectory.joint_types
     return {
@@ -54,6 +56,8 @@ def scene_of_plan(plan: Plan) -> dict[str, Any]:
         **_marks(plan),
         "waypoints": waypoints_of([*_waypoints(plan)]) if loaded.robot.convention else [],
         "findings": [_finding(plan, finding) for finding in verdict.findings],
+        "causes": causes,
+        "opens_at": opening(verdict.findings, causes),
         "events": [_event(plan, event) for event in (*plan.events, *plan.remarks) if not event.is_internal],
         "steps": [_step(plan, k) for k in range(min(len(verdict.steps), _MOST_STEPS))],
         "notes": list(_notes(plan)),
@@ -266,6 +270,23 @@ def _finding(plan: Plan, finding: Finding) -> dict[str, Any]:
         "message": finding.text(plan.loaded.say),
         "hint": finding.hint,
     }
+
+
+def _causes(plan: Plan) -> list[list[int]]:
+    """Return the numbers of findings of one cause, the worst of each first."""
+    if plan.verdict.passed:
+        return []
+    from trajcli.planning.causes import causes_of
+
+    return [list(cause.indices) for cause in causes_of(plan)]
+
+
+def opening(findings: Sequence[Finding], causes: Sequence[Sequence[int]]) -> float | None:
+    """Return the time of the worst finding, s, at which a page opens; None where none has a time."""
+    from trajcli.planning.causes import badness
+
+    worst = [findings[cause[0]] for cause in causes if findings[cause[0]].time is not None]
+    return max(worst, key=badness).time if worst else None
 
 
 def order_of(kind: str) -> int | None:
