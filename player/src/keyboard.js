@@ -10,6 +10,7 @@ const HELP = [
   ['l', 'repeat'],
   ['0  1  2  3', 'view from the corner, front, side, top'],
   ['g  f  t  r  z', 'ghosts, frames, tool path, grid, zones'],
+  ['c', 'the second of two motions'],
   ['j', 'jerk'],
   ['p', 'a plot for each joint'],
   ['d', 'dark or light'],

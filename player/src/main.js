@@ -10,7 +10,7 @@ import { Status } from './status.js';
 import { Theme } from './theme.js';
 import { Transport } from './timeline.js';
 
-const PARTS = [['ghosts', 'Ghosts', 'Ghosts of the arm at waypoints (g)'], ['frames', 'Frames', 'Frames of the links (f)'], ['trace', 'Path', 'Path of the tool (t)'], ['zones', 'Zones', 'Zones about corners, and the programmed path in them (z)'], ['grid', 'Grid', 'Grid (r)']];
+const PARTS = [['ghosts', 'Ghosts', 'Ghosts of the arm at waypoints (g)'], ['frames', 'Frames', 'Frames of the links (f)'], ['trace', 'Path', 'Path of the tool (t)'], ['zones', 'Zones', 'Zones about corners, and the programmed path in them (z)'], ['other', 'Second', 'The second motion (c)'], ['grid', 'Grid', 'Grid (r)']];
 const VIEWS = [['corner', '0'], ['front', '1'], ['side', '2'], ['top', '3']];
 
 function toggle(label, title, pressed, onchange) {
@@ -25,15 +25,19 @@ function toggle(label, title, pressed, onchange) {
 function header(scene, theme, dialog) {
   const round = (name, label, onclick) => element('button.round', { type: 'button', 'aria-label': label, title: label, onclick }, icon(...ICONS[name]));
   const facts = element('span.facts', { text: scene.subtitle });
+  const verdict = ({ state, text }) => element(`span.verdict.${state}`, { text });
+  const titled = scene.other
+    ? [element('div.compared', {}, ...[scene, scene.other].map((one, index) =>
+      element('div.motion', {}, element(`span.${index ? 'ghostly' : 'solid'}`, { title: index ? 'the translucent arm, thin curves' : 'the solid arm, thick curves' }), element('h1', { text: one.title }), element('span.facts', { text: one.subtitle }), verdict(one.verdict))))]
+    : [element('div.title', {}, element('h1', { text: scene.title }), facts), verdict(scene.verdict)];
   return element('header', {},
-    element('div.title', {}, element('h1', { text: scene.title }), facts),
-    element(`span.verdict.${scene.verdict.state}`, { text: scene.verdict.text }),
+    ...titled,
     round('theme', 'Dark or light (d)', () => theme.toggle()),
     round('help', 'Help (?)', () => dialog.showModal()));
 }
 
 /** Return the view in space with its buttons; or why there is none. */
-function viewport(scene, motion, theme) {
+function viewport(scene, motion, theme, other) {
   const holder = element('div.viewport');
   const without = (reason) => {
     holder.classList.add('empty');
@@ -42,8 +46,10 @@ function viewport(scene, motion, theme) {
   };
   if (!scene.robot) return without(scene.no_geometry);
   try {
-    const stage = new Stage(holder, scene, motion, theme);
-    const chips = PARTS.filter(([part]) => part !== 'zones' || scene.zones.length).map(([part, label, title]) => [part, toggle(label, title, part !== 'frames', (on) => stage.show(part, on))]);
+    const stage = new Stage(holder, scene, motion, theme, other);
+    const hidden = new Set(['frames', ...(scene.other ? ['ghosts'] : [])]);
+    const chips = PARTS.filter(([part]) => (part !== 'zones' || scene.zones.length) && (part !== 'other' || scene.other)).map(([part, label, title]) => [part, toggle(label, title, !hidden.has(part), (on) => stage.show(part, on))]);
+    if (scene.other) stage.show('ghosts', false);
     const reset = element('button.chip.reset', { type: 'button', title: 'See everything (0)', 'aria-label': 'See everything', onclick: () => stage.look('corner') }, icon(...ICONS.reset));
     const cell = element('span.cell', { text: `grid ${Number((stage.cell * scene.length.scale).toPrecision(3))} ${scene.length.unit}` });
     holder.append(element('div.chips', {}, ...chips.map(([, chip]) => chip), reset), element('div.legend', {}, stage.trace.legend, cell));
@@ -81,7 +87,7 @@ function keysOf(clock, scene, { stage, chips }, theme, dialog, { jerk, apart }) 
   };
   if (stage) {
     for (const [view, key] of VIEWS) actions[key] = () => stage.look(view);
-    for (const [key, part] of [['g', 'ghosts'], ['f', 'frames'], ['t', 'trace'], ['r', 'grid'], ['z', 'zones']]) actions[key] = () => chips[part]?.click();
+    for (const [key, part] of [['g', 'ghosts'], ['f', 'frames'], ['t', 'trace'], ['r', 'grid'], ['z', 'zones'], ['c', 'other']]) actions[key] = () => chips[part]?.click();
   }
   return actions;
 }
@@ -89,12 +95,13 @@ function keysOf(clock, scene, { stage, chips }, theme, dialog, { jerk, apart }) 
 function start(scene) {
   const theme = new Theme();
   const motion = new Motion(scene);
-  const clock = new Clock(motion.start, motion.end);
+  const other = scene.other && new Motion(scene.other, motion.start);
+  const clock = new Clock(motion.start, Math.max(motion.end, other?.end ?? motion.end));
   const dialog = helpDialog();
-  const view = viewport(scene, motion, theme);
+  const view = viewport(scene, motion, theme, other);
   const status = new Status(scene, clock, view.stage);
-  const plots = new Plots(scene, motion, clock, theme);
-  const table = new JointTable(scene, motion, plots, clock, theme);
+  const plots = new Plots(scene, motion, clock, theme, other);
+  const table = new JointTable(scene, motion, plots, clock, theme, other);
   const limits = toggle('All limits', 'Zoom out until every limit can be seen', false, (on) => plots.setAllLimits(on));
   const apart = toggle('Joints apart', 'A plot for each joint (p)', plots.apart, (on) => plots.setApart(on));
   const jerk = plots.hasJerk ? toggle('Jerk', 'Plot of the jerk (j)', false, (on) => plots.showJerk(on)) : undefined;
@@ -115,6 +122,7 @@ function start(scene) {
     clock,
     motion,
     plots,
+    other,
     stage: view.stage,
     seek: (time) => clock.seek(time),
     joints: (time) => motion.joints(time),

@@ -20,9 +20,17 @@ export function unpack({ values, width, low, high }, count) {
 
 /** The motion on rows of times; where a derivative jumps there are two rows of one time. */
 export class Motion {
-  constructor(scene) {
+  /**
+   * @param {object} scene With its rows.
+   * @param {number} start When it starts, s; without it as its rows say.
+   */
+  constructor(scene, start) {
     const { rows } = scene;
     this.times = new Float64Array(bytes(rows.times).buffer);
+    if (start !== undefined) {
+      const shift = start - this.times[0];
+      this.times = this.times.map((time) => time + shift);
+    }
     this.count = this.times.length;
     this.quantities = Object.keys(rows.quantities);
     this.values = Object.fromEntries(

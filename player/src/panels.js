@@ -1,6 +1,6 @@
 // What is known of the motion: findings, events, moves, and the joints now.
 import { element } from './dom.js';
-import { aligned, scaleOf, seconds } from './numbers.js';
+import { aligned, scaleOf, seconds, significant } from './numbers.js';
 import { UseBar, hasUses } from './use.js';
 
 const ORDERS = ['q', 'qd', 'qdd', 'qddd', 'tau'];
@@ -59,8 +59,8 @@ export function reportPanels(scene, clock) {
 
 /** The joints: their names, which show and hide their curves, and their values now. */
 export class JointTable {
-  constructor(scene, motion, plots, clock, theme) {
-    Object.assign(this, { scene, motion, clock, theme });
+  constructor(scene, motion, plots, clock, theme, other) {
+    Object.assign(this, { scene, motion, clock, theme, other });
     const quantities = motion.quantities.filter((name) => name !== 'qddd');
     this.largest = Object.fromEntries(quantities.map((name) => [name, motion.values[name].map((_, joint) => {
       const alike = motion.values[name].filter((_, other) => scene.joints[other].units[0] === scene.joints[joint].units[0]);
@@ -71,8 +71,10 @@ export class JointTable {
     const mixed = new Set(scene.joints.map((joint) => joint.units[0])).size > 1;
     const head = element('tr', {}, element('th', { scope: 'col', text: 'joint' }), ...quantities.map((name) =>
       element('th', { scope: 'col' }, element('span.symbol', { text: symbols[name] }), mixed ? '' : ` ${scene.joints[0].units[ORDERS.indexOf(name)]}`)));
+    if (other) head.append(element('th', { scope: 'col', title: 'By how much the second motion is ahead' }, element('span.symbol', { text: '\u0394q' })));
     if (hasUses(scene, motion)) head.append(element('th.use', { scope: 'col', title: 'The largest part of any limit that is used now', text: 'use' }));
     this.cells = [];
+    this.differences = other ? scene.joints.map(() => element('td')) : [];
     this.bars = hasUses(scene, motion) ? scene.joints.map((_, index) => new UseBar(scene, motion, index)) : [];
     const rows = scene.joints.map((joint, index) => {
       const swatch = element('span.swatch');
@@ -82,10 +84,10 @@ export class JointTable {
       } }, swatch, element('span', { text: joint.name }), mixed ? element('span.unit', { text: joint.units[0] }) : '');
       const cells = quantities.map((name) => ({ name, index, node: element('td') }));
       this.cells.push(...cells);
-      return { swatch, row: element('tr', {}, element('th', { scope: 'row' }, button), ...cells.map(({ node }) => node), ...(this.bars.length ? [element('td.use', {}, this.bars[index].element)] : [])) };
+      return { swatch, row: element('tr', {}, element('th', { scope: 'row' }, button), ...cells.map(({ node }) => node), ...(other ? [this.differences[index]] : []), ...(this.bars.length ? [element('td.use', {}, this.bars[index].element)] : [])) };
     });
     this.swatches = rows.map(({ swatch }) => swatch);
-    this.element = element(`div.joints${quantities.length + (this.bars.length ? 1 : 0) > 3 ? '.many' : ''}`, {}, element('table', {}, element('thead', {}, head), element('tbody', {}, ...rows.map(({ row }) => row))));
+    this.element = element(`div.joints${quantities.length + (this.bars.length ? 1 : 0) + (other ? 1 : 0) > 3 ? '.many' : ''}`, {}, element('table', {}, element('thead', {}, head), element('tbody', {}, ...rows.map(({ row }) => row))));
     theme.listen(() => this.paint());
     clock.listen(() => this.update());
     this.paint();
@@ -101,6 +103,11 @@ export class JointTable {
 
   update() {
     for (const bar of this.bars) bar.update(this.clock.time);
+    const [here, there] = [this.motion, this.other].map((one) => one?.joints(this.clock.time));
+    this.differences.forEach((node, index) => {
+      const { scale } = this.scene.joints[index];
+      node.textContent = significant((there[index] - here[index]) * scale, 3);
+    });
     for (const { name, index, node } of this.cells) {
       const scale = scaleOf(this.scene.joints[index], name);
       node.textContent = aligned(this.motion.value(name, index, this.clock.time) * scale, this.largest[name][index]);

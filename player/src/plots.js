@@ -3,12 +3,15 @@ import uPlot from 'uplot';
 import { element } from './dom.js';
 import { scaleOf, seconds, significant } from './numbers.js';
 
-const NAMES = { q: 'Position', qd: 'Velocity', qdd: 'Acceleration', qddd: 'Jerk', tau: 'Effort' };
-const SYMBOLS = { q: 'q', qd: 'q\u0307', qdd: 'q\u0308', qddd: 'q\u20db', tau: '\u03c4' };
+const NAMES = { q: 'Position', qd: 'Velocity', qdd: 'Acceleration', qddd: 'Jerk', tau: 'Effort', dq: 'Difference' };
+const SYMBOLS = { q: 'q', qd: 'q\u0307', qdd: 'q\u0308', qddd: 'q\u20db', tau: '\u03c4', dq: '\u0394q' };
 const ORDERS = ['q', 'qd', 'qdd', 'qddd', 'tau'];
 const NEAR = 1.6; // times the range of the curves: a limit that is nearer is always in view
 const HEIGHT = { beside: 168, alone: 240, apart: 104 }; // of a plot, px: beside the view in space, without one, of one joint
 const LONG = 60; // s: of a longer motion each joint has plots of its own at first
+
+/** Return the number of the limits and units of a quantity: a difference is a position. */
+const orderOf = (quantity) => Math.max(ORDERS.indexOf(quantity), 0);
 
 export class Plots {
   /**
@@ -16,9 +19,11 @@ export class Plots {
    * @param {Motion} motion The motion of the joints.
    * @param {Clock} clock What a click seeks with.
    * @param {Theme} theme The colours.
+   * @param {Motion} other A second motion, drawn thin and light beside the first; undefined without one.
    */
-  constructor(scene, motion, clock, theme) {
-    Object.assign(this, { scene, motion, clock, theme });
+  constructor(scene, motion, clock, theme, other) {
+    Object.assign(this, { scene, motion, clock, theme, other });
+    this.quantities = [...motion.quantities, ...(other ? ['dq'] : [])];
     this.hidden = new Set();
     this.allLimits = false;
     this.height = HEIGHT[scene.robot ? 'beside' : 'alone'];
@@ -37,7 +42,7 @@ export class Plots {
     this.holder.replaceChildren();
     this.holder.classList.toggle('apart', this.apart);
     const all = this.scene.joints.map((_, index) => index);
-    this.cards = this.motion.quantities.flatMap((quantity) => (this.apart ? all.map((joint) => this.card(quantity, [joint])) : [this.card(quantity, all)]));
+    this.cards = this.quantities.flatMap((quantity) => (this.apart ? all.map((joint) => this.card(quantity, [joint])) : [this.card(quantity, all)]));
     this.showJerk(this.jerk);
   }
 
@@ -49,13 +54,13 @@ export class Plots {
 
   card(quantity, joints) {
     const room = element('div.plot-room');
-    const limit = this.scene.limits.some(({ bounds }) => (bounds[ORDERS.indexOf(quantity)] ?? []).flat().some((bound) => bound !== null));
+    const limit = this.scene.limits.some(({ bounds }) => (bounds[quantity === 'dq' ? -1 : orderOf(quantity)] ?? []).flat().some((bound) => bound !== null));
     const key = limit ? [element('span.limit-key', { text: 'limit' })] : [];
     const name = this.apart ? `${this.scene.joints[joints[0]].name} ` : `${NAMES[quantity]} `;
     const heading = element('h3', {}, element('span', {}, name, element('span.symbol', { text: SYMBOLS[quantity] })), ...key);
     const card = element('section.plot', { 'aria-label': `${NAMES[quantity]} of ${this.apart ? this.scene.joints[joints[0]].name : 'the joints'} over time`, 'data-quantity': quantity }, heading, room);
     this.holder.append(card);
-    return { quantity, joints, card, room, order: ORDERS.indexOf(quantity) };
+    return { quantity, joints, card, room, order: orderOf(quantity) };
   }
 
   /** Draw all plots anew: colours, ranges or joints have changed. */
@@ -96,8 +101,46 @@ export class Plots {
   /** Return the times and the values of all joints in their units; made once, for all cards. */
   dataOf(quantity) {
     this.data ??= {};
+    if (quantity === 'dq') this.data.dq ??= this.differences();
     this.data[quantity] ??= [this.motion.times, ...this.scene.joints.map((joint, index) => Array.from(this.motion.values[quantity][index], (value) => value * scaleOf(joint, quantity)))];
     return this.data[quantity];
+  }
+
+  /** Return the times of the first motion, and by how much the second is ahead, in the units of the joints. */
+  differences() {
+    const { joints } = this.scene;
+    const columns = joints.map(() => new Array(this.motion.count));
+    this.motion.times.forEach((time, row) => {
+      const there = this.other.joints(time);
+      joints.forEach(({ scale }, joint) => (columns[joint][row] = (there[joint] - this.motion.values.q[joint][row]) * scale));
+    });
+    return [this.motion.times, ...columns];
+  }
+
+  /** Draw the curves of the second motion: thinner, and lighter. */
+  drawOther(plot, card) {
+    const columns = card.quantity === 'dq' ? undefined : this.other?.values[card.quantity];
+    if (!columns) return;
+    const { ctx, bbox } = plot;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    ctx.globalAlpha = 0.55;
+    ctx.lineWidth = devicePixelRatio;
+    for (const joint of this.shown(card)) {
+      const { units } = this.scene.joints[joint];
+      const scale = scaleOf(this.scene.joints[joint], card.quantity);
+      ctx.strokeStyle = this.theme.joint(joint).color;
+      ctx.beginPath();
+      this.other.times.forEach((time, row) => {
+        const at = [plot.valToPos(time, 'x', true), plot.valToPos(columns[joint][row] * scale, units[card.order], true)];
+        if (row) ctx.lineTo(...at);
+        else ctx.moveTo(...at);
+      });
+      ctx.stroke();
+    }
+    ctx.restore();
   }
 
   draw(card) {
@@ -125,7 +168,7 @@ export class Plots {
         series: [{}, ...series],
         hooks: {
           drawAxes: [(plot) => this.drawBorders(plot)],
-          draw: [(plot) => this.drawLimits(plot, card), (plot) => this.drawFindings(plot, card)],
+          draw: [(plot) => this.drawOther(plot, card), (plot) => this.drawLimits(plot, card), (plot) => this.drawFindings(plot, card)],
           setCursor: [(plot) => this.showValues(card, plot)],
           setSelect: [(plot) => (this.zoomed = plot.select.width > 0)],
           setScale: [(plot, key) => key === 'x' && this.followZoom(plot)],
@@ -160,7 +203,7 @@ export class Plots {
   }
 
   timeRange(low, high) {
-    const { start, end } = this.motion;
+    const { start, end } = this.clock;
     return low === null || high - low < 1e-9 ? [start, end > start ? end : start + 1] : [low, high];
   }
 
@@ -191,10 +234,14 @@ export class Plots {
     let [low, high] = [Infinity, -Infinity];
     const shown = this.shown(card, unit);
     for (const joint of shown) for (const value of data[joint + 1]) [low, high] = [Math.min(low, value), Math.max(high, value)];
+    for (const joint of shown) {
+      const scale = scaleOf(this.scene.joints[joint], card.quantity);
+      for (const value of this.other?.values[card.quantity]?.[joint] ?? []) [low, high] = [Math.min(low, value * scale), Math.max(high, value * scale)];
+    }
     if (low > high) return [-1, 1];
     const room = Math.max(high - low, Math.max(Math.abs(low), Math.abs(high)) * (order ? 1 : 0.1), 1e-6);
     const [least, most] = this.allLimits ? [-Infinity, Infinity] : [(low + high) / 2 - (NEAR * room) / 1.6, (low + high) / 2 + (NEAR * room) / 1.6];
-    for (const { value } of this.limits(order, shown)) {
+    for (const { value } of this.limits(card, shown)) {
       if (value >= least && value <= most) [low, high] = [Math.min(low, value), Math.max(high, value)];
     }
     const margin = 0.06 * Math.max(high - low, 1e-6);
@@ -206,7 +253,8 @@ export class Plots {
   }
 
   /** Return the limits of joints: value, interval of time, joints that have it. */
-  limits(order, joints) {
+  limits({ order, quantity }, joints) {
+    if (quantity === 'dq') return [];
     const lines = new Map();
     for (const { start, end, bounds } of this.scene.limits) {
       for (const joint of joints) {
@@ -232,7 +280,7 @@ export class Plots {
     ctx.clip();
     ctx.lineWidth = 1.25 * devicePixelRatio;
     ctx.setLineDash([5 * devicePixelRatio, 4 * devicePixelRatio]);
-    for (const { value, start, end, unit, joints } of this.limits(order, this.shown(card))) {
+    for (const { value, start, end, unit, joints } of this.limits(card, this.shown(card))) {
       ctx.strokeStyle = joints.length > 1 ? this.theme.css('--limit') : this.theme.joint(joints[0]).color;
       const y = plot.valToPos(value, unit, true);
       ctx.beginPath();
@@ -260,13 +308,13 @@ export class Plots {
   }
 
   /** Mark where a limit is broken by a triangle on the curve. */
-  drawFindings(plot, { order, joints }) {
+  drawFindings(plot, { order, joints, quantity }) {
     const { ctx } = plot;
     const size = 5 * devicePixelRatio;
     ctx.save();
     ctx.fillStyle = this.theme.css('--bad');
     for (const { time, order: of, joint, value } of this.scene.findings) {
-      if (of !== order || !joints.includes(joint) || this.hidden.has(joint)) continue;
+      if (quantity === 'dq' || of !== order || !joints.includes(joint) || this.hidden.has(joint)) continue;
       const { units } = this.scene.joints[joint];
       const scale = scaleOf(this.scene.joints[joint], ORDERS[order]);
       const [x, y] = [plot.valToPos(time, 'x', true), plot.valToPos(value * scale, units[order], true)];

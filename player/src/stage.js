@@ -21,7 +21,8 @@ function cellFor(size) {
 }
 
 export class Stage {
-  constructor(holder, scene, motion, theme) {
+  constructor(holder, scene, motion, theme, other) {
+    this.other = other;
     this.holder = holder;
     this.motion = motion;
     this.theme = theme;
@@ -48,6 +49,7 @@ export class Stage {
     this.labels = new Labels(holder);
     this.loads = new Loads(scene.loads, this.arm, this.labels, motion.end);
     this.addWaypoints(scene.waypoints);
+    this.addOther(scene.other);
     this.zones = new Zones(scene.zones, this.arm.size);
     this.scene.add(this.zones.group);
     this.bounds = this.boundsOf();
@@ -99,6 +101,18 @@ export class Stage {
     }
   }
 
+  /** Add the arm of a second motion, translucent, and its path. */
+  addOther(scene) {
+    this.otherParts = [];
+    this.otherMaterial = new MeshStandardMaterial({ transparent: true, opacity: 0.5, roughness: 0.8, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 8 });
+    if (!scene?.robot) return;
+    const one = this.otherMaterial;
+    this.otherArm = new Arm(scene.robot, { link: one, joint: one, prismatic: one, dark: one });
+    this.otherTrace = new Trace(scene.tool, this.other, 0.0013 * this.arm.size, this.theme, (name) => SCENE[name].other);
+    this.otherParts = [this.otherArm.root, this.otherTrace.line];
+    this.scene.add(...this.otherParts);
+  }
+
   /** Return a ball around all that the arm does. */
   boundsOf() {
     const points = [];
@@ -106,7 +120,7 @@ export class Stage {
       this.arm.move(this.motion.joints(this.motion.start + ((this.motion.end - this.motion.start) * k) / 24));
       points.push(...this.arm.extremes());
     }
-    points.push(...this.trace.points);
+    points.push(...this.trace.points, ...(this.otherTrace?.points ?? []));
     const base = new Vector3().setFromMatrixPosition(this.arm.root.children[0].matrixWorld);
     points.push(base);
     this.floor = Math.min(0, base.z);
@@ -165,6 +179,8 @@ export class Stage {
     this.dotMaterial.color.set(colors.waypoint);
     this.loads.material.color.set(colors.load);
     this.zones.paint(colors);
+    this.otherMaterial.color.set(colors.other);
+    this.otherTrace?.paint();
     this.shade.material.opacity = colors.shadow;
     Object.assign(this.sky, { color: new Color(colors.sky), groundColor: new Color(colors.ground), intensity: colors.fill });
     this.sun.intensity = colors.sun;
@@ -230,9 +246,9 @@ export class Stage {
     this.render(); // at once: a canvas of a new size is empty
   }
 
-  /** Show or hide a part: 'ghosts', 'frames', 'trace', 'zones' or 'grid'. */
+  /** Show or hide a part: 'ghosts', 'frames', 'trace', 'zones', 'grid' or 'other'. */
   show(part, visible) {
-    const parts = { ghosts: [this.ghosts], frames: this.arm.axes, trace: [this.trace.line, this.dots], grid: [this.grid, this.world], zones: [this.zones.group] };
+    const parts = { ghosts: [this.ghosts], frames: this.arm.axes, trace: [this.trace.line, this.dots], grid: [this.grid, this.world], zones: [this.zones.group], other: this.otherParts };
     for (const object of parts[part]) object.visible = visible;
     if (part === 'trace') for (const name of this.names) name.hidden = !visible;
     this.draw();
@@ -241,6 +257,8 @@ export class Stage {
   seek(time) {
     this.arm.mountAt(time);
     this.arm.move(this.motion.joints(time));
+    this.otherArm?.mountAt(time - this.other.start);
+    this.otherArm?.move(this.other.joints(time));
     this.loads.seek(time);
     this.draw();
   }

@@ -14,11 +14,11 @@ const SPAN = { light: [0, 0.88], dark: [0.3, 1] }; // the part of it that stands
 export const SCENE = {
   light: {
     background: '#eef2f7', grid: '#c3ccd9', gridMain: '#9aa7b8', link: '#e9edf2', joint: '#2f74c9', prismatic: '#d9822b',
-    dark: '#4a5568', ghost: '#4b7fc4', waypoint: '#c2410c', load: '#7c3aed', zone: '#8a5200', programmed: '#17202e', shadow: 0.2, sky: '#ffffff', ground: '#b9c3d0', fill: 1.9, sun: 2.2,
+    dark: '#4a5568', ghost: '#4b7fc4', waypoint: '#c2410c', load: '#7c3aed', zone: '#8a5200', programmed: '#17202e', other: '#c2410c', shadow: 0.2, sky: '#ffffff', ground: '#b9c3d0', fill: 1.9, sun: 2.2,
   },
   dark: {
     background: '#10161f', grid: '#263141', gridMain: '#40506a', link: '#c5cedb', joint: '#3d8ee6', prismatic: '#e8973a',
-    dark: '#5b6b82', ghost: '#7db4f5', waypoint: '#ffb27a', load: '#b794f6', zone: '#f0b45c', programmed: '#e6ebf3', shadow: 0.45, sky: '#c8d8ef', ground: '#1b2430', fill: 1.4, sun: 2.4,
+    dark: '#5b6b82', ghost: '#7db4f5', waypoint: '#ffb27a', load: '#b794f6', zone: '#f0b45c', programmed: '#e6ebf3', other: '#ff8b3d', shadow: 0.45, sky: '#c8d8ef', ground: '#1b2430', fill: 1.4, sun: 2.4,
   },
 };
 

@@ -13,8 +13,10 @@ export class Trace {
    * @param {Motion} motion The rows.
    * @param {number} thickness Radius of the line, m.
    * @param {Theme} theme The colours.
+   * @param {Function} colour Of the whole line by the theme's name; without it that of the speed.
    */
-  constructor(tool, motion, thickness, theme) {
+  constructor(tool, motion, thickness, theme, colour = undefined) {
+    this.colour = colour;
     const { count } = motion;
     this.motion = motion;
     this.theme = theme;
@@ -59,6 +61,10 @@ export class Trace {
 
   /** Give the line and the legend the colours of the theme. */
   paint() {
+    if (this.colour) {
+      this.line.material.color.set(this.colour(this.theme.name));
+      return;
+    }
     this.parts.forEach((row, index) => {
       const speed = (this.speeds[row - 1] + this.speeds[row]) / 2;
       const [r, g, b] = this.theme.speed(this.largest > 0 ? speed / this.largest : 0);

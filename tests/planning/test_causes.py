@@ -56,12 +56,15 @@ def test_a_point_outside_its_limit_is_one_finding_at_the_number() -> None:
 
 
 def test_what_has_other_causes_is_apart() -> None:
-    short = LIFT[: LIFT.index("moves:")] + """\
+    short = (
+        LIFT[: LIFT.index("moves:")]
+        + """\
 moves:
   - {planner: quintic, to: low, duration: 0.01}
   - {planner: quintic, to: {joints: [80, 90]}, duration: 0.1}
   - {planner: quintic, to: {joints: [95, 90]}, duration: 0.001}
 """
+    )
     causes = causes_of(plan_job(job_from_text(short)))
     assert sorted((cause.worst.move, cause.worst.kind) for cause in causes) == [
         (0, "velocity"),

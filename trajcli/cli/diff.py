@@ -28,6 +28,7 @@ def run_diff(options: DiffCommand) -> int:
     if others == ["-"] and last == "-":
         raise InputError("only one of the files can be standard input")
     alone = len(others) == 1 and not any(Path(name).is_dir() for name in options.files)
+    _check_view(options, alone=alone)
     tolerances = [parse_tolerances(text) if text else {} for text in (options.atol, options.rtol)]
     code, found = 0, list[dict[str, Any]]()
     for a, b in [(others[0], last)] if alone else _pairs(others, last):
@@ -45,7 +46,21 @@ def run_diff(options: DiffCommand) -> int:
             print_lines(text.splitlines())
     if options.as_json:
         print_json(found[0] if alone else found)
+    if options.view is not None:
+        from trajcli.cli.view import write_comparison
+
+        write_comparison(others[0], last, options.view, options.robot)
     return code
+
+
+def _check_view(options: DiffCommand, *, alone: bool) -> None:
+    """Refuse a page of many files, one of what can be read once only, and an arm without a page."""
+    if options.view is None:
+        if options.robot is not None:
+            raise InputError("--robot is the arm of a page, and there is none", hint="add --view FILE.html")
+        return
+    if not alone or "-" in options.files:
+        raise InputError("--view is of two files", hint="name two files, and neither as -")
 
 
 def _compared(

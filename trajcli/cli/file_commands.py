@@ -46,6 +46,14 @@ class DiffCommand(Command):
             show_default="/joint_states",
         ),
     ] = None
+    view: Annotated[
+        str | None,
+        typer.Option("--view", metavar="FILE", help="Also write a page that plays both of two files."),
+    ] = None
+    robot: Annotated[
+        str | None,
+        typer.Option("--robot", "-r", metavar="NAME|FILE|JOB", help="The arm of that page."),
+    ] = None
     as_json: Json = False
 
 
@@ -91,13 +99,16 @@ class PlotCommand(Command):
 
 
 class ViewCommand(Command):
-    """Write a page that plays the motion in any browser: 3D, plots, findings. Exit 1: there are findings."""
+    """Write a page that plays a motion, or two, in any browser: 3D, plots, findings. Exit 1: findings."""
 
     example = "trajcli view examples/ur5e_pick.yaml -o view.html"
 
-    source: Annotated[
-        str,
-        typer.Argument(metavar="JOB|FILE", help="A job, or a file of rows or messages; - is standard input."),
+    sources: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="JOB|FILE...",
+            help="A job, or a file of rows or messages, - from standard input; a second to compare it with.",
+        ),
     ]
     output: Annotated[
         str | None,

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from trajcli.cli.outcome import print_remark
 from trajcli.cli.progress import progress
-from trajcli.errors import InputError, VerificationError
+from trajcli.errors import InputError, Problem, VerificationError
+from trajcli.frozen import frozen
 from trajcli.player.page import page_of
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import holds_motion
@@ -25,7 +26,7 @@ _ENDINGS = (".html", ".htm")
 
 
 def run_view(options: ViewCommand) -> int:
-    """Write the page of a job or of a file of rows; return the exit code.
+    """Write the page of a job or of a file of rows, or of two; return the exit code.
 
     A job that plans and does not verify has its page, too, and the error after it; so has a file that its job
     or robot does not allow.
@@ -34,57 +35,100 @@ def run_view(options: ViewCommand) -> int:
         TrajcliError: When anything is wrong.
     """
     _check_output(options.output)
-    if options.robot is not None or holds_motion(options.source):
-        return _view_file(options)
-    return _view_job(options)
+    if len(options.sources) > 2:
+        hint = f"trajcli view {' '.join(options.sources[:2])}"
+        raise InputError(f"a page shows one motion or two, and {len(options.sources)} are named", hint=hint)
+    jobs = [not holds_motion(name) and options.robot is None for name in options.sources]
+    if options.override and not any(jobs):
+        raise InputError("--set is for jobs, and this is a file of samples", hint="leave it out")
+    by = options.robot or next((n for n, job in zip(options.sources, jobs, strict=True) if job), None)
+    shown = [
+        _shown_job(name, options) if job else _shown_file(name, by, options.output)
+        for name, job in zip(options.sources, jobs, strict=True)
+    ]
+    return _written(shown, options)
 
 
-def _view_job(options: ViewCommand) -> int:
+def write_comparison(first: str, second: str, output: str, robot: str | None) -> None:
+    """Write the page of two files of rows, judged by the limits of an arm where one is named.
+
+    Raises:
+        InputError: When they do not fit each other, the arm, or what a page is called.
+        FileError: When one cannot be read, or the page not be written.
+    """
+    from trajcli.player.compared import scene_of_two
+
+    _check_output(output)
+    shown = [_shown_file(name, robot, output) for name in (first, second)]
+    page = page_of(scene_of_two(*(one.scene for one in shown)))
+    _write(page, output)
+    print_remark(f"{output} ({len(page) / 1e6:.2f} MB) plays both")
+
+
+@frozen
+class _Shown:
+    """A motion to be shown.
+
+    Attributes:
+        scene: Of it.
+        said: What it is and its verdict, in a line.
+        problems: Makes the error of what is wrong with it; None where nothing is.
+    """
+
+    scene: dict[str, Any]
+    said: str
+    problems: Callable[[], Iterable[Problem]] | None
+
+
+def _written(shown: Sequence[_Shown], options: ViewCommand) -> int:
+    """Write the page, say what it shows, and raise what is wrong with it."""
+    scene = shown[0].scene
+    if len(shown) > 1:
+        from trajcli.player.compared import scene_of_two
+
+        scene = scene_of_two(scene, shown[1].scene)
+    page = page_of(scene, compress=options.compress)
+    _write(page, options.output)
+    wrong = [one.problems for one in shown if one.problems is not None]
+    after = "; the page shows the findings" if wrong and not holds_motion(options.sources[0]) else ""
+    print_remark(f"{'; '.join(one.said for one in shown)}{_where(page, options.output)}{after}", verdict=True)
+    if wrong:
+        raise VerificationError(*(problem for problems in wrong for problem in problems()))
+    return 0
+
+
+def _shown_job(name: str, options: ViewCommand) -> _Shown:
     from trajcli.job.read import files_of, load_job
     from trajcli.output.delivery.delivered import plan_of
     from trajcli.player.scene import scene_of_plan
 
-    loaded = load_job(options.source, options.override)
+    loaded = load_job(name, options.override)
     _check_inputs_stay(options.output, [path for _, path in files_of(loaded.document)])
     with progress(), np.errstate(all="ignore"):  # what is not finite is for the checks to find
         plan = plan_of(loaded)
-    page = page_of(scene_of_plan(plan), compress=options.compress)
-    _write(page, options.output)
+    scene = scene_of_plan(plan)
     if plan.verdict.passed:
-        print_remark(
-            f"{loaded.name}: verified, {plan.trajectory.duration:.6g} s{_where(page, options.output)}",
-            verdict=True,
-        )
-        return 0
+        return _Shown(scene, f"{loaded.name}: verified, {plan.trajectory.duration:.6g} s", None)
     from trajcli.output.report import verification_error
 
-    print_remark(
-        f"{loaded.name}: not verified{_where(page, options.output)}; the page shows the findings",
-        verdict=True,
+    return _Shown(
+        scene, f"{loaded.name}: not verified", lambda: verification_error(plan, every=False).problems
     )
-    raise verification_error(plan, every=False)
 
 
-def _view_file(options: ViewCommand) -> int:
+def _shown_file(name: str, robot: str | None, output: str | None) -> _Shown:
     from trajcli.player.recorded import scene_of_file
 
-    if options.override:
-        raise InputError("--set is for jobs, and this is a file of samples", hint="leave it out")
-    _check_inputs_stay(options.output, [options.source])
-    opened = ByteSource(options.source)
-    checked = None if options.robot is None else _judged(opened, options.robot)
-    scene = scene_of_file(opened, options.robot, checked)
-    page = page_of(scene, compress=options.compress)
-    _write(page, options.output)
-    state = scene["verdict"]["text"]
-    print_remark(
-        f"{scene['title']}: {state}, {scene['subtitle']}{_where(page, options.output)}", verdict=True
-    )
+    _check_inputs_stay(output, [name])
+    opened = ByteSource(name)
+    checked = None if robot is None else _judged(opened, robot)
+    scene = scene_of_file(opened, robot, checked)
+    said = f"{scene['title']}: {scene['verdict']['text']}, {scene['subtitle']}"
     if checked is None or isinstance(checked, str) or checked.judgement.passed:
-        return 0
+        return _Shown(scene, said, None)
     from trajcli.cli.judged_file import problems_of
 
-    raise VerificationError(*problems_of(checked, every=False))
+    return _Shown(scene, said, lambda: problems_of(checked, every=False))
 
 
 def _judged(source: ByteSource, robot: str) -> CheckedFile | str:
