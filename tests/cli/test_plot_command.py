@@ -110,7 +110,7 @@ def test_files_lie_over_a_job_with_a_legend(here: Path, capfd: Capture) -> None:
         (["--joints", "j1"], 2, "JOB|FILE"),
         (["job.yaml", "-o", "a.gif"], 2, "pictures are not written as .gif"),
         (["job.yaml", "-o", "a.svg", "--format", "pdf"], 2, "contradict each other"),
-        (["job.yaml", "job.yaml"], 2, "are both jobs"),
+        (["job.yaml", "job.yaml", "job.yaml"], 2, "two jobs can be plotted, and there are 3"),
         (["-", "-"], 2, "only one of the files can be standard input"),
         (["rows.csv", "--set", "name=x"], 2, "--set overrides values of a job, and there is none"),
         (["missing.yaml"], 4, "there is no file 'missing.yaml'"),

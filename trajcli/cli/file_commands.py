@@ -65,7 +65,8 @@ class PlotCommand(Command):
     files: Annotated[
         list[str],
         typer.Argument(
-            metavar="JOB|FILE...", help="A job, files of rows or messages, or such over a job; - is stdin."
+            metavar="JOB|FILE...",
+            help="A job, two, files of rows or messages, or such over a job; - is stdin.",
         ),
     ]
     output: Annotated[

@@ -42,24 +42,25 @@ def run_plot(options: PlotCommand) -> int:
     kind = format_of_picture(options.output, options.kind)
     wanted = None if options.quantities is None else parse_quantities(options.quantities)
     files, joints = _files_and_joints(options.files, split_names(tuple(options.joints)))
-    job, rows = _sorted_out(files, options.override)
-    target = options.output or f"{_stem(job or rows[0])}.{kind}"
+    jobs, rows = _sorted_out(files, options.override)
+    target = options.output or f"{_stem((jobs or rows)[0])}.{kind}"
     if target == "-" and kind != "svg" and sys.stdout is not None and sys.stdout.isatty():
         raise InputError(
-            f"a terminal shows no {kind}", hint=f"name a file: -o {_stem(job or rows[0])}.{kind}"
+            f"a terminal shows no {kind}", hint=f"name a file: -o {_stem((jobs or rows)[0])}.{kind}"
         )
-    plan = None if job is None else _planned(job, options.override)
-    _check_inputs_stay(plan, rows, target)
+    plans = [_planned(job, options.override) for job in jobs]
+    plan, second = (*plans, None, None)[:2]
+    _check_inputs_stay(plans, rows, target)
     sources = [ByteSource(name) for name in rows]
     tables = [read_table(source) for source in sources]
     judged = [] if plan is None else _judged(sources, plan, options)
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # where its caches are is nobody's concern
     with np.errstate(all="ignore"):  # what is not finite was found by the checks
         judgements = [None if checked is None else checked.judgement for checked in judged]
-        picture = picture_of(plan, tables, wanted, joints, judgements)
+        picture = picture_of(plan, tables, wanted, joints, judgements, second)
         _write(rendered(picture, kind), target)
     _say_written(target, options)
-    _refuse_findings(plan, judged, options)
+    _refuse_findings(plans, judged, options)
     return 0
 
 
@@ -79,11 +80,15 @@ def _judged(sources: Sequence[ByteSource], plan: Plan, options: PlotCommand) -> 
     return judged
 
 
-def _refuse_findings(plan: Plan | None, judged: Sequence[CheckedFile | None], options: PlotCommand) -> None:
-    """Raise what is wrong with the plan, and what is certainly wrong with the files."""
+def _refuse_findings(
+    plans: Sequence[Plan], judged: Sequence[CheckedFile | None], options: PlotCommand
+) -> None:
+    """Raise what is wrong with the plans, and what is certainly wrong with the files."""
     problems: list[Problem] = []
     every = options.every or options.errors == "json"
-    if plan is not None and not plan.verdict.passed:
+    for plan in plans:
+        if plan.verdict.passed:
+            continue
         from trajcli.output.report import verification_error
 
         problems += verification_error(plan, every=every).problems
@@ -111,23 +116,23 @@ def _files_and_joints(words: Sequence[str], joints: Sequence[str]) -> tuple[list
     return files, (*joints, *(word for word in words if word not in files))
 
 
-def _sorted_out(files: Sequence[str], overrides: Sequence[str]) -> tuple[str | None, list[str]]:
-    """Return the job, if there is one, and the files of rows.
+def _sorted_out(files: Sequence[str], overrides: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Return the jobs, at most two, and the files of rows.
 
     Raises:
-        InputError: When there are several jobs, standard input is named twice, or `--set` has no job.
+        InputError: When there are more jobs, standard input is named twice, or `--set` has no job.
     """
     if files.count("-") > 1:
         raise InputError("only one of the files can be standard input")
     jobs = [name for name in files if _is_job(name)]
-    if len(jobs) > 1:
-        hint = f"write the rows of the others, and plot these: trajcli plan {jobs[1]} -o rows.csv"
-        raise InputError(f"{jobs[0]} and {jobs[1]} are both jobs, and one can be plotted", hint=hint)
+    if len(jobs) > 2:
+        hint = f"write the rows of the others, and plot these: trajcli plan {jobs[2]} -o rows.csv"
+        raise InputError(f"two jobs can be plotted, and there are {len(jobs)}", hint=hint)
     if overrides and not jobs:
         raise InputError(
             "--set overrides values of a job, and there is none", hint="leave it out, or name the job"
         )
-    return jobs[0] if jobs else None, [name for name in files if name not in jobs]
+    return jobs, [name for name in files if name not in jobs]
 
 
 def _is_job(name: str) -> bool:
@@ -153,9 +158,9 @@ def _stem(name: str) -> str:
     return "plot" if name == "-" else Path(name).stem
 
 
-def _check_inputs_stay(plan: Plan | None, rows: Sequence[str], target: str) -> None:
+def _check_inputs_stay(plans: Sequence[Plan], rows: Sequence[str], target: str) -> None:
     """Refuse to write over a file that is read."""
-    read = [] if plan is None else list(files_of(plan.loaded.document))
+    read = [file for plan in plans for file in files_of(plan.loaded.document)]
     read += [("the rows of", name) for name in rows]
     same = identity(target)
     for what, path in read:

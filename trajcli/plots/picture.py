@@ -48,6 +48,7 @@ def picture_of(
     quantities: Sequence[str] | None = None,
     joints: Sequence[str] = (),
     judgements: Sequence[Judgement | None] = (),
+    second: Plan | None = None,
 ) -> Picture:
     """Return the picture of a plan and of files, which are drawn over it or alone.
 
@@ -57,6 +58,7 @@ def picture_of(
         quantities: Of `QUANTITY_NAMES`; None for those that suit.
         joints: Names of the joints to show; all without any.
         judgements: Of the files over a job, whose errors are marked; None of a file that was not judged.
+        second: Another plan, drawn over the first as a file is, with the difference of their positions.
 
     Raises:
         InputError: When a quantity asked for does not apply, a joint is unknown, or a file does not fit.
@@ -64,6 +66,11 @@ def picture_of(
     if plan is None and not tables:
         raise InputError("there is nothing to plot", hint="give a plan or a file")
     motion = None if plan is None else PlannedMotion(plan)
+    if motion is not None and second is not None:
+        from trajcli.plots.second_plan import rows_of_plan
+
+        tables = [rows_of_plan(second, motion.offset), *tables]
+        judgements = [None, *judgements] if judgements else ()
     records = _records(motion, tables, judgements) if tables else []
     display = records[0].display if motion is None else motion.display
     chosen = choose_joints(joints, display.joint_names)
@@ -74,12 +81,16 @@ def picture_of(
             raise InputError(f"{record.table.file} has no columns for {', '.join(drawn)}", hint=hint)
     maker = _Maker(motion, records, display)
     blocks = maker.joint_blocks([name for name in drawn if name in JOINT_QUANTITIES], chosen)
+    if motion is not None and second is not None:
+        from trajcli.plots.second_plan import difference_block
+
+        blocks.append(difference_block(motion, second, chosen))
     if TOOL in drawn:
         blocks.append(maker.tool_block())
     if PHASE in drawn and motion is not None:
         blocks.append(_phase_block(motion))
     return Picture(
-        _title(motion, records),
+        _title(motion, records, second),
         tuple(
             ([] if plan is None else [plan.loaded.name]) + _names([record.table.file for record in records])
         ),
@@ -148,19 +159,22 @@ def _impossible(motion: PlannedMotion | None, records: Sequence[DrawnTable]) -> 
     return {name: text for name, text in needs.items() if name not in shown}
 
 
-def _title(motion: PlannedMotion | None, records: Sequence[DrawnTable]) -> str:
+def _title(motion: PlannedMotion | None, records: Sequence[DrawnTable], second: Plan | None) -> str:
     if motion is None:
         more = len(records) - 1
         return records[0].table.file + (f" and {more} more file{'s' * (more > 1)}" if more else "")
-    plan = motion.plan
-    count = len(plan.verdict.findings)
-    verdict = "verified" if plan.verdict.passed else f"NOT VERIFIED, {count} finding{'s' * (count != 1)}"
-    title = f"{plan.loaded.name}: {verdict}, {plan.trajectory.duration:.6g} s"
+    title = "; ".join(_verdict(plan) for plan in (motion.plan, second) if plan is not None)
     for name, record in zip(_names([record.table.file for record in records]), records, strict=True):
         if record.judgement is not None and not record.judgement.passed:
             errors = len(record.judgement.errors)
             title += f"; {name}: EXCEEDED, {errors} finding{'s' * (errors != 1)}"
     return title
+
+
+def _verdict(plan: Plan) -> str:
+    count = len(plan.verdict.findings)
+    verdict = "verified" if plan.verdict.passed else f"NOT VERIFIED, {count} finding{'s' * (count != 1)}"
+    return f"{plan.loaded.name}: {verdict}, {plan.trajectory.duration:.6g} s"
 
 
 def _names(files: Sequence[str]) -> list[str]:
