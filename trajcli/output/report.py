@@ -42,7 +42,6 @@ from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.knots import Knots, has_knots, knots_of
 from trajcli.output.sensitivity import at_limit_of
 from trajcli.planners.planner import Event, PlannedMove
-from trajcli.planning.causes import Cause, causes_of, problem_of
 from trajcli.planning.plan import Plan
 from trajcli.trajectory import Span, Trajectory
 from trajcli.units import joint_units
@@ -51,6 +50,7 @@ from trajcli.version import __version__
 if TYPE_CHECKING:
     from trajcli.limits.kinds import LimitKind
     from trajcli.limits.tool_bound import SpeedRun, ToolPeak
+    from trajcli.planning.causes import Cause
 
 _ROUNDING = 1e-12  # rad or m: what leaves the range by less does not leave it
 _HELD = 0.999  # of the wanted speed: that much counts as holding it
@@ -429,6 +429,8 @@ def verification_error(plan: Plan, *, every: bool = True) -> VerificationError:
         every: Whether each finding is said; otherwise the worst of each cause, which tells how many more
             there are.
     """
+    from trajcli.planning.causes import causes_of, problem_of
+
     if every:
         return VerificationError(*(problem_of(plan, finding) for finding in plan.verdict.findings))
     return VerificationError(*(_said(plan, cause) for cause in causes_of(plan)))
@@ -436,6 +438,8 @@ def verification_error(plan: Plan, *, every: bool = True) -> VerificationError:
 
 def _said(plan: Plan, cause: Cause) -> Problem:
     """Return the problem of the worst of findings of one cause."""
+    from trajcli.planning.causes import problem_of
+
     problem, others = problem_of(plan, cause.worst), len(cause.findings) - 1
     more = f" (and {others} more like it: --all)" if others else ""
     return replace(problem, message=problem.message + more)

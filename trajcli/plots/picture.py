@@ -25,7 +25,7 @@ from trajcli.plots.choice import (
 )
 from trajcli.plots.display_units import DisplayUnits, require_joints, units_of_files
 from trajcli.plots.panel import NO_POINTS, Panel, PanelBlock, PathViews, Picture, Trace
-from trajcli.plots.planned_motion import PlannedMotion
+from trajcli.plots.planned_motion import PlannedMotion, difference_block, rows_of_plan
 from trajcli.plots.sampling import thinned
 from trajcli.streams.table import Table
 
@@ -67,8 +67,6 @@ def picture_of(
         raise InputError("there is nothing to plot", hint="give a plan or a file")
     motion = None if plan is None else PlannedMotion(plan)
     if motion is not None and second is not None:
-        from trajcli.plots.second_plan import rows_of_plan
-
         tables = [rows_of_plan(second, motion.offset), *tables]
         judgements = [None, *judgements] if judgements else ()
     records = _records(motion, tables, judgements) if tables else []
@@ -82,8 +80,6 @@ def picture_of(
     maker = _Maker(motion, records, display)
     blocks = maker.joint_blocks([name for name in drawn if name in JOINT_QUANTITIES], chosen)
     if motion is not None and second is not None:
-        from trajcli.plots.second_plan import difference_block
-
         blocks.append(difference_block(motion, second, chosen))
     if TOOL in drawn:
         blocks.append(maker.tool_block())
