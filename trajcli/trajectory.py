@@ -190,6 +190,16 @@ class Span:
         return move_title(self.ends, self.label, self.planner, self.round)
 
     @property
+    def origin(self) -> str:
+        """The name of the point from which it goes; empty without one."""
+        return self.ends.partition(" -> ")[0] if " -> " in self.ends else ""
+
+    @property
+    def goal(self) -> str:
+        """The name of the point to which it goes; empty without one."""
+        return self.ends.rpartition("-> ")[2]
+
+    @property
     def duration(self) -> float:
         """Seconds."""
         return self.end - self.start

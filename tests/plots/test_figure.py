@@ -248,6 +248,35 @@ def test_titles_of_moves_stand_once_and_what_takes_no_time_is_marked(example: Ex
     assert {text.get_rotation() for text in figure.findobj(Text) if text.get_text().isdigit()} == {0.0}
 
 
+def test_a_path_has_its_start_and_its_direction() -> None:
+    text = """\
+version: 1
+robot: {convention: standard, joints: [{type: prismatic, alpha: 90, theta: 90}, {type: prismatic}]}
+start: {joints: [0, 0]}
+moves: [{planner: line, to: {joints: [1, 0]}, law: {speed: 1, acceleration: 4}}, {planner: line, to: {joints: [1, -2]}, law: {speed: 1, acceleration: 4}}]
+"""
+    plan = plan_job(job_from_text(text))
+    views = picture_of(plan, quantities=["path"])
+    path = views.views.traces[0][1] if views.views is not None else np.empty((0, 3))
+    lines = artists(views)
+    for first, second, name in ((0, 1, "view-xy"), (0, 2, "view-xz"), (1, 2, "view-yz")):
+        start = lines[f"{name}-start0"]
+        assert [start.get_xdata()[0], start.get_ydata()[0]] == path[0, [first, second]].tolist()
+        for number in range(5):
+            arrow = lines.get(f"{name}-arrow0-{number}")
+            if arrow is None:  # along the line of sight
+                continue
+            here = np.array([arrow.get_xdata()[0], arrow.get_ydata()[0]])
+            flat = path[:, [first, second]]
+            steps = np.diff(flat, axis=0)
+            k = int(np.linalg.norm(0.5 * (flat[1:] + flat[:-1]) - here, axis=1).argmin())
+            turn = np.radians(arrow.get_marker()[2] + 90)
+            assert np.array([np.cos(turn), np.sin(turn)]) == pytest.approx(
+                steps[k] / np.linalg.norm(steps[k]), abs=1e-6
+            )
+    assert any("arrow" in name for name in lines)
+
+
 def test_of_very_many_moves_the_first_titles_stand_there() -> None:
     borders = MoveBorders(np.arange(101.0), tuple(range(100)), ("hold",) * 100)
     lines = list(_title_lines(borders))

@@ -200,6 +200,17 @@ def test_findings_are_marked_at_their_time_and_value() -> None:
     assert "NOT VERIFIED, 1 finding" in picture.title
 
 
+def test_points_of_a_path_have_their_names(example: Example) -> None:
+    views = picture_of(example("flying_cell"), quantities=["path"]).views
+    assert views is not None
+    named = dict(views.named)
+    assert set(named) == {"home", "above_pick", "pick", "above_place", "place"}
+    plan = example("flying_cell")
+    q = plan.trajectory.curve.evaluate([plan.trajectory.spans[k].end for k in (1, 5)])
+    expected = forward(plan.loaded.robot, q)[:, :3, 3] * 1000
+    assert np.abs(np.array([named["pick"], named["place"]]) - expected).max() < 1e-6
+
+
 NAMED = {"q\u0307": "qd", "q\u0308": "qdd", "q\u20db": "qddd", "\u03c4": "tau", "s\u0307": "sd"}
 
 

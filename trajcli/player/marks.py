@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -91,10 +91,3 @@ def signals_of_plan(plan: Plan) -> list[dict[str, Any]]:
         }
         for signal in plan.trajectory.signals
     ]
-
-
-def names_of_ends(spans: Sequence[Span]) -> tuple[str, list[str]]:
-    """Return the name of the point where a plan starts, and of those where moves end; empty without one."""
-    first = next((span.ends for span in spans if not span.handles), "")
-    start = first.partition(" -> ")[0] if " -> " in first else ""
-    return start, [span.ends.rpartition("-> ")[2] for span in spans]

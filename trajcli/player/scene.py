@@ -227,17 +227,14 @@ def waypoints_of(points: Sequence[tuple[float, Array, str]]) -> list[dict[str, A
 
 def _waypoints(plan: Plan) -> Iterator[tuple[float, Array, str]]:
     """Yield the start, the points that moves pass, and their ends."""
-    from trajcli.player.marks import names_of_ends
-
-    curve = plan.trajectory.curve
-    start, names = names_of_ends(plan.trajectory.spans)
-    yield 0.0, curve.evaluate(0.0), start
-    for move, span, name in zip(plan.moves, plan.trajectory.spans, names, strict=True):
+    curve, spans = plan.trajectory.curve, plan.trajectory.spans
+    yield 0.0, curve.evaluate(0.0), next((span.origin for span in spans if not span.handles), "")
+    for move, span in zip(plan.moves, spans, strict=True):
         points = move.planned.via_points
         for time in [] if points is None else points.times.tolist():
             at = min(max(span.start + time, span.start), span.end)
             yield at, curve.evaluate(min(at, curve.end)), ""
-        yield span.end, curve.evaluate(min(span.end, curve.end), side="left"), name
+        yield span.end, curve.evaluate(min(span.end, curve.end), side="left"), span.goal
 
 
 def _moves(plan: Plan) -> Iterator[dict[str, Any]]:

@@ -32,6 +32,13 @@ WAYPOINT: Mapping[str, Any] = {
     "zorder": 4,
 }
 VIRTUAL_POINT: Mapping[str, Any] = {**WAYPOINT, "marker": "D", "markeredgecolor": "#CC79A7"}
+START: Mapping[str, Any] = {
+    "linestyle": "none",
+    "marker": "s",
+    "markersize": 4.5,
+    "color": COLOURS[0],
+    "zorder": 5,
+}
 ZONE: Mapping[str, Any] = {"color": "#999999", "linewidth": 0.8}
 PROGRAMMED: Mapping[str, Any] = {"color": "black", "linewidth": 0.8, "linestyle": (0, (3, 2))}
 FINDING: Mapping[str, Any] = {
@@ -144,6 +151,7 @@ def _entries(picture: Picture) -> Iterator[tuple[str, Mapping[str, Any]]]:
         ("limit", any(np.isfinite(line[:, 1]).any() for panel in panels for line in panel.limits), LIMIT),
         ("border of moves", timed and many, BORDER),
         ("waypoint", points or any(panel.waypoints.size for panel in panels), WAYPOINT),
+        ("start of a path", views is not None, START),
         ("zone", views is not None and views.zones.size > 0, ZONE),
         ("programmed path", views is not None and len(views.programmed) > 0, PROGRAMMED),
         ("virtual point", any(panel.virtual_points.size for panel in panels), VIRTUAL_POINT),

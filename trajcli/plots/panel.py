@@ -84,6 +84,7 @@ class PathViews:
         waypoints: Positions of the tool at the ends of moves and at points between, shape (k, 3).
         zones: Corners and radii of the balls within which the tool flies by, shape (k, 4).
         programmed: Positions (N, 3) along the programmed path within each zone.
+        named: Names of points and where the tool is there, (3,).
     """
 
     unit: str
@@ -91,6 +92,7 @@ class PathViews:
     waypoints: Array
     zones: Array = field(default_factory=lambda: np.empty((0, 4)))
     programmed: tuple[Array, ...] = ()
+    named: tuple[tuple[str, Array], ...] = ()
 
 
 @frozen

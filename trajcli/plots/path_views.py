@@ -2,20 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
 from trajcli.curves.piecewise import Array
-from trajcli.plots.axes import ticks_of
-from trajcli.plots.frame import AXIS, BELOW, NORMAL, SMALL, TITLE, PanelFrame, Sheet, left_of, panel_width
-from trajcli.plots.legend import LIMIT_COLOUR, PROGRAMMED, WAYPOINT, ZONE, marker_style, style_of
+from trajcli.plots.axes import text_width, ticks_of
+from trajcli.plots.frame import (
+    AXIS,
+    BELOW,
+    GREY,
+    NORMAL,
+    SMALL,
+    TITLE,
+    PanelFrame,
+    Sheet,
+    left_of,
+    panel_width,
+)
+from trajcli.plots.legend import LIMIT_COLOUR, PROGRAMMED, START, WAYPOINT, ZONE, marker_style, style_of
 from trajcli.plots.panel import PathViews
 
 _LEAST, _MOST = 2.1, 3.2  # width of a view, inches
 _VIEW_TICKS, _SPACE_TICKS = 4, 3
 _SPACE = 0.8  # of the view in space is its box: numbers and labels stand outside of it
 _SPACE_PADS = (3, 5, 6)  # of the labels, points
+_ARROWS = 5  # along a path
+_SHORTEST = 0.02  # of the view: a shorter path has no arrows
+_ONCE = 0.6  # opacity of a path
+_BESIDE_POINT, _NAME_HEIGHT = 0.09, 0.13  # of names, inches
 _ROUND = 48  # sides of a circle
 _SHIFT = 0.3  # of that view to the left, inches
 
@@ -57,7 +73,9 @@ def _draw_side(
     (first, second), title = sides
     frame = PanelFrame(sheet, box, ranges[first], ranges[second], f"view-{'xyz'[first]}{'xyz'[second]}")
     for source, trace in views.traces:
-        frame.plot(trace[:, first], trace[:, second], f"source{source}", **style_of(source))
+        flat = trace[:, [first, second]]
+        frame.plot(flat[:, 0], flat[:, 1], f"source{source}", **_see_through(source))
+        _draw_direction(frame, flat, source)
     for number, line in enumerate(views.programmed, 1):
         frame.plot(line[:, first], line[:, second], f"programmed{number}", **PROGRAMMED)
     for number, (corner, size) in enumerate(_balls(views), 1):
@@ -75,6 +93,51 @@ def _draw_side(
     frame.x_axis(x, x_names, f"{'xyz'[first]} [{views.unit}]")
     frame.y_axis(y, y_names, f"{'xyz'[second]} [{views.unit}]")
     frame.titles(title, "", LIMIT_COLOUR)
+    _draw_names(frame, [(name, place[[first, second]]) for name, place in views.named])
+
+
+def _see_through(source: int) -> dict[str, Any]:
+    """Return the style of a path: what is passed twice is darker."""
+    return {**style_of(source), "alpha": _ONCE, "linewidth": 1.5}
+
+
+def _draw_direction(frame: PanelFrame, path: Array, source: int) -> None:
+    """Mark where a path (N, 2) starts, and by arrows where it goes."""
+    colour = style_of(source)["color"]
+    frame.plot(path[:1, 0], path[:1, 1], f"start{source}", **{**START, "color": colour})
+    steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    gone = np.append(0.0, np.cumsum(steps))
+    if not np.isfinite(gone[-1]) or gone[-1] < _SHORTEST * (frame.x[1] - frame.x[0]):
+        return
+    for number in range(_ARROWS):
+        at = np.searchsorted(gone, (number + 0.5) / _ARROWS * gone[-1], "right")
+        k = int(np.clip(at, 1, len(path) - 1))
+        along = path[k] - path[k - 1]
+        angle = float(np.degrees(np.arctan2(along[1], along[0]))) - 90.0
+        style = {"linestyle": "none", "marker": (3, 0, angle), "markersize": 5.0, "color": colour}
+        middle = 0.5 * (path[k] + path[k - 1])
+        frame.plot(middle[:1], middle[1:], f"arrow{source}-{number}", **style)
+
+
+def _draw_names(frame: PanelFrame, named: Sequence[tuple[str, Array]]) -> None:
+    """Write the names of points beside them, where they have room; the first wins."""
+    taken: list[tuple[float, float, float, float]] = []
+    for name, (x, y) in named:
+        down = frame.bottom - (y - frame.y[0]) / (frame.y[1] - frame.y[0]) * frame.height
+        left, width, down = (
+            frame.across(x) + 0.5 * _BESIDE_POINT,
+            text_width(name, SMALL),
+            down - _BESIDE_POINT,
+        )
+        box = (left, down - 0.5 * _NAME_HEIGHT, left + width, down + 0.5 * _NAME_HEIGHT)
+        inside = box[1] > frame.top and box[2] < frame.left + frame.width and box[3] < frame.bottom
+        apart = all(
+            box[2] < other[0] or other[2] < box[0] or box[3] < other[1] or other[3] < box[1]
+            for other in taken
+        )
+        if inside and apart:
+            taken.append(box)
+            frame.sheet.text(left, down, name, SMALL, va="center_baseline", color=GREY)
 
 
 def _draw_space(
@@ -97,7 +160,8 @@ def _draw_space(
     axes.set_box_aspect((1, 1, 1), zoom=_SPACE)
     sheet.figure.add_axes(axes)
     for source, trace in views.traces:
-        axes.plot(*trace.T, gid=f"space-source{source}", **style_of(source))
+        axes.plot(*trace.T, gid=f"space-source{source}", **_see_through(source))
+        axes.plot(*trace[:1].T, gid=f"space-start{source}", **{**START, "color": style_of(source)["color"]})
     for number, line in enumerate(views.programmed, 1):
         axes.plot(*line.T, gid=f"space-programmed{number}", **PROGRAMMED)
     for number, (corner, size) in enumerate(_balls(views), 1):

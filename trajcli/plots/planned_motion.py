@@ -243,6 +243,24 @@ class PlannedMotion:
         zones = flyby.zones if flyby else ()
         return tuple(zone.tool_path(self.moves[zone.move].robot) / scale for zone in zones)
 
+    def corners(self) -> tuple[Array, tuple[Array, ...]]:
+        """Return the zones and the programmed path within each."""
+        return self.zones(), self.programmed()
+
+    def named(self) -> tuple[tuple[str, Array], ...]:
+        """Return the names of points at which moves start and end, and where the tool is there (3,)."""
+        from trajcli.kinematics.forward import forward
+
+        curve, scale = self.plan.trajectory.curve, self.display.factor("length")
+        named: dict[tuple[str, ...], tuple[str, Array]] = {}
+        for move, span in zip(self.moves, self.plan.trajectory.spans, strict=True):
+            for name, time in ((span.origin, span.start), (span.goal, span.end)):
+                if name:
+                    q = curve.evaluate(min(time, curve.end), side="left")
+                    place = forward(move.robot, q)[:3, 3] / scale
+                    named.setdefault((name, *(f"{value:.4g}" for value in place)), (name, place))
+        return tuple(named.values())
+
     def _known_efforts(self) -> EffortSamples:
         if self._efforts is None:
             from trajcli.plots.planned_efforts import effort_samples
