@@ -21,12 +21,13 @@ const UNDEFINED = new Set([...MAPS, 'USE_NORMALMAP_TANGENTSPACE', 'USE_NORMALMAP
 const ZERO = new Set(['NUM_SUN_LIGHTS', 'NUM_SUN_LIGHT_SHADOWS', 'NUM_POINT_LIGHTS', 'NUM_POINT_LIGHT_SHADOWS', 'NUM_SPOT_LIGHTS', 'NUM_SPOT_LIGHT_SHADOWS',
   'NUM_SPOT_LIGHT_COORDS', 'NUM_SPOT_LIGHT_MAPS', 'NUM_RECT_AREA_LIGHTS', 'NUM_CLIPPING_PLANES', 'NUM_LIGHT_PROBE_GRIDS']);
 
-/** Programs of materials that the player does not have. */
-const NO_PROGRAM = /ShaderLib\/(background|backgroundCube|cube|distance|equirect|linedashed|meshlambert|meshmatcap|meshnormal|meshphong|meshtoon|points|sprite|vsm)\.glsl\.js$/;
+/** Programs of materials that the player does not have, and curves of tones. */
+const NO_PROGRAM = /ShaderLib\/(background|backgroundCube|cube|distance|equirect|linedashed|meshlambert|meshmatcap|meshnormal|meshphong|meshtoon|points|sprite|vsm)\.glsl\.js$|ShaderChunk\/tonemapping_pars_fragment\.glsl\.js$/;
 
 /** Modules with nothing to do here, and what stands in their place. */
 const EMPTY = {
   'webgl/WebGLEnvironments.js': 'export function WebGLEnvironments() { return { get: (texture) => texture ?? null, dispose() {} }; }',
+  'WebGLCubeRenderTarget.js': 'export class WebGLCubeRenderTarget {}',
   'webgl/WebGLOutput.js': 'export const WebGLOutput = undefined;',
   'webgl/WebGLUniformsGroups.js': 'export function WebGLUniformsGroups() { return { update() {}, bind() {}, dispose() {} }; }',
   'webgl/WebGLMorphtargets.js': 'export function WebGLMorphtargets() { return { update() {} }; }',
@@ -42,7 +43,7 @@ const EMPTY = {
 };
 
 /** Methods that the player never calls: writing as JSON, and finding what lies under the pointer. */
-const UNCALLED = /\n\t(?:toJSON|fromJSON|raycast)\([^)\n]*\) \{\n[\s\S]*?\n\t\}\n/g;
+const UNCALLED = /\n\t(?:toJSON|fromJSON|raycast|_computeIntersections)\([^)\n]*\) \{\n[\s\S]*?\n\t\}\n/g;
 
 /** Return whether a condition of the preprocessor holds, or undefined where that is not known here. */
 function truth(condition) {
@@ -125,20 +126,45 @@ export function preprocessed(text) {
 /** Return a text of the shading language without comments, indentation and empty lines. */
 const dense = (text) => text.replace(/\/\*[\s\S]*?\*\//g, '').split('\n').map((line) => line.replace(/\/\/.*$/, '').trim()).filter(Boolean).join('\n');
 
-/** A plugin of esbuild: three from its sources, without what the player does not use. */
-export const lean = {
+/** Names of colours: the player's are numbers. */
+const COLOUR_NAMES = /const _colorKeywords = \{[^}]*\};/;
+
+const METHOD = /\n\t(?:static |get |set )?(\w+)\([^)\n]*\) \{\n(?:[\s\S]*?\n)?\t\}\n/g;
+
+/** Return a module without the methods of its classes that none of the names calls. */
+const withoutMethods = (text, names) => text.replace(METHOD, (method, name) => (name === 'constructor' || names.has(name) ? method : '\n'));
+
+/** Return all names that texts take from some object, or have in quotes, comments left out. */
+export function namesIn(texts) {
+  const names = new Set();
+  for (const text of texts) {
+    const code = text.replace(/\/\*[\s\S]*?\*\//g, '').replace(/^\s*\/\/.*$/gm, '');
+    for (const [, taken, quoted] of code.matchAll(/\.\s*([A-Za-z_$][\w$]*)|['"`]([A-Za-z_$][\w$]*)['"`]/g)) names.add(taken ?? quoted);
+  }
+  return names;
+}
+
+/**
+ * Return a plugin of esbuild: three from its sources, without what the player does not use.
+ * @param {Set} names That anybody calls a method by; undefined before that is known.
+ * @param {Map} seen Is filled with the text of each module by its path.
+ */
+export const lean = (names, seen) => ({
   name: 'lean',
   setup(build) {
+    const js = (path, contents) => {
+      const shorter = names && path.startsWith(THREE) ? withoutMethods(contents, names) : contents;
+      seen.set(path, shorter);
+      return { contents: shorter, loader: 'js' };
+    };
     build.onResolve({ filter: /^three$/ }, () => ({ path: `${THREE}Three.js`, sideEffects: false }));
-    build.onLoad({ filter: /three\/src\/renderers\/(webgl|webxr)\/\w+\.js$/ }, ({ path }) => {
-      const contents = EMPTY[path.slice(`${THREE}renderers/`.length)];
-      return contents && { contents, loader: 'js' };
-    });
-    build.onLoad({ filter: /three\/src\/(core|materials|objects|textures|scenes|lights|cameras|geometries)\/\w+\.js$/ }, ({ path }) => ({ contents: readFileSync(path, 'utf-8').replace(UNCALLED, '\n'), loader: 'js' }));
     build.onLoad({ filter: /\.glsl\.js$/ }, ({ path }) => {
-      const source = readFileSync(path, 'utf-8');
       const shorter = (_, text) => `\`${NO_PROGRAM.test(path) ? '' : dense(preprocessed(text))}\``;
-      return { contents: source.replace(/\/\* glsl \*\/\s*`([\s\S]*?)`/g, shorter), loader: 'js' };
+      return { contents: readFileSync(path, 'utf-8').replace(/\/\* glsl \*\/\s*`([\s\S]*?)`/g, shorter), loader: 'js' };
+    });
+    build.onLoad({ filter: /\.js$/ }, ({ path }) => {
+      const source = EMPTY[path.slice(`${THREE}renderers/`.length)] ?? readFileSync(path, 'utf-8');
+      return js(path, path.startsWith(THREE) ? source.replace(UNCALLED, '\n').replace(COLOUR_NAMES, 'const _colorKeywords = {};') : source);
     });
   },
-};
+});

@@ -229,7 +229,7 @@ export class Stage {
     this.camera.position.copy(center).addScaledVector(direction, distance);
     this.camera.lookAt(center);
     this.camera.updateMatrixWorld(true);
-    const [across, up] = [1 - 2 * Math.min(0.13, 75 / this.holder.clientWidth), 1 - 2 * Math.min(0.18, 70 / this.holder.clientHeight)];
+    const [across, up] = [1 - 2 * Math.min(0.06, 36 / this.holder.clientWidth), 1 - 2 * Math.min(0.14, 52 / this.holder.clientHeight)];
     return this.points.every((point) => {
       const { x, y, z } = point.clone().project(this.camera);
       return Math.abs(x) <= across && Math.abs(y) <= up && z < 1;

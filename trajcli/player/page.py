@@ -10,6 +10,8 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from trajcli.errors import InputError
+
 BUNDLE = Path(__file__).parent / "bundle"
 """What `make player` builds from the folder player/ of the repository."""
 
@@ -44,7 +46,7 @@ def page_of(scene: Mapping[str, Any], *, compress: bool = False) -> bytes:
         scene: What the player draws; see `scene_of_plan`.
         compress: Whether scene and script are packed by gzip: a browser of 2023 or later is needed.
     """
-    style, script = _text("style.css"), _text("player.js")
+    style, script = _text("style.css"), _script()
     # A "<" of a name could end the element that holds the scene.
     data = json.dumps(scene, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
     runs = [script]
@@ -91,3 +93,13 @@ def _packed(text: str) -> str:
 
 def _text(name: str) -> str:
     return (BUNDLE / name).read_text(encoding="utf-8")
+
+
+def _script() -> str:
+    """Return the script, which is packed as .xz: it is a tenth of a wheel."""
+    try:
+        import lzma
+    except ModuleNotFoundError:
+        hint = "install a Python that was built with liblzma"
+        raise InputError("the player is packed, and this Python has no module lzma", hint=hint) from None
+    return lzma.decompress((BUNDLE / "player.js.xz").read_bytes()).decode()

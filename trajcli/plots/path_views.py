@@ -93,7 +93,7 @@ def _draw_side(
     frame.x_axis(x, x_names, f"{'xyz'[first]} [{views.unit}]")
     frame.y_axis(y, y_names, f"{'xyz'[second]} [{views.unit}]")
     frame.titles(title, "", LIMIT_COLOUR)
-    _draw_names(frame, [(name, place[[first, second]]) for name, place in views.named])
+    _draw_names(frame, [(name, at[[first, second]]) for name, at in views.named])
 
 
 def _see_through(source: int) -> dict[str, Any]:

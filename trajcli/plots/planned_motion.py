@@ -257,8 +257,8 @@ class PlannedMotion:
             for name, time in ((span.origin, span.start), (span.goal, span.end)):
                 if name:
                     q = curve.evaluate(min(time, curve.end), side="left")
-                    place = forward(move.robot, q)[:3, 3] / scale
-                    named.setdefault((name, *(f"{value:.4g}" for value in place)), (name, place))
+                    at = forward(move.robot, q)[:3, 3] / scale
+                    named.setdefault((name, *(f"{value:.4g}" for value in at)), (name, at))
         return tuple(named.values())
 
     def _known_efforts(self) -> EffortSamples:
