@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import json
 import re
+import sys
 from base64 import b64decode, b64encode
 from hashlib import sha256
 from html.parser import HTMLParser
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from trajcli.errors import InputError
 from trajcli.job.read import job_from_text, load_job
 from trajcli.planning.plan import plan_job
 from trajcli.player.page import BUNDLE, page_of
@@ -136,6 +138,17 @@ def test_the_bundle_is_what_was_built() -> None:
         if path.name != "manifest.json"
     }
     assert manifest["files"] == built, "run `make player`"
+
+
+def test_the_script_is_small() -> None:
+    """A wheel has 1.5 MB: whoever needs more of a library says so here."""
+    assert (BUNDLE / "player.js.xz").stat().st_size < 120_000
+
+
+def test_without_lzma_one_line_says_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "lzma", None)
+    with pytest.raises(InputError, match="this Python has no module lzma"):
+        page(job(1))
 
 
 def test_versions_are_pinned_and_licences_stand_in_every_page() -> None:

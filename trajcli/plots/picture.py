@@ -168,8 +168,12 @@ def _title(motion: PlannedMotion | None, records: Sequence[DrawnTable], second: 
 
 
 def _verdict(plan: Plan) -> str:
-    count = len(plan.verdict.findings)
-    verdict = "verified" if plan.verdict.passed else f"NOT VERIFIED, {count} finding{'s' * (count != 1)}"
+    verdict = "verified"
+    if not plan.verdict.passed:
+        from trajcli.planning.causes import causes_of
+
+        count = len(causes_of(plan))
+        verdict = f"NOT VERIFIED, {count} finding{'s' * (count != 1)}"
     return f"{plan.loaded.name}: {verdict}, {plan.trajectory.duration:.6g} s"
 
 
