@@ -183,3 +183,13 @@ def test_what_hides_between_nodes_is_bounded_by_no_less_than_it_is(orientation: 
     values, _ = path_bound._known(ROBOT, path, coefficients, np.array([t[-1]]))
     apart = np.linalg.norm(np.diff(values[0, :, 1], axis=0), axis=-1)
     np.testing.assert_allclose(apart, 2 * np.sin(rate * 0.2 / 2), rtol=1e-9)  # a chord, as of the angle
+
+
+def test_the_curve_of_the_joints_may_begin_at_any_time() -> None:
+    """Spans count from its start."""
+    each = tool(standing(0, 1.5 * TOLERANCE / float(np.hypot(*POSE[:2, 3]))), law(), start=2.0)
+    curve = each.trajectory.curve
+    later = PiecewisePolynomial(curve.breaks + 5.0, curve.coefficients)
+    moved = replace(each, trajectory=replace(each.trajectory, curve=later))
+    assert most(moved)[0] == pytest.approx(1.5 * TOLERANCE, rel=4e-3)
+    assert most(moved) == pytest.approx(most(each), rel=1e-9)
