@@ -113,6 +113,8 @@ def test_what_says_no_values_is_refused(text: str, message: str) -> None:
         ([], "nothing is varied"),
         (["limits.velocty=1,2"], "unknown key 'velocty'"),
         (["moves.1.duration=1,2"], "there is no '1' in a list of 1 entry"),
+        (["frames.table.xyz.0=1,2"], "--vary frames.table.xyz.0: the job has no frames.table"),
+        (["tools.gripper.mass=1,2"], "--vary tools.gripper.mass: the job has no tools.gripper"),
         (["start.joints.x.y=1"], "--vary start.joints.x.y=1"),
         (["moves.0.duration=1,2", "moves.0.duration=3"], "--vary moves.0.duration stands twice"),
         (["limits.velocity=1..2:2000", "limits.acceleration=1..2:2000"], "has 4000000 combinations"),

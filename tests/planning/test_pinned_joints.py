@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,8 @@ import pytest
 
 from trajcli.errors import InputError, TrajcliError
 from trajcli.job.dump import dump_job
-from trajcli.job.read import job_from_text
-from trajcli.job.robot import catalogue_names, load_robot
+from trajcli.job.read import files_of, job_from_text, load_job
+from trajcli.job.robot import CATALOGUE, catalogue_names, load_robot
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.pinned_joints import without_pinned
 from trajcli.kinematics.inverse.solve import solve
@@ -281,3 +282,14 @@ def test_wrong_rails_are_refused_where_they_are_wrong(robot: Any, message: str) 
         job_from_text(json.dumps({**HEAD, "robot": robot, "moves": [go()]}), "job.yaml")
     problem = next(problem for problem in caught.value.problems if message in problem.message)
     assert problem.place is not None
+
+
+def test_the_file_of_an_arm_on_a_rail_is_one_of_the_files_of_the_job(tmp_path: Path) -> None:
+    (tmp_path / "arm.yaml").write_text((CATALOGUE / "irb4600.yaml").read_text())
+    robot = {"rail": RAIL, "arm": {"file": "arm.yaml"}}
+    (tmp_path / "job.yaml").write_text(
+        json.dumps({**HEAD, "robot": robot, "moves": [go(joints={"rail": 1})]})
+    )
+    loaded = load_job(tmp_path / "job.yaml")
+    assert ("the robot's file", str(tmp_path / "arm.yaml")) in list(files_of(loaded.document))
+    assert loaded.robot.joint_names == ("rail", *load_robot("irb4600").joint_names)

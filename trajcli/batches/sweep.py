@@ -40,6 +40,8 @@ MOST_ROWS = 1_000_000
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _RANGE = re.compile(rf"\s*({_NUMBER}?)\.\.({_NUMBER})(?::(.*))?")
 _VERDICTS: dict[int, PointVerdict] = {1: "exceeded", 3: "unreachable"}
+_NAMED = ("points", "frames", "tools", "sequences")
+"""Sections whose keys are names: a new one changes nothing, as nothing names it."""
 _WHOLE = 1e15  # below it a float without decimals is written as a whole number
 Run = Callable[[Sequence[Task], "SweepSetup"], Generator[JobOutcome, None, None]]
 
@@ -258,6 +260,7 @@ def _check_paths(document: Document, axes: Sequence[Axis]) -> None:
     if _refusal(document, ()) is not None:
         return
     for axis in axes:
+        _check_name(document, axis)
         first: InputError | None = None
         for index in range(len(axis.values)):
             refused = _refusal(document, (axis.setting(index),))
@@ -267,6 +270,23 @@ def _check_paths(document: Document, axes: Sequence[Axis]) -> None:
         else:
             if first is not None:
                 raise first
+
+
+def _check_name(document: Document, axis: Axis) -> None:
+    """Refuse an axis that would add a point, a frame, a tool or a sequence, which nothing in the job names.
+
+    Raises:
+        InputError: Names the nearest that the job has.
+    """
+    section, *rest = axis.setting(0).path
+    if section not in _NAMED or not rest or document.node((section, rest[0])) is not None:
+        return
+    from trajcli.suggest import did_you_mean, valid_names
+
+    node = document.node((section,))
+    known = list(node.value) if node is not None and isinstance(node.value, dict) else []
+    hint = did_you_mean(str(rest[0]), known) or valid_names(known, str(section))
+    raise InputError(f"--vary {axis.path}: the job has no {section}.{rest[0]}", hint=hint or None)
 
 
 def _refusal(document: Document, settings: tuple[Setting, ...]) -> InputError | None:

@@ -227,6 +227,8 @@ def files_of(document: Document) -> Iterator[tuple[str, str]]:
     folder = Path() if standard else Path(document.file).parent
     root = document.plain()
     robot, sequences = root.get("robot"), root.get("sequences")
+    while isinstance(robot, Mapping) and "arm" in robot:  # on a rail
+        robot = robot["arm"]
     for key in ("file", "urdf"):
         if isinstance(robot, Mapping) and isinstance(robot.get(key), str):
             yield "the robot's file", str(folder / robot[key])

@@ -23,6 +23,7 @@ class BetweenMoves(Planner):
     handles: ClassVar[bool] = True
     needs_geometry: ClassVar[str] = "a payload"
     at: ClassVar[Any] = None  # type: ignore[misc]
+    zone: ClassVar[Any] = None  # type: ignore[misc]
     # what would say how to move stands beside a planner only
     limits: ClassVar[Any] = None  # type: ignore[misc]
     when_over_limit: ClassVar[Any] = None  # type: ignore[misc]
