@@ -56,7 +56,13 @@ def judged(folder: Path, columns: str, change: tuple[str, str] = ("", "")) -> Ju
 
 @pytest.mark.parametrize(
     "columns",
-    ["t, q, qd, qdd, pose, twist, twistd", "t, q, qd, pose, path, move", "t, pose", "t, pose, twist, twistd"],
+    [
+        "t, q, qd, qdd, pose, twist, twistd",
+        "t, q, twist, twistd",
+        "t, q, qd, pose, path, move",
+        "t, pose",
+        "t, pose, twist, twistd",
+    ],
 )
 def test_rows_of_the_plan_are_accepted(tmp_path: Path, columns: str) -> None:
     judgement = judged(tmp_path, columns)
@@ -118,3 +124,20 @@ def test_retiming_needs_to_know_the_tool_of_a_row(tmp_path: Path) -> None:
     motion = read_motion(str(tmp_path / "rows.csv"), ReadingOptions(), joints=names, joint_types=types)
     with pytest.raises(InputError, match="has no column `move`, and the job changes its tool"):
         retime(motion, limits.requirements)
+
+
+def test_velocities_beside_joints_are_judged_with_the_tool_of_their_move(tmp_path: Path) -> None:
+    """Stretched rows are none of the plan: their velocities are judged by how the tool moves."""
+    judged(tmp_path, "t, q, twist")
+    names, *lines = (tmp_path / "rows.csv").read_text().splitlines()
+    assert names.split(",")[7:] == ["vx", "vy", "vz", "wx_deg", "wy_deg", "wz_deg"]
+    rows = np.array([[float(cell) for cell in line.split(",")] for line in lines])
+    for factor, kinds in ((1.0, set()), (1.2, {"derivative"})):
+        turned = rows.copy()
+        turned[:, 1] += 1e-6  # joints a little elsewhere
+        turned[120:180, 7:10] *= factor
+        text = [names, *(",".join(f"{cell:.9f}" for cell in row) for row in turned)]
+        (tmp_path / "rows.csv").write_text("\n".join(text) + "\n")
+        found = check_file(str(tmp_path / "rows.csv"), CheckOptions(job=str(tmp_path / "job.yaml"))).judgement
+        assert {finding.kind for finding in found.errors if finding.quantity != "position"} >= kinds
+        assert bool(found.errors) == bool(kinds)

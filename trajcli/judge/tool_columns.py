@@ -206,7 +206,13 @@ class _Judge:
         self._add("angular acceleration", np.linalg.norm(away[:, 3:], axis=1), room, motion, text)
 
     def _see_rates(self, motion: RecordedMotion, values: Array, poses: Array) -> None:
-        """Judge velocities beside positions alone: by how the tool moves and turns from row to row."""
+        """Judge velocities beside positions alone: by how the tool moves and turns from row to row.
+
+        Where the tool changes, that is how the first one moves: another one hangs elsewhere on the flange.
+        """
+        if self._seen.changes:
+            first = forward(self._seen.own, motion.q)
+            values, poses = self._of_first_tool(values, first[:, :3, 3] - poses[:, :3, 3]), first
         before = poses[:1, :3, :3] if self._last is None else self._last
         turns = np.concatenate([before, poses[:, :3, :3]])
         steps = turns[1:] @ np.swapaxes(turns[:-1], 1, 2)
@@ -222,6 +228,17 @@ class _Judge:
         rates = [values[:, at] for at in map(self._table.index, ("twist", "twistd")) if at]
         halves = [half, *(self._table.half(group) for group in ("twist", "twistd"))]
         self._rates.see(_as_motion(motion, [np.hstack([poses[:, :3, 3], turned]), *rates], halves))
+
+    def _of_first_tool(self, values: Array, arms: Array) -> Array:
+        """Return the columns (N, m) with the rates of a point at `arms` (N, 3) from the tcp, m."""
+        moved = values.copy()
+        twist, twistd = self._table.index("twist"), self._table.index("twistd")
+        spin = values[:, twist][:, 3:]
+        across = np.cross(spin, arms)
+        moved[:, twist[:3]] += across
+        if twistd:
+            moved[:, twistd[:3]] += np.cross(values[:, twistd][:, 3:], arms) + np.cross(spin, across)
+        return moved
 
     def _compare_along_paths(
         self, motion: RecordedMotion, values: Array, poses: Array, errors: Array
