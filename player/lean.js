@@ -129,6 +129,12 @@ const dense = (text) => text.replace(/\/\*[\s\S]*?\*\//g, '').split('\n').map((l
 /** Names of colours: the player's are numbers. */
 const COLOUR_NAMES = /const _colorKeywords = \{[^}]*\};/;
 
+/** Uniforms of those programs. */
+const NO_UNIFORMS = /\n\t(?:lambert|phong|toon|matcap|points|dashed|normal|sprite|background|backgroundCube|cube|equirect|distance): \{\n[\s\S]*?\n\t\},?\n/g;
+
+/** Warnings of three, of a line each: a page says nothing. Errors stay. */
+const WARNING = /^[ \t]*(?:warn|warnOnce|console\.warn)\([^;\n]*\);$/gm;
+
 const METHOD = /\n\t(?:static |get |set )?(\w+)\([^)\n]*\) \{\n(?:[\s\S]*?\n)?\t\}\n/g;
 
 /** Return a module without the methods of its classes that none of the names calls. */
@@ -163,8 +169,9 @@ export const lean = (names, seen) => ({
       return { contents: readFileSync(path, 'utf-8').replace(/\/\* glsl \*\/\s*`([\s\S]*?)`/g, shorter), loader: 'js' };
     });
     build.onLoad({ filter: /\.js$/ }, ({ path }) => {
-      const source = EMPTY[path.slice(`${THREE}renderers/`.length)] ?? readFileSync(path, 'utf-8');
-      return js(path, path.startsWith(THREE) ? source.replace(UNCALLED, '\n').replace(COLOUR_NAMES, 'const _colorKeywords = {};') : source);
+      const known = EMPTY[path.slice(`${THREE}renderers/`.length)] ?? readFileSync(path, 'utf-8');
+      const source = path.endsWith('/ShaderLib.js') ? known.replace(NO_UNIFORMS, '\n').replace(NO_UNIFORMS, '\n') : known;
+      return js(path, path.startsWith(THREE) ? source.replace(UNCALLED, '\n').replace(COLOUR_NAMES, 'const _colorKeywords = {};').replace(WARNING, ';') : source);
     });
   },
 });
