@@ -46,6 +46,7 @@ from trajcli.planners.tool_path.arc import ArcFields
 from trajcli.planners.tool_path.law import LawSpec
 from trajcli.planners.tool_path.move import ToleranceSpec
 from trajcli.planners.tool_path.segments import Segment, SegmentLaw, SegmentsField
+from trajcli.planners.tool_path.weave import WeaveSpec
 from trajcli.planners.waypoints.blends import BlendDurations
 from trajcli.planners.waypoints.time_optimal import PathParameter
 from trajcli.planners.waypoints.waypoints import SegmentTimes
@@ -72,6 +73,7 @@ SECTIONS: dict[type, str] = {
     LawSpec: "[law](#law)",
     ToleranceSpec: "[tolerance](#tolerance)",
     Segment: "[segments](#segments)",
+    WeaveSpec: "[weave](#weave)",
     SegmentLaw: "[law of a segment](#laws-of-segments)",
     ArcFields: "[arc](#arcs)",
 }

@@ -7,6 +7,7 @@ from trajcli.planners.tool_path.arc import ArcFields
 from trajcli.planners.tool_path.law import LawSpec
 from trajcli.planners.tool_path.move import ToleranceSpec
 from trajcli.planners.tool_path.segments import Segment, SegmentLaw
+from trajcli.planners.tool_path.weave import WeaveSpec
 
 _PATHS = """\
 `line`, `arc`, `path` and `screw` lead the tcp along a path in space; the joints follow. They start and end
@@ -69,6 +70,15 @@ Speeds of the tool on one segment, in the place of those of the move's law (or o
 to the next within all limits. Of a rounded corner each of its two segments has its half. The speeds are
 verified for all t on each segment; reports, `explain` and pictures show them."""
 
+_WEAVE = """\
+A swing to both sides of `line`, `arc` and `path`, across the path and square to the tool's z axis, or along
+the part of `side` that is square to the path. `s`, the law and `at` are of the path without it: `speed: 10
+mm/s` is along the seam, and what the tool does on top is verified against `limits.tcp`. Where the law names
+no speed that of `limits.tcp` holds for the tool. The corners of a triangle and a trapezoid are rounded
+within 5 % of a cycle, so that the path has a continuous second derivative, and the amplitude is reached. It
+begins and ends on the seam, as at every stop; where neither whole nor half cycles fit, their length is
+changed so that whole ones do (`weave_fitted`). A weave cannot be flown by."""
+
 _ARCS = """\
 Three ways to say which one: through `via` to `to`; about `center` to `to`, the shorter way round, or
 right-handed about `axis`; about `center` and `axis` by a signed `angle`, also several turns, with `pitch` a
@@ -90,5 +100,6 @@ def tool_path_sections() -> list[str]:
     parts += ["### Tolerance", _TOLERANCE, field_table(ToleranceSpec, _SI)]
     parts += ["### Segments", _SEGMENTS, field_table(Segment)]
     parts += ["### Laws of segments", _SEGMENT_LAWS, field_table(SegmentLaw, _OF_MOVE)]
+    parts += ["### Weave", _WEAVE, field_table(WeaveSpec)]
     parts += ["### Arcs", _ARCS, field_table(ArcFields)]
     return parts

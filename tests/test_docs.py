@@ -180,6 +180,7 @@ def test_every_planner_has_its_section_with_every_field(tag: str) -> None:
         ("### Tolerance", "ToleranceSpec"),
         ("### Segments", "Segment"),
         ("### Laws of segments", "SegmentLaw"),
+        ("### Weave", "WeaveSpec"),
         ("### Arcs", "ArcFields"),
         ("## Robot", "RobotModel"),
         ("### Joints", "JointModel"),
@@ -224,7 +225,7 @@ def test_every_definition_of_the_schema_is_looked_at() -> None:
     known |= {"RelativeTarget", "RelativeWaypoint"}  # described in words
     known |= {"Attach", "Detach", "Empty", "PayloadSpec", "ChangeTool"}
     known |= {"RailSpec", "RobotOnRail", "KukaStatus"}
-    known |= {"ToolLimitsSpec", "LawSpec", "ToleranceSpec", "Segment", "SegmentLaw", "ArcFields"}
+    known |= {"ToolLimitsSpec", "LawSpec", "ToleranceSpec", "Segment", "SegmentLaw", "WeaveSpec", "ArcFields"}
     others = {name for name, definition in SCHEMA["$defs"].items() if "properties" in definition} - known
     assert {SCHEMA["$defs"][name]["properties"]["planner"]["const"] for name in others} == set(MOVES)
 

@@ -219,6 +219,7 @@ def _drawing(tool: ToolMotion) -> tuple[list[SegmentReport], list[CornerReport]]
     if isinstance(poses, Screw):
         return [_screw(poses)], []
     curve = poses.position if isinstance(poses, PoseCurve) else None
+    curve = getattr(curve, "seam", curve)  # of a weave
     if not isinstance(curve, Chain):
         return ([] if curve is None else [_segment(curve)]), []
     return [_segment(segment) for segment in curve.segments], [

@@ -62,6 +62,7 @@ class ToolConstraint:
         path: Of the tool.
         limits: Of its speed and acceleration, linear and angular.
         speeds: Limits of both speeds that step along the path, in their place; None where they do not.
+        oblique: Whether p'' has a part along p' that counts, as where s is not the arc length.
     """
 
     estimate: ClassVar[float] = 1.0
@@ -69,6 +70,7 @@ class ToolConstraint:
     path: KnownTool
     limits: ToolLimits
     speeds: SteppingSpeeds | None = None
+    oblique: bool = False
 
     @property
     def bounds_sdd(self) -> bool:
@@ -86,7 +88,8 @@ class ToolConstraint:
         _, first, second = self.path.poses.evaluate(np.clip(s, 0.0, self.path.length), side)
         tangent, turning = (np.linalg.norm(first[:, part], axis=1) for part in (slice(0, 3), slice(3, 6)))
         curvature = np.linalg.norm(second[:, :3], axis=1)
-        linear = _translation_rows(tangent, curvature, limits.acceleration)
+        along = self._along(first, second)
+        linear = _translation_rows(tangent, along, curvature, limits.acceleration)
         angular = _rotation_rows(first[:, 3:], second[:, 3:], turning, limits.angular_acceleration)
         most, most_angular = self._speeds(s, side)
         with np.errstate(divide="ignore"):
@@ -103,7 +106,8 @@ class ToolConstraint:
         most, most_angular = self._speeds(s, side)
         with np.errstate(divide="ignore"):
             speed = np.minimum(most / tangent, most_angular / turning)
-            bend = limits.acceleration / np.linalg.norm(second[:, :3], axis=1)
+            curvature = np.linalg.norm(second[:, :3], axis=1)
+            bend = limits.acceleration / _across(self._along(first, second), curvature)
         return np.asarray(np.minimum(speed**2, bend))
 
     def shortest(self, s: Array) -> Array:
@@ -131,6 +135,14 @@ class ToolConstraint:
         used = _used(first * rate, acceleration, self._speeds(s, "right"), self.limits)
         return np.asarray(used.reshape(2, _BETWEEN, -1).max(axis=1))
 
+    def _along(self, first: Array, second: Array) -> Array:
+        """Return the part of p'' along p' at rows X' and X'' (N, 6), signed (N,); zero unless it counts."""
+        if not self.oblique:
+            return np.zeros(len(first))
+        p, bend = first[:, :3], second[:, :3]
+        size = np.linalg.norm(p, axis=1)
+        return np.asarray((p * bend).sum(axis=1) / np.where(size > 0, size, 1.0))
+
     def _speeds(self, s: Array, side: Side) -> tuple[Array, Array]:
         """Return the limits of both speeds at s (N,), each (N,)."""
         if self.speeds is not None:
@@ -148,17 +160,35 @@ def _used(velocity: Array, acceleration: Array, speeds: tuple[Array, Array], lim
     return np.stack(shares)
 
 
-def _translation_rows(tangent: Array, curvature: Array, limit: float) -> tuple[Array, Array, Array]:
-    """Return a, b and c of rows a sdd + b sd^2 <= c, each (N, k), of the acceleration of the tcp."""
+def _across(along: Array, curvature: Array) -> Array:
+    """Return the size of the part of p'' square to p', (N,)."""
+    rest = np.sqrt(np.maximum(curvature**2 - along**2, 0.0))
+    return np.where(along == 0.0, curvature, rest)
+
+
+def _translation_rows(
+    tangent: Array, along: Array, curvature: Array, limit: float
+) -> tuple[Array, Array, Array]:
+    """Return a, b and c of rows a sdd + b sd^2 <= c, each (N, k), of the acceleration of the tcp.
+
+    Args:
+        tangent: Size of p', (N,).
+        along: Part of p'' along p', (N,); zero where s is the arc length.
+        curvature: Size of p'', (N,).
+        limit: Of the acceleration.
+    """
     count = tangent.size
     if not curvature.any():
         ones = np.ones((count, 1)) * tangent[:, None]
         return np.hstack([ones, -ones]), np.zeros((count, 2)), np.full((count, 2), limit)
     angles = np.pi * (np.arange(_CORNERS // 2) + 0.5) / (_CORNERS // 2)
     apothem = limit * math.cos(math.pi / _CORNERS)
+    bend = _across(along, curvature)[:, None] * np.sin(angles)
+    if along.any():
+        bend = bend + along[:, None] * np.cos(angles)
     return (
         tangent[:, None] * np.cos(angles),
-        curvature[:, None] * np.sin(angles),
+        bend,
         np.full((count, angles.size), apothem),
     )
 

@@ -186,6 +186,11 @@ class ToolPath:
         return self.poses.length
 
     @property
+    def weaves(self) -> bool:
+        """Whether the tool swings about the curve whose arc length s is."""
+        return hasattr(getattr(self.poses, "position", None), "seam")
+
+    @property
     def breaks(self) -> Array:
         """Values of s where a second derivative may jump, or a limit of speed, the ends included."""
         inner = self.poses.breaks

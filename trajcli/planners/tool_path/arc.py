@@ -24,13 +24,13 @@ from trajcli.language.targets import Direction, Numbers, Row, Target
 from trajcli.planners.planner import Event
 from trajcli.planners.tool_path.move import (
     PlannedPath,
-    ToolPathMove,
     ToolTarget,
     flaws_of_target,
     kept_orientation,
     path_to,
     tool_target,
 )
+from trajcli.planners.tool_path.weave import WovenMove
 from trajcli.units import Quantity
 
 _LENGTH, _ANGLE = Quantity("length"), Quantity("angle")
@@ -77,7 +77,7 @@ class ArcFields(Model):
             yield ("via",), "the point that an arc passes needs `xyz`", None
 
 
-class ArcMove(ToolPathMove, ArcFields):
+class ArcMove(WovenMove, ArcFields):
     """Along a circle, also several turns, or a helix.
 
     Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.3.1.
@@ -91,7 +91,7 @@ class ArcMove(ToolPathMove, ArcFields):
         arc = arc_of(self, before, target, robot)
         planned = path_to(arc, before, target, self, self.to)
         via = () if self.via is None else ((("via",), arc.s_of(_position(self.via, robot))),)
-        return replace(planned, events=center_events([arc]), targets=(*via, *planned.targets))
+        return self.woven(replace(planned, events=center_events([arc]), targets=(*via, *planned.targets)))
 
 
 def arc_target(fields: ArcFields, before: Array, robot: Robot) -> ToolTarget:

@@ -27,12 +27,14 @@ class PathDerivatives:
         curvature: Of the position, 1/m.
         turning: First derivative of the orientation, rad per unit of s.
         turning_change: Second derivative of the orientation, rad per unit squared.
+        stretch: Of the position by s; 1 where that is its arc length.
     """
 
     moves: bool
     curvature: float
     turning: float
     turning_change: float
+    stretch: float = 1.0
 
 
 def path_derivatives(path: ToolPath) -> PathDerivatives:
@@ -46,7 +48,10 @@ def path_derivatives(path: ToolPath) -> PathDerivatives:
     if path.orientation != "all":
         turning, change = (_peak(path, s, order) * _SAFE for order in (0, 1))
         change = change if change * path.length > _EVEN * turning else 0.0
-    return PathDerivatives(not path.poses.pure_rotation, largest_norm(second[..., :3]), turning, change)
+    stretch = max(1.0, largest_norm(first[..., :3]))
+    stretch = stretch if stretch > 1.0 + _EVEN else 1.0
+    curvature = largest_norm(second[..., :3])
+    return PathDerivatives(not path.poses.pure_rotation, curvature, turning, change, stretch)
 
 
 def _derivatives(path: ToolPath, s: Array) -> tuple[Array, Array]:

@@ -397,11 +397,11 @@ def _bounds(spec: LawSpec, limits: ToolLimits, derivatives: PathDerivatives) -> 
     bent path also accelerates across: there 0.6 of it goes along and 0.8 across.
     """
     bent = derivatives.moves and derivatives.curvature > 0
-    along = _ALONG if bent else 1.0
-    speed = _or(spec.speed, limits.speed)
+    along = (_ALONG if derivatives.stretch == 1.0 else 1.0 - _ACROSS) if bent else 1.0
+    speed = _or(spec.speed, limits.speed / derivatives.stretch)
     if spec.acceleration is None and bent:
         speed = min(speed, math.sqrt(_ACROSS * limits.acceleration / derivatives.curvature))
-    acceleration = _or(spec.acceleration, along * limits.acceleration)
+    acceleration = _or(spec.acceleration, along * limits.acceleration / derivatives.stretch)
     linear = PathBounds(
         speed, acceleration, _or(spec.deceleration, acceleration), _or(spec.jerk, limits.jerk)
     )

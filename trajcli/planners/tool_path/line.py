@@ -30,11 +30,12 @@ from trajcli.planners.tool_path.move import (
     path_to,
     tool_target,
 )
+from trajcli.planners.tool_path.weave import WovenMove
 
 _SAME_ANGLE = 1e-12  # rad: a rotation by less is none
 
 
-class LineMove(ToolPathMove):
+class LineMove(WovenMove):
     """Straight to the target; where only the orientation differs, the tool turns in its place.
 
     Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.3.
@@ -55,11 +56,13 @@ class LineMove(ToolPathMove):
         target = tool_target(self.to, before, robot)
         start, end = before[:3, 3], target.pose[:3, 3]
         if np.linalg.norm(end - start) > SAME_POINT:
-            return path_to(Line(start, end), before, target, self, self.to)
+            return self.woven(path_to(Line(start, end), before, target, self, self.to))
         turning = orientation_along(self.orientation, before[:3, :3], [target], None, None, self.origin)
         if turning.length <= _SAME_ANGLE:
             return _path_of_no_length(before, target, self.to)
-        return path_of_poses(PoseCurve(Pivot(start, end, turning.length), turning), target, self.to)
+        return self.woven(
+            path_of_poses(PoseCurve(Pivot(start, end, turning.length), turning), target, self.to)
+        )
 
 
 class ScrewMove(ToolPathMove):

@@ -20,7 +20,7 @@ from trajcli.language.recorded import RecordedPoses
 from trajcli.language.targets import Target
 from trajcli.planners.planner import Event
 from trajcli.planners.tool_path.arc import center_events
-from trajcli.planners.tool_path.move import PlannedPath, ToolPathMove, orientation_along
+from trajcli.planners.tool_path.move import PlannedPath, orientation_along
 from trajcli.planners.tool_path.segments import (
     Segment,
     SegmentsField,
@@ -32,6 +32,7 @@ from trajcli.planners.tool_path.segments import (
     stepping_speeds,
     turning_back,
 )
+from trajcli.planners.tool_path.weave import WovenMove
 from trajcli.units import Quantity
 
 _SHRUNK = 1e-9  # relative
@@ -45,7 +46,7 @@ Radius = Annotated[
 ]
 
 
-class PathMove(ToolPathMove):
+class PathMove(WovenMove):
     """Lines and arcs under one law; corners are stopped at, rounded, or cut by overlapping in time.
 
     Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.3.2.
@@ -141,6 +142,8 @@ class PathMove(ToolPathMove):
                 yield ("segments", k, "law"), text, "say law: {shape: time_optimal} in the move"
 
     def _flaws_of_overlap(self) -> Iterator[Flaw]:
+        if self.weave is not None:
+            yield ("weave",), "segments that overlap in time have no path to weave about", "use corner: round"
         if self.overlap is None:
             yield ("corner",), "corner: overlap needs the time `overlap`", None
         if self.law.time_law.uses_joint_limits:
@@ -191,7 +194,7 @@ class PathMove(ToolPathMove):
             ),
         )
         if not overlap:
-            return planned
+            return self.woven(planned)
         from trajcli.planners.tool_path.overlap import overlapping_motion
 
         motion = overlapping_motion(before, curves, targets, self, self.overlap or 0.0, robot.limits.tcp)

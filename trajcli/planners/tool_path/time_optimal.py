@@ -65,7 +65,10 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
     _require_acceleration(curve, robot, planner)
     limits, tcp = robot.limits, limits_of_law(spec, robot.limits.tcp, path.speeds)
     with joints.diagnosed():
-        further = (ToolConstraint(joints.executed, tcp, path.speeds), *path_constraints(curve, robot))
+        further = (
+            ToolConstraint(joints.executed, tcp, path.speeds, path.weaves),
+            *path_constraints(curve, robot),
+        )
 
         turns = path.poses.pure_rotation
         along = (tcp.angular_speed, tcp.angular_acceleration) if turns else (tcp.speed, tcp.acceleration)

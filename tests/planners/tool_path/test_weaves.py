@@ -1,0 +1,212 @@
+"""Weaves: the nominal curve written down here, and where the tool is by products of matrices."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from independent_motion import poses, series_of
+from tool_jobs import DOWN, plan, refusal
+
+from trajcli.geometry.paths.chain import join
+from trajcli.geometry.paths.orientation import FixedOrientation
+from trajcli.geometry.paths.position import Line
+from trajcli.kinematics.following.weave import Weave
+
+HERE = {"xyz": [0.4, -0.1, 0.3], "rpy": DOWN}
+TO = [0.4, 0.1, 0.3]  # 0.2 m along y: with the tool's z down the weave is along x
+LAW = {"speed": 0.02, "acceleration": 0.1}
+WIDE = {
+    "velocity": 6.0,
+    "acceleration": 100.0,
+    "jerk": None,
+    "tcp": {"angular_speed": 3.0, "angular_acceleration": 20.0},
+}
+A, CYCLE = 0.002, 0.01
+TOLERANCE = 1e-6
+
+
+def weaving(move=None, weave=None, start=HERE, **rest):
+    """Return the plan of a line of 0.2 m that weaves."""
+    fields = {"amplitude": A, "length": CYCLE, **(weave or {})}
+    given = {key: value for key, value in fields.items() if value is not None}
+    whole = {"planner": "line", "to": {"xyz": TO}, "law": LAW, "weave": given}
+    return plan("ur5e", start, {**whole, **(move or {})}, limits=WIDE, **rest)
+
+
+def tool_at(made, times):
+    """Return where the tool is, (N, 3), by products of matrices of the rows of its arm."""
+    curve, robot = made.trajectory.curve, made.moves[0].robot
+    piece = np.clip(np.searchsorted(curve.breaks, times, "right") - 1, 0, curve.pieces - 1)
+    q = series_of(curve, piece, times - curve.breaks[piece])[:1]
+    return (poses(robot, q)[1][-1][0] @ robot.tool)[:, :3, 3]
+
+
+def on_rows(made, count=4001):
+    """Return s (N,) and where the tool is, (N, 3)."""
+    times = np.linspace(0.0, made.trajectory.duration, count)
+    return made.moves[0].planned.tool.law.evaluate(times)[:, 0], tool_at(made, times)
+
+
+def test_a_sine_is_followed_within_tolerance_and_its_mean_is_the_seam():
+    made = weaving()
+    s, places = on_rows(made)
+    swing = A * np.sin(2 * np.pi * s / CYCLE)
+    assert np.abs(places[:, 1] - (s - 0.1)).max() < TOLERANCE
+    assert min(np.abs(places[:, 0] - 0.4 - sign * swing).max() for sign in (1, -1)) < TOLERANCE
+    assert np.abs(places[:, 2] - 0.3).max() < TOLERANCE
+    even = np.interp(np.linspace(0, 0.2, 20001)[:-1], s, places[:, 0])
+    assert even.mean() == pytest.approx(0.4, abs=2 * TOLERANCE)
+    assert np.ptp(places[:, 0]) == pytest.approx(2 * A, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("shape", "corners", "slope"),
+    [("triangle", (0.25, 0.75), 4.0), ("trapezoid", (0.125, 0.375, 0.625, 0.875), 8.0)],
+)
+def test_flanks_are_straight_and_corners_rounded_within_five_percent(shape, corners, slope):
+    made = weaving(weave={"shape": shape})
+    s, places = on_rows(made, 8001)
+    swing = (places[:, 0] - 0.4) / A
+    phase = (s / CYCLE) % 1.0
+    swing *= np.sign(swing[np.argmin(np.abs(s - 0.1 * CYCLE))])
+    assert np.abs(swing).max() == pytest.approx(1.0, abs=2e-3)  # the amplitude is reached
+    far = np.min([np.abs(phase - corner) for corner in corners], axis=0) > 0.026
+    sharp = np.interp(
+        phase, [0, *corners, 1], [0, *{"triangle": (1, -1), "trapezoid": (1, 1, -1, -1)}[shape], 0]
+    )
+    steeper = (
+        1 / (1 - 1.5 * 0.025) if shape == "triangle" else 1.0
+    )  # so that a rounded peak reaches the amplitude
+    flank = np.where(np.abs(sharp) < 0.8, steeper * sharp, sharp)
+    rows = far & (np.abs(sharp) < 0.8)
+    assert np.abs(swing - flank)[rows].max() < 2 * TOLERANCE / A
+    assert slope * steeper == pytest.approx(np.abs(np.gradient(swing[rows], s[rows] / CYCLE)).max(), rel=0.05)
+
+
+def test_a_half_cycle_more_ends_on_the_seam_too():
+    made = weaving(weave={"length": 0.2 / 19.5})
+    assert not [e for e in made.moves[0].planned.events if e.kind == "weave_fitted"]
+    s, places = on_rows(made)
+    assert (
+        np.abs(np.abs(places[:, 0] - 0.4) - np.abs(A * np.sin(2 * np.pi * s * 19.5 / 0.2))).max() < TOLERANCE
+    )
+
+
+def test_other_lengths_are_fitted_and_told():
+    made = weaving(weave={"length": 0.011})
+    (event,) = (e for e in made.moves[0].planned.events if e.kind == "weave_fitted")
+    assert event.amounts["used"].value == pytest.approx(0.2 / 18)
+    assert not event.concedes
+    s, places = on_rows(made)
+    assert np.abs(np.abs(places[:, 0] - 0.4) - np.abs(A * np.sin(2 * np.pi * s * 18 / 0.2))).max() < TOLERANCE
+
+
+def test_a_frequency_is_the_speed_of_the_law_over_a_length():
+    same, other = weaving(), weaving(weave={"length": None, "frequency": LAW["speed"] / CYCLE})
+    assert other.trajectory.duration == same.trajectory.duration
+    times = np.linspace(0, same.trajectory.duration, 50)
+    assert np.array_equal(other.trajectory.curve.evaluate(times), same.trajectory.curve.evaluate(times))
+
+
+def test_a_side_says_where_it_swings_first():
+    s, places = on_rows(weaving(weave={"side": [0.0, 0.0, 1.0]}))
+    assert np.abs(places[:, 2] - 0.3 - A * np.sin(2 * np.pi * s / CYCLE)).max() < TOLERANCE
+    assert np.abs(places[:, 0] - 0.4).max() < TOLERANCE
+
+
+def test_an_arc_weaves_along_its_radius():
+    """With the tool's z along the axis: the radius swings, and s goes round evenly."""
+    move = {"planner": "arc", "center": [0.4, 0.0, 0.3], "axis": "z", "angle": np.pi}
+    move["weave"] = {"amplitude": A, "length": 0.1 * np.pi / 30}
+    made = plan("ur5e", HERE, {**move, "law": LAW}, limits=WIDE)
+    s, places = on_rows(made)
+    off = places[:, :2] - [0.4, 0.0]
+    radius = np.hypot(*off.T)
+    swing = A * np.sin(2 * np.pi * 30 * s / (0.1 * np.pi))
+    assert min(np.abs(radius - 0.1 - sign * swing).max() for sign in (1, -1)) < TOLERANCE
+    assert np.abs(np.unwrap(np.arctan2(off[:, 1], off[:, 0])) + np.pi / 2 - s / 0.1).max() < 10 * TOLERANCE
+
+
+def test_a_rounded_corner_is_woven_around_and_a_stop_is_on_the_seam():
+    corner, end = [0.4, 0.0, 0.3], [0.48, 0.0, 0.3]
+    for radius in (0.02, 0.0):
+        move = {
+            "planner": "path",
+            "segments": [{"line": {"xyz": corner}, "radius": radius}, {"line": {"xyz": end}}],
+        }
+        made = plan(
+            "ur5e", HERE, {**move, "law": LAW, "weave": {"amplitude": A, "length": 0.01}}, limits=WIDE
+        )
+        stops = made.moves[0].planned.tool.path.poses.stops
+        assert stops.size == (radius == 0)
+        s, places = on_rows(made)
+        if radius == 0:
+            assert np.abs(places[np.abs(s - 0.1).argmin()] - corner).max() < 1e-4
+        straight = s < 0.07
+        assert np.ptp(places[straight, 0]) == pytest.approx(2 * A, rel=1e-2)
+        assert np.abs(places[-1] - end).max() < TOLERANCE
+
+
+@pytest.mark.parametrize("shape", ["sine", "triangle", "trapezoid"])
+def test_the_path_has_a_continuous_second_derivative(shape):
+    """Also where a corner is rounded, by central differences of what it says of itself."""
+    seam = join([Line([0, 0, 0], [0.1, 0, 0]), Line([0.1, 0, 0], [0.12, 0.1, 0])], 0.03)
+    weave = Weave(seam, FixedOrientation(np.diag([1.0, -1.0, -1.0]), seam.length), A, (20,), shape)
+    for order in (1, 2):
+        left, right = (weave.evaluate(weave.breaks, side)[order] for side in ("left", "right"))
+        assert np.abs(left - right).max() < 1e-7 * np.abs(left).max()
+    s, h = np.linspace(0.001, seam.length - 0.001, 501), 1e-7
+    p = [weave.evaluate(s + k * h)[0] for k in (-1, 0, 1)]
+    values = weave.evaluate(s)
+    assert np.abs((p[2] - p[0]) / (2 * h) - values[1]).max() < 1e-5
+    slopes = [weave.evaluate(s + k * h)[1] for k in (-1, 1)]
+    bend = (slopes[1] - slopes[0]) / (2 * h)
+    assert np.abs(bend - values[2]).max() < 2e-3 * np.abs(values[2]).max()
+
+
+def test_the_fastest_law_keeps_the_limits_of_the_tool():
+    """Speeds and accelerations of the tool, not of the seam, by independent kinematics."""
+    from tool_jobs import times_of, tool_rates
+
+    limits = {"velocity": 6.0, "acceleration": 60.0, "jerk": None, "tcp": {"speed": 0.1, "acceleration": 3.0}}
+    move = {"planner": "line", "to": {"xyz": [0.4, -0.05, 0.3]}, "law": {"shape": "time_optimal"}}
+    made = plan("ur5e", HERE, {**move, "weave": {"amplitude": A, "length": CYCLE}}, limits=limits)
+    speed, _, acceleration, _ = tool_rates(made, times_of(made, 2001))
+    assert 0.9 * 0.1 < speed.max() <= 0.1 * (1 + 1e-6)
+    assert 0.9 * 3.0 < acceleration.max() <= 3.0 * (1 + 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("move", "weave", "message"),
+    [
+        ({}, {"length": None}, "a weave has a `length` of a cycle, or a `frequency`"),
+        ({}, {"frequency": 2.0}, "a weave has a `length` of a cycle, or a `frequency`"),
+        (
+            {"law": {"shape": "time_optimal"}},
+            {"length": None, "frequency": 2.0},
+            "a frequency makes a length",
+        ),
+        ({}, {"amplitude": 0.0}, "expected a number above 0"),
+        ({}, {"shape": "cosine"}, "expected sine, triangle or trapezoid"),
+        ({}, {"side": [0.0, 1.0, 0.0]}, "`side` is along it"),
+        ({"to": {"xyz": [0.4, -0.1, 0.4]}}, {}, "the z axis of the tool is along it"),
+        ({"to": {"xyz": HERE["xyz"], "rpy": [np.pi, 0, 0.5]}}, {}, "a weave needs a path"),
+    ],
+)
+def test_weaves_that_are_none(move, weave, message):
+    fields = {"amplitude": A, "length": CYCLE, **weave}
+    given = {key: value for key, value in fields.items() if value is not None}
+    whole = {"planner": "line", "to": {"xyz": TO}, "law": LAW, "weave": given, **move}
+    problems = refusal("ur5e", HERE, whole, limits=WIDE).problems
+    assert message in problems[0].message
+
+
+def test_a_weave_is_not_flown_by():
+    """A zone of its own is an error; the job's is not used there."""
+    weave = {"amplitude": A, "length": CYCLE}
+    first = {"planner": "line", "to": {"xyz": [0.4, 0.0, 0.3]}, "law": LAW, "weave": weave}
+    last = {"planner": "line", "to": {"xyz": [0.5, 0.0, 0.3]}, "law": LAW}
+    (problem,) = refusal("ur5e", HERE, {**first, "zone": 0.01}, last, limits=WIDE).problems
+    assert "it weaves" in problem.message
+    made = plan("ur5e", HERE, first, last, limits=WIDE, zone=0.01)
+    assert not made.flyby.zones
