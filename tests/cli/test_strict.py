@@ -291,7 +291,8 @@ def test_strict_sees_the_event(kind: str, tmp_path: Path, capfd: pytest.CaptureF
 
 def test_all_events_of_the_report_are_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     seen = 0
-    for example in few(sorted(EXAMPLES.glob("*.yaml"))[1::3], 5):
+    paths = [path for path in sorted(EXAMPLES.glob("*.yaml")) if "zone: " not in path.read_text()]
+    for example in few(paths[::3], 5):  # those with zones are searched for: seconds each
         report = tmp_path / "report.json"
         plain = call(capfd, "plan", str(example), "--no-output", "--report", str(report))
         events = json.loads(report.read_text())["events"]
