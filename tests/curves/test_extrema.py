@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from itertools import pairwise
 
 import numpy as np
@@ -309,3 +310,23 @@ def test_a_peak_at_a_break_has_the_time_of_the_break() -> None:
     assert (breaks[:-1] + np.diff(breaks) < breaks[1:]).any()
     for k, found in enumerate(peaks_between(curve, np.stack([breaks[:-1], breaks[1:]], axis=1), (0,))):
         assert (found[0].low_time[0], found[0].high_time[0]) == (breaks[k], breaks[k + 1])
+
+
+def test_many_intervals_are_looked_at_in_blocks_and_need_little_memory() -> None:
+    """A curve of 70000 pieces, an interval for each: twice the memory of what is returned at most."""
+    pieces, rng = 70_000, np.random.default_rng(7)
+    curve = PiecewisePolynomial(np.arange(pieces + 1.0), rng.normal(size=(4, pieces, 1)))
+    intervals = np.column_stack([curve.breaks[:-1], curve.breaks[1:]])
+    tracemalloc.start()
+    try:
+        found = peaks_between(curve, intervals, (0, 1))
+        kept, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 6 * kept
+    for k in (0, 32_767, 32_768, 65_536, pieces - 1):
+        x = np.linspace(0, 1, 2001)
+        values = np.polyval(curve.coefficients[:, k, 0], x)
+        assert found[k][0].low[0] == pytest.approx(values.min(), abs=1e-5)
+        assert found[k][0].high[0] == pytest.approx(values.max(), abs=1e-5)
+        assert k <= found[k][0].high_time[0] <= k + 1

@@ -31,6 +31,7 @@ from trajcli.frozen import frozen
 _STEP = 2.0**-53  # of a piece: a shorter step of the root finder changes nothing
 _STEPS = 120  # twice what bisection alone needs, because at most every second step is not a bisection
 _BLOCK = 2048  # parts of pieces looked at together: what is computed of them stays in the processor's cache
+_INTERVALS = 32_768  # intervals at a time: what is stored of their parts takes some 100 MB at most
 _MANY = 64  # parts of pieces from which on it pays to look for roots only where control points leave room
 _SAME = 1e-12  # of the largest value: peaks closer than this are one peak, and the earliest is named
 
@@ -119,7 +120,12 @@ def peaks_between(
     Raises:
         ValueError: When an interval is not within the curve.
     """
-    windows = _windows(curve, np.asarray(intervals, dtype=np.float64).reshape(-1, 2))
+    whole = np.asarray(intervals, dtype=np.float64).reshape(-1, 2)
+    if len(whole) > _INTERVALS:
+        starts = range(0, len(whole), _INTERVALS)
+        blocks = [peaks_between(curve, whole[k : k + _INTERVALS], orders) for k in starts]
+        return IntervalPeaks(tuple(map(_joined, zip(*(block.of_orders for block in blocks), strict=True))))
+    windows = _windows(curve, whole)
     ends, worth = _surveyed(curve, windows, orders)
     pairs = np.nonzero(worth)
     chosen, lengths = curve.coefficients[:, windows.piece[pairs[0]], pairs[1]], windows.length[pairs[0]]
@@ -132,6 +138,13 @@ def peaks_between(
             for order, at_ends, inside in zip(orders, ends, critical, strict=True)
         )
     )
+
+
+def _joined(parts: Sequence[Peaks]) -> Peaks:
+    """Return the extremes of intervals that follow each other, each of shape (m, n)."""
+    names = ("low", "low_time", "high", "high_time")
+    low, low_time, high, high_time = (np.concatenate([getattr(p, name) for p in parts]) for name in names)
+    return Peaks(low, low_time, high, high_time)
 
 
 def piece_extremes(
