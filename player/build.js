@@ -51,7 +51,7 @@ const write = (name, text) => {
 };
 /** Return what a text is as .xz, which Python makes and reads; the script is most of a wheel that packs worse. */
 function packed(text) {
-  const program = 'import lzma, sys; sys.stdout.buffer.write(lzma.compress(sys.stdin.buffer.read(), preset=9 | lzma.PRESET_EXTREME))';
+  const program = 'import lzma, sys; sys.stdout.buffer.write(lzma.compress(sys.stdin.buffer.read(), format=lzma.FORMAT_XZ, filters=[{"id": lzma.FILTER_LZMA2, "preset": 9 | lzma.PRESET_EXTREME, "pb": 0}]))';
   const { stdout, status } = spawnSync('python3', ['-c', program], { input: text, maxBuffer: 1 << 26 });
   if (status !== 0) throw new Error('this needs python3 with lzma');
   return stdout;

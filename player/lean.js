@@ -132,8 +132,8 @@ const COLOUR_NAMES = /const _colorKeywords = \{[^}]*\};/;
 /** Uniforms of those programs. */
 const NO_UNIFORMS = /\n\t(?:lambert|phong|toon|matcap|points|dashed|normal|sprite|background|backgroundCube|cube|equirect|distance): \{\n[\s\S]*?\n\t\},?\n/g;
 
-/** Warnings of three, of a line each: a page says nothing. Errors stay. */
-const WARNING = /^[ \t]*(?:warn|warnOnce|console\.warn)\([^;\n]*\);$/gm;
+/** Warnings and errors that three writes to the console, of a line each: a page says nothing, and what is thrown stays. */
+const WARNING = /^[ \t]*(?:warn|warnOnce|error|console\.warn|console\.error)\([^;\n]*\);$/gm;
 
 const METHOD = /\n\t(?:static |get |set )?(\w+)\([^)\n]*\) \{\n(?:[\s\S]*?\n)?\t\}\n/g;
 
