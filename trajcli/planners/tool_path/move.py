@@ -192,11 +192,6 @@ class ToolPathMove(Planner):
     def _pinned_path(self, start: Array, robot: Robot) -> PlannedPath:
         """Return the path from joint values (n,), with the joints that its target pins."""
         planned, target = self.path_from(forward(robot, start), robot), self.target
-        for index, segment in enumerate(getattr(self, "segments", ())[:-1]):
-            inner = segment.line if segment.arc is None else segment.arc.to
-            if inner is not None and inner.pinned is not None:
-                message = f"a joint is pinned in segment {index}, and goes evenly along the whole path"
-                raise InputError(Problem(message, "pin it in the last one", field=("segments", index)))
         if target is None or target.pinned is None:
             return planned
         from trajcli.kinematics.following.pinning import with_pinned

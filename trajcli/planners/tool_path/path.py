@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from trajcli.curves.piecewise import Array
-from trajcli.errors import Amount, PlanningError, Problem
+from trajcli.errors import Amount, InputError, PlanningError, Problem
 from trajcli.geometry.paths.chain import Chain, Corner, join
 from trajcli.geometry.paths.pose import PoseCurve
 from trajcli.kinematics.following.tool_path import ToolPath
@@ -76,8 +76,7 @@ class PathMove(WovenMove):
     @property
     def target(self) -> Target | None:
         """Where the last segment ends; None where an arc ends after an angle."""
-        last = self._listed[-1]
-        return last.line if last.arc is None else last.arc.to
+        return _end_of(self._listed[-1])
 
     @property
     def _listed(self) -> Sequence[Segment]:
@@ -153,8 +152,17 @@ class PathMove(WovenMove):
             text = f"orientation: {self.orientation} is not defined where segments overlap"
             yield ("orientation",), text, "use axis_angle or fixed, or corner: round"
 
+    def _refuse_inner_pins(self) -> None:
+        """Refuse joints that are pinned before the last segment; recorded poses pin none."""
+        for index, segment in enumerate(self._listed[:-1]):
+            inner = _end_of(segment)
+            if inner is not None and inner.pinned is not None:
+                message = f"a joint is pinned in segment {index}, and goes evenly along the whole path"
+                raise InputError(Problem(message, "pin it in the last one", field=("segments", index)))
+
     def path_from(self, before: Array, robot: Robot) -> PlannedPath:
         """Return the segments, joined, from the pose `before` (4, 4)."""
+        self._refuse_inner_pins()
         segments, left_out = segments_from(self.segments, before)
         curves, targets, kept = curves_of(before, segments, robot)
         overlap = self.overlap is not None and len(curves) > 1
@@ -229,3 +237,8 @@ def _shrunk(number: int, corner: Corner) -> Event:
         "by": Amount(corner.deviation, 0, None, "length"),
     }
     return Event("shrunk", text, amounts=amounts)
+
+
+def _end_of(segment: Segment) -> Target | None:
+    """Return where a segment ends; None for an arc of an angle."""
+    return segment.line if segment.arc is None else segment.arc.to
