@@ -111,6 +111,20 @@ def test_a_corner_of_two_lines_of_the_tool_is_flown_by(zone, most):
     assert plan.flyby.stopping == pytest.approx(1.6139, abs=1e-3)
 
 
+def test_a_zone_that_is_lowered_is_flown_at_the_pace_that_is_said_and_its_bound_is_not_lowered():
+    """At a pace f one of velocity, acceleration and jerk of a joint reaches f, f^2 or f^3 of its limit in the zone."""
+    plan = flown(limits={**FAST, "tcp": {"acceleration": 3}})
+    assert plan.flyby is not None
+    (zone,) = plan.flyby.zones
+    times = np.linspace(zone.entered, zone.left, 4001)[1:-1]
+    rates = plan.trajectory.curve.evaluate_orders(times, (1, 2, 3))
+    most = np.abs(rates).max(axis=(0, 2)) / [FAST["velocity"], FAST["acceleration"], FAST["jerk"]]
+    used = max(share ** (1 / order) for order, share in enumerate(most, start=1))
+    assert zone.tempo < 0.99
+    assert used == pytest.approx(zone.tempo, rel=1e-3)
+    assert plan.flyby.bound < plan.flyby.duration * (1 - 1e-3)
+
+
 def test_ramps_of_rounding_are_no_steps_in_velocity():
     """A joint changes its velocity by 3e-8 deg/s in 6e-11 s, within its acceleration: rows show nothing of it."""
     corners = [(400, 300, 250), (600, 300, 250), (600, 100, 250)]

@@ -1,10 +1,10 @@
-"""Points by name, and poses relative to a point: how they become the states that they stand for."""
+"""Points by name, relative to a point, or recorded: how they become the states that they stand for."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationError
@@ -37,6 +37,70 @@ BESIDE = ("configuration", "velocity", "acceleration", "joints", "time", "blend"
 HERE = "here"
 _LONGEST_CHAIN = 100  # points, each relative to the next
 _Fields = dict[str, Any]
+
+
+class ListOrRecorded:
+    """Lets a mapping, such as {csv: PATH}, stand for a list of places.
+
+    Attributes:
+        listed: Type of the list.
+        recorded: What a mapping is read as.
+    """
+
+    listed: ClassVar[Any]
+    recorded: ClassVar[type]
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
+        listed = handler.generate_schema(self.listed)
+        return core_schema.with_info_wrap_validator_function(
+            self._read,
+            listed,
+            serialization=core_schema.wrap_serializer_function_ser_schema(
+                self._write, info_arg=True, schema=listed
+            ),
+        )
+
+    def from_mapping(self, value: Mapping[str, Any], context: ReadingContext) -> Any:  # noqa: ANN401
+        """Return what a mapping of a job stands for.
+
+        Raises:
+            FlawError: When it stands for nothing.
+        """
+        raise NotImplementedError
+
+    def written(
+        self,
+        value: Any,  # noqa: ANN401
+        serialize: core_schema.SerializerFunctionWrapHandler,
+        context: ReadingContext,
+    ) -> Any:  # noqa: ANN401
+        """Return what is recorded as a job writes it."""
+        raise NotImplementedError
+
+    def _read(
+        self,
+        value: Any,  # noqa: ANN401
+        validate: core_schema.ValidatorFunctionWrapHandler,
+        info: core_schema.ValidationInfo,
+    ) -> Any:  # noqa: ANN401
+        if isinstance(value, self.recorded):
+            return value
+        if not isinstance(value, Mapping):
+            return validate(value)
+        try:
+            return self.from_mapping(value, info.context or SI)
+        except FlawError as error:
+            raise refuse(error.flaws) from None
+
+    def _write(
+        self,
+        value: Any,  # noqa: ANN401
+        serialize: core_schema.SerializerFunctionWrapHandler,
+        info: core_schema.SerializationInfo,
+    ) -> Any:  # noqa: ANN401
+        if not isinstance(value, self.recorded):
+            return serialize(value)
+        return value if info.context is None else self.written(value, serialize, info.context)
 
 
 class Named:

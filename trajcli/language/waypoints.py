@@ -6,13 +6,12 @@ from collections.abc import Mapping
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
+from pydantic import GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
 from trajcli.language.numbers import (
     AT_KEY,
-    SI,
     FlawError,
     Number,
     ReadingContext,
@@ -21,7 +20,7 @@ from trajcli.language.numbers import (
     shown,
 )
 from trajcli.language.per_joint import JointDistance, PerJoint
-from trajcli.language.points import Named
+from trajcli.language.points import ListOrRecorded, Named
 from trajcli.language.poses import read_numbers
 from trajcli.language.recorded import Recorded
 from trajcli.language.targets import Target
@@ -53,43 +52,21 @@ class Waypoint(Target):
 NamedWaypoint = Annotated[Waypoint, Named("Waypoint")]
 
 
-class PointsField:
+class PointsField(ListOrRecorded):
     """Lets {csv: PATH} stand for the points of a file, and {positions: [...]} for a table of them."""
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
-        listed = handler.generate_schema(tuple[NamedWaypoint, ...])
-        return core_schema.with_info_wrap_validator_function(
-            self._read,
-            listed,
-            serialization=core_schema.wrap_serializer_function_ser_schema(
-                self._write, info_arg=True, schema=listed
-            ),
-        )
+    listed = tuple[NamedWaypoint, ...]
+    recorded = Recorded
 
-    @staticmethod
-    def _read(
-        value: Any,  # noqa: ANN401
-        validate: core_schema.ValidatorFunctionWrapHandler,
-        info: core_schema.ValidationInfo,
-    ) -> Any:  # noqa: ANN401
-        if isinstance(value, Recorded):
-            return value
-        if not isinstance(value, Mapping):
-            return validate(value)
-        try:
-            return _recorded(value, info.context or SI)
-        except FlawError as error:
-            raise refuse(error.flaws) from None
+    def from_mapping(self, value: Mapping[str, Any], context: ReadingContext) -> Recorded:
+        """Return the points of a file or of a table."""
+        return _recorded(value, context)
 
-    @staticmethod
-    def _write(
-        value: Any,  # noqa: ANN401
-        serialize: core_schema.SerializerFunctionWrapHandler,
-        info: core_schema.SerializationInfo,
+    def written(
+        self, value: Recorded, serialize: core_schema.SerializerFunctionWrapHandler, context: ReadingContext
     ) -> Any:  # noqa: ANN401
-        if not isinstance(value, Recorded):
-            return serialize(value)
-        return value if info.context is None else _written(value, info.context)
+        """Return the points as a table."""
+        return _written(value, context)
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler

@@ -44,27 +44,37 @@ _ALIKE = 0.03  # relative: a pace that changes by less is known
 
 
 @frozen
-class _Found:
-    """The last motion: its row of nodes and parts, and the states at the nodes."""
+class _Motion:
+    """A motion that was found.
 
+    Attributes:
+        chain: With the paces of its zones.
+        row: The chain as nodes and parts.
+        states: At the nodes, (N, 2).
+        lowering: How much longer the search has it last than with zones that were not lowered, s.
+    """
+
+    chain: FlyByChain
     row: ChainRow
     states: Array
+    lowering: float
 
 
 class MotionSearch:
     """Searches of chains that are much the same: each begins where the last one ended.
 
     Attributes:
-        chain: The last one, its zones lowered to the pace that limits allow.
-        model: Duration of the fastest that was found, before the pace of any part was lowered, s.
+        chain: That of the last motion, its zones lowered to the pace that limits allow.
+        model: Duration of the fastest that was found, before the pace of any zone was lowered, s.
     """
 
     def __init__(self) -> None:
         self.chain: FlyByChain
         self.model = math.inf
         self._paces: dict[int, float] = {}
-        self._found: _Found | None = None
-        self._last: _Found
+        self._lowering = 0.0
+        self._near: Array | None = None
+        self._motion: _Motion
 
     def fastest(self, chain: FlyByChain) -> list[FlownPart]:
         """Return the parts of the fastest motion that is found: courses and zones in turns.
@@ -90,14 +100,15 @@ class MotionSearch:
                 continue
             second = best is not None
             if best is None or duration_of(parts) < duration_of(best):
-                best, self._last = parts, _Found(row, found.states)
+                best, self._motion = parts, _Motion(self.chain, row, found.states, self._lowering)
             if self.exact:
                 break
             if self._adapted(_changes(chain, row, found, parts)) <= _ALIKE or second:
                 break
         if best is None:
             raise PlanningError("no motion through its zones is found within the limits")
-        self.model = min(self.model, duration_of(best))
+        self.chain = self._motion.chain  # a later search may have lowered zones more
+        self.model = min(self.model, duration_of(best) - self._motion.lowering)
         return best
 
     @property
@@ -117,13 +128,13 @@ class MotionSearch:
             return parts
         bent = np.repeat([not course.uniform for course in self.chain.courses], 2)
         bent[[0, -1]] = False
-        states = self._last.states
+        states = self._motion.states
         for _ in range(_TRIES):
             states = np.where(bent[:, None], states * [_FASTER, _STEEPER], states)
             try:
                 if any(self._over(states)):
                     break
-                other = flown_parts(self.chain, self._last.row, states)
+                other = flown_parts(self.chain, self._motion.row, states)
             except PlanningError:
                 break
             if duration_of(other) > duration_of(parts) * (1 - _ENOUGH):
@@ -131,7 +142,7 @@ class MotionSearch:
             if any(findings_of(self.chain, k, part) for k, part in enumerate(other)):
                 break
             parts = other
-        self.model = min(self.model, duration_of(parts))
+        self.model = min(self.model, duration_of(parts) - self._motion.lowering)
         return parts
 
     def _adapted(self, changes: Array) -> float:
@@ -143,15 +154,16 @@ class MotionSearch:
 
     def _searched(self, paces: Array, eased: Array) -> tuple[FoundStates, ChainRow]:
         """Return the states found, and their row, once zones are as slow as limits ask for."""
+        before = math.inf
         for turn in range(_LOWERINGS):
             row = row_of(self.chain, paces.tolist(), eased.tolist())
-            near = None if self._found is None else self._found.states
-            found = _found(row, self.chain.ends, near, twice=self.exact)
+            found = _found(row, self.chain.ends, self._near, twice=self.exact)
             if not math.isfinite(found.duration):
                 break
             if self.exact:
                 self.model = min(self.model, found.duration)
-            self._found = _Found(row, found.states)
+            self._lowering += max(found.duration - before, 0.0)
+            self._near, before = found.states, found.duration
             if turn + 1 == _LOWERINGS or not self._lowered(found.states):
                 break
         return found, row

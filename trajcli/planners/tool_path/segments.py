@@ -12,7 +12,7 @@ from itertools import pairwise
 from typing import Annotated, Any, TypeVar
 
 import numpy as np
-from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
+from pydantic import Field, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
@@ -24,8 +24,8 @@ from trajcli.geometry.rotation import matrix_from_quaternion, quaternion_from_ma
 from trajcli.kinematics.following.tool_path import SpeedLimits
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.language.limits import AngularSpeed, ToolSpeed
-from trajcli.language.numbers import AT_KEY, SI, FlawError, Model, Number, ReadingContext, refuse, shown
-from trajcli.language.points import NamedTarget
+from trajcli.language.numbers import AT_KEY, FlawError, Model, Number, ReadingContext, refuse, shown
+from trajcli.language.points import ListOrRecorded, NamedTarget
 from trajcli.language.recorded import RecordedPoses
 from trajcli.language.targets import Target
 from trajcli.planners.planner import Event
@@ -110,50 +110,29 @@ _SCHEMA_OF_FILE: dict[str, Any] = {
 }
 
 
-class SegmentsField:
+class SegmentsField(ListOrRecorded):
     """Lets {csv: PATH} stand for lines to the poses of a file."""
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
-        listed = handler.generate_schema(list[Segment])
-        return core_schema.with_info_wrap_validator_function(
-            self._read,
-            listed,
-            serialization=core_schema.wrap_serializer_function_ser_schema(
-                self._write, info_arg=True, schema=listed
-            ),
-        )
+    listed = Annotated[list[Segment], Field(min_length=1)]
+    recorded = RecordedPoses
 
-    @staticmethod
-    def _read(
-        value: Any,  # noqa: ANN401
-        validate: core_schema.ValidatorFunctionWrapHandler,
-        info: core_schema.ValidationInfo,
-    ) -> Any:  # noqa: ANN401
-        if isinstance(value, RecordedPoses):
-            return value
-        try:
-            if isinstance(value, Mapping):
-                return _from_file(value, info.context or SI)
-        except FlawError as error:
-            raise refuse(error.flaws) from None
-        if isinstance(value, list | tuple) and not value:
-            raise refuse([((), "the list is too short: expected at least 1", None)])
-        return validate(value)
+    def from_mapping(self, value: Mapping[str, Any], context: ReadingContext) -> RecordedPoses:
+        """Return the poses of a file."""
+        return _from_file(value, context)
 
-    @staticmethod
-    def _write(
-        value: Any,  # noqa: ANN401
+    def written(
+        self,
+        value: RecordedPoses,
         serialize: core_schema.SerializerFunctionWrapHandler,
-        info: core_schema.SerializationInfo,
+        context: ReadingContext,
     ) -> Any:  # noqa: ANN401
-        if not isinstance(value, RecordedPoses):
-            return serialize(value)
-        return value if info.context is None else serialize(_lines_to(value))
+        """Return the lines to the poses."""
+        return serialize(_lines_to(value))
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        return {"anyOf": [{**handler(schema), "minItems": 1}, _SCHEMA_OF_FILE]}
+        return {"anyOf": [handler(schema), _SCHEMA_OF_FILE]}
 
 
 def _from_file(value: Mapping[str, Any], context: ReadingContext) -> RecordedPoses:
