@@ -343,6 +343,7 @@ def test_findings_of_one_cause_are_one_and_the_page_opens_there(
     page.locator(".line.bad").first.click()
     assert viewed.time() == pytest.approx(worst.time)
     page.locator(".alike summary").click()
+    page.locator(".line.bad").nth(6).wait_for()  # a browser tells a list later that it was opened
     assert page.locator(".line.bad").count() == 7
     page.locator(".line.bad").nth(3).click()
     others = [finding for finding in findings if finding is not worst]
