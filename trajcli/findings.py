@@ -233,3 +233,65 @@ class Collector:
                 count=count,
                 move=None if key.move < 0 else key.move,
             )
+
+
+class WorstByJoint(Collector):
+    """The worst finding of each kind and joint in all moves, made only when it is asked for.
+
+    It keeps what its findings are made from: it is for motions that are seen in few parts.
+    """
+
+    def __init__(self, same: float = 1e-12) -> None:
+        """Begin with none."""
+        super().__init__(same)
+        self._found: dict[tuple[_Key, _Group], _Offence] = {}
+
+    def add(
+        self,
+        kind: str,
+        moves: NDArray[np.int64] | int,
+        joints: NDArray[np.intp],
+        excess: NDArray[np.float64],
+        make: Make,
+        *,
+        quantity: str | None = None,
+        severity: FindingSeverity = "error",
+        certainty: Certainty = "exceeded",
+        chosen: NDArray[np.bool_] | None = None,
+    ) -> None:
+        """Add offences of one kind, as `Collector` does."""
+        index = np.arange(joints.size) if chosen is None else np.flatnonzero(chosen)
+        of_moves = np.broadcast_to(moves, joints.shape)
+        for joint in sorted(set(joints[index].tolist())):
+            own = index[joints[index] == joint]
+            move = of_moves[own[int(excess[own].argmax())]]
+            own = own[of_moves[own] == move]
+            first = self._first_worst(own, excess[own])
+            key, size = (_Key(kind, quantity, joint, -1), (severity, certainty)), float(excess[first])
+            before, count = self._found.get(key), own.size
+            if before is not None and before.move == move:
+                size -= self._same * abs(before.size)
+                count += before.alike
+            if before is None or size > before.size:
+                self._found[key] = _Offence(float(excess[first]), count, int(move), make, first)
+            elif before.move == move:
+                self._found[key] = before._replace(alike=count)
+
+    def findings(self) -> Iterator[Finding]:
+        """Yield for each kind and joint the worst of each severity and certainty."""
+        for (_, (severity, certainty)), found in self._found.items():
+            yield replace(
+                found.make(found.first),
+                severity=severity,
+                certainty=certainty,
+                count=found.alike,
+                move=None if found.move < 0 else found.move,
+            )
+
+
+class _Offence(NamedTuple):
+    size: float
+    alike: int
+    move: int
+    make: Make
+    first: int

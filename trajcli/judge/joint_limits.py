@@ -55,13 +55,12 @@ class _Offences:
 
 @frozen
 class JudgedRun:
-    """Pieces of recorded rows that belong to one move, with the limits in force.
+    """Pieces of recorded rows, of moves for which the same limits are in force.
 
     Attributes:
         window: The rows.
         pieces: Which ones.
         robot: With the limits in force, gravity, and what its tool carries.
-        move: Its index, -1 for none.
         worst: To which findings are added.
         asked: Whether somebody asked for this curve.
         carries_one: Whether the tool carries the same in all of them: else no row says when it changed.
@@ -70,7 +69,6 @@ class JudgedRun:
     window: Intervals
     pieces: slice
     robot: Robot
-    move: int
     worst: Collector
     asked: bool
     carries_one: bool = True
@@ -78,13 +76,16 @@ class JudgedRun:
     def add(
         self,
         kind: str,
-        joints: NDArray[np.intp],
+        found_at: tuple[NDArray[np.intp], NDArray[np.intp]],
         excess: Array,
         make: Callable[[int], Finding],
         certain: NDArray[np.bool_],
         warned: NDArray[np.bool_],
     ) -> None:
-        """Add offences by what is certain about them: m of one kind, `warned` where they are warnings."""
+        """Add offences by what is certain about them: m of one kind, `warned` where they are warnings.
+
+        They are found at the indices of pieces, and of joints.
+        """
         groups: tuple[tuple[NDArray[np.bool_], FindingSeverity, Certainty], ...] = (
             (certain & ~warned, "error", "exceeded"),
             (~certain, "error", "within rounding"),
@@ -93,8 +94,8 @@ class JudgedRun:
         for chosen, severity, certainty in groups:
             self.worst.add(
                 kind,
-                self.move,
-                joints,
+                self.window.moves[found_at[0]],
+                found_at[1],
                 excess,
                 make,
                 severity=severity,
@@ -104,7 +105,7 @@ class JudgedRun:
 
 
 def judge_limits(run: JudgedRun) -> None:
-    """Add where joints go beyond their limits in pieces of one move.
+    """Add where joints go beyond their limits in pieces with the same limits.
 
     Raises:
         InputError: When efforts are limited, and a link of the arm has no inertia, or the arm no geometry.
@@ -200,7 +201,8 @@ class _Side:
                 found, k, float(value[k]), float(error[k]), run.robot, warned=bool(warned[k])
             )
 
-        run.add(JOINT_KINDS[self.order].name, found.joint, excess, make, certain, warned)
+        found_at = found.piece, found.joint
+        run.add(JOINT_KINDS[self.order].name, found_at, excess, make, certain, warned)
 
     def _unresolved(self, found: _Offences, error: Array) -> NDArray[np.bool_]:
         """Return where a change of the law between two rows explains what the curve goes beyond the bound."""
@@ -263,7 +265,8 @@ def _judge_approaches(run: JudgedRun) -> None:
         for end in (np.zeros_like(fast.local), window.lengths[fast.piece]):
             warned &= ~_fast_approaches(run, found, (end, fast.used)).certain
     make = partial(fast.finding, run)
-    run.add("velocity_by_position", fast.joint, fast.used, make, certain, warned)
+    found_at = fast.piece, fast.joint
+    run.add("velocity_by_position", found_at, fast.used, make, certain, warned)
 
 
 @frozen
@@ -409,7 +412,7 @@ class _OverEffort:
         found = self._finding(piece, local, rounding)
         run.worst.add(
             "effort",
-            run.move,
+            int(run.window.moves[piece]),
             np.array([self.joint]),
             np.array([peak.most / self.limit]),
             lambda _: found,

@@ -53,7 +53,7 @@ def joined_rows(plan: Plan, grid: Grid, form: StreamFormat, digits: Digits = "fi
 
 def with_event(plan: Plan, rows: JoinedRows, form: StreamFormat) -> tuple[Plan, Judgement | None]:
     """Return a plan with the event of rows that pass a limit between them, and what was judged."""
-    judged = rows.judgement()
+    judged = rows.judgement(worst_only=True)
     if judged is None or not judged.events:
         return plan, judged
     kind, _, text = judged.events[0].partition(": ")

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from trajcli.columns import Group, joint_factors
 from trajcli.curves.extrema import piece_extremes
 from trajcli.curves.piecewise import Array
-from trajcli.findings import Collector, Finding, at_time
+from trajcli.findings import Collector, Finding, WorstByJoint, at_time
 from trajcli.frozen import frozen
 from trajcli.grids import AT_BREAK, NANOSECOND, Grid, KnotGrid, ListedGrid, UniformGrid
 from trajcli.judge.judgement import Judgement, as_planned
@@ -30,6 +30,7 @@ from trajcli.samples import sample
 
 if TYPE_CHECKING:
     from trajcli.judge.intervals import JoinedPairs
+    from trajcli.judge.joint_limits import JudgedRun
     from trajcli.judge.motion import Requirements
     from trajcli.judge.recorded_tool import ToolJudge
 
@@ -80,38 +81,67 @@ class JoinedRows:
         chosen = self.interpolation
         return 0 if chosen is None else (_DEGREES[chosen] + 1) // 2
 
-    def judgement(self, *, first_only: bool = False, slack: float = JOINED_RELATIVE) -> Judgement | None:
+    def judgement(
+        self, *, first_only: bool = False, worst_only: bool = False, slack: float = JOINED_RELATIVE
+    ) -> Judgement | None:
         """Return what the joined curve does against the limits; None where nothing says how it is joined.
 
         Args:
             first_only: Whether one group of intervals that is over a limit is enough.
+            worst_only: Whether of each kind and joint the worst finding among moves of the same limits is
+                enough; so it is with the first group.
             slack: Relative: what the joined curve may be above a limit.
 
         Raises:
             InputError: When efforts are limited, and a link of the arm has no inertia.
         """
-        chosen, plan, worst = self.interpolation, self.plan, Collector()
+        chosen, plan = self.interpolation, self.plan
         if chosen is None:
             return None
-        tool = _tool_of(plan)
-        judged = Judgement((), chosen, self.grid.count, planned_rows=True)
+        tool, worst = _tool_of(plan), _Collectors(first_only or worst_only)
+        begun = Judgement((), chosen, self.grid.count, planned_rows=True)
         for window in self._windows(chosen):
-            from trajcli.judge.joint_limits import JudgedRun, judge_limits
+            from trajcli.judge.joint_limits import judge_limits
 
-            required = self._requirements
-            for (before, after), low, high in window.runs():
-                robot, pieces = required.robot_between(before, after), slice(low, high)
-                carries_one = required.carries_one(before, after)
-                judge_limits(JudgedRun(window, pieces, robot, before, worst, True, carries_one))
-                if tool is not None:
-                    since = window.begun[pieces] - plan.trajectory.spans[self._numbers[before]].start
-                    tool.see(window, pieces, robot, before, since=since)
-            findings = (*worst.findings(), *(() if tool is None else tool.findings()))
-            seen = replace(judged, findings=tuple(map(self._in_time, findings)), events=())
-            judged = as_planned(seen, slack)
-            if first_only and judged.findings:
+            for run in self._runs(window, worst):
+                judge_limits(run)
+            if tool is not None:
+                self._see_tool(tool, window)
+            if first_only and self._judged(begun, worst, tool, slack).findings:
                 break
-        return judged
+        return self._judged(begun, worst, tool, slack)
+
+    def _judged(
+        self, begun: Judgement, worst: _Collectors, tool: ToolJudge | None, slack: float
+    ) -> Judgement:
+        """Return the judgement with what was found."""
+        findings = (*worst.findings(), *(() if tool is None else tool.findings()))
+        return as_planned(replace(begun, findings=tuple(map(self._in_time, findings))), slack)
+
+    def _runs(self, window: JoinedPairs, worst: _Collectors) -> Iterator[JudgedRun]:
+        """Yield the pieces of moves, where the worst will do of neighbours with equal limits at once."""
+        from trajcli.judge.joint_limits import JudgedRun
+
+        required = self._requirements
+        runs = [
+            (required.robot_between(*moves), required.carries_one(*moves), low, high)
+            for moves, low, high in window.runs()
+        ]
+        first = 0
+        for k, (robot, carries_one, _, high) in enumerate(runs):
+            last = k + 1 == len(runs) or not worst.together
+            if last or runs[k + 1][0] is not robot or runs[k + 1][1] != carries_one:
+                pieces = slice(runs[first][2], high)
+                yield JudgedRun(window, pieces, robot, worst.of(robot), True, carries_one)
+                first = k + 1
+
+    def _see_tool(self, tool: ToolJudge, window: JoinedPairs) -> None:
+        """Judge the tool in the pieces of each move."""
+        spans = self.plan.trajectory.spans
+        for (before, after), low, high in window.runs():
+            since = window.begun[low:high] - spans[self._numbers[before]].start
+            robot = self._requirements.robot_between(before, after)
+            tool.see(window, slice(low, high), robot, before, since=since)
 
     @cached_property
     def _numbers(self) -> Mapping[int, int]:
@@ -317,6 +347,26 @@ class JoinedRows:
             part = KnotGrid(grid.duration, times, at, grid.states[:, of_knot])
         groups = (*_STATES[:stated], "move")
         return np.concatenate([*sample(plan.trajectory, part, groups, robot=plan.loaded.robot)])
+
+
+class _Collectors:
+    """Collectors of findings: one of all moves, or where the worst will do one for each of their limits."""
+
+    def __init__(self, together: bool) -> None:
+        self.together = together
+        self._all = Collector()
+        self._of_robots: dict[int, tuple[Robot, WorstByJoint]] = {}
+
+    def of(self, robot: Robot) -> Collector:
+        """Return the collector of moves with the limits of a robot."""
+        if not self.together:
+            return self._all
+        return self._of_robots.setdefault(id(robot), (robot, WorstByJoint()))[1]
+
+    def findings(self) -> Iterator[Finding]:
+        """Yield what was found."""
+        for collector in (self._all, *(one for _, one in self._of_robots.values())):
+            yield from collector.findings()
 
 
 def _shares(
