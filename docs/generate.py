@@ -11,15 +11,15 @@ from pathlib import Path
 
 from docs.cli_reference import cli_reference
 from docs.console import outcome
-from docs.job_reference import job_reference
 from docs.markdown import ROOT, blocks, documents
 from docs.planner_pages import planner_page, planner_table
+from docs.reference_pages import REFERENCE, reference_page
 from docs.robots_page import robots_page
 from docs.svg_comparison import is_current
 from trajcli.planners import PLANNERS
 
 PAGES = {
-    "docs/job-reference.md": job_reference,
+    **{page: partial(reference_page, page) for page in REFERENCE},
     "docs/cli-reference.md": cli_reference,
     "docs/planners.md": planner_table,
     "docs/robots.md": robots_page,

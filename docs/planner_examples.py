@@ -33,14 +33,14 @@ EXAMPLES = {
     ),
     "spline": (
         f"{_HEAD}start: {{joints: [0]}}\nmoves:\n"
-        "  - planner: spline                                     # example 5 of the lecture\n"
+        "  - planner: spline                                     # example 5 of Pham's lecture\n"
         "    rule: computed\n"
         "    through: [{joints: [360], time: 2}, {joints: [90], time: 3}]\n"
         "    to: {joints: [180], time: 5}\n"
     ),
     "blends": (
         f"{_HEAD}start: {{joints: [0]}}\nmoves:\n"
-        "  - planner: blends                                     # exercise 7 of the lecture\n"
+        "  - planner: blends                                     # exercise 7 of Pham's lecture\n"
         "    through: [{joints: [360], time: 2}, {joints: [90], time: 3}, {joints: [180], time: 5}]\n"
         "    blend_durations: 0.2\n"
     ),

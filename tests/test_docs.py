@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from docs.console import agrees, commands, outcome, renewed, run, shown
 from docs.generate import PAGES, PICTURES, shows_commands
+from docs.job_reference import job_reference
 from docs.markdown import ROOT, Block, anchors, blocks, documents, links
 from docs.planner_pages import WISHES
 from docs.svg_comparison import is_current, same_picture
@@ -24,7 +25,7 @@ from trajcli.planning.plan import plan_job
 
 DOCUMENTS = documents()
 NAMES = [path.relative_to(ROOT).as_posix() for path in DOCUMENTS]
-JOB_PAGE = (ROOT / "docs/job-reference.md").read_text(encoding="utf-8")
+JOB_PAGE = job_reference()
 CLI_PAGE = (ROOT / "docs/cli-reference.md").read_text(encoding="utf-8")
 
 
