@@ -86,9 +86,10 @@ _END = """\
 
 ## Where the exercises come from
 
-The exercises that the pages work through are those of Phạm Duy Hưng's lecture *Thiết kế quỹ đạo chuyển động robot*
-(Design of robot trajectories), University of Engineering and Technology, Vietnam National University, Hanoi. It follows
-chapter 4 of Siciliano et al., *Robotics: Modelling, Planning and Control* (2009), which is "the book" on these pages."""
+The exercises that the pages work through are those of Phạm Duy Hưng's lecture *Thiết kế quỹ đạo chuyển
+động robot* (Design of robot trajectories), University of Engineering and Technology, Vietnam National
+University, Hanoi. It follows chapter 4 of Siciliano et al., *Robotics: Modelling, Planning and Control*
+(2009), which is "the book" on these pages."""
 
 
 def planner_table() -> str:

@@ -28,7 +28,8 @@ accuracy). Names of joints are those of the maker's URDF where there is one. Len
 delivered arm differs from them by its calibration."""
 
 _TEXTBOOK = """\
-The arms of lecture notes, *Forward and inverse kinematics of serial robots* (in Vietnamese), with the dimensions that the notes print. Where an example
+The arms of lecture notes, *Forward and inverse kinematics of serial robots* (in Vietnamese), with the
+dimensions that the notes print. Where an example
 gives letters only, its dimensions are illustrative, and the note says so. The four-joint arm of the third
 text is not among them: the text gives neither a table nor a length of it, and none are made up;
 [elbow4r](#textbook-arms) is the four-joint arm of example 2.14."""
