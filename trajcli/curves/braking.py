@@ -43,10 +43,10 @@ def braking(velocity: float, acceleration: float, bounds: Array) -> Braking:
         bounds: Shape (3, 2), lower and upper, of velocity, acceleration and jerk. Of the two bounds of the
             jerk the smaller magnitude holds both ways.
     """
-    jerk = float(abs(bounds[2]).min())
+    (low, high), (least, most), jerks = bounds.tolist()
+    jerk = min(map(abs, jerks))
     start = (velocity, acceleration if math.isfinite(jerk) else 0.0)
     reached = start[0] + start[1] * abs(start[1]) / (2 * jerk)
-    (low, high), (least, most) = bounds[0].tolist(), bounds[1].tolist()
     over, under = _above(reached, high), _above(-reached, -low)
     if not over and (under or _above(-velocity, -low)):
         turned = _descent(-start[0], -start[1], (-high, -low), (-most, -least), jerk)

@@ -40,26 +40,39 @@ def merge_breaks(curves: Sequence[PiecewisePolynomial]) -> PiecewisePolynomial:
         raise ValueError(f"curves to merge must all cover [{start!r}, {end!r}]")
     if end == start:
         return PiecewisePolynomial(curves[0].breaks, _stacked([curve.coefficients for curve in curves]))
-    inner = [curve.breaks[1:-1] for curve in curves]
-    owners = np.repeat(np.arange(len(curves)), [times.size for times in inner])
-    times = np.concatenate(inner)
+    columns = [(curve, k) for curve in curves for k in range(curve.dimension)]
+    values = _stacked([curve.coefficients[:, :, k, None] for curve, k in columns], axis=1)
+    return merge_pieces([curve.breaks for curve, _ in columns], values[:, :, 0])
+
+
+def merge_pieces(breaks: Sequence[Array], coefficients: Array) -> PiecewisePolynomial:
+    """Return what `merge_breaks` makes of curves of one variable over one interval, which has a length.
+
+    Args:
+        breaks: Of n curves, each of shape (pieces + 1,).
+        coefficients: Of the pieces of the first one, of the second one and so on, shape (degree + 1, total).
+    """
+    start, end = min(float(each[0]) for each in breaks), max(float(each[-1]) for each in breaks)
+    counts = np.array([each.size - 1 for each in breaks])
+    times = np.concatenate([each[1:-1] for each in breaks])
+    owners = np.repeat(np.arange(len(breaks)), counts - 1)
     order = np.lexsort((owners, times))
-    united, index_of = _united(times[order], owners[order], apart)
-    breaks = np.concatenate([[start], united, [end]])
-    owners = owners[order]
-    split, offsets = [], []
-    for owner, curve in enumerate(curves):
-        starts = np.concatenate([[0], 1 + index_of[owners == owner]])
-        piece = np.searchsorted(starts, np.arange(breaks.size - 1), "right") - 1
-        split.append(curve.coefficients[:, piece, :])
-        offsets.append(breaks[:-1] - curve.breaks[piece])
-        offsets[-1][0] = 0.0
-    columns = np.repeat(np.stack(offsets, axis=1), [curve.dimension for curve in curves], axis=1)
-    return PiecewisePolynomial(breaks, taylor_shift(_stacked(split), columns))
+    times, owners = times[order], owners[order]
+    united, index_of = _united(times, owners, _ROUNDING * max(abs(start), abs(end)))
+    merged = np.concatenate([[start], united, [end]])
+    piece = np.zeros((merged.size - 1, len(breaks)), dtype=np.intp)  # of each curve, on each piece of all
+    piece[0] = np.cumsum(counts) - counts
+    piece[index_of + 1, owners] = 1
+    piece = piece.cumsum(axis=0)
+    offsets = merged[:-1, None] - np.concatenate([each[:-1] for each in breaks])[piece]
+    offsets[0] = 0.0
+    return PiecewisePolynomial(merged, taylor_shift(coefficients[:, piece], offsets))
 
 
 def _united(times: Array, owners: np.ndarray, apart: float) -> tuple[Array, np.ndarray]:
     """Return the times that are kept, and for each of `times` (sorted) the index of its representative."""
+    if not (np.diff(times) <= apart).any():
+        return times, np.arange(times.size)
     kept: list[float] = []
     index_of = np.empty(times.size, dtype=np.intp)
     members: set[int] = set()
@@ -72,8 +85,8 @@ def _united(times: Array, owners: np.ndarray, apart: float) -> tuple[Array, np.n
     return np.array(kept), index_of
 
 
-def _stacked(coefficients: Sequence[Array]) -> Array:
-    """Return coefficients (degree + 1, pieces, n_i) side by side, filled up to the highest degree."""
+def _stacked(coefficients: Sequence[Array], axis: int = 2) -> Array:
+    """Return coefficients (degree + 1, pieces, n) beside each other, filled up to the highest degree."""
     rows = max(block.shape[0] for block in coefficients)
     filled = [
         np.concatenate([np.zeros((rows - block.shape[0], *block.shape[1:])), block])
@@ -81,7 +94,7 @@ def _stacked(coefficients: Sequence[Array]) -> Array:
         else block
         for block in coefficients
     ]
-    return np.concatenate(filled, axis=2)
+    return np.concatenate(filled, axis=axis)
 
 
 def scale_time(curve: PiecewisePolynomial, factor: float) -> PiecewisePolynomial:

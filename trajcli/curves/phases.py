@@ -10,23 +10,39 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, reduce
+from itertools import chain as in_turn
 from itertools import pairwise
 from math import factorial
+from operator import add
+from typing import NamedTuple
 
 import numpy as np
 
+from trajcli.curves.operations import merge_breaks, merge_pieces
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.frozen import frozen
 
 _GOAL = 4e-15  # relative: what summing a few phases leaves
 _ROUNDS = 12
 _RELUCTANCE = 1e-3
+_MANY = 8
+_ORDER = 3
 _WEAK = 1e-5  # changes of constants with less than this influence on the end are left alone
 _LARGEST_STEP = 0.5
 _FACTORIALS = [np.array([[float(factorial(k))] for k in range(order, -1, -1)]) for order in range(4)]
 _LEVEL = 1e-9  # of the peak: an acceleration below this in a phase without jerk means a cruise
+
+
+_Walk = tuple[list[list[float]], list[float], list[float]]
+
+
+class _Seen(NamedTuple):
+    states: list[list[float]]
+    leftover: list[float]
+    peaks: tuple[float, ...]
+    duration: float
+    rounding: list[float]
 
 
 @frozen
@@ -34,74 +50,103 @@ class PhaseChain:
     """A motion from a given state, relative to its first position.
 
     Attributes:
-        initial: Shape (order,): position 0 and its derivatives below the constant one at the start.
-        final: Shape (order,): the same at the end, as wanted; NaN where it is free.
-        durations: Shape (k,), positive.
-        constants: Shape (k,): the derivative of the given order in each phase.
+        initial: As many as the order: position 0 and its derivatives below the constant one at the start.
+        final: The same at the end, as wanted; NaN where it is free.
+        durations: Of k phases, positive.
+        constants: The derivative of the given order in each phase, k of them.
         cruising: Phases in which the derivative below is zero, not only small: else its rounding error would
             drift through the longest phases.
     """
 
-    initial: Array
-    final: Array
-    durations: Array
-    constants: Array
+    initial: tuple[float, ...]
+    final: tuple[float, ...]
+    durations: tuple[float, ...]
+    constants: tuple[float, ...]
     cruising: frozenset[int] = frozenset()
 
     @property
     def order(self) -> int:
         """The derivative that is constant in each phase: 1, 2 or 3."""
-        return int(self.initial.size)
+        return len(self.initial)
 
     @cached_property
-    def duration(self) -> float:
-        """Sum of the phases' durations."""
-        return float(self.durations.sum())
+    def _seen(self) -> _Seen:
+        """What the phases do, seen once."""
+        states, leftover, driving = self._walk_of_third_order() if self.order == _ORDER else self._walk()
+        peaks = tuple(
+            max(*values, -min(values), wanted, -wanted)  # NaN is larger than nothing
+            for values, wanted in zip(zip(*states, strict=True), self.final, strict=True)
+        )
+        duration, sizes = _total(self.durations), [*peaks]
+        if len(sizes) > 1:
+            sizes[0] = max(sizes[0], sizes[1] * duration)
+        if len(sizes) > 2:
+            sizes[1] = max(sizes[1], sizes[2] * math.fsum(driving))
+        return _Seen(states, leftover, peaks, duration, [size or 1.0 for size in sizes])
 
-    @cached_property
-    def _walk(self) -> tuple[list[list[float]], list[float]]:
-        """The states before each phase and at the end, (k + 1, order), and what cruises had instead of 0."""
-        state = self.initial.tolist()
-        rows, leftover, cruising = [], [], self.cruising
-        phases = zip(self.durations.tolist(), self.constants.tolist(), strict=True)
-        for k, (time, constant) in enumerate(phases):
-            if k in cruising:
+    def _walk(self) -> _Walk:
+        """Return the states before each phase and at the end, and what is seen at cruises and beside them.
+
+        Returns:
+            The states; what cruises had instead of 0; the durations of the other phases.
+        """
+        state = [*self.initial]
+        rows, leftover, driving = [], [], []
+        for k, (time, constant) in enumerate(zip(self.durations, self.constants, strict=True)):
+            if k in self.cruising:
                 leftover.append(state[-1])
                 state[-1] = 0.0
+            else:
+                driving.append(time)
             rows.append(state)
             state = _after(state, constant, time)
         rows.append(state)
-        return rows, leftover
+        return rows, leftover, driving
+
+    def _walk_of_third_order(self) -> _Walk:
+        """Return the same of phases with constant jerk, of which there are many."""
+        x, v, a = self.initial
+        rows, leftover, driving, cruising = [], [], [], self.cruising
+        for k, (time, jerk) in enumerate(zip(self.durations, self.constants, strict=True)):
+            if k in cruising:
+                leftover.append(a)
+                a = 0.0
+            else:
+                driving.append(time)
+            rows.append([x, v, a])
+            change = jerk * time
+            x += (v + (a + change / 3) * time / 2) * time
+            v += (a + change / 2) * time
+            a += change
+        rows.append([x, v, a])
+        return rows, leftover, driving
 
     @property
-    def states(self) -> Array:
-        """Derivatives of order 0 to `order` - 1 before each phase and at the end, shape (k + 1, order)."""
-        return np.array(self._walk[0])
+    def duration(self) -> float:
+        """Sum of the phases' durations."""
+        return self._seen.duration
 
-    @cached_property
+    @property
+    def states(self) -> list[list[float]]:
+        """Derivatives of order 0 to `order` - 1 before each phase and at the end, k + 1 of them."""
+        return self._seen.states
+
+    @property
     def peaks(self) -> tuple[float, ...]:
         """Largest magnitude of each derivative at the ends of phases and in the target."""
-        reached = [max(map(abs, values)) for values in zip(*self._walk[0], strict=True)]
-        wanted = self.final.tolist()
-        return tuple(abs(b) if abs(b) > a else a for a, b in zip(reached, wanted, strict=True))
+        return self._seen.peaks
 
-    @cached_property
+    @property
     def _rounding(self) -> list[float]:
         """What rounding is relative to: the peaks, or what the next derivative's peak adds up to."""
-        sizes = list(self.peaks)
-        if self.order > 1:
-            sizes[0] = max(sizes[0], sizes[1] * self.duration)
-        if self.order > 2:
-            driving = [time for k, time in enumerate(self.durations.tolist()) if k not in self.cruising]
-            sizes[1] = max(sizes[1], sizes[2] * math.fsum(driving))
-        return [size or 1.0 for size in sizes]
+        return self._seen.rounding
 
     def with_cruises(self) -> PhaseChain:
         """Return the motion with its cruises marked: phases without jerk and without acceleration."""
         if self.order < 3:
             return self
-        level, states = _LEVEL * self.peaks[-1], self._walk[0]
-        constants = enumerate(self.constants.tolist())
+        level, states = _LEVEL * self.peaks[-1], self.states
+        constants = enumerate(self.constants)
         cruising = frozenset(k for k, constant in constants if not constant and abs(states[k][-1]) <= level)
         if not cruising:
             return self
@@ -126,7 +171,8 @@ class PhaseChain:
     def stretched(self, duration: float) -> PhaseChain:
         """Return the motion over the same positions in `duration`; boundary derivatives must be zero."""
         factor = duration / self.duration
-        return replace(self, durations=self.durations * factor, constants=self.constants / factor**self.order)
+        slower = factor**self.order
+        return self._with([time * factor for time in self.durations], [c / slower for c in self.constants])
 
     def polished(self, duration: float | None = None) -> PhaseChain:
         """Return the motion whose end is its target to rounding, if the phases allow it; see `defect`.
@@ -141,37 +187,42 @@ class PhaseChain:
         return best
 
     def curve(self, position: float, duration: float) -> PiecewisePolynomial:
-        """Return the motion from `position` as a curve (n = 1) over [0, `duration`].
+        """Return the motion from `position` as a curve (n = 1) over [0, `duration`]."""
+        if not self.durations:
+            return PiecewisePolynomial(np.zeros(2), np.full((1, 1, 1), position))
+        breaks, derivatives = self.pieces(duration)
+        rows = np.array(derivatives)
+        rows /= _FACTORIALS[self.order]
+        rows[-1] += position
+        return PiecewisePolynomial(np.array(breaks), rows[:, :, None])
+
+    def pieces(self, duration: float) -> tuple[list[float], list[Sequence[float]]]:
+        """Return breaks from 0 to `duration`, and at each phase's start all derivatives, the highest first.
 
         Break times are rounded so that no phase but the longest gets shorter: no constant need grow. What
         that does to the end is taken back by the constants, and what is left by steps of rounding size into
         the longest phase.
         """
-        if not self.durations.size:
-            return PiecewisePolynomial(np.zeros(2), np.full((1, 1, 1), position))
-        breaks = _rounded_breaks(self.durations.tolist(), duration)
-        lengths = np.array([end - start for start, end in pairwise(breaks)])
-        constants = self.constants * self.durations / lengths
-        chain = PhaseChain(self.initial, self.final, lengths, constants, self.cruising)
+        breaks = _rounded_breaks(self.durations, duration)
+        lengths = [end - start for start, end in pairwise(breaks)]
+        phases = zip(self.constants, self.durations, lengths, strict=True)
+        chain = self._with(lengths, [constant * time / length for constant, time, length in phases])
         chain = chain.corrected(0.0, 1.0, None)
-        states = zip(*chain._landing_states(), strict=True)  # noqa: SLF001
-        rows = np.array([chain.constants.tolist(), *reversed(list(states))])
-        rows /= _FACTORIALS[self.order]
-        rows[-1] += position
-        return PiecewisePolynomial(np.array(breaks), rows[:, :, None])
+        states = [*zip(*chain._landing_states(), strict=True)]  # noqa: SLF001
+        return breaks, [chain.constants, *reversed(states)]
 
     def _landing_states(self) -> list[list[float]]:
         """Return the states before each phase, (k, order), shifted from the longest on to meet the end."""
-        longest = int(self.durations.argmax())
-        states = [list(state) for state in self._walk[0][:-1]]
-        phases = list(zip(self.constants.tolist(), self.durations.tolist(), strict=True))
-        final = self.final.tolist()
+        longest = self.durations.index(max(self.durations))
+        states = [list(state) for state in self.states[:-1]]
+        phases = list(zip(self.constants, self.durations, strict=True))
+        final = self.final
         lowest = 1 if math.isnan(final[0]) else 0
         highest = 0 if longest in self.cruising else self.order - 2
-        for level in [*range(highest, lowest - 1, -1), None]:
+        end = self.states[-1]
+        for level in range(highest, lowest - 1, -1):
+            states[longest][level + 1] += (final[level] - end[level]) / phases[longest][1]
             end = self._walk_on(states, phases, longest)
-            if level is not None:
-                states[longest][level + 1] += (final[level] - end[level]) / phases[longest][1]
         if lowest == 0:
             for state in states[longest + 1 :]:
                 state[0] += final[0] - end[0]
@@ -201,7 +252,7 @@ class PhaseChain:
         if _largest(self._residual(scales, duration)) <= _GOAL:
             return self
         chain, best = self, self
-        weights = np.repeat([yield_duration, yield_constant], self.durations.size)
+        weights = np.repeat([yield_duration, yield_constant], len(self.durations))
         weak, least = None if yield_duration else _WEAK, np.inf
         for _ in range(_ROUNDS):
             residual = chain._residual(scales, duration)
@@ -213,15 +264,14 @@ class PhaseChain:
             matrix = chain._sensitivity(scales, duration) * weights
             step = weights * np.linalg.lstsq(matrix, -np.array(residual), rcond=weak)[0]
             change = 1 + np.clip(step, -_LARGEST_STEP, _LARGEST_STEP).reshape(2, -1)
-            chain = replace(
-                chain, durations=chain.durations * change[0], constants=chain.constants * change[1]
-            )
+            changed = np.array([chain.durations, chain.constants]) * change
+            chain = chain._with(*changed.tolist())
         return best
 
     def _residual(self, scales: Sequence[float], duration: float | None) -> list[float]:
         """Return by how much the end, the cruises and the duration miss what they should be."""
-        states, leftover = self._walk
-        ends = zip(states[-1], self.final.tolist(), scales, strict=True)
+        states, leftover = self._seen[:2]
+        ends = zip(states[-1], self.final, scales, strict=True)
         miss = [(value - wanted) / scale for value, wanted, scale in ends if wanted == wanted]
         miss += [value / scales[-1] for value in leftover]
         if duration is not None:
@@ -230,23 +280,43 @@ class PhaseChain:
 
     def _sensitivity(self, scales: Sequence[float], duration: float | None) -> Array:
         """Return the derivative of the residual by the relative changes of durations and constants."""
-        count, order = self.durations.size, self.order
+        count, order = len(self.durations), self.order
         by_change = np.zeros((order, 2 * count))
         at_cruises = []
-        for k, (time, constant) in enumerate(
-            zip(self.durations.tolist(), self.constants.tolist(), strict=True)
-        ):
+        for k, (time, constant) in enumerate(zip(self.durations, self.constants, strict=True)):
             if k in self.cruising:
                 at_cruises.append(by_change[-1] / scales[-1])
                 by_change[-1] = 0.0
             flow = _flow(time, order)
             by_change = flow[:, :order] @ by_change
-            by_change[:, k] += np.append(self._walk[0][k + 1][1:], constant) * time
+            by_change[:, k] += np.append(self.states[k + 1][1:], constant) * time
             by_change[:, count + k] += flow[:, order] * constant
-        rows = [*(by_change / np.array(scales)[:, None])[~np.isnan(self.final)], *at_cruises]
+        wanted = ~np.isnan(np.array(self.final))
+        rows = [*(by_change / np.array(scales)[:, None])[wanted], *at_cruises]
         if duration is not None:
-            rows.append(np.concatenate([self.durations / duration, np.zeros(count)]))
+            rows.append(np.concatenate([np.array(self.durations) / duration, np.zeros(count)]))
         return np.array(rows)
+
+    def _with(self, durations: Sequence[float], constants: Sequence[float]) -> PhaseChain:
+        """Return the motion with other phases, as many."""
+        return PhaseChain(self.initial, self.final, tuple(durations), tuple(constants), self.cruising)
+
+
+def merged_curve(motions: Sequence[tuple[float, PhaseChain]], duration: float) -> PiecewisePolynomial:
+    """Return the curve of variables over [0, `duration`], each from its position, with the breaks of all."""
+    if len({chain.order for _, chain in motions}) > 1 or not all(chain.durations for _, chain in motions):
+        return merge_breaks([chain.curve(position, duration) for position, chain in motions])
+    pieces = [chain.pieces(duration) for _, chain in motions]
+    derivatives = zip(*(of_order for _, of_order in pieces), strict=True)
+    rows = np.array([[*in_turn.from_iterable(of_order)] for of_order in derivatives])
+    rows /= _FACTORIALS[len(rows) - 1]
+    rows[-1] += np.repeat([position for position, _ in motions], [len(times) - 1 for times, _ in pieces])
+    return merge_pieces([np.array(times) for times, _ in pieces], rows)
+
+
+def _total(values: Sequence[float]) -> float:
+    """Return the sum as numpy has it, which of few values is that from left to right."""
+    return float(np.sum(values)) if len(values) >= _MANY else reduce(add, values, 0.0)
 
 
 def _largest(values: Sequence[float]) -> float:
@@ -254,7 +324,7 @@ def _largest(values: Sequence[float]) -> float:
     return math.nan if any(map(math.isnan, values)) else max(map(abs, values), default=0.0)
 
 
-def _rounded_breaks(durations: list[float], end: float) -> list[float]:
+def _rounded_breaks(durations: Sequence[float], end: float) -> list[float]:
     """Return breaks from 0 to `end`: all phases but the longest last at least as long as given."""
     longest = durations.index(max(durations))
     before, after = [0.0], [end]

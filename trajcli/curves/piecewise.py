@@ -6,7 +6,7 @@ A joint path q(s), a time law s(t) and a trajectory q(t) are this type in three 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import comb, perm
+from math import comb, isfinite, perm
 from typing import Literal
 
 import numpy as np
@@ -56,9 +56,12 @@ class PiecewisePolynomial:
                 f"breaks {breaks.shape} and coefficients {coefficients.shape} do not fit: "
                 "expected (pieces + 1,) and (degree + 1, pieces, n)"
             )
-        if not (np.isfinite(breaks).all() and np.isfinite(coefficients).all()):
+        rising = breaks.size == 2 or bool((breaks[1:] > breaks[:-1]).all())
+        if not (isfinite(breaks[0]) and isfinite(breaks[-1]) and np.isfinite(coefficients).all()):
             raise ValueError("breaks and coefficients must be finite")
-        if (breaks.size > 2 and not (np.diff(breaks) > 0).all()) or breaks[-1] < breaks[0]:
+        if not rising or breaks[-1] < breaks[0]:
+            if not np.isfinite(breaks).all():
+                raise ValueError("breaks and coefficients must be finite")
             raise ValueError("breaks must strictly increase")
         object.__setattr__(self, "breaks", breaks)
         object.__setattr__(self, "coefficients", coefficients)

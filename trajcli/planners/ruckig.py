@@ -16,12 +16,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
-from itertools import islice, product
+from itertools import accumulate, islice, product
 from typing import Any, Literal
 
 import numpy as np
 
-from trajcli.curves.phases import PhaseChain
+from trajcli.curves.phases import PhaseChain, merged_curve
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.frozen import frozen
@@ -108,22 +108,20 @@ class PhaseProfile:
 
     def phases(self, joint: int | None) -> list[Phase]:
         """Return the phases by name, equal neighbours joined."""
-        times = np.concatenate([[0.0], np.cumsum(self.chain.durations)])
-        times[-1] = self.duration
+        ends = [*accumulate(self.chain.durations)][:-1]
         named: list[Phase] = []
-        for k, name in enumerate(self._names()):
-            start, end = float(times[k]), float(times[k + 1])
+        for name, start, end in zip(self._names(), [0.0, *ends], [*ends, self.duration], strict=False):
             if named and named[-1].name == name:
-                start = named.pop().start
-            named.append(Phase(name, start, end, joint))
+                named[-1] = Phase(name, named[-1].start, end, joint, None)
+            else:
+                named.append(Phase(name, start, end, joint, None))
         return named
 
     def _names(self) -> list[str]:
         chain, names = self.chain, []
-        states = chain.states.tolist()
-        for k, constant in enumerate(chain.constants.tolist()):
+        states, speed = chain.states, chain.peaks[1] if chain.order > 1 else 1.0
+        for k, constant in enumerate(chain.constants):
             velocity, acceleration, jerk = (*states[k][1:], constant, 0.0, 0.0)[:3]
-            speed = chain.peaks[1] if chain.order > 1 else 1.0
             if k < self.braking:
                 names.append("brake")
             elif jerk:
@@ -133,6 +131,12 @@ class PhaseProfile:
             else:
                 names.append("cruise" if abs(velocity) > _STILL * speed else "rest")
         return names
+
+
+def joined(profiles: Sequence[PhaseProfile]) -> PiecewisePolynomial:
+    """Return the curve of variables whose motions last equally long, n = as many as there are."""
+    motions = [(profile.position, profile.chain) for profile in profiles]
+    return merged_curve(motions, profiles[0].duration)
 
 
 _EXACT = 1e-12  # relative to the joint's peaks: a larger miss means that other units may do better
@@ -254,9 +258,9 @@ def _double_s(problem: BoundaryProblem, duration: float | None) -> PhaseProfile 
     lengths, constants = found.phases(math.copysign(jerk, displacement))
     if min(lengths) < _SHORT * max(lengths):
         return None
-    final = np.array([displacement, 0.0, 0.0])
     cruise = frozenset([len(lengths) // 2]) if found.cruising else frozenset[int]()
-    chain = PhaseChain(np.zeros(3), final, np.array(lengths), np.array(constants), cruise)
+    final, rest = (displacement, 0.0, 0.0), (0.0, 0.0, 0.0)
+    chain = PhaseChain(rest, final, tuple(lengths), tuple(constants), cruise)
     profile = PhaseProfile(problem.initial[0], chain, chain.duration)
     if duration is not None and duration < profile.duration * (1 - _ROUNDING):
         return None
@@ -294,14 +298,12 @@ def _within(profile: PhaseProfile, bounds: Array) -> bool:
 
 def _clearly_within(chain: PhaseChain, bounds: Sequence[Sequence[float]]) -> bool:
     """Return whether all phases are long, and their states keep the bounds with half of the room."""
-    times = chain.durations.tolist()
+    times = chain.durations
     if not times or min(times) < _LONG * max(times):
         return False
-    _, velocities, accelerations = zip(*chain.states.tolist(), strict=True)
-    for values, (low, high) in zip(
-        (velocities, accelerations, chain.constants.tolist()), bounds, strict=True
-    ):
-        room = 1 + 0.5 * _ROOM
+    _, velocities, accelerations = zip(*chain.states, strict=True)
+    room = 1 + 0.5 * _ROOM
+    for values, (low, high) in zip((velocities, accelerations, chain.constants), bounds, strict=True):
         if not (low * room <= min(values) and max(values) <= high * room):
             return False
     return True
@@ -318,7 +320,7 @@ def _with_less(problem: BoundaryProblem, part: float) -> BoundaryProblem:
 def _accurate(problem: BoundaryProblem, duration: float | None) -> PhaseProfile:
     """Return the motion that misses its target least, of those that units and margins of ruckig lead to."""
     best, least = None, _ACCEPTABLE
-    for margin, (time_unit, length_unit) in product(_MARGINS, _units(problem, duration)):
+    for margin, (time_unit, length_unit) in _attempts(problem, duration):
         answer = _call_ruckig(_with_margin(problem, margin), duration, time_unit, length_unit)
         if answer is None:
             continue
@@ -349,20 +351,29 @@ def _with_margin(problem: BoundaryProblem, part: float) -> BoundaryProblem:
 
 def _steady(problem: BoundaryProblem, duration: float) -> PhaseProfile:
     """Return the motion of constant velocity, or the one of no length that has arrived already."""
-    initial = np.array([0.0, *problem.initial[1:]])[: problem.order]
-    final = np.array([problem.initial[1] * duration, *problem.final[1:]])[: problem.order]
-    constants = [problem.initial[1] if problem.order == 1 else 0.0] if duration > 0 else []
-    chain = PhaseChain(initial, final, np.full(len(constants), duration), np.array(constants))
+    order = problem.order
+    initial = (0.0, *problem.initial[1:])[:order]
+    final = (problem.initial[1] * duration, *problem.final[1:])[:order]
+    constants = (problem.initial[1] if order == 1 else 0.0,) if duration > 0 else ()
+    chain = PhaseChain(initial, final, (duration,) * len(constants), constants)
     return PhaseProfile(problem.initial[0], chain.with_cruises() if constants else chain, duration)
 
 
 def _corrected(answer: PhaseProfile, duration: float | None) -> tuple[PhaseProfile, float]:
     """Return the motion corrected to end in its target, and by how much it still misses it."""
-    free = answer.chain.polished()
-    if duration is None or (answer.duration > duration * (1 + 1e-12) and free.duration > duration):
-        return PhaseProfile(answer.position, free, free.duration, answer.braking), free.defect()
+    if duration is None or answer.duration > duration * (1 + 1e-12):
+        free = answer.chain.polished()
+        if duration is None or free.duration > duration:
+            return PhaseProfile(answer.position, free, free.duration, answer.braking), free.defect()
     kept = answer.chain.polished(duration)
     return PhaseProfile(answer.position, kept, duration, answer.braking), kept.defect(duration)
+
+
+def _attempts(
+    problem: BoundaryProblem, duration: float | None
+) -> Iterator[tuple[float, tuple[float, float]]]:
+    """Yield margins of the acceleration with units of time and length for ruckig."""
+    return ((margin, units) for margin in _MARGINS for units in _units(problem, duration))
 
 
 def _units(problem: BoundaryProblem, duration: float | None) -> Iterator[tuple[float, float]]:
@@ -392,7 +403,7 @@ def _call_ruckig(
     import ruckig
 
     lead = _lead(problem)
-    initial = problem.initial[1:] if lead is None else (*lead.states[-1, 1:].tolist(), 0.0)
+    initial = problem.initial[1:] if lead is None else (*lead.states[-1][1:], 0.0)
     waited = 0.0 if lead is None else lead.duration
     units = [length_unit / time_unit**order for order in range(4)]
     _, velocity, acceleration, _ = units
@@ -430,9 +441,8 @@ def _lead(problem: BoundaryProblem) -> PhaseChain | None:
     from trajcli.curves.braking import braking
 
     phases = braking(*problem.initial[1:], problem.bounds).phases
-    initial = np.array([0.0, *problem.initial[1:]])[: problem.order]
-    times, constants = np.array(phases).reshape(-1, 2).T
-    return PhaseChain(initial, np.full_like(initial, np.nan), times, constants)
+    initial = (0.0, *problem.initial[1:])[: problem.order]
+    return PhaseChain(initial, (math.nan,) * len(initial), *_apart(phases))
 
 
 def _inside(value: float, lower: float, upper: float) -> float:
@@ -455,12 +465,15 @@ def _profile(
         [(t * time_unit, c * units[order]) for t, c in zip(*part, strict=False) if t > 0] for part in parts
     ]
     if lead is not None:
-        phases[0] = [*zip(lead.durations.tolist(), lead.constants.tolist(), strict=True), *phases[0]]
-    lengths, constants = np.array([phase for part in phases for phase in part]).reshape(-1, 2).T
-    initial = np.array([0.0, *problem.initial[1:]])[:order]
-    final = np.array([problem.displacement, *problem.final[1:]])[:order]
-    if problem.control == "velocity":
-        final[0] = np.nan
-    chain = PhaseChain(initial, final, lengths, constants).with_cruises()
+        phases[0] = [*zip(lead.durations, lead.constants, strict=True), *phases[0]]
+    free = problem.control == "velocity"
+    final = (math.nan if free else problem.displacement, *problem.final[1:])[:order]
+    times, constants = _apart([phase for part in phases for phase in part])
+    chain = PhaseChain((0.0, *problem.initial[1:])[:order], final, times, constants).with_cruises()
     duration = answer.duration * time_unit + (0.0 if lead is None else lead.duration)
     return PhaseProfile(problem.initial[0], chain, duration, len(phases[0]))
+
+
+def _apart(phases: Sequence[tuple[float, float]]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return the durations of phases and their constants."""
+    return tuple(time for time, _ in phases), tuple(constant for _, constant in phases)

@@ -191,11 +191,11 @@ def test_boundary_judge_sees_a_phase_that_is_a_billionth_of_a_second_too_long():
     profile = fastest(task)
     start, end = state([0.0], 0.3, 0.1), state([2.0], -0.4, 0.2)
     assert misses(profile.curve(), start, end) == []
-    for k in range(profile.chain.durations.size):
-        durations = profile.chain.durations.copy()
+    for k in range(len(profile.chain.durations)):
+        durations = np.array(profile.chain.durations)
         durations[k] += 1e-9
-        states = replace(profile.chain, durations=durations).states
-        constants = profile.chain.constants
+        states = np.array(replace(profile.chain, durations=tuple(durations.tolist())).states)
+        constants = np.array(profile.chain.constants)
         coefficients = np.stack([constants / 6, states[:-1, 2] / 2, states[:-1, 1], states[:-1, 0]])
         breaks = np.concatenate([[0.0], np.cumsum(durations)])
         assert misses(PiecewisePolynomial(breaks, coefficients[:, :, None]), start, end)

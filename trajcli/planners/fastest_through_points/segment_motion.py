@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.curves.operations import merge_breaks
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
 from trajcli.frozen import frozen
 from trajcli.planners.fastest_through_points.problem import WaypointProblem
 from trajcli.planners.planner import Phase
 from trajcli.planners.ruckig import BoundaryProblem, PhaseProfile, fastest, together
+from trajcli.planners.ruckig import joined as joined_profiles
 
 _ROUNDINGS = 4  # of breaks, that may add up
 _MOST = 1e-7  # relative: no acceleration is lowered by more
@@ -104,7 +104,7 @@ def _bounds(problem: WaypointProblem, total: float) -> Array:
 
 
 def _segment(profiles: Sequence[PhaseProfile]) -> PointMotion:
-    curve = merge_breaks([profile.curve() for profile in profiles])
+    curve = joined_profiles(profiles)
     phases = [phase for joint, profile in enumerate(profiles) for phase in profile.phases(joint)]
     phases.sort(key=lambda phase: (phase.start, phase.joint or 0))
     return PointMotion(curve, np.array([0.0, curve.duration]), tuple(phases))

@@ -29,6 +29,7 @@ from trajcli.planners.ruckig import (
     PhaseProfile,
     fastest,
     fastest_of,
+    joined,
     together,
 )
 from trajcli.trajectory import State
@@ -241,18 +242,19 @@ def _each(request: Request, boundaries: Sequence[BoundaryProblem]) -> Planned:
     alone = [fastest(boundary) for boundary in boundaries]
     profiles = together(boundaries, alone, least) if request.synchronize == "time" else alone
     duration = max([least, *(profile.duration for profile in profiles)])
-    curves, phases = [], []
-    for joint, (boundary, profile) in enumerate(zip(boundaries, profiles, strict=True)):
-        phases += profile.phases(joint)
-        if profile.duration == duration:
-            curves.append(profile.curve())
-            continue
-        curves.append(_waiting(boundary, profile, duration, joint))
-        phases.append(Phase("cruise" if boundary.final[1] else "rest", profile.duration, duration, joint))
+    phases = [phase for joint, profile in enumerate(profiles) for phase in profile.phases(joint)]
+    waiting = [joint for joint, profile in enumerate(profiles) if profile.duration != duration]
+    names = ["cruise" if boundary.final[1] else "rest" for boundary in boundaries]
+    phases += [Phase(names[joint], profiles[joint].duration, duration, joint) for joint in waiting]
+    if waiting:
+        rows = enumerate(zip(boundaries, profiles, strict=True))
+        curve = merge_breaks([_lasting(*row, duration, joint) for joint, row in rows])
+    else:
+        curve = joined(profiles)
     phases.sort(key=lambda phase: (phase.start, phase.joint or 0))
     arrivals = tuple(profile.duration for profile in alone)
     events = (*_duration_events(least, duration, max(arrivals)), *_jerk_events(boundaries))
-    return Planned(merge_breaks(curves), request.end, phases=tuple(phases), events=events, arrivals=arrivals)
+    return Planned(curve, request.end, phases=tuple(phases), events=events, arrivals=arrivals)
 
 
 def _on_one_line(request: Request, boundaries: Sequence[BoundaryProblem], robot: Robot) -> Planned:
@@ -287,14 +289,16 @@ def _boundaries(request: Request, robot: Robot) -> list[BoundaryProblem]:
     ]
 
 
-def _waiting(
+def _lasting(
     boundary: BoundaryProblem, profile: PhaseProfile, duration: float, joint: int
 ) -> PiecewisePolynomial:
-    """Return the curve of a joint that keeps its end state until the others have arrived.
+    """Return the curve of a joint; it keeps its end state until the others have arrived.
 
     Raises:
         PlanningError: When it cannot, because it moves.
     """
+    if profile.duration == duration:
+        return profile.curve()
     if boundary.steady:
         return fastest_of(boundary, duration).curve()
     if not boundary.final[1] and not boundary.final[2]:
@@ -366,6 +370,8 @@ def _require_limits(boundaries: Sequence[BoundaryProblem], robot: Robot) -> None
         MissingLimitError: With one problem for each quantity, naming the joints.
     """
     problems: list[Problem] = []
+    if np.isfinite(robot.limits.velocity).all() and np.isfinite(robot.limits.acceleration).all():
+        return
     for order in (1, 2):
         lacking = [
             joint
@@ -395,8 +401,8 @@ def _require_possible_end(boundaries: Sequence[BoundaryProblem], robot: Robot) -
 
 
 def _end_problems(boundary: BoundaryProblem, joint: int) -> list[Problem]:
-    for order in (1, 2):
-        value, (low, high) = boundary.final[order], boundary.bounds[order - 1].tolist()
+    for order, (low, high) in enumerate(boundary.bounds[:2].tolist(), 1):
+        value = boundary.final[order]
         if not low * (1 + _ROUNDING) <= value <= high * (1 + _ROUNDING):
             limit = low if value < 0 else high
             message = f"{{joint}} would end with {QUANTITIES[order]} {{value}}, beyond its limit {{limit}}"
@@ -407,7 +413,9 @@ def _end_problems(boundary: BoundaryProblem, joint: int) -> list[Problem]:
             }
             hint = f"lower the end {QUANTITIES[order]}, or raise the limit"
             return [Problem(message, hint, joint=boundary.name, value=value, limit=limit, amounts=amounts)]
-    return [] if boundary.control == "velocity" or boundary.done else _approach_problems(boundary, joint)
+    if boundary.control == "velocity" or not boundary.final[2] or boundary.done:
+        return []
+    return _approach_problems(boundary, joint)
 
 
 def _approach_problems(boundary: BoundaryProblem, joint: int) -> list[Problem]:

@@ -124,9 +124,9 @@ def profile_in_periods(
         jerk = acceleration / (period * rise)
         counts, constants = (rise, flat, rise, cruise, rise, flat, rise), (jerk, 0, -jerk, 0, -jerk, 0, jerk)
     phases = [(count * period, constant) for count, constant in zip(counts, constants, strict=True) if count]
-    times, values = (np.array(each) for each in zip(*phases, strict=True))
-    final = np.array([displacement, *(0.0,) * (2 if smooth else 1)])
-    chain = PhaseChain(np.zeros(final.size), final, times, values).with_cruises()
+    times, values = zip(*phases, strict=True)
+    rates = (0.0,) * (2 if smooth else 1)
+    chain = PhaseChain((0.0, *rates), (displacement, *rates), times, values).with_cruises()
     return PhaseProfile(start, chain, sum(counts) * period)
 
 
