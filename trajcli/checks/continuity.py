@@ -6,22 +6,23 @@ and after the last one in its declared end.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.extrema import IntervalPeaks
-from trajcli.curves.piecewise import Array
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.findings import Finding, at_time, joint_amounts
 from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Limits
-from trajcli.limits.joints import peaks_by_move
+from trajcli.limits.joints import numbered, peaks_by_move
 from trajcli.limits.tolerances import allowed_jump
 from trajcli.trajectory import Trajectory
 
 JERK_HINT = "use jerk_limited or quintic, or say limits: {jerk: null}"
+_BLOCK = 16_384  # breaks looked at together: what is computed of them takes some MB
 _SAME = 1e-12  # jumps that differ by less than this part are equal: the earliest is named
 _QUANTITIES = ("position", "velocity", "acceleration")
 _KINDS: tuple[str, ...] = ("position_jump", "velocity_jump", "acceleration_jump")
@@ -101,14 +102,18 @@ def check_continuity(
         ValueError: When there are more or fewer limits than spans.
     """
     known = peaks_by_move(trajectory) if peaks is None else peaks
+    spans, limited = _span_of_pieces(trajectory), _limited_spans(trajectory, limits_by_move)
     findings: list[Finding] = []
-    for order in range(2):
-        jumps = _jumps(trajectory, order, known)
-        findings += _largest(trajectory, order, jumps, jumps.present, _later(trajectory))
-    steps = _jumps(trajectory, 2, known)
-    begins, ends = _limited(trajectory, limits_by_move, steps)
-    owner = np.where(begins, _later(trajectory), _earlier(trajectory))
-    return findings + _largest(trajectory, 2, steps, begins | ends, owner)
+    for order in range(3):
+        found = []
+        for jumps in _jumps(trajectory, order, known, spans):
+            if order < 2:
+                found.append(jumps.chosen(jumps.present, jumps.later))
+                continue
+            begins, ends = _breaking(jumps, limited)
+            found.append(jumps.chosen(begins | ends, np.where(begins, jumps.later, jumps.earlier)))
+        findings += _largest(trajectory, order, _together(found))
+    return findings
 
 
 def acceleration_steps(
@@ -126,31 +131,59 @@ def acceleration_steps(
     Raises:
         ValueError: When there are more or fewer limits than spans.
     """
-    jumps = _jumps(trajectory, 2, peaks_by_move(trajectory) if peaks is None else peaks)
-    chosen = jumps.present
-    if limits_by_move is not None:
-        begins, ends = _limited(trajectory, limits_by_move, jumps)
-        chosen = chosen & ~(begins | ends)
-    rows, joints = np.nonzero(chosen)
-    owners = np.where(jumps.begins, _later(trajectory), _earlier(trajectory))[rows, joints]
-    times = (trajectory.curve.breaks - trajectory.curve.start)[rows]
-    moves = np.array([span.index for span in trajectory.spans])[owners]
-    return AccelerationSteps(moves, joints, times, jumps.size[rows, joints], trajectory.joint_names)
+    known = peaks_by_move(trajectory) if peaks is None else peaks
+    limited = None if limits_by_move is None else _limited_spans(trajectory, limits_by_move)
+    found = []
+    for jumps in _jumps(trajectory, 2, known, _span_of_pieces(trajectory)):
+        legal = jumps.present
+        if limited is not None:
+            begins, ends = _breaking(jumps, limited)
+            legal = legal & ~(begins | ends)
+        found.append(jumps.chosen(legal, np.where(jumps.begins, jumps.later, jumps.earlier)))
+    steps = _together(found)
+    times = trajectory.curve.breaks[steps.rows] - trajectory.curve.start
+    moves = np.array([trajectory.spans[k].index for k in steps.owners.tolist()], dtype=np.intp)
+    return AccelerationSteps(moves, steps.joints, times, steps.sizes, trajectory.joint_names)
+
+
+@frozen
+class _Chosen:
+    """Some of the jumps, k of them, in order of time.
+
+    Attributes:
+        rows: Indices of the breaks, shape (k,).
+        joints: Indices of the joints, shape (k,).
+        owners: Index in `spans` of the move that each belongs to, shape (k,).
+        sizes: Value after minus value before, shape (k,).
+        allowed: The difference that rounding explains, shape (k,).
+    """
+
+    rows: NDArray[np.intp]
+    joints: NDArray[np.intp]
+    owners: NDArray[np.intp]
+    sizes: Array
+    allowed: Array
 
 
 @frozen
 class _Jumps:
-    """The two sides of every break, first and last included, each of shape (pieces + 1, n).
+    """The two sides of some breaks that follow each other, m of them.
 
     Attributes:
-        before: Value on the left side.
-        after: Value on the right side.
-        allowed: The difference that rounding explains.
+        row: Index of the first of these breaks.
+        before: Value on the left side, shape (m, n).
+        after: Value on the right side, shape (m, n).
+        allowed: The difference that rounding explains, shape (m, n).
+        earlier: Index in `spans` of the move before each break, of the first one at the start, shape (m, 1).
+        later: Index in `spans` of the move after each break, of the last one at the end, shape (m, 1).
     """
 
+    row: int
     before: Array
     after: Array
     allowed: Array
+    earlier: NDArray[np.intp]
+    later: NDArray[np.intp]
 
     @property
     def size(self) -> Array:
@@ -172,43 +205,77 @@ class _Jumps:
         """Where the left side is not zero."""
         return np.logical_not(np.abs(self.before) <= self.allowed / 2)
 
+    def chosen(self, which: NDArray[np.bool_], owner: NDArray[np.intp]) -> _Chosen:
+        """Return some of the jumps, (m, n), with the span that each belongs to, (m, n) or (m, 1)."""
+        rows, joints = np.nonzero(which)
+        owners = np.broadcast_to(owner, which.shape)[rows, joints]
+        return _Chosen(rows + self.row, joints, owners, self.size[rows, joints], self.allowed[rows, joints])
 
-def _jumps(trajectory: Trajectory, order: int, peaks: IntervalPeaks) -> _Jumps:
+
+def _together(parts: Sequence[_Chosen]) -> _Chosen:
+    """Return the jumps of all parts."""
+    names = ("rows", "joints", "owners", "sizes", "allowed")
+    return _Chosen(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+
+def _jumps(
+    trajectory: Trajectory, order: int, peaks: IntervalPeaks, spans: NDArray[np.intp]
+) -> Iterator[_Jumps]:
+    """Yield the two sides of all breaks, the first and the last included, many breaks at a time.
+
+    Args:
+        trajectory: What to look at.
+        order: Of the derivative.
+        peaks: `peaks_by_move(trajectory)`.
+        spans: Of each piece, its span, shape (pieces,).
+    """
     curve, quantity = trajectory.curve, _QUANTITIES[order]
-    first, last = curve.piece_ends(order)
-    slope_first, slope_last = np.abs(curve.piece_ends(order + 1))
-    nothing = np.zeros((1, curve.dimension))
-    slope = np.maximum(np.concatenate([nothing, slope_last]), np.concatenate([slope_first, nothing]))
     peak = peaks.of_orders[order].magnitude.max(axis=0)
-    return _Jumps(
-        before=np.concatenate([getattr(trajectory.start, quantity)[None], last]),
-        after=np.concatenate([first, getattr(trajectory.end, quantity)[None]]),
-        allowed=allowed_jump(peak, curve.breaks, slope),
+    nothing = np.zeros((1, curve.dimension))
+    outside = (
+        nothing,
+        nothing,
+        *(getattr(end, quantity)[None] for end in (trajectory.start, trajectory.end)),
     )
+    for row in range(0, curve.pieces + 1, _BLOCK):
+        behind = min(row + _BLOCK, curve.pieces + 1)
+        left, right = max(row - 1, 0), min(behind, curve.pieces)
+        part = PiecewisePolynomial(curve.breaks[left : right + 1], curve.coefficients[:, left:right])
+        (first, last), (slope_first, slope_last) = part.piece_ends(order), np.abs(part.piece_ends(order + 1))
+        sides = [
+            (slope_last, slope_first[row - left :]),
+            (last, first[row - left :]),
+        ]
+        slopes, values = (
+            (
+                (before if row else np.concatenate([start, before]))[: behind - row],
+                (after if behind <= curve.pieces else np.concatenate([after, end]))[: behind - row],
+            )
+            for (before, after), (start, end) in zip(sides, (outside[:2], outside[2:]), strict=True)
+        )
+        breaks = np.arange(row, behind)
+        yield _Jumps(
+            row,
+            *values,
+            allowed_jump(peak, curve.breaks[row:behind], np.maximum(*slopes)),
+            spans[np.maximum(breaks - 1, 0)][:, None],
+            spans[np.minimum(breaks, curve.pieces - 1)][:, None],
+        )
 
 
-def _limited(
-    trajectory: Trajectory, limits_by_move: Sequence[Limits], steps: _Jumps
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return where a step breaks the jerk limit of the move after it, and of that before it, (m, n)."""
+def _limited_spans(trajectory: Trajectory, limits_by_move: Sequence[Limits]) -> NDArray[np.bool_]:
+    """Return whether each span limits the jerk of each joint, (spans, n)."""
     if len(limits_by_move) != len(trajectory.spans):
         raise ValueError(f"{len(limits_by_move)} limits for {len(trajectory.spans)} moves")
-    limited = np.array([np.isfinite(limits.jerk).any(axis=1) for limits in limits_by_move])
-    begins = steps.present & steps.begins & limited[_later(trajectory)[:, 0]]
-    ends = steps.present & steps.ends & limited[_earlier(trajectory)[:, 0]]
+    which, different = numbered(limits_by_move)
+    return np.array([np.isfinite(limits.jerk).any(axis=1) for limits in different])[which]
+
+
+def _breaking(jumps: _Jumps, limited: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return where a step breaks the jerk limit of the move after it, and of that before it, (m, n)."""
+    begins = jumps.present & jumps.begins & limited[jumps.later[:, 0]]
+    ends = jumps.present & jumps.ends & limited[jumps.earlier[:, 0]]
     return begins, ends
-
-
-def _later(trajectory: Trajectory) -> NDArray[np.intp]:
-    """Return the index in `spans` of the move after each break, the last move at the end; (pieces + 1, 1)."""
-    spans = _span_of_pieces(trajectory)
-    return np.append(spans, spans[-1])[:, None]
-
-
-def _earlier(trajectory: Trajectory) -> NDArray[np.intp]:
-    """Return the index in `spans` of the move before each break, the first at the start; (pieces + 1, 1)."""
-    spans = _span_of_pieces(trajectory)
-    return np.append(spans[0], spans)[:, None]
 
 
 def _span_of_pieces(trajectory: Trajectory) -> NDArray[np.intp]:
@@ -219,20 +286,15 @@ def _span_of_pieces(trajectory: Trajectory) -> NDArray[np.intp]:
     return np.maximum(later - 1, 0)
 
 
-def _largest(
-    trajectory: Trajectory, order: int, jumps: _Jumps, chosen: NDArray[np.bool_], owner: NDArray[np.intp]
-) -> list[Finding]:
+def _largest(trajectory: Trajectory, order: int, chosen: _Chosen) -> list[Finding]:
     """Return a finding for the largest of the chosen jumps of each move and joint."""
-    owners = np.broadcast_to(owner, chosen.shape)
-    rows, joints = _first_largest(np.abs(jumps.size), chosen, owners)
-    times = trajectory.curve.breaks - trajectory.curve.start
     findings = []
-    for row, joint in zip(rows.tolist(), joints.tolist(), strict=True):
-        name, time = trajectory.joint_names[joint], float(times[row])
-        value, limit = float(jumps.size[row, joint]), float(jumps.allowed[row, joint])
+    for k in _first_largest(chosen, trajectory.curve.dimension).tolist():
+        joint, value, limit = int(chosen.joints[k]), float(chosen.sizes[k]), float(chosen.allowed[k])
+        time = float(trajectory.curve.breaks[chosen.rows[k]] - trajectory.curve.start)
         finding = Finding(
-            move=trajectory.spans[int(owners[row, joint])].index,
-            joint=name,
+            move=trajectory.spans[int(chosen.owners[k])].index,
+            joint=trajectory.joint_names[joint],
             kind=_KINDS[order],
             value=value,
             limit=limit,
@@ -245,14 +307,10 @@ def _largest(
     return findings
 
 
-def _first_largest(
-    sizes: Array, chosen: NDArray[np.bool_], owner: NDArray[np.intp]
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return rows and columns of the largest chosen size of each owner and column, first of equal ones."""
-    rows, columns = np.nonzero(chosen)
-    group = owner[rows, columns] * sizes.shape[1] + columns
+def _first_largest(chosen: _Chosen, joints: int) -> NDArray[np.intp]:
+    """Return which of the jumps are the largest of their owner and joint, the first of equal ones."""
+    group, sizes = chosen.owners * joints + chosen.joints, np.abs(chosen.sizes)
     largest = np.full(int(group.max(initial=-1)) + 1, 0.0)
-    np.maximum.at(largest, group, sizes[rows, columns])
-    top = np.flatnonzero(np.logical_not(sizes[rows, columns] < largest[group] * (1 - _SAME)))
-    first = top[np.unique(group[top], return_index=True)[1]]
-    return rows[first], columns[first]
+    np.maximum.at(largest, group, sizes)
+    top = np.flatnonzero(np.logical_not(sizes < largest[group] * (1 - _SAME)))
+    return top[np.unique(group[top], return_index=True)[1]]

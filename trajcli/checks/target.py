@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from trajcli.kinematics.inverse.target import IkTarget
     from trajcli.kinematics.robot import Robot
 
+_BLOCK = 16_384  # moves looked at together: what is computed of them takes some MB
+
 
 def check_targets(trajectory: Trajectory, promises: Sequence[Promise]) -> list[Finding]:
     """Return where a move does not end in its target: the joint that is furthest off, or the tool.
@@ -28,18 +30,30 @@ def check_targets(trajectory: Trajectory, promises: Sequence[Promise]) -> list[F
     Raises:
         ValueError: When there are more or fewer promises than spans.
     """
-    known = list(zip(trajectory.spans, promises, strict=True))
-    ends = trajectory.before(np.array([span.end for span in trajectory.spans]))
+    spans = trajectory.spans
+    if len(spans) != len(promises):
+        raise ValueError(f"{len(promises)} promises for {len(spans)} moves")
+    findings = list[Finding]()
+    for first in range(0, len(spans), _BLOCK):
+        block = slice(first, first + _BLOCK)
+        findings += _check_ends(trajectory, spans[block], promises[block])
+    return findings
+
+
+def _check_ends(
+    trajectory: Trajectory, spans: Sequence[Span], promises: Sequence[Promise]
+) -> Iterator[Finding]:
+    """Yield where moves that follow each other do not end in their targets."""
+    ends = trajectory.before(np.array([span.end for span in spans]))
     promised = {k: each.destination for k, each in enumerate(promises) if each.destination is not None}
     to_joints = {k: destination for k, destination in promised.items() if destination.joints is not None}
-    findings = list(_check_joints(trajectory, ends, to_joints))
+    yield from _check_joints(trajectory, spans, ends, to_joints)
     for k, destination in promised.items():
-        span, promise = known[k]
-        if destination.joints is None and destination.pose is not None and promise.robot is not None:
+        span, robot = spans[k], promises[k].robot
+        if destination.joints is None and destination.pose is not None and robot is not None:
             within = destination.tolerance or (TARGET_CLOSURE, TARGET_CLOSURE)
-            findings += _check_pose(span, promise.robot, ends[k], destination.pose, within)
-            findings += _check_pins(trajectory, span, ends[k], destination.pins)
-    return findings
+            yield from _check_pose(span, robot, ends[k], destination.pose, within)
+            yield from _check_pins(trajectory, span, ends[k], destination.pins)
 
 
 def _check_pins(
@@ -67,12 +81,12 @@ def _beside(trajectory: Trajectory, span: Span, joint: int, value: float, limit:
 
 
 def _check_joints(
-    trajectory: Trajectory, ends: Array, destinations: Mapping[int, Destination]
+    trajectory: Trajectory, known: Sequence[Span], ends: Array, destinations: Mapping[int, Destination]
 ) -> Iterator[Finding]:
     """Yield the joint that is furthest from its target, of each span that ends (k, n) beside it."""
     if not destinations:
         return
-    spans = [trajectory.spans[k] for k in destinations]
+    spans = [known[k] for k in destinations]
     targets = np.array([each.joints for each in destinations.values()])
     on_path = [each.tolerance is not None for each in destinations.values()]
     off = np.abs(ends[list(destinations)] - targets)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from trajcli.errors import at_least
 from trajcli.findings import Finding
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import QUANTITIES, Limits, ToolLimits
-from trajcli.limits.joints import JointSurvey, moves_over, peaks_by_move
+from trajcli.limits.joints import JointSurvey, moves_over, numbered, peaks_by_move
 from trajcli.limits.kinds import KIND_OF, LimitedMove, LimitSurvey, families, family
 from trajcli.limits.tolerances import LIMIT_RELATIVE, TOOL_RELATIVE
 from trajcli.trajectory import Promise, Span, Trajectory
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from trajcli.limits.tool_bound import ToolPeak
 
 _NO_TOOL_LIMITS = ToolLimits()
+_NO_SURVEYS: Mapping[str, LimitSurvey] = MappingProxyType({})
 _PART = 0.25  # of that room: a third of it is a third power's
 _NO_HELP = "slowing down does not help"
 _SLOW = "say `when_over_limit: slow`"
@@ -114,16 +116,16 @@ def verify(
     Raises:
         ValueError: When there are more or fewer limits than spans.
     """
-    moves = _limited_moves(trajectory, limits_by_move, promises)
+    moves = _LimitedMoves(trajectory, limits_by_move, promises)
     tools = list(_tools(moves, promises or ()))
-    peaks, surveys = peaks_by_move(trajectory), tuple(map(_further_surveys, moves))
-    whole = [not promise.parts for promise in promises or [Promise()] * len(moves)]
+    peaks, surveys = peaks_by_move(trajectory), tuple(_further_surveys(moves))
+    whole = [not promise.parts for promise in moves.promises]
     findings = check_limits(
         trajectory, limits_by_move, _judged(trajectory, limits_by_move, promises, peaks), whole
     )
-    for move, of_span, one in zip(moves, surveys, whole, strict=True):
+    for k, (of_span, one) in enumerate(zip(surveys, whole, strict=True)):
         for survey in of_span.values() if one else ():
-            findings += limit_findings(move, survey)
+            findings += limit_findings(moves[k], survey)
     findings += check_continuity(trajectory, limits_by_move, peaks)
     if promises is not None:
         findings += _check_via_points(trajectory, promises)
@@ -180,21 +182,51 @@ def limit_findings(move: LimitedMove, survey: LimitSurvey) -> Iterator[Finding]:
         yield replace(finding, move=move.span.index)
 
 
-def _limited_moves(
-    trajectory: Trajectory, limits_by_move: Sequence[Limits], promises: Sequence[Promise] | None
-) -> list[LimitedMove]:
-    """Return the moves of a trajectory with their limits."""
-    known = promises or [Promise()] * len(trajectory.spans)
-    return [
-        LimitedMove(trajectory, span, limits, promise.robot, promise.tool)
-        for span, limits, promise in zip(trajectory.spans, limits_by_move, known, strict=True)
-    ]
+class _LimitedMoves(Sequence[LimitedMove]):
+    """The moves of a trajectory with their limits, made when asked for: most are asked for nothing.
+
+    Attributes:
+        limits: In force, one for each span.
+        promises: What each span says of itself.
+    """
+
+    def __init__(
+        self, trajectory: Trajectory, limits_by_move: Sequence[Limits], promises: Sequence[Promise] | None
+    ) -> None:
+        self._trajectory, self.limits = trajectory, limits_by_move
+        self.promises = promises or [Promise()] * len(trajectory.spans)
+        for each, what in ((limits_by_move, "limits"), (self.promises, "promises")):
+            if len(each) != len(trajectory.spans):
+                raise ValueError(f"{len(each)} {what} for {len(trajectory.spans)} moves")
+
+    def __len__(self) -> int:
+        return len(self.limits)
+
+    @overload
+    def __getitem__(self, index: int) -> LimitedMove: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[LimitedMove]: ...
+
+    def __getitem__(self, index: int | slice) -> LimitedMove | list[LimitedMove]:
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
+        promise = self.promises[index]
+        span, limits = self._trajectory.spans[index], self.limits[index]
+        return LimitedMove(self._trajectory, span, limits, promise.robot, promise.tool)
 
 
-def _further_surveys(move: LimitedMove) -> Mapping[str, LimitSurvey]:
-    """Return what a move uses of limits besides those of derivatives of joints, by their family."""
-    surveys = {name: each.survey(move) for name, each in families(move.limits, further=True)}
-    return {name: survey for name, survey in surveys.items() if survey is not None}
+def _further_surveys(moves: _LimitedMoves) -> Iterator[Mapping[str, LimitSurvey]]:
+    """Yield what each move uses of limits besides those of derivatives of joints, by their family."""
+    which, different = numbered(moves.limits)
+    further = [dict(families(limits, further=True)) for limits in different]
+    for k, number in enumerate(which.tolist()):
+        if not further[number]:
+            yield _NO_SURVEYS
+            continue
+        move = moves[k]
+        surveys = {name: each.survey(move) for name, each in further[number].items()}
+        yield {name: survey for name, survey in surveys.items() if survey is not None}
 
 
 def _judged(
@@ -215,6 +247,8 @@ def _in_order(
     trajectory: Trajectory, findings: list[Finding], promises: Sequence[Promise] | None
 ) -> tuple[Finding, ...]:
     """Return the findings by move and time, each with its remedy."""
+    if not findings:
+        return ()
     number = {span.index: k for k, span in enumerate(trajectory.spans)}
     of_span: dict[int, list[Finding]] = {}
     for finding in findings:
@@ -266,8 +300,10 @@ def _check_via_points(trajectory: Trajectory, promises: Sequence[Promise]) -> Se
 
 def _tools(moves: Sequence[LimitedMove], promises: Sequence[Promise]) -> Iterator[SampledTool]:
     """Yield the tool of each move along a path, or of each part of it that is."""
-    for move, promise in zip(moves, promises, strict=False):
-        parts = [move]
+    for k, promise in enumerate(promises):
+        if promise.tool is None and not promise.parts:
+            continue
+        parts = [move := moves[k]]
         if promise.parts:
             from trajcli.limits.parts import limited_part
 
@@ -300,14 +336,16 @@ def _sampled(tools: Sequence[SampledTool]) -> tuple[tuple[str, tuple[int, ...]],
     return tuple((" and ".join(words), indices) for indices, words in together.items())
 
 
-def _unchecked_of_tool(moves: Sequence[LimitedMove], peaks: IntervalPeaks) -> tuple[str, ...]:
+def _unchecked_of_tool(moves: _LimitedMoves, peaks: IntervalPeaks) -> tuple[str, ...]:
     """Return the limits of the tool that are stated and cannot be judged in some move where the arm moves."""
     names: set[str] = set()
-    for move, of_span in zip(moves, peaks, strict=True):
-        if move.limits.tcp != _NO_TOOL_LIMITS and of_span[1].magnitude.any():
+    which, different = numbered(moves.limits)
+    stated = [limits.tcp != _NO_TOOL_LIMITS for limits in different]
+    for k, number in enumerate(which.tolist()) if any(stated) else ():
+        if stated[number] and peaks[k][1].magnitude.any():
             from trajcli.limits.tool import unjudged
 
-            names |= unjudged(move.limits, move.robot)
+            names |= unjudged(moves.limits[k], moves.promises[k].robot)
     return tuple(name for name in vars(_NO_TOOL_LIMITS) if name in names)
 
 
@@ -319,7 +357,7 @@ def _unchecked(trajectory: Trajectory, limits_by_move: Sequence[Limits]) -> tupl
     ]
     unlimited = [
         np.any(
-            [np.isinf(getattr(limits, name)).any(axis=1) for limits in dict.fromkeys(some)]
+            [np.isinf(getattr(limits, name)).any(axis=1) for limits in numbered(some)[1]]
             or np.zeros((1, len(trajectory.joint_names))),
             axis=0,
         )

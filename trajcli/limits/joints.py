@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajcli.curves.extrema import IntervalPeaks, Peaks, peaks_between
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
@@ -104,7 +105,7 @@ class JointFamily(LimitFamily):
     def survey(self, move: LimitedMove) -> JointSurvey:
         """Return the extremes of the joints in a move."""
         curve, span = move.trajectory.curve, move.span
-        (peaks,) = _peaks(curve, [(span.start, span.end)])
+        (peaks,) = _peaks(curve, np.array([(span.start, span.end)]))
         return JointSurvey(peaks, move.limits, span.duration > 0)
 
     def over_at_ends(self, robot: Robot | None, ends: Sequence[State], use: tuple[str, int, float]) -> bool:
@@ -148,11 +149,23 @@ def moves_over(peaks: IntervalPeaks, limits_by_move: Sequence[Limits]) -> list[i
     if len(peaks) != len(limits_by_move):
         raise ValueError(f"{len(limits_by_move)} limits for {len(peaks)} moves")
     over = np.zeros(len(peaks), dtype=bool)
+    which, different = numbered(limits_by_move)
     for order, extremes in enumerate(peaks.of_orders):
-        bounds = np.array([limits.of_order(order) for limits in limits_by_move])
+        bounds = np.array([limits.of_order(order) for limits in different])[which]
         broken = exceeds(extremes.high, bounds[:, :, 1]) | exceeds(-extremes.low, -bounds[:, :, 0])
         over |= broken.any(axis=1)
     return np.flatnonzero(over).tolist()
+
+
+def numbered(limits_by_move: Sequence[Limits]) -> tuple[NDArray[np.intp], list[Limits]]:
+    """Return which limits each move has, (m,), and these, each once: those of many moves are one."""
+    numbers, different, which = dict[int, int](), list[Limits](), list[int]()
+    for limits in limits_by_move:
+        number = numbers.setdefault(id(limits), len(numbers))
+        if number == len(different):
+            different.append(limits)
+        which.append(number)
+    return np.array(which, dtype=np.intp), different
 
 
 def peaks_by_move(trajectory: Trajectory) -> IntervalPeaks:
@@ -160,11 +173,14 @@ def peaks_by_move(trajectory: Trajectory) -> IntervalPeaks:
 
     At the border of two moves each is asked for its own side.
     """
-    return _peaks(trajectory.curve, [(span.start, span.end) for span in trajectory.spans])
+    spans = trajectory.spans
+    starts, ends = np.array([span.start for span in spans]), np.array([span.end for span in spans])
+    return _peaks(trajectory.curve, np.stack([starts, ends], axis=1))
 
 
-def _peaks(curve: PiecewisePolynomial, spans: Sequence[tuple[float, float]]) -> IntervalPeaks:
-    return peaks_between(curve, _on_breaks(np.array(spans) + curve.start, curve.breaks))
+def _peaks(curve: PiecewisePolynomial, spans: Array) -> IntervalPeaks:
+    """Return the extremes between times (m, 2), s from the start of the curve."""
+    return peaks_between(curve, _on_breaks(spans + curve.start, curve.breaks))
 
 
 def _on_breaks(times: Array, breaks: Array) -> Array:

@@ -475,13 +475,18 @@ class PlannedMove:
             planned.parts,
         )
 
-    def span(self, start: float, end: float) -> Span:
-        """Return the part of a trajectory, from `start` to `end` s, that is this move."""
-        label, payload = self.planner.caption, self.robot.payload
-        handles = self.planner.handles
-        return Span(
-            self.index, self.planner.tag, start, end, self.continuity, payload, label, handles=handles
-        )
+    def span(self, start: float, end: float, of_round: str = "", ends: str = "") -> Span:
+        """Return the part of a trajectory, from `start` to `end` s, that is this move.
+
+        Args:
+            start: s.
+            end: s.
+            of_round: In which round of a repeat it is.
+            ends: The points between which it goes.
+        """
+        planner, payload = self.planner, self.robot.payload
+        values = self.index, planner.tag, start, end, self.continuity, payload, planner.caption
+        return Span(*values, of_round, ends, planner.handles)
 
     def alone(self) -> Trajectory:
         """Return the trajectory of this move alone."""

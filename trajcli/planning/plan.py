@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trajcli.checks.verify import Verdict, verify
-from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
+from trajcli.curves.piecewise import Array, concatenate
 from trajcli.errors import (
     Amount,
     Amounts,
@@ -30,7 +30,15 @@ from trajcli.kinematics.robot import QUANTITIES, Payload, Robot
 from trajcli.language.targets import Target
 from trajcli.limits.tolerances import JUMP_ABSOLUTE
 from trajcli.planners.planner import Event, PlannedMove, Planner, Resolve
-from trajcli.planning.planned_move import KnownMoves, placed, plan_move_within, with_tools
+from trajcli.planning.planned_move import (
+    KnownMoves,
+    handed_over,
+    law_of_tool,
+    placed,
+    plan_move_within,
+    promises_of,
+    with_tools,
+)
 from trajcli.progress import report_progress
 from trajcli.trajectory import State, Trajectory
 
@@ -141,7 +149,7 @@ def plan_job(
         trajectory = replace(trajectory, signals=signals_of(loaded, moves, trajectory, flyby))
     events += [*_ends_moving(loaded, moves), *_velocity_steps(trajectory)]
     report_progress("checking the trajectory")
-    verdict = verify(trajectory, [move.robot.limits for move in moves], [move.promise for move in moves])
+    verdict = verify(trajectory, [move.robot.limits for move in moves], promises_of(moves))
     if advise and not verdict.passed:
         from trajcli.planning.advice import with_tested_advice
 
@@ -175,7 +183,7 @@ def _plan_moves(
     robot, begun, aimed = loaded.robot, 0.0, 0  # the origin is the target of the planner of this id
     for index, planner in enumerate(loaded.job.moves):
         report_progress(f"planning {loaded.called(index)}")
-        start = _handed_over(state, loaded.job.moves[index - 1] if index else None, planner)
+        start = handed_over(state, loaded.job.moves[index - 1] if index else None, planner)
         robot = planner.equipped(robot)
         if planner.changes_tool:
             resolve, origin, standing = partial(resolve, robot=robot), None, None
@@ -310,18 +318,6 @@ def _plan_move(
     return move
 
 
-def _handed_over(state: State, before: Planner | None, after: Planner) -> State:
-    """Return the state in which `after` starts: the acceleration is handed over between continuity 2 only.
-
-    Rates too small to be seen as a jump are rest.
-    """
-    smooth = before is None or (before.joins == 2 and after.joins == 2)
-    velocity, acceleration = (
-        np.where(np.abs(rates) <= JUMP_ABSOLUTE, 0.0, rates) for rates in (state.velocity, state.acceleration)
-    )
-    return State(state.position, velocity, acceleration if smooth else np.zeros_like(acceleration))
-
-
 def _ends_moving(loaded: LoadedJob, moves: Sequence[PlannedMove]) -> Iterator[Event]:
     """Yield the event of a trajectory that ends in motion although nobody says so."""
     last = next(move for move in reversed(moves) if not move.planner.handles)
@@ -343,8 +339,11 @@ _SEEN = 1e-6  # of a joint's largest velocity: a smaller change in a short ramp 
 def _velocity_steps(trajectory: Trajectory) -> Iterator[Event]:
     """Yield the event of ramps that are over before the next time that stamps can tell."""
     curve = trajectory.curve
+    short = curve.lengths <= NANOSECOND
+    if not short.any():
+        return
     first, last = curve.piece_ends(1)
-    steps = np.where((curve.lengths <= NANOSECOND)[:, None], np.abs(last - first), 0.0)
+    steps = np.where(short[:, None], np.abs(last - first), 0.0)
     if not (steps > JUMP_ABSOLUTE + _SEEN * np.maximum(np.abs(first), np.abs(last)).max(axis=0)).any():
         return
     piece, joint = np.unravel_index(steps.argmax(), steps.shape)
@@ -391,11 +390,11 @@ def _joined(moves: list[PlannedMove], loaded: LoadedJob, first: State, flyby: Fl
     for move in moves:
         start, end = end, float(move.planned.curve.breaks[-1] + end)
         of_round, ends = loaded.document.round_of(move.index), loaded.ends(move.index)
-        spans.append(replace(move.span(start, end), round=of_round, ends=ends))
+        spans.append(move.span(start, end, of_round, ends))
     if loaded.job.changes_tool:
         spans = [*with_tools(spans, moves, loaded.robot)]
     robot, last = loaded.robot, moves[-1].planned.end
-    laws = tuple(_law_of_tool(move) for move in moves)
+    laws = tuple(law_of_tool(move) for move in moves)
     return Trajectory(
         curve,
         robot.joint_names,
@@ -407,12 +406,6 @@ def _joined(moves: list[PlannedMove], loaded: LoadedJob, first: State, flyby: Fl
         loaded.job.output.start_time,
         tuple((zone.entered, zone.left) for zone in flyby.zones) if flyby else (),
     )
-
-
-def _law_of_tool(move: PlannedMove) -> PiecewisePolynomial | None:
-    """Return the time law s(t) of the tool along its path; while it turns in its place it has none."""
-    tool = move.planned.tool
-    return None if tool is None or tool.pure_rotation else tool.law
 
 
 @contextmanager

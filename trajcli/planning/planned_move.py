@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import field, replace
 from typing import TYPE_CHECKING, TypeVar
 
-from trajcli.curves.piecewise import Array
+import numpy as np
+
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import PlanningError
 from trajcli.frozen import frozen
 from trajcli.job.read import LoadedJob
 from trajcli.kinematics.robot import MountedTool, Robot
 from trajcli.limits.kinds import has_further_limits
+from trajcli.limits.tolerances import JUMP_ABSOLUTE
 from trajcli.planners.planner import PlannedMove, Planner, WhenOverLimit
-from trajcli.trajectory import Span, State
+from trajcli.trajectory import Promise, Span, State
 
 if TYPE_CHECKING:
     from trajcli.language.targets import Target
@@ -57,6 +60,36 @@ def with_tools(spans: Iterable[Span], moves: Iterable[PlannedMove], own: Robot) 
         if key != first and key not in known:
             known[key] = MountedTool(robot.tool, robot.tool_load, robot.tool_name)
         yield replace(span, tool=known.get(key))
+
+
+def handed_over(state: State, before: Planner | None, after: Planner) -> State:
+    """Return the state in which `after` starts: the acceleration is handed over between continuity 2 only.
+
+    Rates too small to be seen as a jump are rest.
+    """
+    smooth = before is None or (before.joins == 2 and after.joins == 2)
+    velocity, acceleration = (
+        np.where(np.abs(rates) <= JUMP_ABSOLUTE, 0.0, rates) for rates in (state.velocity, state.acceleration)
+    )
+    return State(state.position, velocity, acceleration if smooth else np.zeros_like(acceleration))
+
+
+def promises_of(moves: Sequence[PlannedMove]) -> list[Promise]:
+    """Return what each move says of itself; rounds that are the same motion say it once."""
+    known: dict[tuple[object, ...], Promise] = {}
+    promises = list[Promise]()
+    for move in moves:
+        key = id(move.planner), id(move.start), id(move.robot), id(move.planned), move.over_limit
+        if key not in known:
+            known[key] = move.promise
+        promises.append(known[key])
+    return promises
+
+
+def law_of_tool(move: PlannedMove) -> PiecewisePolynomial | None:
+    """Return the time law s(t) of the tool along its path; while it turns in its place it has none."""
+    tool = move.planned.tool
+    return None if tool is None or tool.pure_rotation else tool.law
 
 
 def placed(loaded: LoadedJob, value: T, robot: Robot, joints: Array | None, standing: Target | None) -> T:
