@@ -14,9 +14,10 @@ from docs.console import outcome
 from docs.markdown import ROOT, blocks, documents
 from docs.planner_pages import planner_page, planner_table
 from docs.reference_pages import REFERENCE, reference_page
-from docs.robots_page import robots_page
+from docs.robots_page import index_text, robots_page
 from docs.svg_comparison import is_current
 from trajcli.planners import PLANNERS
+from trajcli.queries.catalogue_list import INDEX
 
 PAGES = {
     **{page: partial(reference_page, page) for page in REFERENCE},
@@ -34,7 +35,8 @@ def shows_commands(document: Path) -> bool:
 
 
 def main() -> None:
-    """Write every page that differs, and name it on standard error."""
+    """Write every page that differs, and the index of the catalogue; name them on standard error."""
+    _write(INDEX, index_text())
     for name, page in PAGES.items():
         _write(ROOT / name, page())
     for document in filter(shows_commands, documents()):

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 from docs.markdown import table
 from trajcli.job.robot import CATALOGUE, RobotSheet, catalogue_names, read_sheet
+from trajcli.queries.catalogue_list import INDEX, checksum, rows_of_files
 from trajcli.queries.robot_card import robot_row
 
 _INTRODUCTION = """\
@@ -35,6 +37,15 @@ text is not among them: the text gives neither a table nor a length of it, and n
 [elbow4r](#textbook-arms) is the four-joint arm of example 2.14."""
 
 _KNOWN = ("position", "velocity", "acceleration", "jerk")
+
+
+def index_text() -> str:
+    """Return the index of the catalogue, one robot a line; the one that is there where it is of its files."""
+    files = checksum()
+    if INDEX.exists() and json.loads(INDEX.read_bytes())["files"] == files:
+        return INDEX.read_text(encoding="utf-8")
+    rows = ",\n".join(json.dumps(row, ensure_ascii=False) for row in rows_of_files())
+    return f'{{"files": {files}, "robots": [\n{rows}\n]}}\n'
 
 
 def robots_page() -> str:

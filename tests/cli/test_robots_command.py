@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,33 @@ from yaml_files import read_yaml
 
 from trajcli.job.robot import CATALOGUE, catalogue_names, load_robot
 from trajcli.kinematics.forward import forward
+from trajcli.queries import catalogue_list
+
+
+@pytest.fixture(scope="module")
+def told_of_files():
+    """What the files themselves say, not the index of them."""
+    return catalogue_list.rows_of_files()
+
+
+def test_the_index_says_what_the_files_say(told_of_files):
+    index = json.loads(catalogue_list.INDEX.read_bytes())
+    assert index["files"] == catalogue_list.checksum(), "run `make docs`"
+    for told, row in zip(index["robots"], told_of_files, strict=True):
+        assert (told["reach"] is None) == (row["reach"] is None)
+        assert told["reach"] == pytest.approx(row["reach"] or 0.0, rel=1e-9) or row["reach"] is None
+        assert {**told, "reach": None} == {**row, "reach": None}
+
+
+def test_an_index_of_other_files_is_not_read(monkeypatch, tmp_path, told_of_files):
+    other = tmp_path / "index.json"
+    monkeypatch.setattr(catalogue_list, "INDEX", other)
+    monkeypatch.setattr(catalogue_list, "rows_of_files", lambda: told_of_files)
+    for text in ("{", "[]", '{"files": 1, "robots": []}'):
+        other.write_text(text)
+        assert catalogue_list.catalogue_rows() == told_of_files
+    other.unlink()
+    assert catalogue_list.catalogue_rows() == told_of_files
 
 
 @pytest.fixture

@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING, Any
 from trajcli.cli.numbers import number, numbers, table_lines
 from trajcli.cli.outcome import print_json, print_lines, print_remark, print_text
 from trajcli.errors import InputError
-from trajcli.job.robot import catalogue_names, is_urdf
-from trajcli.queries.arm import open_sheet
-from trajcli.queries.robot_card import Selection, robot_card, robot_row, selected
+from trajcli.queries.catalogue_list import Selection, catalogue_rows, selected
 
 if TYPE_CHECKING:
     from trajcli.cli.arm_commands import RobotsCommand
@@ -37,6 +35,10 @@ def run_robots(options: RobotsCommand) -> int:
         raise InputError(
             f"--kind, --joints, --maker and --search choose from the list, and {name} is one robot"
         )
+    from trajcli.job.robot import is_urdf
+    from trajcli.queries.arm import open_sheet
+    from trajcli.queries.robot_card import robot_card
+
     sheet = open_sheet(name)
     if options.as_yaml:
         if sheet.text is None and is_urdf(name):
@@ -70,8 +72,7 @@ def _check_forms(name: str | None, forms: Mapping[str, bool]) -> None:
 
 def _print_list(selection: Selection, *, as_json: bool) -> int:
     """Print the robots of the catalogue that are selected."""
-    sheets = selected(((each, open_sheet(each)) for each in catalogue_names()), selection)
-    rows = [robot_row(*each) for each in sheets]
+    rows = selected(catalogue_rows(), selection)
     if as_json:
         print_json(rows)
     elif rows:

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from trajcli.curves.piecewise import Array
-from trajcli.errors import InputError
 from trajcli.frozen import comparable
 from trajcli.job.robot import RobotSheet
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.families.choose import method_for
 from trajcli.kinematics.robot import QUANTITIES, Friction, Robot
 from trajcli.queries.pose import pose_view
-from trajcli.suggest import did_you_mean
 from trajcli.units import Quantity, factor, joint_quantity, to_user
 
 # Measured: within 2e-4 of what ten times as many draws find, for every robot of the catalogue.
@@ -71,68 +68,6 @@ def _furthest(robot: Robot, ranges: Array) -> float:
         steps = draws.normal(size=(_DRAWN, len(ranges))) * (high - low) * 0.3**turn
         best = np.concatenate([kept, np.clip(np.repeat(kept, _DRAWN // _KEPT, axis=0) + steps, low, high)])
     return float(np.linalg.norm(forward(robot, best)[:, :3, 3] - robot.base[:3, 3], axis=1).max())
-
-
-@comparable
-class Selection:
-    """Which robots of the catalogue are meant; what is None chooses nothing.
-
-    Attributes:
-        kind: The joints from the base on, such as "6R" or "RRPR", or an origin: "real", "textbook".
-        joints: How many there are.
-        maker: Part of the maker's name, in letters of any case.
-        text: Part of the name in the catalogue or of the robot's own name, in letters of any case.
-    """
-
-    kind: str | None = None
-    joints: int | None = None
-    maker: str | None = None
-    text: str | None = None
-
-
-ORIGINS = ("real", "textbook")
-
-
-def selected(sheets: Iterable[tuple[str, RobotSheet]], selection: Selection) -> list[tuple[str, RobotSheet]]:
-    """Return the robots that a selection means, by their names in the catalogue.
-
-    Raises:
-        InputError: When no robot has that kind, or no maker that name.
-    """
-    everyone = list(sheets)
-    _check_selection([sheet for _, sheet in everyone], selection)
-    return [(name, sheet) for name, sheet in everyone if _is_selected(name, sheet, selection)]
-
-
-def _check_selection(sheets: list[RobotSheet], selection: Selection) -> None:
-    """Refuse a kind and a maker that no robot has."""
-    kinds = sorted({kind_of(sheet.robot) for sheet in sheets}) + list(ORIGINS)
-    if selection.kind is not None and _letters(selection.kind) not in map(_letters, kinds):
-        hint = did_you_mean(selection.kind, kinds) or f"the catalogue has {', '.join(kinds)}"
-        raise InputError(f"the catalogue has no robot of the kind '{selection.kind}'", hint=hint)
-    makers = sorted({sheet.maker for sheet in sheets if sheet.maker})
-    part = (selection.maker or "").casefold()
-    if not any(part in maker.casefold() for maker in makers):
-        hint = did_you_mean(part, makers) or f"makers are {', '.join(makers)}"
-        raise InputError(f"the catalogue has no robot of a maker '{selection.maker}'", hint=hint)
-
-
-def _is_selected(name: str, sheet: RobotSheet, selection: Selection) -> bool:
-    kinds = (_letters(kind_of(sheet.robot)), sheet.origin)
-    return (
-        (selection.kind is None or _letters(selection.kind) in kinds)
-        and (selection.joints is None or len(sheet.robot.joints) == selection.joints)
-        and (not selection.maker or selection.maker.casefold() in (sheet.maker or "").casefold())
-        and (selection.text or "").casefold() in f"{name}\n{sheet.robot.name}".casefold()
-    )
-
-
-def _letters(kind: str) -> str:
-    """Return a kind letter by letter: "6r" as "RRRRRR"; any other word in small letters."""
-    count, letter = kind[:-1], kind[-1:].upper()
-    if count.isascii() and count.isdigit() and len(count) <= 2 and letter in ("R", "P"):
-        return letter * int(count)
-    return kind.upper() if kind and set(kind.upper()) <= {"R", "P"} else kind.casefold()
 
 
 def robot_row(name: str, sheet: RobotSheet) -> dict[str, Any]:
