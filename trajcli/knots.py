@@ -41,6 +41,7 @@ _SHORTEST_STEP = 10_000  # ns: over a shorter interval, rounding would show in t
 _LONGEST_STEP = 200_000  # ns: what a small step needs
 _FEWER = 0.1  # of the deviation, between cubics: tools on paths promise a millionth themselves
 _MOST_PARTS = 64  # of an interval that is divided at once
+_BLOCK = 16_384  # intervals looked at together: what is computed of them takes some MB
 _QUINTIC = 3  # derivatives that quintics share with a curve at their ends, of twice the order in their error
 
 
@@ -270,10 +271,19 @@ def _states(trajectory: Trajectory, whole: Nanoseconds) -> Array:
 def _missed(curve: PiecewisePolynomial, whole: Nanoseconds, states: Array) -> Array:
     """Return what polynomials miss in each of the k intervals between knots, orders 0 to 2, (3, k, n)."""
     missed = np.zeros((3, whole.size - 1, curve.dimension))
-    if whole.size < 2:
-        return missed
     times = np.append(whole[:-1] / _PER_SECOND + curve.start, curve.end)
-    united = distinct(np.concatenate([times, curve.breaks]))
+    for first in range(0, whole.size - 1, _BLOCK):
+        knots = slice(first, first + _BLOCK + 1)
+        _note_missed(curve, whole[knots], times[knots], states[:, knots], missed[:, first : first + _BLOCK])
+    return missed
+
+
+def _note_missed(
+    curve: PiecewisePolynomial, whole: Nanoseconds, times: Array, states: Array, missed: Array
+) -> None:
+    """Write what polynomials miss in intervals that follow each other into `missed` (3, k, n)."""
+    between = slice(*np.searchsorted(curve.breaks, times[[0, -1]]).tolist())
+    united = distinct(np.concatenate([times, curve.breaks[between]]))
     starts, lengths = united[:-1], np.diff(united)
     within = starts + lengths / 2
     interval = np.clip(np.searchsorted(times, within, "right") - 1, 0, times.size - 2)
@@ -285,7 +295,6 @@ def _missed(curve: PiecewisePolynomial, whole: Nanoseconds, states: Array) -> Ar
     difference[-joined.shape[0] :] -= taylor_shift(joined[:, interval], (starts - times[interval])[:, None])
     for order, (low, high) in enumerate(piece_extremes(difference, lengths, (0, 1, 2))):
         np.maximum.at(missed[order], interval, np.maximum(-low, high))
-    return missed
 
 
 def _insertions(whole: Nanoseconds, missed: Array, stated: int) -> Nanoseconds:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import tracemalloc
 
 import numpy as np
+import pytest
 from counted_calls import calls_of
 
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.job.read import job_from_text
+from trajcli.knots import knots_of
 from trajcli.planning.plan import plan_job
 
 
@@ -41,3 +43,34 @@ def test_one_time_on_a_curve_of_many_pieces_costs_no_look_at_all_of_them() -> No
     )
     np.testing.assert_allclose(value, expected.T, rtol=1e-12)
     assert peak < curve.coefficients.nbytes / 100
+
+
+def _peak(moves: int) -> int:
+    """Return the largest number of bytes in use while a job of so many moves, of two motions, is planned."""
+    to = ("[1, 0.5]", "[0, 0]")
+    lines = "".join(f"      - {{planner: quintic, to: {{joints: {joints}}}}}\n" for joints in to)
+    head = "version: 1\nrobot: {joints: 2}\nlimits: {velocity: 2, acceleration: 15, jerk: 100}\n"
+    loaded = job_from_text(
+        f"{head}start: {{joints: [0, 0]}}\nmoves:\n  - repeat: {moves // 2}\n    moves:\n{lines}"
+    )
+    tracemalloc.start()
+    try:
+        plan = plan_job(loaded)
+        knots_of(plan.trajectory)
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def test_a_million_moves_are_planned_within_two_gibibytes(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in (
+        "knots._BLOCK",
+        "checks.continuity._BLOCK",
+        "checks.target._BLOCK",
+        "curves.extrema._INTERVALS",
+        "curves.piecewise._ROWS",
+    ):
+        monkeypatch.setattr(f"trajcli.{name}", 256)  # so that a few thousand moves are many
+    _peak(256)  # what is made once
+    each = (_peak(1536) - _peak(768)) / 768
+    assert 100 < each < 1700  # bytes; the job as it is read, and what is imported, are below 400 more

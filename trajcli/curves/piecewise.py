@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 Side = Literal["left", "right"]
 
 _BLOCK = 4096  # rows evaluated at a time: their monomials and results stay in the processor's cache
+_ROWS = 16 * _BLOCK  # rows on a curve of more pieces than that: their table is made for so many at a time
 _BORDER_UNITS = 4.0  # in the last place: a time so near to the border is on it, at any magnitude
 _FEW = 8  # rows a piece below which gathering coefficients beats a product for each piece
 
@@ -146,6 +147,11 @@ class PiecewisePolynomial:
         """
         if t.size and not (t.min() >= self.start and t.max() <= self.end):  # so written, NaN is outside too
             t = self._at_border(t)
+        if t.size > _ROWS and self.pieces > _ROWS and not (t[1:] < t[:-1]).any():
+            parts = [
+                self.evaluate_orders(t[k : k + _ROWS], orders, side=side) for k in range(0, t.size, _ROWS)
+            ]
+            return np.concatenate(parts)
         piece = _piece_of(self.breaks, t, side)
         first, last = (int(piece.min()), int(piece.max())) if t.size else (0, 0)
         spoken = self.coefficients[:, first : last + 1]  # a time on a long curve costs no look at all pieces
