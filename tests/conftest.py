@@ -18,7 +18,7 @@ from extras import pytest_terminal_summary as say_what_lacks
 from hypothesis import settings
 from tally import pytest_terminal_summary as say_what_campaigns_did
 from tally import tally  # noqa: F401
-from tiers import TIER, few_examples
+from tiers import QUICK, TIER, few_examples
 
 # a loaded machine is no defect: no example has a deadline
 settings.register_profile("fixed", derandomize=True, deadline=None)
@@ -43,8 +43,12 @@ def pytest_configure(config: pytest.Config) -> None:
         signal.signal(signal.SIGHUP, lambda *_: None)
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Draw fewer examples in the quick tier."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave long tests out of the quick tier, and draw fewer examples there."""
+    if QUICK:
+        long = [item for item in items if item.get_closest_marker("full")]
+        items[:] = [item for item in items if not item.get_closest_marker("full")]
+        config.hook.pytest_deselected(items=long)
     for test in {item.function for item in items if hasattr(getattr(item, "function", None), ASKED)}:
         asked = getattr(test, ASKED)
         setattr(test, ASKED, settings(asked, max_examples=few_examples(asked.max_examples)))

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from tiers import few
 from typer.testing import CliRunner
 
 from docs.console import agrees, commands, outcome, renewed, run, shown
@@ -39,7 +40,7 @@ def test_generated_pages_are_current(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "path", [path for path in DOCUMENTS if shows_commands(path)], ids=lambda path: path.stem
+    "path", few([path for path in DOCUMENTS if shows_commands(path)], 8), ids=lambda path: path.stem
 )
 def test_commands_print_and_draw_what_is_shown(path: Path) -> None:
     made = outcome(text_of(path))
@@ -272,7 +273,7 @@ JOBS = [
 ]
 
 
-@pytest.mark.parametrize("text", JOBS)
+@pytest.mark.parametrize("text", few(JOBS, 20))
 def test_jobs_and_robots_can_be_used_as_they_stand(text: str, tmp_path: Path) -> None:
     content = yaml.safe_load(text)
     if content is None or not {"joints", "moves"} & content.keys():

@@ -10,6 +10,7 @@ import file_rules
 import floor_rules
 import function_rules
 import pytest
+import safety_rules
 import word_rules
 from sources import ROOT, Offence, Planted, Rule, Sources, the_sources
 
@@ -20,6 +21,7 @@ RULES = [
     *file_rules.RULES,
     *function_rules.RULES,
     *floor_rules.RULES,
+    *safety_rules.RULES,
     *word_rules.RULES,
 ]
 PLANTED = [

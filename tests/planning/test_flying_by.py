@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from planned_examples import planned_example
+from tiers import few
 
 from trajcli.checks.verify import verify
 from trajcli.errors import InputError, MissingLimitError
@@ -125,6 +126,7 @@ def test_a_zone_that_is_lowered_is_flown_at_the_pace_that_is_said_and_its_bound_
     assert plan.flyby.bound < plan.flyby.duration * (1 - 1e-3)
 
 
+@pytest.mark.full
 def test_ramps_of_rounding_are_no_steps_in_velocity():
     """A joint changes its velocity by 3e-8 deg/s in 6e-11 s, within its acceleration: rows show nothing of it."""
     corners = [(400, 300, 250), (600, 300, 250), (600, 100, 250)]
@@ -145,6 +147,7 @@ def test_ramps_of_rounding_are_no_steps_in_velocity():
     assert "velocity_step" not in {event.kind for event in plan.events}
 
 
+@pytest.mark.full
 def test_parts_of_paths_beside_zones_are_proven_to_be_on_their_paths():
     plan = planned_example("flying_cell")
     promises = [move.promise for move in plan.moves]
@@ -210,8 +213,7 @@ HARD = {
 }
 
 
-@pytest.mark.parametrize("name", HARD)
-@pytest.mark.parametrize("zone", [0.02, 0.5])
+@pytest.mark.parametrize(("zone", "name"), few([(zone, name) for zone in (0.02, 0.5) for name in HARD], 4))
 def test_rows_at_10_khz_keep_limits_and_zones(name, zone):
     moves = HARD[name]
     plan = flown(*moves, zone=zone)
@@ -469,10 +471,13 @@ def test_a_time_optimal_move_is_flown_by_at_its_ends_and_passes_its_points():
 
 @pytest.mark.parametrize(
     "second",
-    [
-        {"planner": "arc", "center": [0.4, 0.2, 0.25], "axis": "z", "angle": 1.0},
-        {"planner": "screw", "to": {"xyz": [0.3, 0.3, 0.3], "rpy": [np.pi, 0, 0.5]}},
-    ],
+    few(
+        [
+            {"planner": "arc", "center": [0.4, 0.2, 0.25], "axis": "z", "angle": 1.0},
+            {"planner": "screw", "to": {"xyz": [0.3, 0.3, 0.3], "rpy": [np.pi, 0, 0.5]}},
+        ],
+        1,
+    ),
 )
 def test_arcs_and_screws_are_flown_by(second):
     law = {"law": {"shape": "time_optimal"}}

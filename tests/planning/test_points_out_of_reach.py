@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from tiers import few
 
 from trajcli.errors import PlanningError, Problem
 from trajcli.geometry.paths.arc import Arc
@@ -39,18 +40,29 @@ def refused(moves: str) -> Problem:
 
 @pytest.mark.parametrize(
     ("move", "line", "name"),
-    [
-        ("{planner: line, to: far}", FAR, "far"),
-        ("{planner: line, to: bare}", BARE, "bare"),
-        ("{planner: line, to: far, law: {shape: time_optimal}, limits: {acceleration: 500}}", FAR, "far"),
-        ("{planner: screw, to: far}", FAR, "far"),
-        ("{planner: arc, via: far, to: near}", FAR, "far"),
-        ("{planner: arc, via: near, to: far}", FAR, "far"),
-        ("{planner: path, corner: stop, segments: [{line: near}, {line: bare}, {line: high}]}", BARE, "bare"),
-        ("{planner: path, radius: 5, segments: [{line: high}, {line: far}, {line: bare}]}", FAR, "far"),
-        ("{planner: path, radius: 5, segments: [{line: high}, {arc: {via: near, to: far}}]}", FAR, "far"),
-        ("{planner: path, corner: overlap, overlap: 0.1, segments: [{line: high}, {line: far}]}", FAR, "far"),
-    ],
+    few(
+        [
+            ("{planner: line, to: far}", FAR, "far"),
+            ("{planner: line, to: bare}", BARE, "bare"),
+            ("{planner: line, to: far, law: {shape: time_optimal}, limits: {acceleration: 500}}", FAR, "far"),
+            ("{planner: screw, to: far}", FAR, "far"),
+            ("{planner: arc, via: far, to: near}", FAR, "far"),
+            ("{planner: arc, via: near, to: far}", FAR, "far"),
+            (
+                "{planner: path, corner: stop, segments: [{line: near}, {line: bare}, {line: high}]}",
+                BARE,
+                "bare",
+            ),
+            ("{planner: path, radius: 5, segments: [{line: high}, {line: far}, {line: bare}]}", FAR, "far"),
+            ("{planner: path, radius: 5, segments: [{line: high}, {arc: {via: near, to: far}}]}", FAR, "far"),
+            (
+                "{planner: path, corner: overlap, overlap: 0.1, segments: [{line: high}, {line: far}]}",
+                FAR,
+                "far",
+            ),
+        ],
+        4,
+    ),
 )
 def test_a_named_point_is_named_at_its_line(move: str, line: int, name: str) -> None:
     problem = refused(f"  - {move}\n")
@@ -78,6 +90,7 @@ def test_another_target_is_pointed_at(move: str, pointed: str) -> None:
     assert problem.place.source[problem.place.column - 1 :].startswith(pointed)
 
 
+@pytest.mark.full
 def test_a_path_that_is_out_of_reach_between_its_points_names_none() -> None:
     problem = refused("  - {planner: arc, center: [400, 1000, 300], axis: z, angle: 180}\n")
     assert "the point" not in problem.message

@@ -94,6 +94,7 @@ def test_about_a_corner_the_tool_enters_is_nearest_and_leaves() -> None:
     assert inside == pytest.approx(fine[off.argmin()], abs=fine[1] - fine[0])
 
 
+@pytest.mark.full
 def test_behind_a_zone_lengths_still_count_from_the_start_of_the_programmed_path() -> None:
     some = [at({"path": 40}), at({"path": 5})]
     plan = planned(line(0, 0, 80, zone=20), line(80, 0, 0, at=some))

@@ -75,6 +75,7 @@ def refused(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Plan]:
     return written(tmp_path_factory.mktemp("refused"), plan), plan
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "source",
     [
@@ -154,6 +155,7 @@ def test_keys(view: Callable[..., Any], pick: Path) -> None:
     assert not page.locator("dialog").is_visible()
 
 
+@pytest.mark.full
 def test_playing_ends_at_the_end_and_may_repeat(view: Callable[..., Any], pick: Path) -> None:
     page = view(pick).page
     page.evaluate("trajcli.clock.setSpeed(4); trajcli.seek(6.7); trajcli.clock.toggle()")
@@ -164,6 +166,7 @@ def test_playing_ends_at_the_end_and_may_repeat(view: Callable[..., Any], pick: 
     wait_until(page, "trajcli.clock.playing && trajcli.clock.time < 3")
 
 
+@pytest.mark.full
 def test_the_time_line_is_dragged(view: Callable[..., Any], pick: Path) -> None:
     viewed = view(pick)
     box = viewed.page.locator(".track").bounding_box()
@@ -179,6 +182,7 @@ def test_the_time_line_is_dragged(view: Callable[..., Any], pick: Path) -> None:
     assert viewed.time() == pytest.approx(0.75 * duration, abs=0.02)
 
 
+@pytest.mark.full
 def test_a_click_in_a_plot_seeks_and_all_cursors_follow(view: Callable[..., Any], pick: Path) -> None:
     viewed = view(pick)
     plot = viewed.page.locator(".u-over").nth(1)
@@ -193,6 +197,7 @@ def test_a_click_in_a_plot_seeks_and_all_cursors_follow(view: Callable[..., Any]
     assert places == pytest.approx([box["x"] + 0.5 * box["width"]] * 3, abs=2)
 
 
+@pytest.mark.full
 def test_plots_hold_the_curves_on_both_sides_of_breaks(view: Callable[..., Any], tmp_path: Path) -> None:
     plan = planned(ROOT / "examples/trapezoid.yaml")
     viewed = view(written(tmp_path, plan))
@@ -213,12 +218,14 @@ def test_plots_hold_the_curves_on_both_sides_of_breaks(view: Callable[..., Any],
         assert rows == pytest.approx(sides, abs=1e-4 * high)
 
 
+@pytest.mark.full
 def test_a_joint_at_rest_has_no_velocity(view: Callable[..., Any], pick: Path) -> None:
     hold = planned(PICK).trajectory.spans[2]
     values = "t => ['qd', 'qdd'].flatMap(name => trajcli.motion.values[name].map((_, joint) => trajcli.motion.value(name, joint, t)))"
     assert view(pick).page.evaluate(values, (hold.start + hold.end) / 2) == [0] * 12
 
 
+@pytest.mark.full
 def test_a_load_is_drawn_while_it_is_carried(view: Callable[..., Any], tmp_path: Path) -> None:
     plan = planned(ROOT / "examples/pick_carry_place.yaml")
     page = view(written(tmp_path, plan)).page
@@ -244,6 +251,7 @@ def test_a_load_is_drawn_while_it_is_carried(view: Callable[..., Any], tmp_path:
         wait_until(page, f"document.querySelector('.label.load').style.visibility === '{shown}'", 10)
 
 
+@pytest.mark.full
 def test_zones_signals_and_the_move_of_now(view: Callable[..., Any], tmp_path: Path) -> None:
     plan = planned(ROOT / "examples/signals.yaml")
     viewed = view(written(tmp_path, plan))
@@ -285,6 +293,7 @@ def test_zones_signals_and_the_move_of_now(view: Callable[..., Any], tmp_path: P
     assert viewed.messages == []
 
 
+@pytest.mark.full
 def test_bars_of_use_name_the_limit_of_which_a_joint_uses_most(
     view: Callable[..., Any], tmp_path: Path
 ) -> None:
@@ -311,6 +320,7 @@ moves:
         assert page.evaluate(bar, time) == [f"{words}, {percent} % used", f"{percent} %", True]
 
 
+@pytest.mark.full
 def test_the_values_under_the_pointer_are_shown(view: Callable[..., Any], pick: Path) -> None:
     page = view(pick).page
     plot = page.locator(".u-over").nth(1)
@@ -352,6 +362,7 @@ def test_findings_of_one_cause_are_one_and_the_page_opens_there(
     assert viewed.messages == []
 
 
+@pytest.mark.full
 def test_the_jerk_is_shown_when_asked_for(view: Callable[..., Any], pick: Path) -> None:
     page = view(pick).page
     assert page.locator(".plot:visible h3 > :first-child").all_inner_texts() == [
@@ -364,6 +375,7 @@ def test_the_jerk_is_shown_when_asked_for(view: Callable[..., Any], pick: Path) 
     assert page.locator(".plot:visible canvas").count() == 4
 
 
+@pytest.mark.full
 def test_joints_have_plots_of_their_own(view: Callable[..., Any], pick: Path) -> None:
     viewed = view(pick)
     page = viewed.page
@@ -380,6 +392,7 @@ def test_joints_have_plots_of_their_own(view: Callable[..., Any], pick: Path) ->
     assert viewed.messages == []
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("source", ["scara_pick", "gantry", "ur5e_pick"])
 def test_the_first_view_has_the_whole_arm_and_tool(
     view: Callable[..., Any], tmp_path: Path, source: str
@@ -402,6 +415,7 @@ def test_the_first_view_has_the_whole_arm_and_tool(
         assert page.evaluate(seen, time) < 1
 
 
+@pytest.mark.full
 def test_joints_can_be_hidden(view: Callable[..., Any], pick: Path) -> None:
     page = view(pick).page
     page.locator(".joint").nth(2).click()
@@ -409,6 +423,7 @@ def test_joints_can_be_hidden(view: Callable[..., Any], pick: Path) -> None:
     assert page.locator(".joint[aria-pressed=false]").count() == 1
 
 
+@pytest.mark.full
 def test_parts_of_the_view_can_be_hidden(view: Callable[..., Any], pick: Path) -> None:
     page = view(pick).page
     shown = "[trajcli.stage.ghosts.visible, trajcli.stage.trace.line.visible, trajcli.stage.grid.visible, trajcli.stage.arm.axes[0].visible]"
@@ -454,6 +469,7 @@ LAYOUT = """() => {
 }"""
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("size", SIZES)
 def test_nothing_overlaps_and_nothing_is_cut(
     view: Callable[..., Any], refused: tuple[Path, Plan], size: str
@@ -494,6 +510,7 @@ def test_the_arm_and_the_curves_are_drawn(
     assert colorful.mean() > 0.004
 
 
+@pytest.mark.full
 def test_the_picture_of_the_documents_is_what_is_drawn(chromium: Any) -> None:
     require_module("PIL")
     now, then = pixels(screenshot(chromium)), pixels(PICTURE)
@@ -504,6 +521,7 @@ def test_the_picture_of_the_documents_is_what_is_drawn(chromium: Any) -> None:
     assert np.abs(now - then).mean() < 3, "run `make picture`, and look at it"
 
 
+@pytest.mark.full
 def test_a_file_without_a_robot_has_plots_only(view: Callable[..., Any], tmp_path: Path) -> None:
     recorded = tmp_path / "recorded.csv"
     recorded.write_text("t,q1_deg,q2_mm\n" + "".join(f"{5 + k / 10},{k * k},{-k}\n" for k in range(21)))
@@ -519,6 +537,7 @@ def test_a_file_without_a_robot_has_plots_only(view: Callable[..., Any], tmp_pat
     assert viewed.messages == []
 
 
+@pytest.mark.full
 def test_a_motion_of_no_length(view: Callable[..., Any], tmp_path: Path) -> None:
     text = (
         PANDA[: PANDA.index("moves:")]
@@ -533,6 +552,7 @@ def test_a_motion_of_no_length(view: Callable[..., Any], tmp_path: Path) -> None
     assert viewed.page.locator(".now").inner_text() == "0.000"
 
 
+@pytest.mark.full
 def test_without_webgl_there_are_plots(chromium: Any, pick: Path) -> None:
     context = chromium.new_context(offline=True)
     page = context.new_page()

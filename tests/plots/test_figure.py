@@ -69,7 +69,7 @@ def overlaps(picture: Picture) -> list[tuple[str, str]]:
     return outside + pairs
 
 
-@pytest.mark.parametrize("name", few(NAMES, 16))
+@pytest.mark.parametrize("name", few(NAMES, 8))
 def test_texts_of_examples_do_not_overlap(name: str, example: Example) -> None:
     assert overlaps(picture_of(example(name))) == []
 
@@ -380,7 +380,8 @@ def reference_picture(name: str, example: Example) -> Picture:
 
 
 @pytest.mark.parametrize(
-    "name", ["spline", "sync", "ur5e_pick", "twelve", "dispense", "time_optimal", "findings", "overlay"]
+    "name",
+    few(["spline", "sync", "ur5e_pick", "twelve", "dispense", "time_optimal", "findings", "overlay"], 4),
 )
 def test_pictures_look_as_they_did(name: str, example: Example) -> None:
     """The references are looked at before they are committed; TRAJCLI_NEW_REFERENCES=1 writes them anew."""

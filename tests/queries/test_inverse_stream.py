@@ -6,6 +6,7 @@ import time
 
 import numpy as np
 import pytest
+from tiers import few
 
 from trajcli.geometry.rotation import quaternion_from_matrix
 from trajcli.kinematics.forward import forward
@@ -25,8 +26,20 @@ def followed(arm, poses):
     return np.vstack(list(stream.blocks))
 
 
-@pytest.mark.parametrize("robot", ["ur5e", "irb120", "ur10e"])
-@pytest.mark.parametrize("smooth", [False, True])
+@pytest.mark.parametrize(
+    ("robot", "smooth"),
+    few(
+        [
+            ("ur5e", False),
+            ("irb120", True),
+            ("ur10e", False),
+            ("ur5e", True),
+            ("irb120", False),
+            ("ur10e", True),
+        ],
+        2,
+    ),
+)
 def test_each_row_is_the_nearest_answer(robot, smooth):
     arm = open_arm(robot, si=True)
     rng = np.random.default_rng(3)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from independent_reader import ReadBack
+from tiers import few
 
 import trajcli
 
@@ -44,11 +45,14 @@ RAIL = """\
 
 @pytest.mark.parametrize(
     ("kind", "above"),
-    [
-        ("ur5", [0.0, -1.6, 1.7, -1.7, -1.57, 0.0]),
-        ("kr16_2", [0.1, -1.5, 1.7, 0.2, 1.2, 0.0]),
-        ("rail", [0.2, 0.1, -1.6, 1.7, -1.7, -1.5, 0.0]),
-    ],
+    few(
+        [
+            ("ur5", [0.0, -1.6, 1.7, -1.7, -1.57, 0.0]),
+            ("kr16_2", [0.1, -1.5, 1.7, 0.2, 1.2, 0.0]),
+            ("rail", [0.2, 0.1, -1.6, 1.7, -1.7, -1.5, 0.0]),
+        ],
+        1,
+    ),
 )
 def test_pick_and_place(kind: str, above: list[float], tmp_path: Path) -> None:
     text = (MODELS / f"{'ur5' if kind == 'rail' else kind}.urdf").read_text(encoding="utf-8")
